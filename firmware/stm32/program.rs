@@ -1,5 +1,5 @@
 // The program of an STM32 board, included by the `main.rs` of each: what is its own are `clocks`, `pins`, `spi`, `RECORD`,
-// `prepare` and `memory_intact`.
+// `PASSES`, `prepare` and `memory_intact`.
 
 use specgen_board::{Exchange, Noticed};
 use specgen_stm32::{converters, timer};
@@ -37,7 +37,7 @@ mod app {
     use specgen_stm32::{converters, serial, stack_used, supply, timer};
 
     use crate::pins::{self, Link, Watchdog};
-    use crate::{Board, RECORD, WATCHDOG, clocks, memory_intact, prepare, safe};
+    use crate::{Board, PASSES, RECORD, WATCHDOG, clocks, memory_intact, prepare, safe};
 
     #[shared]
     struct Shared {
@@ -60,6 +60,8 @@ mod app {
         exchange: Exchange = Exchange::new(),
         #[unsafe(link_section = ".record.memory")]
         record: [u64; RECORD] = [0; RECORD],
+        #[unsafe(link_section = ".record.passes")]
+        passes: [[i32; 6]; PASSES] = [[0; 6]; PASSES],
         kept: MaybeUninit<Kept> = MaybeUninit::uninit(),
     ])]
     fn init(mut context: init::Context) -> (Shared, Local) {
@@ -82,6 +84,7 @@ mod app {
         exchange.probes = Probes { hertz: timer::hertz(), stack: stack_used };
         let machine = converters::at_reset(context.local.machine);
         exchange.record(context.local.record, converters::kept(context.local.kept, machine));
+        exchange.play(context.local.passes);
         let mut board = converters::board(wiring.adc, wiring.dac, machine, intact);
         let Some(period) = timer::period(timer::hertz()) else { safe::stop() };
         board.start(&mut exchange.report);

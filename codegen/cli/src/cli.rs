@@ -18,6 +18,7 @@ mod forc;
 mod gcs;
 mod identify;
 mod learn;
+mod line;
 mod lsp;
 mod new;
 mod operate;

@@ -23,6 +23,7 @@ use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
 mod clients;
 mod gcs;
 mod host;
+mod learning;
 use host::{Host, Record};
 
 /// Length of the platform's run, s, where another than that of CI is wanted.
@@ -56,9 +57,15 @@ struct Bench {
 }
 
 impl Bench {
+    /// Of a spec of this repository.
     fn new(spec: &str) -> Self {
+        Self::of(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs").join(spec))
+    }
+
+    fn of(spec_file: &Path) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let spec_file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs").join(spec);
+        let spec_file = spec_file.to_owned();
+        let spec = spec_file.file_name().unwrap().to_str().unwrap();
         let compiled = compile::compile(&spec_file).unwrap_or_else(|_| panic!("{spec} compiles"));
         let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &["rt-pc"]);
         let root = folder.path().join("controller");
@@ -99,7 +106,7 @@ impl Bench {
         let plant = plant(if granted.is_ok_and(|status| status.success()) { &["--priority", "50"] } else { &[] });
         let place = Path::new("/dev/shm").join(format!("specgen-plant-{name}"));
         wait_for("the machine", || place.exists());
-        Self { binary, folder, library, plant, name, spec: spec_file }
+        Self { binary, folder, library, plant, name, spec: spec_file.clone() }
     }
 
     fn path(&self, name: &str) -> PathBuf {

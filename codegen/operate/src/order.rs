@@ -16,7 +16,7 @@ const LONGEST: f64 = 86_400.0;
 const AFTER: u32 = 1000;
 const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, \
                         move|jog AXIS=QUANTITY…, where, limits, can-i-go AXIS=QUANTITY… [speed=QUANTITY], frame [none | work|tool AXIS=QUANTITY…], mark NAME, goto NAME, \
-                        play TRAJECTORY, mode p|f|pf, gains [NAME=VALUE…], wait PHASE|arrived|SECONDS [TIMEOUT], config, \
+                        play TRAJECTORY [correction=FILE machine=NAME], mode p|f|pf, gains [NAME=VALUE…], wait PHASE|arrived|SECONDS [TIMEOUT], config, \
                         config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, stop";
 
 /// One order.
@@ -52,8 +52,13 @@ pub enum Order {
     Mark(String),
     /// Go to a pose that has a name.
     Goto(String),
-    /// Play a trajectory of the spec.
-    Play(String),
+    /// Play a trajectory of the spec; under a correction that was learned for it on a machine, if one is named.
+    Play {
+        /// Its name.
+        name: String,
+        /// File of the correction, and the machine's name.
+        correction: Option<(PathBuf, String)>,
+    },
     /// Other terms of the law, as `mode` of the settings: 0 P, 1 to 3 F, 4 to 6 P/F.
     Mode(Wanted),
     /// Show the gains, or set these.
@@ -189,7 +194,17 @@ impl Order {
             },
             ["mark", name] => Self::Mark(name.to_owned()),
             ["goto", name] => Self::Goto(name.to_owned()),
-            ["play", name] => Self::Play(name.to_owned()),
+            ["play", name] => Self::Play { name: name.to_owned(), correction: None },
+            ["play", name, correction, machine] => {
+                let of = |word: &str, key: &str| word.strip_prefix(key).map(str::to_owned);
+                let correction = of(correction, "correction=").zip(of(machine, "machine="));
+                let (file, machine) = correction.ok_or_else(|| {
+                    format!(
+                        "`{line}`: expected play TRAJECTORY correction=FILE machine=NAME, as `specgen learn` wrote it"
+                    )
+                })?;
+                Self::Play { name: name.to_owned(), correction: Some((file.into(), machine)) }
+            }
             ["mode", mode] => Self::Mode(Wanted::parse(mode)?),
             ["gains", ref rest @ ..] => Self::Gains(rest.iter().map(|text| gain(text)).collect::<Result<_, _>>()?),
             ["wait", until] => Self::wait(until, None)?,

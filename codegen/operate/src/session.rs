@@ -5,8 +5,10 @@ use std::time::{Duration, Instant};
 use host_sim::description::Description;
 use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::{
-    Health, Identity, RecorderAction, RecorderStatus, Reply, Request, Status, WORDS, WaveAction, put_words,
+    Health, Identity, KNOT, KNOTS, PassAction, PassStatus, RecorderAction, RecorderStatus, Reply, Request, Status,
+    WORDS, WaveAction, put_words,
 };
+use specgen_runtime::playback::Knot;
 use specgen_runtime::supervisor;
 
 use crate::motion::Motion;
@@ -266,6 +268,31 @@ impl<P: Port> Session<P> {
     /// The whole record, as the bytes of its file. Every piece keeps the link alive.
     pub fn download(&mut self) -> Result<Vec<u8>, ClientError> {
         self.client.fetch(|offset| Request::Download { offset })
+    }
+
+    /// Sends the correction of passes, from its first knot on.
+    pub fn put_knots(&mut self, knots: &[Knot]) -> Result<(), ClientError> {
+        let mut buffer = [0; KNOTS * KNOT];
+        for (index, part) in knots.chunks(KNOTS).enumerate() {
+            let bytes = specgen_link::Bytes(specgen_link::put_knots(part, 0, &mut buffer));
+            self.done(&Request::Knots { first: (index * KNOTS) as u32, knots: bytes })?;
+            self.asked = Instant::now();
+        }
+        Ok(())
+    }
+
+    /// Something of the player of passes; how it stands then.
+    pub fn pass(&mut self, action: PassAction) -> Result<PassStatus, ClientError> {
+        match self.client.ask(&Request::Pass { action })? {
+            Reply::Pass(status) => Ok(status),
+            _ => Err(ClientError::Unexpected),
+        }
+    }
+
+    /// What the last pass kept of the error.
+    pub fn errors(&mut self) -> Result<Vec<Knot>, ClientError> {
+        let bytes = self.client.fetch(|offset| Request::Errors { offset })?;
+        Ok(specgen_link::Bytes(&bytes).knots().ok_or(ClientError::Unexpected)?.collect())
     }
 
     /// Starts the wave of these words. Where it ends, at its center, is what is commanded from then on.

@@ -17,6 +17,6 @@ mod update;
 
 pub use convergence::{Convergence, LARGEST_RADIUS, Learnable};
 pub use motion::Motion;
-pub use passes::{LearnError, Learned, Pass, Repeating, Seen, learn};
+pub use passes::{LearnError, Learned, Pass, Repeating, Seen, course, held, learn, translation_nm};
 pub use table::{Table, TableError, knots};
 pub use update::Update;

@@ -1,9 +1,8 @@
 //! One control tick on real converters.
 
-use controller::Real;
-use controller::sensing;
 use controller::snapshot::record_after;
 use controller::supervised::{CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, Request, STOP};
+use controller::{Real, passes, sensing};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
 use specgen_link::Silence;
 
@@ -171,6 +170,9 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         // What need not be done before the outputs change.
         if let (Some(recorder), Some(input)) = (recorder, &self.input) {
             record_after(self.machine, input, &output, recorder);
+        }
+        if passes::POSSIBLE {
+            exchange.keep_pass(self.machine, output.tick.status);
         }
         exchange.prepare();
         restart

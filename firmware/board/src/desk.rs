@@ -2,11 +2,13 @@
 
 use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
 use controller::waves::{self, Wave};
-use controller::{COMMAND_WORDS, CONFIG_WORDS, DESCRIPTION, PLACE_WORDS, Real, place_words};
+use controller::{COMMAND_WORDS, CONFIG_WORDS, DESCRIPTION, PLACE_WORDS, Real, passes, place_words};
 use specgen_link::lockstep::{Session, piece};
 use specgen_link::{
-    Bytes, Counted, Counters, Device, Health, Identity, RecorderAction, Refusal, Reply, Request, Status, WaveAction,
+    Bytes, Counted, Counters, Device, Health, Identity, KNOT, KNOTS, PassAction, PassStatus, RecorderAction, Refusal,
+    Reply, Request, Status, WaveAction, put_knots,
 };
+use specgen_runtime::pass::{Course, Player};
 use specgen_runtime::wave::{self, Settings};
 
 use crate::catch_up::catch_up;
@@ -16,8 +18,11 @@ use crate::recording;
 use crate::report::Probes;
 use crate::stepper::{Costs, Stepper, Stopwatch};
 
-/// Words of the longest answer: settings, what a step gives, a piece of a record.
-const WORDS: usize = larger(larger(CONFIG_WORDS, MACHINE_OUTPUT_WORDS), larger(MACHINE_INPUT_WORDS, download::WORDS));
+/// Words of the longest answer: settings, what a step gives, a piece of a record or of errors.
+const WORDS: usize = {
+    let words = larger(larger(CONFIG_WORDS, MACHINE_OUTPUT_WORDS), larger(MACHINE_INPUT_WORDS, download::WORDS));
+    if passes::POSSIBLE { larger(words, KNOTS * KNOT / size_of::<u64>()) } else { words }
+};
 
 const fn larger(a: usize, b: usize) -> usize {
     if a > b { a } else { b }
@@ -61,6 +66,7 @@ impl Visit<'_, '_> {
             if let Some(wave) = &mut exchange.wave {
                 wave.stop();
             }
+            exchange.abort_pass();
         });
         Identity {
             config_words: CONFIG_WORDS as u16,
@@ -144,7 +150,7 @@ impl Visit<'_, '_> {
             return Reply::Refused(Refusal::Length { expected: COMMAND_WORDS as u16 });
         }
         self.order(|exchange| {
-            let free = !exchange.waves();
+            let free = !exchange.is_engaged();
             if free {
                 exchange.orders.command = command;
             }
@@ -236,7 +242,7 @@ impl Visit<'_, '_> {
         let mut reply = Reply::Refused(Refusal::State);
         (self.with)(&mut |exchange, _| {
             let runs = exchange.report.phase == Phase::Running && !exchange.in_lockstep();
-            if runs && !exchange.waves() {
+            if runs && !exchange.is_engaged() {
                 let command = &exchange.orders.command;
                 reply = match waves::may_begin(exchange.report.status, command, &center, &limits) {
                     Ok(()) => Reply::Done,
@@ -248,6 +254,71 @@ impl Visit<'_, '_> {
             }
         });
         reply
+    }
+
+    /// Takes knots of the correction of passes, a message of them at a time.
+    #[inline(never)]
+    fn knots(&mut self, first: u32, knots: Bytes<'_>) -> Reply<'static> {
+        let Some(given) = knots.knots().filter(|given| given.len() <= KNOTS) else {
+            return Reply::Refused(Refusal::Message);
+        };
+        let (mut taken, count) = ([[0; 6]; KNOTS], given.len());
+        for (slot, knot) in taken.iter_mut().zip(given) {
+            *slot = knot;
+        }
+        let mut reply = Reply::Refused(Refusal::Unsupported);
+        (self.with)(&mut |exchange, _| {
+            let Some(player) = &mut exchange.player else { return };
+            reply = match player.is_running() {
+                true => Reply::Refused(Refusal::State),
+                false if player.put(first as usize, taken.iter().take(count).copied()) => Reply::Done,
+                false => Reply::Refused(Refusal::Word { index: 0 }),
+            };
+        });
+        reply
+    }
+
+    #[inline(never)]
+    fn pass(&mut self, action: PassAction) -> Reply<'static> {
+        let mut reply = Reply::Refused(Refusal::Unsupported);
+        (self.with)(&mut |exchange, _| {
+            let refusal = match action {
+                PassAction::Look => None,
+                PassAction::Begin { spacing, before, ticks, trajectory } => {
+                    exchange.begin_pass(Course { spacing, before, ticks, trajectory }).err()
+                }
+                PassAction::Abort => {
+                    exchange.abort_pass();
+                    None
+                }
+            };
+            if let Some(player) = &exchange.player {
+                reply = refusal.map_or_else(|| Reply::Pass(standing(player)), Reply::Refused);
+            }
+        });
+        reply
+    }
+
+    #[inline(never)]
+    fn errors(&mut self, offset: u32) -> Reply<'_> {
+        let (mut taken, mut count, mut total) = ([[0; 6]; KNOTS], 0, 0);
+        let mut refusal = Some(Refusal::Unsupported);
+        let first = offset as usize / KNOT;
+        (self.with)(&mut |exchange, _| {
+            let Some(player) = &exchange.player else { return };
+            refusal = player.is_running().then_some(Refusal::State);
+            total = player.errors().len() * KNOT;
+            for (slot, knot) in taken.iter_mut().zip(player.errors().iter().skip(first)) {
+                *slot = *knot;
+                count += 1;
+            }
+        });
+        if let Some(refusal) = refusal {
+            return Reply::Refused(refusal);
+        }
+        let knots = taken.get(..count).unwrap_or_default();
+        let bytes = Bytes(put_knots(knots, offset as usize - first * KNOT, self.desk.session.buffer()));
+        Reply::Chunk { offset, total: total as u32, bytes }
     }
 
     /// The host steps the machine: only while nothing can move.
@@ -281,6 +352,16 @@ impl Visit<'_, '_> {
         }
         let Desk { stopwatch, costs, session, .. } = &mut *self.desk;
         session.step(&mut Stepper { stopwatch: *stopwatch, costs, with: &mut *self.with }, input)
+    }
+}
+
+/// How a player stands.
+fn standing(player: &Player<'_, Real>) -> PassStatus {
+    PassStatus {
+        stage: player.stage().word(),
+        status: player.status(),
+        knots: player.errors().len() as u32,
+        capacity: player.capacity() as u32,
     }
 }
 
@@ -326,6 +407,12 @@ impl Device for Visit<'_, '_> {
             Request::Recorder { action } => self.recorder(action),
             Request::Download { offset } => self.download(offset),
             Request::Wave { action, words } => self.wave(action, words),
+            Request::Knots { .. } | Request::Pass { .. } | Request::Errors { .. } if !passes::POSSIBLE => {
+                Reply::Refused(Refusal::Unsupported)
+            }
+            Request::Knots { first, knots } => self.knots(first, knots),
+            Request::Pass { action } => self.pass(action),
+            Request::Errors { offset } => self.errors(offset),
         }
     }
 }

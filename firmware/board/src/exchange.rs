@@ -4,8 +4,10 @@ use controller::snapshot::recorder::Recorder;
 use controller::supervised::{Machine, MachineInput, MachineOutput, Phase, Request, supervise};
 use controller::supervision::HOST_TICKS;
 use controller::waves::{self, Wave};
-use controller::{COMMAND_WORDS, Config};
-use specgen_link::Silence;
+use controller::{COMMAND_WORDS, Config, Real, passes};
+use specgen_link::{Refusal, Silence};
+use specgen_runtime::pass::{Course, Player};
+use specgen_runtime::playback::Knot;
 use specgen_runtime::wave::Stage;
 
 use crate::recording::{Kept, recorder};
@@ -51,6 +53,8 @@ pub struct Exchange {
     pub(crate) kept: Option<&'static mut Kept>,
     /// Makes the set-points while it is under way.
     pub wave: Option<Wave>,
+    /// Corrects the motion while a pass is under way, where a memory was given for it.
+    pub player: Option<Player<'static, Real>>,
     /// The host steps the machine, and the ticks do not: how long it has been silent.
     pub lockstep: Option<Silence>,
 }
@@ -80,6 +84,7 @@ impl Exchange {
             recorder: None,
             kept: None,
             wave: None,
+            player: None,
             lockstep: None,
         }
     }
@@ -90,6 +95,13 @@ impl Exchange {
     pub fn record(&mut self, memory: &'static mut [u64], kept: &'static mut Kept) {
         self.recorder = recorder(memory);
         self.kept = Some(kept);
+    }
+
+    /// Makes passes in this memory from here on, if the controller takes a correction.
+    pub fn play(&mut self, memory: &'static mut [Knot]) {
+        if passes::POSSIBLE {
+            self.player = Some(Player::new(memory));
+        }
     }
 
     /// A request of the host was carried out or refused.
@@ -106,6 +118,12 @@ impl Exchange {
         self.wave.as_ref().is_some_and(|wave| wave.stage() != Stage::Idle)
     }
 
+    /// Whether a wave or a pass is under way, which commands in place of the host.
+    #[must_use]
+    pub fn is_engaged(&self) -> bool {
+        self.waves() || self.player.as_ref().is_some_and(Player::is_running)
+    }
+
     /// The newest settings, whether or not they are in force yet.
     #[must_use]
     pub const fn settings(&self) -> &Config {
@@ -116,7 +134,7 @@ impl Exchange {
     }
 
     /// What a tick leaves until its codes are out, and the first one needs to find done: settings that came, the set-point of a wave
-    /// for the next tick.
+    /// or what a pass corrects in the next tick.
     pub fn prepare(&mut self) {
         // A block begins with settings: not before the one that is owed is written.
         let owes = self.recorder.as_ref().is_some_and(Recorder::owes);
@@ -130,6 +148,9 @@ impl Exchange {
             }
         }
         self.advance_wave();
+        if passes::POSSIBLE {
+            self.advance_pass();
+        }
     }
 
     /// Writes the set-point of a wave into the command, from where it stays when the wave has ended; only a running machine
@@ -144,6 +165,57 @@ impl Exchange {
         match wave.advance() {
             Some(motion) => waves::write(&motion, wave.sequence(), &mut self.orders.command),
             None => self.wave = None,
+        }
+    }
+
+    /// Begins a pass with the next tick.
+    ///
+    /// # Errors
+    /// The machine does not run, or not at rest; a wave or a pass is under way; this is no pass, or too long.
+    pub(crate) fn begin_pass(&mut self, course: Course) -> Result<(), Refusal> {
+        let runs = self.report.phase == Phase::Running && !self.in_lockstep() && !self.is_engaged();
+        if !runs || !passes::may_begin(self.report.status, &self.orders.command) {
+            return Err(Refusal::State);
+        }
+        let player = self.player.as_mut().ok_or(Refusal::Unsupported)?;
+        if !player.begin(course) {
+            return Err(Refusal::Word { index: 0 });
+        }
+        self.advance_pass();
+        Ok(())
+    }
+
+    /// Writes what a pass corrects in the next tick into the command. Only a running machine makes one.
+    #[inline(never)]
+    pub(crate) fn advance_pass(&mut self) {
+        if self.report.phase != Phase::Running {
+            self.abort_pass();
+        }
+        if let Some(given) = self.player.as_mut().and_then(Player::give) {
+            passes::write(&given, &mut self.orders.command);
+        }
+    }
+
+    /// Keeps what a tick of a pass showed; after the last one nothing is corrected.
+    #[inline(never)]
+    pub(crate) fn keep_pass(&mut self, machine: &Machine, status: u32) {
+        if let (Some(player), Some([target, pose])) = (&mut self.player, passes::shown(&machine.state))
+            && player.is_running()
+        {
+            player.keep(&target, &pose, status);
+            if !player.is_running() {
+                passes::end(&mut self.orders.command);
+            }
+        }
+    }
+
+    /// Ends the pass under way, if there is one: nothing is corrected from here on.
+    pub(crate) fn abort_pass(&mut self) {
+        if let Some(player) = &mut self.player
+            && player.is_running()
+        {
+            player.abort();
+            passes::end(&mut self.orders.command);
         }
     }
 
@@ -162,6 +234,7 @@ impl Exchange {
             self.lockstep = Some(silence);
             self.orders.request = Request::None;
             self.wave = None;
+            self.abort_pass();
         }
         at_rest
     }

@@ -41,6 +41,7 @@ pub mod kinematics;
 pub mod limits;
 mod machine;
 mod notch;
+pub mod passes;
 pub mod permitted;
 pub mod sensing;
 pub mod setpoint;

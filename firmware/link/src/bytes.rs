@@ -8,6 +8,12 @@ use serde::ser::{Serialize, Serializer};
 /// Most words that a message holds: more than any controller has of inputs, outputs or settings.
 pub const WORDS: usize = 120;
 const WORD: usize = size_of::<u64>();
+/// Most knots that a message holds: six numbers of 32 bits each, little endian.
+pub const KNOTS: usize = 20;
+const NUMBER: usize = size_of::<i32>();
+/// Bytes of a knot.
+pub const KNOT: usize = 6 * NUMBER;
+const _: () = assert!(KNOTS * KNOT + 16 < crate::MESSAGE);
 
 /// Bytes that a message carries as they are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -30,6 +36,34 @@ impl<'a> Bytes<'a> {
         }
         true
     }
+
+    /// Knots, if the bytes are whole ones.
+    #[must_use]
+    pub fn knots(self) -> Option<impl ExactSizeIterator<Item = [i32; 6]> + 'a> {
+        let (knots, rest) = self.0.as_chunks::<KNOT>();
+        rest.is_empty().then(|| knots.iter().map(knot))
+    }
+}
+
+fn knot(bytes: &[u8; KNOT]) -> [i32; 6] {
+    let mut knot = [0; 6];
+    for (slot, number) in knot.iter_mut().zip(bytes.as_chunks::<NUMBER>().0) {
+        *slot = i32::from_le_bytes(*number);
+    }
+    knot
+}
+
+/// The bytes of `knots` from `offset` on, in `buffer`: as many as there are and as fit.
+#[must_use]
+pub fn put_knots<'a>(knots: &[[i32; 6]], offset: usize, buffer: &'a mut [u8]) -> &'a [u8] {
+    let skipped = offset / KNOT;
+    let bytes = knots.iter().skip(skipped).flatten().flat_map(|number| number.to_le_bytes());
+    let mut count = 0;
+    for (slot, byte) in buffer.iter_mut().zip(bytes.skip(offset - skipped * KNOT)) {
+        *slot = byte;
+        count += 1;
+    }
+    buffer.get(..count).unwrap_or_default()
 }
 
 /// `words` as bytes, in `buffer`; none if they do not fit.

@@ -67,6 +67,7 @@ impl Timeout {
                 | Request::Supervise { .. }
                 | Request::Setpoint { .. }
                 | Request::Wave { .. }
+                | Request::Pass { .. }
         );
         if !short || self.attempts == 1 {
             return self;

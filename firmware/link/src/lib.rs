@@ -25,12 +25,13 @@ mod message;
 mod receiver;
 mod silence;
 
-pub use bytes::{Bytes, WORDS, put_words};
+pub use bytes::{Bytes, KNOT, KNOTS, WORDS, put_knots, put_words};
 pub use counters::Counters;
 pub use endpoint::{Device, Endpoint, telemetry};
 pub use frame::{Damage, FRAME, Header, Kind, MESSAGE, VERSION};
 pub use message::{
-    Counted, Health, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request, Stage, Status, WaveAction,
+    Counted, Health, Identity, PassAction, PassStatus, RecorderAction, RecorderStatus, Refusal, Reply, Request, Stage,
+    Status, WaveAction,
 };
 pub use receiver::Receiver;
 pub use silence::Silence;

@@ -81,6 +81,44 @@ pub enum Request<'a> {
     Health,
     /// Where the platform is. Six legs know of none: [`Refusal::Unsupported`]. Answered by [`Reply::Place`].
     Place,
+    /// Knots of the correction of passes, from this one on. Answered by [`Reply::Done`], or [`Refusal::Word`] where there is no room.
+    Knots {
+        /// Number of the first.
+        first: u32,
+        /// Knots: x, y, z in pm, θx, θy, θz in prad, 32 bits each.
+        #[serde(borrow)]
+        knots: Bytes<'a>,
+    },
+    /// Answered by [`Reply::Pass`].
+    Pass {
+        /// What the player of passes is to do.
+        action: PassAction,
+    },
+    /// What the last pass kept of the error, as the bytes of its knots, from this byte on. Answered by [`Reply::Chunk`].
+    Errors {
+        /// First byte wanted.
+        offset: u32,
+    },
+}
+
+/// What a player of passes is to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PassAction {
+    /// Only say how it stands.
+    Look,
+    /// Begin with the next tick, under the correction of the knots that were sent. The machine runs, at rest.
+    Begin {
+        /// Ticks from knot to knot.
+        spacing: u32,
+        /// Ticks of rest before the trajectory.
+        before: u32,
+        /// Ticks in all.
+        ticks: u32,
+        /// Number of the trajectory.
+        trajectory: u32,
+    },
+    /// End it at once; the correction fades out, the trajectory goes on.
+    Abort,
 }
 
 /// What a recorder is to do.
@@ -164,6 +202,8 @@ pub enum Reply<'a> {
         #[serde(borrow)]
         words: Bytes<'a>,
     },
+    /// How the player of passes stands.
+    Pass(PassStatus),
 }
 
 /// Why a request was not carried out.
@@ -298,5 +338,18 @@ pub struct RecorderStatus {
     /// Ticks that it holds.
     pub ticks: u32,
     /// Most that it can hold.
+    pub capacity: u32,
+}
+
+/// How a player of passes stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PassStatus {
+    /// Number of the `pass::Stage` of the last one.
+    pub stage: u8,
+    /// All status bits that the controller gave in it.
+    pub status: u32,
+    /// Knots of its error.
+    pub knots: u32,
+    /// Most knots of a pass.
     pub capacity: u32,
 }

@@ -4,20 +4,23 @@
 use std::collections::VecDeque;
 
 use controller::waves::{self, Wave};
-use controller::{Config, PLACE_WORDS, Real};
+use controller::{Config, PLACE_WORDS, Real, passes};
 use specgen_link::Health;
+use specgen_runtime::pass::Course;
+use specgen_runtime::playback::Knot;
 use specgen_runtime::wave::Settings;
 
 use crate::capture::{CAPACITY, Capture};
-use crate::handover::{Order, Row};
+use crate::handover::{Order, Player, Row};
 use crate::operator::{Operator, Said};
+use crate::passes::Passes;
 
 /// Orders that may wait for room in the ring: the loop takes one a tick.
 const MOST_ORDERS: usize = 64;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum No {
-    /// Not in this state of the machine, of the wave or of the recorder.
+    /// Not in this state of the machine, of the wave, of the pass or of the recorder.
     State,
     /// This word of what was asked for.
     Word(usize),
@@ -26,6 +29,7 @@ pub enum No {
 pub struct Console {
     pub operator: Operator,
     pub capture: Capture,
+    pub passes: Passes,
     pub said: Option<Said>,
     /// Where the platform was then.
     pub place: [u64; PLACE_WORDS],
@@ -49,6 +53,7 @@ impl Console {
         Self {
             operator,
             capture,
+            passes: Passes::new(),
             said: None,
             place: [0; PLACE_WORDS],
             health,
@@ -86,19 +91,19 @@ impl Console {
         self.order(Order::Configure(config));
     }
 
-    /// Whether a wave is under way.
-    pub fn waving(&self) -> bool {
-        self.wave.is_some()
+    /// Whether a wave or a pass is under way, which commands in place of hosts.
+    pub fn is_engaged(&self) -> bool {
+        self.wave.is_some() || self.passes.is_running()
     }
 
     /// Begins a wave.
     ///
     /// # Errors
-    /// The machine does not run, or plays something else; a wave is under way; the word of the axis that would go beyond its limits.
+    /// The machine does not run, or plays something else; a wave or a pass is under way; the word of the axis that would go beyond its limits.
     pub fn start_wave(&mut self, settings: &Settings<Real>) -> Result<(), No> {
         let limits = waves::limits(&self.config);
         let running = self.said.filter(|said| said.phase == controller::supervised::Phase::Running);
-        let Some(said) = running.filter(|_| self.wave.is_none()) else { return Err(No::State) };
+        let Some(said) = running.filter(|_| !self.is_engaged()) else { return Err(No::State) };
         Wave::new(limits).set(settings).map_err(|refused| refused.word().map_or(No::State, No::Word))?;
         waves::may_begin(said.status, self.operator.command(), &settings.center, &limits).map_err(|_| No::State)?;
         // What is wanted when it is over goes first.
@@ -111,6 +116,46 @@ impl Console {
     /// Brings the wave to rest, if there is one.
     pub fn stop_wave(&mut self) {
         self.order(Order::StopWave);
+    }
+
+    /// Takes knots of the correction of passes.
+    ///
+    /// # Errors
+    /// A pass is under way; there is no room for them.
+    pub fn put_knots(&mut self, first: u32, knots: impl ExactSizeIterator<Item = Knot>) -> Result<(), No> {
+        match self.passes.is_running() {
+            true => Err(No::State),
+            false if self.passes.put(first, knots) => Ok(()),
+            false => Err(No::Word(0)),
+        }
+    }
+
+    /// Begins a pass.
+    ///
+    /// # Errors
+    /// The machine does not run, or not at rest; a wave or a pass is under way; this is no pass, or too long.
+    pub fn begin_pass(&mut self, course: Course) -> Result<(), No> {
+        let running = self.said.filter(|said| said.phase == controller::supervised::Phase::Running);
+        let said = running.filter(|_| !self.is_engaged()).ok_or(No::State)?;
+        if !passes::may_begin(said.status, self.operator.command()) {
+            return Err(No::State);
+        }
+        let player = self.passes.begin(course).ok_or(No::Word(0))?;
+        self.wish();
+        self.order(Order::Pass(player));
+        Ok(())
+    }
+
+    /// Ends the pass under way, if there is one.
+    pub fn abort_pass(&mut self) {
+        self.order(Order::AbortPass);
+    }
+
+    /// Takes the player back: what its pass began is what is commanded.
+    pub fn receive_player(&mut self, player: Player) {
+        if let Some(trajectory) = self.passes.receive(player) {
+            self.operator.has_begun(trajectory);
+        }
     }
 
     /// Records anew, until `after` ticks behind the trigger.

@@ -62,7 +62,7 @@ impl<D: Device> Loop<'_, D> {
         scheduling::touch_stack();
         let mut machine = Machine::new();
         let mut setpoints = Setpoints::new(&self.config);
-        let Inner { outlets, mut orders } = self.rings;
+        let Inner { outlets, mut orders, mut players } = self.rings;
         let mut keeper = Keeper::new(outlets, self.tape.take(), self.shared, (&machine, &self.config));
         let mut phase = Phase::Disarmed;
         let mut codes = [0; LEGS];
@@ -132,6 +132,7 @@ impl<D: Device> Loop<'_, D> {
                 self.shared.gauge_faults.fetch_add(1, Ordering::Relaxed);
             }
             phase = output.phase;
+            setpoints.keep(&machine.state, output.tick.status);
             let digest = if keeper.wants_digest() { machine.digest() } else { 0 };
             keeper.keep(Row {
                 tick,
@@ -156,6 +157,8 @@ impl<D: Device> Loop<'_, D> {
                     Order::Configure(config) => (self.config, configured) = (config, true),
                     Order::Wave(settings) => setpoints.start(&settings, &self.config),
                     Order::StopWave => setpoints.stop(),
+                    Order::Pass(player) => setpoints.pass(player),
+                    Order::AbortPass => setpoints.abort_pass(),
                     Order::Tape(tape) => keeper.take(tape, count),
                     Order::Record(settings) => keeper.record(settings, count),
                     Order::Trigger => keeper.trigger(),
@@ -163,6 +166,11 @@ impl<D: Device> Loop<'_, D> {
                 }
             }
             keeper.prepare(&machine, &self.config, count, configured);
+            // After the next tick, if there is no room now.
+            if let Some(Err(rtrb::PushError::Full(player))) = setpoints.take_player().map(|player| players.push(player))
+            {
+                setpoints.put_player(player);
+            }
             let usage = Usage::of_this_thread().since(usage);
             let done = clock::now();
             self.shared.took([planned, woken, read, written, done], period, elastic);

@@ -8,7 +8,7 @@ use controller::supervised::{MachineInput, Request};
 use controller::{Config, PLACE_WORDS, Real};
 use rtrb::{Consumer, Producer, RingBuffer};
 use specgen_link::Health;
-use specgen_runtime::wave;
+use specgen_runtime::{pass, wave};
 
 use crate::words::Command;
 
@@ -23,6 +23,9 @@ pub const SNAPSHOT_EVERY: u32 = 2048;
 
 /// A recorder with its memory, for as long as the program runs: whoever holds the box uses it.
 pub type Tape = Box<Recorder<'static>>;
+
+/// A player of passes with its memory, as a [`Tape`].
+pub type Player = Box<pass::Player<'static, Real>>;
 
 /// One tick, as it is handed over.
 #[derive(Debug, Clone, Copy)]
@@ -76,6 +79,10 @@ pub enum Order {
     /// A wave begins, if none is under way.
     Wave(wave::Settings<Real>),
     StopWave,
+    /// The pass that this player was told begins, if no wave is under way.
+    Pass(Player),
+    /// End the pass under way.
+    AbortPass,
     Tape(Tape),
     /// Begin anew with the recorder that the loop has.
     Record(recorder::Settings),
@@ -171,6 +178,8 @@ pub struct Outlets {
 pub struct Inner {
     pub outlets: Outlets,
     pub orders: Consumer<Order>,
+    /// The player, when its pass is over.
+    pub players: Producer<Player>,
 }
 
 pub struct Outer {
@@ -178,6 +187,7 @@ pub struct Outer {
     pub snapshots: Consumer<Snapshot>,
     pub tapes: Consumer<(Tape, u32)>,
     pub orders: Producer<Order>,
+    pub players: Consumer<Player>,
 }
 
 /// Rings, with room for states if the run is recorded.
@@ -186,9 +196,11 @@ pub fn rings(records: bool) -> (Inner, Outer) {
     let (snapshots, snapshots_out) = RingBuffer::new(if records { SNAPSHOTS } else { 1 });
     // There is one tape; the second place makes that a matter of no care.
     let (tapes, tapes_out) = RingBuffer::new(2);
+    // As of tapes.
+    let (players, players_out) = RingBuffer::new(2);
     let (orders, orders_in) = RingBuffer::new(ORDERS);
     (
-        Inner { outlets: Outlets { rows, snapshots: records.then_some(snapshots), tapes }, orders: orders_in },
-        Outer { rows: rows_out, snapshots: snapshots_out, tapes: tapes_out, orders },
+        Inner { outlets: Outlets { rows, snapshots: records.then_some(snapshots), tapes }, orders: orders_in, players },
+        Outer { rows: rows_out, snapshots: snapshots_out, tapes: tapes_out, orders, players: players_out },
     )
 }

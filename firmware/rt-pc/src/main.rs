@@ -16,6 +16,7 @@ mod devices;
 mod handover;
 mod operator;
 mod options;
+mod passes;
 mod record;
 mod service;
 mod summary;

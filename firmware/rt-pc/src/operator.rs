@@ -5,7 +5,7 @@
 //! supervisor's business, and each step here waits for its answer.
 
 use controller::supervised::{Cause, MACHINE_INPUT_NAMES, Phase, Request};
-use controller::{COMMAND_WORDS, Real, waves};
+use controller::{COMMAND_WORDS, Real, passes, waves};
 use specgen_rt::clock::SECOND;
 
 use crate::handover::Wish;
@@ -312,6 +312,12 @@ impl Operator {
     /// What is wanted once a wave about `center` has come to rest: to stay there.
     pub fn rest_at(&mut self, center: &[Real; 6]) {
         waves::rest(center, &mut self.command);
+        self.changed = true;
+    }
+
+    /// A pass has begun this trajectory: it is what is wanted until another order.
+    pub fn has_begun(&mut self, trajectory: u32) {
+        passes::begin(trajectory, &mut self.command);
         self.changed = true;
     }
 

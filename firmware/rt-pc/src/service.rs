@@ -168,6 +168,9 @@ impl Service<'_> {
                 self.console.order(order);
             }
         }
+        while let Ok(player) = self.rings.players.pop() {
+            self.console.receive_player(player);
+        }
     }
 }
 

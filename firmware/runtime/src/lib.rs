@@ -35,6 +35,7 @@
 //! | [`snapshot`] | a state as words and back, checked | |
 //! | [`wave`] | set-points on board: sine, chirp, multisine, reversal curves | |
 //! | [`playback`] | a table of corrections, interpolated | |
+//! | [`pass`] | a motion that repeats: its correction played, its error kept | |
 //! | [`recorder`], [`record`] | ticks kept in fixed memory, and the format they leave in | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
 //!
@@ -61,6 +62,7 @@ pub mod memory;
 pub mod mode;
 pub mod motion;
 pub mod notch;
+pub mod pass;
 pub mod permitted;
 pub mod playback;
 pub mod real;

@@ -60,7 +60,7 @@ fn passes(
     count: usize,
 ) -> Learned {
     let motion = Motion::of(trajectory, PERIOD, &SPEED, RADIUS).unwrap();
-    let update = Update::new(learnable, &motion, convergence);
+    let update = Update::new(learnable, &motion, convergence, convergence.spacing(PERIOD));
     let mut controller = bench.controller();
     let mut prepared = machine.rig().clone();
     let mut rig = Rig::new(&mut prepared, &mut controller, PERIOD, latency).unwrap();

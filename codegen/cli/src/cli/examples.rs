@@ -101,7 +101,9 @@ Examples:
   specgen learn learning.toml --from case-1.json --passes 1
       goes on where that ended
   specgen learn learning.toml --prepare --passes 0 -o prepared.json
-      what lag and modes would leave, by the model alone";
+      what lag and modes would leave, by the model alone
+  specgen learn learning.toml --trajectory case-1 --socket link --machine stage-7  # (board)
+      on a machine, which is armed for it and ramped down after it";
 
 pub const ROBUST: &str = "\
 Examples:
@@ -159,7 +161,8 @@ Examples:
 
 Commands: status, arm, run, hold, ramp-down, acknowledge, none,
   set NAME=VALUE…, move|jog AXIS=QUANTITY… (z=1um rx=2urad), where, limits,
-  can-i-go AXIS=QUANTITY… [speed=QUANTITY], mark|goto NAME, play TRAJECTORY,
+  can-i-go AXIS=QUANTITY… [speed=QUANTITY], mark|goto NAME,
+  play TRAJECTORY [correction=FILE machine=NAME],
   frame [none | work|tool AXIS=QUANTITY…], mode p|f|pf, gains [NAME=VALUE…],
   wait PHASE|arrived|SECONDS [TIMEOUT], config, config write SPEC,
   record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop,

@@ -7,11 +7,9 @@ use clap::{ArgGroup, Args};
 use host_sim::controller::MachineWord;
 use serde::Serialize;
 use specgen_language::interrupt;
-use specgen_link::client::{Port, Timeout};
 use specgen_operate::gcs::{Axes, Bridge, Stage};
-use specgen_operate::pil::{BAUD, OpenError, SerialLine};
-use specgen_operate::{Session, SocketLine};
 
+use super::line::Line;
 use super::operate::Operator;
 use super::spec;
 use super::ui::{Failure, Outcome, Ui};
@@ -23,15 +21,8 @@ pub struct Arguments {
     /// The spec that the device was built from; another controller is then refused.
     #[arg(value_name = "SPEC")]
     spec: Option<PathBuf>,
-    /// A board at this serial port.
-    #[arg(long, value_name = "DEVICE")]
-    port: Option<PathBuf>,
-    /// Its rate, baud.
-    #[arg(long, default_value_t = BAUD, requires = "port", conflicts_with = "socket", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
-    baud: u32,
-    /// A program that serves the link at this Unix socket.
-    #[arg(long, value_name = "PATH")]
-    socket: Option<PathBuf>,
+    #[command(flatten)]
+    line: Line,
     /// Where clients connect. Whoever can reach it can move the machine: the command set knows no password.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:50000")]
     listen: SocketAddr,
@@ -60,33 +51,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = arguments.spec.as_deref().map(|spec| spec::looked_up(spec, ui)).transpose()?;
     let digest = compiled.as_ref().map(|compiled| compiled.ir.digest.as_str());
     interrupt::heed();
-    match (&arguments.port, &arguments.socket) {
-        (Some(path), _) => {
-            let line = SerialLine::open(path, arguments.baud).map_err(Failure::Environment)?;
-            serve(line, Timeout::SERIAL, &path.display().to_string(), digest, arguments.listen, axes, ui)
-        }
-        (None, Some(path)) => {
-            let line = SocketLine::open(path).map_err(Failure::Environment)?;
-            serve(line, Timeout::SOCKET, &path.display().to_string(), digest, arguments.listen, axes, ui)
-        }
-        // One of the two is required.
-        (None, None) => Err(Failure::Usage("name the device with --port or --socket".to_owned())),
-    }
-}
-
-fn serve(
-    line: impl Port,
-    timeout: Timeout,
-    name: &str,
-    digest: Option<&str>,
-    listen: SocketAddr,
-    axes: Axes,
-    ui: &mut Ui,
-) -> Result<(), Failure> {
-    let session = Session::open(line, timeout, digest).map_err(|error| match error {
-        OpenError::Other(text) => Failure::Gate(format!("{name}: {text}")),
-        OpenError::Link(_) => Failure::Environment(format!("{name}: {error}")),
-    })?;
+    let (session, name) = arguments.line.open(digest)?;
+    let listen = arguments.listen;
     let stage = Stage::new(session).map_err(|error| Failure::Gate(format!("{name}: {error}")))?;
     let no = |error: std::io::Error| Failure::Environment(format!("cannot listen at {listen}: {error}"));
     let listener = TcpListener::bind(listen).map_err(no)?;
@@ -116,6 +82,6 @@ fn serve(
     let mut operator = Operator::new(bridge.into_session(), stop);
     let stands =
         if operator.is_powered() { operator.ramp_down(ui).map_err(|error| lost(&error))? } else { operator.stands() };
-    ui.result(&Summary { device: name.to_owned(), listened: address.to_string(), stands });
+    ui.result(&Summary { device: name, listened: address.to_string(), stands });
     Ok(())
 }

@@ -1,9 +1,10 @@
-//! `specgen learn`: a motion that repeats, learned between passes on the simulated machine of a spec.
+//! `specgen learn`: a motion that repeats, learned between passes, on the simulated machine of a spec or over the link on a real one.
+
+mod machine;
 
 use std::fmt::Write as _;
-use std::fs;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
@@ -12,19 +13,22 @@ use host_sim::word::status_words;
 use serde::Serialize;
 
 use super::file::{check_place, write_file};
+use super::line::Line;
+use super::operate::{Ended, Operator, motion_name};
 use super::robust::trajectory;
 use super::sim::{PlantArguments, emitted, environment, frequency};
 use super::spec;
 use super::table::{left, right, row};
 use super::ui::{Failure, Outcome, Ui};
+use machine::{Own, Remote};
 use specgen_compiler::compile::Compiled;
 use specgen_language::interrupt;
 use specgen_language::model::TaskSpace;
 use specgen_runtime::playback::Knot;
 use specgen_studies::learning::{
-    Convergence, LearnError, Learnable, Learned, Motion, Pass, Table, Update, knots, learn,
+    Convergence, LearnError, Learnable, Learned, Motion, Pass, Repeating, Table, Update, knots, learn,
 };
-use specgen_studies::machine;
+use specgen_studies::machine as plant;
 use specgen_studies::robust::Factors;
 use specgen_studies::robust::factors::Given;
 
@@ -39,7 +43,8 @@ const ARMING: f64 = 60.0;
 pub struct Arguments {
     /// The spec file, with `control.correction`.
     spec: PathBuf,
-    /// What is learned: case-1, case-2, machining or multisine, or a trajectory of the spec by its name; case-1 if not given.
+    /// What is learned: case-1, case-2, machining or multisine, or a trajectory of the spec by its name; case-1 if not given. A machine
+    /// at the end of a link learns the trajectories that it has.
     #[arg(long, value_name = "NAME")]
     trajectory: Option<String>,
     /// Its operating frequency, Hz; 10, or that of the spec, if not given.
@@ -63,21 +68,60 @@ pub struct Arguments {
     /// Write the correction of the best pass here (JSON).
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Learn on this machine, which is armed for it and ramped down after it.
+    #[command(flatten)]
+    line: Line,
+    /// What the machine at the end of the link is called; a correction is played on no other.
+    #[arg(long, value_name = "NAME")]
+    machine: Option<String>,
     #[command(flatten)]
     plant: PlantArguments,
 }
 
+/// What is learned, and how.
+struct Study {
+    compiled: Compiled,
+    convergence: Convergence,
+    motion: Motion,
+    update: Update,
+    motion_name: String,
+    machine_name: String,
+    begin: Vec<Knot>,
+    spacing: u32,
+}
+
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let (leg, noise) = (arguments.plant.leg()?, !arguments.plant.no_noise);
-    let compiled = spec::compiled(&arguments.spec, ui)?;
+    let named = arguments.line.is_named();
+    if named != arguments.machine.is_some() {
+        let missing = if named { "--machine NAME: a correction is played on no other" } else { "--port or --socket" };
+        return Err(Failure::Usage(format!("learning on a machine also needs {missing}")));
+    }
+    if named && (arguments.plant.plant.is_some() || arguments.plant.no_noise || arguments.frequency.is_some()) {
+        let text = "--plant, --no-noise and --frequency are for the simulated machine; a real one is as it is, and plays the \
+                    trajectories of its spec";
+        return Err(Failure::Usage(text.to_owned()));
+    }
+    arguments.output.as_deref().map_or(Ok(()), check_place)?;
+    let compiled = if named { spec::looked_up(&arguments.spec, ui)? } else { spec::compiled(&arguments.spec, ui)? };
+    let own = if named { Some(Own::named(arguments.trajectory.as_deref(), &compiled)?) } else { None };
+    let study = study(arguments, compiled)?;
+    match &own {
+        Some(own) => on_machine(arguments, &study, own, ui),
+        None => simulated(arguments, &study, ui),
+    }
+}
+
+fn study(arguments: &Arguments, compiled: Compiled) -> Result<Study, Failure> {
     let model = &compiled.model;
     let seed = arguments.plant.seed;
     let task = takes_correction(&compiled)?;
     let followed = trajectory::chosen(arguments.trajectory.as_deref(), arguments.frequency, seed, &compiled)?;
-    let motion_name = format!("{} at {} Hz", followed.name, followed.frequency);
+    let motion_name = match &arguments.machine {
+        Some(_) => motion_name(&followed.name),
+        None => format!("{} at {} Hz", followed.name, followed.frequency),
+    };
     let shape = arguments.plant.plant.as_ref().map_or_else(|| "plays".to_owned(), |path| path.display().to_string());
-    let machine_name = format!("simulated, {shape}, seed {seed}");
-    arguments.output.as_deref().map_or(Ok(()), check_place)?;
+    let machine_name = arguments.machine.clone().unwrap_or_else(|| format!("simulated, {shape}, seed {seed}"));
     let learnable = Learnable::of(&compiled)
         .ok_or_else(|| Failure::Environment("the platform has no modes, which the spec was checked for".to_owned()))?;
     let factors = Factors::of(model, &arguments.vary);
@@ -94,37 +138,119 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Motion::of(trajectory.as_ref(), model.timing.period, &speed, model.geometry.joint_radius()).map_err(gate)?;
     let (begin, spacing) =
         begin(arguments, &compiled, &learnable, &motion, &convergence, [&machine_name, &motion_name])?;
+    let update = Update::new(&learnable, &motion, &convergence, spacing);
+    Ok(Study { compiled, convergence, motion, update, motion_name, machine_name, begin, spacing })
+}
 
-    let mut controller = emitted(&compiled, ui)?;
-    let specimen = machine::specimen(model, task, &leg, Some(seed));
-    let noise = if noise { Noise::of(&specimen) } else { Noise::NONE };
-    let scenario = machine::scenario(model, task, &specimen, &noise, seed);
-    let mut rig = scenario.rig().clone();
-    let mut bench = Bench::new(&mut rig, &mut controller, model.timing.period, 0).map_err(environment)?;
-    bench.arm(ARMING).map_err(gate)?;
-    let update = Update::new(&learnable, &motion, &convergence);
+/// Makes the passes; the reader sees each, and may end them.
+fn passes(arguments: &Arguments, study: &Study, machine: &mut dyn Repeating, ui: &Ui) -> Result<Learned, LearnError> {
+    let Study { motion, update, begin, spacing, .. } = study;
     let stop = interrupt::heed();
     let count = arguments.passes as usize;
-    let learned = learn(&mut bench, &motion, &update, &begin, spacing, count, |number, pass| {
+    let learned = learn(machine, motion, update, begin, *spacing, count, |number, pass| {
         ui.rate(&format!("learn: pass {number} of {count}, {:.1} nm", pass.translation_nm));
         if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     ui.rate_done();
-    let learned = learned.map_err(gate)?;
-    if let Some(path) = &arguments.output {
-        let table = Table::new(&compiled.ir.digest, &machine_name, &motion_name, spacing, learned.knots.clone());
-        write_file(path, table.to_json().as_bytes())?;
-        ui.progress(&format!("wrote {} knots to {}", learned.knots.len(), path.display()));
-    }
-    let ended = learned.passes.len() <= count && !learned.grew;
-    let found =
-        Found { name: compiled.ir.name.clone(), motion: motion_name, machine: machine_name, convergence, learned };
-    if ended {
+    learned
+}
+
+fn simulated(arguments: &Arguments, study: &Study, ui: &mut Ui) -> Result<(), Failure> {
+    let (leg, seed) = (arguments.plant.leg()?, arguments.plant.seed);
+    let Study { compiled, motion, .. } = study;
+    let (model, task) = (&compiled.model, takes_correction(compiled)?);
+    let mut controller = emitted(compiled, ui)?;
+    let specimen = plant::specimen(model, task, &leg, Some(seed));
+    let noise = if arguments.plant.no_noise { Noise::NONE } else { Noise::of(&specimen) };
+    let scenario = plant::scenario(model, task, &specimen, &noise, seed);
+    let mut rig = scenario.rig().clone();
+    let mut bench = Bench::new(&mut rig, &mut controller, model.timing.period, 0).map_err(environment)?;
+    bench.arm(ARMING).map_err(gate)?;
+    let learned = passes(arguments, study, &mut bench, ui).map_err(gate)?;
+    let found = keep(arguments, study, learned, motion.targets[0].pose, ui)?;
+    if found.learned.passes.len() <= arguments.passes as usize && !found.learned.grew {
         let message = "interrupted: the best pass so far is kept".to_owned();
         return Err(Failure::Interrupted { message, result: ui.shown(&found) });
     }
     ui.result(&found);
     Ok(())
+}
+
+fn on_machine(arguments: &Arguments, study: &Study, own: &Own, ui: &mut Ui) -> Result<(), Failure> {
+    interrupt::heed();
+    let ir = &study.compiled.ir;
+    let (session, name) = arguments.line.open(Some(&ir.digest))?;
+    let lost = |error: &dyn std::fmt::Display| {
+        Failure::Environment(format!(
+            "{name}: {error}; a machine that lost its host holds, then ramps down (supervisor.host_lost)"
+        ))
+    };
+    let mut operator = Operator::new(session, interrupt::heed());
+    if !operator.is_set_to(&ir.integrity.settings).map_err(|error| lost(&error))? {
+        return Err(Failure::Gate(format!(
+            "{name}: its settings are not those of the spec, for which learning is proven to converge; `config write {}` in \
+             specgen operate restores them",
+            arguments.spec.display()
+        )));
+    }
+    let mut remote = Remote { operator: &mut operator, ui, own, ended: None };
+    let learned = match remote.arm() {
+        Ok(()) => passes(arguments, study, &mut remote, ui),
+        Err(ended) => {
+            remote.ended = Some(ended);
+            Err(LearnError::Ended)
+        }
+    };
+    let ended = remote.ended;
+    let down = match &ended {
+        Some(Ended::Link(error)) => Err(lost(error)),
+        _ if operator.is_powered() => operator.ramp_down(ui).map_err(|error| lost(&error)),
+        _ => Ok(format!("the machine is {}, amplifiers off", operator.stands())),
+    };
+    // What was learned is kept, however the machine ended.
+    let found = match learned {
+        Ok(learned) => Some(keep(arguments, study, learned, own.start, ui)?),
+        Err(LearnError::Ended) => None,
+        Err(error) => return Err(down.err().unwrap_or_else(|| Failure::Gate(format!("{name}: {error}")))),
+    };
+    let down = down?;
+    let why = match ended {
+        Some(Ended::Refused(text) | Ended::Fault(text)) => Some(format!("{name}: {text}")),
+        Some(Ended::Failed(failure)) => return Err(failure),
+        Some(Ended::Stopped) => Some(format!("{name}: the program that serves the link has ended")),
+        Some(Ended::Link(_) | Ended::Interrupted) | None => None,
+    };
+    match (found, why) {
+        (Some(found), Some(why)) => ui.judged(&found, Some(why)),
+        (None, Some(why)) => Err(Failure::Gate(why)),
+        (Some(found), None) if found.learned.passes.len() > arguments.passes as usize || found.learned.grew => {
+            ui.result(&found);
+            Ok(())
+        }
+        (Some(found), None) => {
+            let message = format!("interrupted: the best pass so far is kept; {down}");
+            Err(Failure::Interrupted { message, result: ui.shown(&found) })
+        }
+        (None, None) => Err(Failure::Gate(format!("interrupted before the first pass was over; {down}"))),
+    }
+}
+
+/// Writes the table of the best pass, if a file is named.
+fn keep(arguments: &Arguments, study: &Study, learned: Learned, start: [f64; 6], ui: &Ui) -> Result<Found, Failure> {
+    let Study { compiled, convergence, motion, motion_name, machine_name, spacing, .. } = study;
+    if let Some(path) = &arguments.output {
+        let names = [compiled.ir.digest.as_str(), machine_name, motion_name];
+        let table = Table::new(names, [*spacing, motion.scored.start as u32], start, learned.knots.clone());
+        write_file(path, table.to_json().as_bytes())?;
+        ui.progress(&format!("wrote {} knots to {}", learned.knots.len(), path.display()));
+    }
+    Ok(Found {
+        name: compiled.ir.name.clone(),
+        motion: motion_name.clone(),
+        machine: machine_name.clone(),
+        convergence: convergence.clone(),
+        learned,
+    })
 }
 
 fn gate(error: impl Into<LearnError>) -> Failure {
@@ -162,16 +288,11 @@ fn begin(
         return Ok((knots(&Update::prepared(learnable, motion, convergence.band[1]), spacing), spacing));
     }
     let Some(path) = &arguments.from else { return Ok((Vec::new(), spacing)) };
-    let table = read(path)?;
+    let table = Table::of_file(path).map_err(|error| Failure::Gate(format!("{}: {error}", path.display())))?;
     table
         .is_for(&compiled.ir.digest, machine, motion_name)
         .map_err(|error| Failure::Gate(format!("{}: {error}", path.display())))?;
     Ok((table.knots, table.spacing))
-}
-
-fn read(path: &Path) -> Result<Table, Failure> {
-    let text = fs::read_to_string(path).map_err(|error| Failure::Gate(format!("{}: {error}", path.display())))?;
-    Table::read(&text).map_err(|error| Failure::Gate(format!("{}: {error}", path.display())))
 }
 
 /// What came of it.

@@ -3,6 +3,7 @@
 mod answer;
 mod health;
 mod operator;
+mod passes;
 mod platform;
 
 use std::io::{BufRead, IsTerminal};
@@ -10,18 +11,18 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 
 use clap::{ArgGroup, Args};
-use specgen_link::client::{Port, Timeout};
+use specgen_link::client::Port;
 
+use super::line::Line;
 use super::spec;
 use super::ui::{Failure, Ui};
 use answer::{Mistake, Report};
-use operator::Ended;
-pub use operator::Operator;
+pub use operator::{Ended, Operator};
+pub use passes::motion_name;
 use specgen_compiler::compile;
 use specgen_language::interrupt;
 use specgen_language::model::Model;
-use specgen_operate::pil::{BAUD, OpenError, SerialLine};
-use specgen_operate::{ALIVE, Order, Session, SocketLine};
+use specgen_operate::{ALIVE, Order, Session};
 
 /// Arguments of `operate`.
 #[derive(Args, Debug)]
@@ -31,15 +32,8 @@ use specgen_operate::{ALIVE, Order, Session, SocketLine};
     after_help = super::examples::OPERATE
 )]
 pub struct Arguments {
-    /// A board at this serial port.
-    #[arg(long, value_name = "DEVICE")]
-    port: Option<PathBuf>,
-    /// Its rate, baud.
-    #[arg(long, default_value_t = BAUD, requires = "port", conflicts_with = "socket", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
-    baud: u32,
-    /// A program that serves the link at this Unix socket.
-    #[arg(long, value_name = "PATH")]
-    socket: Option<PathBuf>,
+    #[command(flatten)]
+    line: Line,
     /// Commands from this file, one a line; `#` begins a comment.
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
@@ -82,21 +76,11 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     }
     let digest = compiled.as_ref().map(|compiled| compiled.ir.digest.clone());
     let device =
-        Device { digest, model: compiled.map(|compiled| compiled.model), has_one_host: arguments.port.is_some() };
+        Device { digest, model: compiled.map(|compiled| compiled.model), has_one_host: arguments.line.port.is_some() };
     // The machine is not to be left alone.
     interrupt::heed();
-    match (&arguments.port, &arguments.socket) {
-        (Some(path), _) => {
-            let line = SerialLine::open(path, arguments.baud).map_err(Failure::Environment)?;
-            operate(line, Timeout::SERIAL, &path.display().to_string(), device, source, ui)
-        }
-        (None, Some(path)) => {
-            let line = SocketLine::open(path).map_err(Failure::Environment)?;
-            operate(line, Timeout::SOCKET, &path.display().to_string(), device, source, ui)
-        }
-        // One of the two is required.
-        (None, None) => Err(Failure::Usage("name the device with --port or --socket".to_owned())),
-    }
+    let (session, name) = arguments.line.open(device.digest.as_deref())?;
+    operate(session, &name, device, source, ui)
 }
 
 /// Every command is read before anything is asked of the machine: a mistake in the last line stops the first.
@@ -134,17 +118,12 @@ fn read(arguments: &Arguments, commands: &[String]) -> Result<Source, Failure> {
 }
 
 fn operate(
-    line: impl Port,
-    timeout: Timeout,
+    session: Session<Box<dyn Port>>,
     name: &str,
     device: Device,
     source: Source,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
-    let session = Session::open(line, timeout, device.digest.as_deref()).map_err(|error| match error {
-        OpenError::Other(text) => Failure::Gate(format!("{name}: {text}")),
-        OpenError::Link(_) => Failure::Environment(format!("{name}: {error}")),
-    })?;
     if device.digest.is_none() {
         let text = format!("{name}: not compared with a spec; name it to be sure that the device runs its controller");
         ui.progress(&text);

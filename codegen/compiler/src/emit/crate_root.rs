@@ -3,12 +3,13 @@
 use crate::ir::Ir;
 
 /// Modules that a user of the crate sees; what stands at its root is in the law's `api.rs`.
-const PUBLIC: [&str; 14] = [
+const PUBLIC: [&str; 15] = [
     "dynamics",
     "hysteresis",
     "integrity",
     "kinematics",
     "limits",
+    "passes",
     "permitted",
     "sensing",
     "setpoint",

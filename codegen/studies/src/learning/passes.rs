@@ -7,7 +7,8 @@ use host_sim::closed_loop::RunError;
 use host_sim::platform::rig::{Bench, Request};
 use host_sim::word::status_words;
 use serde::Serialize;
-use specgen_runtime::playback::{self, Knot};
+use specgen_runtime::pass::{Course, Player};
+use specgen_runtime::playback::{self, Knot, UNIT};
 
 use super::motion::Motion;
 use super::table::knots;
@@ -25,10 +26,12 @@ const GROWS: f64 = 1.5;
 /// Why nothing is learned.
 #[derive(Debug)]
 pub enum LearnError {
-    /// The machine does not make a pass.
+    /// The simulated machine does not make a pass.
     Run(RunError),
     /// A pass with these status bits: the controller refused a set-point, or believed no gauge.
     Status(u32),
+    /// The machine ended a pass; why is known to whoever operates it.
+    Ended,
 }
 
 impl fmt::Display for LearnError {
@@ -41,6 +44,7 @@ impl fmt::Display for LearnError {
                  workspace in the spec",
                 status_words(*status)
             ),
+            Self::Ended => f.write_str("the machine ended a pass"),
         }
     }
 }
@@ -56,7 +60,7 @@ impl From<RunError> for LearnError {
 /// What a machine showed in a pass, tick by tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
-    /// Set-point less what the gauges showed, at the end of each tick, m and rad.
+    /// Set-point less what the gauges showed, at the end of each tick, m and rad: the mean over the ticks from knot to knot.
     pub measured: Vec<[f64; 6]>,
     /// Set-point less true pose; what was measured, where nothing else is known.
     pub real: Vec<[f64; 6]>,
@@ -70,29 +74,48 @@ pub trait Repeating {
     ///
     /// # Errors
     /// If the machine does not make it.
-    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, RunError>;
+    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, LearnError>;
 }
 
+/// The course of a pass, in which the trajectory of this number is played.
+#[must_use]
+pub fn course(motion: &Motion, spacing: u32, trajectory: u32) -> Course {
+    Course { spacing, before: motion.scored.start as u32, ticks: motion.corrected as u32, trajectory }
+}
+
+/// Errors tick by tick, m and rad, as they were kept from knot to knot.
+#[must_use]
+pub fn held(errors: &[Knot], spacing: u32, ticks: usize) -> Vec<[f64; 6]> {
+    let metres = |knot: &Knot| knot.map(|value| f64::from(value) * UNIT);
+    errors.iter().flat_map(|knot| std::iter::repeat_n(metres(knot), spacing as usize)).take(ticks).collect()
+}
+
+/// Root mean square of the translation's error as a norm, nm, of what a pass kept.
+#[must_use]
+pub fn translation_nm(errors: &[Knot]) -> f64 {
+    let squares = errors.iter().flat_map(|knot| &knot[..3]).map(|value| f64::from(*value) * f64::from(*value));
+    libm::sqrt(squares.sum::<f64>() / errors.len() as f64) * UNIT * 1e9
+}
+
+/// The same player as on a machine.
 impl Repeating for Bench<'_> {
-    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, RunError> {
-        let ticks = motion.targets.len();
-        let mut seen = Seen { measured: Vec::with_capacity(ticks), real: Vec::with_capacity(ticks), status: 0 };
-        let mut last: Option<[f64; 6]> = None;
-        for (tick, target) in motion.targets.iter().enumerate() {
-            let correction = playback::at(knots, spacing, tick as u32);
+    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, LearnError> {
+        let course = course(motion, spacing, 0);
+        let count = course.knots() as usize;
+        let mut memory = vec![[0; 6]; 2 * count];
+        let mut player = Player::<f64>::new(&mut memory);
+        let known = player.put(0, knots.iter().copied().take(count)) && player.begin(course);
+        debug_assert!(known, "{course:?}");
+        let mut real = Vec::with_capacity(motion.targets.len());
+        let mut status = 0;
+        for target in &motion.targets {
+            let correction = player.give().map_or([0.0; 6], |given| given.correction);
             let done = self.tick(&Request { correction, ..Request::stream(*target) })?;
-            let off = |pose: &[f64; 6], target: &[f64; 6]| std::array::from_fn(|axis| target[axis] - pose[axis]);
-            // The gauges are read at the beginning of a tick: what they show is the end of the one before.
-            if let Some(target) = last {
-                seen.measured.push(off(&done.measured, &target));
-            }
-            last = Some(done.target);
-            seen.real.push(off(&done.pose, &done.target));
-            seen.status |= done.status;
+            player.keep(&done.target, &done.measured, done.status);
+            status |= done.status;
+            real.push(std::array::from_fn(|axis| done.target[axis] - done.pose[axis]));
         }
-        // The pass ends at rest: its last tick is as the one before.
-        seen.measured.extend(seen.measured.last().copied());
-        Ok(seen)
+        Ok(Seen { measured: held(player.errors(), spacing, motion.corrected), real, status })
     }
 }
 
@@ -150,7 +173,7 @@ pub struct Learned {
 
 /// Makes `count` passes beyond the first and learns from each; the best is kept, and an error that grows ends it. One pass before them
 /// is not counted: only after it is the hysteresis as in every repetition. `begin` is the
-/// correction of the first pass, none of no knots. `watch` hears of each pass and may end it.
+/// correction of the first pass, none of no knots. A machine that ends a pass later than the first ends learning. `watch` hears of each pass and may end it.
 ///
 /// # Errors
 /// If the machine does not make a pass, or not the motion.
@@ -167,7 +190,11 @@ pub fn learn(
     let mut learned = Learned { passes: Vec::new(), best: 0, knots: played.clone(), grew: false };
     followed(machine.pass(motion, &played, spacing)?)?;
     for number in 0..=count {
-        let seen = followed(machine.pass(motion, &played, spacing)?)?;
+        let seen = match machine.pass(motion, &played, spacing) {
+            // What was learned so far is worth keeping.
+            Err(LearnError::Ended) if number > 0 => break,
+            seen => followed(seen?)?,
+        };
         let pass = Pass::of(&seen, motion);
         let go_on = watch(number, &pass);
         learned.passes.push(pass);

@@ -1,6 +1,8 @@
 //! The learned correction as a table: knots, and a file that says for what they were learned.
 
 use std::fmt;
+use std::fs;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use specgen_runtime::playback::{Knot, UNIT};
@@ -9,7 +11,7 @@ use specgen_runtime::playback::{Knot, UNIT};
 const FORMAT: &str = "specgen correction 1";
 
 /// A correction that was learned.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
     /// What the file is.
@@ -22,6 +24,10 @@ pub struct Table {
     pub motion: String,
     /// Ticks from knot to knot.
     pub spacing: u32,
+    /// Ticks of rest before the motion.
+    pub before: u32,
+    /// Where the motion begins, in the user's coordinates, m and rad.
+    pub start: [f64; 6],
     /// Knots: pm and prad.
     pub knots: Vec<Knot>,
 }
@@ -29,6 +35,8 @@ pub struct Table {
 /// Why a file is not taken.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TableError {
+    /// It cannot be read.
+    Unread(String),
     /// It is none.
     Format(String),
     /// It is of another spec, machine or motion: what, there, here.
@@ -38,6 +46,7 @@ pub enum TableError {
 impl fmt::Display for TableError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Unread(why) => f.write_str(why),
             Self::Format(why) => write!(f, "this is no correction that `specgen learn` wrote: {why}"),
             Self::Other(what, there, here) => {
                 write!(f, "it was learned for the {what} `{there}`, not `{here}`; learn anew, without --from")
@@ -49,11 +58,16 @@ impl fmt::Display for TableError {
 impl std::error::Error for TableError {}
 
 impl Table {
-    /// A table for a spec (by its digest), a machine and a motion.
+    /// A table for the spec of a digest, a machine and a motion, by its name, from this start on; `spacing` and `before` in ticks.
     #[must_use]
-    pub fn new(digest: &str, machine: &str, motion: &str, spacing: u32, knots: Vec<Knot>) -> Self {
+    pub fn new(
+        [digest, machine, motion]: [&str; 3],
+        [spacing, before]: [u32; 2],
+        start: [f64; 6],
+        knots: Vec<Knot>,
+    ) -> Self {
         let [digest, machine, motion] = [digest, machine, motion].map(str::to_owned);
-        Self { format: FORMAT.to_owned(), digest, machine, motion, spacing, knots }
+        Self { format: FORMAT.to_owned(), digest, machine, motion, spacing, before, start, knots }
     }
 
     /// Its file: JSON, a knot a line.
@@ -61,7 +75,7 @@ impl Table {
     pub fn to_json(&self) -> String {
         let head = serde_json::json!({
             "format": self.format, "digest": self.digest, "machine": self.machine, "motion": self.motion,
-            "spacing": self.spacing,
+            "spacing": self.spacing, "before": self.before, "start": self.start,
         });
         let lines: Vec<String> = self.knots.iter().map(|knot| format!("{knot:?}")).collect();
         let head = head.to_string();
@@ -69,6 +83,14 @@ impl Table {
     }
 
     /// The table of a file.
+    ///
+    /// # Errors
+    /// If it cannot be read, or is none.
+    pub fn of_file(path: &Path) -> Result<Self, TableError> {
+        Self::read(&fs::read_to_string(path).map_err(|error| TableError::Unread(error.to_string()))?)
+    }
+
+    /// The table of a file's text.
     ///
     /// # Errors
     /// If it is none.
@@ -79,6 +101,9 @@ impl Table {
         }
         if table.spacing == 0 {
             return Err(TableError::Format("`spacing` is 0, expected a number of ticks".to_owned()));
+        }
+        if !table.start.iter().all(|place| place.is_finite()) {
+            return Err(TableError::Format("`start` is no pose".to_owned()));
         }
         Ok(table)
     }
@@ -154,7 +179,8 @@ mod tests {
 
     #[test]
     fn a_table_comes_back_and_is_refused_for_anything_else() {
-        let table = Table::new("d1", "stage 7", "case-1 10 Hz", 5, vec![[1, -2, 3, 4, 5, i32::MIN]; 3]);
+        let knots = vec![[1, -2, 3, 4, 5, i32::MIN]; 3];
+        let table = Table::new(["d1", "stage 7", "case-1 10 Hz"], [5, 7], [0.1; 6], knots);
         let back = Table::read(&table.to_json()).unwrap();
         assert_eq!(back, table);
         assert_eq!(back.is_for("d1", "stage 7", "case-1 10 Hz"), Ok(()));

@@ -25,20 +25,23 @@ pub struct Update {
     fade: [usize; 2],
     /// Ticks of rest that a pass begins with.
     rest: usize,
+    /// Ticks that an error is the mean of.
+    spacing: usize,
     transforms: [Arc<dyn Fft<f64>>; 2],
 }
 
 impl Update {
-    /// For passes of a motion.
+    /// For passes of a motion whose errors are means over `spacing` ticks each, which lose a part of what is fast.
     #[must_use]
-    pub fn new(learnable: &Learnable, motion: &Motion, convergence: &Convergence) -> Self {
-        Self::of(learnable, motion, convergence.band[1], |frequencies| {
+    pub fn new(learnable: &Learnable, motion: &Motion, convergence: &Convergence, spacing: u32) -> Self {
+        let width = f64::from(spacing) * learnable.closed_loop.period;
+        Self::of(learnable, motion, convergence.band[1], spacing, |frequencies| {
             let responses = learnable.nominal(frequencies);
             responses
                 .iter()
                 .zip(frequencies)
                 .map(|(response, hertz)| {
-                    let share = convergence.share(*hertz);
+                    let share = convergence.share(*hertz) / kept(hertz * width);
                     let part = inverse(response).map(|row| row.map(|value| value.map(|part| share * part)));
                     (part, convergence.passed(*hertz))
                 })
@@ -51,6 +54,7 @@ impl Update {
         learnable: &Learnable,
         motion: &Motion,
         bandwidth: f64,
+        spacing: u32,
         design: impl FnOnce(&[f64]) -> Vec<(Matrix6c, f64)>,
     ) -> Self {
         let period = learnable.closed_loop.period;
@@ -68,6 +72,7 @@ impl Update {
             length,
             fade: FADE.map(|time| libm::round(time / period) as usize),
             rest: motion.scored.start,
+            spacing: spacing as usize,
             transforms: [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)],
         }
     }
@@ -81,7 +86,7 @@ impl Update {
     #[must_use]
     pub fn prepared(learnable: &Learnable, motion: &Motion, bandwidth: f64) -> Vec<[f64; 6]> {
         let closed_loop = &learnable.closed_loop;
-        let update = Self::of(learnable, motion, bandwidth, |frequencies| {
+        let update = Self::of(learnable, motion, bandwidth, 1, |frequencies| {
             let channel = learnable.open_loop(frequencies);
             channel
                 .iter()
@@ -154,12 +159,14 @@ impl Update {
             .collect()
     }
 
-    /// Variance of white noise in each mode of an error that begins at rest: half of the mean square of its differences there.
+    /// Variance of white noise in each mode of an error that begins at rest, of single ticks: half of the mean square of the differences
+    /// of its means there, times the ticks of one.
     fn noise(&self, error: &[[f64; 6]]) -> [f64; 6] {
-        let rest: Vec<[f64; 6]> = error.iter().take(self.rest).map(|pose| mapped(&self.to_modal, pose)).collect();
+        let rest: Vec<[f64; 6]> =
+            error.iter().take(self.rest).step_by(self.spacing).map(|pose| mapped(&self.to_modal, pose)).collect();
         std::array::from_fn(|mode| {
             let sum: f64 = rest.windows(2).map(|pair| libm::pow(pair[1][mode] - pair[0][mode], 2.0)).sum();
-            0.5 * sum / rest.len() as f64
+            0.5 * sum * self.spacing as f64 / rest.len() as f64
         })
     }
 
@@ -181,6 +188,15 @@ impl Update {
         };
         part(tick, self.fade[0]) * part(ticks - 1 - tick, self.fade[1])
     }
+}
+
+/// What means over a time of which a period is `1/cycles`, held for as long, leave of a frequency: sinc²; half where it is less, for little
+/// of that is let through.
+fn kept(cycles: f64) -> f64 {
+    let angle = 0.5 * TAU * cycles;
+    let part = if angle > 0.0 { libm::sin(angle) / angle } else { 1.0 };
+    let square = part * part;
+    if square > 0.5 { square } else { 0.5 }
 }
 
 fn mapped(matrix: &Matrix6, vector: &[f64; 6]) -> [f64; 6] {

@@ -1,30 +1,40 @@
-//! What the operator wants of the tick to come: the command, or set-points of a wave.
+//! What the operator wants of the tick to come: the command, set-points of a wave, or what a pass corrects.
 
 use controller::supervised::{Phase, Request};
 use controller::waves::{self, Wave};
-use controller::{COMMAND_WORDS, Config, Real};
+use controller::{COMMAND_WORDS, Config, Real, State, passes};
 use specgen_runtime::wave::{Settings, Stage};
 
-use crate::handover::Wish;
+use crate::handover::{Player, Wish};
 use crate::words::Command;
 
-/// Command and wave of the loop.
+/// Command, wave and pass of the loop.
 pub struct Setpoints {
     wish: Wish,
     wave: Wave,
     /// Set-points given by waves so far: a new wave goes on counting, or its first would look like an old one's last.
     sequence: u32,
     waving: bool,
+    /// Of the pass under way; or one that is over, until it is handed back.
+    player: Option<Player>,
 }
 
 impl Setpoints {
     pub fn new(config: &Config) -> Self {
         let wish = Wish { command: [0; COMMAND_WORDS], request: Request::None };
-        Self { wish, wave: Wave::new(waves::limits(config)), sequence: 0, waving: false }
+        Self { wish, wave: Wave::new(waves::limits(config)), sequence: 0, waving: false, player: None }
     }
 
+    /// During a pass the command is its own: only the request is taken.
     pub fn wish(&mut self, wish: Wish) {
-        self.wish = wish;
+        if !self.passes() {
+            self.wish.command = wish.command;
+        }
+        self.wish.request = wish.request;
+    }
+
+    fn passes(&self) -> bool {
+        self.player.as_ref().is_some_and(|player| player.is_running())
     }
 
     pub fn request(&self) -> Request {
@@ -45,14 +55,56 @@ impl Setpoints {
         self.wave.stop();
     }
 
+    /// Begins the pass that a player was told, if no wave is under way. The loop never has two.
+    pub fn pass(&mut self, mut player: Player) {
+        if self.wave.stage() != Stage::Idle {
+            player.abort();
+        }
+        if let Some(other) = self.player.replace(player) {
+            // Not reached: there is one player. Released here it would be by the real-time thread.
+            core::mem::forget(other);
+        }
+    }
+
+    pub fn abort_pass(&mut self) {
+        if let Some(player) = &mut self.player {
+            player.abort();
+        }
+    }
+
+    /// Keeps what a tick of a pass showed.
+    pub fn keep(&mut self, state: &State, status: u32) {
+        if let (Some(player), Some([target, pose])) = (&mut self.player, passes::shown(state)) {
+            player.keep(&target, &pose, status);
+        }
+    }
+
+    /// The player of a pass that is over: nothing is corrected from here on.
+    pub fn take_player(&mut self) -> Option<Player> {
+        let player = self.player.take_if(|player| !player.is_running())?;
+        passes::end(&mut self.wish.command);
+        Some(player)
+    }
+
+    /// Back, where it could not be handed over yet.
+    pub fn put_player(&mut self, player: Player) {
+        self.player = Some(player);
+    }
+
     /// Whether the last command was a wave's.
     pub fn waving(&self) -> bool {
         self.waving
     }
 
-    /// Command of the tick to come. A machine that does not run, by its last `phase`, follows no wave: it ends at once, for
-    /// going on with it later would be a jump.
+    /// Command of the tick to come. A machine that does not run, by its last `phase`, follows no wave and no pass: they end at once, for
+    /// going on later would be a jump.
     pub fn next(&mut self, phase: Phase, config: &Config) -> Command {
+        if phase != Phase::Running {
+            self.abort_pass();
+        }
+        if let Some(given) = self.player.as_mut().and_then(|player| player.give()) {
+            passes::write(&given, &mut self.wish.command);
+        }
         let mut command = self.wish.command;
         self.waving = false;
         if self.wave.stage() != Stage::Idle {

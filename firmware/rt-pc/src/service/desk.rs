@@ -1,11 +1,12 @@
 //! What is answered over the link.
 
 use controller::supervised::{Cause, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
-use controller::{COMMAND_WORDS, CONFIG_WORDS, Config, DESCRIPTION, PLACE_WORDS, Real};
+use controller::{COMMAND_WORDS, CONFIG_WORDS, Config, DESCRIPTION, PLACE_WORDS, Real, passes};
 use specgen_link::{
-    Bytes, Counted, Counters, Device, Health, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request,
-    Status, WaveAction, put_words,
+    Bytes, Counted, Counters, Device, Health, Identity, KNOT, KNOTS, PassAction, RecorderAction, RecorderStatus,
+    Refusal, Reply, Request, Status, WaveAction, put_knots, put_words,
 };
+use specgen_runtime::pass::Course;
 use specgen_runtime::wave::{self, Settings};
 
 use crate::capture::CAPACITY;
@@ -26,11 +27,12 @@ pub struct Desk<'a> {
     /// Now, ns.
     pub now: u64,
     pub words: [u8; size_of::<[u64; CONFIG_WORDS]>()],
+    pub knots: [u8; KNOTS * KNOT],
 }
 
 impl<'a> Desk<'a> {
     pub fn new(console: &'a mut Console, host: HostId, events: &'a mut u32, now: u64) -> Self {
-        Self { console, host, events, now, words: [0; size_of::<[u64; CONFIG_WORDS]>()] }
+        Self { console, host, events, now, words: [0; size_of::<[u64; CONFIG_WORDS]>()], knots: [0; KNOTS * KNOT] }
     }
 
     fn status(&self) -> Reply<'static> {
@@ -92,8 +94,8 @@ impl<'a> Desk<'a> {
     }
 
     fn command(&mut self, words: Bytes<'_>) -> Result<(), Refusal> {
-        // A wave makes the set-points: two at once would be a contradiction.
-        if self.console.waving() {
+        // A wave makes the set-points, and a pass: two at once would be a contradiction.
+        if self.console.is_engaged() {
             return Err(Refusal::State);
         }
         let expected = COMMAND_WORDS as u16;
@@ -122,6 +124,39 @@ impl<'a> Desk<'a> {
         let settings = Settings::<Real>::from_words(&settings)
             .map_err(|refused| refused.word().map_or(Refusal::State, |index| Refusal::Word { index: index as u16 }))?;
         self.console.start_wave(&settings).map_err(refusal)
+    }
+
+    fn knots(&mut self, first: u32, knots: Bytes<'_>) -> Result<(), Refusal> {
+        let knots = knots.knots().ok_or(Refusal::Message)?;
+        self.console.put_knots(first, knots).map_err(refusal)
+    }
+
+    fn pass(&mut self, action: PassAction) -> Reply<'static> {
+        if action != PassAction::Look {
+            let others = !self.console.operator.may_order(self.host, self.now) || self.console.is_full();
+            let done = match action {
+                _ if others => Err(Refusal::Busy),
+                PassAction::Begin { spacing, before, ticks, trajectory } => self.take().and_then(|()| {
+                    self.console.begin_pass(Course { spacing, before, ticks, trajectory }).map_err(refusal)
+                }),
+                _ => {
+                    self.console.abort_pass();
+                    Ok(())
+                }
+            };
+            if let Err(refused) = done {
+                return Reply::Refused(refused);
+            }
+        }
+        self.console.passes.status().map_or(Reply::Refused(Refusal::Unsupported), Reply::Pass)
+    }
+
+    fn errors(&mut self, offset: u32) -> Reply<'_> {
+        let Some(errors) = self.console.passes.errors() else { return Reply::Refused(Refusal::State) };
+        let total = u32::try_from(errors.len() * KNOT).unwrap_or(u32::MAX);
+        let start = usize::try_from(offset).unwrap_or(usize::MAX);
+        let bytes = Bytes(put_knots(errors, start, &mut self.knots));
+        Reply::Chunk { offset, total, bytes }
     }
 
     fn recorder(&mut self, action: RecorderAction) -> Reply<'static> {
@@ -198,6 +233,12 @@ impl Device for Desk<'_> {
                 None => Reply::Refused(Refusal::State),
             },
             Request::Wave { action, words } => self.ordered(|desk| desk.wave(action, words)),
+            Request::Knots { .. } | Request::Pass { .. } | Request::Errors { .. } if !passes::POSSIBLE => {
+                Reply::Refused(Refusal::Unsupported)
+            }
+            Request::Knots { first, knots } => self.ordered(|desk| desk.knots(first, knots)),
+            Request::Pass { action } => self.pass(action),
+            Request::Errors { offset } => self.errors(offset),
             Request::Stop => {
                 self.console.operator.ramp_down(self.now);
                 Reply::Done

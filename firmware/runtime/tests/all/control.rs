@@ -3,6 +3,7 @@
 use core::f64::consts::TAU;
 
 use specgen_runtime::feedback::winds_up;
+use specgen_runtime::pass::{Course, MOST_TICKS, Player, Stage};
 use specgen_runtime::playback::{self, Knot};
 use specgen_runtime::{
     ControlMode, Correction, CorrectionLimit, Damping, Estimate, Integral, Law, NotchState, Resonator, Section,
@@ -133,6 +134,80 @@ fn a_table_is_played_within_its_knots() {
         let now: [f64; 6] = playback::at(&level, 6, tick);
         assert!(now.iter().all(|now| (now - 700.0 * playback::UNIT).abs() < 1e-24));
     }
+}
+
+/// A pass as its definition says it, tick by tick, with f64 sums of its own: correction by the spline, errors by means of whole knot intervals.
+#[test]
+fn a_pass_plays_its_table_and_keeps_the_mean_error_between_knots() {
+    const COURSE: Course = Course { spacing: 7, before: 5, ticks: 40, trajectory: 3 };
+    let knots: Vec<Knot> = (0..6).map(|k| std::array::from_fn(|axis| (k * 100 + axis as i32) * 11 - 300)).collect();
+    let mut memory = [[9; 6]; 16];
+    let mut player = Player::<f64>::new(&mut memory);
+    assert_eq!((player.stage(), player.capacity(), player.errors().len()), (Stage::None, 8, 0));
+    assert!(player.put(0, knots.iter().copied()));
+    let target =
+        |tick: u32| -> [f64; 6] { std::array::from_fn(|axis| f64::from(tick * tick) * 1e-9 + axis as f64 * 1e-8) };
+    let pose = |tick: u32| -> [f64; 6] { std::array::from_fn(|axis| f64::from(tick) * (3e-9 - axis as f64 * 1e-10)) };
+    for (limited, last) in [(false, 40), (true, 20)] {
+        assert!(player.begin(COURSE) && !player.begin(COURSE) && !player.put(0, knots.iter().copied()));
+        for tick in 0..=last {
+            let given = player.give().unwrap();
+            assert_eq!(given.correction, playback::at::<f64>(&knots, 7, tick), "{tick}");
+            assert_eq!(given.begins, (tick == 5).then_some(3), "{tick}");
+            player.keep(&target(tick), &pose(tick), 1 << (tick % 3));
+        }
+        if limited {
+            player.abort();
+        }
+        let (stage, count) = if limited { (Stage::Aborted, 2) } else { (Stage::Complete, 6) };
+        assert_eq!((player.stage(), player.give(), player.status(), player.begun()), (stage, None, 7, Some(3)));
+        assert_eq!(player.errors().len(), count);
+        for (index, found) in (0_u32..).zip(player.errors()) {
+            let ticks: Vec<u32> = (7 * index..(7 * index + 7).min(40)).collect();
+            for (axis, found) in found.iter().enumerate() {
+                // What is shown at the end of tick n is read in tick n + 1.
+                let sum: f64 = ticks.iter().map(|tick| target(*tick)[axis] - pose(tick + 1)[axis]).sum();
+                let mean = sum / ticks.len() as f64 / playback::UNIT;
+                assert!((mean - f64::from(*found)).abs() <= 1.0, "{index} {axis}: {mean} {found}");
+            }
+        }
+    }
+}
+
+/// What is no pass, or too long, is refused and changes nothing; numbers that are none, and hosts that count wrongly, harm nothing.
+#[test]
+fn what_is_no_pass_is_refused() {
+    let mut memory = [[0; 6]; 5];
+    let mut player = Player::<f32>::new(&mut memory);
+    assert_eq!(player.capacity(), 2);
+    let good = Course { spacing: 10, before: 0, ticks: 20, trajectory: u32::MAX };
+    for bad in [
+        Course { spacing: 0, ..good },
+        Course { ticks: 0, ..good },
+        Course { before: 20, ..good },
+        Course { ticks: 21, ..good },
+        Course { spacing: u32::MAX, ticks: u32::MAX, ..good },
+        Course { spacing: 1, ticks: MOST_TICKS, ..good },
+    ] {
+        assert!(!player.begin(bad), "{bad:?}");
+    }
+    let level = [[1; 6]; 3];
+    assert!(!player.put(0, level.into_iter()) && !player.put(usize::MAX, level.into_iter()));
+    assert!(!player.put(1, level.into_iter().take(2)) && player.put(1, level.into_iter().take(1)));
+    assert!(player.begin(good));
+    for _ in 0..30 {
+        let _ = player.give();
+        player.keep(&[f32::NAN; 6], &[f32::INFINITY; 6], 0);
+    }
+    assert_eq!((player.stage(), player.errors()), (Stage::Complete, &[[0; 6]; 2][..]));
+    player.abort();
+    assert_eq!(player.stage(), Stage::Complete);
+    assert!(player.begin(good));
+    assert_eq!((player.errors().len(), player.begun()), (0, None));
+    for stage in [Stage::None, Stage::Running, Stage::Complete, Stage::Aborted] {
+        assert_eq!(Stage::from_word(stage.word()), Some(stage));
+    }
+    assert_eq!(Stage::from_word(4), None);
 }
 
 #[test]

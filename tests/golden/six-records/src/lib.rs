@@ -37,6 +37,7 @@ pub mod integrity;
 pub mod kinematics;
 pub mod limits;
 mod machine;
+pub mod passes;
 pub mod permitted;
 pub mod sensing;
 pub mod snapshot;

@@ -94,6 +94,16 @@ impl<P: Port> Operator<P> {
         MachineWord { phase, cause, amplifier_on }.to_string()
     }
 
+    /// Number of the phase.
+    pub fn phase(&self) -> u8 {
+        self.session.status().phase
+    }
+
+    /// Whether the settings in force are these.
+    pub fn is_set_to(&mut self, settings: &[u64]) -> Result<bool, ClientError> {
+        Ok(self.session.config()? == settings)
+    }
+
     pub fn is_powered(&self) -> bool {
         self.session.status().amplifier_on
     }
@@ -160,7 +170,7 @@ impl<P: Port> Operator<P> {
                 self.motion().map(|_| ()).map_err(nonsense)
             }
             Order::Goto(name) if name != ZERO && !marks.contains(&name.as_str()) => Err(nonsense(self.no_mark(name))),
-            Order::Play(name) => self.trajectory(name).map(|_| ()).map_err(nonsense),
+            Order::Play { name, correction } => self.playable(name, correction.as_ref()).map(|_| ()).map_err(nonsense),
             Order::Gains(gains) => self.gains_of(gains).map(|_| ()).map_err(nonsense),
             Order::Move { .. }
             | Order::Frame(_)
@@ -201,7 +211,7 @@ impl<P: Port> Operator<P> {
             | Order::Frame(_)
             | Order::Mark(_)
             | Order::Goto(_)
-            | Order::Play(_)
+            | Order::Play { .. }
             | Order::Mode(_)
             | Order::Gains(_) => self.of_platform(order, &line, ui)?,
             Order::Config => {
@@ -294,7 +304,7 @@ impl<P: Port> Operator<P> {
         self.look()
     }
 
-    fn wait(&mut self, until: Until, limit: Duration, ui: &Ui) -> Result<(), Ended> {
+    pub(super) fn wait(&mut self, until: Until, limit: Duration, ui: &Ui) -> Result<(), Ended> {
         let start = Instant::now();
         loop {
             let there = match until {
@@ -427,7 +437,7 @@ impl<P: Port> Operator<P> {
 
     /// Ramps down and waits until the amplifiers are off; what came of it.
     pub fn ramp_down(&mut self, ui: &Ui) -> Result<String, ClientError> {
-        ui.progress("interrupted: ramping down");
+        ui.progress("ramping down");
         self.session.supervise(Request::RampDown)?;
         let start = Instant::now();
         while start.elapsed() < DOWN {

@@ -284,14 +284,7 @@ impl<P: Port> Operator<P> {
                 self.go(user)?;
                 self.note(line, &Moves { pose: self.seen(&user) }, ui);
             }
-            Order::Play(name) => {
-                let selector = self.trajectory(name).map_err(Ended::Refused)?;
-                let command = [("command", "trajectory".to_owned()), ("selector", selector.to_string())];
-                let command = command.map(|(name, value)| (name.to_owned(), value));
-                let words = self.session.assign(&command).map_err(Ended::Refused)?;
-                self.send(words)?;
-                self.note(line, &Plain("done".to_owned()), ui);
-            }
+            Order::Play { name, correction } => self.play(name, correction.as_ref(), line, ui)?,
             Order::Mode(wanted) => {
                 self.set_mode(*wanted)?;
                 self.show_gains(None, line, ui)?;

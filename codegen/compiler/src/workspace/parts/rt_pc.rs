@@ -24,6 +24,7 @@ pub const PART: Part = Part {
         "src/main.rs",
         "src/operator.rs",
         "src/options.rs",
+        "src/passes.rs",
         "src/record.rs",
         "src/service.rs",
         "src/service/clients.rs",

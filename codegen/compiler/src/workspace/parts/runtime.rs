@@ -36,6 +36,7 @@ pub const PART: Part = Part {
         "src/mode.rs",
         "src/motion.rs",
         "src/notch.rs",
+        "src/pass.rs",
         "src/permitted.rs",
         "src/playback.rs",
         "src/real.rs",

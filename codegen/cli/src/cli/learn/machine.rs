@@ -1,0 +1,102 @@
+//! Passes over a machine at the end of a link.
+
+use std::time::{Duration, Instant};
+
+use specgen_compiler::compile::Compiled;
+use specgen_compiler::ir::Path as Poses;
+use specgen_link::client::Port;
+use specgen_operate::{ALIVE, Order, Until};
+use specgen_runtime::playback::Knot;
+use specgen_runtime::supervisor::{Phase, Request};
+use specgen_studies::learning::{LearnError, Motion, Repeating, Seen, course, held};
+
+use crate::cli::operate::{Ended, Operator};
+use crate::cli::ui::{Failure, Ui};
+
+/// How long arming, and the way to the bias pose, may take.
+const ARMING: Duration = Duration::from_secs(120);
+
+/// A trajectory of the spec, as its machine plays it.
+pub struct Own {
+    /// Its number.
+    number: u32,
+    /// Where it begins, as the controller has it, in the user's coordinates, m and rad.
+    pub start: [f64; 6],
+}
+
+impl Own {
+    /// Of a name.
+    ///
+    /// # Errors
+    /// There is none, or not one with an end.
+    pub fn named(name: Option<&str>, compiled: &Compiled) -> Result<Self, Failure> {
+        let known = compiled.ir.task_space.iter().flat_map(|task| &task.setpoints.trajectories);
+        let names: Vec<&str> = known.clone().map(|one| one.name.as_str()).collect();
+        let found = known.enumerate().find(|(_, one)| Some(one.name.as_str()) == name);
+        match found.map(|(number, one)| (number as u32, &one.path)) {
+            Some((number, Poses::Segments { start, .. })) => Ok(Self { number, start: *start }),
+            Some(_) => Err(Failure::Usage("a machine learns trajectories of the paper's kinds, not waveforms".to_owned())),
+            None if names.is_empty() => Err(Failure::Usage(
+                "a machine learns the trajectories that it has, and this spec has none: add a [[trajectory]], and build anew"
+                    .to_owned(),
+            )),
+            None => Err(Failure::Usage(format!(
+                "a machine learns the trajectories that it has: name one of them by --trajectory: {}",
+                names.join(", ")
+            ))),
+        }
+    }
+}
+
+/// A machine, and whoever operates it.
+pub struct Remote<'a, P> {
+    pub operator: &'a mut Operator<P>,
+    pub ui: &'a Ui,
+    pub own: &'a Own,
+    /// Why it ended a pass.
+    pub ended: Option<Ended>,
+}
+
+impl<P: Port> Remote<'_, P> {
+    /// Brings it to its bias pose. One that runs already is taken as it is.
+    pub fn arm(&mut self) -> Result<(), Ended> {
+        let wait = |until| Order::Wait { until, limit: ARMING };
+        let stands = u64::from(self.operator.phase());
+        if stands == Phase::Disarmed.word() {
+            self.operator.obey(&Order::Ask(Request::Arm), self.ui)?;
+            let start = Instant::now();
+            while u64::from(self.operator.phase()) == Phase::Disarmed.word() {
+                if start.elapsed() > ARMING {
+                    return Err(Ended::Fault(
+                        "the machine does not arm; `specgen operate` with `status` says why".to_owned(),
+                    ));
+                }
+                self.operator.obey(&wait(Until::Passed(ALIVE)), self.ui)?;
+            }
+            self.operator.obey(&Order::Ask(Request::Run), self.ui)?;
+            self.operator.obey(&wait(Until::Phase(Phase::Running)), self.ui)?;
+        } else if stands != Phase::Running.word() {
+            return Err(Ended::Refused(format!(
+                "the machine is {}; learning begins with one that is disarmed or runs",
+                self.operator.stands()
+            )));
+        }
+        self.operator.obey(&wait(Until::Arrived), self.ui)
+    }
+}
+
+impl<P: Port> Repeating for Remote<'_, P> {
+    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, LearnError> {
+        let course = course(motion, spacing, self.own.number);
+        match self.operator.pass(&self.own.start, course, knots, self.ui) {
+            Ok(passed) => {
+                let measured = held(&passed.errors, spacing, motion.corrected);
+                Ok(Seen { real: measured.clone(), measured, status: passed.status })
+            }
+            Err(ended) => {
+                self.ended = Some(ended);
+                Err(LearnError::Ended)
+            }
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Passes: a trajectory of the device played under a correction, and what it keeps of the error.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use host_sim::word::status_words;
+use serde::Serialize;
+use specgen_link::client::{ClientError, Port};
+use specgen_link::{PassAction, PassStatus, Refusal};
+use specgen_operate::Until;
+use specgen_runtime::pass::{Course, Stage};
+use specgen_runtime::playback::Knot;
+use specgen_runtime::setpoint::BUSY;
+use specgen_studies::learning::{Table, translation_nm};
+
+use super::Ended;
+use super::operator::Operator;
+use crate::cli::ui::{Outcome, Ui};
+
+/// Rest before a pass, s: what rings after the way to its start has died away.
+const REST: f64 = 0.1;
+/// How often a pass is looked at.
+const LOOK: Duration = Duration::from_millis(5);
+/// How much longer than its ticks a pass may take.
+const LATER: Duration = Duration::from_secs(10);
+
+/// What a pass showed.
+pub struct Passed {
+    /// Means of the error from knot to knot.
+    pub errors: Vec<Knot>,
+    /// Status bits seen.
+    pub status: u32,
+}
+
+/// Answer to `play` under a correction.
+#[derive(Serialize)]
+pub struct Played {
+    correction: String,
+    /// Root mean square of the translation's error as the gauges show it, over the motion and the rest after it, nm.
+    error_nm: f64,
+    status: u32,
+}
+
+impl Outcome for Played {
+    fn text(&self) -> String {
+        let mut text = format!("played under {}: {:.1} nm rms by its gauges", self.correction, self.error_nm);
+        let words = status_words(self.status & !BUSY);
+        if !words.is_empty() {
+            // Writing to a String cannot fail.
+            let _ = write!(text, "; {}", words.replace('+', ", "));
+        }
+        text + "\n"
+    }
+}
+
+impl<P: Port> Operator<P> {
+    /// A trajectory by its name: its number, and the table of its correction.
+    ///
+    /// # Errors
+    /// There is no such trajectory; the file is no correction for it on this machine.
+    pub(super) fn playable(
+        &self,
+        name: &str,
+        correction: Option<&(PathBuf, String)>,
+    ) -> Result<(usize, Option<Table>), String> {
+        let number = self.trajectory(name)?;
+        let Some((path, machine)) = correction else { return Ok((number, None)) };
+        let digest = &self.session.description().digest;
+        let table = Table::of_file(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        table.is_for(digest, machine, &motion_name(name)).map_err(|error| format!("{}: {error}", path.display()))?;
+        Ok((number, Some(table)))
+    }
+
+    /// Plays a trajectory; under a correction from its start, which it is brought to first.
+    pub(super) fn play(
+        &mut self,
+        name: &str,
+        correction: Option<&(PathBuf, String)>,
+        line: &str,
+        ui: &Ui,
+    ) -> Result<(), Ended> {
+        let (number, table) = self.playable(name, correction).map_err(Ended::Refused)?;
+        let Some((table, (path, _))) = table.zip(correction) else {
+            let command = [("command", "trajectory".to_owned()), ("selector", number.to_string())];
+            let command = command.map(|(name, value)| (name.to_owned(), value));
+            let words = self.session.assign(&command).map_err(Ended::Refused)?;
+            self.send(words)?;
+            self.note(line, &super::answer::Plain("done".to_owned()), ui);
+            return Ok(());
+        };
+        let (spacing, before) = (table.spacing, table.before);
+        let ticks = u32::try_from(table.knots.len()).unwrap_or(u32::MAX).saturating_mul(spacing);
+        let course = Course { spacing, before, ticks, trajectory: number as u32 };
+        let passed = self.pass(&table.start, course, &table.knots, ui)?;
+        let motion = passed.errors.get((before / spacing) as usize..).unwrap_or_default();
+        let error_nm = translation_nm(motion);
+        self.note(line, &Played { correction: shown(path), error_nm, status: passed.status }, ui);
+        Ok(())
+    }
+
+    /// Goes to `start` (the controller's coordinates, m and rad), rests there, and makes a pass under the correction of these knots.
+    pub fn pass(&mut self, start: &[f64; 6], course: Course, knots: &[Knot], ui: &Ui) -> Result<Passed, Ended> {
+        let PassStatus { capacity, .. } = self.session.pass(PassAction::Look).map_err(refused)?;
+        if course.knots() > capacity {
+            return Err(Ended::Refused(format!(
+                "a pass of {} knots is more than the {capacity} that the device has room for; learn with a lower --bandwidth, which \
+                 needs fewer, or a shorter trajectory",
+                course.knots()
+            )));
+        }
+        self.go(*start)?;
+        self.wait(Until::Arrived, Duration::from_secs(60), ui)?;
+        let rested = self.session.status().tick + (REST / self.session.period()) as u64;
+        while self.session.status().tick < rested {
+            std::thread::sleep(LOOK);
+            self.look()?;
+        }
+        let mut whole = knots.to_vec();
+        whole.resize(course.knots() as usize, [0; 6]);
+        self.session.put_knots(&whole).map_err(refused)?;
+        let Course { spacing, before, ticks, trajectory } = course;
+        self.ordered = true;
+        self.session.pass(PassAction::Begin { spacing, before, ticks, trajectory }).map_err(refused)?;
+        let limit = Duration::from_secs_f64(f64::from(ticks) * self.session.period()) + LATER;
+        let begun = Instant::now();
+        let status = loop {
+            std::thread::sleep(LOOK);
+            self.look()?;
+            self.show(ui);
+            let status = self.session.pass(PassAction::Look).map_err(refused)?;
+            if Stage::from_word(status.stage) != Some(Stage::Running) {
+                break status;
+            }
+            if begun.elapsed() > limit {
+                self.session.pass(PassAction::Abort).map_err(refused)?;
+                return Err(Ended::Fault(format!("the pass does not end; the machine is {}", self.stands())));
+            }
+        };
+        if Stage::from_word(status.stage) != Some(Stage::Complete) {
+            return Err(Ended::Fault(format!("the pass was ended; the machine is {}", self.stands())));
+        }
+        // What it began is what is commanded.
+        let errors = self.session.errors().map_err(refused)?;
+        Ok(Passed { errors, status: status.status })
+    }
+}
+
+/// What a correction says of a trajectory of the spec that a machine plays.
+pub fn motion_name(trajectory: &str) -> String {
+    format!("trajectory {trajectory}")
+}
+
+fn shown(path: &Path) -> String {
+    path.display().to_string()
+}
+
+fn refused(error: ClientError) -> Ended {
+    match error {
+        ClientError::Refused(Refusal::Unsupported) => Ended::Refused(
+            "the device takes no correction; write correction = \"2 um\" in [control] of its spec, then build it anew"
+                .to_owned(),
+        ),
+        ClientError::Refused(Refusal::State) => Ended::Refused(
+            "not now: a pass begins with a machine that runs and rests, with no wave or other pass under way"
+                .to_owned(),
+        ),
+        other => other.into(),
+    }
+}
