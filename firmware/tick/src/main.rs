@@ -1,5 +1,5 @@
 //! A board's tick, its drivers included, between stand-ins for its converters: the emulator writes down which instructions it
-//! takes, specgen prices them. Wave, recorder and new settings are there as on a board that has everything to do at once.
+//! takes, specgen prices them. Wave, pass, recorder and new settings are there as on a board that has everything to do at once.
 //!
 //! Reads rows of INPUT_WORDS words, a closed loop from rest, from `input.bin` in the emulator's working folder, and what the
 //! board's buses take from `rates.bin`; writes what each tick did with them into `counts.bin` ([`parts::COUNTS`] words). A tick
@@ -23,7 +23,7 @@ mod start;
 use controller::sensing::CONVERTER;
 use controller::supervised::{Machine, Phase, Request};
 use controller::waves::{self, Wave};
-use controller::{COMMAND_WORDS, Config, INPUT_WORDS, Real};
+use controller::{COMMAND_WORDS, Config, INPUT_WORDS, Real, passes};
 use parts::{ADC_BITS, Bench, Bus, Delay, Line, Pin, REFERENCE, Rates, Role};
 use semihosting::{Exit, File, exit};
 use specgen_board::{Board, Exchange, Kept, Noticed, catch_up};
@@ -31,11 +31,17 @@ use specgen_hal::CHANNELS;
 use specgen_hal::ad5686r::Ad5686rPair;
 use specgen_hal::ad7606::Ad7606;
 use specgen_runtime::Real as _;
+use specgen_runtime::pass::{Course, Player};
+use specgen_runtime::playback::Knot;
 
 /// Words of the recorder: some blocks, so that a tick that begins one is among those that are seen.
 const RECORD: usize = 32 * 1024;
 /// Settings change at every so manieth tick.
 const SETTINGS_EVERY: usize = 16;
+
+/// A pass that keeps a knot in every tick, which is the most that one does. Begun anew when it is over.
+const KNOTS: usize = 64;
+const PASS: Course = Course { spacing: 1, before: 0, ticks: KNOTS as u32, trajectory: 0 };
 
 /// The converters' drivers on stand-ins.
 type Adc<'b> = Ad7606<ADC_BITS, Bus<'b>, Line<'b>, Pin<'b>, Pin<'b>, Delay<'b>>;
@@ -52,6 +58,7 @@ struct Timed<'m> {
     /// Beside the exchange, whose commands are those of the rows.
     wave: Wave,
     waved: [u64; COMMAND_WORDS],
+    player: Player<'static, Real>,
 }
 
 extern "C" fn main() -> ! {
@@ -68,13 +75,21 @@ fn run() -> Result<(), Exit> {
     // It begins to run with the first tick, as after arming.
     machine.supervisor.phase = Phase::Holding;
     let mut exchange = Exchange::new();
-    let (words, [kept, held]) = memories();
+    let (words, [kept, held], knots) = memories();
     exchange.record(words, kept);
     exchange.orders.request = Request::Run;
     let wave = Wave::new(waves::limits(&exchange.config));
     let bench = &Bench::new(rates()?);
     let board = Board::new(adc(bench), dacs(bench), &mut machine, true);
-    let mut timed = Timed { board, exchange, settings: Config::new(), held, wave, waved: [0; COMMAND_WORDS] };
+    let mut timed = Timed {
+        board,
+        exchange,
+        settings: Config::new(),
+        held,
+        wave,
+        waved: [0; COMMAND_WORDS],
+        player: Player::new(knots),
+    };
     bench.codes.set(codes_of(&[0; INPUT_WORDS]));
     timed.board.start(&mut timed.exchange.report);
     bench.take();
@@ -94,6 +109,9 @@ fn run() -> Result<(), Exit> {
         timed.exchange.host_alive();
         if ticks.is_multiple_of(SETTINGS_EVERY) {
             timed.exchange.next = Some(timed.settings);
+        }
+        if passes::POSSIBLE && !timed.player.is_running() {
+            timed.player.begin(PASS);
         }
         specgen_timed_tick(&mut timed);
         specgen_timed_end();
@@ -149,6 +167,21 @@ fn specgen_timed_tick(timed: &mut Timed<'_>) {
         waves::write(&motion, timed.wave.sequence(), &mut timed.waved);
     }
     timed.board.tick(&mut timed.exchange, Noticed::default());
+    // As the exchange does it: it shares its command, which the rows have here, with no wave.
+    if passes::POSSIBLE {
+        pass(timed);
+    }
+}
+
+#[inline(never)]
+fn pass(timed: &mut Timed<'_>) {
+    let Timed { player, board, waved, exchange, .. } = timed;
+    if let Some([target, pose]) = passes::shown(&board.machine().state) {
+        player.keep(&target, &pose, exchange.report.status);
+    }
+    if let Some(given) = player.give() {
+        passes::write(&given, waved);
+    }
 }
 
 #[unsafe(no_mangle)]
@@ -161,10 +194,11 @@ extern "C" fn specgen_timed_end() {
 
 /// The recorder's memories, for the one call that there is.
 #[allow(unsafe_code)] // Statics that are written.
-fn memories() -> (&'static mut [u64], [&'static mut Kept; 2]) {
+fn memories() -> (&'static mut [u64], [&'static mut Kept; 2], &'static mut [Knot]) {
     static mut MEMORY: [u64; RECORD] = [0; RECORD];
     static mut KEPT: Kept = Kept::new();
     static mut HELD: Kept = Kept::new();
+    static mut PLAYED: [Knot; 2 * KNOTS] = [[0; 6]; 2 * KNOTS];
     // SAFETY: called once, by `run`; no interrupt is enabled.
-    unsafe { (&mut *(&raw mut MEMORY), [&mut *(&raw mut KEPT), &mut *(&raw mut HELD)]) }
+    unsafe { (&mut *(&raw mut MEMORY), [&mut *(&raw mut KEPT), &mut *(&raw mut HELD)], &mut *(&raw mut PLAYED)) }
 }
