@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use serde_json::Value;
+use specgen_language::{SpecSource, spec};
 use specgen_toolchain::provision;
 
 use crate::run::{Outcome, Report, cargo, expect_success};
@@ -26,6 +27,8 @@ const SPECGEN: Package = ["--package", "specgen"];
 /// Where `tests/tests/boards.rs` leaves image and spec of each target.
 const TESTED: &str = "target/tests/boards";
 const TARGETS: [&str; 2] = ["stm32h743", "stm32f4"];
+/// When the record of a played motion ends, s after its order: rest and knots take half a second, then it moves.
+const RECORD: f64 = 0.7;
 /// In the answer to `status`.
 const STANDS: &str = "; status 0x";
 const WAVE: &str = "ramp = 0.05\nseconds = 0.4\n[[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-6, frequency = 5.0 }\n";
@@ -195,7 +198,9 @@ fn run(trial: &Trial, brief: bool) -> Result<(), String> {
     fs::create_dir_all(&trial.folder).map_err(failed)?;
     fs::write(trial.folder.join("wave.toml"), WAVE).map_err(failed)?;
     let mut session = Session::begin(trial)?;
-    let operated = operate(trial, &mut session, brief);
+    let motion = if brief { None } else { learnable(&trial.spec)? };
+    let operated = operate(trial, &mut session, brief)
+        .and_then(|()| motion.as_ref().map_or(Ok(()), |motion| learn(trial, &mut session, motion)));
     let report = session.report()?;
     println!("{}: {}", trial.target, report.text);
     operated.map_err(|why| format!("{}: {why}", trial.target))?;
@@ -209,18 +214,106 @@ fn run(trial: &Trial, brief: bool) -> Result<(), String> {
         hold(trial, &report)?;
     }
     drop(session);
-    let mut replay = Command::new(trial.programs.join("specgen"));
-    replay.current_dir(&trial.folder).args(["replay", "run.rec", "--spec"]).arg(&trial.spec);
-    match replay.status() {
-        Ok(status) if status.success() => Ok(()),
-        _ => Err(format!("{}: the record does not replay bit by bit, see above", trial.target)),
+    replay(trial, "run.rec", &[])?;
+    if motion.is_none() {
+        return Ok(());
     }
+    replay(trial, "pass.rec", &["--csv", "pass.csv"])?;
+    let table = fs::read_to_string(trial.folder.join("pass.csv")).map_err(failed)?;
+    let corrected = corrected(&table);
+    println!("{}: a pass on record, {corrected} ticks of it under a correction", trial.target);
+    if corrected > 0 {
+        Ok(())
+    } else {
+        Err(format!(
+            "{}: no tick of pass.rec is under a correction; a computer that is busy lets it begin late",
+            trial.target
+        ))
+    }
+}
+
+fn replay(trial: &Trial, record: &str, more: &[&str]) -> Result<(), String> {
+    let mut replay = Command::new(trial.programs.join("specgen"));
+    replay.current_dir(&trial.folder).args(["replay", record, "--spec"]).arg(&trial.spec).args(more);
+    if replay.status().is_ok_and(|status| status.success()) {
+        Ok(())
+    } else {
+        Err(format!("{}: {record} does not replay bit by bit, see above", trial.target))
+    }
+}
+
+/// Rows of a record's table in which a correction is not zero.
+fn corrected(table: &str) -> usize {
+    let mut lines = table.lines();
+    let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let is = |place: usize| names.get(place).is_some_and(|name| name.starts_with("correction["));
+    lines
+        .filter(|line| {
+            line.split(',')
+                .enumerate()
+                .any(|(place, text)| is(place) && text.parse().is_ok_and(|value: f64| value != 0.0))
+        })
+        .count()
+}
+
+/// A motion that is learned.
+struct Repeated {
+    name: String,
+    /// Ticks after which its record ends.
+    record: u32,
+}
+
+/// The first trajectory that a machine of this spec learns, if its controller takes a correction.
+fn learnable(path: &Path) -> Result<Option<Repeated>, String> {
+    let source = SpecSource::read(path).map_err(|finding| finding.message)?;
+    let (model, _) = spec::load(&source);
+    let model = model.ok_or_else(|| format!("{} is refused", path.display()))?;
+    let task = model.task_space.filter(|task| task.correction.is_some());
+    let record = (RECORD / model.timing.period) as u32;
+    Ok(task.and_then(|task| task.trajectories.first().map(|first| Repeated { name: first.name.clone(), record })))
+}
+
+/// Learns a motion over the link, which has to take a good part of its error, and plays it with a record.
+fn learn(trial: &Trial, session: &mut Session, motion: &Repeated) -> Result<(), String> {
+    let Repeated { name: motion, record } = motion;
+    let mut command = session.command_of(trial, "learn");
+    command.args([
+        "--trajectory",
+        motion,
+        "--machine",
+        "emulated",
+        "--passes",
+        "2",
+        "--output",
+        "learned.json",
+        "--json",
+    ]);
+    let output = command.output().map_err(|error| format!("specgen learn: {error}"))?;
+    let found: Value = serde_json::from_slice(&output.stdout).map_err(|error| format!("specgen learn: {error}"))?;
+    let passes = found["result"]["passes"].as_array().ok_or_else(|| format!("specgen learn: {found}"))?;
+    let errors: Vec<f64> = passes.iter().filter_map(|pass| pass["translation_nm"].as_f64()).collect();
+    println!("{}: {motion}, passes of {errors:.1?} nm rms by the gauges", trial.target);
+    if !matches!(errors[..], [first, _, last] if last < 0.7 * first) {
+        return Err(format!("{motion} was not learned"));
+    }
+    let mut host = Host::of(session.command_of(trial, "operate"))?;
+    let play =
+        format!("record arm {record}\nrecord trigger\nplay {motion} correction=learned.json machine=emulated\nstatus");
+    for (orders, words) in [
+        ("arm\nwait holding 600\nrun\nwait running 600\nset command=0\nwait arrived 600\nstatus", ": running"),
+        (&play, STANDS),
+        ("record stop\nrecord download pass.rec", "wrote "),
+        ("ramp-down\nwait disarmed 600\nstatus", "disarmed, amplifiers off"),
+    ] {
+        host.order(orders, words)?;
+    }
+    Ok(())
 }
 
 /// From arming to a record; times are the board's, ms. The record is short: what it holds has to go over the line.
 fn operate(trial: &Trial, session: &mut Session, brief: bool) -> Result<(), String> {
     let settings = format!("config write {}\nstatus", trial.spec.display());
-    let mut host = Host::of(session.host(trial))?;
+    let mut host = Host::of(session.command_of(trial, "operate"))?;
     let whole = [
         ("status\narm\nwait holding 600\nrun\nwait running 600\nset command=0\nstatus", ": running", 200.0),
         ("record arm 300\nwave wave.toml\nstatus", STANDS, 60.0),

@@ -17,8 +17,8 @@ mod spi;
 /// Words of the recorder: what the 128 KiB of RAM have besides the 24 KiB of the rest and some in reserve, 80 KiB with the knots.
 const RECORD: usize = (80 * 1024 - size_of::<[[i32; 6]; PASSES]>()) / size_of::<u64>();
 
-/// Knots of passes that learn, where the controller takes a correction: 18 KiB, half for corrections and half for errors.
-const PASSES: usize = if controller::passes::POSSIBLE { 768 } else { 0 };
+/// Knots of passes that learn, where the controller takes a correction: 36 KiB, half for corrections and half for errors.
+const PASSES: usize = if controller::passes::POSSIBLE { 1536 } else { 0 };
 
 /// This core has no caches.
 const fn prepare(_: &mut cortex_m::Peripherals) {}

@@ -94,7 +94,7 @@ pub fn run(trial: &Trial) -> Result<(), String> {
 
 fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, String> {
     let mut session = Session::begin(trial)?;
-    let mut host = Host::of(session.host(trial))?;
+    let mut host = Host::of(session.command_of(trial, "operate"))?;
     host.order("arm\nwait holding 600\nrun\nwait running 600\nset command=0\nstatus", ": running, ")?;
     session.pass(RUNS)?;
     // The board writes both down with their times.
@@ -146,7 +146,7 @@ fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, St
 
 /// A new host acknowledges once and arms.
 fn arms_again(trial: &Trial, session: &Session) -> Result<(), String> {
-    let mut again = session.host(trial);
+    let mut again = session.command_of(trial, "operate");
     again.args(["acknowledge", "wait 0.2", "arm", "wait holding 60", "ramp-down", "wait disarmed 60"]);
     match again.stdout(Stdio::null()).stderr(Stdio::null()).status() {
         Ok(status) if status.success() => Ok(()),

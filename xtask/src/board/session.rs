@@ -81,10 +81,10 @@ impl Session {
         Ok(session)
     }
 
-    /// `specgen operate` on its link.
-    pub fn host(&self, trial: &Trial) -> Command {
+    /// `specgen operate` or another host on its link.
+    pub fn command_of(&self, trial: &Trial, name: &str) -> Command {
         let mut host = Command::new(trial.programs.join("specgen"));
-        host.current_dir(&trial.folder).arg("operate").arg("--socket").arg(&self.socket).arg(&trial.spec);
+        host.current_dir(&trial.folder).arg(name).arg("--socket").arg(&self.socket).arg(&trial.spec);
         host
     }
 
