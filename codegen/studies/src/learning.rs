@@ -12,11 +12,13 @@
 mod convergence;
 mod motion;
 mod passes;
+mod plan;
 mod table;
 mod update;
 
 pub use convergence::{Convergence, LARGEST_RADIUS, Learnable};
 pub use motion::Motion;
-pub use passes::{LearnError, Learned, Pass, Repeating, Seen, course, held, learn, translation_nm};
+pub use passes::{LearnError, Learned, Learner, Pass, Repeating, Seen, course, held, learn, translation_nm};
+pub use plan::Plan;
 pub use table::{Table, TableError, knots};
 pub use update::Update;

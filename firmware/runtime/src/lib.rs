@@ -57,6 +57,7 @@ pub mod everett;
 pub mod feedback;
 mod field;
 pub mod kinematics;
+pub mod learning;
 pub mod linear;
 pub mod memory;
 pub mod mode;

@@ -4,8 +4,9 @@
 //! e_k = 1/D Σ (h_d(n) − h(n)),  n = k D … (k + 1) D − 1        D: ticks from knot to knot, of errors as of corrections
 //! ```
 //! A pass begins with rest, in which the correction may already lead; then a trajectory is played, and the rest behind it belongs to the pass. What it
-//! kept is for whoever learns from it, between passes.
+//! kept is for whoever learns from it, between passes: the host, or the [background](crate::learning) of the device itself.
 
+use crate::learning::{Learned, Learning, Settings};
 use crate::playback::{self, Knot, UNIT};
 use crate::real::Real;
 
@@ -44,6 +45,8 @@ pub enum Stage {
     Complete,
     /// It was ended before: the machine did not run any more, or somebody asked.
     Aborted,
+    /// It came to its end, and the correction of the next one is being made of it.
+    Learning,
 }
 
 impl Stage {
@@ -55,6 +58,7 @@ impl Stage {
             Self::Running => 1,
             Self::Complete => 2,
             Self::Aborted => 3,
+            Self::Learning => 4,
         }
     }
 
@@ -66,6 +70,7 @@ impl Stage {
             1 => Some(Self::Running),
             2 => Some(Self::Complete),
             3 => Some(Self::Aborted),
+            4 => Some(Self::Learning),
             _ => None,
         }
     }
@@ -98,6 +103,7 @@ pub struct Player<'m, T> {
     status: u32,
     /// The trajectory that it began.
     begun: Option<u32>,
+    learning: Learning,
 }
 
 impl<'m, T: Real> Player<'m, T> {
@@ -117,6 +123,7 @@ impl<'m, T: Real> Player<'m, T> {
             kept: 0,
             status: 0,
             begun: None,
+            learning: Learning::NONE,
         }
     }
 
@@ -138,6 +145,12 @@ impl<'m, T: Real> Player<'m, T> {
         matches!(self.stage, Stage::Running)
     }
 
+    /// Whether a pass is under way, or learning from one.
+    #[must_use]
+    pub const fn is_busy(&self) -> bool {
+        matches!(self.stage, Stage::Running | Stage::Learning)
+    }
+
     /// Status bits that the controller gave in the ticks of the last pass.
     #[must_use]
     pub const fn status(&self) -> u32 {
@@ -156,10 +169,18 @@ impl<'m, T: Real> Player<'m, T> {
         self.errors.get(..self.kept as usize).unwrap_or_default()
     }
 
-    /// Takes knots of the correction from the `first` on; false, with nothing taken, during a pass or where there is no room.
+    /// Knots of the correction, and behind them what a plan needs.
+    #[must_use]
+    pub fn table(&self) -> &[Knot] {
+        self.table
+    }
+
+    /// Takes knots of the correction, or rows of a [plan](crate::learning), from the `first` on; false, with nothing taken, during a pass or
+    /// learning, or where there is no room.
     pub fn put(&mut self, first: usize, knots: impl ExactSizeIterator<Item = Knot>) -> bool {
         let Some(end) = first.checked_add(knots.len()) else { return false };
-        let Some(slots) = self.table.get_mut(first..end).filter(|_| self.stage != Stage::Running) else {
+        let busy = self.is_busy();
+        let Some(slots) = self.table.get_mut(first..end).filter(|_| !busy) else {
             return false;
         };
         for (slot, knot) in slots.iter_mut().zip(knots) {
@@ -173,8 +194,12 @@ impl<'m, T: Real> Player<'m, T> {
         let Course { spacing, before, ticks, .. } = course;
         let makes_sense = spacing >= 1 && (1..=MOST_TICKS).contains(&ticks) && before < ticks;
         let fits = course.knots() as usize <= self.capacity();
-        if self.is_running() || !makes_sense || !fits {
+        if self.is_busy() || !makes_sense || !fits {
             return false;
+        }
+        if course != self.course {
+            // What was learned is of another motion.
+            self.learning.remember(None);
         }
         (self.course, self.stage, self.tick) = (course, Stage::Running, 0);
         (self.last, self.sum, self.kept, self.status, self.begun) = (None, [T::ZERO; 6], 0, 0, None);
@@ -186,6 +211,58 @@ impl<'m, T: Real> Player<'m, T> {
         if self.is_running() {
             self.stage = Stage::Aborted;
         }
+    }
+
+    /// Learns from the pass that came to its end, anew if `first`; false, with nothing changed, if there is none, or no plan, or no room. What the
+    /// pass kept of the error is gone then. [`Player::work`] does it.
+    pub fn learn(&mut self, settings: Settings, first: bool) -> bool {
+        let knots = self.course.knots() as usize;
+        if self.stage != Stage::Complete || self.kept as usize != knots {
+            return false;
+        }
+        let before = self.learning.learned();
+        if first {
+            self.learning.remember(None);
+        }
+        let begun = self.learning.begin(settings, knots, self.table, self.errors);
+        if begun {
+            self.kept = 0;
+            self.stage = if self.learning.is_busy() { Stage::Learning } else { Stage::Complete };
+        } else {
+            self.learning.remember(before);
+        }
+        begun
+    }
+
+    /// Does so many steps of learning, each of at most four products for every knot that the plan reaches; whether there are more. For a
+    /// background: no pass begins before it is done.
+    pub fn work(&mut self, steps: u32) -> bool {
+        if self.stage != Stage::Learning {
+            return false;
+        }
+        let more = self.learning.work(steps, self.table, self.errors);
+        if !more {
+            self.stage = Stage::Complete;
+        }
+        more
+    }
+
+    /// Ends learning: the correction of the least error is in the table. False, with nothing changed, during a pass, or where nothing was learned.
+    pub fn settle(&mut self) -> bool {
+        if self.is_running() || self.learning.learned().is_none() {
+            return false;
+        }
+        self.learning.settle(self.table, self.errors);
+        if self.stage == Stage::Learning {
+            self.stage = Stage::Complete;
+        }
+        true
+    }
+
+    /// What came of learning so far; none before the first pass that was learned from.
+    #[must_use]
+    pub const fn learned(&self) -> Option<Learned> {
+        self.learning.learned()
     }
 
     /// What the coming tick is given; none if no pass is under way.

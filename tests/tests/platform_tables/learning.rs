@@ -9,7 +9,7 @@ use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{Bench as Rig, Noise};
 use host_sim::platform::{PlatformScenario, Specimen};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
-use specgen::learning::{Convergence, Learnable, Learned, Motion, Repeating, Update, knots, learn};
+use specgen::learning::{Convergence, Learnable, Learned, Learner, Motion, Plan, Repeating, Update, knots, learn};
 use specgen::machine;
 use specgen::robust::{Deviation, Factors};
 use specgen::stability::platform::{Adapting, Conditions, Law, Tuning};
@@ -66,11 +66,43 @@ fn passes(
     let mut rig = Rig::new(&mut prepared, &mut controller, PERIOD, latency).unwrap();
     rig.arm(60.0).unwrap();
     let spacing = convergence.spacing(PERIOD);
-    learn(&mut rig, &motion, &update, &[], spacing, count, |_, _| ControlFlow::Continue(())).unwrap()
+    learn(&mut rig, &motion, Learner::Host(&update), &[], spacing, count, |_, _| ControlFlow::Continue(())).unwrap()
 }
 
 fn case_1(hertz: f64) -> PaperPose {
     PaperPose::corrected(PaperPath::Case1, hertz)
+}
+
+/// What a device learns by itself, with room for so many knots.
+#[test]
+fn a_device_learns_by_itself() {
+    for (bench, name) in [(plays(), "plays"), (other(), "bouc-wen")] {
+        let (learnable, convergence) = design(bench);
+        let factors = Factors::of(&bench.emitted.compiled.model, &[]);
+        for (hertz, capacity, count) in [(10.0, 4096, 5), (10.0, 768, 5), (30.0, 4096, 5), (50.0, 4096, 8), (1.0, 4096, 5)] {
+            let motion = Motion::of(&case_1(hertz), PERIOD, &SPEED, RADIUS).unwrap();
+            let Some(plan) = Plan::new(&learnable, &motion, &convergence, &factors, capacity) else {
+                println!("{name} {hertz} Hz, {capacity}: none");
+                continue;
+            };
+            let found = &plan.convergence;
+            println!(
+                "{name} {hertz} Hz, {capacity} knots: {:?}, {} ticks, f_c {:.0} Hz, radius {:.2} at {:.0} Hz",
+                plan.settings, plan.spacing, found.band[1], found.radius, found.at
+            );
+            let mut controller = bench.controller();
+            let mut prepared = bench.scenario().rig().clone();
+            let mut rig = Rig::new(&mut prepared, &mut controller, PERIOD, 0).unwrap();
+            rig.arm(60.0).unwrap();
+            let learned = learn(&mut rig, &motion, Learner::Device(&plan), &[], plan.spacing, count, |_, _| {
+                ControlFlow::Continue(())
+            })
+            .unwrap();
+            let errors: Vec<String> =
+                learned.passes.iter().map(|pass| format!("{:.1}|{:.0}", pass.translation_nm, pass.orientation_nrad)).collect();
+            println!("   {}", errors.join(" "));
+        }
+    }
 }
 
 #[test]

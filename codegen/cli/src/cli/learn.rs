@@ -26,7 +26,7 @@ use specgen_language::interrupt;
 use specgen_language::model::TaskSpace;
 use specgen_runtime::playback::Knot;
 use specgen_studies::learning::{
-    Convergence, LearnError, Learnable, Learned, Motion, Pass, Repeating, Table, Update, knots, learn,
+    Convergence, LearnError, Learnable, Learned, Learner, Motion, Pass, Repeating, Table, Update, knots, learn,
 };
 use specgen_studies::machine as plant;
 use specgen_studies::robust::Factors;
@@ -147,7 +147,7 @@ fn passes(arguments: &Arguments, study: &Study, machine: &mut dyn Repeating, ui:
     let Study { motion, update, begin, spacing, .. } = study;
     let stop = interrupt::heed();
     let count = arguments.passes as usize;
-    let learned = learn(machine, motion, update, begin, *spacing, count, |number, pass| {
+    let learned = learn(machine, motion, Learner::Host(update), begin, *spacing, count, |number, pass| {
         ui.rate(&format!("learn: pass {number} of {count}, {:.1} nm", pass.translation_nm));
         if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });

@@ -182,7 +182,7 @@ impl Learnable {
     }
 
     /// Frequencies up to where Q lets nothing through, rising, closest about the modes.
-    fn grid(&self, wish: f64) -> Vec<f64> {
+    pub(super) fn grid(&self, wish: f64) -> Vec<f64> {
         let highest = highest(wish, self.closed_loop.period);
         let share = |k: u32| f64::from(k) / f64::from(GRID - 1);
         let mut all: Vec<f64> = (0..GRID).map(|k| highest * libm::pow(1e-3, 1.0 - share(k))).collect();
@@ -197,7 +197,7 @@ impl Learnable {
     }
 
     /// Every corner of gain, stiffness over mass, damping, lag and delay.
-    fn machines(&self, factors: &Factors) -> Vec<(ClosedLoop, Conditions)> {
+    pub(super) fn machines(&self, factors: &Factors) -> Vec<(ClosedLoop, Conditions)> {
         let range = |factor| factors.range(factor);
         let ([soft, stiff], [light, heavy]) = (range(Factor::Stiffness), range(Factor::Mass));
         let [low, high] = [soft / heavy, stiff / light];
@@ -239,12 +239,12 @@ fn left(product: &Matrix6c, share: f64) -> Matrix6c {
     })
 }
 
-fn multiply(a: &Matrix6c, b: &Matrix6c) -> Matrix6c {
+pub(super) fn multiply(a: &Matrix6c, b: &Matrix6c) -> Matrix6c {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..6).fold([0.0; 2], |sum, k| plus(sum, times(a[i][k], b[k][j])))))
 }
 
 /// Bound of the spectral radius from above, close: ‖M^n‖^(1/n).
-fn spectral_radius(matrix: &Matrix6c) -> f64 {
+pub(super) fn spectral_radius(matrix: &Matrix6c) -> f64 {
     let mut power = *matrix;
     let mut scale = 0.0;
     for _ in 0..SQUARINGS {

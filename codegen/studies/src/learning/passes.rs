@@ -11,6 +11,7 @@ use specgen_runtime::pass::{Course, Player};
 use specgen_runtime::playback::{self, Knot, UNIT};
 
 use super::motion::Motion;
+use super::plan::Plan;
 use super::table::knots;
 use super::update::Update;
 
@@ -32,6 +33,8 @@ pub enum LearnError {
     Status(u32),
     /// The machine ended a pass; why is known to whoever operates it.
     Ended,
+    /// The device does not learn with its plan.
+    Refused,
 }
 
 impl fmt::Display for LearnError {
@@ -45,6 +48,7 @@ impl fmt::Display for LearnError {
                 status_words(*status)
             ),
             Self::Ended => f.write_str("the machine ended a pass"),
+            Self::Refused => f.write_str("the device does not learn with this plan"),
         }
     }
 }
@@ -64,8 +68,19 @@ pub struct Seen {
     pub measured: Vec<[f64; 6]>,
     /// Set-point less true pose; what was measured, where nothing else is known.
     pub real: Vec<[f64; 6]>,
+    /// What was measured, as it was kept from knot to knot.
+    pub kept: Vec<Knot>,
     /// Status bits seen.
     pub status: u32,
+}
+
+/// Who makes the correction of the next pass.
+#[derive(Clone, Copy)]
+pub enum Learner<'a> {
+    /// The host, by the spectra of a whole pass.
+    Host(&'a Update),
+    /// The machine's own device, in its background.
+    Device(&'a Plan),
 }
 
 /// A machine that can repeat a motion.
@@ -75,6 +90,14 @@ pub trait Repeating {
     /// # Errors
     /// If the machine does not make it.
     fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, LearnError>;
+
+    /// The correction that its device makes of the one that was played and what was seen.
+    ///
+    /// # Errors
+    /// If the device does not learn with this plan.
+    fn next(&mut self, plan: &Plan, played: &[Knot], seen: &Seen) -> Result<Vec<Knot>, LearnError> {
+        plan.next(played, &seen.kept).ok_or(LearnError::Refused)
+    }
 }
 
 /// The course of a pass, in which the trajectory of this number is played.
@@ -115,7 +138,8 @@ impl Repeating for Bench<'_> {
             status |= done.status;
             real.push(std::array::from_fn(|axis| done.target[axis] - done.pose[axis]));
         }
-        Ok(Seen { measured: held(player.errors(), spacing, motion.corrected), real, status })
+        let kept = player.errors().to_vec();
+        Ok(Seen { measured: held(&kept, spacing, motion.corrected), real, kept, status })
     }
 }
 
@@ -180,7 +204,7 @@ pub struct Learned {
 pub fn learn(
     machine: &mut dyn Repeating,
     motion: &Motion,
-    update: &Update,
+    learner: Learner<'_>,
     begin: &[Knot],
     spacing: u32,
     count: usize,
@@ -209,9 +233,14 @@ pub fn learn(
         if number == count || learned.grew || go_on.is_break() {
             break;
         }
-        let correction: Vec<[f64; 6]> =
-            (0..motion.corrected as u32).map(|tick| playback::at(&played, spacing, tick)).collect();
-        played = knots(&update.next(&correction, &seen.measured[..motion.corrected]), spacing);
+        played = match learner {
+            Learner::Device(plan) => machine.next(plan, &played, &seen)?,
+            Learner::Host(update) => {
+                let correction: Vec<[f64; 6]> =
+                    (0..motion.corrected as u32).map(|tick| playback::at(&played, spacing, tick)).collect();
+                knots(&update.next(&correction, &seen.measured[..motion.corrected]), spacing)
+            }
+        };
     }
     Ok(learned)
 }

@@ -11,7 +11,7 @@ use super::motion::Motion;
 use specgen_numerics::Matrix6;
 
 /// Over which a correction fades in and out, s.
-const FADE: [f64; 2] = [5e-3, 20e-3];
+pub(super) const FADE: [f64; 2] = [5e-3, 20e-3];
 /// Power of a bin over that of white noise up to which it counts as noise.
 const NOISE: f64 = 3.0;
 

@@ -91,7 +91,7 @@ impl<P: Port> Repeating for Remote<'_, P> {
         match self.operator.pass(&self.own.start, course, knots, self.ui) {
             Ok(passed) => {
                 let measured = held(&passed.errors, spacing, motion.corrected);
-                Ok(Seen { real: measured.clone(), measured, status: passed.status })
+                Ok(Seen { real: measured.clone(), measured, kept: passed.errors, status: passed.status })
             }
             Err(ended) => {
                 self.ended = Some(ended);

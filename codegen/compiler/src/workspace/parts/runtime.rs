@@ -31,6 +31,7 @@ pub const PART: Part = Part {
         "src/field.rs",
         "src/kinematics.rs",
         "src/lib.rs",
+        "src/learning.rs",
         "src/linear.rs",
         "src/memory.rs",
         "src/mode.rs",

@@ -1,0 +1,267 @@
+//! Learning between passes, on the device itself: its background changes the correction of the next pass by what the last one showed.
+//!
+//! ```text
+//! c_j ← w_j V ( Σ_m q_|m| V⁻¹ c_{j−m} + Σ_m h_m V⁻¹ e_{j−m} )        |m| ≤ M, j = 0 … N − 1
+//! ```
+//! c is the correction and e = h_d − h the error of a pass, knot by knot, V the modes. q and h are impulse responses of Q and of Q T⁻¹: both look
+//! ahead as far as back, so nothing is late in them. w fades the correction in and out. Whoever designs q and h shows that this converges. Sums
+//! are of `f32`, in the order in which they stand, so that every device learns the same bits from the same errors.
+//!
+//! What it learns with, a [*plan*](plan_rows), lies in the memory of the player behind the knots of the pass: rows of six words, the bits of an `f32` each.
+
+use crate::playback::Knot;
+use crate::real::Real as _;
+
+/// Rows of a plan before its taps: V⁻¹, V, and the weights of the axes where errors are compared.
+pub const HEAD: usize = 13;
+
+/// An error of more than this part of the least one ends learning: it grows.
+const GROWS: f32 = 1.5;
+
+/// Rows of a plan whose impulse responses reach M knots to both sides: its head, h_−M to h_M of each mode, q_0 to q_M.
+#[must_use]
+pub const fn plan_rows(reach: usize) -> usize {
+    HEAD + 2 * reach + 1 + (reach + 1).div_ceil(6)
+}
+
+/// How the knots of a pass are learned from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// M, knots.
+    pub reach: u32,
+    /// Knots over which the correction fades in and out.
+    pub fade: [u32; 2],
+    /// The first knot, and the one behind the last, whose errors are compared.
+    pub scored: [u32; 2],
+}
+
+/// What came of it so far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Learned {
+    /// Mean square of the last pass' error, weighted, pm².
+    pub measured: f32,
+    /// The least of all passes, pm².
+    pub least: f32,
+    /// The error grew: learning has ended, and the best correction stands in the table.
+    pub grew: bool,
+}
+
+/// What is done next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Step {
+    /// The knot of this number to modal coordinates, of correction and error.
+    ToModes(usize),
+    /// The correction of this mode at this knot.
+    Mode(usize, usize),
+    /// The knot of this number to a pose.
+    ToPose(usize),
+    /// Nothing.
+    Done,
+}
+
+/// Learns from pass to pass.
+#[derive(Debug)]
+pub struct Learning {
+    settings: Settings,
+    knots: usize,
+    step: Step,
+    learned: Option<Learned>,
+}
+
+impl Learning {
+    /// Nothing is learned yet.
+    pub const NONE: Self =
+        Self { settings: Settings { reach: 0, fade: [0; 2], scored: [0; 2] }, knots: 0, step: Step::Done, learned: None };
+
+    /// What came of it; none before the first pass that was learned from.
+    #[must_use]
+    pub const fn learned(&self) -> Option<Learned> {
+        self.learned
+    }
+
+    /// Whether there is something left to do.
+    #[must_use]
+    pub const fn is_busy(&self) -> bool {
+        !matches!(self.step, Step::Done)
+    }
+
+    /// As it was before, or as if nothing were learned.
+    pub const fn remember(&mut self, learned: Option<Learned>) {
+        self.learned = learned;
+    }
+
+    /// Begins to learn from a pass of `knots` knots; false, with nothing changed, if the plan behind them is none or there is no room. `table` is the
+    /// half of the memory that holds the correction and the plan, `errors` the other.
+    pub fn begin(&mut self, settings: Settings, knots: usize, table: &mut [Knot], errors: &mut [Knot]) -> bool {
+        let Settings { reach, scored: [first, end], .. } = settings;
+        let reach = reach as usize;
+        let (Some(rows), Some(kept)) = (reach.checked_mul(3), knots.checked_mul(3)) else { return false };
+        let fits = rows < table.len()
+            && knots + plan_rows(reach) <= table.len()
+            && kept / 2 <= errors.len()
+            && 2 * knots + knots.div_ceil(6) <= errors.len();
+        if !fits || first >= end || end as usize > knots {
+            return false;
+        }
+        let plan = table.get(knots..knots + plan_rows(reach)).unwrap_or_default();
+        if !plan.as_flattened().iter().all(|word| number(*word).is_finite()) {
+            return false;
+        }
+        let measured = measured(settings, plan, errors);
+        if !measured.is_finite() {
+            return false;
+        }
+        (self.settings, self.knots) = (settings, knots);
+        let least = self.learned.map_or(measured, |learned| learned.least);
+        let grew = measured > GROWS * GROWS * least;
+        let (played, best) = (table.get_mut(..knots).unwrap_or_default(), errors.get_mut(knots..2 * knots).unwrap_or_default());
+        if grew {
+            played.copy_from_slice(best);
+        } else if self.learned.is_none() || measured < least {
+            best.copy_from_slice(played);
+        }
+        let least = if measured < least { measured } else { least };
+        self.learned = Some(Learned { measured, least, grew });
+        self.step = if grew { Step::Done } else { Step::ToModes(0) };
+        true
+    }
+
+    /// Puts the correction of the least error back into the table.
+    pub fn settle(&mut self, table: &mut [Knot], errors: &[Knot]) {
+        self.step = Step::Done;
+        for (slot, best) in table.iter_mut().take(self.knots).zip(errors.iter().skip(self.knots)) {
+            *slot = *best;
+        }
+    }
+
+    /// Does so many steps, each of at most 4 M + 2 products; whether there are more.
+    pub fn work(&mut self, steps: u32, table: &mut [Knot], errors: &mut [Knot]) -> bool {
+        let Some((played, plan)) = table.split_at_mut_checked(self.knots) else { return false };
+        let Some((errors, kept)) = errors.split_at_mut_checked(self.knots) else { return false };
+        let Some((_, scratch)) = kept.split_at_mut_checked(self.knots) else { return false };
+        let Some((head, taps)) = plan.split_at_checked(HEAD) else { return false };
+        for _ in 0..steps {
+            self.step = match self.step {
+                Step::ToModes(knot) => {
+                    for rows in [&mut *played, &mut *errors] {
+                        if let Some(row) = rows.get_mut(knot) {
+                            let pose = row.map(|value| value as f32);
+                            *row = mapped(head, 0, &pose).map(word);
+                        }
+                    }
+                    self.after(knot, Step::ToModes, Step::Mode(0, 0))
+                }
+                Step::Mode(mode, knot) => {
+                    // The old correction, for the new one is written over it.
+                    let old = scratch.as_flattened_mut();
+                    if knot == 0 {
+                        for (slot, row) in old.iter_mut().zip(&*played) {
+                            *slot = row.get(mode).copied().unwrap_or(0);
+                        }
+                    }
+                    let value = self.filtered(mode, knot, taps, old, errors);
+                    if let Some(slot) = played.get_mut(knot).and_then(|row| row.get_mut(mode)) {
+                        *slot = word(value);
+                    }
+                    let next = if mode < 5 { Step::Mode(mode + 1, 0) } else { Step::ToPose(0) };
+                    self.after(knot, |knot| Step::Mode(mode, knot), next)
+                }
+                Step::ToPose(knot) => {
+                    if let Some(row) = played.get_mut(knot) {
+                        let share = self.share(knot);
+                        let modes = row.map(number);
+                        *row = mapped(head, 6, &modes).map(|value| rounded(share * value));
+                    }
+                    self.after(knot, Step::ToPose, Step::Done)
+                }
+                Step::Done => return false,
+            };
+        }
+        self.is_busy()
+    }
+
+    /// The same for the next knot, or `last` behind the last.
+    fn after(&self, knot: usize, same: impl Fn(usize) -> Step, last: Step) -> Step {
+        if knot + 1 < self.knots { same(knot + 1) } else { last }
+    }
+
+    /// Σ q c + Σ h e of a mode at a knot.
+    fn filtered(&self, mode: usize, knot: usize, taps: &[Knot], old: &[i32], errors: &[Knot]) -> f32 {
+        let reach = self.settings.reach as usize;
+        let first = knot.saturating_sub(reach);
+        let last = if knot + reach < self.knots { knot + reach } else { self.knots - 1 };
+        let (taps, smoothing) = taps.split_at_checked(2 * reach + 1).unwrap_or_default();
+        let smoothing = smoothing.as_flattened();
+        let mut sum = 0.0;
+        let past = old.get(first..=knot).unwrap_or_default();
+        for (value, tap) in past.iter().zip(smoothing.get(..=knot - first).unwrap_or_default().iter().rev()) {
+            sum = sum + number(*tap) * number(*value);
+        }
+        let ahead = old.get(knot + 1..=last).unwrap_or_default();
+        for (value, tap) in ahead.iter().zip(smoothing.get(1..).unwrap_or_default()) {
+            sum = sum + number(*tap) * number(*value);
+        }
+        let seen = errors.get(first..=last).unwrap_or_default();
+        let taps = taps.get(reach + knot - last..=reach + knot - first).unwrap_or_default();
+        for (error, tap) in seen.iter().zip(taps.iter().rev()) {
+            if let (Some(tap), Some(error)) = (tap.get(mode), error.get(mode)) {
+                sum = sum + number(*tap) * number(*error);
+            }
+        }
+        sum
+    }
+
+    /// w: 0 at both ends, 1 but for the fades.
+    fn share(&self, knot: usize) -> f32 {
+        let part = |inward: usize, fade: u32| {
+            if inward >= fade as usize {
+                return 1.0;
+            }
+            let s = inward as f32 / fade as f32;
+            s * s * (3.0 - 2.0 * s)
+        };
+        let [rise, fall] = self.settings.fade;
+        part(knot, rise) * part(self.knots - 1 - knot, fall)
+    }
+}
+
+/// Mean square of the errors that are compared, pm².
+fn measured(settings: Settings, plan: &[Knot], errors: &[Knot]) -> f32 {
+    let weights = plan.get(HEAD - 1).map_or([0.0; 6], |row| row.map(number));
+    let [first, end] = settings.scored.map(|knot| knot as usize);
+    let seen = errors.get(first..end).unwrap_or_default();
+    let mut sum = 0.0;
+    for error in seen {
+        for (weight, value) in weights.iter().zip(error) {
+            let value = *weight * *value as f32;
+            sum = sum + value * value;
+        }
+    }
+    sum / seen.len() as f32
+}
+
+/// The six rows of a matrix from this row of the plan on, times a vector.
+fn mapped(plan: &[Knot], first: usize, vector: &[f32; 6]) -> [f32; 6] {
+    let mut found = [0.0; 6];
+    for (slot, row) in found.iter_mut().zip(plan.iter().skip(first)) {
+        for (factor, value) in row.iter().zip(vector) {
+            *slot = *slot + number(*factor) * *value;
+        }
+    }
+    found
+}
+
+/// The word of a plan.
+const fn word(number: f32) -> i32 {
+    number.to_bits().cast_signed()
+}
+
+/// The number of a word.
+const fn number(word: i32) -> f32 {
+    f32::from_bits(word.cast_unsigned())
+}
+
+/// To the nearest whole number, saturated; a NaN gives 0.
+fn rounded(value: f32) -> i32 {
+    (if value < 0.0 { value - 0.5 } else { value + 0.5 }).truncate()
+}
