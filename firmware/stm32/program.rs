@@ -1,7 +1,7 @@
 // The program of an STM32 board, included by the `main.rs` of each: what is its own are `clocks`, `pins`, `spi`, `RECORD`,
 // `PASSES`, `prepare` and `memory_intact`.
 
-use specgen_board::{Exchange, Noticed};
+use specgen_board::{Exchange, Noticed, SampleMemory};
 use specgen_stm32::{converters, timer};
 
 /// The machine on this board's converters.
@@ -63,6 +63,7 @@ mod app {
         #[unsafe(link_section = ".record.passes")]
         passes: [[i32; 6]; PASSES] = [[0; 6]; PASSES],
         kept: MaybeUninit<Kept> = MaybeUninit::uninit(),
+        #[unsafe(link_section = ".record.samples")]
         samples: SampleMemory = SampleMemory::new(),
     ])]
     fn init(mut context: init::Context) -> (Shared, Local) {

@@ -47,7 +47,7 @@ impl Copied {
     }
 }
 
-/// Memory for samples: 6 KiB.
+/// Memory for samples, 6 KiB. It need not be initialised.
 #[derive(Debug)]
 pub struct SampleMemory {
     copies: [Copied; COPIES],
@@ -76,7 +76,7 @@ impl SampleMemory {
 pub(crate) struct Samples {
     /// Ticks of a row; 0 while nobody looks on.
     every: u32,
-    /// Rows begin anew.
+    /// Rows begin anew; also at power-up, when nothing is known of their memory.
     anew: bool,
     /// A ring: the oldest, and how many wait.
     copies: &'static mut [Copied; COPIES],
@@ -91,7 +91,7 @@ pub(crate) struct Samples {
 impl Samples {
     pub(crate) fn new(memory: &'static mut SampleMemory, baud: u32) -> Self {
         let SampleMemory { copies, rows } = memory;
-        Self { every: 0, anew: false, copies, first: 0, waiting: 0, rows: Some(rows), baud }
+        Self { every: 0, anew: true, copies, first: 0, waiting: 0, rows: Some(rows), baud }
     }
 
     /// Rows of `every` ticks from here on, none with 0.
