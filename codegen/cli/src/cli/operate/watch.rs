@@ -59,7 +59,8 @@ struct Sample {
 
 impl Outcome for Watched {
     fn text(&self) -> String {
-        let mut text = format!("{} rows of {} ticks", self.rows, self.every);
+        let ticks = if self.every == 1 { "tick" } else { "ticks" };
+        let mut text = format!("{} rows of {} {ticks}", self.rows, self.every);
         if let Some(file) = &self.file {
             text += &format!(" in {file}");
         }
