@@ -185,7 +185,9 @@ pub const REPLAY: &str = "\
 Examples:
   specgen replay run.rec --spec platform.toml
       bit-equal, or the first tick that differs
-  specgen replay run.rec --csv run.csv  # time, inputs with units, what came out";
+  specgen replay run.rec --csv run.csv  # time, inputs with units, what came out
+  specgen replay run.rec --spec platform.toml --mcap run.mcap
+      for viewers of logs";
 
 pub const DYNAMICS: &str = "\
 Examples:

@@ -80,7 +80,7 @@ fn rows_are_what_the_ticks_say() {
 
 #[test]
 fn a_million_ticks_have_the_mean_of_one_and_its_neighbours() {
-    // Where every addition rounds: without what it loses carried along, the sum stands still at 2^24 times a tick.
+    // Where every addition rounds: without what it loses carried along the mean would be 1.
     let mut collector = collector(2, MOST_EVERY);
     let tick = Sample { error: [1.0 + f32::EPSILON; AXES], ..ticks(1, 0)[0] };
     for number in 0..u64::from(MOST_EVERY) {
