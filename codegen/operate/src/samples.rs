@@ -53,7 +53,7 @@ impl Block {
     /// The tick behind its last one.
     #[must_use]
     pub fn end(&self) -> u64 {
-        self.tick + u64::from(self.every) * self.rows.len() as u64
+        self.tick.saturating_add(u64::from(self.every) * self.rows.len() as u64)
     }
 }
 

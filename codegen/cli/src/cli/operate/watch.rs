@@ -64,7 +64,7 @@ impl Outcome for Watched {
         if let Some(file) = &self.file {
             text += &format!(" in {file}");
         }
-        let missing: u64 = self.gaps.iter().map(|gap| gap.to - gap.from).sum();
+        let missing: u64 = self.gaps.iter().map(|gap| gap.to.saturating_sub(gap.from)).fold(0, u64::saturating_add);
         text + &match self.gaps.len() {
             0 => ", without a gap\n".to_owned(),
             gaps => format!(", {gaps} gaps of {missing} ticks in all\n"),
@@ -101,7 +101,7 @@ impl Sink {
 
     fn gap(&self, gap: &Gap, ui: &Ui) {
         if let Self::Shown = self {
-            ui.out(&format!("  ticks {} to {} are missing\n", gap.from, gap.to - 1));
+            ui.out(&format!("  ticks {} to {} are missing\n", gap.from, gap.to.saturating_sub(1)));
         }
     }
 
@@ -231,7 +231,7 @@ impl<P: Port> Operator<P> {
                     sink.gap(&gap, ui);
                     watched.gaps.push(gap);
                 }
-                let end = *end.get_or_insert(tick + ticks);
+                let end = *end.get_or_insert(tick.saturating_add(ticks));
                 (next, number) = (Some(block.end()), found.wrapping_add(1));
                 for sample in self.samples(block).take_while(|sample| sample.tick < end) {
                     watched.rows += 1;
@@ -259,7 +259,7 @@ impl<P: Port> Operator<P> {
         rows.into_iter().enumerate().map(move |(index, mut row)| {
             row.pose = frame.pose(&row.pose).unwrap_or(row.pose);
             row.target = frame.pose(&row.target).unwrap_or(row.target);
-            let tick = tick + u64::from(every) * index as u64;
+            let tick = tick.saturating_add(u64::from(every) * index as u64);
             Sample { tick, time: tick as f64 * period, ticks: every, row }
         })
     }
