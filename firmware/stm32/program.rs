@@ -30,7 +30,7 @@ mod app {
     use controller::supervised::Machine;
     use embassy_stm32::interrupt::{InterruptExt, Priority};
     use embassy_stm32::wdg::IndependentWatchdog;
-    use specgen_board::{Desk, Exchange, Health, Noticed, Probes, Schedule, Kept, SampleMemory, catch_up, gather};
+    use specgen_board::{Desk, Exchange, Health, Noticed, Probes, Schedule, Kept, SampleMemory, catch_up, gather, learn};
     use specgen_link::Endpoint;
     use specgen_stm32::cycles::{self, CYCLES};
     use specgen_stm32::enable::Stop;
@@ -159,6 +159,7 @@ mod app {
                 timer::is_calm::<{ clocks::COPY }>,
             );
             gather(&mut |action| shared.lock(|exchange, board| action(exchange, board.machine_mut())));
+            learn(&mut |action| shared.lock(|exchange, board| action(exchange, board.machine_mut())));
             cortex_m::asm::wfi();
         }
     }

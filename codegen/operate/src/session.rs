@@ -276,12 +276,12 @@ impl<P: Port> Session<P> {
         self.client.fetch(|offset| Request::Download { offset })
     }
 
-    /// Sends the correction of passes, from its first knot on.
-    pub fn put_knots(&mut self, knots: &[Knot]) -> Result<(), ClientError> {
+    /// Sends knots of the correction of passes, or rows of a plan behind them, from the `first` on.
+    pub fn put_knots(&mut self, first: usize, knots: &[Knot]) -> Result<(), ClientError> {
         let mut buffer = [0; KNOTS * KNOT];
         for (index, part) in knots.chunks(KNOTS).enumerate() {
             let bytes = specgen_link::Bytes(specgen_link::put_knots(part, 0, &mut buffer));
-            self.done(&Request::Knots { first: (index * KNOTS) as u32, knots: bytes })?;
+            self.done(&Request::Knots { first: (first + index * KNOTS) as u32, knots: bytes })?;
             self.asked = Instant::now();
         }
         Ok(())
@@ -298,6 +298,12 @@ impl<P: Port> Session<P> {
     /// What the last pass kept of the error.
     pub fn errors(&mut self) -> Result<Vec<Knot>, ClientError> {
         let bytes = self.client.fetch(|offset| Request::Errors { offset })?;
+        Ok(specgen_link::Bytes(&bytes).knots().ok_or(ClientError::Unexpected)?.collect())
+    }
+
+    /// The correction that the next pass plays.
+    pub fn correction(&mut self) -> Result<Vec<Knot>, ClientError> {
+        let bytes = self.client.fetch(|offset| Request::Correction { offset })?;
         Ok(specgen_link::Bytes(&bytes).knots().ok_or(ClientError::Unexpected)?.collect())
     }
 

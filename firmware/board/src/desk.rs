@@ -9,7 +9,9 @@ use specgen_link::{
     Bytes, Counted, Counters, Device, Health, Identity, KNOT, KNOTS, PassAction, PassStatus, RecorderAction, Refusal,
     Reply, Request, Status, WaveAction, put_knots,
 };
+use specgen_runtime::learning::Settings as Plan;
 use specgen_runtime::pass::{Course, Player};
+use specgen_runtime::playback::Knot;
 use specgen_runtime::wave::{self, Settings};
 
 use crate::catch_up::catch_up;
@@ -273,8 +275,11 @@ impl Visit<'_, '_> {
         }
         let mut reply = Reply::Refused(Refusal::Unsupported);
         (self.with)(&mut |exchange, _| {
+            if exchange.away.is_some() {
+                reply = Reply::Refused(Refusal::State);
+            }
             let Some(player) = &mut exchange.player else { return };
-            reply = match player.is_running() {
+            reply = match player.is_busy() {
                 true => Reply::Refused(Refusal::State),
                 false if player.put(first as usize, taken.iter().take(count).copied()) => Reply::Done,
                 false => Reply::Refused(Refusal::Word { index: 0 }),
@@ -296,24 +301,33 @@ impl Visit<'_, '_> {
                     exchange.abort_pass();
                     None
                 }
+                PassAction::Learn { reach, fade } => {
+                    let player = exchange.player.as_mut();
+                    let learns = player.is_some_and(|player| player.learn(Plan { reach, fade }));
+                    (!learns).then_some(Refusal::State)
+                }
             };
-            if let Some(player) = &exchange.player {
-                reply = refusal.map_or_else(|| Reply::Pass(standing(player)), Reply::Refused);
+            if let Some(status) = exchange.away.or_else(|| exchange.player.as_ref().map(standing)) {
+                reply = refusal.map_or(Reply::Pass(status), Reply::Refused);
             }
         });
         reply
     }
 
+    /// Knots of what a pass kept, or of what the next one plays.
     #[inline(never)]
-    fn errors(&mut self, offset: u32) -> Reply<'_> {
+    fn fetched(&mut self, offset: u32, knots: impl for<'p> Fn(&'p Player<'static, Real>) -> &'p [Knot]) -> Reply<'_> {
         let (mut taken, mut count, mut total) = ([[0; 6]; KNOTS], 0, 0);
         let mut refusal = Some(Refusal::Unsupported);
         let first = offset as usize / KNOT;
         (self.with)(&mut |exchange, _| {
+            if exchange.away.is_some() {
+                refusal = Some(Refusal::State);
+            }
             let Some(player) = &exchange.player else { return };
-            refusal = player.is_running().then_some(Refusal::State);
-            total = player.errors().len() * KNOT;
-            for (slot, knot) in taken.iter_mut().zip(player.errors().iter().skip(first)) {
+            refusal = player.is_busy().then_some(Refusal::State);
+            total = knots(player).len() * KNOT;
+            for (slot, knot) in taken.iter_mut().zip(knots(player).iter().skip(first)) {
                 *slot = *knot;
                 count += 1;
             }
@@ -321,8 +335,8 @@ impl Visit<'_, '_> {
         if let Some(refusal) = refusal {
             return Reply::Refused(refusal);
         }
-        let knots = taken.get(..count).unwrap_or_default();
-        let bytes = Bytes(put_knots(knots, offset as usize - first * KNOT, self.desk.session.buffer()));
+        let taken = taken.get(..count).unwrap_or_default();
+        let bytes = Bytes(put_knots(taken, offset as usize - first * KNOT, self.desk.session.buffer()));
         Reply::Chunk { offset, total: total as u32, bytes }
     }
 
@@ -381,7 +395,7 @@ impl Visit<'_, '_> {
 }
 
 /// How a player stands.
-fn standing(player: &Player<'_, Real>) -> PassStatus {
+pub(crate) fn standing(player: &Player<'_, Real>) -> PassStatus {
     PassStatus {
         stage: player.stage().word(),
         status: player.status(),
@@ -432,12 +446,15 @@ impl Device for Visit<'_, '_> {
             Request::Recorder { action } => self.recorder(action),
             Request::Download { offset } => self.download(offset),
             Request::Wave { action, words } => self.wave(action, words),
-            Request::Knots { .. } | Request::Pass { .. } | Request::Errors { .. } if !passes::POSSIBLE => {
+            Request::Knots { .. } | Request::Pass { .. } | Request::Errors { .. } | Request::Correction { .. }
+                if !passes::POSSIBLE =>
+            {
                 Reply::Refused(Refusal::Unsupported)
             }
             Request::Knots { first, knots } => self.knots(first, knots),
             Request::Pass { action } => self.pass(action),
-            Request::Errors { offset } => self.errors(offset),
+            Request::Errors { offset } => self.fetched(offset, Player::errors),
+            Request::Correction { offset } => self.fetched(offset, Player::correction),
             Request::Stream { .. } | Request::Samples if !samples::POSSIBLE => Reply::Refused(Refusal::Unsupported),
             Request::Stream { every } => self.stream(every),
             Request::Samples => self.samples(),

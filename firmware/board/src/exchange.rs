@@ -5,7 +5,7 @@ use controller::supervised::{Machine, MachineInput, MachineOutput, Phase, Reques
 use controller::supervision::HOST_TICKS;
 use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, Config, Real, passes};
-use specgen_link::{Refusal, Silence};
+use specgen_link::{PassStatus, Refusal, Silence};
 use specgen_runtime::pass::{Course, Player};
 use specgen_runtime::playback::Knot;
 use specgen_runtime::wave::Stage;
@@ -56,6 +56,8 @@ pub struct Exchange {
     pub wave: Option<Wave>,
     /// Corrects the motion while a pass is under way, where a memory was given for it.
     pub player: Option<Player<'static, Real>>,
+    /// How the player stands while the background has it, which learns.
+    pub(crate) away: Option<PassStatus>,
     /// Shows the ticks to a host that looks on, where a memory was given for it.
     pub(crate) samples: Option<Samples>,
     /// The host steps the machine, and the ticks do not: how long it has been silent.
@@ -88,6 +90,7 @@ impl Exchange {
             kept: None,
             wave: None,
             player: None,
+            away: None,
             samples: None,
             lockstep: None,
         }
@@ -194,7 +197,7 @@ impl Exchange {
     /// The machine does not run, or not at rest; a wave or a pass is under way; this is no pass, or too long.
     pub(crate) fn begin_pass(&mut self, course: Course) -> Result<(), Refusal> {
         let runs = self.report.phase == Phase::Running && !self.in_lockstep() && !self.is_engaged();
-        if !runs || !passes::may_begin(self.report.status, &self.orders.command) {
+        if !runs || self.away.is_some() || !passes::may_begin(self.report.status, &self.orders.command) {
             return Err(Refusal::State);
         }
         let player = self.player.as_mut().ok_or(Refusal::Unsupported)?;

@@ -107,6 +107,11 @@ pub enum Request<'a> {
     },
     /// The oldest block of samples that was not fetched. Answered by [`Reply::Samples`].
     Samples,
+    /// The correction that the next pass plays, as the bytes of its knots, from this byte on. Answered by [`Reply::Chunk`].
+    Correction {
+        /// First byte wanted.
+        offset: u32,
+    },
 }
 
 /// What a player of passes is to do.
@@ -127,6 +132,13 @@ pub enum PassAction {
     },
     /// End it at once; the correction fades out, the trajectory goes on.
     Abort,
+    /// Make the correction of the next pass, in the background, of the one that came to its end, with the plan that was sent behind its knots.
+    Learn {
+        /// Knots that the plan reaches to both sides.
+        reach: u32,
+        /// Knots over which the correction fades in and out.
+        fade: [u32; 2],
+    },
 }
 
 /// What a recorder is to do.

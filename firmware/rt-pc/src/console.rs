@@ -121,9 +121,9 @@ impl Console {
     /// Takes knots of the correction of passes.
     ///
     /// # Errors
-    /// A pass is under way; there is no room for them.
+    /// A pass is under way, or learned from; there is no room for them.
     pub fn put_knots(&mut self, first: u32, knots: impl ExactSizeIterator<Item = Knot>) -> Result<(), No> {
-        match self.passes.is_running() {
+        match self.passes.is_busy() {
             true => Err(No::State),
             false if self.passes.put(first, knots) => Ok(()),
             false => Err(No::Word(0)),

@@ -2,6 +2,7 @@
 
 use controller::passes;
 use specgen_link::PassStatus;
+use specgen_runtime::learning::Settings;
 use specgen_runtime::pass::{self, Course, Stage};
 use specgen_runtime::playback::Knot;
 
@@ -9,6 +10,8 @@ use crate::handover::Player;
 
 /// Knots of its memory, one half of them for corrections: 3 MiB.
 const MEMORY: usize = 1 << 17;
+/// Steps of learning in a round of the service, which has others to serve: some milliseconds.
+const STEPS: u32 = 1000;
 
 /// The player's other side.
 pub struct Passes {
@@ -25,6 +28,11 @@ impl Passes {
     /// Whether a pass is under way, or the order for it.
     pub fn is_running(&self) -> bool {
         passes::POSSIBLE && self.here.is_none()
+    }
+
+    /// Whether a pass is under way, or learned from.
+    pub fn is_busy(&self) -> bool {
+        passes::POSSIBLE && self.here.as_ref().is_none_or(|player| player.is_busy())
     }
 
     /// How it stands; none where there are no passes.
@@ -46,6 +54,23 @@ impl Passes {
     /// What the last pass kept of the error; none during one.
     pub fn errors(&self) -> Option<&[Knot]> {
         self.here.as_ref().map(|player| player.errors())
+    }
+
+    /// The correction that the next pass plays; none during one.
+    pub fn correction(&self) -> Option<&[Knot]> {
+        self.here.as_ref().map(|player| player.correction())
+    }
+
+    /// Makes the correction of the next pass from here on; false if no pass came to its end, or there is no plan for it.
+    pub fn learn(&mut self, settings: Settings) -> bool {
+        self.here.as_mut().is_some_and(|player| player.learn(settings))
+    }
+
+    /// Learns a little, where there is something to learn.
+    pub fn work(&mut self) {
+        if let Some(player) = &mut self.here {
+            player.work(STEPS);
+        }
     }
 
     /// The player comes back; the trajectory that it began.

@@ -82,6 +82,7 @@ impl Service<'_> {
                 self.console.operator.update(&said, now);
             }
             self.serve(now);
+            self.console.passes.work();
             self.signals += u32::from(self.signal.swap(false, Ordering::Relaxed));
             if self.signals > 0 || self.until.is_some_and(|until| now >= until) {
                 self.console.operator.ramp_down(now);

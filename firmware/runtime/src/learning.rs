@@ -12,11 +12,8 @@
 use crate::playback::Knot;
 use crate::real::Real as _;
 
-/// Rows of a plan before its taps: V⁻¹, V, and the weights of the axes where errors are compared.
-pub const HEAD: usize = 13;
-
-/// An error of more than this part of the least one ends learning: it grows.
-const GROWS: f32 = 1.5;
+/// Rows of a plan before its taps: V⁻¹ and V.
+pub const HEAD: usize = 12;
 
 /// Rows of a plan whose impulse responses reach M knots to both sides: its head, h_−M to h_M of each mode, q_0 to q_M.
 #[must_use]
@@ -31,19 +28,6 @@ pub struct Settings {
     pub reach: u32,
     /// Knots over which the correction fades in and out.
     pub fade: [u32; 2],
-    /// The first knot, and the one behind the last, whose errors are compared.
-    pub scored: [u32; 2],
-}
-
-/// What came of it so far.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Learned {
-    /// Mean square of the last pass' error, weighted, pm².
-    pub measured: f32,
-    /// The least of all passes, pm².
-    pub least: f32,
-    /// The error grew: learning has ended, and the best correction stands in the table.
-    pub grew: bool,
 }
 
 /// What is done next.
@@ -59,24 +43,30 @@ enum Step {
     Done,
 }
 
-/// Learns from pass to pass.
+/// Makes the correction of the next pass.
 #[derive(Debug)]
 pub struct Learning {
     settings: Settings,
     knots: usize,
     step: Step,
-    learned: Option<Learned>,
 }
 
 impl Learning {
-    /// Nothing is learned yet.
-    pub const NONE: Self =
-        Self { settings: Settings { reach: 0, fade: [0; 2], scored: [0; 2] }, knots: 0, step: Step::Done, learned: None };
+    /// Nothing to do.
+    pub const NONE: Self = Self { settings: Settings { reach: 0, fade: [0; 2] }, knots: 0, step: Step::Done };
 
-    /// What came of it; none before the first pass that was learned from.
+    /// Learns from a pass of `knots` knots from here on; none if the plan behind them is none or there is no room. `table` is the half of the
+    /// memory that holds the correction and the plan, `errors` the other.
     #[must_use]
-    pub const fn learned(&self) -> Option<Learned> {
-        self.learned
+    pub fn new(settings: Settings, knots: usize, table: &[Knot], errors: &[Knot]) -> Option<Self> {
+        let reach = settings.reach as usize;
+        let fits = reach < table.len() && knots.checked_add(knots.div_ceil(6))? <= errors.len();
+        if knots == 0 || !fits {
+            return None;
+        }
+        let plan = table.get(knots..knots.checked_add(plan_rows(reach))?)?;
+        let known = plan.as_flattened().iter().all(|word| number(*word).is_finite());
+        known.then_some(Self { settings, knots, step: Step::ToModes(0) })
     }
 
     /// Whether there is something left to do.
@@ -85,60 +75,10 @@ impl Learning {
         !matches!(self.step, Step::Done)
     }
 
-    /// As it was before, or as if nothing were learned.
-    pub const fn remember(&mut self, learned: Option<Learned>) {
-        self.learned = learned;
-    }
-
-    /// Begins to learn from a pass of `knots` knots; false, with nothing changed, if the plan behind them is none or there is no room. `table` is the
-    /// half of the memory that holds the correction and the plan, `errors` the other.
-    pub fn begin(&mut self, settings: Settings, knots: usize, table: &mut [Knot], errors: &mut [Knot]) -> bool {
-        let Settings { reach, scored: [first, end], .. } = settings;
-        let reach = reach as usize;
-        let (Some(rows), Some(kept)) = (reach.checked_mul(3), knots.checked_mul(3)) else { return false };
-        let fits = rows < table.len()
-            && knots + plan_rows(reach) <= table.len()
-            && kept / 2 <= errors.len()
-            && 2 * knots + knots.div_ceil(6) <= errors.len();
-        if !fits || first >= end || end as usize > knots {
-            return false;
-        }
-        let plan = table.get(knots..knots + plan_rows(reach)).unwrap_or_default();
-        if !plan.as_flattened().iter().all(|word| number(*word).is_finite()) {
-            return false;
-        }
-        let measured = measured(settings, plan, errors);
-        if !measured.is_finite() {
-            return false;
-        }
-        (self.settings, self.knots) = (settings, knots);
-        let least = self.learned.map_or(measured, |learned| learned.least);
-        let grew = measured > GROWS * GROWS * least;
-        let (played, best) = (table.get_mut(..knots).unwrap_or_default(), errors.get_mut(knots..2 * knots).unwrap_or_default());
-        if grew {
-            played.copy_from_slice(best);
-        } else if self.learned.is_none() || measured < least {
-            best.copy_from_slice(played);
-        }
-        let least = if measured < least { measured } else { least };
-        self.learned = Some(Learned { measured, least, grew });
-        self.step = if grew { Step::Done } else { Step::ToModes(0) };
-        true
-    }
-
-    /// Puts the correction of the least error back into the table.
-    pub fn settle(&mut self, table: &mut [Knot], errors: &[Knot]) {
-        self.step = Step::Done;
-        for (slot, best) in table.iter_mut().take(self.knots).zip(errors.iter().skip(self.knots)) {
-            *slot = *best;
-        }
-    }
-
     /// Does so many steps, each of at most 4 M + 2 products; whether there are more.
     pub fn work(&mut self, steps: u32, table: &mut [Knot], errors: &mut [Knot]) -> bool {
         let Some((played, plan)) = table.split_at_mut_checked(self.knots) else { return false };
-        let Some((errors, kept)) = errors.split_at_mut_checked(self.knots) else { return false };
-        let Some((_, scratch)) = kept.split_at_mut_checked(self.knots) else { return false };
+        let Some((errors, scratch)) = errors.split_at_mut_checked(self.knots) else { return false };
         let Some((head, taps)) = plan.split_at_checked(HEAD) else { return false };
         for _ in 0..steps {
             self.step = match self.step {
@@ -223,21 +163,6 @@ impl Learning {
         let [rise, fall] = self.settings.fade;
         part(knot, rise) * part(self.knots - 1 - knot, fall)
     }
-}
-
-/// Mean square of the errors that are compared, pm².
-fn measured(settings: Settings, plan: &[Knot], errors: &[Knot]) -> f32 {
-    let weights = plan.get(HEAD - 1).map_or([0.0; 6], |row| row.map(number));
-    let [first, end] = settings.scored.map(|knot| knot as usize);
-    let seen = errors.get(first..end).unwrap_or_default();
-    let mut sum = 0.0;
-    for error in seen {
-        for (weight, value) in weights.iter().zip(error) {
-            let value = *weight * *value as f32;
-            sum = sum + value * value;
-        }
-    }
-    sum / seen.len() as f32
 }
 
 /// The six rows of a matrix from this row of the plan on, times a vector.

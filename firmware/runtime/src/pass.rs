@@ -6,7 +6,7 @@
 //! A pass begins with rest, in which the correction may already lead; then a trajectory is played, and the rest behind it belongs to the pass. What it
 //! kept is for whoever learns from it, between passes: the host, or the [background](crate::learning) of the device itself.
 
-use crate::learning::{Learned, Learning, Settings};
+use crate::learning::{Learning, Settings};
 use crate::playback::{self, Knot, UNIT};
 use crate::real::Real;
 
@@ -169,10 +169,10 @@ impl<'m, T: Real> Player<'m, T> {
         self.errors.get(..self.kept as usize).unwrap_or_default()
     }
 
-    /// Knots of the correction, and behind them what a plan needs.
+    /// Knots of the correction that the next pass of the same course plays.
     #[must_use]
-    pub fn table(&self) -> &[Knot] {
-        self.table
+    pub fn correction(&self) -> &[Knot] {
+        self.table.get(..self.course.knots() as usize).unwrap_or_default()
     }
 
     /// Takes knots of the correction, or rows of a [plan](crate::learning), from the `first` on; false, with nothing taken, during a pass or
@@ -197,10 +197,6 @@ impl<'m, T: Real> Player<'m, T> {
         if self.is_busy() || !makes_sense || !fits {
             return false;
         }
-        if course != self.course {
-            // What was learned is of another motion.
-            self.learning.remember(None);
-        }
         (self.course, self.stage, self.tick) = (course, Stage::Running, 0);
         (self.last, self.sum, self.kept, self.status, self.begun) = (None, [T::ZERO; 6], 0, 0, None);
         true
@@ -213,25 +209,16 @@ impl<'m, T: Real> Player<'m, T> {
         }
     }
 
-    /// Learns from the pass that came to its end, anew if `first`; false, with nothing changed, if there is none, or no plan, or no room. What the
-    /// pass kept of the error is gone then. [`Player::work`] does it.
-    pub fn learn(&mut self, settings: Settings, first: bool) -> bool {
-        let knots = self.course.knots() as usize;
-        if self.stage != Stage::Complete || self.kept as usize != knots {
+    /// Makes the correction of the next pass of the one that came to its end; false, with nothing changed, if there is none, or no
+    /// [plan](crate::learning) behind its knots, or no room. What the pass kept of the error is gone then. [`Player::work`] does it.
+    pub fn learn(&mut self, settings: Settings) -> bool {
+        let knots = self.course.knots();
+        if self.stage != Stage::Complete || self.kept != knots {
             return false;
         }
-        let before = self.learning.learned();
-        if first {
-            self.learning.remember(None);
-        }
-        let begun = self.learning.begin(settings, knots, self.table, self.errors);
-        if begun {
-            self.kept = 0;
-            self.stage = if self.learning.is_busy() { Stage::Learning } else { Stage::Complete };
-        } else {
-            self.learning.remember(before);
-        }
-        begun
+        let Some(learning) = Learning::new(settings, knots as usize, self.table, self.errors) else { return false };
+        (self.learning, self.stage, self.kept) = (learning, Stage::Learning, 0);
+        true
     }
 
     /// Does so many steps of learning, each of at most four products for every knot that the plan reaches; whether there are more. For a
@@ -245,24 +232,6 @@ impl<'m, T: Real> Player<'m, T> {
             self.stage = Stage::Complete;
         }
         more
-    }
-
-    /// Ends learning: the correction of the least error is in the table. False, with nothing changed, during a pass, or where nothing was learned.
-    pub fn settle(&mut self) -> bool {
-        if self.is_running() || self.learning.learned().is_none() {
-            return false;
-        }
-        self.learning.settle(self.table, self.errors);
-        if self.stage == Stage::Learning {
-            self.stage = Stage::Complete;
-        }
-        true
-    }
-
-    /// What came of learning so far; none before the first pass that was learned from.
-    #[must_use]
-    pub const fn learned(&self) -> Option<Learned> {
-        self.learning.learned()
     }
 
     /// What the coming tick is given; none if no pass is under way.

@@ -87,7 +87,7 @@ impl Plan {
                 }
                 if radius <= LARGEST_RADIUS {
                     let convergence = Convergence { radius, at, ..wish };
-                    return Some(grid.plan(&taps, learnable, motion, convergence));
+                    return Some(grid.plan(&taps, learnable, convergence));
                 }
             }
             wish.band[1] *= LOWER;
@@ -103,11 +103,8 @@ impl Plan {
         table.resize(knots, [0; 6]);
         table.extend(&self.rows);
         let mut kept = errors.to_vec();
-        kept.resize(2 * knots + knots.div_ceil(6), [0; 6]);
-        let mut learning = Learning::NONE;
-        if !learning.begin(self.settings, knots, &mut table, &mut kept) {
-            return None;
-        }
+        kept.resize(knots + knots.div_ceil(6), [0; 6]);
+        let mut learning = Learning::new(self.settings, knots, &table, &kept)?;
         while learning.work(u32::MAX, &mut table, &mut kept) {}
         table.truncate(knots);
         Some(table)
@@ -117,7 +114,7 @@ impl Plan {
 /// How far the responses may reach; none if there is no room for the knots.
 fn reach(knots: usize, capacity: usize) -> Option<usize> {
     let fits = |reach: usize| knots + plan_rows(reach) <= capacity;
-    let others = 2 * knots + knots.div_ceil(6) <= capacity;
+    let others = knots + knots.div_ceil(6) <= capacity;
     let most = if knots < REACH { knots } else { REACH };
     (1..=most).rev().find(|reach| others && fits(*reach))
 }
@@ -213,22 +210,19 @@ impl Grid {
         })
     }
 
-    fn plan(&self, taps: &Taps, learnable: &Learnable, motion: &Motion, convergence: Convergence) -> Plan {
+    fn plan(&self, taps: &Taps, learnable: &Learnable, convergence: Convergence) -> Plan {
         let basis = &learnable.closed_loop.basis;
-        let weights = [1.0, 1.0, 1.0, motion.radius, motion.radius, motion.radius];
         let mut rows: Vec<[f64; 6]> = Vec::with_capacity(plan_rows(self.reach));
         let matrix = |matrix: &Matrix6| (*matrix).into_iter();
         rows.extend(matrix(&basis.to_modal).chain(matrix(&basis.from_modal)));
-        rows.push(weights);
         debug_assert_eq!(rows.len(), HEAD);
         rows.extend(&taps.learned);
         rows.extend(taps.kept.chunks(6).map(|part| std::array::from_fn(|k| part.get(k).copied().unwrap_or(0.0))));
         // Sums are of f32; what a plan holds is rounded once.
         let rows = rows.iter().map(|row| row.map(|value| (value as f32).to_bits().cast_signed())).collect();
         let knot = |time: f64| libm::ceil(time / self.apart()) as u32;
-        let scored = [motion.scored.start, motion.scored.end].map(|tick| (tick as u32).div_ceil(self.spacing));
         Plan {
-            settings: Settings { reach: self.reach as u32, fade: FADE.map(knot), scored },
+            settings: Settings { reach: self.reach as u32, fade: FADE.map(knot) },
             rows,
             convergence,
             spacing: self.spacing,

@@ -6,12 +6,15 @@ use specgen_link::{
     Bytes, Counted, Counters, Device, Health, Identity, KNOT, KNOTS, PassAction, RecorderAction, RecorderStatus,
     Refusal, Reply, Request, Status, WaveAction, put_knots, put_words,
 };
+use specgen_runtime::learning;
 use specgen_runtime::pass::Course;
+use specgen_runtime::playback::Knot;
 use specgen_runtime::wave::{self, Settings};
 
 use crate::capture::CAPACITY;
 use crate::console::{Console, No};
 use crate::operator::{Denied, HostId};
+use crate::passes::Passes;
 use crate::samples::Stream;
 
 /// Bytes of a piece of something longer.
@@ -140,6 +143,10 @@ impl<'a> Desk<'a> {
             let others = !self.console.operator.may_order(self.host, self.now) || self.console.is_full();
             let done = match action {
                 _ if others => Err(Refusal::Busy),
+                PassAction::Learn { reach, fade } => self.take().and_then(|()| {
+                    let learns = self.console.passes.learn(learning::Settings { reach, fade });
+                    if learns { Ok(()) } else { Err(Refusal::State) }
+                }),
                 PassAction::Begin { spacing, before, ticks, trajectory } => self.take().and_then(|()| {
                     self.console.begin_pass(Course { spacing, before, ticks, trajectory }).map_err(refusal)
                 }),
@@ -155,11 +162,12 @@ impl<'a> Desk<'a> {
         self.console.passes.status().map_or(Reply::Refused(Refusal::Unsupported), Reply::Pass)
     }
 
-    fn errors(&mut self, offset: u32) -> Reply<'_> {
-        let Some(errors) = self.console.passes.errors() else { return Reply::Refused(Refusal::State) };
-        let total = u32::try_from(errors.len() * KNOT).unwrap_or(u32::MAX);
+    /// Knots of what a pass kept, or of what the next one plays.
+    fn fetched(&mut self, offset: u32, knots: impl Fn(&Passes) -> Option<&[Knot]>) -> Reply<'_> {
+        let Some(knots) = knots(&self.console.passes) else { return Reply::Refused(Refusal::State) };
+        let total = u32::try_from(knots.len() * KNOT).unwrap_or(u32::MAX);
         let start = usize::try_from(offset).unwrap_or(usize::MAX);
-        let bytes = Bytes(put_knots(errors, start, &mut self.knots));
+        let bytes = Bytes(put_knots(knots, start, &mut self.knots));
         Reply::Chunk { offset, total, bytes }
     }
 
@@ -237,12 +245,15 @@ impl Device for Desk<'_> {
                 None => Reply::Refused(Refusal::State),
             },
             Request::Wave { action, words } => self.ordered(|desk| desk.wave(action, words)),
-            Request::Knots { .. } | Request::Pass { .. } | Request::Errors { .. } if !passes::POSSIBLE => {
+            Request::Knots { .. } | Request::Pass { .. } | Request::Errors { .. } | Request::Correction { .. }
+                if !passes::POSSIBLE =>
+            {
                 Reply::Refused(Refusal::Unsupported)
             }
             Request::Knots { first, knots } => self.ordered(|desk| desk.knots(first, knots)),
             Request::Pass { action } => self.pass(action),
-            Request::Errors { offset } => self.errors(offset),
+            Request::Errors { offset } => self.fetched(offset, Passes::errors),
+            Request::Correction { offset } => self.fetched(offset, Passes::correction),
             Request::Stream { every } => self.stream.start(every).map_or_else(Reply::Refused, |()| Reply::Done),
             Request::Samples => self.stream.take(),
             Request::Stop => {

@@ -8,7 +8,7 @@ use specgen_link::client::Port;
 use specgen_operate::{ALIVE, Order, Until};
 use specgen_runtime::playback::Knot;
 use specgen_runtime::supervisor::{Phase, Request};
-use specgen_studies::learning::{LearnError, Motion, Repeating, Seen, course, held};
+use specgen_studies::learning::{LearnError, Motion, Plan, Repeating, Seen, course, held};
 
 use crate::cli::operate::{Ended, Operator};
 use crate::cli::ui::{Failure, Ui};
@@ -53,6 +53,8 @@ pub struct Remote<'a, P> {
     pub operator: &'a mut Operator<P>,
     pub ui: &'a Ui,
     pub own: &'a Own,
+    /// The correction that its device made and has.
+    pub made: Option<Vec<Knot>>,
     /// Why it ended a pass.
     pub ended: Option<Ended>,
 }
@@ -88,11 +90,30 @@ impl<P: Port> Remote<'_, P> {
 impl<P: Port> Repeating for Remote<'_, P> {
     fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, LearnError> {
         let course = course(motion, spacing, self.own.number);
-        match self.operator.pass(&self.own.start, course, knots, self.ui) {
+        // What the device made stays there.
+        let sent = if self.made.as_deref() == Some(knots) { None } else { Some(knots) };
+        match self.operator.pass(&self.own.start, course, sent, self.ui) {
             Ok(passed) => {
                 let measured = held(&passed.errors, spacing, motion.corrected);
                 Ok(Seen { real: measured.clone(), measured, kept: passed.errors, status: passed.status })
             }
+            Err(ended) => {
+                self.ended = Some(ended);
+                Err(LearnError::Ended)
+            }
+        }
+    }
+
+    /// The device makes it, and the same kernel here finds whether it made it to the bit.
+    fn next(&mut self, plan: &Plan, played: &[Knot], seen: &Seen) -> Result<Vec<Knot>, LearnError> {
+        let expected = plan.next(played, &seen.kept).ok_or(LearnError::Refused)?;
+        let made = self.operator.plan(seen.kept.len(), &plan.rows).and_then(|()| self.operator.learn(plan.settings, self.ui));
+        match made {
+            Ok(made) if made == expected => {
+                self.made = Some(made.clone());
+                Ok(made)
+            }
+            Ok(_) => Err(LearnError::Refused),
             Err(ended) => {
                 self.ended = Some(ended);
                 Err(LearnError::Ended)

@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 use host_sim::word::status_words;
 use serde::Serialize;
 use specgen_link::client::{ClientError, Port};
-use specgen_link::{PassAction, PassStatus, Refusal};
+use specgen_link::{PassAction, Refusal};
 use specgen_operate::Until;
+use specgen_runtime::learning::Settings;
 use specgen_runtime::pass::{Course, Stage};
 use specgen_runtime::playback::Knot;
 use specgen_runtime::setpoint::BUSY;
@@ -92,16 +93,22 @@ impl<P: Port> Operator<P> {
         let (spacing, before) = (table.spacing, table.before);
         let ticks = u32::try_from(table.knots.len()).unwrap_or(u32::MAX).saturating_mul(spacing);
         let course = Course { spacing, before, ticks, trajectory: number as u32 };
-        let passed = self.pass(&table.start, course, &table.knots, ui)?;
+        let passed = self.pass(&table.start, course, Some(&table.knots), ui)?;
         let motion = passed.errors.get((before / spacing) as usize..).unwrap_or_default();
         let error_nm = translation_nm(motion);
         self.note(line, &Played { correction: shown(path), error_nm, status: passed.status }, ui);
         Ok(())
     }
 
-    /// Goes to `start` (the controller's coordinates, m and rad), rests there, and makes a pass under the correction of these knots.
-    pub fn pass(&mut self, start: &[f64; 6], course: Course, knots: &[Knot], ui: &Ui) -> Result<Passed, Ended> {
-        let PassStatus { capacity, .. } = self.session.pass(PassAction::Look).map_err(refused)?;
+    /// Knots that the device has room for in a pass.
+    pub fn pass_capacity(&mut self) -> Result<u32, Ended> {
+        self.session.pass(PassAction::Look).map(|status| status.capacity).map_err(refused)
+    }
+
+    /// Goes to `start` (the controller's coordinates, m and rad), rests there, and makes a pass under the correction of these knots, or of those that
+    /// the device has.
+    pub fn pass(&mut self, start: &[f64; 6], course: Course, knots: Option<&[Knot]>, ui: &Ui) -> Result<Passed, Ended> {
+        let capacity = self.pass_capacity()?;
         if course.knots() > capacity {
             return Err(Ended::Refused(format!(
                 "a pass of {} knots is more than the {capacity} that the device has room for; learn with a lower --bandwidth, which \
@@ -116,9 +123,11 @@ impl<P: Port> Operator<P> {
             std::thread::sleep(LOOK);
             self.look()?;
         }
-        let mut whole = knots.to_vec();
-        whole.resize(course.knots() as usize, [0; 6]);
-        self.session.put_knots(&whole).map_err(refused)?;
+        if let Some(knots) = knots {
+            let mut whole = knots.to_vec();
+            whole.resize(course.knots() as usize, [0; 6]);
+            self.session.put_knots(0, &whole).map_err(refused)?;
+        }
         let Course { spacing, before, ticks, trajectory } = course;
         self.ordered = true;
         self.session.pass(PassAction::Begin { spacing, before, ticks, trajectory }).map_err(refused)?;
@@ -143,6 +152,30 @@ impl<P: Port> Operator<P> {
         // What it began is what is commanded.
         let errors = self.session.errors().map_err(refused)?;
         Ok(Passed { errors, status: status.status })
+    }
+}
+
+/// Learning in the device.
+impl<P: Port> Operator<P> {
+    /// Sends what the device learns with, behind the knots of its passes.
+    pub fn plan(&mut self, knots: usize, rows: &[Knot]) -> Result<(), Ended> {
+        self.session.put_knots(knots, rows).map_err(refused)
+    }
+
+    /// Lets the device make the correction of the next pass; it then has the knots that this gives.
+    pub fn learn(&mut self, Settings { reach, fade }: Settings, ui: &Ui) -> Result<Vec<Knot>, Ended> {
+        let mut status = self.session.pass(PassAction::Learn { reach, fade }).map_err(refused)?;
+        let begun = Instant::now();
+        while Stage::from_word(status.stage) == Some(Stage::Learning) {
+            if begun.elapsed() > LATER {
+                return Err(Ended::Fault("the device does not come to an end of learning".to_owned()));
+            }
+            std::thread::sleep(LOOK);
+            self.look()?;
+            self.show(ui);
+            status = self.session.pass(PassAction::Look).map_err(refused)?;
+        }
+        self.session.correction().map_err(refused)
     }
 }
 

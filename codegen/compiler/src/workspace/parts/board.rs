@@ -17,6 +17,7 @@ pub const PART: Part = Part {
         "src/exchange.rs",
         "src/health.rs",
         "src/lib.rs",
+        "src/learn.rs",
         "src/recording.rs",
         "src/report.rs",
         "src/samples.rs",
