@@ -38,7 +38,7 @@ fn with_trajectories(kinds: Vec<TrajectoryKind>) -> Model {
     let mut model = reference();
     let name = |index: usize| format!("t{index}");
     model.task_space.as_mut().unwrap().trajectories =
-        kinds.into_iter().enumerate().map(|(index, kind)| Trajectory { name: name(index), kind }).collect();
+        kinds.into_iter().enumerate().map(|(index, kind)| Trajectory { name: name(index), lead: None, kind }).collect();
     model
 }
 

@@ -66,6 +66,7 @@ fn every_value_of_the_reference_is_in_si() {
 
     let paper = |name: &str, path| Trajectory {
         name: name.to_owned(),
+        lead: None,
         kind: TrajectoryKind::Paper { path, as_printed: false, frequency: 1.0 },
     };
     let expected = TaskSpace {
@@ -250,7 +251,7 @@ fn a_waveform_is_named_and_not_read() {
     assert!(findings.is_empty(), "{findings:#?}");
     let kind = TrajectoryKind::Waveform { file: "none.csv".to_owned(), period: 2e-3, repeat: true };
     let space = model.and_then(|model| model.task_space).expect("a model");
-    assert_eq!(space.trajectories[3], Trajectory { name: "w".to_owned(), kind });
+    assert_eq!(space.trajectories[3], Trajectory { name: "w".to_owned(), lead: None, kind });
 
     let printed = text.replacen("\"case-1\"\nfrequency", "\"case-1\"\nas_printed = true\nfrequency", 1);
     let (model, _) = spec::load(&source(&printed, "spec.toml", &folder));

@@ -6,7 +6,7 @@ use super::section::{Grid, Section};
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::ir::Scalar;
 use specgen_compiler::precision::{self, Precision};
-use specgen_compiler::stability::platform::Design;
+use specgen_compiler::stability::platform::{DampedMode, Design, SLOW};
 use specgen_language::diagnostic::to_json;
 use specgen_language::model::Target;
 use specgen_studies::reproduce::write::digits;
@@ -80,6 +80,28 @@ pub fn modes(design: &Design) -> Grid {
         modes.push(vec![format!("{}", number + 1), digits(hertz), format!("{:.4}", mode.damping_ratio)]);
     }
     modes
+}
+
+/// What active damping does to each mode; none without it.
+#[must_use]
+pub fn damping(design: &Design) -> Option<Grid> {
+    let damping = design.damping.as_ref()?;
+    let at = SLOW.map(|part| format!("|S| at {} Hz", digits(design.modes[0].frequency / TAU / part)));
+    let mut head = vec!["mode", "Hz", "peak of the compliance ×", "largest |S|", "worst |S|"];
+    head.extend(at.iter().map(String::as_str));
+    let mut table = Grid::new("Active damping in P/F, beside that without it", &head);
+    for (number, (mode, found)) in design.modes.iter().zip(&damping.modes).enumerate() {
+        let mut row = vec![format!("{}", number + 1), digits(mode.frequency / TAU)];
+        match found {
+            Some(DampedMode { compliance, sensitivity, slow, without }) => {
+                row.extend([*compliance, sensitivity[0], sensitivity[1]].map(|value| format!("{value:.2}")));
+                row.extend(slow.iter().zip(without).map(|(with, without)| format!("{with:.3} ({without:.3})")));
+            }
+            None => row.extend(["too fast for the period", "", "", "", "", ""].map(str::to_owned)),
+        }
+        table.push(row);
+    }
+    Some(table)
 }
 
 /// Rounding errors of the scalar, axis by axis.

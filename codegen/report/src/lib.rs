@@ -17,6 +17,7 @@ pub mod front;
 mod grid;
 pub mod hysteresis;
 pub mod identification;
+pub mod learning;
 pub mod margins;
 pub mod page;
 pub mod paper;

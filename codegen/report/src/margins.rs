@@ -5,7 +5,7 @@ use core::f64::consts::TAU;
 use serde_json::{Value, json};
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::lower;
-use specgen_compiler::stability::platform::{Design, Law, RestDynamics};
+use specgen_compiler::stability::platform::{DampedMode, Design, Law, RestDynamics};
 use specgen_language::model::TaskSpace;
 use specgen_studies::reproduce::write::digits;
 
@@ -93,7 +93,24 @@ pub fn section(compiled: &Compiled, mode: u32, command: &str) -> Section {
         section = section
             .pane(&[AXES[axis]], vec![Part::Lead(lead.clone()), Part::Columns(vec![left, vec![Part::Rows(all)]])]);
     }
+    if let Some(damping) = evidence::damping(design) {
+        let said = damped(design);
+        section = section.text(&said).table(damping);
+    }
     section.text("The open loop is that of the model with the sampled platform, lags of amplifiers and gauges, notch and active damping, opened at the legs, all axes at once: its gain margin is λ = ρ/ρ̂ of the legs. The limits of the control modes are found by eigenvalues of the whole closed loop.")
+}
+
+/// What active damping brings at its least and costs at its most.
+fn damped(design: &Design) -> String {
+    let found: Vec<_> = design.damping.iter().flat_map(|damping| damping.modes.iter().flatten()).collect();
+    let largest = |of: &dyn Fn(&DampedMode) -> f64| {
+        found.iter().map(|mode| of(mode)).fold(0.0, |most: f64, value| if value > most { value } else { most })
+    };
+    format!(
+        "Active damping takes the peak of each mode's compliance, from force to pose, to {} or less of that without it; the worst |S| over stiffness, gain, lag and delay is {}.",
+        short(largest(&|mode| mode.compliance)),
+        short(largest(&|mode| mode.sensitivity[1]))
+    )
 }
 
 fn bode(compiled: &Compiled, design: &Design, task: &TaskSpace, law: Law) -> Option<Vec<Vec<Chart>>> {

@@ -10,15 +10,19 @@
 //! tick a table is played.
 
 mod convergence;
+mod excitation;
 mod motion;
 mod passes;
 mod plan;
+mod response;
 mod table;
 mod update;
 
 pub use convergence::{Convergence, LARGEST_RADIUS, Learnable};
+pub use excitation::{Excitation, PASSES};
 pub use motion::Motion;
 pub use passes::{LearnError, Learned, Learner, Pass, Repeating, Seen, course, held, learn, translation_nm};
 pub use plan::Plan;
+pub use response::{Bin, Heard, Response};
 pub use table::{Table, TableError, knots};
 pub use update::Update;

@@ -9,6 +9,7 @@
 pub mod deviation;
 pub mod factors;
 pub mod gate;
+pub mod learning;
 pub mod plan;
 pub mod quantiles;
 pub mod run;
@@ -17,6 +18,7 @@ pub mod shard;
 pub use deviation::Deviation;
 pub use factors::{Factor, Factors, Origin};
 pub use gate::Gate;
+pub use learning::{Learning, Learnt};
 pub use plan::{Member, Plan};
 pub use run::{Figures, Outcome, Study};
 pub use shard::Shard;

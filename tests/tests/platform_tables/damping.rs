@@ -6,7 +6,8 @@ use std::sync::OnceLock;
 use host_sim::platform::rig::{Bench as Rig, Request};
 use host_sim::platform::{Specimen, WorkPart};
 use host_sim::trajectory::PoseTarget;
-use specgen::stability::platform::{Adapting, Conditions, Law};
+use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, Tuning};
+use specgen::tuning::relay;
 use specgen_tests::length;
 
 use super::bench::{Bench, PERIOD, in_parallel, reference_machine};
@@ -112,5 +113,44 @@ fn damped_machines_follow_and_hold_better_than_undamped_ones() {
         let [(before, [ring, place, turn]), (after, [rung, placed, turned])] = found[..] else { unreachable!() };
         assert!(after[0] <= *bar && after[0] < before[0], "{after:?}");
         assert!(rung <= 10.0 && rung < ring && placed <= place && turned <= turn, "{found:?}");
+    }
+}
+
+/// Where the loop with a gain on one axis alone becomes unstable, over the stiffness of that axis, by eigenvalues.
+fn limit(closed_loop: &ClosedLoop, axis: usize) -> f64 {
+    let law = Law::Combined(Adapting::Invhys);
+    let stable = |gain: f64| {
+        let mut tuning = Tuning::NONE;
+        tuning.proportional[axis] = gain * closed_loop.basis.axis_stiffness[axis];
+        closed_loop.spectral_radius(law, &tuning, &Conditions::NOMINAL) < 1.0
+    };
+    let mut gain = 0.05;
+    while gain < 20.0 && stable(gain) {
+        gain *= 1.01;
+    }
+    gain
+}
+
+#[test]
+fn the_relay_test_of_tune_finds_the_limit_of_the_damped_loop() {
+    let bench = damped_machine();
+    let damped = closed_loop(bench);
+    let bare = ClosedLoop { active_damping: None, ..damped.clone() };
+    let lead = bench.design().lead / PERIOD;
+    let found = in_parallel(2, |which| {
+        let closed_loop = [&damped, &bare][which as usize];
+        relay::test(&bench.scenario(), &bench.controller(), closed_loop, [0.1, lead]).unwrap()
+    });
+    for axis in 0..2 {
+        let [damped, bare] = [(0, &damped), (1, &bare)].map(|(which, closed_loop): (usize, _)| {
+            let found = found[which][axis].unwrap();
+            (found.gain, 1.0 / found.period, limit(closed_loop, axis))
+        });
+        println!("axis {axis}: gain, Hz, gain by eigenvalues: damped {damped:.2?}, without {bare:.2?}");
+        for (gain, _, expected) in [damped, bare] {
+            assert!(gain / expected > 0.75 && gain / expected < 1.25, "{gain} {expected}");
+        }
+        // So the two are told apart.
+        assert!((damped.2 / bare.2 - 1.0).abs() > 0.1);
     }
 }

@@ -26,18 +26,18 @@ const LEARNING: [(&str, &str); 3] = [
     ("stale_ticks  = 10", "stale_ticks = 3"),
 ];
 /// Of the platform's joints, m.
-const RADIUS: f64 = 0.1;
+pub const RADIUS: f64 = 0.1;
 /// Back to the start, m/s and rad/s.
-const SPEED: [f64; 6] = [1e-3, 1e-3, 1e-3, 1e-2, 1e-2, 1e-2];
+pub const SPEED: [f64; 6] = [1e-3, 1e-3, 1e-3, 1e-2, 1e-2, 1e-2];
 /// Highest frequency to be learned, Hz.
-const WISH: f64 = 800.0;
+pub const WISH: f64 = 800.0;
 
-fn plays() -> &'static Bench {
+pub fn plays() -> &'static Bench {
     static BENCH: OnceLock<Bench> = OnceLock::new();
     BENCH.get_or_init(|| Bench::new("learning-plays", Specimen::reference(), &LEARNING))
 }
 
-fn other() -> &'static Bench {
+pub fn other() -> &'static Bench {
     static BENCH: OnceLock<Bench> = OnceLock::new();
     BENCH.get_or_init(|| bouc_wen("learning-bouc-wen", &LEARNING))
 }

@@ -84,7 +84,7 @@ impl Choice {
             ("hysteresis", _) if key.name.starts_with("creep_") => !self.dynamic,
             ("hysteresis", _) if key.name == "dead_time" => !self.control,
             ("sensor", _) if matches!(key.name, "calibration" | "input_range") => self.control,
-            ("trajectory", Presence::Rule(_)) => of_waveform == self.waveform,
+            ("trajectory", Presence::Rule(_)) if key.name != "lead" => of_waveform == self.waveform,
             _ => true,
         }
     }

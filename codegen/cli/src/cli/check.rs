@@ -18,6 +18,7 @@ use specgen_compiler::reach::Reach;
 use specgen_compiler::stability::Margins;
 use specgen_compiler::stability::platform::Design;
 use specgen_identify::Report;
+use specgen_studies::lead::{self, LeadOf};
 use specgen_studies::verdict::Verdict;
 
 /// Arguments of `check`.
@@ -133,6 +134,25 @@ pub fn describe(compiled: &Compiled) -> String {
     }
     if let Some(design) = &compiled.design {
         text.push_str(&stability::platform::describe(design));
+    }
+    for one in lead::of(compiled) {
+        let LeadOf { name, lead, best, errors: [error, least] } = &one;
+        let _ = write!(
+            text,
+            "  trajectory {name}: lead {:.4} ms leaves {:.1} nm rms by the model",
+            lead * 1e3,
+            error * 1e9
+        );
+        let _ = if one.is_proposed() {
+            writeln!(
+                text,
+                ";\n    its corners ask for less: lead = \"{:.3} ms\" in its [[trajectory]] leaves {:.1} nm",
+                best * 1e3,
+                least * 1e9
+            )
+        } else {
+            writeln!(text, ", the best {:.1} nm", least * 1e9)
+        };
     }
     if let Some(reach) = &compiled.reach {
         text.push_str(&reach::describe(reach, compiled.design.is_some()));

@@ -102,6 +102,10 @@ Examples:
       goes on where that ended
   specgen learn learning.toml --prepare --passes 0 -o prepared.json
       what lag and modes would leave, by the model alone
+  specgen learn learning.toml --excite response.json
+      measures the response of the running loop, for
+  specgen learn learning.toml --response response.json
+      which learns with it, whatever the machine has of the spec's stiffness
   specgen learn learning.toml --trajectory case-1 --socket link --machine stage-7  # (board)
       on a machine, which is armed for it and ramped down after it";
 
@@ -215,7 +219,9 @@ Examples:
 pub const RESPONSE: &str = "\
 Examples:
   specgen identify response sweep.csv --plot response.svg
-      resonance, damping, lag, dead time";
+      resonance, damping, lag, dead time
+
+The response of a platform whose loop runs: specgen learn SPEC --excite FILE.";
 
 pub const GAUGE: &str = "\
 Examples:

@@ -1,5 +1,6 @@
 //! `specgen learn`: a motion that repeats, learned between passes, on the simulated machine of a spec or over the link on a real one.
 
+mod excite;
 mod machine;
 
 use std::fmt::Write as _;
@@ -24,16 +25,21 @@ use machine::{Own, Remote};
 use specgen_compiler::compile::Compiled;
 use specgen_language::interrupt;
 use specgen_language::model::TaskSpace;
+use specgen_report::learning::BANDWIDTH;
 use specgen_runtime::playback::Knot;
 use specgen_studies::learning::{
-    Convergence, LearnError, Learnable, Learned, Learner, Motion, Pass, Repeating, Table, Update, knots, learn,
+    Convergence, LearnError, Learnable, Learned, Learner, Motion, Pass, Plan, Repeating, Response, Table, Update, knots, learn,
 };
 use specgen_studies::machine as plant;
 use specgen_studies::robust::Factors;
 use specgen_studies::robust::factors::Given;
 
-/// Highest frequency that is learned unless asked otherwise, Hz.
-const BANDWIDTH: f64 = 800.0;
+/// Why nothing is learned with the model's response.
+pub(super) const NOWHERE: &str = "learning converges at no frequency on every machine within the declared intervals; narrow them in [robust] or by \
+     --vary, such as stiffness=2%, once they are measured";
+/// The same with a measured one.
+const UNKNOWN: &str =
+    "too little is known of the measured response for learning; measure it along a longer motion by --excite";
 /// How long the machine may take to its bias pose, s.
 const ARMING: f64 = 60.0;
 
@@ -65,6 +71,17 @@ pub struct Arguments {
     /// Begin with this correction, of the same spec, machine and motion.
     #[arg(long, value_name = "FILE")]
     from: Option<PathBuf>,
+    /// Learn nothing: measure the response of the running loop to a correction, by sweeps within passes of the motion, and write it here (JSON).
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["passes", "vary", "prepare", "from", "output", "response"])]
+    excite: Option<PathBuf>,
+    /// Learn with the response that --excite measured on this machine, not with the model's and the intervals of [robust].
+    #[arg(long, value_name = "FILE", conflicts_with = "vary")]
+    response: Option<PathBuf>,
+    /// Let the machine's own device make each correction, in its background, in room for so many knots a pass: 4096 on an STM32H743, which is
+    /// taken if no number is given, 768 on an STM32F446, 65536 on a PC.
+    #[arg(long, value_name = "KNOTS", num_args = 0..=1, default_missing_value = "4096", conflicts_with_all = ["excite", "response"],
+          value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    on_device: Option<u32>,
     /// Write the correction of the best pass here (JSON).
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -78,12 +95,18 @@ pub struct Arguments {
     plant: PlantArguments,
 }
 
+/// Who makes the corrections, and by what.
+enum Rule {
+    Host(Update),
+    Device(Plan),
+}
+
 /// What is learned, and how.
 struct Study {
     compiled: Compiled,
     convergence: Convergence,
     motion: Motion,
-    update: Update,
+    rule: Rule,
     motion_name: String,
     machine_name: String,
     begin: Vec<Knot>,
@@ -102,52 +125,131 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         return Err(Failure::Usage(text.to_owned()));
     }
     arguments.output.as_deref().map_or(Ok(()), check_place)?;
+    arguments.excite.as_deref().map_or(Ok(()), check_place)?;
     let compiled = if named { spec::looked_up(&arguments.spec, ui)? } else { spec::compiled(&arguments.spec, ui)? };
     let own = if named { Some(Own::named(arguments.trajectory.as_deref(), &compiled)?) } else { None };
+    if let Some(path) = &arguments.excite {
+        return excite::run(arguments, path, &compiled, own.as_ref(), ui);
+    }
     let study = study(arguments, compiled)?;
-    match &own {
-        Some(own) => on_machine(arguments, &study, own, ui),
-        None => simulated(arguments, &study, ui),
+    let start = own.as_ref().map_or(study.motion.targets[0].pose, |own| own.start);
+    let Done { found, why, down } = on(
+        arguments,
+        &study.compiled,
+        own.as_ref(),
+        ui,
+        |machine, ui| passes(arguments, &study, machine, ui),
+        |learned, ui| keep(arguments, &study, learned, start, ui),
+    )?;
+    match (found, why) {
+        (Some(found), Some(why)) => ui.judged(&found, Some(why)),
+        (None, Some(why)) => Err(Failure::Gate(why)),
+        (Some(found), None) if found.learned.passes.len() > arguments.passes as usize || found.learned.grew => {
+            ui.result(&found);
+            Ok(())
+        }
+        (Some(found), None) => {
+            let message = format!("interrupted: the best pass so far is kept{down}");
+            Err(Failure::Interrupted { message, result: ui.shown(&found) })
+        }
+        (None, None) => Err(Failure::Gate(format!("interrupted before the first pass was over{down}"))),
     }
 }
 
-fn study(arguments: &Arguments, compiled: Compiled) -> Result<Study, Failure> {
+/// What came of work on a machine.
+struct Done<F> {
+    /// What was found, if the machine made its passes.
+    found: Option<F>,
+    /// Why it ended before it was asked to.
+    why: Option<String>,
+    /// How a machine at the end of a link was left, behind "; ".
+    down: String,
+}
+
+/// Does work on the machine at the end of the link, or on a simulated one, and keeps what it gives, however the machine ends.
+fn on<T, F>(
+    arguments: &Arguments,
+    compiled: &Compiled,
+    own: Option<&Own>,
+    ui: &mut Ui,
+    work: impl FnOnce(&mut dyn Repeating, &Ui) -> Result<T, LearnError>,
+    keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
+) -> Result<Done<F>, Failure> {
+    match own {
+        Some(own) => on_machine(arguments, compiled, own, ui, work, keep),
+        None => simulated(arguments, compiled, ui, work, keep),
+    }
+}
+
+/// The motion, and what it is called.
+fn motion_of(arguments: &Arguments, compiled: &Compiled) -> Result<(Motion, String), Failure> {
     let model = &compiled.model;
-    let seed = arguments.plant.seed;
-    let task = takes_correction(&compiled)?;
-    let followed = trajectory::chosen(arguments.trajectory.as_deref(), arguments.frequency, seed, &compiled)?;
-    let motion_name = match &arguments.machine {
+    let task = takes_correction(compiled)?;
+    let followed =
+        trajectory::chosen(arguments.trajectory.as_deref(), arguments.frequency, arguments.plant.seed, compiled)?;
+    let name = match &arguments.machine {
         Some(_) => motion_name(&followed.name),
         None => format!("{} at {} Hz", followed.name, followed.frequency),
     };
-    let shape = arguments.plant.plant.as_ref().map_or_else(|| "plays".to_owned(), |path| path.display().to_string());
-    let machine_name = arguments.machine.clone().unwrap_or_else(|| format!("simulated, {shape}, seed {seed}"));
-    let learnable = Learnable::of(&compiled)
-        .ok_or_else(|| Failure::Environment("the platform has no modes, which the spec was checked for".to_owned()))?;
-    let factors = Factors::of(model, &arguments.vary);
-    let convergence = learnable.convergence(&factors, arguments.bandwidth).ok_or_else(|| {
-        Failure::Gate(
-            "learning converges at no frequency on every machine within the declared intervals; narrow them in [robust] or by \
-             --vary, such as stiffness=2%, once they are measured"
-                .to_owned(),
-        )
-    })?;
     let trajectory = followed.choice.of_platform(model, task);
     let speed = task.setpoint.speed;
     let motion =
         Motion::of(trajectory.as_ref(), model.timing.period, &speed, model.geometry.joint_radius()).map_err(gate)?;
+    Ok((motion, name))
+}
+
+/// What the machine is called.
+fn machine_name(arguments: &Arguments) -> String {
+    let PlantArguments { plant, seed, .. } = &arguments.plant;
+    let shape = plant.as_ref().map_or_else(|| "plays".to_owned(), |path| path.display().to_string());
+    arguments.machine.clone().unwrap_or_else(|| format!("simulated, {shape}, seed {seed}"))
+}
+
+fn learnable_of(compiled: &Compiled) -> Result<Learnable, Failure> {
+    Learnable::of(compiled)
+        .ok_or_else(|| Failure::Environment("the platform has no modes, which the spec was checked for".to_owned()))
+}
+
+fn study(arguments: &Arguments, compiled: Compiled) -> Result<Study, Failure> {
+    let (motion, motion_name) = motion_of(arguments, &compiled)?;
+    let machine_name = machine_name(arguments);
+    let mut learnable = learnable_of(&compiled)?;
+    let mut refused = format!("{NOWHERE}, or measure the response of the machine by --excite");
+    if let Some(path) = &arguments.response {
+        let named = |error| Failure::Gate(format!("{}: {error}", path.display()));
+        let response = Response::of_file(path).map_err(named)?;
+        response.is_for(&compiled.ir.digest, &machine_name).map_err(named)?;
+        learnable = learnable.with(response);
+        refused = UNKNOWN.to_owned();
+    }
+    let factors = Factors::of(&compiled.model, &arguments.vary);
+    let convergence = learnable.convergence(&factors, arguments.bandwidth).ok_or(Failure::Gate(refused))?;
+    let plan = arguments.on_device.map(|room| {
+        Plan::new(&learnable, &motion, &convergence, &factors, room as usize).ok_or_else(|| {
+            Failure::Gate(format!(
+                "no plan of this motion fits into {room} knots and converges on every machine within the declared intervals; learn without \
+                 --on-device, or a shorter motion"
+            ))
+        })
+    });
+    let plan = plan.transpose()?;
+    let convergence = plan.as_ref().map_or(convergence, |plan| plan.convergence.clone());
     let (begin, spacing) =
         begin(arguments, &compiled, &learnable, &motion, &convergence, [&machine_name, &motion_name])?;
-    let update = Update::new(&learnable, &motion, &convergence, spacing);
-    Ok(Study { compiled, convergence, motion, update, motion_name, machine_name, begin, spacing })
+    let rule = plan.map_or_else(|| Rule::Host(Update::new(&learnable, &motion, &convergence, spacing)), Rule::Device);
+    Ok(Study { compiled, convergence, motion, rule, motion_name, machine_name, begin, spacing })
 }
 
 /// Makes the passes; the reader sees each, and may end them.
 fn passes(arguments: &Arguments, study: &Study, machine: &mut dyn Repeating, ui: &Ui) -> Result<Learned, LearnError> {
-    let Study { motion, update, begin, spacing, .. } = study;
+    let Study { motion, rule, begin, spacing, .. } = study;
+    let learner = match rule {
+        Rule::Host(update) => Learner::Host(update),
+        Rule::Device(plan) => Learner::Device(plan),
+    };
     let stop = interrupt::heed();
     let count = arguments.passes as usize;
-    let learned = learn(machine, motion, Learner::Host(update), begin, *spacing, count, |number, pass| {
+    let learned = learn(machine, motion, learner, begin, *spacing, count, |number, pass| {
         ui.rate(&format!("learn: pass {number} of {count}, {:.1} nm", pass.translation_nm));
         if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
@@ -155,9 +257,14 @@ fn passes(arguments: &Arguments, study: &Study, machine: &mut dyn Repeating, ui:
     learned
 }
 
-fn simulated(arguments: &Arguments, study: &Study, ui: &mut Ui) -> Result<(), Failure> {
+fn simulated<T, F>(
+    arguments: &Arguments,
+    compiled: &Compiled,
+    ui: &mut Ui,
+    work: impl FnOnce(&mut dyn Repeating, &Ui) -> Result<T, LearnError>,
+    keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
+) -> Result<Done<F>, Failure> {
     let (leg, seed) = (arguments.plant.leg()?, arguments.plant.seed);
-    let Study { compiled, motion, .. } = study;
     let (model, task) = (&compiled.model, takes_correction(compiled)?);
     let mut controller = emitted(compiled, ui)?;
     let specimen = plant::specimen(model, task, &leg, Some(seed));
@@ -166,19 +273,24 @@ fn simulated(arguments: &Arguments, study: &Study, ui: &mut Ui) -> Result<(), Fa
     let mut rig = scenario.rig().clone();
     let mut bench = Bench::new(&mut rig, &mut controller, model.timing.period, 0).map_err(environment)?;
     bench.arm(ARMING).map_err(gate)?;
-    let learned = passes(arguments, study, &mut bench, ui).map_err(gate)?;
-    let found = keep(arguments, study, learned, motion.targets[0].pose, ui)?;
-    if found.learned.passes.len() <= arguments.passes as usize && !found.learned.grew {
-        let message = "interrupted: the best pass so far is kept".to_owned();
-        return Err(Failure::Interrupted { message, result: ui.shown(&found) });
-    }
-    ui.result(&found);
-    Ok(())
+    let found = match work(&mut bench, ui) {
+        Ok(done) => Some(keep(done, ui)?),
+        Err(LearnError::Ended) => None,
+        Err(error) => return Err(gate(error)),
+    };
+    Ok(Done { found, why: None, down: String::new() })
 }
 
-fn on_machine(arguments: &Arguments, study: &Study, own: &Own, ui: &mut Ui) -> Result<(), Failure> {
+fn on_machine<T, F>(
+    arguments: &Arguments,
+    compiled: &Compiled,
+    own: &Own,
+    ui: &mut Ui,
+    work: impl FnOnce(&mut dyn Repeating, &Ui) -> Result<T, LearnError>,
+    keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
+) -> Result<Done<F>, Failure> {
     interrupt::heed();
-    let ir = &study.compiled.ir;
+    let ir = &compiled.ir;
     let (session, name) = arguments.line.open(Some(&ir.digest))?;
     let lost = |error: &dyn std::fmt::Display| {
         Failure::Environment(format!(
@@ -193,9 +305,9 @@ fn on_machine(arguments: &Arguments, study: &Study, own: &Own, ui: &mut Ui) -> R
             arguments.spec.display()
         )));
     }
-    let mut remote = Remote { operator: &mut operator, ui, own, ended: None };
-    let learned = match remote.arm() {
-        Ok(()) => passes(arguments, study, &mut remote, ui),
+    let mut remote = Remote { operator: &mut operator, ui, own, made: None, ended: None };
+    let done = match remote.arm() {
+        Ok(()) => work(&mut remote, ui),
         Err(ended) => {
             remote.ended = Some(ended);
             Err(LearnError::Ended)
@@ -207,32 +319,20 @@ fn on_machine(arguments: &Arguments, study: &Study, own: &Own, ui: &mut Ui) -> R
         _ if operator.is_powered() => operator.ramp_down(ui).map_err(|error| lost(&error)),
         _ => Ok(format!("the machine is {}, amplifiers off", operator.stands())),
     };
-    // What was learned is kept, however the machine ended.
-    let found = match learned {
-        Ok(learned) => Some(keep(arguments, study, learned, own.start, ui)?),
+    // What was found is kept, however the machine ended.
+    let found = match done {
+        Ok(done) => Some(keep(done, ui)?),
         Err(LearnError::Ended) => None,
         Err(error) => return Err(down.err().unwrap_or_else(|| Failure::Gate(format!("{name}: {error}")))),
     };
-    let down = down?;
+    let down = format!("; {}", down?);
     let why = match ended {
         Some(Ended::Refused(text) | Ended::Fault(text)) => Some(format!("{name}: {text}")),
         Some(Ended::Failed(failure)) => return Err(failure),
         Some(Ended::Stopped) => Some(format!("{name}: the program that serves the link has ended")),
         Some(Ended::Link(_) | Ended::Interrupted) | None => None,
     };
-    match (found, why) {
-        (Some(found), Some(why)) => ui.judged(&found, Some(why)),
-        (None, Some(why)) => Err(Failure::Gate(why)),
-        (Some(found), None) if found.learned.passes.len() > arguments.passes as usize || found.learned.grew => {
-            ui.result(&found);
-            Ok(())
-        }
-        (Some(found), None) => {
-            let message = format!("interrupted: the best pass so far is kept; {down}");
-            Err(Failure::Interrupted { message, result: ui.shown(&found) })
-        }
-        (None, None) => Err(Failure::Gate(format!("interrupted before the first pass was over; {down}"))),
-    }
+    Ok(Done { found, why, down })
 }
 
 /// Writes the table of the best pass, if a file is named.
@@ -258,7 +358,7 @@ fn gate(error: impl Into<LearnError>) -> Failure {
 }
 
 /// The `[control]` of a spec whose controller takes a correction.
-fn takes_correction(compiled: &Compiled) -> Result<&TaskSpace, Failure> {
+pub(super) fn takes_correction(compiled: &Compiled) -> Result<&TaskSpace, Failure> {
     let task = compiled.model.task_space.as_ref().ok_or_else(|| {
         Failure::Gate(
             "learning is for a spec with [control]: legs with their own gauges learn from tick to tick by EWMA and PCC"
@@ -318,9 +418,14 @@ impl Outcome for Found {
         // Writing to a String cannot fail, here and below.
         let _ = writeln!(
             text,
-            "  learned {low:.1} to {high:.0} Hz; error times {:.2} a pass or less on every machine within\n  the intervals, worst at \
-             {:.0} Hz",
-            convergence.radius, convergence.at
+            "  learned {low:.1} to {high:.0} Hz; error times {:.2} a pass or less {}, worst at {:.0} Hz",
+            convergence.radius,
+            if convergence.measured {
+                "by the response\n  as it was measured"
+            } else {
+                "on every machine within\n  the intervals"
+            },
+            convergence.at
         );
         let columns = [right(6), right(10), right(10), right(12), left(0).behind("  ")];
         row(&mut text, &columns, &[&"pass", &"nm rms", &"nrad rms", &"gauges, nm", &""]);

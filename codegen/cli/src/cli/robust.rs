@@ -13,14 +13,16 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 
 use super::file::{check_place, claim, write_folder};
+use super::learn::{NOWHERE, takes_correction};
 use super::plot::Plot;
 use super::sim::{PlantArguments, emitted, environment, frequency};
 use super::spec;
 use super::ui::{Failure, Ui};
 use specgen_language::interrupt;
 use specgen_language::spec::quantity::{self, Dimension};
+use specgen_report::learning::BANDWIDTH;
 use specgen_studies::robust::factors::Given;
-use specgen_studies::robust::{Member, Outcome, Plan, Shard, Study};
+use specgen_studies::robust::{Factors, Learning, Member, Outcome, Plan, Shard, Study};
 use work::{Part, Ran, Work};
 
 /// Lines of progress of a run whose output is not looked at.
@@ -77,6 +79,12 @@ struct StudyArguments {
     /// Gate: largest rms error of the angles, such as "100 nrad"; for a spec with [control].
     #[arg(long, value_name = "ANGLE", value_parser = angle, allow_hyphen_values = true)]
     max_orientation: Option<f64>,
+    /// Learn the motion on each machine, from so many passes, and show what is left; for a spec with control.correction.
+    #[arg(long, value_name = "PASSES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    learn: Option<u32>,
+    /// Gate: largest rms error of the translation once learned, such as "6 nm"; learning must grow on no machine, either.
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true, requires = "learn")]
+    max_learned: Option<f64>,
     /// Quantile of the draws that the gate compares, %; the largest of draws and corners if not given.
     #[arg(long, value_name = "PERCENT", value_parser = percent, allow_negative_numbers = true)]
     quantile: Option<f64>,
@@ -135,7 +143,17 @@ fn study(arguments: &StudyArguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = spec::compiled(path, ui)?;
     let followed =
         trajectory::chosen(arguments.trajectory.as_deref(), arguments.frequency, arguments.plant.seed, &compiled)?;
-    let work = Work::of(arguments, path, &compiled, &followed, &leg)?;
+    let factors = Factors::of(&compiled.model, &arguments.vary);
+    let learning = match arguments.learn {
+        Some(passes) => {
+            takes_correction(&compiled)?;
+            let learning =
+                Learning::of(&compiled, &followed.choice, &factors, BANDWIDTH, passes).map_err(environment)?;
+            Some(learning.ok_or_else(|| Failure::Gate(NOWHERE.to_owned()))?)
+        }
+        None => None,
+    };
+    let work = Work::of(arguments, path, &compiled, &followed, &leg, learning.as_ref())?;
     let whole = match &arguments.replay {
         Some(name) => Plan::alone(&work.factors, name, work.seed).map_err(Failure::Usage)?,
         None => work.plan(),
@@ -156,6 +174,7 @@ fn study(arguments: &StudyArguments, ui: &mut Ui) -> Result<(), Failure> {
         controller: &controller,
         leg: &leg,
         trajectory: followed.choice,
+        learning,
         noise: work.noise,
         bound: work.bound,
     };

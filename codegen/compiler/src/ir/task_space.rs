@@ -86,6 +86,9 @@ pub struct ControlLaw {
     pub wrench_limit: [f64; 6],
     /// Lead of the leg displacements, in periods; zero if there is none.
     pub lead: f64,
+    /// That of each trajectory, if one has its own; else empty.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub own_leads: Vec<f64>,
     /// Part of the transfer offset left after a tick.
     pub transfer_keep: f64,
     /// Transfer offset that is as good as none, m.

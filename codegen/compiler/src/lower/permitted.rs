@@ -139,9 +139,10 @@ fn largest_request(law: &ControlLaw) -> f64 {
     let apart = 2.0 * LARGEST_PLACE;
     let modal = to_modes * apart;
     let error = to_pose * ring * modal;
+    let lead = law.own_leads.iter().fold(law.lead, |most, lead| if *lead > most { *lead } else { most });
     let deflection = norm(&law.force_to_modes) * (LARGEST_GAIN * error + LARGEST);
     // Environment, damping, and all that is measured or computed of the motion.
-    let load = norm(&law.wrench_to_legs) * (LARGEST_GAIN * (apart + 2.0 * LARGEST) + LARGEST) + law.lead.abs() * apart;
+    let load = norm(&law.wrench_to_legs) * (LARGEST_GAIN * (apart + 2.0 * LARGEST) + LARGEST) + lead * apart;
     // A change of mode is bumpless by an offset as large as the request.
     let damping = law.damping.as_ref().map_or(0.0, |sections| modal * resounds(sections));
     let correction = law.correction.as_ref().map_or(0.0, |limits| to_modes * (limits[0].most + limits[3].most));

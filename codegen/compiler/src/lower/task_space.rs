@@ -63,6 +63,7 @@ pub(super) fn law(
         rest_force: rest_force.map(round),
         wrench_limit: largest_wrench(model).map(round),
         lead: round(design.lead / model.timing.period),
+        own_leads: own_leads(task, design.lead).map(|lead| round(lead / model.timing.period)).collect(),
         transfer_keep: round(libm::exp(-model.timing.period / task.transfer_time)),
         transfer_negligible: round(TRANSFER_NEGLIGIBLE),
         cells_per_metre: round(1.0 / metres_per_cell),
@@ -80,6 +81,13 @@ pub(super) fn law(
             })
         }),
     }
+}
+
+/// The lead (s) of each trajectory, that of the control, `usual`, where it has none of its own; nothing where none has.
+fn own_leads(task: &model::TaskSpace, usual: f64) -> impl Iterator<Item = f64> {
+    let any = task.trajectories.iter().any(|trajectory| trajectory.lead.is_some());
+    let all = task.trajectories.iter().map(move |trajectory| trajectory.lead.unwrap_or(usual));
+    all.take(if any { task.trajectories.len() } else { 0 })
 }
 
 /// The matrix with what rounding left of a zero made one: entries below 10⁻¹² of the largest in their column. A symmetric

@@ -30,7 +30,7 @@ use specgen_numerics::Matrix6;
 
 pub use super::LARGEST_RADIUS;
 pub use closed_loop::{ClosedLoop, Conditions};
-pub use damping::{ActiveDamping, DampedMode};
+pub use damping::{ActiveDamping, DampedMode, SLOW};
 pub use law::{Adapting, Law, Tuning};
 pub use margins::{ClosedMode, ModeMargins};
 pub use modes::ModalBasis;

@@ -285,6 +285,8 @@ section! {
         name: String = NAME, Required, "", "circle";
         /// One of the paper's paths, or a table of poses.
         kind = one_of(&["case-1", "case-2", "machining", "waveform"]), Required, "", "case-1";
+        /// Time by which the leg displacements are asked for early while the controller plays it; `specgen check --details` proposes less than control.lead where corners ask for that.
+        lead: Option<f64> = one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Rule("that of `control.lead`"), "", "0.2 ms";
         /// Of a paper's path: operating frequency.
         frequency = one(Dimension::FREQUENCY, Range::closed(1e-3, 1e3), "Hz"), Rule("error, but for a waveform"), "f_c" ["f", "rate"], "1 Hz";
         /// Of a paper's path: the formulas as printed, with their jumps.

@@ -9,6 +9,7 @@ use specgen_compiler::stability::platform::{Adapting, ClosedLoop, Conditions, La
 use specgen_language::model::{AdaptationMode, ControlMode};
 use specgen_numerics::nyquist::{Complex, over, plus, square, times};
 
+use super::response::Response;
 use crate::robust::Factors;
 use crate::robust::factors::Factor;
 
@@ -17,7 +18,7 @@ pub const LARGEST_RADIUS: f64 = 0.9;
 /// Order of Q at its upper end, and at its lower one.
 const ORDERS: [f64; 2] = [8.0, 4.0];
 /// Where the loop leaves less of a correction than this it is not learned: the feedback does it.
-const LEAST_LEFT: f64 = 0.004;
+pub(super) const LEAST_LEFT: f64 = 0.004;
 /// Parts of the inverse that are tried: less of it learns more slowly, and bears more of what is not known.
 const SHARES: [f64; 7] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4];
 /// Knots in a period of f_c.
@@ -43,6 +44,8 @@ pub struct Learnable {
     tuning: Tuning,
     /// τ, s.
     pub(super) lead: f64,
+    /// T of the machine, where it was measured.
+    measured: Option<Response>,
 }
 
 /// What learning may do on every machine within the intervals.
@@ -54,6 +57,11 @@ pub struct Convergence {
     pub radius: f64,
     /// Where, Hz.
     pub at: f64,
+    /// Whether T was measured: then it is shown for what it may be on that machine, else for every machine within the intervals.
+    pub measured: bool,
+    /// That bound without Q at frequencies (Hz), rising.
+    #[serde(skip)]
+    pub bounds: Vec<[f64; 2]>,
     /// The part of T⁻¹ that is learned with at frequencies (Hz), rising.
     #[serde(skip)]
     pub(super) shares: Vec<[f64; 2]>,
@@ -63,12 +71,21 @@ impl Convergence {
     /// Ticks of `period` (s) from knot to knot of a table that holds what Q lets through.
     #[must_use]
     pub fn spacing(&self, period: f64) -> u32 {
-        let apart = libm::floor(1.0 / (KNOTS * self.band[1] * period));
-        if apart >= 1.0 { apart as u32 } else { 1 }
+        spacing(self.band[1], period)
+    }
+
+    /// Takes in what an error is multiplied with at a frequency (Hz) before Q.
+    pub(super) fn meet(&mut self, hertz: f64, radius: f64) {
+        self.bounds.push([hertz, radius]);
+        let radius = radius * self.passed(hertz);
+        if radius > self.radius {
+            (self.radius, self.at) = (radius, hertz);
+        }
     }
 
     /// |Q| at a frequency, Hz.
-    pub(super) fn passed(&self, hertz: f64) -> f64 {
+    #[must_use]
+    pub fn passed(&self, hertz: f64) -> f64 {
         let [low, high] = self.band;
         let below = if low > 0.0 { 1.0 / (1.0 + libm::pow(low / hertz, ORDERS[1])) } else { 1.0 };
         below * cut(hertz, high)
@@ -102,7 +119,28 @@ impl Learnable {
             ControlMode::F => (Law::Feedforward(adapting), design.combined),
             ControlMode::PF => (Law::Combined(adapting), design.combined),
         };
-        Some(Self { closed_loop, law, tuning, lead: design.lead })
+        Some(Self { closed_loop, law, tuning, lead: design.lead, measured: None })
+    }
+
+    pub(crate) fn closed_loop(&self) -> &ClosedLoop {
+        &self.closed_loop
+    }
+
+    /// The control mode that it starts in, and its numbers.
+    pub(crate) fn law(&self) -> (Law, &Tuning) {
+        (self.law, &self.tuning)
+    }
+
+    /// Of its modes, rad/s.
+    #[must_use]
+    pub fn modes(&self) -> [f64; 6] {
+        self.closed_loop.basis.frequencies
+    }
+
+    /// The same with T as it was measured, not as the model has it.
+    #[must_use]
+    pub fn with(self, measured: Response) -> Self {
+        Self { measured: Some(measured), ..self }
     }
 
     /// T at frequencies (Hz), in modal coordinates.
@@ -119,8 +157,16 @@ impl Learnable {
     /// G, without feedback.
     pub(super) fn open_loop(&self, frequencies: &[f64]) -> Vec<Matrix6c> {
         let law = Law::Feedforward(Adapting::Invhys);
-        let open = Self { closed_loop: self.closed_loop.clone(), law, tuning: Tuning::NONE, lead: 0.0 };
+        let open = Self { closed_loop: self.closed_loop.clone(), law, tuning: Tuning::NONE, lead: 0.0, measured: None };
         open.nominal(frequencies)
+    }
+
+    /// T that is learned with.
+    pub(super) fn known(&self, frequencies: &[f64]) -> Vec<Matrix6c> {
+        match &self.measured {
+            Some(response) => frequencies.iter().map(|hertz| response.at(*hertz)).collect(),
+            None => self.nominal(frequencies),
+        }
     }
 
     /// T as the compiler's model has it.
@@ -128,10 +174,13 @@ impl Learnable {
         self.response(&self.closed_loop, &Conditions::NOMINAL, frequencies)
     }
 
-    /// The highest f_c up to `wish` (Hz) at which learning converges on every machine within `factors`; none where it does at no
-    /// frequency looked at.
+    /// The highest f_c up to `wish` (Hz) at which learning converges on every machine within `factors`, or with a measured T whatever it
+    /// may be; none where it does at no frequency looked at.
     #[must_use]
     pub fn convergence(&self, factors: &Factors, wish: f64) -> Option<Convergence> {
+        if let Some(response) = &self.measured {
+            return response.convergence(wish);
+        }
         let frequencies = self.grid(wish);
         let inverses: Vec<Matrix6c> = self.nominal(&frequencies).iter().map(inverse).collect();
         let mut radii = vec![[0.0; SHARES.len()]; frequencies.len()];
@@ -152,17 +201,7 @@ impl Learnable {
             (SHARES[index], radii[index])
         });
         let (shares, radii): (Vec<f64>, Vec<f64>) = chosen.unzip();
-        let mut highest = wish;
-        for (hertz, radius) in frequencies.iter().zip(&radii) {
-            let excess = radius / LARGEST_RADIUS - 1.0;
-            if excess.is_nan() {
-                return None;
-            }
-            if excess > 0.0 {
-                let bound = hertz / libm::pow(excess, 1.0 / ORDERS[0]);
-                highest = if bound < highest { bound } else { highest };
-            }
-        }
+        let highest = highest_passed(frequencies.iter().zip(&radii).map(|(hertz, radius)| [*hertz, *radius]), wish)?;
         let lowest = *frequencies.first()?;
         // The slowest frequency at which every mode answers.
         let answers = frequencies.iter().zip(&inverses).find(|(_, inverse)| norm(inverse) * LEAST_LEFT <= 1.0);
@@ -171,12 +210,10 @@ impl Learnable {
             return None;
         }
         let shares = frequencies.iter().zip(shares).map(|(hertz, share)| [*hertz, share]).collect();
-        let mut found = Convergence { band: [low, highest], radius: 0.0, at: 0.0, shares };
+        let mut found =
+            Convergence { band: [low, highest], radius: 0.0, at: 0.0, measured: false, bounds: Vec::new(), shares };
         for (hertz, radius) in frequencies.iter().zip(&radii) {
-            let radius = radius * found.passed(*hertz);
-            if radius > found.radius {
-                (found.radius, found.at) = (radius, *hertz);
-            }
+            found.meet(*hertz, *radius);
         }
         Some(found)
     }
@@ -221,6 +258,28 @@ impl Learnable {
     }
 }
 
+/// The highest f_c up to `wish` (Hz) whose Q leaves each radius at its frequency (Hz) below the largest; none where one is no number.
+pub(super) fn highest_passed(radii: impl Iterator<Item = [f64; 2]>, wish: f64) -> Option<f64> {
+    let mut highest = wish;
+    for [hertz, radius] in radii {
+        let excess = radius / LARGEST_RADIUS - 1.0;
+        if excess.is_nan() {
+            return None;
+        }
+        if excess > 0.0 {
+            let bound = hertz / libm::pow(excess, 1.0 / ORDERS[0]);
+            highest = if bound < highest { bound } else { highest };
+        }
+    }
+    Some(highest)
+}
+
+/// Ticks of `period` (s) from knot to knot for what is learned up to a frequency, Hz.
+pub(super) fn spacing(bandwidth: f64, period: f64) -> u32 {
+    let apart = libm::floor(1.0 / (KNOTS * bandwidth * period));
+    if apart >= 1.0 { apart as u32 } else { 1 }
+}
+
 /// Where Q of f_c (Hz) lets less than a ten-thousandth through, or the fastest that can be sampled well, Hz.
 pub(super) fn highest(bandwidth: f64, period: f64) -> f64 {
     let (cut, fastest) = (3.2 * bandwidth, 0.45 / period);
@@ -261,7 +320,7 @@ pub(super) fn spectral_radius(matrix: &Matrix6c) -> f64 {
 }
 
 /// Largest sum of magnitudes of a row.
-fn norm(matrix: &Matrix6c) -> f64 {
+pub(super) fn norm(matrix: &Matrix6c) -> f64 {
     let sums = matrix.iter().map(|row| row.iter().map(|value| libm::sqrt(square(*value))).sum::<f64>());
     sums.fold(0.0, |most, sum| if sum <= most { most } else { sum })
 }

@@ -19,6 +19,8 @@ use super::update::Update;
 const NOT_FOLLOWED: u32 = 0x3_0000;
 /// Status bits of gauges that were not believed.
 const GAUGES: u32 = 0x3f00;
+/// Status bits of legs that the limits held back.
+const LEGS: u32 = 0x3f;
 /// Status bit of a correction that the limits held back.
 const CORRECTION_LIMITED: u32 = 1 << 20;
 /// An error above this part of the least one ends learning: it grows.
@@ -31,6 +33,8 @@ pub enum LearnError {
     Run(RunError),
     /// A pass with these status bits: the controller refused a set-point, or believed no gauge.
     Status(u32),
+    /// Limits held back what the machine was to be excited with, with these status bits.
+    Limited(u32),
     /// The machine ended a pass; why is known to whoever operates it.
     Ended,
     /// The device does not learn with its plan.
@@ -45,6 +49,12 @@ impl fmt::Display for LearnError {
                 f,
                 "the controller does not make this motion: {}; make it slower, or raise control.setpoint.stream_speed or the \
                  workspace in the spec",
+                status_words(*status)
+            ),
+            Self::Limited(status) => write!(
+                f,
+                "limits held the sweep back, so that it shows no response: {}; leave more room: a smaller motion, or a larger \
+                 control.correction",
                 status_words(*status)
             ),
             Self::Ended => f.write_str("the machine ended a pass"),
@@ -246,7 +256,13 @@ pub fn learn(
 }
 
 /// A pass in which the motion was made and seen.
-fn followed(seen: Seen) -> Result<Seen, LearnError> {
+pub(super) fn followed(seen: Seen) -> Result<Seen, LearnError> {
     let bad = seen.status & (NOT_FOLLOWED | GAUGES);
     if bad == 0 { Ok(seen) } else { Err(LearnError::Status(bad)) }
+}
+
+/// A pass in which no limit held a leg or the correction back.
+pub(super) fn unlimited(seen: Seen) -> Result<Seen, LearnError> {
+    let bad = seen.status & (LEGS | CORRECTION_LIMITED);
+    if bad == 0 { Ok(seen) } else { Err(LearnError::Limited(bad)) }
 }

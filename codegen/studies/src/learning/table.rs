@@ -41,6 +41,10 @@ pub enum TableError {
     Format(String),
     /// It is of another spec, machine or motion: what, there, here.
     Other(&'static str, String, String),
+    /// It is no response.
+    Response(String),
+    /// It is a response of another spec or machine: what, there, here.
+    Measured(&'static str, String, String),
 }
 
 impl fmt::Display for TableError {
@@ -50,6 +54,10 @@ impl fmt::Display for TableError {
             Self::Format(why) => write!(f, "this is no correction that `specgen learn` wrote: {why}"),
             Self::Other(what, there, here) => {
                 write!(f, "it was learned for the {what} `{there}`, not `{here}`; learn anew, without --from")
+            }
+            Self::Response(why) => write!(f, "this is no response that `specgen learn --excite` wrote: {why}"),
+            Self::Measured(what, there, here) => {
+                write!(f, "it was measured with the {what} `{there}`, not `{here}`; measure it anew by --excite")
             }
         }
     }

@@ -36,13 +36,17 @@ impl Update {
     pub fn new(learnable: &Learnable, motion: &Motion, convergence: &Convergence, spacing: u32) -> Self {
         let width = f64::from(spacing) * learnable.closed_loop.period;
         Self::of(learnable, motion, convergence.band[1], spacing, |frequencies| {
-            let responses = learnable.nominal(frequencies);
+            let responses = learnable.known(frequencies);
             responses
                 .iter()
                 .zip(frequencies)
                 .map(|(response, hertz)| {
                     let share = convergence.share(*hertz) / kept(hertz * width);
-                    let part = inverse(response).map(|row| row.map(|value| value.map(|part| share * part)));
+                    let part = match share {
+                        // A response that is not known may have no inverse.
+                        0.0 => [[[0.0; 2]; 6]; 6],
+                        _ => inverse(response).map(|row| row.map(|value| value.map(|part| share * part))),
+                    };
                     (part, convergence.passed(*hertz))
                 })
                 .collect()
@@ -192,13 +196,13 @@ impl Update {
 
 /// What means over a time of which a period is `1/cycles`, held for as long, leave of a frequency: sinc²; half where it is less, for little
 /// of that is let through.
-fn kept(cycles: f64) -> f64 {
+pub(super) fn kept(cycles: f64) -> f64 {
     let angle = 0.5 * TAU * cycles;
     let part = if angle > 0.0 { libm::sin(angle) / angle } else { 1.0 };
     let square = part * part;
     if square > 0.5 { square } else { 0.5 }
 }
 
-fn mapped(matrix: &Matrix6, vector: &[f64; 6]) -> [f64; 6] {
+pub(super) fn mapped(matrix: &Matrix6, vector: &[f64; 6]) -> [f64; 6] {
     matrix.map(|row| row.iter().zip(vector).map(|(factor, value)| factor * value).sum())
 }

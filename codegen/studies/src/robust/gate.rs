@@ -13,6 +13,9 @@ pub struct Gate {
     pub error_nm: Option<f64>,
     /// Largest rms error of the angles, nrad.
     pub orientation_nrad: Option<f64>,
+    /// Largest such error of the translation that a machine has learned, nm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub learned_nm: Option<f64>,
     /// Quantile of the draws that is compared, %; none for the largest of draws and corners.
     pub quantile: Option<f64>,
 }
@@ -30,17 +33,30 @@ impl Gate {
         if let Some(first) = lost.first() {
             reasons.push(format!("{} of {} runs have diverged, the first of them {first}", lost.len(), runs.len()));
         }
-        type Figure = fn(&Figures) -> f64;
-        let looked_at: [(Option<f64>, &str, &str, Figure); 2] = [
-            (self.error_nm, "error", "nm", |figures| figures.error_nm),
-            (self.orientation_nrad, "orientation error", "nrad", |figures| figures.orientation_nrad),
+        let grew: Vec<&str> = runs
+            .iter()
+            .filter(|(_, outcome)| outcome.figures().and_then(|figures| figures.learned).is_some_and(|one| one.grew))
+            .map(|(member, _)| member.name.as_str())
+            .collect();
+        if let Some(first) = grew.first() {
+            reasons.push(format!(
+                "the error grew in learning on {} of {} machines, the first of them {first}",
+                grew.len(),
+                runs.len()
+            ));
+        }
+        type Figure = fn(&Figures) -> Option<f64>;
+        let looked_at: [(Option<f64>, &str, &str, Figure); 3] = [
+            (self.error_nm, "error", "nm", |figures| Some(figures.error_nm)),
+            (self.orientation_nrad, "orientation error", "nrad", |figures| Some(figures.orientation_nrad)),
+            (self.learned_nm, "learned error", "nm", |figures| Some(figures.learned?.error_nm)),
         ];
         for (limit, what, unit, of) in looked_at {
             let Some(limit) = limit else { continue };
             let compared: Vec<Option<f64>> = runs
                 .iter()
                 .filter(|(member, _)| self.quantile.is_none() || member.drawn)
-                .map(|(_, outcome)| outcome.figures().map(of))
+                .map(|(_, outcome)| outcome.figures().and_then(of))
                 .collect();
             let which = self.quantile.map_or("largest".to_owned(), |percent| format!("{percent} % quantile of the"));
             match quantile(&compared, self.quantile.unwrap_or(100.0)) {
@@ -60,7 +76,7 @@ impl Gate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robust::{Deviation, Factor};
+    use crate::robust::{Deviation, Factor, Learnt};
 
     fn run(name: &str, drawn: bool, error_nm: Option<f64>) -> (Member, Outcome) {
         let deviation = Deviation::common(Factor::nominal);
@@ -74,8 +90,9 @@ mod tests {
     #[test]
     fn the_largest_counts_corners_and_a_quantile_only_draws() {
         let runs = [run("mass-low", false, Some(50.0)), run("7", true, Some(10.0)), run("8", true, Some(20.0))];
-        let reasons =
-            |error_nm, quantile| Gate { error_nm: Some(error_nm), orientation_nrad: None, quantile }.reasons(&runs);
+        let reasons = |error_nm, quantile| {
+            Gate { error_nm: Some(error_nm), orientation_nrad: None, learned_nm: None, quantile }.reasons(&runs)
+        };
         assert!(reasons(50.0, None).is_empty());
         assert!(reasons(49.9, None)[0].contains("largest rms error is 50.00 nm, above 49.90 nm"));
         assert!(reasons(20.0, Some(95.0)).is_empty() && reasons(10.0, Some(50.0)).is_empty());
@@ -83,13 +100,30 @@ mod tests {
     }
 
     #[test]
+    fn what_is_learned_has_a_limit_of_its_own_and_must_not_grow() {
+        let with = |name: &str, error_nm: f64, grew: bool| {
+            let learned = Some(Learnt { error_nm, passes: 5, grew });
+            let (member, _) = run(name, true, None);
+            (member, Outcome::Ran(Figures { error_nm: 20.0, learned, ..Figures::default() }))
+        };
+        let gate = |learned_nm| Gate { error_nm: Some(20.0), orientation_nrad: None, learned_nm, quantile: None };
+        let runs = [with("1", 3.0, false), with("2", 4.0, false)];
+        assert!(gate(Some(4.0)).reasons(&runs).is_empty() && gate(None).reasons(&runs).is_empty());
+        assert_eq!(gate(Some(3.9)).reasons(&runs), ["largest rms learned error is 4.00 nm, above 3.90 nm"]);
+        let grown = [with("1", 3.0, false), with("2", 4.0, true)];
+        assert!(gate(None).reasons(&grown)[0].contains("grew in learning on 1 of 2 machines, the first of them 2"));
+        // Machines that learned nothing pass no limit of what is learned.
+        assert!(!gate(Some(4.0)).reasons(&[run("1", true, Some(1.0))]).is_empty());
+    }
+
+    #[test]
     fn a_diverged_run_fails_whatever_is_asked_for() {
         let runs = [run("all-soft", false, None), run("7", true, Some(10.0))];
         for quantile in [None, Some(50.0)] {
-            let gate = Gate { error_nm: None, orientation_nrad: None, quantile };
+            let gate = Gate { error_nm: None, orientation_nrad: None, learned_nm: None, quantile };
             assert_eq!(gate.reasons(&runs), ["1 of 2 runs have diverged, the first of them all-soft"]);
         }
-        let gate = Gate { error_nm: Some(1e9), orientation_nrad: None, quantile: None };
+        let gate = Gate { error_nm: Some(1e9), orientation_nrad: None, learned_nm: None, quantile: None };
         assert_eq!(gate.reasons(&runs).len(), 2);
     }
 }

@@ -1,5 +1,6 @@
 //! Runs of a plan, in threads, in the order of the plan.
 
+use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
@@ -9,7 +10,9 @@ use host_sim::controller::Controller;
 use host_sim::plant::LegParameters;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::learning::{Learning, Learnt};
 use super::plan::{Member, Plan};
+use crate::learning::LearnError;
 use crate::tuning::{Case, Conditions, Setting, TrajectoryChoice};
 use specgen_compiler::compile::Compiled;
 
@@ -39,6 +42,9 @@ pub struct Figures {
     pub fault_ticks: u64,
     /// Their status bits.
     pub fault_bits: u32,
+    /// What the machine learned, where it was asked to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub learned: Option<Learnt>,
 }
 
 /// JSON has no infinity.
@@ -74,6 +80,11 @@ impl Outcome {
     }
 }
 
+/// Of a machine that never began.
+fn lost(why: &dyn fmt::Display) -> Outcome {
+    Outcome::Diverged { time: None, reason: why.to_string(), limited_percent: 0.0 }
+}
+
 /// What every member is run with.
 pub struct Study<'a> {
     /// The spec.
@@ -84,6 +95,8 @@ pub struct Study<'a> {
     pub leg: &'a LegParameters,
     /// What is followed.
     pub trajectory: TrajectoryChoice,
+    /// How the machines learn it, if they do.
+    pub learning: Option<Learning>,
     /// Whether there is noise.
     pub noise: bool,
     /// Error beyond which a run counts as diverged, m; angles count with the radius of the platform joints.
@@ -97,10 +110,20 @@ impl Study<'_> {
     /// If the run cannot be laid out or the controller refuses its own settings.
     pub fn run(&self, member: &Member) -> Result<Outcome, RunError> {
         match self.simulate(member) {
-            Err(error @ (RunError::NotReady { .. } | RunError::NotFinite { .. })) => {
-                Ok(Outcome::Diverged { time: None, reason: error.to_string(), limited_percent: 0.0 })
-            }
+            Err(error @ (RunError::NotReady { .. } | RunError::NotFinite { .. })) => Ok(lost(&error)),
+            Ok(Outcome::Ran(figures)) => self.learned(member, figures),
             other => other,
+        }
+    }
+
+    /// With what the machine learns, if it is asked to.
+    fn learned(&self, member: &Member, figures: Figures) -> Result<Outcome, RunError> {
+        let Some(learning) = &self.learning else { return Ok(Outcome::Ran(figures)) };
+        match learning.on(self, member) {
+            Ok(learned) => Ok(Outcome::Ran(Figures { learned, ..figures })),
+            Err(LearnError::Run(error @ (RunError::NotReady { .. } | RunError::NotFinite { .. }))) => Ok(lost(&error)),
+            Err(LearnError::Run(error)) => Err(error),
+            Err(error) => Ok(lost(&format_args!("learning: {error}"))),
         }
     }
 

@@ -2,7 +2,7 @@
 //! and Nichols.
 //!
 //! One axis at a time, at the bias pose. The relay stands where k_p would: behind the modal notch, and its force ± d asks the
-//! legs for K⁻¹ d. The emitted controller turns that motion into voltages in mode F with the inverse model alone, so that
+//! legs for K⁻¹ d. Active damping, which takes the raw error beside it, is at work. The emitted controller turns that motion into voltages in mode F with the inverse model alone, so that
 //! the hysteresis is compensated as it will be; its lead, which works on set-points and not on feedback, is undone. On the bare loop the test finds the first resonance; with the notch in it
 //! finds where the lag of amplifier, notch and tick turn the phase.
 
@@ -93,20 +93,24 @@ fn one_axis(
     let force = basis.axis_stiffness[axis] * amplitude;
     let motion: [f64; 6] =
         std::array::from_fn(|k| force * (0..6).map(|i| basis.from_modal[k][i] * modal[i]).sum::<f64>());
-    let mut notch = ModalNotch::of(closed_loop);
+    let mut notch = Sections::new(closed_loop, closed_loop.notch.as_ref().map(|notch| notch.sections));
+    let mut damping = closed_loop.active_damping.map(|sections| Sections::new(closed_loop, Some(sections)));
     let center = bench.rig().plant().pose();
     let mut relay = Relay::default();
-    let mut asked = 0.0;
+    let mut asked = [0.0; 6];
     for tick in 0..MOST_TICKS {
         let pose = bench.rig().plant().pose();
-        let error = notch.filter(&std::array::from_fn(|k| center[k] - pose[k]))[axis];
-        let output = relay.switch(tick, error / amplitude);
+        let error: [f64; 6] = std::array::from_fn(|k| center[k] - pose[k]);
+        let output = relay.switch(tick, notch.filter(&error)[axis] / amplitude);
+        let damped = damping.as_mut().map_or([0.0; 6], |damping| damping.filter(&error));
         if let Some((gain, period)) = relay.found {
             return Ok(Some(Ultimate { gain, period: period * options.interval }));
         }
-        // The controller asks for r + lead (r − r_last): this r makes it the relay's output.
-        asked = (output + lead * asked) / (1.0 + lead);
-        bench.tick(&Request::stream(PoseTarget { pose: motion.map(|x| x * asked), ..PoseTarget::default() }))?;
+        // The controller asks for r + lead (r − r_last): this r makes it what relay and damping ask for.
+        for (k, asked) in asked.iter_mut().enumerate() {
+            *asked = (motion[k] * output + damped[k] + lead * *asked) / (1.0 + lead);
+        }
+        bench.tick(&Request::stream(PoseTarget { pose: asked, ..PoseTarget::default() }))?;
     }
     Ok(None)
 }
@@ -159,18 +163,19 @@ impl Relay {
     }
 }
 
-/// The notch of the controller, in the simulator's own text.
-struct ModalNotch {
+/// Sections of the controller in modal coordinates, in the simulator's own text.
+struct Sections {
     to_modal: Matrix6,
     from_modal: Matrix6,
     sections: [Biquad; 6],
     states: [[f64; 2]; 6],
 }
 
-impl ModalNotch {
-    fn of(closed_loop: &ClosedLoop) -> Self {
+impl Sections {
+    /// Without sections they pass everything.
+    fn new(closed_loop: &ClosedLoop, sections: Option<[Biquad; 6]>) -> Self {
         let basis = &closed_loop.basis;
-        let sections = closed_loop.notch.as_ref().map_or([Biquad::IDENTITY; 6], |notch| notch.sections);
+        let sections = sections.unwrap_or([Biquad::IDENTITY; 6]);
         Self { to_modal: basis.to_modal, from_modal: basis.from_modal, sections, states: [[0.0; 2]; 6] }
     }
 

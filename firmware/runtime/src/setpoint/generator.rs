@@ -106,6 +106,16 @@ impl<T: Real> Generator<T> {
         }
     }
 
+    /// The trajectory that is played, if one is: not on the way to its start.
+    #[inline]
+    #[must_use]
+    pub fn plays(&self) -> Option<u32> {
+        match self.phase {
+            Phase::Play(selector) => Some(selector),
+            _ => None,
+        }
+    }
+
     /// Set-point at the end of the interval before the last [`Generator::tick`], or after it: from rest and with the bias.
     #[inline]
     #[must_use]

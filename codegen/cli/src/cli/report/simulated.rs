@@ -14,7 +14,7 @@ use specgen_report::first::Errors;
 use specgen_report::platform::{self, Motion};
 use specgen_report::section::Section;
 use specgen_report::tracking::{self, Followed, Line, Shown, norm, short};
-use specgen_report::{hysteresis, margins};
+use specgen_report::{hysteresis, learning, margins};
 use specgen_studies::verdict::Figure;
 
 use super::SEED;
@@ -78,6 +78,11 @@ fn of_platform(
     let pair = Pair { own: &mut *controller, fine };
     sections.push(budget::of_platform(model, task, &specimen, pair, SEED, &all).map_err(environment)?);
     sections.push(margins::section(compiled, mode, &format!("specgen check {name}")));
+    if task.correction.is_some() {
+        ui.progress("learning between passes");
+    }
+    let learned = learning::section(compiled, task, &scenario, controller, &format!("specgen learn {name}"));
+    sections.extend(learned.map_err(|error| Failure::Gate(error.to_string()))?);
     ui.progress("hysteresis of each leg");
     let legs = &specimen.legs;
     let behind =

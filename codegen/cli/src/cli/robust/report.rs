@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use specgen_report::chart::{Axis, Chart, DOTS};
 
-use super::work::{Work, quoted};
+use super::work::{Lessons, Work, quoted};
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::Outcome as Shown;
 use specgen_studies::robust::quantiles::quantile;
-use specgen_studies::robust::{Deviation, Factor, Factors, Figures, Gate, Member, Outcome};
+use specgen_studies::robust::{Deviation, Factor, Factors, Figures, Gate, Learnt, Member, Outcome};
 
 /// Quantiles of the draws that are shown, %; 100 is the largest.
 const QUANTILES: [f64; 4] = [5.0, 50.0, 95.0, 100.0];
@@ -19,7 +19,8 @@ struct Row {
     name: &'static str,
     key: &'static str,
     of: fn(&Figures) -> f64,
-    platform_only: bool,
+    /// Whether a study has it.
+    shown: fn(&Work) -> bool,
     /// Whether its worst run is shown.
     judged: bool,
 }
@@ -28,20 +29,30 @@ const fn figure(
     name: &'static str,
     key: &'static str,
     of: fn(&Figures) -> f64,
-    platform_only: bool,
+    shown: fn(&Work) -> bool,
     judged: bool,
 ) -> Row {
-    Row { name, key, of, platform_only, judged }
+    Row { name, key, of, shown, judged }
 }
 
-const ROWS: [Row; 6] = [
-    figure("error, nm rms", "error_nm", |f| f.error_nm, false, true),
-    figure("error, nm peak", "peak_nm", |f| f.peak_nm, false, false),
-    figure("angles, nrad rms", "orientation_nrad", |f| f.orientation_nrad, true, true),
-    figure("angles, nrad peak", "orientation_peak_nrad", |f| f.orientation_peak_nrad, true, false),
-    figure("at a limit, % of ticks", "limited_percent", |f| f.limited_percent, false, false),
-    figure("with a fault, ticks", "fault_ticks", |f| f.fault_ticks as f64, false, false),
+const ALWAYS: fn(&Work) -> bool = |_| true;
+const PLATFORM: fn(&Work) -> bool = |work| work.platform;
+const LEARNED: fn(&Work) -> bool = |work| work.learning.is_some();
+
+const ROWS: [Row; 7] = [
+    figure("error, nm rms", "error_nm", |f| f.error_nm, ALWAYS, true),
+    figure("error, nm peak", "peak_nm", |f| f.peak_nm, ALWAYS, false),
+    figure("angles, nrad rms", "orientation_nrad", |f| f.orientation_nrad, PLATFORM, true),
+    figure("angles, nrad peak", "orientation_peak_nrad", |f| f.orientation_peak_nrad, PLATFORM, false),
+    figure("at a limit, % of ticks", "limited_percent", |f| f.limited_percent, ALWAYS, false),
+    figure("with a fault, ticks", "fault_ticks", |f| f.fault_ticks as f64, ALWAYS, false),
+    figure("learned, nm rms", "learned_nm", learned_nm, LEARNED, true),
 ];
+
+/// Of a machine that learned.
+fn learned_nm(figures: &Figures) -> f64 {
+    figures.learned.map_or(f64::INFINITY, |learned| learned.error_nm)
+}
 
 /// What a study worked on, and what its machines did.
 #[derive(Clone, Copy)]
@@ -153,8 +164,8 @@ impl<'a> Found<'a> {
     }
 
     fn rows(&self) -> impl Iterator<Item = &'static Row> + use<> {
-        let platform = self.work.platform;
-        ROWS.iter().filter(move |row| platform || !row.platform_only)
+        let shown = ROWS.each_ref().map(|row| (row.shown)(self.work));
+        ROWS.iter().zip(shown).filter(|(_, shown)| *shown).map(|(row, _)| row)
     }
 
     fn line(&self, row: &'static Row) -> Line<'a> {
@@ -204,6 +215,10 @@ impl<'a> Found<'a> {
                     let (rms, peak) = (f.orientation_nrad, f.orientation_peak_nrad);
                     let _ = write!(out, ", {rms:.1} nrad rms, {peak:.1} nrad peak");
                 }
+                if let Some(Learnt { error_nm, passes, grew }) = f.learned {
+                    let _ = write!(out, ", {error_nm:.2} nm learned in {passes} passes");
+                    out.push_str(if grew { ", then it grew" } else { "" });
+                }
                 if f.limited_percent > 0.0 {
                     let _ = write!(out, ", {:.2} % of ticks at a limit", f.limited_percent);
                 }
@@ -234,6 +249,9 @@ impl<'a> Found<'a> {
         }
         if let Some(limit) = self.gate.orientation_nrad {
             parts.push(format!("{which} rms orientation error at most {limit:.2} nrad"));
+        }
+        if let Some(limit) = self.gate.learned_nm {
+            parts.push(format!("{which} rms learned error at most {limit:.2} nm"));
         }
         parts.join(", ")
     }
@@ -289,6 +307,9 @@ impl Shown for Report<'_> {
             self.seed,
             if self.noise { "" } else { ", without noise" },
         );
+        if let Some(Lessons { passes, band: [low, high] }) = found.work.learning {
+            let _ = writeln!(out, "learned from {passes} passes on each, {low:.1} to {high:.0} Hz");
+        }
         out.push_str("varied, as factors on the spec:\n");
         for one in self.factors.iter() {
             let [low, high] = one.range;

@@ -4,7 +4,8 @@ use host_sim::trajectory::PaperPath;
 
 use crate::cli::ui::Failure;
 use specgen_compiler::compile::Compiled;
-use specgen_language::model::{self, TrajectoryKind};
+use specgen_language::model::TrajectoryKind;
+use specgen_studies::lead::streamed;
 use specgen_studies::tuning::TrajectoryChoice;
 
 /// Operating frequency unless asked otherwise, Hz.
@@ -69,13 +70,5 @@ pub(in crate::cli) fn chosen(
                 known.join(", ")
             )))
         }
-    }
-}
-
-fn streamed(path: model::PaperPath) -> PaperPath {
-    match path {
-        model::PaperPath::Case1 => PaperPath::Case1,
-        model::PaperPath::Case2 => PaperPath::Case2,
-        model::PaperPath::Machining => PaperPath::Machining,
     }
 }

@@ -12,7 +12,7 @@ use super::trajectory::Followed;
 use crate::cli::file::write_file;
 use crate::cli::ui::{Failure, Outcome as Shown, Ui};
 use specgen_compiler::compile::Compiled;
-use specgen_studies::robust::{Factors, Gate, Member, Outcome, Plan, Shard, shard};
+use specgen_studies::robust::{Factors, Gate, Learning, Member, Outcome, Plan, Shard, shard};
 use specgen_toolchain::sha256;
 
 /// Part of the stroke beyond which an error counts as diverged, unless asked otherwise.
@@ -51,8 +51,22 @@ pub(super) struct Work {
     pub(super) max_orientation: Option<f64>,
     /// Of the gate, %.
     pub(super) quantile: Option<f64>,
+    /// How the machines learn, if they do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) learning: Option<Lessons>,
+    /// Of the gate, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) max_learned: Option<f64>,
     /// Options that were given and decide what a member is, each with a space before it.
     pub(super) options: String,
+}
+
+/// How machines learn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Lessons {
+    pub(super) passes: u32,
+    /// Frequencies, Hz.
+    pub(super) band: [f64; 2],
 }
 
 impl Work {
@@ -63,6 +77,7 @@ impl Work {
         compiled: &Compiled,
         followed: &Followed,
         leg: &LegParameters,
+        learning: Option<&Learning>,
     ) -> Result<Self, Failure> {
         let declared = &compiled.model.robust;
         let platform = compiled.model.task_space.is_some();
@@ -90,6 +105,9 @@ impl Work {
             max_error: arguments.max_error.or(declared.max_error),
             max_orientation: arguments.max_orientation.or(declared.max_orientation.filter(|_| platform)),
             quantile: arguments.quantile,
+            learning: learning
+                .map(|learning| Lessons { passes: arguments.learn.unwrap_or(0), band: learning.convergence.band }),
+            max_learned: arguments.max_learned,
             options: options(arguments),
         })
     }
@@ -104,6 +122,7 @@ impl Work {
         Gate {
             error_nm: self.max_error.map(|error| error * 1e9),
             orientation_nrad: self.max_orientation.map(|error| error * 1e9),
+            learned_nm: self.max_learned.map(|error| error * 1e9),
             quantile: self.quantile.filter(|_| !alone),
         }
     }
@@ -111,7 +130,7 @@ impl Work {
 
 /// What a replay of a member has to be given as well.
 fn options(arguments: &StudyArguments) -> String {
-    let StudyArguments { vary, trajectory, frequency, plant, diverged_above, .. } = arguments;
+    let StudyArguments { vary, trajectory, frequency, plant, diverged_above, learn, .. } = arguments;
     let mut out = String::new();
     // Writing to a String cannot fail, here and below.
     if plant.seed != 1 {
@@ -128,6 +147,9 @@ fn options(arguments: &StudyArguments) -> String {
     }
     if let Some(bound) = diverged_above {
         let _ = write!(out, " --diverged-above '{bound:e} m'");
+    }
+    if let Some(passes) = learn {
+        let _ = write!(out, " --learn {passes}");
     }
     if let Some(path) = &plant.plant {
         let _ = write!(out, " --plant {}", quoted(&path.display().to_string()));

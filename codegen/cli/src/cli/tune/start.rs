@@ -5,7 +5,7 @@ use host_sim::platform::rig::Noise;
 use super::super::sim::environment;
 use super::super::ui::{Failure, Ui};
 use super::{Job, refused};
-use specgen_compiler::stability::platform::Tuning;
+use specgen_compiler::stability::platform::{ClosedLoop, Tuning};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_studies::machine;
 use specgen_studies::tuning::feasible::Feasibility;
@@ -102,7 +102,10 @@ fn relay_test(job: &Job, ui: &Ui) -> Result<Option<[Option<Ultimate>; 6]>, Failu
     scenario.options.latency = job.arguments.latency as usize;
     let radius = model.geometry.joint_radius();
     let lead = job.compiled.design.as_ref().map_or(0.0, |design| design.lead) / model.timing.period;
-    relay::test(&scenario, &job.controller, closed_loop, [radius, lead]).map(Some).map_err(environment)
+    // Active damping is P/F's.
+    let active_damping = closed_loop.active_damping.filter(|_| !job.space.alone);
+    let closed_loop = ClosedLoop { active_damping, ..closed_loop.as_ref().clone() };
+    relay::test(&scenario, &job.controller, &closed_loop, [radius, lead]).map(Some).map_err(environment)
 }
 
 /// PI gains of the relay test in place of the spec's; none if an axis did not oscillate.

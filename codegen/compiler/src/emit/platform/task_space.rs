@@ -34,6 +34,8 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let (keep, negligible) = (real(law.transfer_keep), real(law.transfer_negligible));
     let (cells_per_metre, metres_per_cell) = (real(law.cells_per_metre), real(law.metres_per_cell));
     let lead = real(law.lead);
+    let own_leads: Vec<_> = law.own_leads.iter().map(|lead| real(*lead)).collect();
+    let led = proc_macro2::Literal::usize_unsuffixed(own_leads.len());
     let notch = law.notch.as_ref().map_or_else(|| quote! { None }, |notch| with_sections(ir, notch, &matrix));
     let (damped, damping) = with_damping(ir, law.damping.as_ref());
     let (corrected, correction) = with_correction(ir, law.correction.as_ref());
@@ -66,6 +68,10 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         pub const WRENCH_LIMIT: [Real; 6] = [#wrench_limit];
         /// Lead of the leg displacements, in periods; from `control.lead`. Zero: none.
         pub const LEAD: Real = #lead;
+        /// Trajectories with a lead of their own: all or none; from `trajectory.lead`.
+        pub const LED: usize = #led;
+        /// Lead of each, in periods.
+        pub const OWN_LEADS: [Real; LED] = [#(#own_leads),*];
         /// Part of the offset of a change of mode that is left after a tick; from `control.transfer_time`.
         pub const TRANSFER_KEEP: Real = #keep;
         /// Offset of a change of mode below which it is over, m.

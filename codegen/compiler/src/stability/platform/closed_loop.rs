@@ -11,12 +11,13 @@
 //! q̂ = u − δ̂ − φ̂ + p + D e ;   d = λ q̂, late by the delay                    D: active damping, on e before N
 //! ```
 
+mod driven;
+
 use super::law::{Adapting, Law, Tuning};
 use super::modes::ModalBasis;
 use super::notch::{Biquad, Notch};
 use super::sampled::{PLACE, Plant, shown, states};
-use specgen_numerics::nyquist::{Complex, times};
-use specgen_numerics::{Matrix, Matrix6, Resolvent, spectral_radius};
+use specgen_numerics::{Matrix, Matrix6, spectral_radius};
 
 /// A linear combination of the states.
 type Signal = Vec<f64>;
@@ -80,49 +81,6 @@ impl ClosedLoop {
         Assembly::new(self, law, tuning, conditions).matrix()
     }
 
-    /// What the gauges show at the end of an interval by the correction that is given for it, both in modal coordinates, at each of the angles
-    /// ωT_s: T(z) = z C (z − A)⁻¹ B of the transition A, row by row, as (real, imaginary).
-    #[must_use]
-    pub fn correction_response(
-        &self,
-        law: Law,
-        tuning: &Tuning,
-        conditions: &Conditions,
-        angles: &[f64],
-    ) -> Vec<[[Complex; 6]; 6]> {
-        let shown = shown(self.lags_used()[1]);
-        let (transition, input) = Assembly::new(self, law, tuning, conditions).driven();
-        let mut resolvent = Resolvent::new(&transition, &input);
-        let mut found = Vec::with_capacity(angles.len());
-        for angle in angles {
-            let z = [libm::cos(*angle), libm::sin(*angle)];
-            let states = resolvent.at(z);
-            found.push(core::array::from_fn(|i| core::array::from_fn(|j| times(z, states[shown + i][j]))));
-        }
-        found
-    }
-
-    /// What the gauges show at the end of each interval of requests that nothing is fed back to, all in modal coordinates, from rest.
-    #[must_use]
-    pub fn without_feedback(&self, requests: &[[f64; 6]]) -> Vec<[f64; 6]> {
-        let law = Law::Feedforward(Adapting::Invhys);
-        let (transition, input) = Assembly::new(self, law, &Tuning::NONE, &Conditions::NOMINAL).driven();
-        let shown = shown(self.lags_used()[1]);
-        let mut states = vec![0.0; transition.size()];
-        let mut next = states.clone();
-        let mut found = Vec::with_capacity(requests.len());
-        for request in requests {
-            for (row, (next, input)) in next.iter_mut().zip(&input).enumerate() {
-                let kept: f64 = transition.row(row).iter().zip(&states).map(|(factor, state)| factor * state).sum();
-                let driven: f64 = input.iter().zip(request).map(|(factor, value)| factor * value).sum();
-                *next = kept + driven;
-            }
-            core::mem::swap(&mut states, &mut next);
-            found.push(core::array::from_fn(|mode| states[shown + mode]));
-        }
-        found
-    }
-
     /// Lags of amplifier and gauges, s. One below a ten-thousandth of a tick is as good as none: the amplifier's is then that,
     /// the gauges' nothing, which keeps the matrix exponential well scaled.
     pub(super) fn lags_used(&self) -> [f64; 2] {
@@ -179,6 +137,8 @@ struct Assembly<'a> {
     damped: Vec<usize>,
     /// Where the states of a correction begin, if one is given.
     correction: Option<usize>,
+    /// Whether these are an error on the gauges, not a correction of the request.
+    on_gauges: bool,
     layout: Layout,
     next: Matrix,
 }
@@ -231,6 +191,7 @@ impl<'a> Assembly<'a> {
             integrating,
             damped,
             correction: None,
+            on_gauges: false,
             layout,
             next,
         }
@@ -257,6 +218,15 @@ impl<'a> Assembly<'a> {
         let shown = shown(self.of.lags_used()[1]);
         let [place, seen] =
             [PLACE, shown].map(|first| -> [Signal; 6] { core::array::from_fn(|i| self.state(first + i)) });
+        let given = self.correction;
+        let seen = match given.filter(|_| self.on_gauges) {
+            Some(first) => core::array::from_fn(|i| {
+                let mut seen = seen[i].clone();
+                seen[first + i] -= 1.0;
+                seen
+            }),
+            None => seen,
+        };
         let feedback = self.feedback(&seen);
         let estimates = self.adaptation(&seen, &feedback);
         let load = self.load(&place, &seen);
@@ -266,7 +236,7 @@ impl<'a> Assembly<'a> {
             add(&mut request, -1.0, &estimates[i]);
             add(&mut request, 1.0, &load[i]);
             add(&mut request, 1.0, &damping[i]);
-            if let Some(first) = self.correction {
+            if let Some(first) = given.filter(|_| !self.on_gauges) {
                 request[first + i] += 1.0;
             }
             request

@@ -36,8 +36,8 @@ const SENSITIVITY: f64 = 1.95;
 const WIDE_SENSITIVITY: f64 = 4.0;
 /// Peak of the compliance aimed at, of that without feedback.
 const COMPLIANCE: f64 = 0.5;
-/// |S| of slow motion aimed at, of the start rule's: 1/36, 1/7.2 and 1/3.6 of the lowest mode.
-pub(super) const SLOW: [f64; 3] = [36.0, 7.2, 3.6];
+/// |S| of slow motion is aimed at, of the start rule's, at 1/36, 1/7.2 and 1/3.6 of the lowest mode.
+pub const SLOW: [f64; 3] = [36.0, 7.2, 3.6];
 const SLOWEST: f64 = 1.04;
 const MIDDLE: f64 = 0.74;
 /// Gain of D above all modes aimed at: what the gauges' noise asks of the legs.

@@ -1,0 +1,105 @@
+//! `specgen learn --excite`: the response of a running machine to a correction, measured in passes of a motion.
+
+use std::fmt::Write as _;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::atomic::Ordering;
+
+use serde::Serialize;
+
+use super::machine::Own;
+use super::{Arguments, Done, learnable_of, machine_name, motion_of, on, takes_correction};
+use crate::cli::file::write_file;
+use crate::cli::table::{right, row};
+use crate::cli::ui::{Failure, Outcome, Ui};
+use specgen_compiler::compile::Compiled;
+use specgen_language::interrupt;
+use specgen_studies::learning::{Convergence, Excitation, Heard, PASSES};
+
+/// Measures and writes the response.
+pub(super) fn run(
+    arguments: &Arguments,
+    path: &Path,
+    compiled: &Compiled,
+    own: Option<&Own>,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    let limit = takes_correction(compiled)?.correction.unwrap_or_default();
+    let (motion, _) = motion_of(arguments, compiled)?;
+    let (learnable, machine) = (learnable_of(compiled)?, machine_name(arguments));
+    let excitation = Excitation::new(&learnable, &motion, arguments.bandwidth, [limit, compiled.model.sensor.noise]);
+    let stop = interrupt::heed();
+    let names = [compiled.ir.digest.as_str(), &machine];
+    let done = on(
+        arguments,
+        compiled,
+        own,
+        ui,
+        |repeating, ui| {
+            let measured = excitation.measure(repeating, &learnable, &motion, names, |number| {
+                ui.rate(&format!("learn: sweep {} of {PASSES}", number + 1));
+                if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            });
+            ui.rate_done();
+            measured
+        },
+        |response, ui| {
+            write_file(path, response.to_json().as_bytes())?;
+            ui.progress(&format!("wrote the response at {} frequencies to {}", response.bins.len(), path.display()));
+            Ok(Found {
+                name: compiled.ir.name.clone(),
+                machine: machine.clone(),
+                band: excitation.band,
+                amplitude_nm: excitation.amplitude * 1e9,
+                modes: learnable.heard(&response),
+                convergence: response.convergence(arguments.bandwidth),
+                file: path.display().to_string(),
+            })
+        },
+    )?;
+    let Done { found, why, down } = done;
+    match found {
+        Some(found) => ui.judged(&found, why),
+        None => Err(Failure::Gate(why.unwrap_or_else(|| format!("interrupted before the last sweep was over{down}")))),
+    }
+}
+
+/// What was measured.
+#[derive(Serialize)]
+struct Found {
+    name: String,
+    machine: String,
+    /// Of the sweeps, Hz.
+    band: [f64; 2],
+    /// At the joints, along the axis that moves most, nm.
+    amplitude_nm: f64,
+    modes: [Heard; 6],
+    /// How far up learning converges with it, if anywhere.
+    convergence: Option<Convergence>,
+    file: String,
+}
+
+impl Outcome for Found {
+    fn text(&self) -> String {
+        let Self { name, machine, band: [low, high], amplitude_nm, modes, convergence, file } = self;
+        let mut text = format!(
+            "{name}: response of the running loop from {low:.1} to {high:.0} Hz, {PASSES} sweeps of\n  {amplitude_nm:.0} nm ({machine})\n"
+        );
+        let columns = [right(10), right(20), right(20), right(14)];
+        row(&mut text, &columns, &[&"mode, Hz", &"largest", &"by the model", &"known to"]);
+        for Heard { frequency, largest, modelled, error } in modes {
+            let at = |[hertz, gain]: &[f64; 2]| format!("{gain:.2} at {hertz:.0} Hz");
+            let cells = [format!("{frequency:.1}"), at(largest), at(modelled), format!("{:.1} %", 100.0 * error)];
+            row(&mut text, &columns, &[&cells[0], &cells[1], &cells[2], &cells[3]]);
+        }
+        // Writing to a String cannot fail.
+        let _ = match convergence {
+            Some(Convergence { band: [low, high], radius, at, .. }) => writeln!(
+                text,
+                "  learning with --response {file} converges from {low:.1} to {high:.0} Hz:\n  error times {radius:.2} a pass or less, worst at {at:.0} Hz"
+            ),
+            None => writeln!(text, "  too little is known of it for learning; measure along a longer motion"),
+        };
+        text
+    }
+}

@@ -1,0 +1,82 @@
+//! What six inputs do to the loop: a correction of the request, or an error of the motion.
+
+use super::{Adapting, Assembly, ClosedLoop, Conditions, Law, Tuning, shown};
+use specgen_numerics::nyquist::{Complex, times};
+use specgen_numerics::{Matrix, Resolvent};
+
+impl ClosedLoop {
+    /// What the gauges show at the end of an interval by the correction that is given for it, both in modal coordinates, at each of the angles
+    /// ωT_s: T(z) = z C (z − A)⁻¹ B of the transition A, row by row, as (real, imaginary).
+    #[must_use]
+    pub fn correction_response(
+        &self,
+        law: Law,
+        tuning: &Tuning,
+        conditions: &Conditions,
+        angles: &[f64],
+    ) -> Vec<[[Complex; 6]; 6]> {
+        let shown = shown(self.lags_used()[1]);
+        let (transition, input) = Assembly::new(self, law, tuning, conditions).driven();
+        let mut resolvent = Resolvent::new(&transition, &input);
+        let mut found = Vec::with_capacity(angles.len());
+        for angle in angles {
+            let z = [libm::cos(*angle), libm::sin(*angle)];
+            let states = resolvent.at(z);
+            found.push(core::array::from_fn(|i| core::array::from_fn(|j| times(z, states[shown + i][j]))));
+        }
+        found
+    }
+
+    /// What the gauges show at the end of each interval of requests that nothing is fed back to, all in modal coordinates, from rest.
+    #[must_use]
+    pub fn without_feedback(&self, requests: &[[f64; 6]]) -> Vec<[f64; 6]> {
+        let law = Law::Feedforward(Adapting::Invhys);
+        let (transition, input) = Assembly::new(self, law, &Tuning::NONE, &Conditions::NOMINAL).driven();
+        let shown = shown(self.lags_used()[1]);
+        let mut found = Vec::with_capacity(requests.len());
+        over_time(&transition, &input, requests, |states| {
+            found.push(core::array::from_fn(|mode| states[shown + mode]));
+        });
+        found
+    }
+
+    /// What feedback leaves of an error that the gauges would show at the beginning of each interval without it, from rest, all in modal
+    /// coordinates.
+    #[must_use]
+    pub fn left(&self, law: Law, tuning: &Tuning, errors: &[[f64; 6]]) -> Vec<[f64; 6]> {
+        let mut assembly = Assembly::new(self, law, tuning, &Conditions::NOMINAL);
+        assembly.on_gauges = true;
+        let (transition, input) = assembly.driven();
+        let shown = shown(self.lags_used()[1]);
+        let mut given = errors.iter();
+        let mut last = [0.0; 6];
+        let mut found = Vec::with_capacity(errors.len());
+        over_time(&transition, &input, errors, |states| {
+            // What the feedback did in the intervals before is shown beside the error.
+            if let Some(error) = given.next() {
+                found.push(core::array::from_fn(|mode| error[mode] - last[mode]));
+            }
+            last = core::array::from_fn(|mode| states[shown + mode]);
+        });
+        found
+    }
+}
+
+/// The states after each interval, from rest, of six inputs.
+fn over_time(transition: &Matrix, input: &[[f64; 6]], inputs: &[[f64; 6]], mut seen: impl FnMut(&[f64])) {
+    // Most states depend on a few.
+    let rows: Vec<Vec<(usize, f64)>> = (0..transition.size())
+        .map(|row| transition.row(row).iter().copied().enumerate().filter(|(_, factor)| *factor != 0.0).collect())
+        .collect();
+    let mut states = vec![0.0; rows.len()];
+    let mut next = states.clone();
+    for given in inputs {
+        for ((next, row), input) in next.iter_mut().zip(&rows).zip(input) {
+            let kept: f64 = row.iter().map(|(column, factor)| factor * states[*column]).sum();
+            let driven: f64 = input.iter().zip(given).map(|(factor, value)| factor * value).sum();
+            *next = kept + driven;
+        }
+        core::mem::swap(&mut states, &mut next);
+        seen(&states);
+    }
+}

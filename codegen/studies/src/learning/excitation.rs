@@ -1,0 +1,227 @@
+//! Measures T of a running machine: passes of a motion in which the correction is a sweep, and what the gauges show of it.
+//!
+//! ```text
+//! c_k = ± V a H_k s(t)        s: sine of rising frequency, each octave for as long;  H_k: row k of a conference matrix, H Hᵀ = 5 I
+//! y_k = T c_k + y₀ + noise    y₀: what the motion itself leaves, the same in every pass
+//! T = Σ y_k c_kᴴ (Σ c_k c_kᴴ)⁻¹       over twelve passes and the bins of 2.5 Hz;  what is left of y_k gives its standard error
+//! ```
+//! Each sweep is made with both signs, so that y₀ and what is even in c cancel. The loop is closed and the machine moves as it does when it
+//! learns: hysteresis, delay and stiffness are in T as they are. H1 of several inputs: Bendat and Piersol, Random Data, 7.4.
+
+use std::f64::consts::TAU;
+use std::ops::ControlFlow;
+
+use rustfft::FftPlannerScalar;
+use rustfft::num_complex::Complex64;
+use specgen_numerics::nyquist::{Complex, plus, times};
+use specgen_runtime::playback::{self, Knot};
+
+use super::convergence::{Learnable, Matrix6c, inverse, multiply, spacing};
+use super::motion::Motion;
+use super::passes::{LearnError, Repeating, followed, unlimited};
+use super::response::{Bin, Response};
+use super::table::knots;
+use super::update::{kept, mapped};
+
+/// Rows that are orthogonal, of signs and one zero each.
+const CONFERENCE: [[i8; 6]; 6] = [
+    [0, 1, 1, 1, 1, 1],
+    [1, 0, 1, -1, -1, 1],
+    [1, 1, 0, 1, -1, -1],
+    [1, -1, 1, 0, 1, -1],
+    [1, -1, -1, 1, 0, 1],
+    [1, 1, -1, -1, 1, 0],
+];
+/// Passes that are measured.
+pub const PASSES: usize = 2 * CONFERENCE.len();
+/// Highest frequency of the sweep over that to be learned, and at most so much of the rate of knots.
+const BEYOND: f64 = 1.6;
+const RATE: f64 = 0.4;
+/// Amplitude at the joints over the noise of a gauge, and at most so much of what the limits of a correction let through.
+const OVER_NOISE: f64 = 50.0;
+const WITHIN: f64 = 0.5;
+/// How fast a correction may come, s from nothing to its limit.
+const ONSET: f64 = 1e-3;
+/// Over which a sweep fades in and out, s.
+const FADE: f64 = 5e-3;
+/// Width of a bin, Hz: half of the narrowest resonance that feedback leaves on usual platforms.
+const WIDTH: f64 = 2.5;
+/// Digits that a file keeps.
+const DIGITS: usize = 5;
+
+/// Twelve corrections that are played in passes of a motion.
+pub struct Excitation {
+    passes: Vec<Vec<Knot>>,
+    /// Lowest and highest frequency, Hz.
+    pub band: [f64; 2],
+    /// Largest along an axis, angles at the joints, m.
+    pub amplitude: f64,
+    /// Ticks from knot to knot.
+    pub spacing: u32,
+}
+
+impl Excitation {
+    /// For learning up to a frequency (Hz), within the `limit` of a correction; `noise` of a gauge rms, m.
+    #[must_use]
+    pub fn new(learnable: &Learnable, motion: &Motion, bandwidth: f64, [limit, noise]: [f64; 2]) -> Self {
+        let period = learnable.closed_loop.period;
+        let spacing = spacing(bandwidth, period);
+        let time = motion.scored.end as f64 * period;
+        let [wish, fastest] = [BEYOND * bandwidth, RATE / (f64::from(spacing) * period)];
+        let band = [1.0 / time, if wish < fastest { wish } else { fastest }];
+        let bearable = WITHIN * limit / (TAU * band[1] * ONSET);
+        let wanted = OVER_NOISE * noise;
+        let amplitude = if wanted > 0.0 && wanted < bearable { wanted } else { bearable };
+        // Modes alike at the joints, and what they sum up to on the axis that has most.
+        let from_modal = &learnable.closed_loop.basis.from_modal;
+        let at_joints =
+            |axis: usize, mode: usize| from_modal[axis][mode].abs() * if axis < 3 { 1.0 } else { motion.radius };
+        let largest = |values: &mut dyn Iterator<Item = f64>| {
+            values.fold(0.0, |most, value| if value > most { value } else { most })
+        };
+        let modes: [f64; 6] = std::array::from_fn(|mode| 1.0 / largest(&mut (0..6).map(|axis| at_joints(axis, mode))));
+        let sum = largest(&mut (0..6).map(|axis| (0..6).map(|mode| modes[mode] * at_joints(axis, mode)).sum()));
+        let sweep = sweep(motion.scored.end, motion.corrected, period, band);
+        let mut passes = Vec::with_capacity(PASSES);
+        for row in CONFERENCE {
+            for sign in [1.0, -1.0] {
+                let modal: [f64; 6] =
+                    std::array::from_fn(|mode| sign * f64::from(row[mode]) * modes[mode] * amplitude / sum);
+                let pose = mapped(from_modal, &modal);
+                let signal: Vec<[f64; 6]> = sweep.iter().map(|value| pose.map(|axis| axis * value)).collect();
+                passes.push(knots(&signal, spacing));
+            }
+        }
+        Self { passes, band, amplitude, spacing }
+    }
+
+    /// Makes the passes, after one that is not counted, and gives T with its standard error; `names` are the digest of the spec and the machine.
+    /// `watch` hears of each pass and may end it.
+    ///
+    /// # Errors
+    /// If the machine does not make a pass, or limits hold back what it is excited with, or it was ended.
+    pub fn measure(
+        &self,
+        machine: &mut dyn Repeating,
+        learnable: &Learnable,
+        motion: &Motion,
+        names: [&str; 2],
+        mut watch: impl FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Response, LearnError> {
+        let period = learnable.closed_loop.period;
+        let to_modal = &learnable.closed_loop.basis.to_modal;
+        let length = (2 * motion.corrected).next_power_of_two();
+        let transform = FftPlannerScalar::new().plan_fft_forward(length);
+        let spectra = |signal: &mut dyn Iterator<Item = [f64; 6]>| -> [Vec<Complex64>; 6] {
+            let modal: Vec<[f64; 6]> = signal.map(|pose| mapped(to_modal, &pose)).collect();
+            std::array::from_fn(|mode| {
+                let mut values: Vec<Complex64> = modal.iter().map(|value| Complex64::new(value[mode], 0.0)).collect();
+                values.resize(length, Complex64::default());
+                transform.process(&mut values);
+                values
+            })
+        };
+        followed(machine.pass(motion, &[], self.spacing)?)?;
+        let mut pairs = Vec::with_capacity(PASSES);
+        for (number, knots) in self.passes.iter().enumerate() {
+            if watch(number).is_break() {
+                return Err(LearnError::Ended);
+            }
+            let seen = unlimited(followed(machine.pass(motion, knots, self.spacing)?)?)?;
+            let given = (0..motion.corrected as u32).map(|tick| playback::at(knots, self.spacing, tick));
+            let shown = seen.measured[..motion.corrected].iter().map(|error| error.map(|axis| -axis));
+            pairs.push([spectra(&mut { given }), spectra(&mut { shown })]);
+        }
+        let hertz = |bin: usize| bin as f64 / (length as f64 * period);
+        let [first, end] = self.band.map(|edge| libm::ceil(edge * length as f64 * period) as usize);
+        let width = libm::floor(WIDTH / hertz(1));
+        let width = if width > 1.0 { width as usize } else { 1 };
+        // Zeros behind the signals tie bins together.
+        let tied = length as f64 / motion.corrected as f64;
+        let held = f64::from(self.spacing) * period;
+        let mut bins = Vec::new();
+        for low in (first..end).step_by(width) {
+            let group = low..if low + width < end { low + width } else { end };
+            let middle = 0.5 * (hertz(group.start) + hertz(group.end - 1));
+            let (response, error) = regression(&pairs, group, tied);
+            let scale = 1.0 / kept(middle * held);
+            bins.push(Bin {
+                hertz: rounded(middle),
+                response: response.map(|row| row.map(|value| value.map(|part| rounded(scale * part)))),
+                error: error.map(|row| row.map(|value| rounded(scale * value))),
+            });
+        }
+        Ok(Response::new(names, bins))
+    }
+}
+
+/// A sine whose frequency rises from the lower end of a band (Hz) to the upper over so many ticks, in equal times by equal factors; 0 from there on.
+fn sweep(ticks: usize, all: usize, period: f64, [low, high]: [f64; 2]) -> Vec<f64> {
+    let time = ticks as f64 * period;
+    let growth = libm::log(high / low) / time;
+    let fade = |inward: f64| if inward < FADE { 0.5 - 0.5 * libm::cos(0.5 * TAU * inward / FADE) } else { 1.0 };
+    (0..all)
+        .map(|tick| {
+            let t = tick as f64 * period;
+            if tick >= ticks {
+                return 0.0;
+            }
+            fade(t) * fade(time - t) * libm::sin(TAU * low / growth * libm::expm1(growth * t))
+        })
+        .collect()
+}
+
+/// T and its standard errors of the bins of a group, over passes of (given, shown) spectra; of `tied` bins one is independent.
+fn regression(
+    pairs: &[[[Vec<Complex64>; 6]; 2]],
+    group: std::ops::Range<usize>,
+    tied: f64,
+) -> (Matrix6c, [[f64; 6]; 6]) {
+    let at = |signal: &[Vec<Complex64>; 6], bin: usize| -> [Complex; 6] {
+        std::array::from_fn(|mode| [signal[mode][bin].re, signal[mode][bin].im])
+    };
+    let conjugate = |value: Complex| [value[0], -value[1]];
+    let mut given_given = [[[0.0; 2]; 6]; 6];
+    let mut shown_given = [[[0.0; 2]; 6]; 6];
+    for bin in group.clone() {
+        for [given, shown] in pairs {
+            let (given, shown) = (at(given, bin), at(shown, bin));
+            for i in 0..6 {
+                for j in 0..6 {
+                    given_given[i][j] = plus(given_given[i][j], times(given[i], conjugate(given[j])));
+                    shown_given[i][j] = plus(shown_given[i][j], times(shown[i], conjugate(given[j])));
+                }
+            }
+        }
+    }
+    let inverse = inverse(&given_given);
+    let response = multiply(&shown_given, &inverse);
+    let mut left = [0.0; 6];
+    for bin in group.clone() {
+        // What every pass shows is the motion's.
+        let mut mean = [[0.0; 2]; 6];
+        for [_, shown] in pairs {
+            for (mean, value) in mean.iter_mut().zip(at(shown, bin)) {
+                *mean = plus(*mean, value.map(|part| part / pairs.len() as f64));
+            }
+        }
+        for [given, shown] in pairs {
+            let (given, shown) = (at(given, bin), at(shown, bin));
+            for (mode, left) in left.iter_mut().enumerate() {
+                let row = response[mode].iter().zip(&given);
+                let expected = row.fold(mean[mode], |sum, (factor, value)| plus(sum, times(*factor, *value)));
+                let off = [shown[mode][0] - expected[0], shown[mode][1] - expected[1]];
+                *left += off[0] * off[0] + off[1] * off[1];
+            }
+        }
+    }
+    // Of each bin the mean is taken out, of the group one response.
+    let free = (group.len() * (pairs.len() - 1)) as f64 - 6.0;
+    let error = std::array::from_fn(|i| std::array::from_fn(|j| libm::sqrt(tied * left[i] / free * inverse[j][j][0])));
+    (response, error)
+}
+
+/// To the digits of a file.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.DIGITS$e}").parse().unwrap_or(value)
+}

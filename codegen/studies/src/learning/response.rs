@@ -1,0 +1,206 @@
+//! The response of a running loop to a correction, as it was measured: its file, and how far learning with it converges.
+
+use std::f64::consts::TAU;
+use std::fs;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use specgen_numerics::nyquist::square;
+
+use super::convergence::{
+    Convergence, LARGEST_RADIUS, LEAST_LEFT, Learnable, Matrix6c, highest_passed, inverse, multiply, norm,
+    spectral_radius,
+};
+use super::table::TableError;
+
+/// Version of the file.
+const FORMAT: &str = "specgen response 1";
+/// Standard errors that the response may be off in every entry.
+const ERRORS: f64 = 3.0;
+/// Behind the last frequency nothing is learned.
+const JUST_BEYOND: f64 = 1.001;
+
+/// T at one frequency.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bin {
+    /// Hz.
+    pub hertz: f64,
+    /// What the gauges show of each mode by the correction of each mode: rows are shown, columns given; real and imaginary part.
+    pub response: Matrix6c,
+    /// Standard error of the magnitude of each entry.
+    pub error: [[f64; 6]; 6],
+}
+
+/// T of a machine, measured with its loop closed and running, in the modal coordinates of its spec.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Response {
+    /// What the file is.
+    format: String,
+    /// Digest of the spec.
+    pub digest: String,
+    /// The machine, as its user calls it.
+    pub machine: String,
+    /// By rising frequency, at least two.
+    pub bins: Vec<Bin>,
+}
+
+impl Response {
+    /// Of the spec of a digest and a machine.
+    #[must_use]
+    pub fn new([digest, machine]: [&str; 2], bins: Vec<Bin>) -> Self {
+        let [digest, machine] = [digest, machine].map(str::to_owned);
+        Self { format: FORMAT.to_owned(), digest, machine, bins }
+    }
+
+    /// Its file: JSON, a frequency a line.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        let head =
+            serde_json::json!({ "format": self.format, "digest": self.digest, "machine": self.machine }).to_string();
+        let lines: Vec<String> = self.bins.iter().map(|bin| serde_json::json!(bin).to_string()).collect();
+        format!("{},\n\"bins\":[\n{}\n]}}\n", head.trim_end_matches('}'), lines.join(",\n"))
+    }
+
+    /// The response of a file.
+    ///
+    /// # Errors
+    /// If it cannot be read, or is none.
+    pub fn of_file(path: &Path) -> Result<Self, TableError> {
+        Self::read(&fs::read_to_string(path).map_err(|error| TableError::Unread(error.to_string()))?)
+    }
+
+    /// The response of a file's text.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn read(text: &str) -> Result<Self, TableError> {
+        let response: Self = serde_json::from_str(text).map_err(|error| TableError::Response(error.to_string()))?;
+        if response.format != FORMAT {
+            return Err(TableError::Response(format!("its format is `{}`, expected `{FORMAT}`", response.format)));
+        }
+        let bins = &response.bins;
+        if bins.len() < 2 || !(bins[0].hertz > 0.0 && bins.windows(2).all(|pair| pair[0].hertz < pair[1].hertz)) {
+            return Err(TableError::Response("`bins` are not two or more, by rising frequency".to_owned()));
+        }
+        Ok(response)
+    }
+
+    /// Whether it is of this spec and machine.
+    ///
+    /// # Errors
+    /// What it is of instead.
+    pub fn is_for(&self, digest: &str, machine: &str) -> Result<(), TableError> {
+        let other = |what, there: &str, here: &str| Err(TableError::Measured(what, there.to_owned(), here.to_owned()));
+        if self.digest != digest {
+            return other("spec with digest", &self.digest, digest);
+        }
+        if self.machine != machine {
+            return other("machine", &self.machine, machine);
+        }
+        Ok(())
+    }
+
+    /// T at a frequency, Hz, along a straight line between those that were measured; beyond them that of the last.
+    #[must_use]
+    pub fn at(&self, hertz: f64) -> Matrix6c {
+        let above = self.bins.partition_point(|bin| bin.hertz <= hertz);
+        match (above.checked_sub(1).and_then(|below| self.bins.get(below)), self.bins.get(above)) {
+            (Some(below), Some(above)) => {
+                let part = (hertz - below.hertz) / (above.hertz - below.hertz);
+                let between = |a: f64, b: f64| a + (b - a) * part;
+                std::array::from_fn(|i| {
+                    std::array::from_fn(|j| {
+                        let [a, b] = [below, above].map(|bin| bin.response[i][j]);
+                        [between(a[0], b[0]), between(a[1], b[1])]
+                    })
+                })
+            }
+            (Some(one), None) | (None, Some(one)) => one.response,
+            (None, None) => [[[0.0; 2]; 6]; 6],
+        }
+    }
+
+    /// The band about the best known frequency in which learning with T⁻¹ converges whatever T is within three standard errors of what was
+    /// measured, up to `wish` (Hz); none if there is no such band.
+    #[must_use]
+    pub fn convergence(&self, wish: f64) -> Option<Convergence> {
+        let radii: Vec<f64> = self.bins.iter().map(Bin::doubt).collect();
+        let inside = |k: &usize| self.bins[*k].hertz <= wish;
+        let best = (0..radii.len()).filter(inside).min_by(|a, b| radii[*a].total_cmp(&radii[*b]))?;
+        // A NaN is not known.
+        let known = |k: &usize| radii[*k] <= LARGEST_RADIUS;
+        if !known(&best) {
+            return None;
+        }
+        let first = (0..best).rev().find(|k| !known(k)).map_or(0, |k| k + 1);
+        let behind = (best..radii.len()).find(|k| !known(k)).unwrap_or(radii.len());
+        let answers = |k: &usize| norm(&inverse(&self.bins[*k].response)) * LEAST_LEFT <= 1.0;
+        let low = self.bins[(first..behind).find(answers)?].hertz;
+        // What is not known is not learned: there Q alone decides.
+        let learned = |k: usize| k >= first && k < behind;
+        let radius = |k: usize| if learned(k) { radii[k] } else { 1.0 };
+        let above: Vec<[f64; 2]> = (first..radii.len()).map(|k| [self.bins[k].hertz, radius(k)]).collect();
+        // Nothing is known beyond the last.
+        let end = [self.bins.last()?.hertz, 1.0];
+        let high = highest_passed(above.into_iter().chain([end]), wish)?;
+        if low >= high {
+            return None;
+        }
+        let mut shares: Vec<[f64; 2]> = vec![[0.0, 0.0]];
+        shares.extend(self.bins.iter().enumerate().map(|(k, bin)| [bin.hertz, f64::from(u8::from(learned(k)))]));
+        shares.push([JUST_BEYOND * end[0], 0.0]);
+        let mut found =
+            Convergence { band: [low, high], radius: 0.0, at: 0.0, measured: true, bounds: Vec::new(), shares };
+        for (k, bin) in self.bins.iter().enumerate() {
+            found.meet(bin.hertz, radius(k));
+        }
+        Some(found)
+    }
+}
+
+impl Bin {
+    /// Bound of ρ(I − T_real T⁻¹) for every T_real within three standard errors in every entry: that of the matrix of magnitudes.
+    fn doubt(&self) -> f64 {
+        let inverse = inverse(&self.response).map(|row| row.map(|value| [libm::sqrt(square(value)), 0.0]));
+        spectral_radius(&multiply(&self.error.map(|row| row.map(|error| [ERRORS * error, 0.0])), &inverse))
+    }
+}
+
+/// What was measured of a mode.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Heard {
+    /// By the model, Hz.
+    pub frequency: f64,
+    /// Where (Hz) its response to its own correction is largest, and how large, between half and one and a half times that frequency.
+    pub largest: [f64; 2],
+    /// The same by the model.
+    pub modelled: [f64; 2],
+    /// Standard error where it is largest, relative.
+    pub error: f64,
+}
+
+impl Learnable {
+    /// What a response says of each mode.
+    #[must_use]
+    pub fn heard(&self, response: &Response) -> [Heard; 6] {
+        let frequencies: Vec<f64> = response.bins.iter().map(|bin| bin.hertz).collect();
+        let model = self.nominal(&frequencies);
+        std::array::from_fn(|mode| {
+            let frequency = self.closed_loop.basis.frequencies[mode] / TAU;
+            let near: Vec<usize> =
+                (0..frequencies.len()).filter(|k| (frequencies[*k] / frequency - 1.0).abs() <= 0.5).collect();
+            let gain = |matrix: &Matrix6c| libm::sqrt(square(matrix[mode][mode]));
+            let largest = |gains: &dyn Fn(usize) -> f64| {
+                near.iter()
+                    .copied()
+                    .max_by(|a, b| gains(*a).total_cmp(&gains(*b)))
+                    .map_or((0, [frequency, 0.0]), |k| (k, [frequencies[k], gains(k)]))
+            };
+            let (at, measured) = largest(&|k| gain(&response.bins[k].response));
+            let (_, modelled) = largest(&|k| gain(&model[k]));
+            Heard { frequency, largest: measured, modelled, error: response.bins[at].error[mode][mode] / measured[1] }
+        })
+    }
+}
