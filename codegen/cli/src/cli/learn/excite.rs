@@ -55,7 +55,7 @@ pub(super) fn run(
                 band: excitation.band,
                 amplitude_nm: excitation.amplitude * 1e9,
                 modes,
-                convergence: learnable.with(response).convergence(&factors, arguments.bandwidth),
+                convergence: learnable_of(compiled)?.with(response).convergence(&factors, arguments.bandwidth),
                 file: path.display().to_string(),
             })
         },
