@@ -316,3 +316,42 @@ fn ctrl_c_keeps_what_was_run_and_says_so() {
     let shown = run.stdout;
     assert!(shown.contains("worst error") && !shown.contains("gate: passed"), "{shown}");
 }
+
+/// Machines learn, a gate judges what is left, and parts of such a study are the single run.
+#[test]
+fn learned_errors_have_a_row_a_gate_and_parts() {
+    let folder = Folder::new();
+    let text = std::fs::read_to_string(folder.path("reference.toml")).unwrap();
+    let text = text.replacen("[control]\n", "[control]\ncorrection = \"2 um\"\nactive_damping = true\n", 1);
+    let text = text.replacen(
+        "stream_speed = [\"5 mm/s\", \"5 mm/s\", \"5 mm/s\"",
+        "stream_speed = [\"8 mm/s\", \"8 mm/s\", \"8 mm/s\"",
+        1,
+    );
+    std::fs::write(folder.path("learning.toml"), text).unwrap();
+    let fixed =
+        ["mass", "stiffness", "damping", "hysteresis", "creep", "lag", "noise"].map(|name| format!("{name}=1:1"));
+    let mut study = vec!["robust", "learning.toml", "--draws", "1", "--learn", "2", "--vary", "delay_ticks=0:0"];
+    fixed.iter().for_each(|vary| study.extend(["--vary", vary]));
+    let run = |more: &[&str]| folder.run(&[&study[..], more].concat());
+    let single = run(&["--max-learned", "1 nm", "-o", "single"]);
+    assert_eq!(single.code, 1, "{single:#?}");
+    assert!(single.stderr.contains("largest rms learned error is"), "{single:#?}");
+    assert!(single.stdout.contains("learned from 2 passes on each") && single.stdout.contains("learned, nm rms"));
+    let report: Value = serde_json::from_slice(&std::fs::read(folder.path("single/report.json")).unwrap()).unwrap();
+    for one in report["runs"].as_array().unwrap() {
+        let ran = &one["outcome"]["ran"];
+        let [before, after] = [&ran["error_nm"], &ran["learned"]["error_nm"]].map(|nm| nm.as_f64().unwrap());
+        assert!(after < 0.6 * before, "{one}");
+    }
+    for index in ["1/2", "2/2"] {
+        let part = run(&["--max-learned", "1 nm", "--shard", index, "-o", &format!("part-{}.json", &index[..1])]);
+        assert_eq!(part.code, 0, "{part:#?}");
+    }
+    let merged = folder.run(&["robust", "merge", "part-2.json", "part-1.json", "-o", "merged"]);
+    assert_eq!((merged.code, &merged.stdout), (1, &single.stdout));
+    assert_eq!(contents(&folder.path("merged")), contents(&folder.path("single")));
+    // A spec without a correction has nothing to learn with; a limit needs something learned.
+    folder.run(&["robust", "reference.toml", "--learn", "2"]).says(1, &["write correction = \"2 um\" in [control]"]);
+    folder.run(&["robust", "learning.toml", "--max-learned", "1 nm"]).says(2, &["--learn"]);
+}

@@ -46,7 +46,9 @@ fn played(bench: &Bench) -> (Vec<[f64; 6]>, f64) {
         })
         .collect();
     let hold = Request::default();
-    (0..2000).for_each(|_| drop(rig.tick(&hold).unwrap()));
+    for _ in 0..2000 {
+        rig.tick(&hold).unwrap();
+    }
     let play = Request { command: Command::Trajectory, selector: 0, ..Request::default() };
     let (mut sum, mut count, mut rest) = (0.0, 0, 0);
     while rest < 1000 {

@@ -18,7 +18,7 @@ pub const LARGEST_RADIUS: f64 = 0.9;
 /// Order of Q at its upper end, and at its lower one.
 const ORDERS: [f64; 2] = [8.0, 4.0];
 /// Where the loop leaves less of a correction than this it is not learned: the feedback does it.
-pub(super) const LEAST_LEFT: f64 = 0.004;
+const LEAST_LEFT: f64 = 0.004;
 /// Parts of the inverse that are tried: less of it learns more slowly, and bears more of what is not known.
 const SHARES: [f64; 7] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4];
 /// Knots in a period of f_c.
@@ -59,6 +59,9 @@ pub struct Convergence {
     pub at: f64,
     /// Whether T was measured: then it is shown for what it may be on that machine, else for every machine within the intervals.
     pub measured: bool,
+    /// From here on T is the measured one, Hz; nowhere, where none was measured.
+    #[serde(skip)]
+    pub(super) edge: f64,
     /// That bound without Q at frequencies (Hz), rising.
     #[serde(skip)]
     pub bounds: Vec<[f64; 2]>,
@@ -161,12 +164,14 @@ impl Learnable {
         open.nominal(frequencies)
     }
 
-    /// T that is learned with.
-    pub(super) fn known(&self, frequencies: &[f64]) -> Vec<Matrix6c> {
-        match &self.measured {
-            Some(response) => frequencies.iter().map(|hertz| response.at(*hertz)).collect(),
-            None => self.nominal(frequencies),
-        }
+    /// T that is learned with at frequencies (Hz), rising: the model's below an edge, from there on the measured one.
+    pub(super) fn known(&self, frequencies: &[f64], edge: f64) -> Vec<Matrix6c> {
+        let slower = frequencies.partition_point(|hertz| *hertz < edge);
+        let mut all = self.nominal(&frequencies[..slower]);
+        let measured =
+            self.measured.iter().flat_map(|response| frequencies[slower..].iter().map(|hertz| response.at(*hertz)));
+        all.extend(measured);
+        all
     }
 
     /// T as the compiler's model has it.
@@ -179,13 +184,64 @@ impl Learnable {
     #[must_use]
     pub fn convergence(&self, factors: &Factors, wish: f64) -> Option<Convergence> {
         if let Some(response) = &self.measured {
-            return response.convergence(wish);
+            return Some(self.slower(response.convergence(wish)?, factors, wish));
         }
         let frequencies = self.grid(wish);
-        let inverses: Vec<Matrix6c> = self.nominal(&frequencies).iter().map(inverse).collect();
+        let (inverses, shares, radii) = self.modelled(&frequencies, factors);
+        let highest = highest_passed(frequencies.iter().zip(&radii).map(|(hertz, radius)| [*hertz, *radius]), wish)?;
+        let lowest = *frequencies.first()?;
+        // The slowest frequency at which every mode answers.
+        let answers = frequencies.iter().zip(&inverses).find(|(_, inverse)| norm(inverse) * LEAST_LEFT <= 1.0);
+        let low = answers.map(|(hertz, _)| *hertz).filter(|hertz| *hertz > lowest).unwrap_or(0.0);
+        if !(highest > lowest && highest > low) {
+            return None;
+        }
+        let shares = frequencies.iter().zip(shares).map(|(hertz, share)| [*hertz, share]).collect();
+        let mut found = Convergence {
+            band: [low, highest],
+            radius: 0.0,
+            at: 0.0,
+            measured: false,
+            edge: f64::INFINITY,
+            bounds: Vec::new(),
+            shares,
+        };
+        for (hertz, radius) in frequencies.iter().zip(&radii) {
+            found.meet(*hertz, *radius);
+        }
+        Some(found)
+    }
+
+    /// With the model's T, and the machines within `factors`, for what is slower than a measured one is known: a sweep of a pass says little of
+    /// slow motion, of which feedback leaves little, and there mass and stiffness hardly count.
+    fn slower(&self, found: Convergence, factors: &Factors, wish: f64) -> Convergence {
+        let frequencies: Vec<f64> = self.grid(wish).into_iter().filter(|hertz| *hertz < found.edge).collect();
+        let (inverses, shares, radii) = self.modelled(&frequencies, factors);
+        let learned = |k: &usize| radii[*k] <= LARGEST_RADIUS && norm(&inverses[*k]) * LEAST_LEFT <= 1.0;
+        // The band that ends where the measured one begins.
+        let first = (0..frequencies.len()).rev().take_while(learned).last();
+        let Some(first) = first else { return found };
+        let slow = frequencies[first..].iter().zip(&shares[first..]).map(|(hertz, share)| [*hertz, *share]);
+        let fast = found.shares.iter().copied().filter(|[hertz, _]| *hertz >= found.edge);
+        let band = [if first == 0 { 0.0 } else { frequencies[first] }, found.band[1]];
+        let shares = slow.chain(fast).collect();
+        let (edge, bounds) = (found.edge, found.bounds);
+        let mut whole = Convergence { band, radius: 0.0, at: 0.0, measured: true, edge, bounds: Vec::new(), shares };
+        for (hertz, radius) in frequencies.iter().zip(&radii) {
+            whole.meet(*hertz, *radius);
+        }
+        for [hertz, radius] in bounds.into_iter().filter(|[hertz, _]| *hertz >= edge) {
+            whole.meet(hertz, radius);
+        }
+        whole
+    }
+
+    /// By the model, at each frequency (Hz): T⁻¹, the part of it that is learned with, and the radius on every machine within `factors`.
+    fn modelled(&self, frequencies: &[f64], factors: &Factors) -> (Vec<Matrix6c>, Vec<f64>, Vec<f64>) {
+        let inverses: Vec<Matrix6c> = self.nominal(frequencies).iter().map(inverse).collect();
         let mut radii = vec![[0.0; SHARES.len()]; frequencies.len()];
         for (closed_loop, conditions) in self.machines(factors) {
-            let real = self.response(&closed_loop, &conditions, &frequencies);
+            let real = self.response(&closed_loop, &conditions, frequencies);
             for ((radii, real), inverse) in radii.iter_mut().zip(&real).zip(&inverses) {
                 let product = multiply(real, inverse);
                 for (radius, share) in radii.iter_mut().zip(SHARES) {
@@ -200,22 +256,8 @@ impl Learnable {
             let index = if radii[0] <= FAST { 0 } else { least };
             (SHARES[index], radii[index])
         });
-        let (shares, radii): (Vec<f64>, Vec<f64>) = chosen.unzip();
-        let highest = highest_passed(frequencies.iter().zip(&radii).map(|(hertz, radius)| [*hertz, *radius]), wish)?;
-        let lowest = *frequencies.first()?;
-        // The slowest frequency at which every mode answers.
-        let answers = frequencies.iter().zip(&inverses).find(|(_, inverse)| norm(inverse) * LEAST_LEFT <= 1.0);
-        let low = answers.map(|(hertz, _)| *hertz).filter(|hertz| *hertz > lowest).unwrap_or(0.0);
-        if !(highest > lowest && highest > low) {
-            return None;
-        }
-        let shares = frequencies.iter().zip(shares).map(|(hertz, share)| [*hertz, share]).collect();
-        let mut found =
-            Convergence { band: [low, highest], radius: 0.0, at: 0.0, measured: false, bounds: Vec::new(), shares };
-        for (hertz, radius) in frequencies.iter().zip(&radii) {
-            found.meet(*hertz, *radius);
-        }
-        Some(found)
+        let (shares, radii) = chosen.unzip();
+        (inverses, shares, radii)
     }
 
     /// Frequencies up to where Q lets nothing through, rising, closest about the modes.
@@ -320,7 +362,7 @@ pub(super) fn spectral_radius(matrix: &Matrix6c) -> f64 {
 }
 
 /// Largest sum of magnitudes of a row.
-pub(super) fn norm(matrix: &Matrix6c) -> f64 {
+fn norm(matrix: &Matrix6c) -> f64 {
     let sums = matrix.iter().map(|row| row.iter().map(|value| libm::sqrt(square(*value))).sum::<f64>());
     sums.fold(0.0, |most, sum| if sum <= most { most } else { sum })
 }

@@ -40,6 +40,8 @@ const RATE: f64 = 0.4;
 /// Amplitude at the joints over the noise of a gauge, and at most so much of what the limits of a correction let through.
 const OVER_NOISE: f64 = 50.0;
 const WITHIN: f64 = 0.5;
+/// Where the loop leaves little, the sweep is larger: as much again at the first frequency, Hz, and in proportion to its inverse down to the other.
+const SLOW: [f64; 2] = [100.0, 10.0];
 /// How fast a correction may come, s from nothing to its limit.
 const ONSET: f64 = 1e-3;
 /// Over which a sweep fades in and out, s.
@@ -69,7 +71,10 @@ impl Excitation {
         let time = motion.scored.end as f64 * period;
         let [wish, fastest] = [BEYOND * bandwidth, RATE / (f64::from(spacing) * period)];
         let band = [1.0 / time, if wish < fastest { wish } else { fastest }];
-        let bearable = WITHIN * limit / (TAU * band[1] * ONSET);
+        // Of its rate at the end, of its size in the beginning.
+        let rate = limit / (TAU * (band[1] + SLOW[0]) * ONSET);
+        let size = limit / larger(0.0);
+        let bearable = WITHIN * if size < rate { size } else { rate };
         let wanted = OVER_NOISE * noise;
         let amplitude = if wanted > 0.0 && wanted < bearable { wanted } else { bearable };
         // Modes alike at the joints, and what they sum up to on the axis that has most.
@@ -155,6 +160,11 @@ impl Excitation {
     }
 }
 
+/// Amplitude of the sweep at a frequency (Hz) over that at its end.
+fn larger(hertz: f64) -> f64 {
+    1.0 + SLOW[0] / if hertz > SLOW[1] { hertz } else { SLOW[1] }
+}
+
 /// A sine whose frequency rises from the lower end of a band (Hz) to the upper over so many ticks, in equal times by equal factors; 0 from there on.
 fn sweep(ticks: usize, all: usize, period: f64, [low, high]: [f64; 2]) -> Vec<f64> {
     let time = ticks as f64 * period;
@@ -166,7 +176,8 @@ fn sweep(ticks: usize, all: usize, period: f64, [low, high]: [f64; 2]) -> Vec<f6
             if tick >= ticks {
                 return 0.0;
             }
-            fade(t) * fade(time - t) * libm::sin(TAU * low / growth * libm::expm1(growth * t))
+            let hertz = low * libm::exp(growth * t);
+            larger(hertz) * fade(t) * fade(time - t) * libm::sin(TAU * low / growth * libm::expm1(growth * t))
         })
         .collect()
 }

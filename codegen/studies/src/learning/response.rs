@@ -8,8 +8,7 @@ use serde::{Deserialize, Serialize};
 use specgen_numerics::nyquist::square;
 
 use super::convergence::{
-    Convergence, LARGEST_RADIUS, LEAST_LEFT, Learnable, Matrix6c, highest_passed, inverse, multiply, norm,
-    spectral_radius,
+    Convergence, LARGEST_RADIUS, Learnable, Matrix6c, highest_passed, inverse, multiply, spectral_radius,
 };
 use super::table::TableError;
 
@@ -124,8 +123,7 @@ impl Response {
 
     /// The band about the best known frequency in which learning with T⁻¹ converges whatever T is within three standard errors of what was
     /// measured, up to `wish` (Hz); none if there is no such band.
-    #[must_use]
-    pub fn convergence(&self, wish: f64) -> Option<Convergence> {
+    pub(super) fn convergence(&self, wish: f64) -> Option<Convergence> {
         let radii: Vec<f64> = self.bins.iter().map(Bin::doubt).collect();
         let inside = |k: &usize| self.bins[*k].hertz <= wish;
         let best = (0..radii.len()).filter(inside).min_by(|a, b| radii[*a].total_cmp(&radii[*b]))?;
@@ -136,8 +134,7 @@ impl Response {
         }
         let first = (0..best).rev().find(|k| !known(k)).map_or(0, |k| k + 1);
         let behind = (best..radii.len()).find(|k| !known(k)).unwrap_or(radii.len());
-        let answers = |k: &usize| norm(&inverse(&self.bins[*k].response)) * LEAST_LEFT <= 1.0;
-        let low = self.bins[(first..behind).find(answers)?].hertz;
+        let low = self.bins[first].hertz;
         // What is not known is not learned: there Q alone decides.
         let learned = |k: usize| k >= first && k < behind;
         let radius = |k: usize| if learned(k) { radii[k] } else { 1.0 };
@@ -151,8 +148,15 @@ impl Response {
         let mut shares: Vec<[f64; 2]> = vec![[0.0, 0.0]];
         shares.extend(self.bins.iter().enumerate().map(|(k, bin)| [bin.hertz, f64::from(u8::from(learned(k)))]));
         shares.push([JUST_BEYOND * end[0], 0.0]);
-        let mut found =
-            Convergence { band: [low, high], radius: 0.0, at: 0.0, measured: true, bounds: Vec::new(), shares };
+        let mut found = Convergence {
+            band: [low, high],
+            radius: 0.0,
+            at: 0.0,
+            measured: true,
+            edge: low,
+            bounds: Vec::new(),
+            shares,
+        };
         for (k, bin) in self.bins.iter().enumerate() {
             found.meet(bin.hertz, radius(k));
         }

@@ -36,7 +36,7 @@ impl Update {
     pub fn new(learnable: &Learnable, motion: &Motion, convergence: &Convergence, spacing: u32) -> Self {
         let width = f64::from(spacing) * learnable.closed_loop.period;
         Self::of(learnable, motion, convergence.band[1], spacing, |frequencies| {
-            let responses = learnable.known(frequencies);
+            let responses = learnable.known(frequencies, convergence.edge);
             responses
                 .iter()
                 .zip(frequencies)

@@ -15,6 +15,7 @@ use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_language::interrupt;
 use specgen_studies::learning::{Convergence, Excitation, Heard, PASSES};
+use specgen_studies::robust::Factors;
 
 /// Measures and writes the response.
 pub(super) fn run(
@@ -28,6 +29,7 @@ pub(super) fn run(
     let (motion, _) = motion_of(arguments, compiled)?;
     let (learnable, machine) = (learnable_of(compiled)?, machine_name(arguments));
     let excitation = Excitation::new(&learnable, &motion, arguments.bandwidth, [limit, compiled.model.sensor.noise]);
+    let factors = Factors::of(&compiled.model, &[]);
     let stop = interrupt::heed();
     let names = [compiled.ir.digest.as_str(), &machine];
     let done = on(
@@ -45,14 +47,15 @@ pub(super) fn run(
         },
         |response, ui| {
             write_file(path, response.to_json().as_bytes())?;
+            let modes = learnable.heard(&response);
             ui.progress(&format!("wrote the response at {} frequencies to {}", response.bins.len(), path.display()));
             Ok(Found {
                 name: compiled.ir.name.clone(),
                 machine: machine.clone(),
                 band: excitation.band,
                 amplitude_nm: excitation.amplitude * 1e9,
-                modes: learnable.heard(&response),
-                convergence: response.convergence(arguments.bandwidth),
+                modes,
+                convergence: learnable_of(compiled)?.with(response).convergence(&factors, arguments.bandwidth),
                 file: path.display().to_string(),
             })
         },
