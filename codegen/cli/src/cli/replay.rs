@@ -2,6 +2,7 @@
 
 mod export;
 mod mcap;
+mod messages;
 
 use std::fmt::Write as _;
 use std::fs::File;

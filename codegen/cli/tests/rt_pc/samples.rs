@@ -96,8 +96,11 @@ pub fn hosts_look_on_and_are_no_burden(bench: &Bench) {
     let mut operate = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut blocks: Vec<Block> = Vec::new();
     // What waits for one that does not read are 1023 blocks of nine ticks.
+    let mut ages = Vec::new();
     while operate.try_wait().unwrap().is_none() || one.poll().unwrap().tick < begun + 10_000 {
         blocks.extend(one.take_blocks().unwrap());
+        let seen = blocks.last().map_or(begun, Block::end);
+        ages.push(one.poll().unwrap().tick - seen);
         std::thread::sleep(Duration::from_millis(5));
     }
     blocks.extend(one.take_blocks().unwrap());
@@ -132,6 +135,12 @@ pub fn hosts_look_on_and_are_no_burden(bench: &Bench) {
         let ticks = block.tick..;
         block.rows.iter().zip(ticks).for_each(|(row, tick)| check_row(row, tick, 1, &shown, &motion));
     }
+    ages.sort_unstable();
+    println!(
+        "the newest row of 37 ticks is {} ticks old when it is here, {} at most",
+        ages[ages.len() / 2],
+        ages[ages.len() - 1]
+    );
     println!(
         "{rows} rows of 37 ticks and {} of one are what the record says; {} blocks were given up for the one that did not read",
         late.iter().map(|block| block.rows.len()).sum::<usize>(),

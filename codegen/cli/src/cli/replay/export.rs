@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use host_sim::record::{self, Again, Block, Header};
 
-use super::mcap::Mcap;
+use super::messages::Messages;
 use crate::cli::file::{PendingFile, unwritten};
 use crate::cli::ui::Failure;
 
@@ -13,13 +13,13 @@ use crate::cli::ui::Failure;
 #[derive(Default)]
 pub struct Exports {
     csv: Option<Csv>,
-    mcap: Option<Mcap>,
+    mcap: Option<Messages>,
     rows: u64,
 }
 
 impl Exports {
     pub fn new(csv: Option<&Path>, mcap: Option<&Path>) -> Result<Self, Failure> {
-        Ok(Self { csv: csv.map(Csv::new).transpose()?, mcap: mcap.map(Mcap::new).transpose()?, rows: 0 })
+        Ok(Self { csv: csv.map(Csv::new).transpose()?, mcap: mcap.map(Messages::new).transpose()?, rows: 0 })
     }
 
     pub fn add(&mut self, header: &Header, block: &Block, again: Option<Again>) -> Result<(), Failure> {
@@ -36,7 +36,7 @@ impl Exports {
     /// Puts them in their places; how many rows there were.
     pub fn finish(self) -> Result<u64, Failure> {
         self.csv.map(Csv::finish).transpose()?;
-        self.mcap.map(Mcap::finish).transpose()?;
+        self.mcap.map(Messages::finish).transpose()?;
         Ok(self.rows)
     }
 }

@@ -1,258 +1,187 @@
-//! A record as MCAP, with JSON messages and their schemas: what viewers of robots' logs read. Time begins with the record's tick 0.
+//! The container of MCAP (mcap.dev/spec, version 0): chunks with an index, so that a viewer finds a time without reading the whole file.
+//! Nothing is compressed and no checksum given, both of which the format leaves free.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
-use std::io::BufWriter;
-use std::path::{Path, PathBuf};
+use std::io::{self, Write};
 
-use host_sim::controller::MachineWord;
-use host_sim::record::{Again, Block, Header, Row};
-use host_sim::word::{Scalar, WordKind, status_words};
-use mcap::records::{MessageHeader, Metadata};
-use mcap::write::NoSeek;
-use mcap::{McapError, WriteOptions, Writer};
-use serde_json::{Value, json};
+const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+/// A chunk ends behind the message that makes it so long, bytes.
+const CHUNK: usize = 1 << 20;
 
-use crate::cli::file::{PendingFile, unwritten};
-use crate::cli::ui::Failure;
-use specgen_operate::place::AXES;
+const HEADER: u8 = 0x01;
+const FOOTER: u8 = 0x02;
+const SCHEMA: u8 = 0x03;
+const CHANNEL: u8 = 0x04;
+const MESSAGE: u8 = 0x05;
+const CHUNK_OF: u8 = 0x06;
+const MESSAGE_INDEX: u8 = 0x07;
+const CHUNK_INDEX: u8 = 0x08;
+const STATISTICS: u8 = 0x0b;
+const METADATA: u8 = 0x0c;
+const METADATA_INDEX: u8 = 0x0d;
+const DATA_END: u8 = 0x0f;
 
-/// Channels whose numbers are those of a pose, where there is one.
-const POSES: [&str; 3] = ["pose", "target", "error"];
-
-/// A file on its way.
-pub struct Mcap {
-    writer: Writer<NoSeek<BufWriter<PendingFile>>>,
-    /// As its user named it.
-    path: PathBuf,
-    /// Numbers of the channels, by name, once the header of the record is known.
-    channels: BTreeMap<&'static str, u16>,
-    /// Status and supervisor that were written last.
-    said: Option<(u32, u32)>,
-    text: String,
+/// A file that is being written; every message is of a channel with JSON and its schema.
+pub struct Writer<W> {
+    sink: W,
+    /// Bytes that went there.
+    at: u64,
+    chunk: Vec<u8>,
+    /// Of the chunk: first and last time, and of each channel times and places of its messages.
+    bounds: Option<[u64; 2]>,
+    index: BTreeMap<u16, Fields>,
+    /// What the end of the file repeats: schemas and channels, and where chunks and metadata are.
+    declared: Vec<u8>,
+    chunks: Vec<u8>,
+    metadata: Vec<u8>,
+    /// How many chunks and metadata there were; messages by channel; first and last time.
+    counts: [u32; 2],
+    messages: BTreeMap<u16, u64>,
+    all: Option<[u64; 2]>,
 }
 
-impl Mcap {
-    pub fn new(path: &Path) -> Result<Self, Failure> {
-        let file = NoSeek::new(BufWriter::new(PendingFile::create(path)?));
-        let library = concat!("specgen ", env!("CARGO_PKG_VERSION"));
-        // Nothing is compressed, and pipes are written to as well.
-        let options = WriteOptions::new().compression(None).disable_seeking(true).library(library);
-        let writer = options.create(file).map_err(|error| unwritten(path, &error))?;
-        Ok(Self { writer, path: path.to_owned(), channels: BTreeMap::new(), said: None, text: String::new() })
-    }
-
-    pub fn add(&mut self, header: &Header, block: &Block, again: Option<Again>) -> Result<(), Failure> {
-        self.put(header, block, again).map_err(|error| unwritten(&self.path, &error))
-    }
-
-    /// Writes the index, and puts the file in its place.
-    pub fn finish(mut self) -> Result<(), Failure> {
-        self.writer.finish().map_err(|error| unwritten(&self.path, &error))?;
-        let file = self.writer.into_inner().into_inner();
-        file.into_inner().map_err(|error| unwritten(&self.path, &error))?.keep()
-    }
-
-    fn put(&mut self, header: &Header, block: &Block, again: Option<Again>) -> Result<(), McapError> {
-        let scalar = header.description.scalar;
-        let signals = Signals::new(header, again);
-        if self.channels.is_empty() {
-            self.declare(header, &signals)?;
-        }
-        let settings = header.description.config_names.iter().zip(&block.config).map(|(name, word)| {
-            let value = match WordKind::of(name) {
-                WordKind::Integer => json!(word),
-                WordKind::Real => json!(scalar.decode(*word)),
-            };
-            (name.clone(), value)
-        });
-        self.text = Value::Object(settings.collect()).to_string();
-        self.send("settings", block.first, header.period)?;
-        // Of each block, so that one can be read without those before it.
-        self.said = None;
-        for (index, row) in block.rows.iter().enumerate() {
-            self.tick(row, &signals, again.and_then(|again| again.rows.get(index)), header)?;
-        }
-        Ok(())
-    }
-
-    fn tick(
-        &mut self,
-        row: &Row,
-        signals: &Signals,
-        given: Option<&Vec<u64>>,
-        header: &Header,
-    ) -> Result<(), McapError> {
-        let (scalar, period) = (header.description.scalar, header.period);
-        for (name, of) in &signals.0 {
-            let six =
-                |words: &[u64], first: usize| words.get(first..).and_then(|words| words.first_chunk::<6>()).copied();
-            let numbers = match *of {
-                Of::Input(place) => six(&row.input, place).map(|words| Numbers::Words(scalar, words)),
-                Of::Output(place) => {
-                    given.and_then(|given| six(given, place)).map(|words| Numbers::Words(scalar, words))
-                }
-                Of::Difference(target, pose) => given.and_then(|given| {
-                    let (target, pose) = (six(given, target)?, six(given, pose)?);
-                    let less = |k: usize| scalar.decode(target[k]) - scalar.decode(pose[k]);
-                    Some(Numbers::Values(core::array::from_fn(less)))
-                }),
-                Of::FromInput(target, place) => given.and_then(|given| {
-                    let (target, gauge) = (six(given, target)?, six(&row.input, place)?);
-                    let less = |k: usize| scalar.decode(target[k]) - scalar.decode(gauge[k]);
-                    Some(Numbers::Values(core::array::from_fn(less)))
-                }),
-            };
-            // Where a record was not run to its end there is nothing more.
-            let Some(numbers) = numbers else { continue };
-            self.text.clear();
-            numbers.write(signals.keys(name), &mut self.text);
-            self.send(name, row.tick, period)?;
-        }
-        self.text.clear();
-        Numbers::Codes(row.codes).write(LEG_KEYS, &mut self.text);
-        self.send("codes", row.tick, period)?;
-        let now = (row.status, row.supervisor);
-        if self.said.is_none_or(|said| said.0 != now.0) {
-            self.text = json!({ "status": row.status, "text": status_words(row.status) }).to_string();
-            self.send("status", row.tick, period)?;
-        }
-        if self.said.is_none_or(|said| said.1 != now.1) {
-            let [phase, cause, on, _] = row.supervisor.to_le_bytes();
-            let text = MachineWord::of(u64::from(row.supervisor)).to_string();
-            self.text = json!({ "phase": phase, "cause": cause, "amplifiers_on": on == 1, "text": text }).to_string();
-            self.send("phase", row.tick, period)?;
-        }
-        self.said = Some(now);
-        Ok(())
-    }
-
-    fn send(&mut self, name: &str, tick: u64, period: f64) -> Result<(), McapError> {
-        let Some(channel_id) = self.channels.get(name).copied() else { return Ok(()) };
-        let log_time = (tick as f64 * period * 1e9).round() as u64;
-        let header = MessageHeader { channel_id, sequence: tick as u32, log_time, publish_time: log_time };
-        self.writer.write_to_known_channel(&header, self.text.as_bytes())
-    }
-
-    fn declare(&mut self, header: &Header, signals: &Signals) -> Result<(), McapError> {
-        let described = &header.description;
-        let metadata = [
-            ("name", described.name.clone()),
-            ("spec_digest", described.digest.clone()),
-            ("specgen", described.version.clone()),
-            ("period_s", format!("{:?}", header.period)),
-        ];
-        let metadata = metadata.map(|(key, value)| (key.to_owned(), value)).into();
-        self.writer.write_metadata(&Metadata { name: "specgen".to_owned(), metadata })?;
-        let six = |unit: &str, keys: [&str; 6], kind: &str| {
-            let property = |key: &str| {
-                let unit = if unit == "m" && key.starts_with('r') { "rad" } else { unit };
-                (key.to_owned(), json!({ "type": kind, "description": unit }))
-            };
-            Value::Object(keys.into_iter().map(property).collect())
+impl<W: Write> Writer<W> {
+    /// # Errors
+    /// The sink does not take it; here and below.
+    pub fn new(sink: W, library: &str) -> io::Result<Self> {
+        let mut this = Self {
+            sink,
+            at: 0,
+            chunk: Vec::with_capacity(2 * CHUNK),
+            bounds: None,
+            index: BTreeMap::new(),
+            declared: Vec::new(),
+            chunks: Vec::new(),
+            metadata: Vec::new(),
+            counts: [0; 2],
+            messages: BTreeMap::new(),
+            all: None,
         };
-        for (name, of) in &signals.0 {
-            // A gauge gives V or m, as the spec calibrates it.
-            let unit = match (of, *name) {
-                (Of::Input(_), _) => "V, or m from rest",
-                (_, "volts") => "V",
-                _ => "m",
-            };
-            self.channel(name, six(unit, signals.keys(name), "number"))?;
-        }
-        self.channel("codes", six("converter code", LEG_KEYS, "integer"))?;
-        let (number, text) = (json!({ "type": "integer" }), json!({ "type": "string" }));
-        self.channel("status", json!({ "status": number, "text": text }))?;
-        let on = json!({ "type": "boolean" });
-        self.channel("phase", json!({ "phase": number, "cause": number, "amplifiers_on": on, "text": text }))?;
-        let names = described.config_names.iter().map(|name| (name.clone(), json!({ "type": "number" })));
-        self.channel("settings", Value::Object(names.collect()))
+        this.put(MAGIC)?;
+        this.put(&record(HEADER, Fields::default().text("").text(library)))?;
+        Ok(this)
     }
 
-    fn channel(&mut self, name: &'static str, properties: Value) -> Result<(), McapError> {
-        let schema = json!({ "type": "object", "properties": properties });
-        let schema = self.writer.add_schema(&format!("specgen.{name}"), "jsonschema", schema.to_string().as_bytes())?;
-        let channel = self.writer.add_channel(schema, &format!("/{name}"), "json", &BTreeMap::new())?;
-        self.channels.insert(name, channel);
+    /// Makes a channel of JSON messages; its number.
+    pub fn channel(&mut self, topic: &str, name: &str, schema: &str) -> io::Result<u16> {
+        let number = self.messages.len() as u16 + 1;
+        self.messages.insert(number, 0);
+        let schema = Fields::default().u16(number).text(name).text("jsonschema").text(schema);
+        let channel = Fields::default().u16(number).u16(number).text(topic).text("json").part(Fields::default());
+        let records = [record(SCHEMA, schema), record(CHANNEL, channel)].concat();
+        self.put(&records)?;
+        self.declared.extend(records);
+        Ok(number)
+    }
+
+    /// What is known of the whole.
+    pub fn metadata(&mut self, name: &str, values: &[(&str, &str)]) -> io::Result<()> {
+        let values = values.iter().fold(Fields::default(), |fields, (key, value)| fields.text(key).text(value));
+        let bytes = record(METADATA, Fields::default().text(name).part(values));
+        let place = Fields::default().u64(self.at).u64(bytes.len() as u64).text(name);
+        self.metadata.extend(record(METADATA_INDEX, place));
+        self.counts[1] += 1;
+        self.put(&bytes)
+    }
+
+    /// A message of a channel, at a time in ns.
+    pub fn message(&mut self, channel: u16, time: u64, sequence: u32, data: &[u8]) -> io::Result<()> {
+        let place = self.chunk.len() as u64;
+        let message = Fields::default().u16(channel).u32(sequence).u64(time).u64(time).raw(data);
+        self.chunk.extend(record(MESSAGE, message));
+        let index = self.index.entry(channel).or_default();
+        *index = std::mem::take(index).u64(time).u64(place);
+        self.bounds = Some(wider(self.bounds, time));
+        self.all = Some(wider(self.all, time));
+        *self.messages.entry(channel).or_default() += 1;
+        if self.chunk.len() >= CHUNK { self.end_chunk() } else { Ok(()) }
+    }
+
+    fn end_chunk(&mut self) -> io::Result<()> {
+        let Some([begin, end]) = self.bounds.take() else { return Ok(()) };
+        let (size, start) = (self.chunk.len() as u64, self.at);
+        let head = Fields::default().u64(begin).u64(end).u64(size).u32(0).text("").u64(size);
+        let bytes = record(CHUNK_OF, head.raw(&self.chunk));
+        self.chunk.clear();
+        self.put(&bytes)?;
+        let (length, behind) = (self.at - start, self.at);
+        let mut places = Fields::default();
+        for (channel, entries) in std::mem::take(&mut self.index) {
+            places = places.u16(channel).u64(self.at);
+            self.put(&record(MESSAGE_INDEX, Fields::default().u16(channel).part(entries)))?;
+        }
+        let index = Fields::default().u64(begin).u64(end).u64(start).u64(length).part(places);
+        let index = index.u64(self.at - behind).text("").u64(size).u64(size);
+        self.chunks.extend(record(CHUNK_INDEX, index));
+        self.counts[0] += 1;
         Ok(())
     }
-}
 
-const LEG_KEYS: [&str; 6] = ["leg0", "leg1", "leg2", "leg3", "leg4", "leg5"];
-const GAUGE_KEYS: [&str; 6] = ["gauge0", "gauge1", "gauge2", "gauge3", "gauge4", "gauge5"];
-
-/// Six numbers, and where a tick has them.
-#[derive(Clone, Copy)]
-enum Of {
-    /// From this input word on.
-    Input(usize),
-    /// From this output word of what was run again on.
-    Output(usize),
-    /// Output words less others: target less pose.
-    Difference(usize, usize),
-    /// Output words less input words: demand of the legs less their gauges.
-    FromInput(usize, usize),
-}
-
-/// What every tick has, by name; whether there is a pose.
-struct Signals(Vec<(&'static str, Of)>, bool);
-
-impl Signals {
-    fn new(header: &Header, again: Option<Again>) -> Self {
-        let place = |names: &[String], stem: &str| names.iter().position(|name| *name == format!("{stem}[0]"));
-        let inputs = header.input_names();
-        let gauges = place(&inputs, "gauge").or_else(|| place(&inputs, "displacement"));
-        let mut all: Vec<(&str, Of)> = gauges.map(|place| ("gauges", Of::Input(place))).into_iter().collect();
-        let outputs = again.map_or(&[][..], |again| again.names);
-        let output = |stem: &str| place(outputs, stem);
-        all.extend(output("voltage").map(|place| ("volts", Of::Output(place))));
-        let (pose, target) = (output("pose"), output("target"));
-        all.extend(pose.map(|place| ("pose", Of::Output(place))));
-        all.extend(target.map(|place| ("target", Of::Output(place))));
-        match (target.zip(pose), output("demand").zip(gauges)) {
-            (Some((target, pose)), _) => all.push(("error", Of::Difference(target, pose))),
-            (None, Some((demand, gauge))) => {
-                all.push(("demand", Of::Output(demand)));
-                all.push(("error", Of::FromInput(demand, gauge)));
-            }
-            (None, None) => {}
-        }
-        Self(all, pose.is_some())
+    /// Writes the index behind the data; the sink.
+    pub fn finish(mut self) -> io::Result<W> {
+        self.end_chunk()?;
+        self.put(&record(DATA_END, Fields::default().u32(0)))?;
+        let summary = self.at;
+        let [begin, end] = self.all.unwrap_or_default();
+        let (channels, [chunks, metadata]) = (self.messages.len(), self.counts);
+        let statistics = Fields::default().u64(self.messages.values().sum()).u16(channels as u16).u32(channels as u32);
+        let counts =
+            self.messages.iter().fold(Fields::default(), |fields, (channel, count)| fields.u16(*channel).u64(*count));
+        let statistics = statistics.u32(0).u32(metadata).u32(chunks).u64(begin).u64(end).part(counts);
+        let parts = [
+            std::mem::take(&mut self.declared),
+            record(STATISTICS, statistics),
+            std::mem::take(&mut self.chunks),
+            std::mem::take(&mut self.metadata),
+            record(FOOTER, Fields::default().u64(summary).u64(0).u32(0)),
+        ];
+        self.put(&parts.concat())?;
+        self.put(MAGIC)?;
+        Ok(self.sink)
     }
 
-    fn keys(&self, name: &str) -> [&'static str; 6] {
-        match name {
-            "gauges" => GAUGE_KEYS,
-            name if POSES.contains(&name) && self.1 => AXES,
-            _ => LEG_KEYS,
-        }
+    fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.at += bytes.len() as u64;
+        self.sink.write_all(bytes)
     }
 }
 
-enum Numbers {
-    Words(Scalar, [u64; 6]),
-    Values([f64; 6]),
-    Codes([i32; 6]),
+fn wider(bounds: Option<[u64; 2]>, time: u64) -> [u64; 2] {
+    bounds.map_or([time; 2], |[begin, end]| [begin.min(time), end.max(time)])
 }
 
-impl Numbers {
-    /// As a JSON object; shortest decimals that give the same bits. JSON has no NaN: a gauge that was not read is null.
-    fn write(&self, keys: [&str; 6], text: &mut String) {
-        text.push('{');
-        for (k, key) in keys.into_iter().enumerate() {
-            let comma = if k > 0 { "," } else { "" };
-            // Writing to a String cannot fail.
-            let _ = write!(text, "{comma}\"{key}\":");
-            let _ = match *self {
-                Self::Codes(codes) => write!(text, "{}", codes[k]),
-                Self::Values(values) if values[k].is_finite() => write!(text, "{:e}", values[k]),
-                Self::Words(scalar, words) if scalar.decode(words[k]).is_finite() => match scalar.bits() {
-                    32 => write!(text, "{:e}", f32::from_bits(words[k] as u32)),
-                    _ => write!(text, "{:e}", f64::from_bits(words[k])),
-                },
-                Self::Values(_) | Self::Words(..) => write!(text, "null"),
-            };
-        }
-        text.push('}');
+fn record(kind: u8, Fields(content): Fields) -> Vec<u8> {
+    [&[kind][..], &(content.len() as u64).to_le_bytes(), &content].concat()
+}
+
+/// Fields of a record, one behind the other: numbers are little endian, what is of any length has it in front.
+#[derive(Default)]
+struct Fields(Vec<u8>);
+
+impl Fields {
+    fn raw(mut self, bytes: &[u8]) -> Self {
+        self.0.extend_from_slice(bytes);
+        self
+    }
+
+    fn u16(self, value: u16) -> Self {
+        self.raw(&value.to_le_bytes())
+    }
+
+    fn u32(self, value: u32) -> Self {
+        self.raw(&value.to_le_bytes())
+    }
+
+    fn u64(self, value: u64) -> Self {
+        self.raw(&value.to_le_bytes())
+    }
+
+    fn text(self, text: &str) -> Self {
+        self.u32(text.len() as u32).raw(text.as_bytes())
+    }
+
+    /// Fields of their own: a map or an array.
+    fn part(self, Fields(part): Fields) -> Self {
+        self.u32(part.len() as u32).raw(&part)
     }
 }
