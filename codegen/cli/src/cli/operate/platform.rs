@@ -370,7 +370,7 @@ impl<P: Port> Operator<P> {
         if let Some(task) = &mut model.task_space {
             (task.gains, task.position_gains) = (Some(of("")), Some(of("position_")));
         }
-        let design = compile::check_stability(&model).map_err(|findings| {
+        let design = self.meanwhile(|| compile::check_stability(&model))?.map_err(|findings| {
             let texts: Vec<String> = findings.iter().map(|one| format!("{}: {}", one.code, one.message)).collect();
             Ended::Refused(format!("not sent: {}", texts.join("; ")))
         })?;
