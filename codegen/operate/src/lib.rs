@@ -12,6 +12,7 @@ pub mod motion;
 mod order;
 pub mod pil;
 pub mod place;
+pub mod samples;
 pub mod served;
 mod session;
 mod socket;

@@ -177,7 +177,13 @@ impl<P: Port> Session<P> {
         ALIVE.saturating_sub(self.asked.elapsed())
     }
 
-    fn done(&mut self, request: &Request<'_>) -> Result<(), ClientError> {
+    /// Asks for a block of samples, and that the host is there.
+    pub(crate) fn ask_for_samples(&mut self) -> Result<(Option<&Motion>, Reply<'_>), ClientError> {
+        self.asked = Instant::now();
+        Ok((self.motion.as_ref(), self.client.ask(&Request::Samples)?))
+    }
+
+    pub(crate) fn done(&mut self, request: &Request<'_>) -> Result<(), ClientError> {
         match self.client.ask(request)? {
             Reply::Done => Ok(()),
             _ => Err(ClientError::Unexpected),

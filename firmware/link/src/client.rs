@@ -68,6 +68,8 @@ impl Timeout {
                 | Request::Setpoint { .. }
                 | Request::Wave { .. }
                 | Request::Pass { .. }
+                | Request::Stream { .. }
+                | Request::Samples
         );
         if !short || self.attempts == 1 {
             return self;
@@ -149,6 +151,7 @@ fn words(refusal: Refusal) -> String {
         Refusal::State => "not in its present state".into(),
         Refusal::TooLong => "its answer does not fit into a message".into(),
         Refusal::Busy => "another host has the orders; hold, ramp-down and stop are taken from every host, all else once that one has ended its session".into(),
+        Refusal::Rate { least } => format!("its line has no room for so many samples; the most are rows of {least} ticks"),
     }
 }
 

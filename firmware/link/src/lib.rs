@@ -23,6 +23,7 @@ mod frame;
 pub mod lockstep;
 mod message;
 mod receiver;
+pub mod samples;
 mod silence;
 
 pub use bytes::{Bytes, KNOT, KNOTS, WORDS, put_knots, put_words};

@@ -99,6 +99,14 @@ pub enum Request<'a> {
         /// First byte wanted.
         offset: u32,
     },
+    /// Samples for this host from the next tick on, none with 0: see [`samples`](crate::samples). Answered by [`Reply::Done`], or
+    /// [`Refusal::Rate`] where the line or the device has no room for so many.
+    Stream {
+        /// Ticks of a row.
+        every: u32,
+    },
+    /// The oldest block of samples that was not fetched. Answered by [`Reply::Samples`].
+    Samples,
 }
 
 /// What a player of passes is to do.
@@ -204,6 +212,20 @@ pub enum Reply<'a> {
     },
     /// How the player of passes stands.
     Pass(PassStatus),
+    /// A block of samples.
+    Samples {
+        /// Its number; what is missing before it was given up.
+        number: u32,
+        /// First tick of its first row.
+        tick: u64,
+        /// Ticks of each row.
+        every: u32,
+        /// Whether a whole block waits behind it.
+        more: bool,
+        /// Its rows, for [`samples::rows`](crate::samples::rows); empty where there is none.
+        #[serde(borrow)]
+        rows: Bytes<'a>,
+    },
 }
 
 /// Why a request was not carried out.
@@ -235,6 +257,11 @@ pub enum Refusal {
     TooLong,
     /// Another host has the orders, or there are more of them than are carried out: hold, ramp-down and stop are taken all the same.
     Busy,
+    /// Samples more often than there is room for.
+    Rate {
+        /// Ticks of a row at least.
+        least: u32,
+    },
 }
 
 /// What a device counts where it says what something cost.

@@ -19,6 +19,7 @@ pub const PART: Part = Part {
         "src/lockstep.rs",
         "src/message.rs",
         "src/receiver.rs",
+        "src/samples.rs",
         "src/silence.rs",
     },
 };

@@ -1,0 +1,320 @@
+//! Samples of a machine for whoever looks on: ticks become rows, rows blocks, and blocks wait in fixed memory until the host asks.
+//!
+//! ```text
+//! every tick ─ Sample ─► Collector ── Row of `every` ticks ──► Block of rows ──► ring ──► Reply::Samples
+//!                        least, mean, most                      numbered          the oldest is given up
+//! ```
+//! A block is made whether or not anybody fetches it, and has the next number: what was given up is a gap in the numbers. Ticks that
+//! did not reach the collector are a gap between the ticks of two blocks. Where a gap cuts a row off, its ticks are a row of their
+//! own, in a block that says how many they are: nothing that was seen is left out.
+
+/// Axes of a pose, and legs.
+pub const AXES: usize = 6;
+/// Most ticks of a row.
+pub const MOST_EVERY: u32 = 1_000_000;
+/// Bytes of a row of one tick: status, phase, pose, set-point, error, voltages.
+pub const ROW_OF_ONE: usize = 4 + 1 + 4 * AXES * NUMBER;
+/// Bytes of a row of several: errors and voltages as least, mean and most.
+pub const ROW: usize = 4 + 1 + (2 + 3 + 3) * AXES * NUMBER;
+/// Most bytes of a block.
+pub const BLOCK: usize = 5 * ROW;
+
+const NUMBER: usize = size_of::<f32>();
+/// Values of a row that are spread over its ticks.
+const SPREADS: usize = 2 * AXES;
+/// What else a reply with a block holds: variant, number, tick, ticks a row, whether there are more, length.
+const OVERHEAD: usize = 1 + 5 + 10 + 3 + 1 + 2;
+const _: () = assert!(BLOCK + OVERHEAD <= crate::MESSAGE);
+const _: () = assert!(MOST_EVERY < 1 << 21, "three bytes in a message");
+
+/// What a tick showed. Poses are the platform's own: from rest and with the bias.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Ticks since power-up.
+    pub tick: u64,
+    /// The controller's status word.
+    pub status: u32,
+    /// Number of `supervisor::Phase`.
+    pub phase: u8,
+    /// Pose measured, m and rad.
+    pub pose: [f32; AXES],
+    /// Set-point, m and rad.
+    pub target: [f32; AXES],
+    /// Set-point less pose, subtracted before it was rounded to 32 bits, m and rad.
+    pub error: [f32; AXES],
+    /// Voltage of each leg, V.
+    pub volts: [f32; AXES],
+}
+
+/// A value over the ticks of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Spread {
+    /// The least.
+    pub least: f32,
+    /// The mean: the sum in order, with its rounding error carried along, by the number of ticks.
+    pub mean: f32,
+    /// The most.
+    pub most: f32,
+}
+
+/// Some ticks, one behind the other.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Row {
+    /// Every bit that the status word had in any of them.
+    pub status: u32,
+    /// Number of the phase in the last one.
+    pub phase: u8,
+    /// Pose measured in the last one, m and rad.
+    pub pose: [f32; AXES],
+    /// Set-point of the last one, m and rad.
+    pub target: [f32; AXES],
+    /// Set-point less pose, m and rad.
+    pub error: [Spread; AXES],
+    /// Voltage of each leg, V.
+    pub volts: [Spread; AXES],
+}
+
+/// Rows as bytes, and which they are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Block {
+    /// Counts the blocks that were made.
+    pub number: u32,
+    /// First tick of the first row.
+    pub tick: u64,
+    /// Ticks of each row.
+    pub every: u32,
+    bytes: [u8; BLOCK],
+    length: usize,
+}
+
+impl Block {
+    /// Of no rows.
+    pub const EMPTY: Self = Self { number: 0, tick: 0, every: 1, bytes: [0; BLOCK], length: 0 };
+
+    /// The rows, for [`rows`].
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or_default()
+    }
+
+    fn is_full(&self) -> bool {
+        self.length + row_of(self.every) > BLOCK
+    }
+}
+
+/// Bytes of a row of so many ticks.
+#[must_use]
+pub const fn row_of(every: u32) -> usize {
+    if every == 1 { ROW_OF_ONE } else { ROW }
+}
+
+/// The rows of a block, of `every` ticks each; none if the bytes are not whole ones.
+#[must_use]
+pub fn rows(every: u32, bytes: &[u8]) -> Option<impl ExactSizeIterator<Item = Row> + '_> {
+    let rows = bytes.chunks_exact(row_of(every));
+    rows.remainder().is_empty().then(|| rows.map(move |bytes| Row::read(every, bytes)))
+}
+
+impl Row {
+    fn read(every: u32, bytes: &[u8]) -> Self {
+        let (status, rest) = bytes.split_first_chunk().unwrap_or((&[0; 4], &[]));
+        let (phase, rest) = rest.split_first().unwrap_or((&0, &[]));
+        let mut numbers = rest.as_chunks().0.iter().map(|number| f32::from_le_bytes(*number));
+        let mut next = || numbers.next().unwrap_or(0.0);
+        let (pose, target) = ([(); AXES].map(|()| next()), [(); AXES].map(|()| next()));
+        let mut spread = || {
+            let least = next();
+            if every == 1 {
+                Spread { least, mean: least, most: least }
+            } else {
+                Spread { least, mean: next(), most: next() }
+            }
+        };
+        let (error, volts) = ([(); AXES].map(|()| spread()), [(); AXES].map(|()| spread()));
+        Self { status: u32::from_le_bytes(*status), phase: *phase, pose, target, error, volts }
+    }
+}
+
+/// A value so far.
+#[derive(Debug, Clone, Copy)]
+struct Sum {
+    least: f32,
+    most: f32,
+    sum: f32,
+    /// What rounding has taken from the sum.
+    lost: f32,
+}
+
+impl Sum {
+    const fn of(value: f32) -> Self {
+        Self { least: value, most: value, sum: value, lost: 0.0 }
+    }
+
+    /// One more, by Kahan's summation.
+    fn add(&mut self, value: f32) {
+        if value < self.least {
+            self.least = value;
+        }
+        if value > self.most {
+            self.most = value;
+        }
+        let value = value - self.lost;
+        let sum = self.sum + value;
+        self.lost = (sum - self.sum) - value;
+        self.sum = sum;
+    }
+}
+
+/// Makes blocks of the ticks that it is shown, in the memory `S` of two blocks or more: one is being filled.
+#[derive(Debug)]
+pub struct Collector<S> {
+    ring: S,
+    /// Of the blocks that wait: the oldest, and how many. The one behind them is being filled.
+    first: usize,
+    waiting: usize,
+    /// Number of the one that is being filled.
+    number: u32,
+    /// Ticks of a row; 0 while nobody looks on.
+    every: u32,
+    /// Ticks of the row that is being made, its first one, and the tick that comes next.
+    count: u32,
+    begun: u64,
+    next: u64,
+    /// The last of them, with all status bits that there were.
+    last: Sample,
+    sums: [Sum; SPREADS],
+}
+
+impl<S: AsRef<[Block]> + AsMut<[Block]>> Collector<S> {
+    /// Nobody looks on.
+    #[must_use]
+    pub const fn new(ring: S) -> Self {
+        let nothing = [0.0; AXES];
+        let last =
+            Sample { tick: 0, status: 0, phase: 0, pose: nothing, target: nothing, error: nothing, volts: nothing };
+        let sums = [Sum::of(0.0); SPREADS];
+        Self { ring, first: 0, waiting: 0, number: 0, every: 0, count: 0, begun: 0, next: 0, last, sums }
+    }
+
+    /// Rows of `every` ticks from here on, none with 0. What waited is given up; blocks are numbered from 0.
+    pub fn start(&mut self, every: u32) {
+        (self.every, self.number) = (every, 0);
+        (self.first, self.waiting, self.count) = (0, 0, 0);
+        if let Some(open) = self.open() {
+            open.length = 0;
+        }
+    }
+
+    /// Ticks of a row; 0 while nobody looks on.
+    #[must_use]
+    pub const fn every(&self) -> u32 {
+        self.every
+    }
+
+    /// Blocks that wait whole.
+    #[must_use]
+    pub const fn waiting(&self) -> usize {
+        self.waiting
+    }
+
+    /// Takes a tick.
+    pub fn add(&mut self, sample: &Sample) {
+        if self.every == 0 {
+            return;
+        }
+        if sample.tick != self.next {
+            self.cut();
+        }
+        let status = if self.count == 0 { 0 } else { self.last.status };
+        let values = sample.error.iter().chain(&sample.volts);
+        for (sum, value) in self.sums.iter_mut().zip(values) {
+            if self.count == 0 {
+                *sum = Sum::of(*value);
+            } else {
+                sum.add(*value);
+            }
+        }
+        if self.count == 0 {
+            self.begun = sample.tick;
+        }
+        self.last = Sample { status: sample.status | status, ..*sample };
+        self.next = sample.tick.wrapping_add(1);
+        self.count += 1;
+        if self.count >= self.every {
+            self.put();
+        }
+    }
+
+    /// The oldest block, which is given up with that: a whole one, else what there is of the one that is being filled. None if there
+    /// are no rows.
+    pub fn take(&mut self) -> Option<&Block> {
+        if self.waiting == 0 {
+            self.close();
+        }
+        self.waiting = self.waiting.checked_sub(1)?;
+        let oldest = self.first;
+        self.first = self.place(1);
+        self.ring.as_ref().get(oldest)
+    }
+
+    /// Ends block and row at a gap.
+    fn cut(&mut self) {
+        self.close();
+        if self.count > 0 {
+            self.put();
+            self.close();
+        }
+    }
+
+    /// Writes the row that is being made, whatever ticks it has.
+    fn put(&mut self) {
+        let Self { last, sums, count, begun, number, .. } = *self;
+        self.count = 0;
+        let Some(block) = self.open() else { return };
+        if block.length == 0 {
+            (block.number, block.tick, block.every) = (number, begun, count);
+        }
+        let start = last.status.to_le_bytes().into_iter().chain([last.phase]);
+        let ends = last.pose.into_iter().chain(last.target);
+        let spreads = sums.into_iter().flat_map(|Sum { least, most, sum, .. }| {
+            let mean = sum / count as f32;
+            // Rounding is not to lead out of what was there.
+            let mean = if mean < least { least } else { mean };
+            [least, if mean > most { most } else { mean }, most].into_iter().take(if count == 1 { 1 } else { 3 })
+        });
+        let bytes = start.chain(ends.chain(spreads).flat_map(f32::to_le_bytes));
+        for (slot, byte) in block.bytes.iter_mut().skip(block.length).zip(bytes) {
+            *slot = byte;
+            block.length += 1;
+        }
+        if block.is_full() {
+            self.close();
+        }
+    }
+
+    /// The block that is being filled waits from here on, if it has rows. Without room the oldest is given up.
+    fn close(&mut self) {
+        if self.open().is_none_or(|block| block.length == 0) {
+            return;
+        }
+        self.number = self.number.wrapping_add(1);
+        if self.waiting + 1 < self.ring.as_ref().len() {
+            self.waiting += 1;
+        } else {
+            self.first = self.place(1);
+        }
+        if let Some(block) = self.open() {
+            block.length = 0;
+        }
+    }
+
+    fn open(&mut self) -> Option<&mut Block> {
+        let place = self.place(self.waiting);
+        self.ring.as_mut().get_mut(place)
+    }
+
+    /// Where the block is that stands so many behind the oldest.
+    fn place(&self, behind: usize) -> usize {
+        (self.first + behind).checked_rem(self.ring.as_ref().len()).unwrap_or(0)
+    }
+}
