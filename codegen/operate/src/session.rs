@@ -172,6 +172,11 @@ impl<P: Port> Session<P> {
         }
     }
 
+    /// Time since the device was asked last.
+    pub fn silence(&self) -> Duration {
+        self.asked.elapsed()
+    }
+
     /// Time until the device must get the next request.
     pub fn due(&self) -> Duration {
         ALIVE.saturating_sub(self.asked.elapsed())

@@ -3,6 +3,7 @@
 mod answer;
 mod health;
 mod operator;
+pub mod panel;
 mod passes;
 mod platform;
 

@@ -132,9 +132,14 @@ impl<P: Port> Operator<P> {
         }
     }
 
+    /// Whether the user wants it to end.
+    pub(super) fn is_interrupted(&self) -> bool {
+        self.interrupted.load(Ordering::Relaxed)
+    }
+
     /// Asks how it stands. A fault that is new ends what is not attended.
     pub fn look(&mut self) -> Result<(), Ended> {
-        if self.interrupted.load(Ordering::Relaxed) {
+        if self.is_interrupted() {
             return Err(Ended::Interrupted);
         }
         let before = self.session.status().phase;

@@ -1,0 +1,488 @@
+//! `specgen panel`: a machine on one page in the browser.
+//!
+//! ```text
+//! browsers ─ HTTP, WebSocket ─► a thread each ─ Heard ─► this thread: Operator ─ link ─► machine
+//!            page, samples ◄────────────────── Outbox ◄─┘ at every look: samples, state, hold and ramp down
+//! ```
+//! One thread has the machine. Whatever an order waits for, the machine is looked at meanwhile, and at every look the pages get their
+//! samples and *hold* and *ramp down* are carried out. What a browser does, or fails to do, keeps nothing waiting.
+
+mod browser;
+mod check;
+mod feed;
+mod hall;
+mod http;
+mod said;
+
+use std::cell::RefCell;
+use std::net::{IpAddr, SocketAddr, TcpListener};
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::sync::mpsc::sync_channel;
+use std::time::{Duration, Instant};
+
+use clap::{ArgGroup, Args};
+use serde::Serialize;
+use serde_json::{Value, json};
+use specgen_compiler::compile::Compiled;
+use specgen_language::interrupt;
+use specgen_link::client::{ClientError, Port};
+use specgen_link::{RecorderAction, Refusal};
+use specgen_operate::{ALIVE, Order, Session};
+use specgen_runtime::supervisor::{Phase, Request};
+use tungstenite::Message;
+
+use super::operator::Pulse;
+use super::{Ended, Operator, mistake};
+use crate::cli::line::Line;
+use crate::cli::spec;
+use crate::cli::ui::{Failure, Outcome, Ui};
+use hall::{Asked, Begin, Hall, now};
+
+/// Between two messages with samples.
+const FRAME: Duration = Duration::from_millis(50);
+/// Between two looks at the samples that wait.
+const LOOK: Duration = Duration::from_millis(10);
+/// Between two words about how the machine stands.
+const STATE: Duration = Duration::from_millis(200);
+/// Between two questions that need more than a look: what it noticed, reach, recorder, gains.
+const QUESTION: Duration = Duration::from_secs(1);
+/// Rows a second that are asked for, at most.
+const ROWS: f64 = 2000.0;
+/// How long a request that is to begin to be given is not given before.
+const BEFORE: u64 = 10;
+/// Longer than any ramp after a host was gone, s.
+const RAMPED: f64 = 5.0;
+/// Kind of a message with a record.
+const RECORD: u32 = 2;
+
+/// Arguments of `panel`.
+#[derive(Args, Debug)]
+#[command(group(ArgGroup::new("line").required(true).args(["port", "socket"])), after_help = crate::cli::examples::PANEL)]
+pub struct Arguments {
+    /// The spec that the device was built from: for the figure of the platform, and for the margins of gains.
+    #[arg(value_name = "SPEC")]
+    spec: PathBuf,
+    #[command(flatten)]
+    line: Line,
+    /// Where browsers connect. Any address but one of this computer itself lets others on the network who know the token move the
+    /// machine.
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8020")]
+    listen: SocketAddr,
+}
+
+/// What was served.
+#[derive(Serialize)]
+struct Summary {
+    device: String,
+    listened: String,
+    stands: String,
+}
+
+impl Outcome for Summary {
+    fn text(&self) -> String {
+        String::new()
+    }
+}
+
+/// What the panel knows and tells.
+struct Panel {
+    hall: Hall,
+    compiled: Compiled,
+    facts: Value,
+    /// Rows come from the device; none where it has no stream.
+    streams: bool,
+    blocks: Vec<specgen_operate::samples::Block>,
+    framed: Instant,
+    stated: Instant,
+    /// Phase, cause and late ticks that were told last.
+    told: Option<(u8, u8, u32)>,
+    /// An order is under way: what ends it is told as an error.
+    is_busy: bool,
+    /// What the questions gave.
+    known: Value,
+    check: Value,
+    wave: Value,
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let compiled = spec::looked_up(&arguments.spec, ui)?;
+    interrupt::heed();
+    let (session, name) = arguments.line.open(Some(&compiled.ir.digest))?;
+    let listen = arguments.listen;
+    let no = |error: std::io::Error| Failure::Environment(format!("cannot listen at {listen}: {error}"));
+    let listener = TcpListener::bind(listen).map_err(no)?;
+    let address = listener.local_addr().map_err(no)?;
+    let guard = http::Guard::new(address.port()).map_err(no)?;
+    // What is listened at everywhere is reached here.
+    let shown = match address.ip() {
+        IpAddr::V4(ip) if ip.is_unspecified() => SocketAddr::from(([127, 0, 0, 1], address.port())),
+        _ => address,
+    };
+    if !address.ip().is_loopback() {
+        ui.progress("warning: whoever reaches this address and knows the token can move the machine; nothing is encrypted");
+    }
+    ui.progress(&format!("{name}: panel at http://{shown}/?token={}", guard.token()));
+    ui.progress("Ctrl-C ramps down and ends");
+
+    let mut facts = specgen_report::panel::facts(&compiled.model, compiled.design.as_ref());
+    facts["device"] = json!(name);
+    facts["trajectories"] = json!(session.motion().map(|motion| motion.trajectories()));
+    let page = specgen_report::panel::html(&format!("{}: panel", compiled.model.name), &facts);
+    let (heard, hears) = sync_channel(256);
+    browser::serve(listener, guard, page, heard);
+
+    let stop = interrupt::heed();
+    let mut operator = Operator::new(session, stop);
+    operator.model = Some(compiled.model.clone());
+    operator.attended = true;
+    let panel = Rc::new(RefCell::new(Panel::new(Hall::new(hears), compiled, facts)));
+    let lost = |error: ClientError| {
+        Failure::Environment(format!(
+            "{name}: {error}; a machine that lost its host holds, then ramps down (supervisor.host_lost)"
+        ))
+    };
+    panel.borrow_mut().begin(&mut operator.session).map_err(lost)?;
+    operator.pulse = Some(pulse(panel.clone()));
+    let ended = serve(&mut operator, &panel, ui);
+    operator.pulse = None;
+    let left = match ended {
+        Ended::Link(error) => Err(lost(error)),
+        Ended::Failed(failure) => Err(failure),
+        _ if operator.is_powered() => operator.ramp_down(ui).map_err(lost),
+        _ => Ok(operator.stands()),
+    };
+    let why = left.as_ref().map_or_else(|_| "The link to the machine broke.".to_owned(), |_| "The panel was ended.".to_owned());
+    panel.borrow_mut().hall.publish(&json!({ "k": "end", "why": why }));
+    // The threads of the pages send it.
+    std::thread::sleep(FRAME);
+    ui.result(&Summary { device: name.clone(), listened: address.to_string(), stands: left? });
+    Ok(())
+}
+
+/// Until it is to end.
+fn serve<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Panel>>, ui: &Ui) -> Ended {
+    // Answers go to pages; nothing is printed.
+    let mut quiet = Ui::called(|_| (), None);
+    let mut asked = Instant::now();
+    loop {
+        if let Err(ended) = round(operator, panel, &mut quiet, &mut asked) {
+            match mistake(Err(ended), &mut quiet) {
+                // It ended an order at most.
+                Ok(_) => {}
+                Err(ended) => return ended,
+            }
+        }
+        operator.show(ui);
+    }
+}
+
+/// Listens, looks, carries out one order or asks what is asked now and then.
+fn round<P: Port + 'static>(
+    operator: &mut Operator<P>,
+    panel: &Rc<RefCell<Panel>>,
+    quiet: &mut Ui,
+    asked: &mut Instant,
+) -> Result<(), Ended> {
+    panel.borrow_mut().hall.listen(operator.session.due().min(LOOK));
+    if operator.is_interrupted() {
+        return Err(Ended::Interrupted);
+    }
+    if panel.borrow_mut().leaves_alone(operator) {
+        return Ok(());
+    }
+    operator.look()?;
+    let next = panel.borrow_mut().hall.next();
+    if let Some((page, order)) = next {
+        panel.borrow_mut().is_busy = true;
+        let done = carry_out(operator, panel, page, &order, quiet);
+        panel.borrow_mut().is_busy = false;
+        operator.answers.clear();
+        let id = order.id();
+        return match done {
+            Ok(value) => {
+                panel.borrow().hall.answer(page, id, Ok(value));
+                Ok(())
+            }
+            Err(ended) => {
+                if let Some(why) = mistake(Err(ended), quiet)? {
+                    panel.borrow().hall.answer(page, id, Err(&why));
+                }
+                Ok(())
+            }
+        };
+    }
+    if asked.elapsed() >= QUESTION {
+        *asked = Instant::now();
+        let known = question(operator, quiet)?;
+        panel.borrow_mut().known = known;
+    }
+    Ok(())
+}
+
+/// The answer to an order as `operate` gives it.
+fn ask<P: Port>(operator: &mut Operator<P>, order: &Order, quiet: &Ui) -> Result<Value, Ended> {
+    operator.answers.clear();
+    operator.obey(order, quiet)?;
+    Ok(operator.answers.pop().map_or(Value::Null, |answer| answer.answer))
+}
+
+/// What it noticed, what each axis can still do, recorder and gains. What a device does not have is nothing.
+fn question<P: Port>(operator: &mut Operator<P>, quiet: &mut Ui) -> Result<Value, Ended> {
+    let mut known = json!({});
+    let orders = [
+        ("standing", Order::Status),
+        ("reach", Order::Limits),
+        ("recorder", Order::Record(RecorderAction::Look)),
+        ("gains", Order::Gains(Vec::new())),
+    ];
+    for (key, order) in orders {
+        let answer = ask(operator, &order, quiet);
+        match answer {
+            Ok(value) => known[key] = value,
+            Err(ended) => {
+                mistake(Err(ended), quiet)?;
+            }
+        }
+    }
+    Ok(known)
+}
+
+fn carry_out<P: Port + 'static>(
+    operator: &mut Operator<P>,
+    panel: &Rc<RefCell<Panel>>,
+    page: u64,
+    order: &Asked,
+    quiet: &Ui,
+) -> Result<Value, Ended> {
+    match order {
+        Asked::Order { line, .. } => {
+            let order = Order::parse(line).map_err(Ended::Refused)?;
+            let order = order.ok_or_else(|| Ended::Refused("an order is expected".to_owned()))?;
+            if !is_for_pages(&order) {
+                return Err(Ended::Refused(format!("`{line}` is not for a page: it reads or writes files, waits, or ends the program")));
+            }
+            if matches!(order, Order::StopWave) {
+                panel.borrow_mut().wave = Value::Null;
+            }
+            let what = format!("Page {page}: {line}.");
+            let value = ask(operator, &order, quiet)?;
+            panel.borrow_mut().hall.note("note", &what, "", None);
+            Ok(value)
+        }
+        Asked::Begin { request, .. } => {
+            let (request, what) = match request {
+                Begin::Arm => (Request::Arm, "arm"),
+                Begin::Run => (Request::Run, "run"),
+                Begin::Acknowledge => (Request::Acknowledge, "acknowledge"),
+            };
+            begin(operator, request)?;
+            panel.borrow_mut().hall.note("note", &format!("Page {page} asked to {what}."), "", None);
+            Ok(Value::Null)
+        }
+        Asked::Wave { name, text, .. } => {
+            let (words, center) = operator.wave_of_text(text).map_err(Ended::Refused)?;
+            operator.start_wave(name, &words, &center)?;
+            let mut panel = panel.borrow_mut();
+            panel.wave = json!({ "name": name, "tick": operator.status().tick });
+            panel.hall.note("note", &format!("Page {page} started the wave {name}."), "", None);
+            Ok(Value::Null)
+        }
+        Asked::Gain { factor, .. } => {
+            let gains = panel.borrow().gains(operator, *factor).map_err(Ended::Refused)?;
+            let value = ask(operator, &Order::Gains(gains), quiet)?;
+            panel.borrow_mut().hall.note("note", &format!("Page {page} set all gains to {factor} of the spec's."), "", None);
+            Ok(value)
+        }
+        Asked::Download { .. } => {
+            let record = operator.record()?;
+            let mut bytes = RECORD.to_le_bytes().to_vec();
+            bytes.extend(&record);
+            panel.borrow().hall.tell(page, Message::binary(bytes));
+            Ok(json!(record.len()))
+        }
+        Asked::Check { .. } => {
+            panel.borrow_mut().hall.note("note", &format!("Page {page} began the first-power check."), "", None);
+            let checked = check::run(operator, panel, quiet);
+            panel.borrow_mut().check["runs"] = json!(false);
+            checked
+        }
+        _ => Ok(Value::Null),
+    }
+}
+
+/// Asks for what counts when it begins to be given.
+fn begin<P: Port>(operator: &mut Operator<P>, request: Request) -> Result<(), Ended> {
+    operator.ordered = true;
+    operator.session.supervise(Request::None)?;
+    let (sent, since) = (operator.status().tick, Instant::now());
+    // A machine without ticks is asked all the same.
+    while operator.status().tick < sent + BEFORE && since.elapsed() < ALIVE {
+        std::thread::sleep(Duration::from_millis(1));
+        operator.look()?;
+    }
+    operator.session.supervise(request)?;
+    operator.look()
+}
+
+/// What a page may order by a line.
+fn is_for_pages(order: &Order) -> bool {
+    match order {
+        Order::Ask(request) => matches!(request, Request::None | Request::Arm | Request::Run | Request::Acknowledge),
+        Order::Play { correction, .. } => correction.is_none(),
+        Order::Status
+        | Order::Where
+        | Order::Limits
+        | Order::CanIGo { .. }
+        | Order::Move { .. }
+        | Order::Goto(_)
+        | Order::Mark(_)
+        | Order::Mode(_)
+        | Order::Gains(_)
+        | Order::Record(_)
+        | Order::StopWave => true,
+        _ => false,
+    }
+}
+
+/// What is done at every look.
+fn pulse<P: Port + 'static>(panel: Rc<RefCell<Panel>>) -> Pulse<P> {
+    Box::new(move |operator| panel.borrow_mut().pulse(operator))
+}
+
+impl Panel {
+    fn new(hall: Hall, compiled: Compiled, facts: Value) -> Self {
+        let begun = Instant::now();
+        Self {
+            hall,
+            compiled,
+            facts,
+            streams: false,
+            blocks: Vec::new(),
+            framed: begun,
+            stated: begun,
+            told: None,
+            is_busy: false,
+            known: json!({}),
+            check: Value::Null,
+            wave: Value::Null,
+        }
+    }
+
+    /// Asks for samples, as many as are of use and there is room for.
+    fn begin(&mut self, session: &mut Session<impl Port>) -> Result<(), ClientError> {
+        let mut every = (1.0 / (ROWS * session.period())).ceil() as u32;
+        self.streams = loop {
+            match session.stream(every) {
+                Ok(()) => break true,
+                Err(ClientError::Refused(Refusal::Rate { least })) if least > every => every = least,
+                Err(ClientError::Refused(_)) => break false,
+                Err(error) => return Err(error),
+            }
+        };
+        self.facts["every"] = json!(every);
+        Ok(())
+    }
+
+    fn pulse<P: Port>(&mut self, operator: &mut Operator<P>) -> Result<(), Ended> {
+        self.hall.listen(Duration::ZERO);
+        if let Some((who, request)) = self.hall.urgent() {
+            operator.ordered = true;
+            operator.session.supervise(request)?;
+            let what = if request == Request::Hold { "hold" } else { "ramp down" };
+            self.hall.note("note", &format!("{who} asked to {what}."), "", None);
+            if self.is_busy {
+                return Err(Ended::Refused(format!("{who} asked to {what}")));
+            }
+        }
+        if self.is_busy && !self.hall.has_holder() {
+            return Err(Ended::Refused("the page that had the orders is gone".to_owned()));
+        }
+        self.samples(&mut operator.session)?;
+        self.say(operator);
+        Ok(())
+    }
+
+    /// Whether the machine gets no sign of us: the page that had the orders is gone, and it is to do what it does without a host.
+    fn leaves_alone<P: Port>(&mut self, operator: &Operator<P>) -> bool {
+        let rules = &self.compiled.ir.supervision;
+        let gone = f64::from(*rules.timeout.last().unwrap_or(&0)) * operator.session.period();
+        let silent = operator.session.silence().as_secs_f64();
+        let is_at_rest = silent > gone + RAMPED || !operator.is_powered() || !operator.ordered;
+        if self.hall.is_left && is_at_rest {
+            self.hall.is_left = false;
+        }
+        if !self.hall.is_left || self.hall.is_pressed() {
+            return false;
+        }
+        if self.stated.elapsed() >= STATE {
+            self.stated = Instant::now();
+            let left = if silent < gone { gone - silent } else { 0.0 };
+            self.hall.publish(&json!({ "k": "left", "t": now(), "left": left }));
+        }
+        true
+    }
+
+    fn samples(&mut self, session: &mut Session<impl Port>) -> Result<(), ClientError> {
+        if self.streams {
+            self.blocks.extend(session.take_blocks()?);
+        }
+        if self.framed.elapsed() >= FRAME && !self.blocks.is_empty() {
+            self.framed = Instant::now();
+            let number = self.hall.number();
+            let bytes = feed::message(number, &self.blocks, session.motion(), now());
+            self.hall.show(number, bytes);
+            self.blocks.clear();
+        }
+        Ok(())
+    }
+
+    /// Tells how the machine stands, and what is new.
+    fn say<P: Port>(&mut self, operator: &Operator<P>) {
+        let status = operator.session.status();
+        let told = (status.phase, status.cause, status.late);
+        let said = said::stands(status, &self.compiled.ir.supervision, &self.compiled.model);
+        if let Some(before) = self.told.replace(told) {
+            if (before.0, before.1) != (told.0, told.1) {
+                self.hall.note(if said.kind == "ok" { "note" } else { said.kind }, &said.what, said.advice, said.code.as_deref());
+                if u64::from(told.0) != Phase::Running.word() {
+                    self.wave = Value::Null;
+                }
+            }
+            let late = told.2.saturating_sub(before.2);
+            if late > 0 {
+                let s = if late == 1 { "" } else { "s" };
+                self.hall.note("warning", &format!("{late} late tick{s}."), "Nothing, unless it comes back.", None);
+            }
+        }
+        if self.stated.elapsed() < STATE {
+            return;
+        }
+        self.stated = Instant::now();
+        let state = json!({
+            "k": "state",
+            "t": now(),
+            "every": self.facts["every"],
+            "streams": self.streams,
+            "status": operator.status(),
+            "phase": Phase::from_word(u64::from(status.phase)).map(Phase::name),
+            "said": { "kind": said.kind, "what": said.what, "do": said.advice, "code": said.code },
+            "known": self.known,
+            "check": self.check,
+            "wave": self.wave,
+            "busy": self.is_busy,
+        });
+        self.hall.publish(&state);
+    }
+
+    /// All gains as the spec has them, by this factor.
+    fn gains<P: Port>(&self, operator: &Operator<P>, factor: f64) -> Result<Vec<(String, f64)>, String> {
+        if !(factor.is_finite() && factor > 0.0) {
+            return Err(format!("expected a factor on the gains above 0, found {factor}"));
+        }
+        let description = operator.session.description();
+        let words = description.config_names.iter().zip(&self.compiled.ir.integrity.settings);
+        let gains = words.filter(|(name, _)| super::platform::is_gain(name));
+        Ok(gains.map(|(name, word)| (name.clone(), description.scalar.decode(*word) * factor)).collect())
+    }
+}
