@@ -18,6 +18,7 @@ mod operator;
 mod options;
 mod passes;
 mod record;
+mod samples;
 mod service;
 mod summary;
 mod words;

@@ -147,6 +147,9 @@ impl Service<'_> {
                 outcome.incidents.push(Incident { tick: said.tick, phase: said.phase, cause: said.cause });
             }
             self.console.update(&row, said);
+            if let Some(link) = &mut self.link {
+                link.show(&row);
+            }
             if let Some((path, mut writer)) = self.record.take() {
                 match writer.add(&row, &mut self.rings.snapshots) {
                     Ok(()) => self.record = Some((path, writer)),

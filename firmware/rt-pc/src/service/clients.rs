@@ -76,6 +76,11 @@ impl<T> Clients<T> {
         self.all.iter()
     }
 
+    /// The same, to change their states.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut Client<T>> {
+        self.all.iter_mut()
+    }
+
     pub fn descriptors(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
         std::iter::once(self.listener.descriptor()).chain(self.all.iter().map(|client| client.stream.as_fd()))
     }

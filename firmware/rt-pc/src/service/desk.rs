@@ -12,6 +12,7 @@ use specgen_runtime::wave::{self, Settings};
 use crate::capture::CAPACITY;
 use crate::console::{Console, No};
 use crate::operator::{Denied, HostId};
+use crate::samples::Stream;
 
 /// Bytes of a piece of something longer.
 const CHUNK: usize = 960;
@@ -24,6 +25,8 @@ pub struct Desk<'a> {
     pub host: HostId,
     /// Events that were not yet reported to this host.
     pub events: &'a mut u32,
+    /// What it looks on with.
+    pub stream: &'a mut Stream,
     /// Now, ns.
     pub now: u64,
     pub words: [u8; size_of::<[u64; CONFIG_WORDS]>()],
@@ -31,8 +34,15 @@ pub struct Desk<'a> {
 }
 
 impl<'a> Desk<'a> {
-    pub fn new(console: &'a mut Console, host: HostId, events: &'a mut u32, now: u64) -> Self {
-        Self { console, host, events, now, words: [0; size_of::<[u64; CONFIG_WORDS]>()], knots: [0; KNOTS * KNOT] }
+    pub fn new(
+        console: &'a mut Console,
+        host: HostId,
+        events: &'a mut u32,
+        stream: &'a mut Stream,
+        now: u64,
+    ) -> Self {
+        let words = [0; size_of::<[u64; CONFIG_WORDS]>()];
+        Self { console, host, events, stream, now, words, knots: [0; KNOTS * KNOT] }
     }
 
     fn status(&self) -> Reply<'static> {
@@ -239,6 +249,8 @@ impl Device for Desk<'_> {
             Request::Knots { first, knots } => self.ordered(|desk| desk.knots(first, knots)),
             Request::Pass { action } => self.pass(action),
             Request::Errors { offset } => self.errors(offset),
+            Request::Stream { every } => self.stream.start(every).map_or_else(Reply::Refused, |()| Reply::Done),
+            Request::Samples => self.stream.take(),
             Request::Stop => {
                 self.console.operator.ramp_down(self.now);
                 Reply::Done

@@ -10,7 +10,9 @@ use super::clients::{Client, Clients, room};
 use super::desk::Desk;
 use super::listener::Listener;
 use crate::console::Console;
+use crate::handover::Row;
 use crate::operator::HostId;
+use crate::samples::Stream;
 
 /// Bytes that a connection may leave unread: more than any answer, and hosts ask one thing at a time.
 const UNREAD: usize = 1 << 14;
@@ -45,6 +47,7 @@ struct Line {
     unsent: Vec<u8>,
     /// Events that were not yet reported to this host.
     events: u32,
+    stream: Stream,
 }
 
 impl Link {
@@ -57,12 +60,19 @@ impl Link {
         Ok(Self { hosts, traffic: Traffic::default() })
     }
 
+    /// Shows a tick to the hosts that look on.
+    pub fn show(&mut self, row: &Row) {
+        for client in self.hosts.iter_mut() {
+            client.state.stream.add(row);
+        }
+    }
+
     /// Answers what came since the last call. Never waits.
     pub fn serve(&mut self, console: &mut Console, now: u64) {
         let Self { hosts, traffic } = self;
         let fresh = || {
             traffic.hosts += 1;
-            Line { id: HostId(traffic.hosts), endpoint: Box::default(), unsent: Vec::new(), events: 0 }
+            Line { id: HostId(traffic.hosts), endpoint: Box::default(), unsent: Vec::new(), events: 0, stream: Stream::default() }
         };
         let crowded = hosts.accept(now, fresh, |line| console.operator.is_hosts(line.id));
         traffic.closed += crowded.len() as u64;
@@ -100,8 +110,8 @@ fn serve(client: &mut Client<Line>, console: &mut Console, now: u64) -> io::Resu
     if client.state.unsent.len() < UNREAD {
         let mut bytes = room();
         let said = client.read(&mut bytes, now)?;
-        let Line { id, endpoint, unsent, events } = &mut client.state;
-        let mut desk = Desk::new(console, *id, events, now);
+        let Line { id, endpoint, unsent, events, stream } = &mut client.state;
+        let mut desk = Desk::new(console, *id, events, stream, now);
         for byte in said {
             if let Some(answer) = endpoint.push(*byte, &mut desk) {
                 unsent.extend_from_slice(answer);

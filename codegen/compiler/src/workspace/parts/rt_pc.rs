@@ -26,6 +26,7 @@ pub const PART: Part = Part {
         "src/options.rs",
         "src/passes.rs",
         "src/record.rs",
+        "src/samples.rs",
         "src/service.rs",
         "src/service/clients.rs",
         "src/service/desk.rs",
