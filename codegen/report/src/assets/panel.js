@@ -2,7 +2,7 @@
 (function () {
   counted();
   const root = document.documentElement, facts = JSON.parse(by("facts").textContent);
-  const NAMES = ["x", "y", "z", "θx", "θy", "θz"], STALE = 300, DIGITS = 200, SPECTRUM = 500, FACTORS = [1e6, 1e6, 1e6, 1e6, 1e6, 1e6];
+  const NAMES = ["x", "y", "z", "θx", "θy", "θz"], STALE = 300, DIGITS = 200, SPECTRUM = 500;
   const samples = new Samples(facts.period), strips = new Strips(by("strips"), samples), legs = new Legs(by("legs"), samples, facts.volts);
   const spectrum = new Spectrum(by("spectrum"), samples, facts.modes);
   const shownAfter = { count: 0, sum: 0, most: 0 };
@@ -77,7 +77,7 @@
   function taken(buffer) {
     const at = new DataView(buffer);
     if (at.getUint32(0, true) === 2) { save(facts.name + "-" + new Date().toISOString().replace(/[:.]/g, "-") + ".rec", URL.createObjectURL(new Blob([buffer.slice(4)]))); return; }
-    const blocks = at.getUint32(4, true), number = at.getUint32(8, true), came = Date.now(), out = at.getFloat64(16, true);
+    const blocks = at.getUint32(4, true), number = at.getUint32(8, true), out = at.getFloat64(16, true);
     standing = [0, 1, 2, 3, 4, 5].map(k => at.getFloat64(24 + 8 * k, true));
     let place = 72;
     for (let b = 0; b < blocks; b++) {
@@ -96,8 +96,6 @@
     say({ do: "seen", number });
     pending = pending || out;
     wake();
-    // How long it was under way here, for the count.
-    shownAfter.came = came;
   }
 
   // A gap of this page is told apart from one of the machine: that is the panel's to say.

@@ -28,6 +28,7 @@ use specgen_compiler::compile::Compiled;
 use specgen_language::interrupt;
 use specgen_link::client::{ClientError, Port};
 use specgen_link::{RecorderAction, Refusal};
+use specgen_operate::samples::Block;
 use specgen_operate::{ALIVE, Order, Session};
 use specgen_runtime::supervisor::{Phase, Request};
 use tungstenite::Message;
@@ -89,10 +90,11 @@ impl Outcome for Summary {
 struct Panel {
     hall: Hall,
     compiled: Compiled,
-    facts: Value,
-    /// Rows come from the device; none where it has no stream.
-    streams: bool,
-    blocks: Vec<specgen_operate::samples::Block>,
+    blocks: Vec<Block>,
+    /// Number of the next block, and its first tick.
+    next: Option<(u32, u64)>,
+    /// Ticks of which the machine's samples never came here, not told yet; when they were told last.
+    lost: (u64, Instant),
     framed: Instant,
     stated: Instant,
     /// Phase, cause and late ticks that were told last.
@@ -109,6 +111,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = spec::looked_up(&arguments.spec, ui)?;
     interrupt::heed();
     let (session, name) = arguments.line.open(Some(&compiled.ir.digest))?;
+    let Some(motion) = session.motion() else {
+        return Err(Failure::Gate(format!("{name}: the device controls six legs: the panel shows a platform")));
+    };
     let listen = arguments.listen;
     let no = |error: std::io::Error| Failure::Environment(format!("cannot listen at {listen}: {error}"));
     let listener = TcpListener::bind(listen).map_err(no)?;
@@ -127,7 +132,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 
     let mut facts = specgen_report::panel::facts(&compiled.model, compiled.design.as_ref());
     facts["device"] = json!(name);
-    facts["trajectories"] = json!(session.motion().map(|motion| motion.trajectories()));
+    // V/s.
+    let (rules, volts) = (&compiled.ir.supervision, compiled.ir.actuation.volts_per_code);
+    facts["ramp"] = json!(f64::from(rules.ramp_step) * volts / (f64::from(rules.ramp_every) * session.period()));
+    facts["trajectories"] = json!(motion.trajectories());
     let page = specgen_report::panel::html(&format!("{}: panel", compiled.model.name), &facts);
     let (heard, hears) = sync_channel(256);
     browser::serve(listener, guard, page, heard);
@@ -136,13 +144,19 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut operator = Operator::new(session, stop);
     operator.model = Some(compiled.model.clone());
     operator.attended = true;
-    let panel = Rc::new(RefCell::new(Panel::new(Hall::new(hears), compiled, facts)));
+    let panel = Rc::new(RefCell::new(Panel::new(Hall::new(hears), compiled)));
     let lost = |error: ClientError| {
         Failure::Environment(format!(
             "{name}: {error}; a machine that lost its host holds, then ramps down (supervisor.host_lost)"
         ))
     };
-    panel.borrow_mut().begin(&mut operator.session).map_err(lost)?;
+    panel.borrow_mut().begin(&mut operator.session).map_err(|error| match error {
+        ClientError::Refused(refusal) => {
+            let what = "the device sends no samples; build and flash it with this specgen";
+            Failure::Gate(format!("{name}: {what}: {}", ClientError::Refused(refusal)))
+        }
+        other => lost(other),
+    })?;
     operator.pulse = Some(pulse(panel.clone()));
     let ended = serve(&mut operator, &panel, ui);
     operator.pulse = None;
@@ -351,14 +365,14 @@ fn pulse<P: Port + 'static>(panel: Rc<RefCell<Panel>>) -> Pulse<P> {
 }
 
 impl Panel {
-    fn new(hall: Hall, compiled: Compiled, facts: Value) -> Self {
+    fn new(hall: Hall, compiled: Compiled) -> Self {
         let begun = Instant::now();
         Self {
             hall,
             compiled,
-            facts,
-            streams: false,
             blocks: Vec::new(),
+            next: None,
+            lost: (0, begun),
             framed: begun,
             stated: begun,
             told: None,
@@ -372,16 +386,12 @@ impl Panel {
     /// Asks for samples, as many as are of use and there is room for.
     fn begin(&mut self, session: &mut Session<impl Port>) -> Result<(), ClientError> {
         let mut every = (1.0 / (ROWS * session.period())).ceil() as u32;
-        self.streams = loop {
+        loop {
             match session.stream(every) {
-                Ok(()) => break true,
                 Err(ClientError::Refused(Refusal::Rate { least })) if least > every => every = least,
-                Err(ClientError::Refused(_)) => break false,
-                Err(error) => return Err(error),
+                other => return other,
             }
-        };
-        self.facts["every"] = json!(every);
-        Ok(())
+        }
     }
 
     fn pulse<P: Port>(&mut self, operator: &mut Operator<P>) -> Result<(), Ended> {
@@ -424,8 +434,19 @@ impl Panel {
     }
 
     fn samples(&mut self, session: &mut Session<impl Port>) -> Result<(), ClientError> {
-        if self.streams {
-            self.blocks.extend(session.take_blocks()?);
+        for block in session.take_blocks()? {
+            if let Some((number, tick)) = self.next
+                && block.number != number
+            {
+                self.lost.0 += block.tick.saturating_sub(tick);
+            }
+            self.next = Some((block.number.wrapping_add(1), block.end()));
+            self.blocks.push(block);
+        }
+        if self.lost.0 > 0 && self.lost.1.elapsed() >= QUESTION {
+            let seconds = self.lost.0 as f64 * session.period();
+            self.lost = (0, Instant::now());
+            self.hall.note("warning", &format!("{seconds:.3} s of samples were lost on the way from the machine."), "", None);
         }
         if self.framed.elapsed() >= FRAME && !self.blocks.is_empty() {
             self.framed = Instant::now();
@@ -462,8 +483,6 @@ impl Panel {
         let state = json!({
             "k": "state",
             "t": now(),
-            "every": self.facts["every"],
-            "streams": self.streams,
             "status": operator.status(),
             "phase": Phase::from_word(u64::from(status.phase)).map(Phase::name),
             "said": { "kind": said.kind, "what": said.what, "do": said.advice, "code": said.code },
