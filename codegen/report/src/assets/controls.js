@@ -97,7 +97,7 @@ class Gain {
       element("text", { x: x(margin) + 5, y: 21, class: "orange" }, svg, "unstable");
       element("text", { x: x(margin), y: 44, class: "orange", "text-anchor": "middle" }, svg, "×" + number(Number(margin.toPrecision(3))));
     }
-    for (const v of [0.25, 0.5, 1, 2]) if (!margin || Math.abs(x(v) - x(margin)) > 34) element("text", { x: x(v), y: 44, "text-anchor": v === 0.25 ? "start" : "middle" }, svg, "×" + v);
+    for (const v of [0.25, 1, 2]) if (!margin || Math.abs(x(v) - x(margin)) > 34) element("text", { x: x(v), y: 44, "text-anchor": v === 0.25 ? "start" : "middle" }, svg, "×" + v);
     element("rect", { x: at - 6, y: 5, width: 12, height: 24, rx: 3, fill: "var(--card)", stroke: "var(--blue)", "stroke-width": 3 }, svg);
     element("text", { x: at, y: 0, "text-anchor": "middle", class: "strong" }, svg, "×" + this.factor);
   }

@@ -26,6 +26,9 @@ function shown(text) {
   return (whole.startsWith("-") ? "\u2212" : "") + grouped + (part === undefined ? "" : "." + part);
 }
 
+// With so many digits behind the point; nothing is never less than nothing.
+function fixed(v, digits) { const text = v.toFixed(digits); return shown(Number(text) === 0 ? text.replace("-", "") : text); }
+
 function number(v) {
   if (!isFinite(v)) return "–";
   const size = Math.abs(v);

@@ -120,7 +120,7 @@
     while (box.children.length > 100) box.lastChild.remove();
     lastEvent = Math.max(lastEvent, e.t);
     by("event-note").textContent = "newest first · " + box.children.length;
-    if (Date.now() - e.t < 2000 && e.kind !== "ok") samples.mark(e.text.length > 28 ? e.text.slice(0, 27) + "…" : e.text, e.kind === "error");
+    if (Date.now() - e.t < 2000 && !/late tick|No data/.test(e.text)) samples.mark(e.text.length > 28 ? e.text.slice(0, 27) + "…" : e.text, e.kind === "error");
   }
 
   // ── Drawing: on what comes, at the display's next picture ──
@@ -167,9 +167,9 @@
   function shownDigits(error) {
     cells.forEach((cell, k) => {
       const law = row && row.phase === 2, places = k < 3 ? 4 : 3;
-      cell.pose.textContent = error ? shown((row.values[k] * 1e6).toFixed(places)) : "–";
-      cell.target.textContent = error && law ? shown((row.values[6 + k] * 1e6).toFixed(places)) : "–";
-      cell.error.textContent = error && law ? shown((error[k] * 1e9).toFixed(k < 3 ? 1 : 0)) : "–";
+      cell.pose.textContent = error ? fixed(row.values[k] * 1e6, places) : "–";
+      cell.target.textContent = error && law ? fixed(row.values[6 + k] * 1e6, places) : "–";
+      cell.error.textContent = error && law ? (error[k] > 0 ? "+" : "") + fixed(error[k] * 1e9, k < 3 ? 1 : 0) : "–";
       bar(cell.bar, samples, k, error && law ? error[k] : NaN);
     });
   }
@@ -232,14 +232,14 @@
     allow(by("acknowledge"), phase !== "faulted" ? "no fault" : orders, "press 1\u2009s");
     for (const [id, next] of [["arm", "disarmed"], ["run", "holding"], ["acknowledge", "faulted"]]) by(id).classList.toggle("next", phase === next && !by(id).disabled);
     const events = known.standing && known.standing.health ? known.standing.health.events_in_words : null;
-    by("stop").textContent = "Lower three: press for 1\u2009s. Hardware stop: " + (events ? (events.includes("emergency stop") ? "pressed" : "not pressed") : "–") + ".";
+    by("stop").textContent = "Hardware stop: " + (events ? (events.includes("emergency stop") ? "pressed" : "not pressed") : "–") + ".";
     const busy = row && (row.status & 1 << 18), waving = wave && state.wave;
     const move = phase !== "running" ? "not running" : orders || (waving ? "the wave moves it" : "");
     by("move-note").textContent = move || "press, or arrow keys";
     moves.forEach(one => { one.disabled = move !== ""; one.title = move; });
     by("bias").textContent = waving ? "Take from wave" : "Go to bias";
     allow(by("bias"), phase !== "running" ? "not running" : orders);
-    if (known.reach) by("reach").innerHTML = "Reach left, each alone, µm and µrad:<br>" + known.reach.limits.map(([low, high], k) => (k < 3 ? NAMES[k] : "θ<sub>" + NAMES[k][1] + "</sub>") + "\u2009" + number(Number(Math.max(0, Math.min(high - known.reach.from[k], known.reach.from[k] - low)).toPrecision(3)))).join(", ");
+    if (known.reach) by("reach").innerHTML = "Reach left, each alone, µm, µrad:<br>" + known.reach.limits.map(([low, high], k) => (k < 3 ? NAMES[k] : "θ<sub>" + NAMES[k][1] + "</sub>") + "\u2009" + number(Number(Math.max(0, Math.min(high - known.reach.from[k], known.reach.from[k] - low)).toPrecision(2)))).join(", ");
     // Wave: what the panel started, and for how long it goes.
     if (!state.wave) wave = wave && wave.trajectory && busy ? wave : null;
     by("wave-name").textContent = chosen ? chosen.name : "";

@@ -86,6 +86,9 @@ class Spectrum {
     });
   }
 
+  // Three decades and what is left of the uppermost.
+  limits(most) { const top = Math.ceil(Math.log10(Math.max(...most, 1e-9)) * 2) / 2; return [Math.pow(10, top - 3.5), Math.pow(10, top)]; }
+
   draw(name, now) {
     const found = this.density();
     if (!found) return "collecting " + Math.round(100 * this.whole / LENGTH) + "\u2009% of " + LENGTH + " rows without a gap";
@@ -93,13 +96,14 @@ class Spectrum {
     if (!this.plot) {
       const unit = this.axis < 3 ? "nm/√Hz" : "nrad/√Hz", top = found.x[found.x.length - 1], seen = this.modes.map((f, k) => [f, k + 1]).filter(([f]) => f < top);
       this.plot = new Plot(this.figure, { id: "spectrum", title: "error of " + name, label: "Spectrum of the error of " + name, x: { label: "frequency", unit: "Hz", log: true }, y: { label: "error of " + name, unit, log: true }, keys: false, height: Math.max(140, this.figure.clientHeight - 4),
-        notes: [{ k: "modes", x: seen.map(([f]) => f), text: seen.map(([, k]) => String(k)) }],
+        y_limits: this.limits(most), notes: [{ k: "modes", x: seen.map(([f]) => f), text: seen.map(([, k]) => String(k)) }],
         series: [{ name: "60\u2009s most", style: "line", color: 7, x: found.x, y: most }, { name: "live", style: "line", color: 4, x: found.x, y: found.y }] });
     } else {
       [this.plot.series[0].y, this.plot.series[1].y] = [most, found.y];
       delete this.figure.dataset.points;
+      this.plot.data.y_limits = this.limits(most);
       this.plot.zoom(this.plot.window);
     }
-    return "from rows of " + duration(this.every * this.samples.period) + "; numbers: modes of the platform";
+    return "rows of " + duration(this.every * this.samples.period);
   }
 }

@@ -109,8 +109,15 @@ function round125(v) {
   return [1, 2, 5, 10].find(f => f * decade >= v * 0.999) * decade;
 }
 
+// Sizes are told, not asked for: asking lays the page out anew at every picture.
+const sizes = new Map(), resized = new ResizeObserver(entries => { for (const { target, contentRect } of entries) sizes.set(target, [contentRect.width, contentRect.height]); });
+
 function sized(canvas) {
-  const scale = window.devicePixelRatio || 1, wide = canvas.clientWidth, tall = canvas.clientHeight;
+  if (!sizes.has(canvas)) {
+    sizes.set(canvas, [canvas.clientWidth, canvas.clientHeight]);
+    resized.observe(canvas);
+  }
+  const scale = window.devicePixelRatio || 1, [wide, tall] = sizes.get(canvas);
   if (canvas.width !== Math.round(wide * scale) || canvas.height !== Math.round(tall * scale)) {
     canvas.width = Math.round(wide * scale);
     canvas.height = Math.round(tall * scale);
@@ -227,8 +234,8 @@ class Strips {
       written(to, names[this.first + k], 2, top + box[3] / 2 + 5, 15, inks.ink, "left", 600);
       written(to, number(this.bound), left - 5, top + 9, 11, inks.ink2, "right");
       written(to, number(-this.bound), left - 5, top + box[3], 11, inks.ink2, "right");
-      written(to, (live ? shown((live[k] * 1e9).toFixed(this.first ? 0 : 1)) : "–") + "\u2009" + unit, wide, top + box[3] / 2 - 1, 16, inks.ink, "right", 600);
-      written(to, "rms " + (live && isFinite(stats[k].rms) ? shown((stats[k].rms * 1e9).toFixed(1)) : "–"), wide, top + box[3] / 2 + 14, 12, inks.ink2, "right");
+      written(to, (live ? (live[k] > 0 ? "+" : "") + fixed(live[k] * 1e9, this.first ? 0 : 1) : "–") + "\u2009" + unit, wide, top + box[3] / 2 - 1, 16, inks.ink, "right", 600);
+      written(to, "rms " + (live && isFinite(stats[k].rms) ? fixed(stats[k].rms * 1e9, this.first ? 0 : 1) : "–"), wide, top + box[3] / 2 + 14, 12, inks.ink2, "right");
     }
     const x = tick => left + inner * (1 - (samples.last - tick) * samples.period / seconds);
     let edge = -Infinity;
@@ -278,7 +285,7 @@ class Legs {
         to.stroke();
       }
       written(to, String(leg), 2, middle + 6, 16, inks.ink, "left", 600);
-      written(to, live ? shown(live[leg].toFixed(1)) : "–", left - 24, middle + 8, 24, inks.ink, "right", 600);
+      written(to, live ? fixed(live[leg], 1) : "–", left - 24, middle + 8, 24, inks.ink, "right", 600);
       written(to, "V", left - 20, middle + 8, 14, inks.ink2);
       written(to, number(limits[1]), wide, box[1] + 9, 12, inks.ink2, "right");
       written(to, number(limits[0]), wide, box[1] + box[3], 12, inks.ink2, "right");

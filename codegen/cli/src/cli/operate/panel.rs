@@ -48,6 +48,8 @@ const LOOK: Duration = Duration::from_millis(10);
 const STATE: Duration = Duration::from_millis(200);
 /// Between two questions that need more than a look: what it noticed, reach, recorder, gains.
 const QUESTION: Duration = Duration::from_secs(1);
+/// Between two words about late ticks.
+const LATE: Duration = Duration::from_secs(60);
 /// Rows a second that are asked for, at most.
 const ROWS: f64 = 2000.0;
 /// How long a request that is to begin to be given is not given before.
@@ -99,6 +101,8 @@ struct Panel {
     stated: Instant,
     /// Phase, cause and late ticks that were told last.
     told: Option<(u8, u8, u32)>,
+    /// Late ticks that were not told yet, and when some were told last.
+    late: (u32, Option<Instant>),
     /// An order is under way: what ends it is told as an error.
     is_busy: bool,
     /// What the questions gave.
@@ -376,6 +380,7 @@ impl Panel {
             framed: begun,
             stated: begun,
             told: None,
+            late: (0, None),
             is_busy: false,
             known: json!({}),
             check: Value::Null,
@@ -470,10 +475,13 @@ impl Panel {
                     self.wave = Value::Null;
                 }
             }
-            let late = told.2.saturating_sub(before.2);
-            if late > 0 {
+            self.late.0 += told.2.saturating_sub(before.2);
+            if self.late.0 > 0 && self.late.1.is_none_or(|last| last.elapsed() >= LATE) {
+                let late = std::mem::take(&mut self.late.0);
+                let again = self.late.1.replace(Instant::now()).is_some();
                 let s = if late == 1 { "" } else { "s" };
-                self.hall.note("warning", &format!("{late} late tick{s}."), "Nothing, unless it comes back.", None);
+                let advice = if again { "Look at the load of the controller's computer." } else { "Nothing, unless it comes back." };
+                self.hall.note("warning", &format!("{late} late tick{s}."), advice, None);
             }
         }
         if self.stated.elapsed() < STATE {
