@@ -84,10 +84,10 @@
       const tick = at.getFloat64(place, true), every = at.getUint32(place + 12, true), rows = at.getUint32(place + 16, true);
       place += 24;
       for (let r = 0; r < rows; r++) {
-        const values = new Float32Array(buffer, place + 8, 48), gap = samples.add(tick + r * every, every, values, 12);
-        spectrum.add(every, gap, values, 12);
+        const values = new Float32Array(buffer, place + 8, 48), phase = at.getUint32(place + 4, true), gap = samples.add(tick + r * every, every, phase === 2, values, 12);
+        spectrum.add(every, gap || phase !== 2, values, 12);
         if (gap) missing(gap);
-        row = { status: at.getUint32(place, true), phase: at.getUint32(place + 4, true), values };
+        row = { status: at.getUint32(place, true), phase, values };
         place += 200;
       }
     }

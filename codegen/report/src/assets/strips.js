@@ -6,7 +6,8 @@ class Ring {
     this.seconds = seconds;
     this.ticks = Math.max(1, seconds / BINS / period);
     this.id = new Float64Array(BINS).fill(-1);
-    this.count = new Float32Array(BINS);
+    // Ticks of which there are voltages, and errors: where the law does not run there is none.
+    this.counts = [new Float32Array(BINS), new Float32Array(BINS)];
     [this.least, this.sum, this.most, this.square] = [0, 1, 2, 3].map(() => new Float32Array(BINS * CHANNELS));
   }
 
@@ -15,7 +16,7 @@ class Ring {
     const id = Math.floor(tick / this.ticks), at = id % BINS;
     if (this.id[at] !== id) {
       this.id[at] = id;
-      this.count[at] = 0;
+      this.counts[0][at] = this.counts[1][at] = 0;
       const from = at * CHANNELS, to = from + CHANNELS;
       this.least.fill(Infinity, from, to);
       this.most.fill(-Infinity, from, to);
@@ -25,11 +26,12 @@ class Ring {
     return at;
   }
 
-  // A row: `values` from `at` on are least, mean, most of each channel; it stands for so many ticks.
-  add(tick, every, values, at) {
+  // A row: `values` from `at` on are least, mean, most of each channel, errors first; it stands for so many ticks.
+  add(tick, every, law, values, at) {
     const bin = this.place(tick), weight = every;
-    this.count[bin] += weight;
-    for (let k = 0, i = bin * CHANNELS; k < CHANNELS; k++, i++) {
+    this.counts[0][bin] += weight;
+    if (law) this.counts[1][bin] += weight;
+    for (let k = law ? 0 : 6, i = bin * CHANNELS + k; k < CHANNELS; k++, i++) {
       const least = values[at + 3 * k], mean = values[at + 3 * k + 1], most = values[at + 3 * k + 2];
       if (least < this.least[i]) this.least[i] = least;
       if (most > this.most[i]) this.most[i] = most;
@@ -40,12 +42,12 @@ class Ring {
 
   // For each pixel up to `last` that has data, from the oldest: its first tick, least, mean, largest of a channel.
   each(channel, last, seconds, period, see) {
-    const end = Math.floor(last / this.ticks), count = Math.min(BINS - 1, Math.round(seconds / period / this.ticks));
+    const counts = this.counts[channel < 6 ? 1 : 0], end = Math.floor(last / this.ticks), count = Math.min(BINS - 1, Math.round(seconds / period / this.ticks));
     for (let id = Math.max(0, end - count); id <= end; id++) {
       const at = id % BINS;
-      if (this.id[at] !== id || !this.count[at]) continue;
+      if (this.id[at] !== id || !counts[at]) continue;
       const i = at * CHANNELS + channel;
-      see(id * this.ticks, this.least[i], this.sum[i] / this.count[at], this.most[i], this.square[i] / this.count[at]);
+      see(id * this.ticks, this.least[i], this.sum[i] / counts[at], this.most[i], this.square[i] / counts[at]);
     }
   }
 
@@ -74,12 +76,13 @@ class Samples {
   }
 
   // Takes a row; the length of the gap before it, ticks.
-  add(tick, every, values, at) {
+  add(tick, every, law, values, at) {
     if (tick < this.last) this.restart();
     const gap = this.last < 0 ? 0 : tick - this.last;
     if (gap > 0) this.gaps.push([this.last, tick]);
-    for (const ring of this.rings) ring.add(tick, every, values, at);
+    for (const ring of this.rings) ring.add(tick, every, law, values, at);
     this.last = tick + every;
+    this.every = 1.5 * every;
     this.rows++;
     const old = this.last - 1.1 * SPANS[SPANS.length - 1] / this.period;
     while (this.gaps.length && (this.gaps[0][1] < old || this.gaps.length > 2000)) this.gaps.shift();
@@ -144,7 +147,7 @@ function lane(to, samples, ring, channel, box, seconds, scale) {
   to.beginPath();
   to.rect(left, top, wide, tall);
   to.clip();
-  let gap = 0, part = [];
+  let gap = 0, part = [], before = -Infinity;
   const flush = () => {
     if (part.length === 1) part.push([part[0][0] + 1, ...part[0].slice(1)]);
     if (part.length) {
@@ -171,6 +174,9 @@ function lane(to, samples, ring, channel, box, seconds, scale) {
       if (tick < gaps[gap][1]) break;
       gap++;
     }
+    // Where there is nothing to be shown between two pixels, no line is.
+    if (part.length && tick > before + Math.max(1.5 * ring.ticks, samples.every)) flush();
+    before = tick;
     part.push([x(tick + ring.ticks / 2), least, mean, most]);
   });
   flush();
@@ -245,17 +251,22 @@ class Strips {
       edge = at;
       written(to, "gap " + duration((behind - from) * samples.period), Math.min(at, left + inner - 24), 10, 12, inks.ink, "center", 600);
     }
-    for (const [tick, text, bad] of samples.marks) {
-      const at = x(tick);
-      if (at < left) continue;
+    // From the newest on; a label that would stand on another is left out.
+    edge = Infinity;
+    for (const [tick, text, bad] of [...samples.marks].reverse()) {
+      const at = x(tick), room = 6.2 * text.length;
+      if (at < left) break;
       to.strokeStyle = bad ? inks.orange : inks.ink2;
+      to.lineWidth = 1;
       to.setLineDash(bad ? [4, 3] : [1, 3]);
       to.beginPath();
       to.moveTo(at, head);
       to.lineTo(at, tall - foot);
       to.stroke();
       to.setLineDash([]);
-      written(to, text, at > left + inner / 2 ? at - 4 : at + 4, tall - foot - 3, 12, bad ? inks.orange : inks.ink2, at > left + inner / 2 ? "right" : "left", bad ? 600 : 400);
+      if (at - 4 - room < left || at > edge) continue;
+      edge = at - 4 - room;
+      written(to, text, at - 4, tall - foot - 3, 12, bad ? inks.orange : inks.ink2, "right", bad ? 600 : 400);
     }
   }
 }

@@ -53,7 +53,7 @@ impl Outbox {
 /// Lets browsers in, until the process ends. Each has a thread.
 pub fn serve(listener: TcpListener, guard: Guard, page: String, heard: SyncSender<Heard>) {
     let (guard, page) = (Arc::new(guard), Arc::<str>::from(page));
-    let (count, there) = (AtomicU64::new(0), Arc::new(AtomicUsize::new(0)));
+    let (count, there) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicUsize::new(0)));
     std::thread::spawn(move || {
         for stream in listener.incoming() {
             let Ok(stream) = stream else {
@@ -64,11 +64,12 @@ pub fn serve(listener: TcpListener, guard: Guard, page: String, heard: SyncSende
                 continue;
             }
             there.fetch_add(1, Ordering::Relaxed);
-            let number = count.fetch_add(1, Ordering::Relaxed) + 1;
-            let (guard, page, heard, there) = (guard.clone(), page.clone(), heard.clone(), there.clone());
+            let (guard, page, heard) = (guard.clone(), page.clone(), heard.clone());
+            let (count, there) = (count.clone(), there.clone());
             std::thread::spawn(move || {
                 // A browser that goes away is no news but to the one who has the machine.
                 if let Ok(Some(stream)) = guard.admit(stream, &page) {
+                    let number = count.fetch_add(1, Ordering::Relaxed) + 1;
                     let _ = talk(stream, number, &heard);
                     let _ = heard.send(Heard::Left { page: number });
                 }
