@@ -1,7 +1,7 @@
 // The program of an STM32 board, included by the `main.rs` of each: what is its own are `clocks`, `pins`, `spi`, `RECORD`,
 // `PASSES`, `prepare` and `memory_intact`.
 
-use specgen_board::{Exchange, Noticed};
+use specgen_board::{Exchange, Noticed, SampleMemory};
 use specgen_stm32::{converters, timer};
 
 /// The machine on this board's converters.
@@ -30,7 +30,7 @@ mod app {
     use controller::supervised::Machine;
     use embassy_stm32::interrupt::{InterruptExt, Priority};
     use embassy_stm32::wdg::IndependentWatchdog;
-    use specgen_board::{Desk, Exchange, Health, Noticed, Probes, Schedule, Kept, catch_up};
+    use specgen_board::{Desk, Exchange, Health, Noticed, Probes, Schedule, Kept, SampleMemory, catch_up, gather};
     use specgen_link::Endpoint;
     use specgen_stm32::cycles::{self, CYCLES};
     use specgen_stm32::enable::Stop;
@@ -63,6 +63,8 @@ mod app {
         #[unsafe(link_section = ".record.passes")]
         passes: [[i32; 6]; PASSES] = [[0; 6]; PASSES],
         kept: MaybeUninit<Kept> = MaybeUninit::uninit(),
+        #[unsafe(link_section = ".record.samples")]
+        samples: SampleMemory = SampleMemory::new(),
     ])]
     fn init(mut context: init::Context) -> (Shared, Local) {
         let core = &mut context.core;
@@ -85,6 +87,7 @@ mod app {
         let machine = converters::at_reset(context.local.machine);
         exchange.record(context.local.record, converters::kept(context.local.kept, machine));
         exchange.play(context.local.passes);
+        exchange.show(context.local.samples, serial::BAUD);
         let mut board = converters::board(wiring.adc, wiring.dac, machine, intact);
         let Some(period) = timer::period(timer::hertz()) else { safe::stop() };
         board.start(&mut exchange.report);
@@ -155,6 +158,7 @@ mod app {
                 &mut |action| shared.lock(|exchange, board| action(exchange, board.machine_mut())),
                 timer::is_calm::<{ clocks::COPY }>,
             );
+            gather(&mut |action| shared.lock(|exchange, board| action(exchange, board.machine_mut())));
             cortex_m::asm::wfi();
         }
     }

@@ -2,6 +2,7 @@
 
 mod bit_identity;
 mod board_link;
+mod board_samples;
 mod board_support;
 mod boards;
 mod budgets;

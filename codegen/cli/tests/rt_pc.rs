@@ -25,6 +25,7 @@ mod gcs;
 mod host;
 mod learning;
 mod panel;
+mod samples;
 use host::{Host, Record};
 
 /// Length of the platform's run, s, where another than that of CI is wanted.
@@ -247,6 +248,7 @@ fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_b
     a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(&bench);
     clients::nobody_keeps_others_from_ramping_down(&bench);
     gcs::clients_move_it_and_none_disturbs_it(&bench);
+    samples::hosts_look_on_and_are_no_burden(&bench);
     a_record_that_finds_no_room_brings_the_machine_down(&bench);
     a_card_is_read_driven_and_switched_off(&bench);
 }

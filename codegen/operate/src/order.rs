@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use specgen_link::RecorderAction;
+use specgen_link::samples::MOST_EVERY;
 use specgen_runtime::supervisor::{Phase, Request};
 
 use crate::place::{Named, Pace, named, pace};
@@ -12,12 +13,15 @@ use crate::place::{Named, Pace, named, pace};
 const TIMEOUT: Duration = Duration::from_secs(60);
 /// Longest time that can be asked for, s.
 const LONGEST: f64 = 86_400.0;
+/// How long is watched if nothing else is said, s.
+const WATCHED: f64 = 10.0;
 /// Rows after a trigger, if nothing else is said.
 const AFTER: u32 = 1000;
 const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, \
                         move|jog AXIS=QUANTITY…, where, limits, can-i-go AXIS=QUANTITY… [speed=QUANTITY], frame [none | work|tool AXIS=QUANTITY…], mark NAME, goto NAME, \
                         play TRAJECTORY [correction=FILE machine=NAME], mode p|f|pf, gains [NAME=VALUE…], wait PHASE|arrived|SECONDS [TIMEOUT], config, \
-                        config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, stop";
+                        config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, \
+                        watch [EVERY [SECONDS [FILE]]], stop";
 
 /// One order.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,6 +86,15 @@ pub enum Order {
     Wave(PathBuf),
     /// End the wave under way.
     StopWave,
+    /// Show samples of the running machine, or write them to a file.
+    Watch {
+        /// Ticks of a row; those of 0.1 s if it is not said.
+        every: Option<u32>,
+        /// For so long, s.
+        seconds: f64,
+        /// CSV, or JSON lines where the name ends in `.jsonl`.
+        file: Option<PathBuf>,
+    },
     /// Ramp down and end the program that serves the link.
     Stop,
 }
@@ -223,10 +236,24 @@ impl Order {
             ["record", "download", file] => Self::Download(file.into()),
             ["wave", "stop"] => Self::StopWave,
             ["wave", file] => Self::Wave(file.into()),
+            ["watch", ref rest @ ..] if rest.len() <= 3 => Self::watch(rest)?,
             ["stop"] => Self::Stop,
             _ => return Err(format!("`{line}` is none of: {COMMANDS}")),
         };
         Ok(Some(order))
+    }
+
+    fn watch(words: &[&str]) -> Result<Self, String> {
+        let every = words.first().map(|text| {
+            let every = text.parse().ok().filter(|every| (1..=MOST_EVERY).contains(every));
+            every.ok_or_else(|| format!("`watch {text}`: expected ticks of a row, 1 to {MOST_EVERY}"))
+        });
+        let time = words.get(1).map(|text| {
+            let time = text.parse().ok().filter(|time| *time > 0.0 && *time <= LONGEST);
+            time.ok_or_else(|| format!("`watch … {text}`: expected a time of more than 0 and up to {LONGEST} s"))
+        });
+        let file = words.get(2).map(PathBuf::from);
+        Ok(Self::Watch { every: every.transpose()?, seconds: time.transpose()?.unwrap_or(WATCHED), file })
     }
 
     fn wait(until: &str, limit: Option<&str>) -> Result<Self, String> {
@@ -294,6 +321,8 @@ mod tests {
             ("record download run.rec", Some(Order::Download("run.rec".into()))),
             ("wave stop", Some(Order::StopWave)),
             ("stop", Some(Order::Stop)),
+            ("watch", Some(Order::Watch { every: None, seconds: 10.0, file: None })),
+            ("watch 20 0.5 w.csv", Some(Order::Watch { every: Some(20), seconds: 0.5, file: Some("w.csv".into()) })),
             ("wave w.toml", Some(Order::Wave("w.toml".into()))),
             ("config write tuned.toml", Some(Order::WriteConfig("tuned.toml".into()))),
         ];
@@ -325,6 +354,9 @@ mod tests {
             ("record arm -1", "1 or more"),
             ("config write", "is none of"),
             ("arm now", "is none of"),
+            ("watch 0", "`watch 0`: expected ticks of a row, 1 to 1000000"),
+            ("watch 1 0", "expected a time of more than 0"),
+            ("watch 1 1 a b", "is none of"),
         ] {
             let error = Order::parse(line).unwrap_err();
             assert!(error.contains(expected), "{line}: {error}");

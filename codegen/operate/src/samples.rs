@@ -7,6 +7,7 @@
 //! blocks say so. A look takes the whole blocks that wait, else the rows of the one that is being filled: a row is here as soon as
 //! it is whole and asked for.
 
+use serde::Serialize;
 use specgen_link::client::{ClientError, Port};
 use specgen_link::{Reply, Request, samples};
 
@@ -19,7 +20,7 @@ pub use specgen_link::samples::Spread;
 const LOOK: usize = 256;
 
 /// Some ticks of a machine, one behind the other.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Row {
     /// Every bit that the controller's status word had in any of them.
     pub status: u32,
@@ -36,7 +37,7 @@ pub struct Row {
 }
 
 /// Rows, one behind the other.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Block {
     /// Counts the blocks that the device made, from 0 at the beginning of the stream: one that is missing was lost.
     pub number: u32,
@@ -52,7 +53,7 @@ impl Block {
     /// The tick behind its last one.
     #[must_use]
     pub fn end(&self) -> u64 {
-        self.tick + u64::from(self.every) * self.rows.len() as u64
+        self.tick.saturating_add(u64::from(self.every) * self.rows.len() as u64)
     }
 }
 

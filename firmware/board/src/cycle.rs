@@ -174,6 +174,11 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         if passes::POSSIBLE {
             exchange.keep_pass(self.machine, output.tick.status);
         }
+        if let Some(samples) = &mut exchange.samples {
+            // Those that never came count, too.
+            let due = exchange.report.tick + u64::from(exchange.report.missed);
+            samples.keep(due - 1, self.machine, &output);
+        }
         exchange.prepare();
         restart
     }

@@ -4,6 +4,7 @@ use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, R
 use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, CONFIG_WORDS, DESCRIPTION, PLACE_WORDS, Real, passes, place_words};
 use specgen_link::lockstep::{Session, piece};
+use specgen_link::samples::Block;
 use specgen_link::{
     Bytes, Counted, Counters, Device, Health, Identity, KNOT, KNOTS, PassAction, PassStatus, RecorderAction, Refusal,
     Reply, Request, Status, WaveAction, put_knots,
@@ -16,6 +17,7 @@ use crate::download::{self, Download};
 use crate::exchange::{Access, Exchange};
 use crate::recording;
 use crate::report::Probes;
+use crate::samples::{self, with_rows};
 use crate::stepper::{Costs, Stepper, Stopwatch};
 
 /// Words of the longest answer: settings, what a step gives, a piece of a record or of errors.
@@ -36,6 +38,8 @@ pub struct Desk {
     costs: Costs,
     session: Session<WORDS>,
     download: Download,
+    /// Of the last answer with samples.
+    block: Block,
 }
 
 /// A desk while bytes are looked at. `dyn`, so that there is one copy of it, compiled as this crate is.
@@ -50,7 +54,7 @@ impl Desk {
     /// At power-up.
     #[must_use]
     pub const fn new(stopwatch: Stopwatch) -> Self {
-        Self { stopwatch, costs: Costs::NONE, session: Session::new(), download: Download::new() }
+        Self { stopwatch, costs: Costs::NONE, session: Session::new(), download: Download::new(), block: Block::EMPTY }
     }
 }
 
@@ -67,6 +71,7 @@ impl Visit<'_, '_> {
                 wave.stop();
             }
             exchange.abort_pass();
+            let _ = exchange.watch(0);
         });
         Identity {
             config_words: CONFIG_WORDS as u16,
@@ -321,6 +326,26 @@ impl Visit<'_, '_> {
         Reply::Chunk { offset, total: total as u32, bytes }
     }
 
+    fn stream(&mut self, every: u32) -> Reply<'static> {
+        let mut done = Ok(());
+        (self.with)(&mut |exchange, _| done = exchange.watch(every));
+        done.map_or_else(Reply::Refused, |()| Reply::Done)
+    }
+
+    #[inline(never)]
+    fn samples(&mut self) -> Reply<'_> {
+        let (block, mut more) = (&mut self.desk.block, false);
+        *block = Block::EMPTY;
+        with_rows(&mut *self.with, |rows| {
+            more = rows.waiting() > 1;
+            if let Some(oldest) = rows.take() {
+                *block = *oldest;
+            }
+        });
+        let Block { number, tick, every, .. } = *block;
+        Reply::Samples { number, tick, every, more, rows: Bytes(block.bytes()) }
+    }
+
     /// The host steps the machine: only while nothing can move.
     #[cfg(feature = "lockstep")]
     #[inline(never)]
@@ -413,6 +438,9 @@ impl Device for Visit<'_, '_> {
             Request::Knots { first, knots } => self.knots(first, knots),
             Request::Pass { action } => self.pass(action),
             Request::Errors { offset } => self.errors(offset),
+            Request::Stream { .. } | Request::Samples if !samples::POSSIBLE => Reply::Refused(Refusal::Unsupported),
+            Request::Stream { every } => self.stream(every),
+            Request::Samples => self.samples(),
         }
     }
 }

@@ -12,6 +12,7 @@ use specgen_runtime::wave::Stage;
 
 use crate::recording::{Kept, recorder};
 use crate::report::{Probes, Report};
+use crate::samples::{self, SampleMemory, Samples};
 #[cfg(feature = "lockstep")]
 use crate::words::PERIOD_NANOSECONDS;
 
@@ -55,6 +56,8 @@ pub struct Exchange {
     pub wave: Option<Wave>,
     /// Corrects the motion while a pass is under way, where a memory was given for it.
     pub player: Option<Player<'static, Real>>,
+    /// Shows the ticks to a host that looks on, where a memory was given for it.
+    pub(crate) samples: Option<Samples>,
     /// The host steps the machine, and the ticks do not: how long it has been silent.
     pub lockstep: Option<Silence>,
 }
@@ -85,6 +88,7 @@ impl Exchange {
             kept: None,
             wave: None,
             player: None,
+            samples: None,
             lockstep: None,
         }
     }
@@ -102,6 +106,22 @@ impl Exchange {
         if passes::POSSIBLE {
             self.player = Some(Player::new(memory));
         }
+    }
+
+    /// Has samples for a host in this memory from here on, over a line of `baud` bits a second, if the controller has a pose. The
+    /// background has to call [`gather`](crate::gather).
+    pub fn show(&mut self, memory: &'static mut SampleMemory, baud: u32) {
+        if samples::POSSIBLE {
+            self.samples = Some(Samples::new(memory, baud));
+        }
+    }
+
+    /// Samples in rows of `every` ticks from here on, none with 0.
+    ///
+    /// # Errors
+    /// There is no memory for it, no pose, or no room on the line; the row is too long.
+    pub fn watch(&mut self, every: u32) -> Result<(), Refusal> {
+        self.samples.as_mut().map_or(Err(Refusal::Unsupported), |samples| samples.start(every))
     }
 
     /// A request of the host was carried out or refused.

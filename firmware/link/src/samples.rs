@@ -8,6 +8,8 @@
 //! did not reach the collector are a gap between the ticks of two blocks. Where a gap cuts a row off, its ticks are a row of their
 //! own, in a block that says how many they are: nothing that was seen is left out.
 
+use serde::Serialize;
+
 /// Axes of a pose, and legs.
 pub const AXES: usize = 6;
 /// Most ticks of a row.
@@ -47,7 +49,7 @@ pub struct Sample {
 }
 
 /// A value over the ticks of a row.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Spread {
     /// The least.
     pub least: f32,
@@ -89,7 +91,7 @@ pub struct Block {
 
 impl Block {
     /// Of no rows.
-    pub const EMPTY: Self = Self { number: 0, tick: 0, every: 1, bytes: [0; BLOCK], length: 0 };
+    pub const EMPTY: Self = Self { number: 0, tick: 0, every: 0, bytes: [0; BLOCK], length: 0 };
 
     /// The rows, for [`rows`].
     #[must_use]

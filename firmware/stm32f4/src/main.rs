@@ -14,8 +14,9 @@ mod clocks;
 mod pins;
 mod spi;
 
-/// Words of the recorder: what the 128 KiB of RAM have besides the 24 KiB of the rest and some in reserve, 80 KiB with the knots.
-const RECORD: usize = (80 * 1024 - size_of::<[[i32; 6]; PASSES]>()) / size_of::<u64>();
+/// Words of the recorder: what the 128 KiB of RAM have besides the 24 KiB of the rest and some in reserve, 80 KiB with the knots and
+/// samples.
+const RECORD: usize = (80 * 1024 - size_of::<[[i32; 6]; PASSES]>() - size_of::<SampleMemory>()) / size_of::<u64>();
 
 /// Knots of passes that learn, where the controller takes a correction: 36 KiB, half for corrections and half for errors.
 const PASSES: usize = if controller::passes::POSSIBLE { 1536 } else { 0 };

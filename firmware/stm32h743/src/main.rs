@@ -18,8 +18,9 @@ mod tightly;
 
 use tightly::is_intact as memory_intact;
 
-/// Words of the recorder, in the AXI SRAM (512 KiB) that has only the buffers of the DMA besides: 448 KiB with the knots.
-const RECORD: usize = (448 * 1024 - size_of::<[[i32; 6]; PASSES]>()) / size_of::<u64>();
+/// Words of the recorder, in the AXI SRAM (512 KiB) that has only the buffers of the DMA besides: 448 KiB with the knots
+/// and samples.
+const RECORD: usize = (448 * 1024 - size_of::<[[i32; 6]; PASSES]>() - size_of::<SampleMemory>()) / size_of::<u64>();
 
 /// Knots of passes that learn, where the controller takes a correction: 192 KiB, half for corrections and half for errors.
 const PASSES: usize = if controller::passes::POSSIBLE { 8192 } else { 0 };

@@ -26,7 +26,7 @@ use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, Config, INPUT_WORDS, Real, passes};
 use parts::{ADC_BITS, Bench, Bus, Delay, Line, Pin, REFERENCE, Rates, Role};
 use semihosting::{Exit, File, exit};
-use specgen_board::{Board, Exchange, Kept, Noticed, catch_up};
+use specgen_board::{Board, Exchange, Kept, Noticed, SampleMemory, catch_up, gather};
 use specgen_hal::CHANNELS;
 use specgen_hal::ad5686r::Ad5686rPair;
 use specgen_hal::ad7606::Ad7606;
@@ -38,6 +38,9 @@ use specgen_runtime::playback::Knot;
 const RECORD: usize = 32 * 1024;
 /// Settings change at every so manieth tick.
 const SETTINGS_EVERY: usize = 16;
+
+/// A host looks on: ticks of its rows.
+const WATCHED: u32 = 100;
 
 /// A pass that keeps a knot in every tick, which is the most that one does. Begun anew when it is over.
 const KNOTS: usize = 64;
@@ -75,8 +78,10 @@ fn run() -> Result<(), Exit> {
     // It begins to run with the first tick, as after arming.
     machine.supervisor.phase = Phase::Holding;
     let mut exchange = Exchange::new();
-    let (words, [kept, held], knots) = memories();
+    let (words, [kept, held], knots, samples) = memories();
     exchange.record(words, kept);
+    exchange.show(samples, u32::MAX);
+    let _ = exchange.watch(WATCHED);
     exchange.orders.request = Request::Run;
     let wave = Wave::new(waves::limits(&exchange.config));
     let bench = &Bench::new(rates()?);
@@ -118,6 +123,7 @@ fn run() -> Result<(), Exit> {
         // As the background.
         let Timed { board, exchange, .. } = &mut timed;
         catch_up(&mut |action| action(exchange, board.machine_mut()), || true);
+        gather(&mut |action| action(exchange, board.machine_mut()));
         if !output.write(&bench.take()) {
             return Err(Exit::CannotWrite);
         }
@@ -194,11 +200,15 @@ extern "C" fn specgen_timed_end() {
 
 /// The recorder's memories, for the one call that there is.
 #[allow(unsafe_code)] // Statics that are written.
-fn memories() -> (&'static mut [u64], [&'static mut Kept; 2], &'static mut [Knot]) {
+fn memories() -> (&'static mut [u64], [&'static mut Kept; 2], &'static mut [Knot], &'static mut SampleMemory) {
     static mut MEMORY: [u64; RECORD] = [0; RECORD];
     static mut KEPT: Kept = Kept::new();
     static mut HELD: Kept = Kept::new();
     static mut PLAYED: [Knot; 2 * KNOTS] = [[0; 6]; 2 * KNOTS];
+    static mut SAMPLES: SampleMemory = SampleMemory::new();
     // SAFETY: called once, by `run`; no interrupt is enabled.
-    unsafe { (&mut *(&raw mut MEMORY), [&mut *(&raw mut KEPT), &mut *(&raw mut HELD)], &mut *(&raw mut PLAYED)) }
+    unsafe {
+        let kept = [&mut *(&raw mut KEPT), &mut *(&raw mut HELD)];
+        (&mut *(&raw mut MEMORY), kept, &mut *(&raw mut PLAYED), &mut *(&raw mut SAMPLES))
+    }
 }

@@ -11,7 +11,7 @@ use controller::supervised::Machine;
 use controller::supervision::READINGS_PER_LEG;
 use controller::{Config, LEGS, LegState};
 use specgen::operate::Session;
-use specgen_board::{Board, Desk, Exchange, Kept, Noticed, Stopwatch, Visit, catch_up};
+use specgen_board::{Board, Desk, Exchange, Kept, Noticed, SampleMemory, Stopwatch, Visit, catch_up, gather};
 use specgen_hal::{Amplifiers, Fault, Gauges};
 use specgen_link::client::{Port, Timeout};
 use specgen_link::{Endpoint, Kind, Receiver, RecorderAction, VERSION};
@@ -118,19 +118,20 @@ impl Amplifiers for Parts {
     }
 }
 
-/// Memories of a recorder. A board has them for ever; here they are given back after each input, of which there are millions.
-struct Tape(*mut [u64], *mut Kept);
+/// Memories of a recorder and of samples. A board has them for ever; here they are given back after each input, of which there are millions.
+struct Tape(*mut [u64], *mut Kept, *mut SampleMemory);
 
 #[allow(unsafe_code)]
 impl Tape {
     fn new() -> Self {
-        Self(Box::into_raw(vec![0; 4000].into_boxed_slice()), Box::into_raw(Box::new(Kept::new())))
+        let samples = Box::into_raw(Box::new(SampleMemory::new()));
+        Self(Box::into_raw(vec![0; 4000].into_boxed_slice()), Box::into_raw(Box::new(Kept::new())), samples)
     }
 
     /// To be called once, by what is dropped before this is.
-    fn memories(&self) -> (&'static mut [u64], &'static mut Kept) {
+    fn memories(&self) -> (&'static mut [u64], &'static mut Kept, &'static mut SampleMemory) {
         // SAFETY: they are there until this is dropped, and nobody else has them.
-        unsafe { (&mut *self.0, &mut *self.1) }
+        unsafe { (&mut *self.0, &mut *self.1, &mut *self.2) }
     }
 }
 
@@ -138,7 +139,7 @@ impl Tape {
 impl Drop for Tape {
     fn drop(&mut self) {
         // SAFETY: made by `Box::into_raw`, and given back once.
-        drop(unsafe { (Box::from_raw(self.0), Box::from_raw(self.1)) });
+        drop(unsafe { (Box::from_raw(self.0), Box::from_raw(self.1), Box::from_raw(self.2)) });
     }
 }
 
@@ -149,8 +150,9 @@ fn device(mut script: &[u8]) {
     let mut machine = Box::new(Machine::new());
     let mut board = Board::new(parts.clone(), parts.clone(), &mut machine, true);
     let mut exchange = Exchange::new();
-    let (words, kept) = tape.memories();
+    let (words, kept, samples) = tape.memories();
     exchange.record(words, kept);
+    exchange.show(samples, 921_600);
     board.start(&mut exchange.report);
     let (mut desk, mut endpoint, mut host) = (Desk::new(Stopwatch::NONE), Endpoint::new(), Receiver::new());
     let (mut sequence, mut ticks) = (0, 0);
@@ -173,6 +175,7 @@ fn device(mut script: &[u8]) {
                     board.tick(&mut exchange, Noticed::default());
                 }
                 catch_up(&mut |action| action(&mut exchange, board.machine_mut()), || true);
+                gather(&mut |action| action(&mut exchange, board.machine_mut()));
                 continue;
             }
         };
@@ -246,4 +249,7 @@ fn host(script: &[u8]) {
     let _ = session.download();
     let _ = session.command(words);
     let _ = session.poll();
+    let _ = session.stream(7);
+    let blocks = session.take_blocks().unwrap_or_default();
+    assert!(blocks.iter().all(|block| block.end() >= block.tick && !block.rows.is_empty()));
 }

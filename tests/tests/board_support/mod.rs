@@ -10,13 +10,13 @@ use std::io;
 use std::rc::Rc;
 use std::time::Duration;
 
-use controller::Real;
 use controller::sensing::CONVERTER;
 use controller::supervised::{Machine, Phase};
 use controller::supervision::READINGS_PER_LEG;
+use controller::{PLACE_WORDS, Real, place_words};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen_board::{Board, Desk, Exchange, Kept, Noticed, Stopwatch, Visit, catch_up};
+use specgen_board::{Board, Desk, Exchange, Kept, Noticed, SampleMemory, Stopwatch, Visit, catch_up, gather};
 use specgen_hal::{Amplifiers, Fault, Gauges};
 use specgen_link::Endpoint;
 use specgen_link::client::{Client, ClientError, Port, Timeout};
@@ -78,6 +78,10 @@ pub struct Rig {
     pub spoilt: u32,
     /// Ticks that pass while an answer is waited for.
     pub pace: u32,
+    /// The background has no time for samples.
+    pub busy: bool,
+    /// What every tick showed, where it is wanted: its number, status, phase, and where the platform was.
+    pub shown: Option<Vec<(u64, u32, u8, [u64; PLACE_WORDS])>>,
 }
 
 /// The rig as a line, and to look at.
@@ -92,6 +96,7 @@ impl Line {
         let mut board = Board::new(parts.clone(), parts.clone(), machine, true);
         let mut exchange = Exchange::new();
         exchange.record(Box::leak(vec![0; record].into_boxed_slice()), Box::leak(Box::new(Kept::new())));
+        exchange.show(Box::leak(Box::new(SampleMemory::new())), 921_600);
         board.start(&mut exchange.report);
         exchange.prepare();
         Self(Rc::new(RefCell::new(Rig {
@@ -104,6 +109,8 @@ impl Line {
             answers: VecDeque::new(),
             spoilt: 0,
             pace: 3,
+            busy: false,
+            shown: None,
         })))
     }
 
@@ -140,6 +147,14 @@ impl Rig {
         board.tick(exchange, Noticed::default());
         // The background, as after every tick.
         catch_up(&mut |action| action(exchange, board.machine_mut()), || true);
+        if !self.busy {
+            gather(&mut |action| action(exchange, board.machine_mut()));
+        }
+        if let Some(shown) = &mut self.shown {
+            let report = &self.exchange.report;
+            let place = place_words(&self.board.machine().state);
+            shown.push((report.tick - 1, report.status, report.phase.word() as u8, place));
+        }
         let legs = self.board.machine().state.legs;
         let mut state = self.parts.0.borrow_mut();
         for (code, row) in state.gauges.iter_mut().zip(READINGS_PER_LEG) {

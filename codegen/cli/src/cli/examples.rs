@@ -166,7 +166,7 @@ Commands: status, arm, run, hold, ramp-down, acknowledge, none,
   frame [none | work|tool AXIS=QUANTITY…], mode p|f|pf, gains [NAME=VALUE…],
   wait PHASE|arrived|SECONDS [TIMEOUT], config, config write SPEC,
   record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop,
-  stop (ends the program at a socket)
+  watch [EVERY [SECONDS [FILE]]], stop (ends the program at a socket)
 
 The link lives as long as this command does; without it the machine holds after
 0.1 s. Ctrl-C ramps down first.";
@@ -197,7 +197,9 @@ pub const REPLAY: &str = "\
 Examples:
   specgen replay run.rec --spec platform.toml
       bit-equal, or the first tick that differs
-  specgen replay run.rec --csv run.csv  # time, inputs with units, what came out";
+  specgen replay run.rec --csv run.csv  # time, inputs with units, what came out
+  specgen replay run.rec --spec platform.toml --mcap run.mcap
+      for viewers of logs";
 
 pub const DYNAMICS: &str = "\
 Examples:

@@ -6,6 +6,7 @@ mod operator;
 pub mod panel;
 mod passes;
 mod platform;
+mod watch;
 
 use std::io::{BufRead, IsTerminal};
 use std::path::PathBuf;

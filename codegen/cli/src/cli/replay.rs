@@ -1,8 +1,12 @@
 //! `specgen replay`: a recording run again on the host, tick by tick, by bits.
 
+mod export;
+mod mcap;
+mod messages;
+
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Write as _};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -11,12 +15,12 @@ use host_sim::description::Description;
 use host_sim::record::{self, Again, Block, Header, PhaseChange, Piece, Reader, Replay, ReplayError};
 use serde::Serialize;
 
-use super::file::{PendingFile, unwritten};
 use super::plot::Plot;
 use super::sim;
 use super::spec;
 use super::table::{left, right, row};
 use super::ui::{Failure, Outcome, Ui};
+use export::Exports;
 use specgen_compiler::compile::Compiled;
 use specgen_report::chart::{Axis, Chart, DASHED, LINE};
 
@@ -29,11 +33,15 @@ pub struct Arguments {
     /// The recording: from a target, from `specgen sim --record` or from `rt-pc --record`.
     recording: PathBuf,
     /// The spec that the target was built from. Without it the recording can only be exported.
-    #[arg(long, value_name = "SPEC", required_unless_present = "csv")]
+    #[arg(long, value_name = "SPEC", required_unless_present_any = ["csv", "mcap"])]
     spec: Option<PathBuf>,
     /// Write the recording as CSV, with time and units; with --spec also volts, and of a platform pose, target and error.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Write the recording as MCAP, a channel a signal, JSON with schemas: gauges, codes, status, phase, settings; with --spec
+    /// also what --csv has.
+    #[arg(long, value_name = "FILE")]
+    mcap: Option<PathBuf>,
     /// With --spec: target less pose, or demand less gauge of the legs.
     #[command(flatten)]
     plot: Plot,
@@ -43,14 +51,14 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let shown = arguments.recording.display();
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{shown}: {error}"));
     let mut reader = open(&arguments.recording)?;
-    let mut csv = arguments.csv.as_deref().map(Csv::new).transpose()?;
+    let mut exports = Exports::new(arguments.csv.as_deref(), arguments.mcap.as_deref())?;
     let drawn = arguments.plot.wanted()?;
     if drawn && arguments.spec.is_none() {
         return Err(Failure::Usage("--plot is for a recording that is run again: name its --spec".to_owned()));
     }
     let Some(spec) = &arguments.spec else {
-        let found = export(&mut reader, csv.as_mut(), &refuse)?;
-        let rows = csv.map(Csv::finish).transpose()?.unwrap_or_default();
+        let found = export(&mut reader, &mut exports, &refuse)?;
+        let rows = exports.finish()?;
         let failed = found.damaged.first().map(|(block, reason)| {
             format!("{shown}: block {block} is damaged: {reason}; its rows are missing. Fetch or copy it again")
         });
@@ -70,10 +78,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         if drawn {
             errors.add(header, block, &names, rows);
         }
-        if let Some(csv) = &mut csv
-            && trouble.is_none()
-        {
-            trouble = csv.add(header, block, Some(Again { names: &names, rows })).err();
+        if trouble.is_none() {
+            trouble = exports.add(header, block, Some(Again { names: &names, rows })).err();
         }
     });
     let found = match found {
@@ -83,9 +89,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     if let Some(failure) = trouble {
         return Err(failure);
     }
-    if let Some(csv) = csv {
-        csv.finish()?;
-    }
+    exports.finish()?;
     let plot = arguments.plot.charts(&compiled.ir.name, &shown.to_string(), &[errors.chart()])?;
     if let Some(line) = plot {
         ui.progress(line.trim_end());
@@ -253,7 +257,7 @@ impl Outcome for Report {
     }
 }
 
-/// A recording that was read for its CSV alone, and what is wrong with it.
+/// A recording that was read for its export alone, and what is wrong with it.
 #[derive(Default, Serialize)]
 struct Exported {
     #[serde(skip)]
@@ -272,18 +276,14 @@ impl Outcome for Exported {
 
 fn export(
     reader: &mut Reader<BufReader<File>>,
-    mut csv: Option<&mut Csv>,
+    exports: &mut Exports,
     refuse: &impl Fn(&dyn std::fmt::Display) -> Failure,
 ) -> Result<Exported, Failure> {
     let header = reader.header().clone();
     let mut found = Exported::default();
     while let Some(piece) = reader.next_piece().map_err(|error| refuse(&error))? {
         match piece {
-            Piece::Block(block) => {
-                if let Some(csv) = csv.as_deref_mut() {
-                    csv.add(&header, &block, None)?;
-                }
-            }
+            Piece::Block(block) => exports.add(&header, &block, None)?,
             Piece::Damaged { block, reason } => found.damaged.push((block, reason)),
             Piece::Cut { .. } => found.cut = true,
         }
@@ -329,32 +329,5 @@ impl Errors {
         let name = |k: usize| if self.platform { ["x", "y", "z"][k].to_owned() } else { format!("leg {k}") };
         let lines = self.points.iter().enumerate().filter(|(_, points)| !points.is_empty());
         lines.fold(chart, |chart, (k, points)| chart.with(&name(k), if k < 4 { LINE } else { DASHED }, points.clone()))
-    }
-}
-
-/// A CSV file on its way.
-struct Csv {
-    file: BufWriter<PendingFile>,
-    /// As its user named it.
-    path: PathBuf,
-    rows: u64,
-}
-
-impl Csv {
-    fn new(path: &Path) -> Result<Self, Failure> {
-        Ok(Self { file: BufWriter::new(PendingFile::create(path)?), path: path.to_owned(), rows: 0 })
-    }
-
-    fn add(&mut self, header: &Header, block: &Block, again: Option<Again>) -> Result<(), Failure> {
-        record::write_csv(&mut self.file, header, block, again, self.rows == 0)
-            .map_err(|error| unwritten(&self.path, &error))?;
-        self.rows += block.rows.len() as u64;
-        Ok(())
-    }
-
-    fn finish(mut self) -> Result<u64, Failure> {
-        self.file.flush().map_err(|error| unwritten(&self.path, &error))?;
-        self.file.into_inner().map_err(|error| unwritten(&self.path, &error))?.keep()?;
-        Ok(self.rows)
     }
 }

@@ -3,4 +3,5 @@
 mod damage;
 mod messages;
 mod panic_free;
+mod samples;
 mod support;

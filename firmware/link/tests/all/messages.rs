@@ -55,6 +55,8 @@ fn requests() -> Vec<Request<'static>> {
         Request::Stop,
         Request::Health,
         Request::Place,
+        Request::Stream { every: u32::MAX },
+        Request::Samples,
     ]
 }
 
@@ -65,6 +67,7 @@ fn replies() -> Vec<Reply<'static>> {
         Refusal::Word { index: 54 },
         Refusal::State,
         Refusal::TooLong,
+        Refusal::Rate { least: u32::MAX },
     ];
     let stage = Stage { name: "supervise", calls: 3, smallest: 0, sum: u64::MAX, largest: 1 << 40, stack: 4096 };
     let recorder = RecorderStatus { running: true, triggered: false, ticks: 100, capacity: 4096 };
@@ -79,6 +82,7 @@ fn replies() -> Vec<Reply<'static>> {
         Reply::Stage(stage),
         Reply::Recorder(recorder),
         Reply::Chunk { offset: 5, total: u32::MAX, bytes: Bytes(b"0123") },
+        Reply::Samples { number: u32::MAX, tick: u64::MAX, every: 1, more: true, rows: Bytes(b"01234") },
     ]);
     all
 }

@@ -34,13 +34,7 @@ pub struct Desk<'a> {
 }
 
 impl<'a> Desk<'a> {
-    pub fn new(
-        console: &'a mut Console,
-        host: HostId,
-        events: &'a mut u32,
-        stream: &'a mut Stream,
-        now: u64,
-    ) -> Self {
+    pub fn new(console: &'a mut Console, host: HostId, events: &'a mut u32, stream: &'a mut Stream, now: u64) -> Self {
         let words = [0; size_of::<[u64; CONFIG_WORDS]>()];
         Self { console, host, events, stream, now, words, knots: [0; KNOTS * KNOT] }
     }

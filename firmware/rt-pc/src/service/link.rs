@@ -72,7 +72,13 @@ impl Link {
         let Self { hosts, traffic } = self;
         let fresh = || {
             traffic.hosts += 1;
-            Line { id: HostId(traffic.hosts), endpoint: Box::default(), unsent: Vec::new(), events: 0, stream: Stream::default() }
+            Line {
+                id: HostId(traffic.hosts),
+                endpoint: Box::default(),
+                unsent: Vec::new(),
+                events: 0,
+                stream: Stream::default(),
+            }
         };
         let crowded = hosts.accept(now, fresh, |line| console.operator.is_hosts(line.id));
         traffic.closed += crowded.len() as u64;

@@ -193,8 +193,13 @@ impl<P: Port> Operator<P> {
             | Order::Limits
             | Order::CanIGo { .. }
             | Order::Goto(_)
+            | Order::Watch { file: None, .. }
             | Order::Mode(_) => self.motion().map(|_| ()).map_err(nonsense),
             Order::Wave(path) => self.wave_of(path).map(|_| ()).map_err(nonsense),
+            Order::Watch { file: Some(path), .. } => {
+                self.motion().map_err(nonsense)?;
+                check_place(path)
+            }
             Order::Download(path) => check_place(path),
             _ => Ok(()),
         })
@@ -229,6 +234,7 @@ impl<P: Port> Operator<P> {
             | Order::Play { .. }
             | Order::Mode(_)
             | Order::Gains(_) => self.of_platform(order, &line, ui)?,
+            Order::Watch { every, seconds, file } => self.watch(*every, *seconds, file.as_deref(), &line, ui)?,
             Order::Config => {
                 let settings = self.config()?;
                 self.note(&line, &settings, ui);

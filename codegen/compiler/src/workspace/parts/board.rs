@@ -19,6 +19,7 @@ pub const PART: Part = Part {
         "src/lib.rs",
         "src/recording.rs",
         "src/report.rs",
+        "src/samples.rs",
         "src/schedule.rs",
         "src/stepper.rs",
         "src/words.rs",

@@ -3,6 +3,7 @@
 #![no_std]
 
 use specgen_link::lockstep::{Lockstep, Machine};
+use specgen_link::samples::{Block, Collector, Sample};
 use specgen_link::{Bytes, Counted, Device, Endpoint, FRAME, Receiver, Reply, Request, Stage, Status, telemetry};
 
 #[panic_handler]
@@ -98,6 +99,25 @@ pub unsafe extern "C" fn proof_every(endpoint: *mut Endpoint, device: *mut Every
     // SAFETY: the caller's duty.
     let (endpoint, device) = unsafe { (&mut *endpoint, &mut *device) };
     endpoint.push(byte, device).map_or(0, <[u8]>::len)
+}
+
+/// A tick into a collector, and a block out of it; length of its rows.
+///
+/// # Safety
+/// The pointers are to what they say.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn proof_samples(
+    collector: *mut Collector<[Block; 3]>,
+    sample: *const Sample,
+    every: u32,
+) -> usize {
+    // SAFETY: the caller's duty.
+    let (collector, sample) = unsafe { (&mut *collector, &*sample) };
+    if every != collector.every() {
+        collector.start(every);
+    }
+    collector.add(sample);
+    collector.take().map_or(0, |block| block.bytes().len())
 }
 
 /// Telemetry out, and a byte into a receiver.

@@ -1,0 +1,266 @@
+//! `watch`: samples of the running machine, shown, written to a file, or kept for the document.
+
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use specgen_link::Refusal;
+use specgen_link::client::{ClientError, Port};
+use specgen_operate::place::AXES;
+use specgen_operate::samples::{Block, Row};
+
+use super::operator::{Ended, Operator};
+use crate::cli::file::{PendingFile, unwritten};
+use crate::cli::table::{Column, right, row};
+use crate::cli::ui::{Outcome, Ui};
+
+/// Time of a row, if nothing else is said, s.
+const ROW: f64 = 0.1;
+/// Between two looks.
+const LOOK: Duration = Duration::from_millis(10);
+/// So long without a sample, and the machine makes no ticks.
+const SILENT: Duration = Duration::from_secs(2);
+
+/// What was watched.
+#[derive(Serialize)]
+struct Watched {
+    /// Ticks of a row.
+    every: u32,
+    rows: u64,
+    gaps: Vec<Gap>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<String>,
+    /// Where they were not written to a file; SI.
+    #[serde(rename = "samples", skip_serializing_if = "Vec::is_empty")]
+    kept: Vec<Sample>,
+}
+
+/// Ticks of which there are no samples.
+#[derive(Serialize)]
+struct Gap {
+    from: u64,
+    /// The first one behind it.
+    to: u64,
+    /// Blocks that were made and not fetched in time.
+    blocks: u32,
+}
+
+/// A row with its place in time.
+#[derive(Serialize)]
+struct Sample {
+    /// The first of its ticks.
+    tick: u64,
+    time: f64,
+    ticks: u32,
+    #[serde(flatten)]
+    row: Row,
+}
+
+impl Outcome for Watched {
+    fn text(&self) -> String {
+        let ticks = if self.every == 1 { "tick" } else { "ticks" };
+        let mut text = format!("{} rows of {} {ticks}", self.rows, self.every);
+        if let Some(file) = &self.file {
+            text += &format!(" in {file}");
+        }
+        let missing: u64 = self.gaps.iter().map(|gap| gap.to.saturating_sub(gap.from)).fold(0, u64::saturating_add);
+        text + &match self.gaps.len() {
+            0 => ", without a gap\n".to_owned(),
+            gaps => format!(", {gaps} gaps of {missing} ticks in all\n"),
+        }
+    }
+}
+
+/// Where rows go.
+enum Sink {
+    Shown,
+    Kept,
+    File { file: BufWriter<PendingFile>, path: PathBuf, as_json: bool },
+}
+
+impl Sink {
+    fn new(path: Option<&Path>, ui: &Ui) -> Result<Self, Ended> {
+        let Some(path) = path else { return Ok(if ui.is_json() { Self::Kept } else { Self::Shown }) };
+        let as_json = path.extension().is_some_and(|extension| extension == "jsonl");
+        let mut file = BufWriter::new(PendingFile::create(path).map_err(Ended::Failed)?);
+        if !as_json {
+            writeln!(file, "{}", titles()).map_err(|error| Ended::Failed(unwritten(path, &error)))?;
+        }
+        Ok(Self::File { file, path: path.to_owned(), as_json })
+    }
+
+    fn begin(&self, ui: &Ui) {
+        if let Self::Shown = self {
+            let mut text = "pose in um and urad; largest error of a row in nm and nrad\n".to_owned();
+            let [x, y, z, rx, ry, rz] = AXES;
+            row(&mut text, &COLUMNS, &[&"tick", &x, &y, &z, &rx, &ry, &rz, &"nm", &"nrad"]);
+            ui.out(&text);
+        }
+    }
+
+    fn gap(&self, gap: &Gap, ui: &Ui) {
+        if let Self::Shown = self {
+            ui.out(&format!("  ticks {} to {} are missing\n", gap.from, gap.to.saturating_sub(1)));
+        }
+    }
+
+    fn put(&mut self, sample: Sample, kept: &mut Vec<Sample>, ui: &Ui) -> Result<(), Ended> {
+        match self {
+            Self::Shown => ui.out(&line(&sample)),
+            Self::Kept => kept.push(sample),
+            Self::File { file, path, as_json } => {
+                let written = if *as_json {
+                    serde_json::to_writer(&mut *file, &sample).map_err(Into::into).and_then(|()| writeln!(file))
+                } else {
+                    writeln!(file, "{}", values(&sample))
+                };
+                written.map_err(|error| Ended::Failed(unwritten(path, &error)))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A pipe has a reader who looks on, too.
+    fn flush(&mut self) -> Result<(), Ended> {
+        match self {
+            Self::File { file, path, .. } => file.flush().map_err(|error| Ended::Failed(unwritten(path, &error))),
+            Self::Shown | Self::Kept => Ok(()),
+        }
+    }
+
+    fn finish(self) -> Result<(), Ended> {
+        let Self::File { file, path, .. } = self else { return Ok(()) };
+        let file = file.into_inner().map_err(|error| Ended::Failed(unwritten(&path, &error.into_error())))?;
+        file.keep().map_err(Ended::Failed)
+    }
+}
+
+const COLUMNS: [Column; 9] =
+    [right(10), right(9), right(9), right(9), right(9), right(9), right(9), right(8), right(8)];
+
+fn line(Sample { tick, row: given, .. }: &Sample) -> String {
+    let pose = given.pose.map(|value| format!("{:.3}", value * 1e6));
+    let largest = |axes: std::ops::Range<usize>| {
+        let ends = given.error[axes].iter().flat_map(|error| [error.least, error.most]);
+        format!(
+            "{:.1}",
+            1e9 * ends.fold(0.0, |largest: f32, end| if end.abs() > largest { end.abs() } else { largest })
+        )
+    };
+    let [x, y, z, rx, ry, rz] = &pose;
+    let mut text = String::new();
+    row(&mut text, &COLUMNS, &[tick, x, y, z, rx, ry, rz, &largest(0..3), &largest(3..6)]);
+    text
+}
+
+/// Names of the columns, with units as in the CSV of a record.
+fn titles() -> String {
+    let mut titles = "tick,time_s,ticks,status,phase".to_owned();
+    let unit = |axis: usize| if axis < 3 { "m" } else { "rad" };
+    for name in ["pose", "target"] {
+        (0..AXES.len()).for_each(|axis| titles += &format!(",{name}[{axis}]_{}", unit(axis)));
+    }
+    for name in ["error", "volts"] {
+        for axis in 0..AXES.len() {
+            let unit = if name == "volts" { "V" } else { unit(axis) };
+            ["least", "mean", "most"].iter().for_each(|which| titles += &format!(",{name}[{axis}]_{which}_{unit}"));
+        }
+    }
+    titles
+}
+
+/// Numbers as the shortest decimals that give the same bits.
+fn values(Sample { tick, time, ticks, row }: &Sample) -> String {
+    let mut values = format!("{tick},{time:.9},{ticks},{},{}", row.status, row.phase);
+    for value in row.pose.iter().chain(&row.target) {
+        values += &format!(",{value:e}");
+    }
+    for spread in row.error.iter().chain(&row.volts) {
+        values += &format!(",{:e},{:e},{:e}", spread.least, spread.mean, spread.most);
+    }
+    values
+}
+
+impl<P: Port> Operator<P> {
+    /// Rows of `every` ticks for so many seconds of the machine's time.
+    pub(super) fn watch(
+        &mut self,
+        every: Option<u32>,
+        seconds: f64,
+        path: Option<&Path>,
+        line: &str,
+        ui: &Ui,
+    ) -> Result<(), Ended> {
+        self.motion().map_err(Ended::Refused)?;
+        let period = self.session.period();
+        // As much as a message of the link counts to.
+        let every = every.unwrap_or((ROW / period).ceil() as u32);
+        let mut sink = Sink::new(path, ui)?;
+        self.session.stream(every).map_err(|error| match error {
+            ClientError::Refused(Refusal::Word { .. }) => Ended::Refused(format!(
+                "rows of {every} ticks are longer than the device makes them: {} at most",
+                specgen_link::samples::MOST_EVERY
+            )),
+            other => other.into(),
+        })?;
+        let file = path.map(|path| path.display().to_string());
+        let mut watched = Watched { every, rows: 0, gaps: Vec::new(), file, kept: Vec::new() };
+        sink.begin(ui);
+        let ticks = (seconds / period).ceil() as u64;
+        let ended = self.take(ticks, &mut watched, &mut sink, ui);
+        // What was seen until then is whole.
+        sink.finish()?;
+        ended?;
+        self.session.stream(0)?;
+        self.note(line, &watched, ui);
+        Ok(())
+    }
+
+    fn take(&mut self, ticks: u64, watched: &mut Watched, sink: &mut Sink, ui: &Ui) -> Result<(), Ended> {
+        let (mut next, mut number, mut end) = (None, 0_u32, None);
+        let mut heard = Instant::now();
+        loop {
+            for block in self.session.take_blocks()? {
+                heard = Instant::now();
+                let Block { number: found, tick, .. } = block;
+                if let Some(from) = next
+                    && tick != from
+                {
+                    let gap = Gap { from, to: tick, blocks: found.wrapping_sub(number) };
+                    sink.gap(&gap, ui);
+                    watched.gaps.push(gap);
+                }
+                let end = *end.get_or_insert(tick.saturating_add(ticks));
+                (next, number) = (Some(block.end()), found.wrapping_add(1));
+                for sample in self.samples(block).take_while(|sample| sample.tick < end) {
+                    watched.rows += 1;
+                    sink.put(sample, &mut watched.kept, ui)?;
+                }
+            }
+            sink.flush()?;
+            if next.zip(end).is_some_and(|(next, end)| next >= end) {
+                return Ok(());
+            }
+            let most = SILENT + Duration::from_secs_f64(f64::from(watched.every) * self.session.period());
+            if heard.elapsed() > most {
+                return Err(Ended::Fault(format!("the machine makes no ticks, and is {}", self.stands())));
+            }
+            self.look()?;
+            self.show(ui);
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    /// The rows of a block, in the session's frame.
+    fn samples(&self, block: Block) -> impl Iterator<Item = Sample> {
+        let (frame, period) = (self.frame, self.session.period());
+        let Block { tick, every, rows, .. } = block;
+        rows.into_iter().enumerate().map(move |(index, mut row)| {
+            row.pose = frame.pose(&row.pose).unwrap_or(row.pose);
+            row.target = frame.pose(&row.target).unwrap_or(row.target);
+            let tick = tick.saturating_add(u64::from(every) * index as u64);
+            Sample { tick, time: tick as f64 * period, ticks: every, row }
+        })
+    }
+}

@@ -1,0 +1,196 @@
+//! Samples for a host that looks on: a tick leaves a copy of what it showed, the background makes rows of the copies.
+
+use controller::limits::DAC;
+use controller::supervised::{Machine, MachineOutput};
+use controller::{LEGS, PLACE_WORDS, Real, passes};
+use specgen_link::Refusal;
+use specgen_link::samples::{AXES, Block, Collector, MOST_EVERY, ROW, ROW_OF_ONE, Sample};
+
+use crate::exchange::Access;
+use crate::words::PERIOD_NANOSECONDS;
+
+/// Copies that may wait: what comes while the background makes a frame of 1 KiB.
+const COPIES: usize = 32;
+/// Blocks: one that is being filled, and two that wait.
+const BLOCKS: usize = 3;
+/// Bits that a byte takes on the line.
+const BITS: u64 = 10;
+/// What the frame of a block of five rows holds besides them, for each of them.
+const FRAME: usize = 8;
+/// Whether there is a pose: six legs have none.
+pub(crate) const POSSIBLE: bool = PLACE_WORDS > 0;
+
+/// What a tick leaves.
+#[derive(Debug, Clone, Copy)]
+struct Copied {
+    tick: u64,
+    status: u32,
+    phase: u8,
+    /// Set-point and pose.
+    shown: [[Real; AXES]; 2],
+    codes: [i32; LEGS],
+}
+
+impl Copied {
+    fn sample(&self) -> Sample {
+        let [target, pose] = self.shown;
+        let (mut error, mut volts) = ([0.0; AXES], [0.0; AXES]);
+        for (slot, (target, pose)) in error.iter_mut().zip(target.iter().zip(&pose)) {
+            *slot = (target - pose) as f32;
+        }
+        for (slot, code) in volts.iter_mut().zip(self.codes) {
+            *slot = DAC.voltage(code) as f32;
+        }
+        let rounded = |values: [Real; AXES]| values.map(|value| value as f32);
+        let Self { tick, status, phase, .. } = *self;
+        Sample { tick, status, phase, pose: rounded(pose), target: rounded(target), error, volts }
+    }
+}
+
+/// Memory for samples, 6 KiB. It need not be initialised.
+#[derive(Debug)]
+pub struct SampleMemory {
+    copies: [Copied; COPIES],
+    rows: Rows,
+}
+
+type Rows = Collector<[Block; BLOCKS]>;
+
+impl Default for SampleMemory {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl SampleMemory {
+    /// Zeros.
+    #[must_use]
+    pub const fn new() -> Self {
+        let nothing = Copied { tick: 0, status: 0, phase: 0, shown: [[0.0; AXES]; 2], codes: [0; LEGS] };
+        Self { copies: [nothing; COPIES], rows: Collector::new([Block::EMPTY; BLOCKS]) }
+    }
+}
+
+/// Samples between tick and background.
+#[derive(Debug)]
+pub(crate) struct Samples {
+    /// Ticks of a row; 0 while nobody looks on.
+    every: u32,
+    /// Rows begin anew; also at power-up, when nothing is known of their memory.
+    anew: bool,
+    /// A ring: the oldest, and how many wait.
+    copies: &'static mut [Copied; COPIES],
+    first: usize,
+    waiting: usize,
+    /// None while the background is at it.
+    rows: Option<&'static mut Rows>,
+    /// Bits a second of the line.
+    baud: u32,
+}
+
+impl Samples {
+    pub(crate) fn new(memory: &'static mut SampleMemory, baud: u32) -> Self {
+        let SampleMemory { copies, rows } = memory;
+        Self { every: 0, anew: true, copies, first: 0, waiting: 0, rows: Some(rows), baud }
+    }
+
+    /// Rows of `every` ticks from here on, none with 0.
+    pub(crate) fn start(&mut self, every: u32) -> Result<(), Refusal> {
+        if every > MOST_EVERY {
+            return Err(Refusal::Word { index: 0 });
+        }
+        if every > 0 && !fits(every, self.baud) {
+            return Err(Refusal::Rate { least: least(self.baud) });
+        }
+        (self.every, self.anew, self.waiting) = (every, true, 0);
+        Ok(())
+    }
+
+    /// Keeps a copy of what a tick showed, if anybody looks on. What finds no room is left out: a gap between ticks.
+    #[inline]
+    pub(crate) fn keep(&mut self, tick: u64, machine: &Machine, output: &MachineOutput) {
+        if self.every > 0 {
+            self.copy(tick, machine, output);
+        }
+    }
+
+    #[inline(never)]
+    fn copy(&mut self, tick: u64, machine: &Machine, output: &MachineOutput) {
+        let Some(shown) = passes::shown(&machine.state).filter(|_| self.waiting < COPIES) else { return };
+        if let Some(slot) = self.copies.get_mut((self.first + self.waiting) % COPIES) {
+            let (status, phase) = (output.tick.status, output.phase.word() as u8);
+            *slot = Copied { tick, status, phase, shown, codes: output.tick.dac_code };
+            self.waiting += 1;
+        }
+    }
+
+    fn pop(&mut self) -> Option<Copied> {
+        self.waiting = self.waiting.checked_sub(1)?;
+        let oldest = self.first;
+        self.first = (oldest + 1) % COPIES;
+        self.copies.get(oldest).copied()
+    }
+}
+
+/// Whether rows of so many ticks take half of the line at most: the rest is for requests.
+fn fits(every: u32, baud: u32) -> bool {
+    let row = if every == 1 { ROW_OF_ONE } else { ROW };
+    // In ns: the time of the bits of a row, twice, and that of its ticks.
+    let line = 2 * BITS * (row + FRAME) as u64 * 1_000_000_000;
+    line <= u64::from(every) * u64::from(PERIOD_NANOSECONDS) * u64::from(baud)
+}
+
+/// The shortest rows of several ticks that fit, unless those of one do.
+fn least(baud: u32) -> u32 {
+    let (mut low, mut high) = (0, MOST_EVERY);
+    while high - low > 1 {
+        let middle = low + (high - low) / 2;
+        if fits(middle, baud) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    high
+}
+
+/// Work of the background, best after each tick: makes rows of what the ticks left. The tick is held off for each copy that is taken.
+pub fn gather(with: &mut Access<'_>) {
+    with_rows(with, |_| {});
+}
+
+/// Brings the rows up to date and does something with them; nothing if another one is at it, whom this one has interrupted.
+pub(crate) fn with_rows(with: &mut Access<'_>, action: impl FnOnce(&mut Rows)) {
+    let mut taken = None;
+    with(&mut |exchange, _| {
+        if let Some(samples) = &mut exchange.samples
+            && (samples.every > 0 || samples.anew)
+        {
+            taken = samples.rows.take();
+        }
+    });
+    let Some(rows) = taken else { return };
+    // No more than a ring of them, so that it ends.
+    for _ in 0..COPIES {
+        let (mut copied, mut anew) = (None, None);
+        with(&mut |exchange, _| {
+            if let Some(samples) = &mut exchange.samples {
+                anew = samples.anew.then_some(samples.every);
+                samples.anew = false;
+                copied = samples.pop();
+            }
+        });
+        if let Some(every) = anew {
+            rows.start(every);
+        }
+        let Some(copied) = copied else { break };
+        rows.add(&copied.sample());
+    }
+    action(rows);
+    let mut rows = Some(rows);
+    with(&mut |exchange, _| {
+        if let Some(samples) = &mut exchange.samples {
+            samples.rows = rows.take();
+        }
+    });
+}
