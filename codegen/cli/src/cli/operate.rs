@@ -7,6 +7,7 @@ pub mod panel;
 mod passes;
 mod platform;
 mod watch;
+mod waves;
 
 use std::io::{BufRead, IsTerminal};
 use std::path::PathBuf;

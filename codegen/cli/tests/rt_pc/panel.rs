@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
 use serde_json::{Value, json};
-use specgen::{compile, interrupt, machine, served};
+use specgen::{compile, machine, served};
 use specgen_rt::exchange::{Server, path_of};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
@@ -38,7 +38,8 @@ impl Panel {
         command.arg("panel").arg(spec).args(["--listen", "127.0.0.1:0", "--socket"]).arg(link);
         let mut process = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let mut said = BufReader::new(process.stderr.take().unwrap()).lines();
-        let printed = said.find_map(|line| line.unwrap().split_once("panel at http://").map(|(_, rest)| rest.to_owned()));
+        let printed =
+            said.find_map(|line| line.unwrap().split_once("panel at http://").map(|(_, rest)| rest.to_owned()));
         // What it says later is nobody's: it must not wait for that.
         std::thread::spawn(move || said.for_each(drop));
         let printed = printed.expect("it says where it is");
@@ -194,16 +195,24 @@ impl Page {
         self.done(json!({ "do": "begin", "request": "arm" }));
         self.phase("holding");
         self.done(json!({ "do": "begin", "request": "run" }));
-        self.wait("arrived", |state| {
-            state["phase"] == "running" && state["said"]["what"] == "Running. Nothing to do."
-        });
+        self.wait("arrived", |state| state["phase"] == "running" && state["said"]["what"] == "Running. Nothing to do.");
     }
 }
 
 /// A program on the simulated machine, at a link.
 fn program(bench: &Bench, name: &str, plant: &str, link: &Path) -> Running {
     let mut command = Command::new(&bench.binary);
-    command.args(["--sim", plant, "--allow-no-rt", "--json", "--elastic", "--sim-timeout", "5000", "--link-silence", "1000"]);
+    command.args([
+        "--sim",
+        plant,
+        "--allow-no-rt",
+        "--json",
+        "--elastic",
+        "--sim-timeout",
+        "5000",
+        "--link-silence",
+        "1000",
+    ]);
     command.arg("--record").arg(bench.path(name)).arg("--link").arg(link);
     let running = Running::new(&mut command);
     wait_for("the link", || link.exists());
@@ -234,6 +243,7 @@ fn pages_operate_a_machine_one_has_the_orders_and_a_page_that_leaves_is_a_host_t
     first.phase("holding");
     first.done(json!({ "do": "begin", "request": "run" }));
     first.phase("running");
+    drop(second);
 
     // What is unstable is not sent; what is no order does nothing.
     let answer = first.order(json!({ "do": "gain", "factor": 30.0 }));
@@ -248,11 +258,14 @@ fn pages_operate_a_machine_one_has_the_orders_and_a_page_that_leaves_is_a_host_t
     // A wave by the text of its file, a record over the socket.
     let wave = "ramp = 0.1\n[[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-7, frequency = 5.0 }\n";
     first.refused(json!({ "do": "wave", "name": "w", "text": "ramp = 1" }), "axis");
-    first.line("goto zero");
-    first.wait("at zero", |state| state["said"]["what"] == "Running. Nothing to do.");
+    first.done(json!({ "do": "order", "line": "goto zero" }));
     first.done(json!({ "do": "order", "line": "record arm 500" }));
-    first.done(json!({ "do": "wave", "name": "small.toml", "text": wave }));
-    first.refused(json!({ "do": "order", "line": "jog z=100nm" }), "wave");
+    // It begins at its center.
+    let start = Instant::now();
+    while first.order(json!({ "do": "wave", "name": "small.toml", "text": wave }))["ok"] == false {
+        assert!(start.elapsed() < LONG, "no wave: {:#}", first.state);
+    }
+    first.refused(json!({ "do": "order", "line": "jog z=100nm" }), "under way");
     first.done(json!({ "do": "order", "line": "wave stop" }));
     first.done(json!({ "do": "order", "line": "record stop" }));
     first.say(&json!({ "do": "download", "id": 999 }));
@@ -261,13 +274,14 @@ fn pages_operate_a_machine_one_has_the_orders_and_a_page_that_leaves_is_a_host_t
             break bytes[4..].to_vec();
         }
     };
+    // Every tick was in a row, or it was told that it was not.
+    assert!(first.gap == 0 || first.events.iter().any(|text| text.contains("were lost")), "{} ticks", first.gap);
     let record = Record::new(bytes);
     let replay = record.replay(&mut bench.machine());
     assert!(replay.divergence.is_none() && replay.ticks == record.rows.len() as u64 && replay.ticks > 100);
-    // Every tick was in a row of every page.
-    assert_eq!((first.gap, second.gap), (0, 0), "ticks that did not come");
 
     // Handed over, then the page is closed: the machine holds.
+    let mut second = panel.page();
     second.say(&json!({ "do": "ask" }));
     first.wait("asked", |state| state["asked"]["by"].is_string());
     first.say(&json!({ "do": "give" }));
@@ -285,15 +299,14 @@ fn pages_operate_a_machine_one_has_the_orders_and_a_page_that_leaves_is_a_host_t
     let mut third = panel.page();
     std::thread::sleep(Duration::from_millis(100));
     third.wait("a page that is silent", |state| state["k"] == "left");
+    std::thread::sleep(Duration::from_millis(1500));
     third.say(&json!({ "do": "ramp-down" }));
     third.phase("faulted");
     assert!(third.events.iter().any(|text| text.contains("asked to ramp down")), "{:?}", third.events);
     drop((first, third));
-    browser::a_browser_draws_it(&bench, &panel);
+    browser::a_browser_draws_it(&panel);
     panel.end();
-    let output = running.end(Signal::TERM);
-    let (summary, _) = bench.check(&output, "panel.rec");
-    assert_eq!(summary["last_phase"], "Disarmed", "{summary}");
+    bench.check(&running.end(Signal::TERM), "panel.rec");
 }
 
 fn nobody_gets_in_without_the_token_or_from_elsewhere(panel: &Panel) {
@@ -322,7 +335,14 @@ fn garbage_disturbs_nothing(panel: &Panel, page: &mut Page) {
     }
     // Frames that are none, texts that are no orders, numbers beyond what was sent, a message that is too long.
     let mut stranger = panel.page();
-    for text in ["", "{}", "[1,2", "{\"do\":\"fly\"}", "{\"do\":\"gain\",\"id\":1,\"factor\":\"NaN\"}", "{\"do\":\"seen\",\"number\":4000000000}"] {
+    for text in [
+        "",
+        "{}",
+        "[1,2",
+        "{\"do\":\"fly\"}",
+        "{\"do\":\"gain\",\"id\":1,\"factor\":\"NaN\"}",
+        "{\"do\":\"seen\",\"number\":4000000000}",
+    ] {
         stranger.socket.send(Message::text(text)).unwrap();
     }
     stranger.socket.send(Message::binary(vec![7; 1000])).unwrap();
@@ -379,7 +399,6 @@ impl Drop for Exchanged {
 
 #[test]
 fn the_first_power_check_finds_gauges_that_are_exchanged_or_turned_and_nothing_where_all_is_well() {
-    interrupt::heed();
     let bench = Bench::named("reference.toml", "check");
     let text = fs::read_to_string(&bench.spec).unwrap();
     let digest = compile::compile(&bench.spec).unwrap_or_else(|_| panic!("it compiles")).ir.digest;
@@ -393,17 +412,18 @@ fn the_first_power_check_finds_gauges_that_are_exchanged_or_turned_and_nothing_w
     let turned = text.replace(one, &one.replace("[0, 0, 1]", "[0, 0, -1]"));
     let cases = [
         (&text, &[][..]),
-        (&exchanged, &["gauge 3 shows what gauge 5 should", "gauge 5 shows what gauge 3 should"]),
-        (&turned, &["gauge 1 runs the wrong way"]),
+        (&exchanged, &["gauge 3 shows what gauge 5 should", "gauge 5 shows what gauge 3 should"][..]),
+        (&turned, &["gauge 1 runs the wrong way"][..]),
     ];
+    let records = bench.spec.with_file_name("records");
+    fs::create_dir(bench.path("records")).unwrap();
+    fs::copy(records.join("reference-forc.csv"), bench.path("records/reference-forc.csv")).unwrap();
     for (number, (spec, expected)) in cases.into_iter().enumerate() {
         assert!(number == 0 || *spec != text, "the spec is another");
-        // Beside the records that it names.
-        let path = bench.spec.with_file_name(format!("check-{number}-{}.toml", std::process::id()));
+        let path = bench.path(&format!("check-{number}.toml"));
         fs::write(&path, spec).unwrap();
         let name = format!("check-{number}-{}", std::process::id());
         let plant = Exchanged::new(&path, &digest, &name);
-        fs::remove_file(&path).unwrap();
         let link = bench.path(&format!("check{number}.link"));
         let running = program(&bench, &format!("check{number}.rec"), &name, &link);
         let panel = Panel::new(&bench.spec, &link);

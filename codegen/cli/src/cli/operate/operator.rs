@@ -15,13 +15,14 @@ use specgen_runtime::supervisor::{Phase, Request};
 use super::answer::{Answer, Downloaded, MachineStatus, Moves, Plain, RecorderState, Settings};
 use super::health::Standing;
 use super::platform::{ZERO, in_words};
+use super::waves::waving;
 use crate::cli::file::{check_place, write_file};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
 use specgen_language::model::Model;
 use specgen_operate::frame::Frame;
 use specgen_operate::place::meant;
-use specgen_operate::{Order, Session, Until, read_wave, refused_wave};
+use specgen_operate::{Order, Session, Until};
 
 /// How long ramping down may take.
 const DOWN: Duration = Duration::from_secs(60);
@@ -396,8 +397,7 @@ impl<P: Port> Operator<P> {
                 std::thread::sleep(self.session.due());
             }
             // The hook has said where.
-            work.join()
-                .map_err(|_| Ended::Failed(Failure::Environment("the compiler of specs failed".to_owned())))
+            work.join().map_err(|_| Ended::Failed(Failure::Environment("the compiler of specs failed".to_owned())))
         })
     }
 
@@ -453,36 +453,6 @@ impl<P: Port> Operator<P> {
         Ok(Downloaded { file: path.display().to_string(), bytes: bytes.len() })
     }
 
-    fn wave_of(&self, path: &Path) -> Result<(Vec<u64>, [u64; 6]), String> {
-        let name = path.display();
-        let text = std::fs::read_to_string(path).map_err(|error| format!("could not read `{name}`: {error}"))?;
-        self.wave_of_text(&text).map_err(|error| format!("{name}: {error}"))
-    }
-
-    /// Words and center of a wave as its file says it.
-    pub(super) fn wave_of_text(&self, text: &str) -> Result<(Vec<u64>, [u64; 6]), String> {
-        let single = self.session.description().scalar.bits() == 32;
-        read_wave(text, self.session.period(), single).map_err(|error| error.trim_end().to_owned())
-    }
-
-    fn wave(&mut self, path: &Path) -> Result<(), Ended> {
-        let (words, center) = self.wave_of(path).map_err(Ended::Refused)?;
-        self.start_wave(&path.display().to_string(), &words, &center)
-    }
-
-    /// Starts a wave of this name.
-    pub(super) fn start_wave(&mut self, name: &str, words: &[u64], center: &[u64; 6]) -> Result<(), Ended> {
-        self.ordered = true;
-        self.session.start_wave(words, center).map_err(|error| match error {
-            ClientError::Refused(Refusal::Word { index }) => Ended::Refused(format!("{name}: {}", refused_wave(index))),
-            ClientError::Refused(Refusal::State) => Ended::Refused(format!(
-                "{name}: not now; the machine must be running and stand at the wave's center, with no wave or move under way: {}",
-                self.stands()
-            )),
-            other => other.into(),
-        })
-    }
-
     /// Ramps down and waits until the amplifiers are off; what came of it.
     pub fn ramp_down(&mut self, ui: &Ui) -> Result<String, ClientError> {
         ui.progress("ramping down");
@@ -499,16 +469,6 @@ impl<P: Port> Operator<P> {
             std::thread::sleep(self.session.due());
         }
         Ok(format!("the machine is still {} after {} s", self.stands(), DOWN.as_secs()))
-    }
-}
-
-/// Why set-points are refused while a wave makes them.
-fn waving(error: ClientError) -> Ended {
-    match error {
-        ClientError::Refused(Refusal::State) => {
-            Ended::Refused("not while a wave is under way or a host steps the machine; `wave stop` first".to_owned())
-        }
-        other => other.into(),
     }
 }
 

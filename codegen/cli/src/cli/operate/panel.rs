@@ -12,6 +12,7 @@ mod check;
 mod feed;
 mod hall;
 mod http;
+mod orders;
 mod said;
 
 use std::cell::RefCell;
@@ -26,19 +27,19 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use specgen_compiler::compile::Compiled;
 use specgen_language::interrupt;
+use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
-use specgen_link::{RecorderAction, Refusal};
+use specgen_operate::Session;
 use specgen_operate::samples::Block;
-use specgen_operate::{ALIVE, Order, Session};
 use specgen_runtime::supervisor::{Phase, Request};
-use tungstenite::Message;
 
 use super::operator::Pulse;
 use super::{Ended, Operator, mistake};
 use crate::cli::line::Line;
 use crate::cli::spec;
 use crate::cli::ui::{Failure, Outcome, Ui};
-use hall::{Asked, Begin, Hall, now};
+use hall::{Hall, now};
+use orders::{ask, begin, carry_out, question};
 
 /// Between two messages with samples.
 const FRAME: Duration = Duration::from_millis(50);
@@ -52,12 +53,8 @@ const QUESTION: Duration = Duration::from_secs(1);
 const LATE: Duration = Duration::from_secs(60);
 /// Rows a second that are asked for, at most.
 const ROWS: f64 = 2000.0;
-/// How long a request that is to begin to be given is not given before.
-const BEFORE: u64 = 10;
 /// Longer than any ramp after a host was gone, s.
 const RAMPED: f64 = 5.0;
-/// Kind of a message with a record.
-const RECORD: u32 = 2;
 
 /// Arguments of `panel`.
 #[derive(Args, Debug)]
@@ -129,7 +126,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         _ => address,
     };
     if !address.ip().is_loopback() {
-        ui.progress("warning: whoever reaches this address and knows the token can move the machine; nothing is encrypted");
+        ui.progress(
+            "warning: whoever reaches this address and knows the token can move the machine; nothing is encrypted",
+        );
     }
     ui.progress(&format!("{name}: panel at http://{shown}/?token={}", guard.token()));
     ui.progress("Ctrl-C ramps down and ends");
@@ -170,7 +169,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         _ if operator.is_powered() => operator.ramp_down(ui).map_err(lost),
         _ => Ok(operator.stands()),
     };
-    let why = left.as_ref().map_or_else(|_| "The link to the machine broke.".to_owned(), |_| "The panel was ended.".to_owned());
+    let why = left
+        .as_ref()
+        .map_or_else(|_| "The link to the machine broke.".to_owned(), |_| "The panel was ended.".to_owned());
     panel.borrow_mut().hall.publish(&json!({ "k": "end", "why": why }));
     // The threads of the pages send it.
     std::thread::sleep(FRAME);
@@ -236,131 +237,6 @@ fn round<P: Port + 'static>(
         panel.borrow_mut().known = known;
     }
     Ok(())
-}
-
-/// The answer to an order as `operate` gives it.
-fn ask<P: Port>(operator: &mut Operator<P>, order: &Order, quiet: &Ui) -> Result<Value, Ended> {
-    operator.answers.clear();
-    operator.obey(order, quiet)?;
-    Ok(operator.answers.pop().map_or(Value::Null, |answer| answer.answer))
-}
-
-/// What it noticed, what each axis can still do, recorder and gains. What a device does not have is nothing.
-fn question<P: Port>(operator: &mut Operator<P>, quiet: &mut Ui) -> Result<Value, Ended> {
-    let mut known = json!({});
-    let orders = [
-        ("standing", Order::Status),
-        ("reach", Order::Limits),
-        ("recorder", Order::Record(RecorderAction::Look)),
-        ("gains", Order::Gains(Vec::new())),
-    ];
-    for (key, order) in orders {
-        let answer = ask(operator, &order, quiet);
-        match answer {
-            Ok(value) => known[key] = value,
-            Err(ended) => {
-                mistake(Err(ended), quiet)?;
-            }
-        }
-    }
-    Ok(known)
-}
-
-fn carry_out<P: Port + 'static>(
-    operator: &mut Operator<P>,
-    panel: &Rc<RefCell<Panel>>,
-    page: u64,
-    order: &Asked,
-    quiet: &Ui,
-) -> Result<Value, Ended> {
-    match order {
-        Asked::Order { line, .. } => {
-            let order = Order::parse(line).map_err(Ended::Refused)?;
-            let order = order.ok_or_else(|| Ended::Refused("an order is expected".to_owned()))?;
-            if !is_for_pages(&order) {
-                return Err(Ended::Refused(format!("`{line}` is not for a page: it reads or writes files, waits, or ends the program")));
-            }
-            if matches!(order, Order::StopWave) {
-                panel.borrow_mut().wave = Value::Null;
-            }
-            let what = format!("Page {page}: {line}.");
-            let value = ask(operator, &order, quiet)?;
-            panel.borrow_mut().hall.note("note", &what, "", None);
-            Ok(value)
-        }
-        Asked::Begin { request, .. } => {
-            let (request, what) = match request {
-                Begin::Arm => (Request::Arm, "arm"),
-                Begin::Run => (Request::Run, "run"),
-                Begin::Acknowledge => (Request::Acknowledge, "acknowledge"),
-            };
-            begin(operator, request)?;
-            panel.borrow_mut().hall.note("note", &format!("Page {page} asked to {what}."), "", None);
-            Ok(Value::Null)
-        }
-        Asked::Wave { name, text, .. } => {
-            let (words, center) = operator.wave_of_text(text).map_err(Ended::Refused)?;
-            operator.start_wave(name, &words, &center)?;
-            let mut panel = panel.borrow_mut();
-            panel.wave = json!({ "name": name, "tick": operator.status().tick });
-            panel.hall.note("note", &format!("Page {page} started the wave {name}."), "", None);
-            Ok(Value::Null)
-        }
-        Asked::Gain { factor, .. } => {
-            let gains = panel.borrow().gains(operator, *factor).map_err(Ended::Refused)?;
-            let value = ask(operator, &Order::Gains(gains), quiet)?;
-            panel.borrow_mut().hall.note("note", &format!("Page {page} set all gains to {factor} of the spec's."), "", None);
-            Ok(value)
-        }
-        Asked::Download { .. } => {
-            let record = operator.record()?;
-            let mut bytes = RECORD.to_le_bytes().to_vec();
-            bytes.extend(&record);
-            panel.borrow().hall.tell(page, Message::binary(bytes));
-            Ok(json!(record.len()))
-        }
-        Asked::Check { .. } => {
-            panel.borrow_mut().hall.note("note", &format!("Page {page} began the first-power check."), "", None);
-            let checked = check::run(operator, panel, quiet);
-            panel.borrow_mut().check["runs"] = json!(false);
-            checked
-        }
-        _ => Ok(Value::Null),
-    }
-}
-
-/// Asks for what counts when it begins to be given.
-fn begin<P: Port>(operator: &mut Operator<P>, request: Request) -> Result<(), Ended> {
-    operator.ordered = true;
-    operator.session.supervise(Request::None)?;
-    let (sent, since) = (operator.status().tick, Instant::now());
-    // A machine without ticks is asked all the same.
-    while operator.status().tick < sent + BEFORE && since.elapsed() < ALIVE {
-        std::thread::sleep(Duration::from_millis(1));
-        operator.look()?;
-    }
-    operator.session.supervise(request)?;
-    operator.look()
-}
-
-/// What a page may order by a line.
-fn is_for_pages(order: &Order) -> bool {
-    match order {
-        Order::Ask(request) => matches!(request, Request::None | Request::Arm | Request::Run | Request::Acknowledge),
-        Order::Play { correction, .. } => correction.is_none(),
-        Order::Status
-        | Order::Where
-        | Order::Limits
-        | Order::CanIGo { .. }
-        | Order::Move { .. }
-        | Order::Goto(_)
-        | Order::Mark(_)
-        | Order::Mode(_)
-        | Order::Gains(_)
-        | Order::Record(_)
-        | Order::StopWave => true,
-        _ => false,
-    }
 }
 
 /// What is done at every look.
@@ -451,7 +327,12 @@ impl Panel {
         if self.lost.0 > 0 && self.lost.1.elapsed() >= QUESTION {
             let seconds = self.lost.0 as f64 * session.period();
             self.lost = (0, Instant::now());
-            self.hall.note("warning", &format!("{seconds:.3} s of samples were lost on the way from the machine."), "", None);
+            self.hall.note(
+                "warning",
+                &format!("{seconds:.3} s of samples were lost on the way from the machine."),
+                "",
+                None,
+            );
         }
         if self.framed.elapsed() >= FRAME && !self.blocks.is_empty() {
             self.framed = Instant::now();
@@ -470,7 +351,12 @@ impl Panel {
         let said = said::stands(status, &self.compiled.ir.supervision, &self.compiled.model);
         if let Some(before) = self.told.replace(told) {
             if (before.0, before.1) != (told.0, told.1) {
-                self.hall.note(if said.kind == "ok" { "note" } else { said.kind }, &said.what, said.advice, said.code.as_deref());
+                self.hall.note(
+                    if said.kind == "ok" { "note" } else { said.kind },
+                    &said.what,
+                    said.advice,
+                    said.code.as_deref(),
+                );
                 if u64::from(told.0) != Phase::Running.word() {
                     self.wave = Value::Null;
                 }
@@ -480,7 +366,11 @@ impl Panel {
                 let late = std::mem::take(&mut self.late.0);
                 let again = self.late.1.replace(Instant::now()).is_some();
                 let s = if late == 1 { "" } else { "s" };
-                let advice = if again { "Look at the load of the controller's computer." } else { "Nothing, unless it comes back." };
+                let advice = if again {
+                    "Look at the load of the controller's computer."
+                } else {
+                    "Nothing, unless it comes back."
+                };
                 self.hall.note("warning", &format!("{late} late tick{s}."), advice, None);
             }
         }

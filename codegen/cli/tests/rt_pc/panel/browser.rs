@@ -10,7 +10,6 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
 
-use super::super::Bench;
 use super::{LONG, Panel};
 use crate::support;
 
@@ -32,7 +31,13 @@ impl Window {
         let profile = tempfile::tempdir().unwrap();
         let start = |program: &str| {
             let mut command = Command::new(program);
-            command.args(["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking"]);
+            command.args([
+                "--headless",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--no-first-run",
+                "--disable-background-networking",
+            ]);
             command.args(["--disable-component-update", "--disable-sync", "--remote-debugging-port=0", "about:blank"]);
             command.arg(format!("--user-data-dir={}", profile.path().display()));
             command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().ok()
@@ -162,7 +167,7 @@ fn decoded(text: &str) -> Vec<u8> {
 }
 
 /// Machine faulted, then running, moving, watched.
-pub fn a_browser_draws_it(_bench: &Bench, panel: &Panel) {
+pub fn a_browser_draws_it(panel: &Panel) {
     let chip = |phase: &str| format!("document.getElementById('chip').textContent === '{phase}'");
     let Some(mut page) = Window::open(&panel.url(), true) else {
         return support::skipped("no chromium: the panel is not drawn");
@@ -205,7 +210,8 @@ pub fn a_browser_draws_it(_bench: &Bench, panel: &Panel) {
     other.wait("document.getElementById('events').textContent.split('jog y=100nm').length > 2");
     other.picture("moving-light");
     for window in [&mut page, &mut other] {
-        let [mean, most] = ["shownMean", "shownMost"].map(|key| window.value(&format!("document.documentElement.dataset.{key}")));
+        let [mean, most] =
+            ["shownMean", "shownMost"].map(|key| window.value(&format!("document.documentElement.dataset.{key}")));
         println!("from the panel to the screen: {mean} ms in the mean, {most} ms at most");
     }
     // Key Esc ramps down from the page that looks.

@@ -91,8 +91,7 @@ fn talk(stream: TcpStream, page: u64, heard: &SyncSender<Heard>) -> Result<(), E
     let config = WebSocketConfig::default().max_message_size(Some(LARGEST)).max_frame_size(Some(LARGEST));
     let mut socket = WebSocket::from_raw_socket(stream, Role::Server, Some(config));
     loop {
-        let mut files =
-            [PollFd::new(socket.get_ref(), PollFlags::IN), PollFd::new(&woken, PollFlags::IN)];
+        let mut files = [PollFd::new(socket.get_ref(), PollFlags::IN), PollFd::new(&woken, PollFlags::IN)];
         // A signal ends it early: there is a next round.
         let _ = poll(&mut files, Some(&IDLE));
         drain(&woken);

@@ -74,7 +74,9 @@ pub(super) fn run<P: Port + 'static>(
         (expected, jacobian, inverse)
     };
     if u64::from(operator.phase()) != Phase::Holding.word() {
-        return Err(no("the check begins with a machine that was armed and holds at rest: ramp down if it is not, then arm"));
+        return Err(no(
+            "the check begins with a machine that was armed and holds at rest: ramp down if it is not, then arm",
+        ));
     }
     let mode = panel.borrow().known["gains"]["mode"].as_str().map(str::to_owned);
     let mode = mode.and_then(|mode| Order::parse(&format!("mode {mode}")).ok().flatten());
@@ -93,8 +95,11 @@ pub(super) fn run<P: Port + 'static>(
         ask(operator, &mode, quiet)?;
     }
     let verdict = judge(&expected, &measured?);
-    let (kind, advice) =
-        if verdict.good { ("note", "") } else { ("error", "Ramp down, and mend what the check says before the loop is closed.") };
+    let (kind, advice) = if verdict.good {
+        ("note", "")
+    } else {
+        ("error", "Ramp down, and mend what the check says before the loop is closed.")
+    };
     let mut panel = panel.borrow_mut();
     panel.hall.note(kind, &format!("First-power check: {}", verdict.what), advice, None);
     panel.check = json!({ "runs": false, "verdict": verdict });
@@ -217,7 +222,8 @@ fn matched(expected: &Matrix, measured: &Matrix) -> ([(usize, f64); 6], f64) {
         let gain = |which: usize| dot(row, &expected[which]) / dot(&expected[which], &expected[which]);
         // What is explained of the row's power; its own place first, where that is as good.
         let explained = |which: usize| gain(which) * dot(row, &expected[which]);
-        let best = (0..6).fold(index, |best, which| if explained(which) > 1.02 * explained(best) { which } else { best });
+        let best =
+            (0..6).fold(index, |best, which| if explained(which) > 1.02 * explained(best) { which } else { best });
         left += dot(row, row) - explained(best);
         (best, gain(best))
     });
@@ -308,11 +314,20 @@ fn unexplained(expected: &Matrix, measured: &Matrix) -> Verdict {
         let gain = dot(&seen[leg], &wanted[leg]) / dot(&wanted[leg], &wanted[leg]);
         let left = dot(&seen[leg], &seen[leg]) - gain * dot(&seen[leg], &wanted[leg]);
         let good = left <= LEFT * dot(&seen[leg], &seen[leg]) && !is_off(gain);
-        let what = if good { format!("leg {leg} is as the spec says") } else { format!("leg {leg} moves otherwise than it should") };
-        let mend = if good { "" } else { "Check joints and gauges of the spec against the machine, and what is bolted where." };
+        let what = if good {
+            format!("leg {leg} is as the spec says")
+        } else {
+            format!("leg {leg} moves otherwise than it should")
+        };
+        let mend = if good {
+            ""
+        } else {
+            "Check joints and gauges of the spec against the machine, and what is bolted where."
+        };
         Found { good, gain, what, mend: mend.to_owned() }
     });
-    let what = "what the gauges show is neither gauges nor legs exchanged: more than one kind of thing is wrong.".to_owned();
+    let what =
+        "what the gauges show is neither gauges nor legs exchanged: more than one kind of thing is wrong.".to_owned();
     Verdict { good: false, what, legs: legs.collect(), gauges: Vec::new() }
 }
 
@@ -360,7 +375,10 @@ mod tests {
             assert_eq!(bad(&judge(&expected, &dead)), [format!("gauge {one} does not move")]);
             let mut shortens = transposed(&good);
             shortens[one] = shortens[one].map(|value| -value);
-            assert_eq!(bad(&judge(&expected, &transposed(&shortens))), [format!("leg {one} shortens with its voltage")]);
+            assert_eq!(
+                bad(&judge(&expected, &transposed(&shortens))),
+                [format!("leg {one} shortens with its voltage")]
+            );
             for other in one + 1..6 {
                 let mut exchanged = good;
                 exchanged.swap(one, other);

@@ -29,7 +29,9 @@ const EVENTS: usize = 100;
 #[serde(tag = "do", rename_all = "kebab-case")]
 pub enum Asked {
     /// It has shown the samples up to this message: it is there.
-    Seen { number: u32 },
+    Seen {
+        number: u32,
+    },
     RampDown,
     Hold,
     /// The orders, or an answer to one who asks for them.
@@ -38,15 +40,32 @@ pub enum Asked {
     Give,
     Keep,
     /// A line as `specgen operate` takes it.
-    Order { id: u32, line: String },
+    Order {
+        id: u32,
+        line: String,
+    },
     /// A request to the supervisor that is to begin to be given.
-    Begin { id: u32, request: Begin },
-    Wave { id: u32, name: String, text: String },
+    Begin {
+        id: u32,
+        request: Begin,
+    },
+    Wave {
+        id: u32,
+        name: String,
+        text: String,
+    },
     /// All gains by this factor of the spec's.
-    Gain { id: u32, factor: f64 },
-    Download { id: u32 },
+    Gain {
+        id: u32,
+        factor: f64,
+    },
+    Download {
+        id: u32,
+    },
     /// The first-power check.
-    Check { id: u32 },
+    Check {
+        id: u32,
+    },
     EndCheck,
 }
 
@@ -282,8 +301,10 @@ impl Hall {
             state["you"] = json!(name(page.number));
             state["holder"] = json!(self.holder.map(name));
             state["mine"] = json!(self.holder == Some(page.number));
-            state["asked"] =
-                json!(self.asked.map(|(asks, since)| json!({ "by": name(asks), "mine": asks == page.number, "left": left(since) })));
+            state["asked"] = json!(
+                self.asked
+                    .map(|(asks, since)| json!({ "by": name(asks), "mine": asks == page.number, "left": left(since) }))
+            );
             state["offered"] = json!(self.offered.map(left));
             state["pages"] = json!(self.pages.len());
             state["left_out"] = json!(page.left_out);

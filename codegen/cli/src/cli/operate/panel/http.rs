@@ -97,15 +97,22 @@ impl Guard {
         }
         // A name that somebody else's server gave this address would let that server's page in.
         if !field("host").is_some_and(|host| self.is_here(host)) {
-            return Asked::No("421 Misdirected Request", "open the panel by the address that it printed, not by a name\n");
+            return Asked::No(
+                "421 Misdirected Request",
+                "open the panel by the address that it printed, not by a name\n",
+            );
         }
-        let (path, query) = request.path.and_then(|path| path.split_once('?')).unwrap_or((request.path.unwrap_or(""), ""));
+        let (path, query) =
+            request.path.and_then(|path| path.split_once('?')).unwrap_or((request.path.unwrap_or(""), ""));
         if !matches!(path, "/" | "/socket") {
             return Asked::No("404 Not Found", "the panel is one page: /\n");
         }
         let token = query.split('&').find_map(|part| part.strip_prefix("token=")).unwrap_or("");
         if !is_same(token, &self.token) {
-            return Asked::No("403 Forbidden", "the token is missing or wrong: open the address that `specgen panel` printed\n");
+            return Asked::No(
+                "403 Forbidden",
+                "the token is missing or wrong: open the address that `specgen panel` printed\n",
+            );
         }
         if path == "/" {
             return Asked::Page;
@@ -173,7 +180,8 @@ mod tests {
         assert!(refused(get("/x?token=00ff", "Host: localhost:8000\r\n"), "404"));
         assert!(refused(guard.asked(b"POST / HTTP/1.1\r\n\r\n"), "405"));
         assert!(refused(guard.asked(b"\x00\x01\r\n\r\n"), "400"));
-        let socket = "Host: localhost:8000\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: abc\r\n";
+        let socket =
+            "Host: localhost:8000\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: abc\r\n";
         let with = |origin: &str| get("/socket?token=00ff", &format!("{socket}Origin: {origin}\r\n"));
         assert_eq!(with("http://localhost:8000"), Asked::Socket("abc".to_owned()));
         for origin in ["http://evil.example", "null", "https://localhost:8000", "http://127.0.0.1:8000"] {
