@@ -131,6 +131,11 @@
   function draw() {
     const now = performance.now(), live = row && now - arrived < STALE && !left;
     const error = live ? NAMES.map((_, k) => row.values[13 + 3 * k]) : null, volts = live ? NAMES.map((_, k) => row.values[31 + 3 * k]) : null;
+    // First, for it asks how wide it is, which is known as long as nothing else has changed.
+    if (standing && live && standing.every(isFinite)) {
+      facts.view.pose = standing.map(v => v * larger);
+      view.draw();
+    }
     if (now - digits >= DIGITS || !live) {
       digits = now;
       shownDigits(error);
@@ -140,10 +145,6 @@
     legs.draw(live ? shown5.volts || volts : null);
     if (now - shown5.at >= DIGITS) Object.assign(shown5, { at: now, error, volts });
     if (!live) Object.assign(shown5, { error: null, volts: null });
-    if (standing && live && standing.every(isFinite)) {
-      facts.view.pose = standing.map(v => v * larger);
-      view.draw();
-    }
     if (now - spectra >= SPECTRUM) {
       spectra = now;
       const law = row && row.phase === 2;

@@ -86,8 +86,8 @@ class Spectrum {
     });
   }
 
-  // Three decades and what is left of the uppermost.
-  limits(most) { const top = Math.ceil(Math.log10(Math.max(...most, 1e-9)) * 2) / 2; return [Math.pow(10, top - 3.5), Math.pow(10, top)]; }
+  // Two and a half decades.
+  limits(most) { const top = Math.ceil(Math.log10(Math.max(...most, 1e-9)) * 2) / 2; return [Math.pow(10, top - 2.5), Math.pow(10, top)]; }
 
   draw(name, now) {
     const found = this.density();
