@@ -434,7 +434,9 @@ fn the_first_power_check_finds_gauges_that_are_exchanged_or_turned_and_nothing_w
         page.done(json!({ "do": "begin", "request": "arm" }));
         page.phase("holding");
         page.wait("the mode", |state| state["known"]["gains"]["mode"].is_string());
-        let verdict = page.done(json!({ "do": "check" }));
+        let answer = page.order(json!({ "do": "check" }));
+        assert_eq!(answer["ok"], true, "{number}: {answer}");
+        let verdict = answer["value"].clone();
         let lists = ["legs", "gauges"].map(|key| verdict[key].as_array().unwrap().clone());
         let found = lists.iter().flatten().filter(|one| one["good"] == false);
         let found: Vec<&str> = found.map(|one| one["what"].as_str().unwrap()).collect();

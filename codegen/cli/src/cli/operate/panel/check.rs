@@ -137,8 +137,8 @@ fn measure<P: Port + 'static>(
         }
         looked(operator, panel)?;
     }
-    // A stop on the way to the bias, and on from there without moving.
-    begin(operator, Request::Hold)?;
+    // A stop on the way to the bias, at once: further up a gauge that is turned shows a platform that is astray. Then on without moving.
+    operator.session.supervise(Request::Hold)?;
     operator.wait(Until::Phase(Phase::Holding), PATIENCE, quiet)?;
     begin(operator, Request::Run)?;
     operator.wait(Until::Phase(Phase::Running), PATIENCE, quiet)?;
