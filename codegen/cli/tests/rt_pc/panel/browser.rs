@@ -96,18 +96,23 @@ impl Window {
         }
     }
 
+    fn evaluated(&mut self, expression: &str) -> Value {
+        let asked = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
+        self.ask("Runtime.evaluate", asked)
+    }
+
     /// The value of an expression.
     fn value(&mut self, expression: &str) -> Value {
-        let asked = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
-        let result = self.ask("Runtime.evaluate", asked);
+        let result = self.evaluated(expression);
         assert!(result["exceptionDetails"].is_null(), "{expression}: {result}");
         result["result"]["value"].clone()
     }
 
+    /// Until it is so; a page that is not there yet has nothing to ask for.
     #[track_caller]
     fn wait(&mut self, condition: &str) {
         let start = Instant::now();
-        while self.value(condition) != true {
+        while self.evaluated(condition)["result"]["value"] != true {
             let text = self.value("document.body ? document.body.innerText : ''");
             assert!(start.elapsed() < LONG, "{condition}: {text}");
             std::thread::sleep(Duration::from_millis(50));
