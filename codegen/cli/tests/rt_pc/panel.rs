@@ -40,8 +40,8 @@ impl Panel {
         let mut said = BufReader::new(process.stderr.take().unwrap()).lines();
         let printed =
             said.find_map(|line| line.unwrap().split_once("panel at http://").map(|(_, rest)| rest.to_owned()));
-        // What it says later is nobody's: it must not wait for that.
-        std::thread::spawn(move || said.for_each(drop));
+        // What it says later it must not wait for.
+        std::thread::spawn(move || said.map_while(Result::ok).for_each(|line| println!("panel: {line}")));
         let printed = printed.expect("it says where it is");
         let (address, token) = printed.split_once("/?token=").unwrap();
         Self { process: Some(process), address: address.to_owned(), token: token.to_owned() }
