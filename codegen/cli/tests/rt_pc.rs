@@ -24,6 +24,7 @@ mod clients;
 mod gcs;
 mod host;
 mod learning;
+mod panel;
 mod samples;
 use host::{Host, Record};
 
@@ -63,7 +64,17 @@ impl Bench {
         Self::of(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs").join(spec))
     }
 
+    /// Of a spec of this repository, its machine under a name of its own.
+    fn named(spec: &str, name: &str) -> Self {
+        Self::with(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs").join(spec), name)
+    }
+
     fn of(spec_file: &Path) -> Self {
+        let name = spec_file.file_stem().unwrap().to_str().unwrap();
+        Self::with(spec_file, name)
+    }
+
+    fn with(spec_file: &Path, name: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let spec_file = spec_file.to_owned();
         let spec = spec_file.file_name().unwrap().to_str().unwrap();
@@ -96,7 +107,7 @@ impl Bench {
         fs::copy(kept.join("release/rt-pc"), &binary).unwrap();
         let library = target::host::build_library(&root, &root.join("target")).unwrap();
         drop(one);
-        let name = format!("test-{}-{}", spec.trim_end_matches(".toml"), std::process::id());
+        let name = format!("test-{name}-{}", std::process::id());
         // Under real-time priority where that is granted: other tests want the processors too.
         let plant = |more: &[&str]| {
             let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));

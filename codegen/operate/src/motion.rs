@@ -118,7 +118,8 @@ impl Motion {
     }
 
     /// Pose of the platform from rest, in or out of its workspace; none if an angle is beyond what is meant.
-    fn platform(&self, user: &[f64; 6]) -> Option<[f64; 6]> {
+    #[must_use]
+    pub fn platform(&self, user: &[f64; 6]) -> Option<[f64; 6]> {
         let target = Target::at(*user);
         let moved = match &self.frames {
             Coordinates::Parallel => Some(target),

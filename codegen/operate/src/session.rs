@@ -172,6 +172,11 @@ impl<P: Port> Session<P> {
         }
     }
 
+    /// Time since the device was asked last.
+    pub fn silence(&self) -> Duration {
+        self.asked.elapsed()
+    }
+
     /// Time until the device must get the next request.
     pub fn due(&self) -> Duration {
         ALIVE.saturating_sub(self.asked.elapsed())
@@ -271,9 +276,11 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// The whole record, as the bytes of its file. Every piece keeps the link alive.
-    pub fn download(&mut self) -> Result<Vec<u8>, ClientError> {
-        self.client.fetch(|offset| Request::Download { offset })
+    /// The next piece of the record, behind what there is of its file; whether it is whole. Every piece keeps the link alive.
+    pub fn download_on(&mut self, whole: &mut Vec<u8>) -> Result<bool, ClientError> {
+        let complete = self.client.fetch_on(|offset| Request::Download { offset }, whole)?;
+        self.asked = Instant::now();
+        Ok(complete)
     }
 
     /// Sends knots of the correction of passes, or rows of a plan behind them, from the `first` on.

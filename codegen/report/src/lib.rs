@@ -1,5 +1,5 @@
 //! One self-contained HTML file about one spec: what it promises, and the figures that show it; a refused spec, a recorded run
-//! and the paper's figures have pages of their own. Plots of what was identified and tuned.
+//! and the paper's figures have pages of their own, and so has a machine that is operated. Plots of what was identified and tuned.
 //!
 //! ```text
 //! compiled + verdict            → first (cards) ──┐
@@ -20,6 +20,7 @@ pub mod identification;
 pub mod learning;
 pub mod margins;
 pub mod page;
+pub mod panel;
 pub mod paper;
 pub mod platform;
 pub mod plot;

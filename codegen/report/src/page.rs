@@ -8,7 +8,7 @@ use super::chart::Chart;
 use super::plot::escaped;
 use super::section::{Grid, Multiples, Part, Section};
 
-const STYLE: &str = include_str!("assets/report.css");
+const STYLE: &str = concat!(include_str!("assets/shared.css"), include_str!("assets/report.css"));
 const SCRIPT: &str = concat!(
     include_str!("assets/draw.js"),
     include_str!("assets/plot.js"),
@@ -17,7 +17,7 @@ const SCRIPT: &str = concat!(
     include_str!("assets/page.js")
 );
 /// The marks, by the shape that tells them apart without colour.
-const MARKS: &str = r##"<svg width="0" height="0" style="position:absolute" aria-hidden="true"><defs>
+pub(crate) const MARKS: &str = r##"<svg width="0" height="0" style="position:absolute" aria-hidden="true"><defs>
 <symbol id="m-ok" viewBox="0 0 16 16"><circle cx="8" cy="8" r="7.5" fill="var(--blue)"/><path d="M4.6 8.3l2.4 2.4 4.5-5" fill="none" stroke="var(--on)" stroke-width="1.8" stroke-linecap="round" stroke-linejoin="round"/></symbol>
 <symbol id="m-warning" viewBox="0 0 16 16"><path d="M8 1.6L15 14H1z" fill="none" stroke="var(--orange)" stroke-width="1.5" stroke-linejoin="round"/><path d="M8 6v4M8 11.6v.9" stroke="var(--orange)" stroke-width="1.6" stroke-linecap="round"/></symbol>
 <symbol id="m-error" viewBox="0 0 16 16"><path d="M5 .8h6L15.2 5v6L11 15.2H5L.8 11V5z" fill="var(--orange)"/><path d="M5.5 5.5l5 5M10.5 5.5l-5 5" stroke="var(--on)" stroke-width="1.8" stroke-linecap="round"/></symbol>

@@ -283,20 +283,29 @@ impl<P: Port> Client<P> {
     /// As [`Client::ask`], and if the pieces do not make a whole.
     pub fn fetch(&mut self, request: impl Fn(u32) -> Request<'static>) -> Result<Vec<u8>, ClientError> {
         let mut whole = Vec::new();
-        loop {
-            let wanted = u32::try_from(whole.len()).map_err(|_| ClientError::TooLong)?;
-            let Reply::Chunk { offset, total, bytes } = self.ask(&request(wanted))? else {
-                return Err(ClientError::Unexpected);
-            };
-            whole.extend_from_slice(bytes.0);
-            let complete = whole.len() == total as usize;
-            if offset != wanted || whole.len() > total as usize || (bytes.0.is_empty() && !complete) {
-                return Err(ClientError::Unexpected);
-            }
-            if complete {
-                return Ok(whole);
-            }
+        while !self.fetch_on(&request, &mut whole)? {}
+        Ok(whole)
+    }
+
+    /// The next piece of something longer, behind what there is of it; whether it is complete.
+    ///
+    /// # Errors
+    /// As [`Client::ask`]; a device that does not go on where it was is [`ClientError::Unexpected`].
+    pub fn fetch_on(
+        &mut self,
+        request: impl Fn(u32) -> Request<'static>,
+        whole: &mut Vec<u8>,
+    ) -> Result<bool, ClientError> {
+        let wanted = u32::try_from(whole.len()).map_err(|_| ClientError::TooLong)?;
+        let Reply::Chunk { offset, total, bytes } = self.ask(&request(wanted))? else {
+            return Err(ClientError::Unexpected);
+        };
+        whole.extend_from_slice(bytes.0);
+        let complete = whole.len() == total as usize;
+        if offset != wanted || whole.len() > total as usize || (bytes.0.is_empty() && !complete) {
+            return Err(ClientError::Unexpected);
         }
+        Ok(complete)
     }
 
     /// What the device said last of itself, unasked.

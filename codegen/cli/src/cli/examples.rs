@@ -175,6 +175,18 @@ Commands: status, arm, run, hold, ramp-down, acknowledge, none,
 The link lives as long as this command does; without it the machine holds after
 0.1 s. Ctrl-C ramps down first.";
 
+pub const PANEL: &str = "\
+Examples:
+  specgen panel platform.toml --socket rt.sock         # (board) at 127.0.0.1:8020
+  specgen panel platform.toml --port /dev/ttyACM0      # (board)
+  specgen panel platform.toml --socket rt.sock --listen 0.0.0.0:8020  # (board)
+      for others on the network who know the token
+
+The address that it prints has the token in it: whoever has it may look, and take
+the orders. One page has them at a time; hold and ramp down work from every page.
+A page that has them and is closed is a host that is lost: the machine holds, then
+ramps down. Ctrl-C ramps down first. docs/panel.md has the rest.";
+
 pub const GCS: &str = "\
 Examples:
   specgen gcs --socket rt.sock                       # (board) at 127.0.0.1:50000

@@ -3,9 +3,11 @@
 mod answer;
 mod health;
 mod operator;
+pub mod panel;
 mod passes;
 mod platform;
 mod watch;
+mod waves;
 
 use std::io::{BufRead, IsTerminal};
 use std::path::PathBuf;
@@ -184,21 +186,25 @@ fn line(line: &str, operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(
         Ok(Some(order)) => operator.obey(&order, ui),
         Err(text) => Err(Ended::Refused(text)),
     };
-    let mistake = match done {
-        Ok(()) => None,
-        Err(Ended::Refused(text) | Ended::Fault(text)) => Some(text),
-        Err(Ended::Failed(Failure::Environment(text) | Failure::Gate(text) | Failure::Usage(text))) => Some(text),
-        Err(Ended::Failed(Failure::Refused(refused))) => {
-            ui.findings(refused.source.as_ref(), &refused.findings);
-            Some("the spec is refused".to_owned())
-        }
-        Err(other) => return Err(other),
-    };
-    if let Some(error) = mistake {
+    if let Some(error) = mistake(done, ui)? {
         operator.note(line, &Mistake { error }, ui);
     }
     ui.answered(&mut operator.answers);
     Ok(())
+}
+
+/// Why an order was not carried out, where that ends nothing.
+fn mistake(done: Result<(), Ended>, ui: &mut Ui) -> Result<Option<String>, Ended> {
+    match done {
+        Ok(()) => Ok(None),
+        Err(Ended::Refused(text) | Ended::Fault(text)) => Ok(Some(text)),
+        Err(Ended::Failed(Failure::Environment(text) | Failure::Gate(text) | Failure::Usage(text))) => Ok(Some(text)),
+        Err(Ended::Failed(Failure::Refused(refused))) => {
+            ui.findings(refused.source.as_ref(), &refused.findings);
+            Ok(Some("the spec is refused".to_owned()))
+        }
+        Err(other) => Err(other),
+    }
 }
 
 /// A thread that waits for lines, so that the link does not.

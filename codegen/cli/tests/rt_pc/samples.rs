@@ -1,6 +1,7 @@
 //! Hosts that look on: samples are what the record of the same run says, each host has its own, and one that does not read is no
 //! burden to anybody.
 
+use host_sim::controller::TickController;
 use std::collections::BTreeMap;
 use std::process::{Command, Stdio};
 use std::time::Duration;

@@ -26,6 +26,9 @@ function shown(text) {
   return (whole.startsWith("-") ? "\u2212" : "") + grouped + (part === undefined ? "" : "." + part);
 }
 
+// With so many digits behind the point; nothing is never less than nothing.
+function fixed(v, digits) { const text = v.toFixed(digits); return shown(Number(text) === 0 ? text.replace("-", "") : text); }
+
 function number(v) {
   if (!isFinite(v)) return "–";
   const size = Math.abs(v);
@@ -78,9 +81,30 @@ function apart(labels, step, low, high) {
 
 function quoted(text) { return /[",\n]/.test(text) ? '"' + text.replace(/"/g, '""') + '"' : text; }
 
-function download(name, text) {
+// Light or dark, as the system has it until somebody chooses; gives what applies it anew.
+function themed(button) {
+  const root = document.documentElement, dark = window.matchMedia("(prefers-color-scheme: dark)");
+  let chosen = null;
+  const apply = () => root.classList.toggle("dark", chosen === null ? dark.matches : chosen);
+  dark.addEventListener("change", apply);
+  button.addEventListener("click", () => { chosen = !root.classList.contains("dark"); apply(); });
+  apply();
+  return apply;
+}
+
+// Says in the page how many errors there were: a page that hides one is worse than none.
+function counted() {
+  const root = document.documentElement;
+  let failed = 0;
+  window.addEventListener("error", () => { root.dataset.errors = String(++failed); });
+  root.dataset.errors = "0";
+}
+
+function download(name, text) { save(name, "data:text/csv;charset=utf-8," + encodeURIComponent(text)); }
+
+function save(name, address) {
   const link = document.createElement("a");
-  link.href = "data:text/csv;charset=utf-8," + encodeURIComponent(text);
+  link.href = address;
   link.download = name;
   link.click();
 }

@@ -1,15 +1,7 @@
-// Draws every figure, and says in the page what went wrong: a report that hides an error is worse than none.
+// Draws every figure.
 (function () {
-  const root = document.documentElement, drawn = [];
-  let failed = 0;
-  window.addEventListener("error", () => { root.dataset.errors = String(++failed); });
-  root.dataset.errors = "0";
-  const dark = window.matchMedia("(prefers-color-scheme: dark)");
-  let chosen = null;
-  const apply = () => root.classList.toggle("dark", chosen === null ? dark.matches : chosen);
-  dark.addEventListener("change", apply);
-  document.getElementById("theme").addEventListener("click", () => { chosen = !root.classList.contains("dark"); apply(); });
-  apply();
+  counted();
+  const root = document.documentElement, drawn = [], apply = themed(document.getElementById("theme"));
 
   const data = JSON.parse(document.getElementById("data").textContent);
   const add = (Kind, figure, of, options) => { const made = new Kind(figure, of, options); drawn.push(made); return made; };

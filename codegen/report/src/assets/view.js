@@ -1,4 +1,4 @@
-// The platform in parallel projection, to turn, to zoom and, with a motion, to play.
+// The platform in parallel projection, to turn, to zoom and, with a motion, to play; live, as somebody else moves it.
 const VIEWS = { "3-D": [-0.62, 0.42], top: [0, Math.PI / 2], front: [0, 0], side: [-Math.PI / 2, 0] };
 
 class View {
@@ -151,7 +151,7 @@ class View {
     svg.replaceChildren();
     const rb = radius(data.base), rp = radius(data.platform), reach = Math.max(rb, rp);
     // Room above for a pose that is drawn larger.
-    const rise = Math.max(0, data.ghost ? data.ghost[2] : 0);
+    const rise = Math.max(0, data.ghost ? data.ghost[2] : 0, data.live || 0);
     this.scale = this.zoom * Math.min((wide - aside - 96) / (2 * reach), (tall - 96) / (data.height + rise + 0.9 * rb + 0.1 * rp));
     this.center = [(wide - aside) / 2 - 14, tall / 2 + 6 * this.zoom + rise * this.scale / 2];
     const frame = Math.min(Math.floor(this.frame), Math.max(0, this.poses.length - 1));
@@ -179,6 +179,7 @@ class View {
     }
     if (data.part) this.box(on, data.part, 0.26 * rp);
     if (!data.ghost) this.gauges(0.42 * rp, bad.gauges || []);
+    if (data.live) this.plate(p => this.moved(p, [0, 0, 0, 0, 0, 0]), rp * 1.02, 0, { side: "none", face: "none", edge: "var(--ink2)", dash: "5 3", width: 1.5 });
     if (data.ghost) this.plate(p => this.moved(p, data.ghost), rp * 1.02, 0, { side: "none", face: "none", edge: "var(--orange)", dash: "5 3", width: 1.5 });
     if (this.bars) {
       this.way(frame, factor);
@@ -186,7 +187,7 @@ class View {
       this.strokes(data.legs[frame], ...legsAt, aside ? 40 : 24);
       const at = k => pose.slice(k, k + 3).map(v => number(v / 1000)).join(", ");
       this.read.textContent = "t = " + (frame * data.step).toFixed(3) + " s: x, y, z = " + at(0) + " µm; θx, θy, θz = " + at(3) + " µrad. Motion drawn " + number(factor) + " times larger.";
-    } else this.dimensions(rb, rp, on);
+    } else if (!data.live) this.dimensions(rb, rp, on);
     for (const [k, text] of (data.texts || []).entries()) this.text(8, 16 + 17 * k, text, "orange halo", "start");
     for (const [name, button] of this.buttons) button.classList.toggle("on", VIEWS[name].every((v, k) => Math.abs(v - this.turn[k]) < 1e-9));
     this.figure.dataset.points = 12 + this.poses.length;

@@ -15,13 +15,14 @@ use specgen_runtime::supervisor::{Phase, Request};
 use super::answer::{Answer, Downloaded, MachineStatus, Moves, Plain, RecorderState, Settings};
 use super::health::Standing;
 use super::platform::{ZERO, in_words};
+use super::waves::waving;
 use crate::cli::file::{check_place, write_file};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
 use specgen_language::model::Model;
 use specgen_operate::frame::Frame;
 use specgen_operate::place::meant;
-use specgen_operate::{Order, Session, Until, read_wave, refused_wave};
+use specgen_operate::{Order, Session, Until};
 
 /// How long ramping down may take.
 const DOWN: Duration = Duration::from_secs(60);
@@ -52,6 +53,9 @@ impl From<ClientError> for Ended {
     }
 }
 
+/// What is done whenever a machine is looked at. An error ends what is under way.
+pub type Pulse<P> = Box<dyn FnMut(&mut Operator<P>) -> Result<(), Ended>>;
+
 /// One host's hands on a machine.
 pub struct Operator<P> {
     pub(super) session: Session<P>,
@@ -68,6 +72,8 @@ pub struct Operator<P> {
     shown: (u8, u8),
     /// A person looks at it: a fault is shown, and ends nothing.
     pub attended: bool,
+    /// Done at every look, however long an order takes.
+    pub(super) pulse: Option<Pulse<P>>,
     /// Answers to the orders so far, for the JSON document.
     pub answers: Vec<Answer>,
 }
@@ -84,6 +90,7 @@ impl<P: Port> Operator<P> {
             interrupted,
             shown,
             attended: false,
+            pulse: None,
             answers: Vec::new(),
         }
     }
@@ -126,9 +133,14 @@ impl<P: Port> Operator<P> {
         }
     }
 
+    /// Whether the user wants it to end.
+    pub(super) fn is_interrupted(&self) -> bool {
+        self.interrupted.load(Ordering::Relaxed)
+    }
+
     /// Asks how it stands. A fault that is new ends what is not attended.
     pub fn look(&mut self) -> Result<(), Ended> {
-        if self.interrupted.load(Ordering::Relaxed) {
+        if self.is_interrupted() {
             return Err(Ended::Interrupted);
         }
         let before = self.session.status().phase;
@@ -138,7 +150,11 @@ impl<P: Port> Operator<P> {
         if !self.attended && status.phase == faulted && before != faulted {
             return Err(Ended::Fault(format!("the machine is {}, at tick {}", self.stands(), status.tick)));
         }
-        Ok(())
+        // It may look itself.
+        let Some(mut pulse) = self.pulse.take() else { return Ok(()) };
+        let done = pulse(self);
+        self.pulse = Some(pulse);
+        done
     }
 
     /// Shows a phase that is new.
@@ -372,21 +388,22 @@ impl<P: Port> Operator<P> {
         Ok(Settings(names.zip(words).map(|(name, word)| (name.clone(), value(name, word))).collect()))
     }
 
-    /// The settings of a spec; its tables stay in the spec.
-    fn write_config(&mut self, path: &Path) -> Result<(), Ended> {
-        // Compiling takes its time, in which the link is not to be lost.
-        let compiled = std::thread::scope(|scope| {
-            let work = scope.spawn(|| compile::compile(path));
+    /// Does what takes its time, in which the link is not to be lost.
+    pub(super) fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, Ended> {
+        std::thread::scope(|scope| {
+            let work = scope.spawn(work);
             while !work.is_finished() {
                 self.look()?;
-                std::thread::sleep(super::ALIVE);
+                std::thread::sleep(self.session.due());
             }
-            match work.join() {
-                Ok(compiled) => compiled.map_err(|refused| Ended::Failed(refused.into())),
-                // The hook has said where.
-                Err(_) => Err(Ended::Failed(Failure::Environment("the compiler of specs failed".to_owned()))),
-            }
-        })?;
+            // The hook has said where.
+            work.join().map_err(|_| Ended::Failed(Failure::Environment("the compiler of specs failed".to_owned())))
+        })
+    }
+
+    /// The settings of a spec; its tables stay in the spec.
+    fn write_config(&mut self, path: &Path) -> Result<(), Ended> {
+        let compiled = self.meanwhile(|| compile::compile(path))?.map_err(|refused| Ended::Failed(refused.into()))?;
         let (ours, theirs) = (&compiled.ir, self.session.description());
         let words = &compiled.ir.integrity.settings;
         if ours.scalar.bits() != theirs.scalar.bits() || words.len() != theirs.config_names.len() {
@@ -410,35 +427,30 @@ impl<P: Port> Operator<P> {
         })
     }
 
-    fn download(&mut self, path: &Path) -> Result<Downloaded, Ended> {
-        let bytes = self.session.download().map_err(|error| match error {
-            ClientError::Refused(Refusal::State) => {
-                Ended::Refused("it still records; `record stop` first, or wait for the trigger".to_owned())
+    /// The whole record, as the bytes of its file.
+    pub(super) fn record(&mut self) -> Result<Vec<u8>, Ended> {
+        let (mut whole, mut looked) = (Vec::new(), Instant::now());
+        loop {
+            let complete = self.session.download_on(&mut whole).map_err(|error| match error {
+                ClientError::Refused(Refusal::State) => {
+                    Ended::Refused("it still records; `record stop` first, or wait for the trigger".to_owned())
+                }
+                other => other.into(),
+            })?;
+            if complete {
+                return Ok(whole);
             }
-            other => other.into(),
-        })?;
+            if looked.elapsed() >= super::ALIVE {
+                self.look()?;
+                looked = Instant::now();
+            }
+        }
+    }
+
+    fn download(&mut self, path: &Path) -> Result<Downloaded, Ended> {
+        let bytes = self.record()?;
         write_file(path, &bytes).map_err(Ended::Failed)?;
         Ok(Downloaded { file: path.display().to_string(), bytes: bytes.len() })
-    }
-
-    fn wave_of(&self, path: &Path) -> Result<(Vec<u64>, [u64; 6]), String> {
-        let name = path.display();
-        let text = std::fs::read_to_string(path).map_err(|error| format!("could not read `{name}`: {error}"))?;
-        let single = self.session.description().scalar.bits() == 32;
-        read_wave(&text, self.session.period(), single).map_err(|error| format!("{name}: {}", error.trim_end()))
-    }
-
-    fn wave(&mut self, path: &Path) -> Result<(), Ended> {
-        let name = path.display();
-        let (words, center) = self.wave_of(path).map_err(Ended::Refused)?;
-        self.session.start_wave(&words, &center).map_err(|error| match error {
-            ClientError::Refused(Refusal::Word { index }) => Ended::Refused(format!("{name}: {}", refused_wave(index))),
-            ClientError::Refused(Refusal::State) => Ended::Refused(format!(
-                "{name}: not now; the machine must be running and stand at the wave's center, with no wave or move under way: {}",
-                self.stands()
-            )),
-            other => other.into(),
-        })
     }
 
     /// Ramps down and waits until the amplifiers are off; what came of it.
@@ -457,16 +469,6 @@ impl<P: Port> Operator<P> {
             std::thread::sleep(self.session.due());
         }
         Ok(format!("the machine is still {} after {} s", self.stands(), DOWN.as_secs()))
-    }
-}
-
-/// Why set-points are refused while a wave makes them.
-fn waving(error: ClientError) -> Ended {
-    match error {
-        ClientError::Refused(Refusal::State) => {
-            Ended::Refused("not while a wave is under way or a host steps the machine; `wave stop` first".to_owned())
-        }
-        other => other.into(),
     }
 }
 

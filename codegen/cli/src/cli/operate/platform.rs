@@ -137,6 +137,12 @@ impl Outcome for GainsInForce {
     }
 }
 
+/// Whether a setting is a gain.
+pub(super) fn is_gain(name: &str) -> bool {
+    let stem = name.split('[').next().unwrap_or(name);
+    GAINS.contains(&stem.strip_prefix("position_").unwrap_or(stem))
+}
+
 fn unit(axis: usize) -> &'static str {
     if axis < 3 { "um" } else { "urad" }
 }
@@ -221,10 +227,6 @@ impl<P: Port> Operator<P> {
             return Err("gains are held against the margins of the spec before they are sent: name the spec".to_owned());
         }
         let names = &self.session.description().config_names;
-        let is_gain = |name: &str| {
-            let stem = name.split('[').next().unwrap_or(name);
-            GAINS.contains(&stem.strip_prefix("position_").unwrap_or(stem))
-        };
         let mut places = Vec::new();
         for (name, value) in gains {
             let found = names.iter().enumerate().filter(|(_, known)| {
@@ -370,7 +372,7 @@ impl<P: Port> Operator<P> {
         if let Some(task) = &mut model.task_space {
             (task.gains, task.position_gains) = (Some(of("")), Some(of("position_")));
         }
-        let design = compile::check_stability(&model).map_err(|findings| {
+        let design = self.meanwhile(|| compile::check_stability(&model))?.map_err(|findings| {
             let texts: Vec<String> = findings.iter().map(|one| format!("{}: {}", one.code, one.message)).collect();
             Ended::Refused(format!("not sent: {}", texts.join("; ")))
         })?;

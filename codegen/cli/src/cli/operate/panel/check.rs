@@ -1,0 +1,407 @@
+//! The first-power check: each leg is driven a little, by feed-forward alone, and what the gauges show is held against the spec.
+//!
+//! The law that inverts the hysteresis and feeds nothing back does not mind what gauges say, so a gauge with a wrong sign or in the wrong
+//! place cannot make it run away; the supervisor looks on as always. The way to the bias is left as soon as every leg has room.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use serde_json::{Value, json};
+use specgen_compiler::lower;
+use specgen_link::client::Port;
+use specgen_operate::motion::Motion;
+use specgen_operate::{Order, Until, Wanted};
+use specgen_runtime::setpoint::BUSY;
+use specgen_runtime::supervisor::{Phase, Request};
+
+use super::{Panel, ask, begin};
+use crate::cli::operate::{Ended, Operator};
+use crate::cli::ui::Ui;
+
+/// How far a leg is driven, as part of its stroke.
+const STEP: f64 = 0.02;
+/// How long the platform may take to where there is room, and to arrive after a step.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// How long it may take until it runs.
+const COMES: Duration = Duration::from_secs(2);
+/// From arriving to reading: gauges and amplifiers lag.
+const SETTLE: Duration = Duration::from_millis(100);
+/// Readings of which the mean is taken.
+const READINGS: u32 = 40;
+/// Part of what is measured that a finding may leave unexplained, in power.
+const LEFT: f64 = 0.05;
+/// Gain beyond which something is wrong. The inverse of the hysteresis is good to some per cent without feedback.
+const GAIN: [f64; 2] = [0.75, 1.25];
+/// Less than this part of what is expected is nothing.
+const NOTHING: f64 = 0.2;
+
+type Matrix = [[f64; 6]; 6];
+
+/// What was found of one gauge or leg.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Found {
+    pub good: bool,
+    /// Times what the spec says.
+    pub gain: f64,
+    pub what: String,
+    /// What to mend; empty where it is good.
+    pub mend: String,
+}
+
+/// What was found of all of them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    pub good: bool,
+    pub what: String,
+    pub legs: Vec<Found>,
+    pub gauges: Vec<Found>,
+}
+
+/// Drives, measures, judges. The machine holds at the end, with the mode that it had.
+pub(super) fn run<P: Port + 'static>(
+    operator: &mut Operator<P>,
+    panel: &Rc<RefCell<Panel>>,
+    quiet: &Ui,
+) -> Result<Value, Ended> {
+    let no = |why: &str| Ended::Refused(why.to_owned());
+    let (expected, jacobian, inverse) = {
+        let panel = panel.borrow();
+        let geometry = &panel.compiled.model.geometry;
+        let expected = panel.compiled.ir.supervision.readings_per_leg;
+        let expected = expected.ok_or_else(|| no("each leg has a gauge of its own: there is no platform to check"))?;
+        let both = lower::leg_jacobian(geometry).zip(lower::inverse_jacobian(geometry));
+        let (jacobian, inverse) = both.ok_or_else(|| no("the legs of the spec hold no platform"))?;
+        (expected, jacobian, inverse)
+    };
+    if u64::from(operator.phase()) != Phase::Holding.word() {
+        return Err(no(
+            "the check begins with a machine that was armed and holds at rest: ramp down if it is not, then arm",
+        ));
+    }
+    let mode = panel.borrow().known["gains"]["mode"].as_str().map(str::to_owned);
+    let mode = mode.and_then(|mode| Order::parse(&format!("mode {mode}")).ok().flatten());
+    panel.borrow_mut().check = json!({ "runs": true, "done": 0 });
+    ask(operator, &Order::Mode(Wanted { terms: [false, true], law: Some(0) }), quiet)?;
+    let step = STEP * panel.borrow().compiled.model.actuator.stroke;
+    let measured = measure(operator, panel, quiet, &expected, [&jacobian, &inverse], step);
+    // Whatever came of it, it is to stand and to be as it was.
+    operator.session.supervise(Request::Hold)?;
+    operator.wait(Until::Phase(Phase::Holding), PATIENCE, quiet).or_else(|ended| match ended {
+        // A machine that ramps down or is faulted does not hold.
+        Ended::Fault(_) | Ended::Refused(_) => Ok(()),
+        other => Err(other),
+    })?;
+    if let Some(mode) = mode {
+        ask(operator, &mode, quiet)?;
+    }
+    let verdict = judge(&expected, &measured?);
+    let (kind, advice) = if verdict.good {
+        ("note", "")
+    } else {
+        ("error", "Ramp down, and mend what the check says before the loop is closed.")
+    };
+    let mut panel = panel.borrow_mut();
+    panel.hall.note(kind, &format!("First-power check: {}", verdict.what), advice, None);
+    panel.check = json!({ "runs": false, "verdict": verdict });
+    Ok(json!(verdict))
+}
+
+/// Readings of the gauges (rows) per displacement of a leg (columns).
+fn measure<P: Port + 'static>(
+    operator: &mut Operator<P>,
+    panel: &Rc<RefCell<Panel>>,
+    quiet: &Ui,
+    expected: &Matrix,
+    [jacobian, inverse]: [&Matrix; 2],
+    step: f64,
+) -> Result<Matrix, Ended> {
+    let motion = operator.motion().map_err(Ended::Refused)?.clone();
+    let along = |leg: usize, standing: &[f64; 6]| -> Option<[f64; 6]> {
+        let from = motion.platform(standing)?;
+        motion.user(&core::array::from_fn(|axis| from[axis] + inverse[axis][leg] * step))
+    };
+    let has_room = |standing: &[f64; 6]| {
+        (0..6).all(|leg| along(leg, standing).is_some_and(|pose| motion.admits(&pose))) && motion.admits(standing)
+    };
+    begin(operator, Request::Run)?;
+    // Asked without a pause: the way is 100 um/s fast, say, and a micrometre is enough.
+    let since = Instant::now();
+    loop {
+        let place = operator.place()?;
+        let runs = u64::from(place.phase) == Phase::Running.word();
+        if runs && (has_room(&place.target) || place.status & BUSY == 0) {
+            break;
+        }
+        let comes = u64::from(place.phase) == Phase::Holding.word() && since.elapsed() < COMES;
+        if !runs && !comes || since.elapsed() > PATIENCE {
+            operator.look()?;
+            return Err(Ended::Fault(format!(
+                "the legs do not come to where they have room: the machine is {}",
+                operator.stands()
+            )));
+        }
+    }
+    // A stop on the way to the bias, at once: further up a gauge that is turned shows a platform that is astray. Then on without moving.
+    operator.session.supervise(Request::Hold)?;
+    operator.wait(Until::Phase(Phase::Holding), PATIENCE, quiet)?;
+    begin(operator, Request::Run)?;
+    operator.wait(Until::Phase(Phase::Running), PATIENCE, quiet)?;
+    operator.wait(Until::Arrived, PATIENCE, quiet)?;
+    let start = operator.place()?.target;
+    let mut measured = [[0.0; 6]; 6];
+    for leg in 0..6 {
+        let before = readings(operator, panel, &motion, expected, jacobian)?;
+        let to = along(leg, &start).ok_or_else(|| Ended::Refused("a leg has no room".to_owned()))?;
+        operator.go(to)?;
+        operator.wait(Until::Arrived, PATIENCE, quiet)?;
+        let after = readings(operator, panel, &motion, expected, jacobian)?;
+        for (row, (after, before)) in measured.iter_mut().zip(after.iter().zip(before)) {
+            row[leg] = (after - before) / step;
+        }
+        operator.go(start)?;
+        operator.wait(Until::Arrived, PATIENCE, quiet)?;
+        panel.borrow_mut().check = json!({ "runs": true, "done": leg + 1 });
+    }
+    Ok(measured)
+}
+
+/// Looks, and ends where the page asks for it or the machine does not run.
+fn looked<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Panel>>) -> Result<(), Ended> {
+    operator.look()?;
+    if std::mem::take(&mut panel.borrow_mut().hall.ends) {
+        return Err(Ended::Refused("the check was ended".to_owned()));
+    }
+    if u64::from(operator.phase()) != Phase::Running.word() {
+        return Err(Ended::Fault(format!(
+            "the machine is {}: gauges or legs are not as the spec says, or something holds the platform",
+            operator.stands()
+        )));
+    }
+    std::thread::sleep(Duration::from_millis(2));
+    Ok(())
+}
+
+/// What the gauges show, m: the mean of some looks, from the pose that the controller makes of them.
+fn readings<P: Port + 'static>(
+    operator: &mut Operator<P>,
+    panel: &Rc<RefCell<Panel>>,
+    motion: &Motion,
+    per_leg: &Matrix,
+    jacobian: &Matrix,
+) -> Result<[f64; 6], Ended> {
+    let since = Instant::now();
+    while since.elapsed() < SETTLE {
+        looked(operator, panel)?;
+    }
+    let mut pose = [0.0; 6];
+    for _ in 0..READINGS {
+        looked(operator, panel)?;
+        let place = operator.place()?;
+        let from_rest = motion.platform(&place.pose).unwrap_or(place.pose);
+        for (sum, value) in pose.iter_mut().zip(from_rest) {
+            *sum += value / f64::from(READINGS);
+        }
+    }
+    Ok(times(per_leg, &times(jacobian, &pose)))
+}
+
+fn times(matrix: &Matrix, vector: &[f64; 6]) -> [f64; 6] {
+    matrix.map(|row| dot(&row, vector))
+}
+
+fn dot(a: &[f64; 6], b: &[f64; 6]) -> f64 {
+    a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b)
+}
+
+fn transposed(matrix: &Matrix) -> Matrix {
+    core::array::from_fn(|row| core::array::from_fn(|column| matrix[column][row]))
+}
+
+/// For each row of `measured` the row of `expected` that it is, with its gain; and what that leaves, as part of the power.
+fn matched(expected: &Matrix, measured: &Matrix) -> ([(usize, f64); 6], f64) {
+    let power = measured.iter().fold(0.0, |sum, row| sum + dot(row, row));
+    let mut left = 0.0;
+    let rows = core::array::from_fn(|index| {
+        let row = &measured[index];
+        let gain = |which: usize| dot(row, &expected[which]) / dot(&expected[which], &expected[which]);
+        // What is explained of the row's power; its own place first, where that is as good.
+        let explained = |which: usize| gain(which) * dot(row, &expected[which]);
+        let best =
+            (0..6).fold(index, |best, which| if explained(which) > 1.02 * explained(best) { which } else { best });
+        left += dot(row, row) - explained(best);
+        (best, gain(best))
+    });
+    (rows, if power > 0.0 { left / power } else { 1.0 })
+}
+
+/// Whether each place is taken once.
+fn is_order(rows: &[(usize, f64); 6]) -> bool {
+    (0..6).all(|place| rows.iter().any(|(which, _)| *which == place))
+}
+
+/// What is wrong with gauges or legs, if `measured` can be told from that.
+pub fn judge(expected: &Matrix, measured: &Matrix) -> Verdict {
+    let (gauges, left) = matched(expected, measured);
+    let (legs, left_by_legs) = matched(&transposed(expected), &transposed(measured));
+    let is_plain = |rows: &[(usize, f64); 6]| rows.iter().enumerate().all(|(place, row)| row.0 == place && row.1 > 0.0);
+    let own = core::array::from_fn(|place| (place, 1.0));
+    let by_gauges = left <= LEFT && is_order(&gauges);
+    let by_legs = left_by_legs <= LEFT && is_order(&legs);
+    // What the one explains is not looked for in the other.
+    let (legs, gauges) = if by_gauges && by_legs && is_plain(&gauges) && is_plain(&legs) {
+        (legs, gauges)
+    } else if by_gauges && (!by_legs || left <= left_by_legs) {
+        (own, gauges)
+    } else if by_legs {
+        (legs, own)
+    } else {
+        return unexplained(expected, measured);
+    };
+    let legs: Vec<Found> = legs.iter().enumerate().map(|(leg, row)| of_leg(leg, *row)).collect();
+    let gauges: Vec<Found> = gauges.iter().enumerate().map(|(gauge, row)| of_gauge(gauge, *row)).collect();
+    let bad: Vec<&Found> = legs.iter().chain(&gauges).filter(|one| !one.good).collect();
+    let what = match bad.first() {
+        None => "every leg lengthens with its voltage, and every gauge is where the spec says.".to_owned(),
+        Some(first) if bad.len() == 1 => format!("{}.", first.what),
+        Some(first) => format!("{}, and {} more.", first.what, bad.len() - 1),
+    };
+    Verdict { good: bad.is_empty(), what, legs, gauges }
+}
+
+fn is_off(gain: f64) -> bool {
+    !(GAIN[0]..=GAIN[1]).contains(&gain)
+}
+
+fn of_gauge(gauge: usize, (place, gain): (usize, f64)) -> Found {
+    let (good, what, mend) = if gain.abs() < NOTHING {
+        (false, format!("gauge {gauge} does not move"), "Check its cable and its supply.".to_owned())
+    } else if place != gauge {
+        let turned = if gain < 0.0 { ", and the wrong way" } else { "" };
+        let mend = format!(
+            "Exchange the cables of gauges {gauge} and {place}, or their `[[gauge]]` in the spec{}.",
+            if gain < 0.0 { "; then turn its `direction`" } else { "" }
+        );
+        (false, format!("gauge {gauge} shows what gauge {place} should{turned}"), mend)
+    } else if gain < 0.0 {
+        let mend = "Exchange its wires, or turn its `direction` in the spec.".to_owned();
+        (false, format!("gauge {gauge} runs the wrong way"), mend)
+    } else if is_off(gain) {
+        let mend = "Check `sensor.range` or its calibration, and its converter's input range.".to_owned();
+        (false, format!("gauge {gauge} shows {gain:.2} times what it should"), mend)
+    } else {
+        (true, format!("gauge {gauge} is as the spec says"), String::new())
+    };
+    Found { good, gain, what, mend }
+}
+
+fn of_leg(leg: usize, (place, gain): (usize, f64)) -> Found {
+    let (good, what, mend) = if gain.abs() < NOTHING {
+        (false, format!("leg {leg} does not move"), "Check its amplifier, its cable and its bolts.".to_owned())
+    } else if place != leg {
+        let mend = format!("Exchange the amplifier cables of legs {leg} and {place}.");
+        (false, format!("leg {leg} moves what leg {place} should"), mend)
+    } else if gain < 0.0 {
+        (false, format!("leg {leg} shortens with its voltage"), "Exchange the wires of its stack.".to_owned())
+    } else if is_off(gain) {
+        let mend = "Check its amplifier's gain, `dac.range` and its reversal-curve record.".to_owned();
+        (false, format!("leg {leg} moves {gain:.2} times as far as it should"), mend)
+    } else {
+        (true, format!("leg {leg} lengthens with its voltage"), String::new())
+    };
+    Found { good, gain, what, mend }
+}
+
+/// Neither gauges nor legs alone: leg by leg, how well what it does is what it should do.
+fn unexplained(expected: &Matrix, measured: &Matrix) -> Verdict {
+    let (wanted, seen) = (transposed(expected), transposed(measured));
+    let legs = (0..6).map(|leg| {
+        let gain = dot(&seen[leg], &wanted[leg]) / dot(&wanted[leg], &wanted[leg]);
+        let left = dot(&seen[leg], &seen[leg]) - gain * dot(&seen[leg], &wanted[leg]);
+        let good = left <= LEFT * dot(&seen[leg], &seen[leg]) && !is_off(gain);
+        let what = if good {
+            format!("leg {leg} is as the spec says")
+        } else {
+            format!("leg {leg} moves otherwise than it should")
+        };
+        let mend = if good {
+            ""
+        } else {
+            "Check joints and gauges of the spec against the machine, and what is bolted where."
+        };
+        Found { good, gain, what, mend: mend.to_owned() }
+    });
+    let what =
+        "what the gauges show is neither gauges nor legs exchanged: more than one kind of thing is wrong.".to_owned();
+    Verdict { good: false, what, legs: legs.collect(), gauges: Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use specgen_compiler::compile;
+    use std::path::Path;
+
+    fn expected() -> Matrix {
+        let spec = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/reference.toml");
+        let compiled = compile::compile(&spec).unwrap_or_else(|_| panic!("the reference compiles"));
+        compiled.ir.supervision.readings_per_leg.unwrap()
+    }
+
+    /// As measured where feed-forward is off by some per cent, otherwise for each leg.
+    fn measured(expected: &Matrix) -> Matrix {
+        let mut measured = *expected;
+        for row in &mut measured {
+            row.iter_mut().enumerate().for_each(|(leg, value)| *value *= 0.94 + 0.02 * leg as f64);
+        }
+        measured
+    }
+
+    fn bad(verdict: &Verdict) -> Vec<String> {
+        verdict.legs.iter().chain(&verdict.gauges).filter(|one| !one.good).map(|one| one.what.clone()).collect()
+    }
+
+    #[test]
+    fn every_exchange_and_every_sign_is_told_from_every_other() {
+        let expected = expected();
+        let good = measured(&expected);
+        let verdict = judge(&expected, &good);
+        assert!(verdict.good && verdict.legs.len() == 6 && verdict.gauges.len() == 6, "{verdict:?}");
+        for one in 0..6 {
+            let mut turned = good;
+            turned[one] = turned[one].map(|value| -value);
+            assert_eq!(bad(&judge(&expected, &turned)), [format!("gauge {one} runs the wrong way")]);
+            let mut half = good;
+            half[one] = half[one].map(|value| 0.5 * value);
+            let found = bad(&judge(&expected, &half));
+            assert!(found.len() == 1 && found[0].starts_with(&format!("gauge {one} shows 0.")), "{found:?}");
+            let mut dead = good;
+            dead[one] = [1e-6; 6];
+            assert_eq!(bad(&judge(&expected, &dead)), [format!("gauge {one} does not move")]);
+            let mut shortens = transposed(&good);
+            shortens[one] = shortens[one].map(|value| -value);
+            assert_eq!(
+                bad(&judge(&expected, &transposed(&shortens))),
+                [format!("leg {one} shortens with its voltage")]
+            );
+            for other in one + 1..6 {
+                let mut exchanged = good;
+                exchanged.swap(one, other);
+                let words = [(one, other), (other, one)].map(|(a, b)| format!("gauge {a} shows what gauge {b} should"));
+                assert_eq!(bad(&judge(&expected, &exchanged)), words);
+                let mut exchanged = transposed(&good);
+                exchanged.swap(one, other);
+                let words = [(one, other), (other, one)].map(|(a, b)| format!("leg {a} moves what leg {b} should"));
+                assert_eq!(bad(&judge(&expected, &transposed(&exchanged))), words);
+            }
+        }
+        // Two kinds of mistakes at once are not explained away.
+        let mut both = transposed(&good);
+        both.swap(0, 3);
+        let mut both = transposed(&both);
+        both.swap(1, 4);
+        let verdict = judge(&expected, &both);
+        assert!(!verdict.good && verdict.gauges.is_empty(), "{verdict:?}");
+    }
+}

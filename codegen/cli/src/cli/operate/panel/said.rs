@@ -1,0 +1,93 @@
+//! How a machine stands, as an operator is told: what is so, what to do.
+
+use specgen_compiler::ir::Supervision;
+use specgen_language::model::Model;
+use specgen_link::Status;
+use specgen_runtime::setpoint::{BUSY, REFUSED, STALE};
+use specgen_runtime::supervisor::{Cause, Phase};
+
+/// Kind of a mark (`ok`, `note`, `warning`, `error`), what is so, what to do, and the number of the cause with its limit.
+pub struct Said {
+    pub kind: &'static str,
+    pub what: String,
+    pub advice: &'static str,
+    pub code: Option<String>,
+}
+
+/// What a cause means, and what to do about it.
+fn cause(cause: Cause) -> (&'static str, &'static str) {
+    match cause {
+        Cause::None => ("", ""),
+        Cause::GaugeNotFinite => ("A gauge reads no number.", "Check its converter and cable."),
+        Cause::GaugeRange => ("A gauge is out of its range.", "Check its cable and its zero."),
+        Cause::GaugeStuck => ("A gauge does not follow the legs.", "Check its cable and converter."),
+        Cause::GaugeDisagreement => (
+            "A gauge disagrees with the model.",
+            "Check cables and mounts of the gauges, and that nothing touches the platform.",
+        ),
+        Cause::TrackingError => {
+            ("The platform does not follow its set-point.", "Check load, gains, and that nothing touches the platform.")
+        }
+        Cause::VoltageSaturation => ("A leg is at the end of its voltage.", "Move to where the legs have room."),
+        Cause::SlewSaturation => ("A leg moves as fast as its amplifier can.", "Move or play more slowly."),
+        Cause::MissedTick => ("Ticks were missed.", "Look at the load of the controller's computer."),
+        Cause::LinkLost => ("The host was silent.", "Check the link."),
+        Cause::Integrity => ("Tables or settings are not those that were built.", "Flash the controller anew."),
+        Cause::Converter => ("A converter does not answer.", "Check its supply and cables."),
+        Cause::EmergencyStop => ("The hardware stop is pressed.", "Release it when it is safe."),
+        Cause::HostGone => ("The host was gone for too long.", "Check the link."),
+    }
+}
+
+/// From what on a cause acts, by the spec.
+fn limit(of: Cause, rules: &Supervision, model: &Model) -> Option<String> {
+    let micrometres = |length: f64| format!("limit {}\u{2009}µm", (length * 1e8).round() / 100.0);
+    let share = model.supervisor.tracking_error * 100.0;
+    match of {
+        Cause::GaugeDisagreement => Some(micrometres(rules.disagreement)),
+        Cause::GaugeStuck => Some(micrometres(rules.stuck_motion)),
+        Cause::TrackingError => Some(format!("limit {share:.0}\u{2009}% of the workspace")),
+        Cause::MissedTick => Some(format!("limit {} in 1\u{2009}s", model.supervisor.missed_ticks)),
+        Cause::LinkLost => {
+            Some(format!("limit {:.0}\u{2009}ms", f64::from(rules.host_ticks) * model.timing.period * 1e3))
+        }
+        _ => None,
+    }
+}
+
+/// The same of a machine with this status.
+pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
+    let phase = Phase::from_word(u64::from(status.phase));
+    let of = Cause::from_word(u64::from(status.cause)).unwrap_or(Cause::None);
+    let (what, mend) = cause(of);
+    let code = (of != Cause::None).then(|| {
+        let limit = limit(of, rules, model).map_or(String::new(), |limit| format!(" · {limit}"));
+        format!("cause {}{limit}", of.word())
+    });
+    let said = |kind, what: &str, advice| Said { kind, what: what.to_owned(), advice, code: code.clone() };
+    match phase {
+        Some(Phase::Disarmed) => said("note", "Disarmed. Amplifiers are off.", "To begin: arm, then run."),
+        Some(Phase::Arming) => said("note", "Arming. Gauges and model are compared.", "Run may be asked for now."),
+        Some(Phase::Running) => {
+            let bits = status.status & !BUSY;
+            let (kind, what, advice) = if bits & REFUSED != 0 {
+                ("warning", "Running. The last command is refused.", "Hold, run, and move to where there is reach.")
+            } else if bits & STALE != 0 {
+                ("warning", "Running. The stream of set-points has stopped.", "Move, or send set-points.")
+            } else if bits != 0 {
+                ("warning", "Running, with a limit reached.", "Look at the status below the events.")
+            } else if status.status & BUSY != 0 {
+                ("ok", "Running. A motion is under way.", "")
+            } else {
+                ("ok", "Running. Nothing to do.", "")
+            };
+            said(kind, what, advice)
+        }
+        Some(Phase::Holding) if of == Cause::None => said("note", "Holding. The law is suspended.", "Run goes on."),
+        Some(Phase::Holding) => said("warning", &format!("Holding. {what}"), mend),
+        Some(Phase::RampingDown) if of == Cause::None => said("note", "Ramping down.", ""),
+        Some(Phase::RampingDown) => said("error", &format!("Ramping down. {what}"), mend),
+        Some(Phase::Faulted) => said("error", what, mend),
+        None => said("error", "The machine says a phase that is not known.", "Build panel and controller alike."),
+    }
+}

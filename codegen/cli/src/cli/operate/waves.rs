@@ -1,0 +1,51 @@
+//! Waves of an operator's files.
+
+use std::path::Path;
+
+use specgen_link::Refusal;
+use specgen_link::client::{ClientError, Port};
+use specgen_operate::{read_wave, refused_wave};
+
+use super::operator::{Ended, Operator};
+
+impl<P: Port> Operator<P> {
+    pub(super) fn wave_of(&self, path: &Path) -> Result<(Vec<u64>, [u64; 6]), String> {
+        let name = path.display();
+        let text = std::fs::read_to_string(path).map_err(|error| format!("could not read `{name}`: {error}"))?;
+        self.wave_of_text(&text).map_err(|error| format!("{name}: {error}"))
+    }
+
+    /// Words and center of a wave as its file says it.
+    pub(super) fn wave_of_text(&self, text: &str) -> Result<(Vec<u64>, [u64; 6]), String> {
+        let single = self.session.description().scalar.bits() == 32;
+        read_wave(text, self.session.period(), single).map_err(|error| error.trim_end().to_owned())
+    }
+
+    pub(super) fn wave(&mut self, path: &Path) -> Result<(), Ended> {
+        let (words, center) = self.wave_of(path).map_err(Ended::Refused)?;
+        self.start_wave(&path.display().to_string(), &words, &center)
+    }
+
+    /// Starts a wave of this name.
+    pub(super) fn start_wave(&mut self, name: &str, words: &[u64], center: &[u64; 6]) -> Result<(), Ended> {
+        self.ordered = true;
+        self.session.start_wave(words, center).map_err(|error| match error {
+            ClientError::Refused(Refusal::Word { index }) => Ended::Refused(format!("{name}: {}", refused_wave(index))),
+            ClientError::Refused(Refusal::State) => Ended::Refused(format!(
+                "{name}: not now; the machine must be running and stand at the wave's center, with no wave or move under way: {}",
+                self.stands()
+            )),
+            other => other.into(),
+        })
+    }
+}
+
+/// Why set-points are refused while a wave makes them.
+pub(super) fn waving(error: ClientError) -> Ended {
+    match error {
+        ClientError::Refused(Refusal::State) => {
+            Ended::Refused("not while a wave is under way or a host steps the machine; `wave stop` first".to_owned())
+        }
+        other => other.into(),
+    }
+}

@@ -1,0 +1,227 @@
+//! The page in headless Chromium, driven over its DevTools: four states, their pictures, and nothing in the console.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tungstenite::{Message, WebSocket};
+
+use super::{LONG, Panel};
+use crate::support;
+
+/// Folder in which the pictures stay, where they are to be looked at.
+const PICTURES: &str = "SPECGEN_PICTURES";
+
+/// A window.
+struct Window {
+    process: Child,
+    socket: WebSocket<TcpStream>,
+    _profile: tempfile::TempDir,
+    asked: u64,
+    /// What the console said, exceptions included.
+    console: Vec<String>,
+}
+
+impl Window {
+    fn open(url: &str, dark: bool) -> Option<Self> {
+        let profile = tempfile::tempdir().unwrap();
+        let start = |program: &str| {
+            let mut command = Command::new(program);
+            command.args([
+                "--headless",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--no-first-run",
+                "--disable-background-networking",
+            ]);
+            command.args(["--disable-component-update", "--disable-sync", "--remote-debugging-port=0", "about:blank"]);
+            command.arg(format!("--user-data-dir={}", profile.path().display()));
+            command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().ok()
+        };
+        let mut process = ["chromium", "chromium-browser", "google-chrome"].into_iter().find_map(start)?;
+        let mut said = BufReader::new(process.stderr.take().unwrap()).lines();
+        let at = said.find_map(|line| line.ok()?.split_once("ws://")?.1.split('/').next().map(str::to_owned)).unwrap();
+        std::thread::spawn(move || said.for_each(drop));
+        let mut stream = TcpStream::connect(&at).unwrap();
+        stream.set_read_timeout(Some(LONG)).unwrap();
+        write!(stream, "GET /json HTTP/1.1\r\nHost: {at}\r\nConnection: close\r\n\r\n").unwrap();
+        let mut bytes = Vec::new();
+        // It says how long the list is, and may keep the connection.
+        let list: Value = loop {
+            let mut part = [0; 4096];
+            let count = stream.read(&mut part).unwrap();
+            bytes.extend_from_slice(&part[..count]);
+            let text = String::from_utf8_lossy(&bytes);
+            let body = text.split_once("\r\n\r\n").and_then(|(_, body)| serde_json::from_str(body).ok());
+            if let Some(list) = body {
+                break list;
+            }
+            assert!(count > 0, "{text}");
+        };
+        let target = list.as_array().unwrap().iter().find(|one| one["type"] == "page").unwrap();
+        let address = target["webSocketDebuggerUrl"].as_str().unwrap();
+        let (socket, _) = tungstenite::client(address, TcpStream::connect(&at).unwrap()).unwrap();
+        socket.get_ref().set_read_timeout(Some(LONG)).unwrap();
+        let mut window = Self { process, socket, _profile: profile, asked: 0, console: Vec::new() };
+        for domain in ["Runtime", "Log", "Page"] {
+            window.ask(&format!("{domain}.enable"), json!({}));
+        }
+        let size = json!({ "width": 1440, "height": 900, "deviceScaleFactor": 1, "mobile": false });
+        window.ask("Emulation.setDeviceMetricsOverride", size);
+        let theme = if dark { "dark" } else { "light" };
+        let features = json!({ "features": [{ "name": "prefers-color-scheme", "value": theme }] });
+        window.ask("Emulation.setEmulatedMedia", features);
+        window.ask("Page.navigate", json!({ "url": url }));
+        Some(window)
+    }
+
+    fn ask(&mut self, method: &str, parameters: Value) -> Value {
+        self.asked += 1;
+        let request = json!({ "id": self.asked, "method": method, "params": parameters });
+        self.socket.send(Message::text(request.to_string())).unwrap();
+        loop {
+            let Message::Text(text) = self.socket.read().unwrap() else { continue };
+            let message: Value = serde_json::from_str(&text).unwrap();
+            let event = message["method"].as_str().unwrap_or("");
+            if ["Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded"].contains(&event) {
+                self.console.push(message["params"].to_string());
+            }
+            if message["id"] == self.asked {
+                return message["result"].clone();
+            }
+        }
+    }
+
+    fn evaluated(&mut self, expression: &str) -> Value {
+        let asked = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
+        self.ask("Runtime.evaluate", asked)
+    }
+
+    /// The value of an expression.
+    fn value(&mut self, expression: &str) -> Value {
+        let result = self.evaluated(expression);
+        assert!(result["exceptionDetails"].is_null(), "{expression}: {result}");
+        result["result"]["value"].clone()
+    }
+
+    /// Until it is so; a page that is not there yet has nothing to ask for.
+    #[track_caller]
+    fn wait(&mut self, condition: &str) {
+        let start = Instant::now();
+        while self.evaluated(condition)["result"]["value"] != true {
+            let text = self.value("document.body ? document.body.innerText : ''");
+            assert!(start.elapsed() < LONG, "{condition}: {text}");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    fn click(&mut self, id: &str) {
+        self.value(&format!("document.getElementById('{id}').click()"));
+    }
+
+    /// Presses for a second and a little.
+    fn press(&mut self, id: &str) {
+        self.wait(&format!("!document.getElementById('{id}').disabled"));
+        self.value(&format!(
+            "(async () => {{ const b = document.getElementById('{id}'), key = kind => b.dispatchEvent(new KeyboardEvent(kind, {{ key: ' ', bubbles: true }})); key('keydown'); await new Promise(done => setTimeout(done, 1400)); key('keyup'); }})()"
+        ));
+    }
+
+    fn picture(&mut self, name: &str) {
+        let data = self.ask("Page.captureScreenshot", json!({ "format": "png" }));
+        let bytes = decoded(data["data"].as_str().unwrap());
+        assert!(bytes.starts_with(b"\x89PNG") && bytes.len() > 20_000, "{name}: {} bytes", bytes.len());
+        if let Some(folder) = std::env::var_os(PICTURES) {
+            fs::write(PathBuf::from(folder).join(format!("panel-{name}.png")), bytes).unwrap();
+        }
+    }
+
+    /// Whatever it was, nothing went wrong in the page.
+    fn is_sound(mut self) {
+        assert_eq!(self.value("document.documentElement.dataset.errors"), "0", "the page's own count of errors");
+        assert_eq!(self.console, Vec::<String>::new(), "console");
+    }
+}
+
+impl Drop for Window {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// Base64.
+fn decoded(text: &str) -> Vec<u8> {
+    let value = |byte: u8| match byte {
+        b'A'..=b'Z' => u32::from(byte - b'A'),
+        b'a'..=b'z' => u32::from(byte - b'a') + 26,
+        b'0'..=b'9' => u32::from(byte - b'0') + 52,
+        b'+' => 62,
+        _ => 63,
+    };
+    let mut bytes = Vec::new();
+    for group in text.trim_end_matches('=').as_bytes().chunks(4) {
+        let word = group.iter().fold(0, |word, byte| word << 6 | value(*byte)) << (6 * (4 - group.len()));
+        bytes.extend_from_slice(&word.to_be_bytes()[1..group.len()]);
+    }
+    bytes
+}
+
+/// Machine faulted, then running, moving, watched.
+pub fn a_browser_draws_it(panel: &Panel) {
+    let chip = |phase: &str| format!("document.getElementById('chip').textContent === '{phase}'");
+    let Some(mut page) = Window::open(&panel.url(), true) else {
+        return support::skipped("no chromium: the panel is not drawn");
+    };
+    page.wait(&chip("faulted"));
+    page.click("orders");
+    page.wait("document.getElementById('holder').textContent.startsWith('this page')");
+    page.wait("Number(document.documentElement.dataset.shown) > 40");
+    page.picture("faulted-dark");
+    page.press("acknowledge");
+    page.wait(&chip("disarmed"));
+    page.press("arm");
+    page.wait(&chip("holding"));
+    page.press("run");
+    page.wait(&chip("running"));
+    page.wait("document.getElementById('message').textContent.includes('Nothing to do')");
+    page.value("document.querySelector('#jog button').click()");
+    page.wait("document.getElementById('events').textContent.includes('jog y=100nm')");
+    // What a hand feels for: the figures have moved with it, and digits and strips with the machine.
+    page.wait("/\\d/.test(document.querySelector('#readout .pose').textContent)");
+    page.wait("document.querySelector('#spectrum svg') !== null");
+    page.picture("running-dark");
+    let drawn = "(id => { const c = document.getElementById(id), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; return new Set(new Uint32Array(d.buffer)).size; })";
+    for canvas in ["strips", "legs"] {
+        let colors = page.value(&format!("{drawn}('{canvas}')"));
+        assert!(colors.as_u64().unwrap() > 20, "{canvas}: {colors} colours");
+    }
+    let mut other = Window::open(&panel.url(), false).unwrap();
+    other.wait(&chip("running"));
+    other.wait("document.getElementById('message').textContent.includes('You watch')");
+    other.wait("document.getElementById('arm').disabled && !document.getElementById('hold').disabled");
+    other.wait("Number(document.documentElement.dataset.shown) > 40");
+    other.picture("watching-light");
+    // The orders change hands.
+    other.click("orders");
+    page.wait("document.getElementById('message').textContent.includes('asks for the orders')");
+    page.click("orders");
+    other.wait("document.getElementById('holder').textContent.startsWith('this page')");
+    other.value("document.querySelector('#jog button').click()");
+    other.wait("document.getElementById('events').textContent.split('jog y=100nm').length > 2");
+    other.picture("moving-light");
+    for window in [&mut page, &mut other] {
+        let [mean, most] =
+            ["shownMean", "shownMost"].map(|key| window.value(&format!("document.documentElement.dataset.{key}")));
+        println!("from the panel to the screen: {mean} ms in the mean, {most} ms at most");
+    }
+    // Key Esc ramps down from the page that looks.
+    page.value("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'Escape', bubbles: true }))");
+    page.wait(&chip("disarmed"));
+    page.is_sound();
+    other.is_sound();
+}

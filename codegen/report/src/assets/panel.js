@@ -1,0 +1,356 @@
+// The page: what comes over the socket to what draws it, what is pressed to orders. A number is never older than it looks.
+(function () {
+  counted();
+  const root = document.documentElement, facts = JSON.parse(by("facts").textContent);
+  const NAMES = ["x", "y", "z", "θx", "θy", "θz"], STALE = 300, DIGITS = 200, SPECTRUM = 500;
+  const samples = new Samples(facts.period), strips = new Strips(by("strips"), samples), legs = new Legs(by("legs"), samples, facts.volts);
+  const spectrum = new Spectrum(by("spectrum"), samples, facts.modes);
+  const shownAfter = { count: 0, sum: 0, most: 0 };
+  let socket = null, state = null, left = null, ended = "", you = "", row = null, standing = null, arrived = -Infinity, stated = -Infinity, sent = 0, asked = 0, answers = {};
+  let wave = null, pending = null, gapped = 0, lastEvent = 0, pose = null, delay = 500;
+
+  // Platform: live, its motion drawn larger by a round factor.
+  const reach = Math.max(...facts.view.base.map(p => Math.hypot(p[0], p[1])));
+  facts.view.live = 0.12 * facts.view.height;
+  facts.view.label = "The platform of " + facts.name + " as it stands, its motion drawn larger.";
+  const view = new View(by("view"), facts.view);
+  const larger = 1000;
+  by("larger").textContent = "×" + number(larger);
+  by("spec").textContent = facts.name;
+  by("device").textContent = facts.device;
+  by("leg-note").textContent = "30\u2009s · limits " + number(facts.volts[0]) + " and " + number(facts.volts[1]) + "\u2009V";
+
+  // Rows of the readout.
+  const cells = NAMES.map((name, k) => {
+    const tr = html("tr", document.querySelector("#readout tbody"));
+    html("td", tr).innerHTML = k < 3 ? name : "θ<sub>" + name[1] + "</sub>";
+    const cell = (kind, unit) => { const td = html("td", tr, "", kind), value = html("span", td, "–"); html("i", td, unit); return value; };
+    const made = { pose: cell("pose", k < 3 ? "µm" : "µrad"), target: cell("target", k < 3 ? "µm" : "µrad"), error: cell("error", k < 3 ? "nm" : "nrad") };
+    made.bar = html("canvas", html("td", tr));
+    return made;
+  });
+  const axisBox = by("axis");
+  NAMES.forEach((name, k) => { const b = html("button", axisBox); b.innerHTML = k < 3 ? name : "θ<sub>" + name[1] + "</sub>"; b.dataset.value = k; b.classList.toggle("on", k === 0); });
+
+  // ── The socket ──
+  function connect() {
+    const token = new URLSearchParams(location.search).get("token") || "";
+    socket = new WebSocket("ws://" + location.host + "/socket?token=" + encodeURIComponent(token));
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => { delay = 500; };
+    socket.onmessage = e => (typeof e.data === "string" ? told(JSON.parse(e.data)) : taken(e.data));
+    socket.onclose = () => { socket = null; state = null; left = null; draw(); if (!ended) { setTimeout(connect, delay); delay = Math.min(5000, 2 * delay); } };
+  }
+
+  function say(what) { if (socket && socket.readyState === 1) socket.send(JSON.stringify(what)); else note("error", "Not sent: no link to the panel."); }
+
+  // An order with an answer; what is refused is an event of this page.
+  function order(what, then) {
+    const id = ++asked;
+    answers[id] = then || (() => {});
+    say(Object.assign({ id }, what));
+  }
+
+  function told(message) {
+    if (message.k === "hello") {
+      you = message.you;
+      by("events").replaceChildren();
+      lastEvent = 0;
+      message.events.forEach(event);
+    } else if (message.k === "event") event(message);
+    else if (message.k === "answer") {
+      const then = answers[message.id];
+      delete answers[message.id];
+      if (!message.ok) note("warning", message.why + (/[.!]$/.test(message.why) ? "" : "."));
+      if (then) then(message);
+    } else if (message.k === "end") { ended = message.why; state = null; }
+    else {
+      const now = performance.now();
+      stated = now;
+      if (message.k === "left") left = message; else { state = message; left = null; }
+      if (message.k === "left") state = Object.assign({}, state, { holder: message.holder, mine: message.mine, asked: message.asked, offered: message.offered, pages: message.pages });
+      say({ do: "seen", number: sent });
+      controls();
+    }
+  }
+
+  function taken(buffer) {
+    const at = new DataView(buffer);
+    if (at.getUint32(0, true) === 2) { save(facts.name + "-" + new Date().toISOString().replace(/[:.]/g, "-") + ".rec", URL.createObjectURL(new Blob([buffer.slice(4)]))); return; }
+    const blocks = at.getUint32(4, true), number = at.getUint32(8, true), out = at.getFloat64(16, true);
+    standing = [0, 1, 2, 3, 4, 5].map(k => at.getFloat64(24 + 8 * k, true));
+    let place = 72;
+    for (let b = 0; b < blocks; b++) {
+      const tick = at.getFloat64(place, true), every = at.getUint32(place + 12, true), rows = at.getUint32(place + 16, true);
+      place += 24;
+      for (let r = 0; r < rows; r++) {
+        const values = new Float32Array(buffer, place + 8, 48), phase = at.getUint32(place + 4, true), gap = samples.add(tick + r * every, every, phase === 2, values, 12);
+        spectrum.add(every, gap || phase !== 2, values, 12);
+        if (gap) missing(gap);
+        row = { status: at.getUint32(place, true), phase, values };
+        place += 200;
+      }
+    }
+    sent = number;
+    arrived = performance.now();
+    say({ do: "seen", number });
+    pending = pending || out;
+    wake();
+  }
+
+  // A gap of this page is told apart from one of the machine: that is the panel's to say.
+  function missing(ticks) {
+    gapped += ticks;
+    root.dataset.gaps = String((Number(root.dataset.gaps) || 0) + 1);
+    if (missing.timer) return;
+    missing.timer = setTimeout(() => { missing.timer = null; note("note", "No data on this page for " + duration(gapped * facts.period) + ". The machine went on."); gapped = 0; }, 300);
+  }
+
+  // ── Events ──
+  function note(kind, text, advice) { event({ t: Date.now(), kind, text, do: advice || "" }); }
+
+  function event(e) {
+    const box = by("events"), time = new Date(e.t).toTimeString().slice(0, 8);
+    const one = document.createElement("div");
+    one.className = "event";
+    one.innerHTML = '<svg class="mark"><use href="#m-' + e.kind + '"/></svg>';
+    html("time", one, time);
+    html("span", one, e.text.charAt(0).toUpperCase() + e.text.slice(1) + (e.do ? " Do: " + e.do.charAt(0).toLowerCase() + e.do.slice(1) : "") + (e.code ? " (" + e.code + ")" : ""));
+    box.prepend(one);
+    while (box.children.length > 100) box.lastChild.remove();
+    lastEvent = Math.max(lastEvent, e.t);
+    by("event-note").textContent = "newest first · " + box.children.length;
+    if (Date.now() - e.t < 2000 && !/late tick|No data/.test(e.text)) samples.mark(e.text.length > 28 ? e.text.slice(0, 27) + "…" : e.text, e.kind === "error");
+  }
+
+  // ── Drawing: on what comes, at the display's next picture ──
+  let woken = false;
+  function wake() { if (!woken) { woken = true; requestAnimationFrame(() => { woken = false; draw(); }); } }
+
+  let digits = 0, spectra = 0;
+  function draw() {
+    const now = performance.now(), live = row && now - arrived < STALE && !left;
+    const error = live ? NAMES.map((_, k) => row.values[13 + 3 * k]) : null, volts = live ? NAMES.map((_, k) => row.values[31 + 3 * k]) : null;
+    // First, for it asks how wide it is, which is known as long as nothing else has changed.
+    if (standing && live && standing.every(isFinite)) {
+      facts.view.pose = standing.map(v => v * larger);
+      view.draw();
+    }
+    if (now - digits >= DIGITS || !live) {
+      digits = now;
+      shownDigits(error);
+      heading(now);
+    }
+    strips.draw(NAMES, shown5.error);
+    legs.draw(live ? shown5.volts || volts : null);
+    if (now - shown5.at >= DIGITS) Object.assign(shown5, { at: now, error, volts });
+    if (!live) Object.assign(shown5, { error: null, volts: null });
+    if (now - spectra >= SPECTRUM) {
+      spectra = now;
+      const law = row && row.phase === 2;
+      by("spectrum-note").textContent = live && law ? spectrum.draw(NAMES[spectrum.axis], now) : live ? "no live spectrum: the law is suspended" : "no data";
+    }
+    if (pending !== null) {
+      const after = Date.now() - pending;
+      pending = null;
+      shownAfter.count++;
+      shownAfter.sum += after;
+      if (after > shownAfter.most) shownAfter.most = after;
+      root.dataset.shown = String(shownAfter.count);
+      root.dataset.shownMean = (shownAfter.sum / shownAfter.count).toFixed(2);
+      root.dataset.shownMost = String(shownAfter.most);
+      root.dataset.rows = String(samples.rows);
+    }
+  }
+  const shown5 = { at: 0, error: null, volts: null };
+
+  // Digits stop at the noise.
+  function shownDigits(error) {
+    cells.forEach((cell, k) => {
+      const law = row && row.phase === 2, places = k < 3 ? 4 : 3;
+      cell.pose.textContent = error ? fixed(row.values[k] * 1e6, places) : "–";
+      cell.target.textContent = error && law ? fixed(row.values[6 + k] * 1e6, places) : "–";
+      cell.error.textContent = error && law ? (error[k] > 0 ? "+" : "") + fixed(error[k] * 1e9, k < 3 ? 1 : 0) : "–";
+      bar(cell.bar, samples, k, error && law ? error[k] : NaN);
+    });
+  }
+
+  // ── Message line and chip ──
+  function heading(now) {
+    const line = by("message"), chip = by("chip"), texts = line.querySelectorAll("p b, p span");
+    const put = (kind, what, more, right) => {
+      line.className = kind;
+      line.querySelector("use").setAttribute("href", "#m-" + kind);
+      texts[0].textContent = what;
+      texts[1].textContent = more || "";
+      line.querySelector(".note").textContent = right || "";
+    };
+    const events = lastEvent ? "last event " + new Date(lastEvent).toTimeString().slice(0, 8) : "";
+    const age = now - arrived, link = socket && now - stated < 1000;
+    chip.className = "chip" + (!state || !link || left ? " none" : state.phase === "faulted" ? " bad" : "");
+    chip.textContent = state && link && !left ? state.phase : "–";
+    if (ended) put("error", "The panel has ended.", ended);
+    else if (!link) put("error", "No link to the panel.", "Use the hardware stop if the machine must stop.", state ? "" : "connecting");
+    else if (left) put("warning", "The page that had the orders is gone.", "The machine holds" + (left.left > 0 ? ", and ramps down in " + left.left.toFixed(0) + "\u2009s" : " or is at rest") + ". Hold, Ramp down and Ask for orders work from here.");
+    else if (age > STALE) put("error", "No data for " + (isFinite(age) ? duration(age / 1000) : "any time") + ".", "Readouts are blank until it comes.");
+    else if (state) {
+      const said = state.said, watch = !state.mine && state.holder;
+      let more = said.do;
+      if (state.phase === "running" && wave && state.wave) more = "Wave " + state.wave.name + " has the set-point.";
+      else if (watch && said.kind !== "error") more = state.holder + " has the orders. Hold and Ramp down work from here, too.";
+      else if (!state.holder && said.kind !== "error") more = (more ? more + " " : "") + "Ask for orders first.";
+      if (state.asked && state.mine) put("warning", state.asked.by + " asks for the orders.", "Hand over or keep: " + state.asked.left.toFixed(0) + "\u2009s left.", said.code || events);
+      else put(said.kind, watch && said.kind === "ok" ? "You watch." : said.what, more, said.code ? said.code + " · " + events : "no condition present" + (events ? " · " + events : ""));
+    }
+    const down = by("down").querySelector("span"), volts = row ? Math.max(...[0, 1, 2, 3, 4, 5].map(k => Math.abs(row.values[31 + 3 * k]))) : 0;
+    const time = facts.ramp ? (volts / facts.ramp).toFixed(1) + "\u2009s to 0\u2009V" : "";
+    down.textContent = !link ? "No link: use the hardware stop" : state && !state.status.amplifiers_on && !left ? "at rest already" : (state && state.phase === "ramping down" ? "ramping down, " : "") + time + " · key Esc";
+  }
+
+  // ── Controls ──
+  let moves = [];
+  function controls() {
+    if (!state || !state.status) return;
+    const { status, phase, mine, holder, known } = state, on = status.amplifiers_on, cause = state.said.code;
+    const orders = mine ? "" : holder ? "orders: " + holder : "ask for orders";
+    by("amplifiers").textContent = on ? "on" : "off";
+    const mode = known.gains && known.gains.mode || "–";
+    by("mode").textContent = mode.toUpperCase().replace("PF", "P/F").replace("-", " with ").replace("INVHYS", "Invhys");
+    by("holder").textContent = mine ? "this page (" + you + ")" : holder || "nobody";
+    by("pages").textContent = mine ? state.pages - 1 + " other" + (state.pages === 2 ? "" : "s") : "this page, " + (state.pages - 1) + " other" + (state.pages === 2 ? "" : "s");
+    by("link").textContent = "20\u2009ms, " + (status.link_errors + status.damaged_frames) + " lost";
+    by("late").textContent = shown(status.late);
+    const button = by("orders");
+    button.textContent = mine ? (state.asked ? "Hand over" : state.offered !== null ? "Offered" : "Hand over") : state.asked && state.asked.mine ? "Asked, " + state.asked.left.toFixed(0) + "\u2009s" : holder && state.offered === null ? "Ask for orders" : "Take the orders";
+    button.disabled = !mine && !!state.asked;
+    by("keep").hidden = !(mine && (state.asked || state.offered !== null));
+    const steps = ["disarmed", "arming", "holding", "running"], step = steps.indexOf(phase);
+    [...by("steps").children].forEach((span, k) => { span.className = k === step ? "on" : k < step ? "past" : ""; });
+    const held = ["running", "arming", "holding"].includes(phase);
+    allow(by("hold"), held ? "" : "not armed", "acts at once · key H");
+    allow(by("arm"), phase === "faulted" ? "acknowledge first" : phase !== "disarmed" ? "armed" : orders, "press 1\u2009s");
+    allow(by("run"), phase === "running" ? "running" : phase !== "holding" && phase !== "arming" ? "not armed" : orders, "press 1\u2009s");
+    allow(by("acknowledge"), phase !== "faulted" ? "no fault" : orders, "press 1\u2009s");
+    for (const [id, next] of [["arm", "disarmed"], ["run", "holding"], ["acknowledge", "faulted"]]) by(id).classList.toggle("next", phase === next && !by(id).disabled);
+    const events = known.standing && known.standing.health ? known.standing.health.events_in_words : null;
+    by("stop").textContent = "Hardware stop: " + (events ? (events.includes("emergency stop") ? "pressed" : "not pressed") : "–") + ".";
+    const busy = row && (row.status & 1 << 18), waving = wave && state.wave;
+    const move = phase !== "running" ? "not running" : orders || (waving ? "the wave moves it" : "");
+    by("move-note").textContent = move || "press, or arrow keys";
+    moves.forEach(one => { one.disabled = move !== ""; one.title = move; });
+    by("bias").textContent = waving ? "Take from wave" : "Go to bias";
+    allow(by("bias"), phase !== "running" ? "not running" : orders);
+    if (known.reach) by("reach").innerHTML = "Reach left, each alone, µm, µrad:<br>" + known.reach.limits.map(([low, high], k) => (k < 3 ? NAMES[k] : "θ<sub>" + NAMES[k][1] + "</sub>") + "\u2009" + number(Number(Math.max(0, Math.min(high - known.reach.from[k], known.reach.from[k] - low)).toPrecision(2)))).join(", ");
+    // Wave: what the panel started, and for how long it goes.
+    if (!state.wave) wave = wave && wave.trajectory && busy ? wave : null;
+    by("wave-name").textContent = chosen ? chosen.name : "";
+    by("wave-note").textContent = wave ? (wave.trajectory ? "playing" : "under way") : "not playing";
+    const played = wave && wave.seconds && state.wave ? (samples.last - state.wave.tick) * facts.period / wave.seconds : 0;
+    if (wave && wave.seconds && played >= 1) wave = null;
+    by("wave-bar").style.width = Math.min(100, 100 * played) + "%";
+    if (wave && wave.seconds) by("wave-note").textContent = (played * wave.seconds).toFixed(1) + " of " + number(wave.seconds) + "\u2009s";
+    by("play").textContent = wave ? "Stop" : "Play";
+    allow(by("play"), orders || (wave ? (wave.trajectory ? "a trajectory ends by itself; Hold stops it" : "") : phase !== "running" ? "not running" : chosen ? "" : "choose one first"));
+    allow(by("choose"), "");
+    // Recorder.
+    const recorder = known.recorder;
+    if (recorder) {
+      by("record-room").textContent = shown(recorder.capacity) + " ticks";
+      by("record-bar").style.width = Math.min(100, 100 * recorder.ticks / recorder.capacity) + "%";
+      by("record-note").textContent = recorder.running ? (recorder.triggered ? "after the trigger" : "waits for a fault") : recorder.triggered ? "complete: holds the trigger" : "stopped";
+      by("record").textContent = recorder.running ? "Stop" : "Record";
+    }
+    allow(by("record"), recorder ? orders : "no recorder");
+    allow(by("download"), !recorder ? "no recorder" : recorder.running ? "it records: stop it first" : orders);
+    // Gain.
+    by("gain-note").textContent = "all axes; computed margin " + (facts.gain_margin ? "×" + number(Number(facts.gain_margin.toPrecision(3))) : "beyond what is looked at");
+    allow(by("apply"), orders || (facts.gain_margin && gain.factor >= facts.gain_margin ? "unstable: beyond the computed margin" : state.busy ? "an order is under way" : ""));
+    checked(state.check, phase, orders);
+  }
+
+  function checked(check, phase, orders) {
+    allow(by("check"), "");
+    const runs = check && check.runs;
+    by("check-bar").style.width = (check ? (check.runs ? 100 * check.done / 6 : check.verdict ? 100 : 0) : 0) + "%";
+    by("check-note").textContent = runs ? "leg " + Math.min(check.done, 5) + " is driven" : "";
+    allow(by("check-begin"), runs ? "under way" : phase !== "holding" ? "arm first" : orders, "press 1\u2009s");
+    allow(by("check-end"), runs ? orders : "not under way");
+    const verdict = check && check.verdict, text = JSON.stringify(verdict || null);
+    if (checked.shown === text) return;
+    checked.shown = text;
+    const box = by("verdict");
+    box.replaceChildren();
+    if (!verdict) return;
+    html("h3", box, verdict.what.charAt(0).toUpperCase() + verdict.what.slice(1));
+    for (const one of [...verdict.legs, ...verdict.gauges]) {
+      const line = html("div", box, "", "row");
+      line.innerHTML = '<svg class="mark"><use href="#m-' + (one.good ? "ok" : "error") + '"/></svg>';
+      html("span", line, one.what.charAt(0).toUpperCase() + one.what.slice(1) + "." + (one.mend ? " Do: " + one.mend : ""));
+      html("span", line, "gain " + shown(one.gain.toFixed(2)));
+    }
+  }
+
+  // ── What is pressed ──
+  const urgent = what => say({ do: what });
+  by("down").addEventListener("click", () => urgent("ramp-down"));
+  by("hold").addEventListener("click", () => urgent("hold"));
+  document.addEventListener("keydown", e => {
+    if (e.key === "Escape") { e.preventDefault(); urgent("ramp-down"); return; }
+    if (e.ctrlKey || e.metaKey || e.altKey || e.repeat) return;
+    if (e.key === "h" || e.key === "H") { urgent("hold"); return; }
+    const arrow = { ArrowRight: ["x", 1], ArrowLeft: ["x", -1], ArrowUp: ["y", 1], ArrowDown: ["y", -1], PageUp: ["z", 1], PageDown: ["z", -1] }[e.key];
+    // In a figure that has the focus they turn it.
+    if (arrow && !moves[0].disabled && !e.target.closest("svg, input, dialog")) { e.preventDefault(); step(...arrow); }
+  });
+  let size = 100;
+  const step = (axis, sign) => order({ do: "order", line: "jog " + axis + "=" + sign * size * (axis[0] === "r" ? 10 : 1) + (axis[0] === "r" ? "nrad" : "nm") });
+  moves = jog(by("jog"), step);
+  choose(by("step"), value => { size = Number(value); });
+  choose(by("unit"), value => { strips.first = Number(value); strips.bound = 0; wake(); });
+  choose(by("span"), value => { strips.span = Number(value); strips.bound = 0; spanNote(); wake(); });
+  choose(axisBox, value => { spectrum.choose(Number(value)); spectra = 0; wake(); });
+  const spanNote = () => { by("strip-note").textContent = "line: mean, band: least and largest of " + duration(SPANS[strips.span] / BINS); };
+  spanNote();
+  for (const request of ["arm", "run", "acknowledge"]) slow(by(request), () => order({ do: "begin", request }));
+  by("orders").addEventListener("click", () => { if (!state) return; say({ do: state.mine ? (state.asked ? "give" : "offer") : "ask" }); });
+  by("keep").addEventListener("click", () => say({ do: "keep" }));
+  by("bias").addEventListener("click", () => order({ do: "order", line: wave && state.wave ? "wave stop" : "goto zero" }));
+  by("record").addEventListener("click", () => order({ do: "order", line: state.known.recorder.running ? "record stop" : "record arm" }));
+  by("download").addEventListener("click", () => order({ do: "download" }));
+  const gain = new Gain(by("gain"), facts.gain_margin);
+  gain.changed = controls;
+  by("apply").addEventListener("click", () => order({ do: "gain", factor: gain.factor }));
+
+  // What is played: a trajectory of the spec, or a wave from a file of this computer.
+  let chosen = null;
+  const pick = what => { chosen = what; by("panel-choose").close(); controls(); };
+  const list = by("choices");
+  if (!(facts.trajectories || []).length) html("p", list, "The spec has no trajectories.");
+  for (const name of facts.trajectories || []) html("button", list, "Trajectory " + name).addEventListener("click", () => pick({ name, trajectory: true }));
+  by("file").addEventListener("change", e => {
+    const file = e.target.files[0];
+    if (file) file.text().then(text => pick({ name: file.name, text, seconds: Number((/^\s*seconds\s*=\s*([\d.eE+-]+)/m.exec(text) || [])[1]) || 0 }));
+    e.target.value = "";
+  });
+  by("play").addEventListener("click", () => {
+    if (wave) order({ do: "order", line: "wave stop" }, () => { wave = null; });
+    else if (chosen.trajectory) order({ do: "order", line: "play " + chosen.name }, done => { if (done.ok) wave = { trajectory: true }; });
+    else order({ do: "wave", name: chosen.name, text: chosen.text }, done => { if (done.ok) wave = { seconds: chosen.seconds }; });
+  });
+  by("choose").addEventListener("click", () => by("panel-choose").show());
+  by("check").addEventListener("click", () => by("panel-check").show());
+  slow(by("check-begin"), () => order({ do: "check" }));
+  by("check-end").addEventListener("click", () => say({ do: "end-check" }));
+  for (const button of document.querySelectorAll("[data-close]")) button.addEventListener("click", () => button.closest("dialog").close());
+
+  // ── Themes, sizes, time ──
+  const again = () => { readInks(); gain.draw(); view.draw(); if (spectrum.plot) { spectrum.choose(spectrum.axis); } wake(); };
+  themed(by("theme"));
+  by("theme").addEventListener("click", again);
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
+  window.addEventListener("resize", again);
+  again();
+  // What is stale must not wait for something to come.
+  setInterval(() => { if (performance.now() - arrived > STALE) draw(); }, 100);
+  connect();
+})();
