@@ -206,29 +206,37 @@ impl StackLanes {
         match &mut self.hysteresis {
             Hysteresis::Plays(plays) => {
                 // Of what plays moved, times the part of the way that they missed, and times the part of its square.
-                let mut missed = [[0.0; LANES]; 2];
+                let (mut missed, mut squared) = ([0.0; LANES], [0.0; LANES]);
+                let (widening, after) = (self.widening, *after);
                 for [threshold, weight, state] in plays {
+                    // In short loops over values at hand, which compilers take as vectors.
+                    let (threshold, weight, last) = (*threshold, *weight, *state);
+                    let mut next = [0.0; LANES];
                     for k in 0..LANES {
-                        let r = threshold[k] * self.widening[k];
+                        let r = threshold[k] * widening[k];
                         let (low, high) = (after[k] - r, after[k] + r);
-                        let raised = if state[k] < low { low } else { state[k] };
-                        let next = if raised > high { high } else { raised };
-                        let change = next - state[k];
-                        let part = change * per_way[k];
-                        let part = if part > 0.0 { part } else { 0.0 };
-                        let part = if part < 1.0 { part } else { 1.0 };
-                        state[k] = next;
-                        sum[k] += weight[k] * next;
-                        let change = weight[k] * change;
+                        let raised = if last[k] < low { low } else { last[k] };
+                        next[k] = if raised > high { high } else { raised };
+                    }
+                    *state = next;
+                    let mut part = [0.0; LANES];
+                    for k in 0..LANES {
+                        let of_way = (next[k] - last[k]) * per_way[k];
+                        let above = if of_way > 0.0 { of_way } else { 0.0 };
+                        part[k] = if above < 1.0 { above } else { 1.0 };
+                    }
+                    for k in 0..LANES {
+                        let change = weight[k] * (next[k] - last[k]);
+                        let short = change * (1.0 - part[k]);
+                        sum[k] += weight[k] * next[k];
                         moved[k] += change;
-                        let short = change * (1.0 - part);
-                        missed[0][k] += short;
-                        missed[1][k] += short + short * part;
+                        missed[k] += short;
+                        squared[k] += short + short * part[k];
                     }
                 }
                 for k in 0..LANES {
-                    mean_off[k] = late.mean[0][k] * missed[0][k] + late.mean[1][k] * missed[1][k];
-                    skew_off[k] = late.skew[0][k] * missed[0][k] + late.skew[1][k] * missed[1][k];
+                    mean_off[k] = late.mean[0][k] * missed[k] + late.mean[1][k] * squared[k];
+                    skew_off[k] = late.skew[0][k] * missed[k] + late.skew[1][k] * squared[k];
                 }
             }
             Hysteresis::BoucWen(legs) => {
