@@ -1,14 +1,16 @@
-//! Host time of the parts of one simulated tick: `cargo run --release -p host-sim --example whole_tick_cost [LIBRARY]`, with
-//! the host library of an emitted platform controller for the controller's part.
+//! Host time of the parts of one simulated tick: `cargo run --release -p oracle --example whole_tick_cost [LIBRARY]`, with the
+//! host library of the reference platform's controller for what takes one: the controller's part, 15 s of everything in
+//! long and in small steps of the plant, and how far their tables are apart.
 
 use std::hint::black_box;
 use std::time::Instant;
 
 use host_sim::closed_loop::Preparation;
 use host_sim::controller::{Controller, TickController};
-use host_sim::platform::rig::{Bench, Noise, Request};
-use host_sim::platform::{PlatformRig, Specimen};
-use host_sim::trajectory::{Multisine, PoseTrajectory};
+use host_sim::platform::rig::{Bench, Noise, Request, RunOptions};
+use host_sim::platform::scenario::{FREE_MODES, select};
+use host_sim::platform::{PlatformRig, PlatformScenario, Specimen};
+use host_sim::trajectory::{Multisine, PaperPath, PaperPose, PoseTrajectory};
 
 const TICKS: usize = 500;
 
@@ -70,17 +72,41 @@ fn main() {
     let (inputs, outputs) = (controller.description().input_names.len(), controller.description().output_names.len());
     let (input, mut output) = (vec![0; inputs], vec![0; outputs]);
     println!("controller on zeros: {:.0} ns", least(|_| controller.step(&input, &mut output)));
-    rig.plant_mut().step_whole_ticks(1e-4);
-    rig.draw_ahead(400 * TICKS);
-    let mut bench = match Bench::new(&mut rig, &mut controller, 1e-4, 0) {
-        Ok(bench) => bench,
-        Err(error) => return eprintln!("{error}"),
-    };
-    if let Err(error) = bench.arm(60.0) {
-        return eprintln!("{error}");
+    let paths = [(PaperPath::Case1, 1.0), (PaperPath::Case2, 1.0)].map(|(path, hz)| PaperPose::corrected(path, hz));
+    let options = RunOptions::new(1e-4, [0.0, 0.0, 10e-6, 0.0, 0.0, 0.0]);
+    let mut scenario = PlatformScenario::new(&specimen, &Noise::of(&specimen), 1, options);
+    let mut tables = Vec::new();
+    for long in [false, true] {
+        if long {
+            scenario.rig_mut().plant_mut().step_whole_ticks(1e-4);
+        }
+        let (mut best, mut simulated, mut table) = (f64::INFINITY, 0.0, Vec::new());
+        for _ in 0..5 {
+            let begun = Instant::now();
+            (simulated, table) = (0.0, Vec::new());
+            for (_, word) in FREE_MODES {
+                if let Err(error) = select(&mut controller, word) {
+                    return eprintln!("{error}");
+                }
+                for path in &paths {
+                    match scenario.run(&mut controller, path) {
+                        Err(error) => return eprintln!("{error}"),
+                        Ok(run) => {
+                            simulated += run.arming + scenario.options.settle + path.duration();
+                            table.extend(run.errors.rms_nano());
+                        }
+                    }
+                }
+            }
+            best = f64::min(best, begun.elapsed().as_secs_f64());
+        }
+        let steps = if long { "long" } else { "small" };
+        println!("{simulated:.2} s of everything in {steps} steps: {best:.3} s, {:.1} × real time", simulated / best);
+        tables.push(table);
     }
-    let loop_ = least(|tick| {
-        let _ = black_box(bench.tick(&Request::stream(sines.target(tick as f64 * 1e-4))));
-    });
-    println!("whole loop with set-point: {loop_:.0} ns");
+    let apart = |first: usize| {
+        let each = tables[0].iter().zip(&tables[1]).enumerate().filter(|(k, _)| k % 6 / 3 == first / 3);
+        each.map(|(_, (small, long))| (small - long).abs()).fold(0.0, f64::max)
+    };
+    println!("largest difference of an rms error: {:.4} nm, {:.3} nrad", apart(0), apart(3));
 }

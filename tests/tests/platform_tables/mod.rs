@@ -9,4 +9,5 @@ mod damping;
 mod learning;
 mod limits;
 mod oracle;
+mod steps;
 mod tables;
