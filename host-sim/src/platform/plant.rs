@@ -9,7 +9,7 @@ use super::whole_tick::WholeTick;
 use crate::closed_loop::Preparation;
 use crate::plant::{SmoothLag, Stack, steps_within};
 
-/// How much longer long steps are than the longest small one.
+/// How much longer long steps are than the longest small one, and those of the pre-cycle.
 const LONG: f64 = 5.0;
 
 /// Amplifier and stacks of one leg.
@@ -134,8 +134,31 @@ impl PlatformPlant {
     ///
     /// Quasi-static for the structure, which follows the legs without error: it is put to rest at the end.
     pub fn prepare(&mut self, preparation: &Preparation) {
-        let Preparation { peak, rate, settle, update, rest } = *preparation;
+        let Preparation { rate, settle, update, rest, .. } = *preparation;
         self.shorten();
+        self.structure.release();
+        if !self.cycle_long(&Preparation { update: LONG * update, ..*preparation }) {
+            self.cycle_small(preparation);
+        }
+        for actuator in &mut self.actuators {
+            actuator.rest = actuator.displacement;
+        }
+        self.step = 0.0;
+        self.structure.set_state(&[0.0; 6], &[0.0; 6], &[0.0; 6]);
+        self.gauges.iter_mut().flatten().for_each(|gauge| gauge.rest_at(0.0));
+        if rest > 0.0 {
+            let steps = steps_within(rest / rate, update);
+            for step in 1..=steps {
+                self.hold(&[rest * f64::from(step) / f64::from(steps); 6], rest / rate / f64::from(steps));
+            }
+            for _ in 0..steps_within(settle, update) {
+                self.hold(&[rest; 6], update);
+            }
+        }
+    }
+
+    /// Pre-cycle and rest of the legs, one by one in small steps.
+    fn cycle_small(&mut self, &Preparation { peak, rate, settle, update, .. }: &Preparation) {
         for actuator in &mut self.actuators {
             let peak = if peak < actuator.peak { peak } else { actuator.peak };
             let steps = steps_within(peak / rate, update);
@@ -150,21 +173,32 @@ impl PlatformPlant {
                     actuator.advance(0.0, true);
                 }
             }
-            actuator.rest = actuator.displacement;
         }
-        self.step = 0.0;
-        self.structure.release();
-        self.structure.set_state(&[0.0; 6], &[0.0; 6], &[0.0; 6]);
-        self.gauges.iter_mut().flatten().for_each(|gauge| gauge.rest_at(0.0));
-        if rest > 0.0 {
-            let steps = steps_within(rest / rate, update);
-            for step in 1..=steps {
-                self.hold(&[rest * f64::from(step) / f64::from(steps); 6], rest / rate / f64::from(steps));
-            }
-            for _ in 0..steps_within(settle, update) {
-                self.hold(&[rest; 6], update);
+    }
+
+    /// The same of all legs at once in long steps, if they can be had and the peaks are equal; whether that is so. A ramp is
+    /// monotonic, and what ends in rest does not show how it got there: free displacements are the same within 0.01 nm.
+    fn cycle_long(&mut self, &Preparation { peak, rate, settle, update, .. }: &Preparation) -> bool {
+        let own = self.actuators[0].peak;
+        if self.actuators.iter().any(|actuator| actuator.peak != own) {
+            return false;
+        }
+        let peak = if peak < own { peak } else { own };
+        let ramp = steps_within(peak / rate, update);
+        self.lengthen(peak / rate / f64::from(ramp));
+        let Some(whole) = &mut self.whole_tick else { return false };
+        for step in (1..=ramp).chain((0..ramp).rev()) {
+            whole.advance(&[peak * f64::from(step) / f64::from(ramp); 6]);
+        }
+        if settle > 0.0 {
+            let steps = steps_within(settle, update);
+            self.lengthen(settle / f64::from(steps));
+            for _ in 0..steps {
+                self.whole_tick.iter_mut().for_each(|whole| whole.advance(&[0.0; 6]));
             }
         }
+        self.shorten();
+        true
     }
 
     /// Holds six voltages (V, at the amplifier inputs) for `interval` (s, > 0).

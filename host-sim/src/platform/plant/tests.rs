@@ -211,6 +211,34 @@ fn intervals_longer_than_a_long_step_are_several_and_others_may_follow() {
     assert!(long.whole_tick.as_ref().is_some_and(|whole| whole.step() == 1e-4));
 }
 
+/// The pre-cycle of the parameter files, 20 V/s and 50 µs.
+#[test]
+fn a_pre_cycle_in_long_steps_leaves_the_legs_where_small_steps_do() {
+    for (name, specimen) in classes() {
+        let preparation = Preparation::of(&specimen.legs[0], 0.0);
+        let [mut long, mut small] = [PlatformPlant::new(&specimen), PlatformPlant::new(&specimen)];
+        assert!(long.cycle_long(&Preparation { update: LONG * preparation.update, ..preparation }));
+        small.cycle_small(&preparation);
+        // Where they rest, and what the history is to a drive through all plays.
+        for volts in [0.0, 100.0] {
+            let mut worst: f64 = 0.0;
+            for (a, b) in long.actuators.iter_mut().zip(&mut small.actuators) {
+                for actuator in [&mut *a, &mut *b] {
+                    actuator.set_step(2e-5);
+                    (0..500).for_each(|_| actuator.advance(volts, true));
+                }
+                worst = worst.max((a.displacement - b.displacement).abs() * 1e-6);
+            }
+            println!("{name}, {volts} V: {:.2} pm", worst * 1e12);
+            assert!(worst < 10e-12, "{name}, {volts} V: {worst:e}");
+        }
+        // Legs that differ go through it one by one.
+        let mut unequal = specimen.clone();
+        unequal.legs[2].u_max = 90.0;
+        assert!(!PlatformPlant::new(&unequal).cycle_long(&preparation));
+    }
+}
+
 #[test]
 fn a_part_that_may_let_go_is_met_in_small_steps_and_left_in_long_ones() {
     let mut long = prepared(&Specimen::reference());
