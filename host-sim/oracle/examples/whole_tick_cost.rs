@@ -1,15 +1,17 @@
-//! Host time of the parts of one simulated tick: `cargo run --release -p oracle --example whole_tick_cost [LIBRARY]`, with the
-//! host library of the reference platform's controller for what takes one: the controller's part, 15 s of everything in
-//! long and in small steps of the plant, and how far their tables are apart.
+//! Host time of the parts of one simulated tick: `cargo run --release -p oracle --example whole_tick_cost [LIBRARY [LEG]]`,
+//! with the host library of the reference platform's controller for what takes one: the controller's part, everything of the
+//! paper's cases and machining in small, finer and long steps of the plant, and how far their tables are apart. LEG is the class
+//! of the legs, `plays` or `bouc-wen`.
 
 use std::hint::black_box;
 use std::time::Instant;
 
 use host_sim::closed_loop::Preparation;
 use host_sim::controller::{Controller, TickController};
+use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{Noise, RunOptions};
 use host_sim::platform::scenario::{FREE_MODES, select};
-use host_sim::platform::{PlatformRig, PlatformScenario, Specimen};
+use host_sim::platform::{PlatformParameters, PlatformRig, PlatformScenario, Specimen, WorkPart};
 use host_sim::trajectory::{Multisine, PaperPath, PaperPose, PoseTrajectory};
 
 const TICKS: usize = 500;
@@ -94,24 +96,38 @@ fn main() {
     let (inputs, outputs) = (controller.description().input_names.len(), controller.description().output_names.len());
     let (input, mut output) = (vec![0; inputs], vec![0; outputs]);
     println!("controller on zeros: {:.0} ns", least(|_| controller.step(&input, &mut output)));
-    let paths = [(PaperPath::Case1, 1.0), (PaperPath::Case2, 1.0)].map(|(path, hz)| PaperPose::corrected(path, hz));
+    let leg = std::env::args_os().nth(2).unwrap_or_else(|| "plays".into());
+    let leg = match LegParameters::named(leg.as_ref()) {
+        Ok(leg) => leg,
+        Err(error) => return eprintln!("{error}"),
+    };
+    let specimen = Specimen::within_tolerances(&PlatformParameters::reference(), &leg, 1);
+    let cases = [(PaperPath::Case1, 1.0), (PaperPath::Case2, 1.0), (PaperPath::Case1, 10.0), (PaperPath::Case2, 10.0)];
+    let machining = [WorkPart::glass(), WorkPart::aluminium()].map(|part| (PaperPath::Machining, 1.0, Some(part)));
+    let runs: Vec<_> = cases.iter().map(|(path, hz)| (*path, *hz, None)).chain(machining).collect();
     let options = RunOptions::new(1e-4, [0.0, 0.0, 10e-6, 0.0, 0.0, 0.0]);
     let mut scenario = PlatformScenario::new(&specimen, &Noise::of(&specimen), 1, options);
     let mut tables = Vec::new();
-    for long in [false, true] {
-        if long {
+    for (steps, longest) in [("small", 2e-5), ("finer", 4e-6), ("long", 2e-5)] {
+        scenario.rig_mut().plant_mut().set_longest_step(longest);
+        if steps == "long" {
             scenario.rig_mut().plant_mut().step_whole_ticks(1e-4);
         }
         let (mut best, mut simulated, mut table) = (f64::INFINITY, 0.0, Vec::new());
-        for _ in 0..5 {
+        for _ in 0..if steps == "finer" { 1 } else { 3 } {
             let begun = processor_time(start);
             (simulated, table) = (0.0, Vec::new());
             for (_, word) in FREE_MODES {
                 if let Err(error) = select(&mut controller, word) {
                     return eprintln!("{error}");
                 }
-                for path in &paths {
-                    match scenario.run(&mut controller, path) {
+                for (path, hertz, part) in &runs {
+                    let path = PaperPose::corrected(*path, *hertz);
+                    let run = match part {
+                        Some(part) => scenario.against(&mut controller, &path, *part),
+                        None => scenario.run(&mut controller, &path),
+                    };
+                    match run {
                         Err(error) => return eprintln!("{error}"),
                         Ok(run) => {
                             simulated += run.arming + scenario.options.settle + path.duration();
@@ -122,13 +138,15 @@ fn main() {
             }
             best = f64::min(best, processor_time(start) - begun);
         }
-        let steps = if long { "long" } else { "small" };
         println!("{simulated:.2} s of everything in {steps} steps: {best:.3} s, {:.1} × real time", simulated / best);
         tables.push(table);
     }
-    let apart = |first: usize| {
-        let each = tables[0].iter().zip(&tables[1]).enumerate().filter(|(k, _)| k % 6 / 3 == first / 3);
-        each.map(|(_, (small, long))| (small - long).abs()).fold(0.0, f64::max)
+    let apart = |table: &[f64], first: usize| {
+        let each = table.iter().zip(&tables[1]).enumerate().filter(|(k, _)| k % 6 / 3 == first / 3);
+        each.map(|(_, (found, finer))| (found - finer).abs()).fold(0.0, f64::max)
     };
-    println!("largest difference of an rms error: {:.4} nm, {:.3} nrad", apart(0), apart(3));
+    for (steps, table) in [("small", &tables[0]), ("long", &tables[2])] {
+        let [nm, nrad] = [0, 3].map(|first| apart(table, first));
+        println!("largest difference of an rms error, {steps} steps from finer ones: {nm:.4} nm, {nrad:.3} nrad");
+    }
 }
