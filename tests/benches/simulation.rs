@@ -7,8 +7,8 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use host_sim::controller::TickController;
 use host_sim::plant::LegParameters;
-use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::{Bench, Noise, Request};
+use host_sim::platform::{PlatformRig, PlatformScenario};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTrajectory};
 use specgen::machine;
 use specgen_tests::Emitted;
@@ -28,14 +28,11 @@ fn scenario(emitted: &Emitted) -> PlatformScenario {
     machine::scenario(model, task, &specimen, &Noise::of(&specimen), 1)
 }
 
-/// The plant alone under six voltages that change every tick, in small steps or in one per tick.
-#[divan::bench(args = [false, true])]
-fn plant(bencher: Bencher, whole_ticks: bool) {
+/// The plant alone under six voltages that change every tick, in long steps or in small ones.
+#[divan::bench(args = ["long", "small"])]
+fn plant(bencher: Bencher, steps: &str) {
     let emitted = Emitted::new("bench-plant", "reference.toml", &[]);
-    let mut rig = scenario(&emitted).rig().clone();
-    if whole_ticks {
-        rig.plant_mut().step_whole_ticks(INTERVAL);
-    }
+    let mut rig = stepped(&emitted, steps);
     bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
         for tick in 0..TICKS {
             let voltage = std::array::from_fn(|leg| 40.0 + 0.01 * ((tick * (leg + 3)) % 500) as f64);
@@ -43,6 +40,22 @@ fn plant(bencher: Bencher, whole_ticks: bool) {
         }
         black_box(rig.plant().pose());
     });
+}
+
+/// The machine in long steps or in small ones.
+fn stepped(emitted: &Emitted, steps: &str) -> PlatformRig {
+    let mut rig = scenario(emitted).rig().clone();
+    if steps == "small" {
+        rig.plant_mut().step_small();
+    }
+    rig
+}
+
+/// A machine as built, through its pre-cycle.
+#[divan::bench]
+fn preparation(bencher: Bencher) {
+    let emitted = Emitted::new("bench-preparation", "reference.toml", &[]);
+    bencher.bench_local(|| black_box(scenario(&emitted).rig().plant().pose()));
 }
 
 /// Six gauges, their noise and their converters.
@@ -80,18 +93,35 @@ fn set_points(bencher: Bencher) {
     });
 }
 
-/// Everything: controller, plant, gauges, noise, set-points.
+/// The controller alone, words in and out, at rest.
 #[divan::bench]
-fn whole_loop(bencher: Bencher) {
+fn controller(bencher: Bencher) {
+    let emitted = Emitted::new("bench-controller", "reference.toml", &[]);
+    let mut controller = emitted.controller();
+    let description = controller.description();
+    let (input, mut output) = (vec![0; description.input_names.len()], vec![0; description.output_names.len()]);
+    bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
+        for _ in 0..TICKS {
+            controller.step(black_box(&input), &mut output);
+        }
+        black_box(&output);
+    });
+}
+
+/// Everything: controller, plant, gauges, noise, set-points; without a trace and with every word kept.
+#[divan::bench(args = ["long", "small", "long, traced"])]
+fn whole_loop(bencher: Bencher, steps: &str) {
     let emitted = Emitted::new("bench-loop", "reference.toml", &[]);
-    let scenario = scenario(&emitted);
     let mut controller = emitted.controller();
     let words = controller.default_config();
     controller.configure(&words).expect("the spec's settings");
     let trajectory = PaperPose::corrected(PaperPath::Case1, 1.25);
-    let mut rig = scenario.rig().clone();
+    let mut rig = stepped(&emitted, steps);
     let mut bench = Bench::new(&mut rig, &mut controller, INTERVAL, 0).expect("a platform");
     bench.arm(60.0).expect("at its bias pose");
+    if steps.ends_with("traced") {
+        bench.record();
+    }
     bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
         for tick in 0..TICKS {
             let target = trajectory.target(tick as f64 * INTERVAL);

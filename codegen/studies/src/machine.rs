@@ -57,7 +57,8 @@ pub fn specimen(model: &Model, task: &TaskSpace, leg: &LegParameters, seed: Opti
     }
 }
 
-/// That machine, prepared, with the gauges of the spec; `noise` as [`Noise::of`] it or [`Noise::NONE`].
+/// That machine, prepared, with the gauges of the spec, in steps as long as the control interval; `noise` as [`Noise::of`] it or
+/// [`Noise::NONE`].
 #[must_use]
 pub fn scenario(model: &Model, task: &TaskSpace, specimen: &Specimen, noise: &Noise, seed: u64) -> PlatformScenario {
     let mut options = RunOptions::new(model.timing.period, bias(task));
@@ -69,6 +70,7 @@ pub fn scenario(model: &Model, task: &TaskSpace, specimen: &Specimen, noise: &No
         let rig: PlatformRig = scenario.rig().clone().with_signal(GaugeSignal::Volts(calibration.clone()));
         *scenario.rig_mut() = rig;
     }
+    scenario.rig_mut().plant_mut().step_whole_ticks(model.timing.period);
     scenario
 }
 

@@ -67,6 +67,18 @@ impl BoucWen {
         Self { of, voltage: 0.0, lost: 0.0 }
     }
 
+    /// x now, V.
+    pub(super) fn output(&self) -> f64 {
+        self.voltage - self.lost
+    }
+
+    /// dx/dv of a voltage that goes the way of `way` from here.
+    pub(super) fn slope(&self, way: f64) -> f64 {
+        let BoucWenParameters { alpha, beta_per_v: beta, gamma_per_v: gamma } = self.of;
+        let g = if way < 0.0 { -self.lost } else { self.lost };
+        1.0 - (alpha - (if g < 0.0 { beta - gamma } else { beta + gamma }) * g)
+    }
+
     /// Moves to voltage `v` (V); returns x (V).
     pub fn advance(&mut self, v: f64) -> f64 {
         let BoucWenParameters { alpha, beta_per_v: beta, gamma_per_v: gamma } = self.of;

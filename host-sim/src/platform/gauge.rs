@@ -4,6 +4,7 @@ use serde::Deserialize;
 
 use super::geometry::{angles, rotation};
 use super::linear::{Matrix3, Six, Three, apply, dot};
+use crate::plant::lanes::{LANES, Lane};
 
 /// A gauge fixed to the base that measures along its line to a plane on the platform.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -24,11 +25,7 @@ pub struct Probe {
 impl Probe {
     /// Distance along the line to the plane, m.
     pub(super) fn distance(&self, height: f64, pose: &Six) -> f64 {
-        self.distance_turned(height, pose, &rotation(angles(pose)))
-    }
-
-    /// The same with the rotation of the pose at hand.
-    pub(super) fn distance_turned(&self, height: f64, pose: &Six, turn: &Matrix3) -> f64 {
+        let turn = &rotation(angles(pose));
         let at = apply(turn, &self.plane_point);
         let normal = apply(turn, &self.plane_normal);
         let to_plane = [
@@ -43,6 +40,52 @@ impl Probe {
     #[must_use]
     pub fn reading(&self, height: f64, pose: &Six) -> f64 {
         self.distance(height, pose) - self.distance(height, &[0.0; 6])
+    }
+}
+
+/// Six probes, a lane each.
+#[derive(Debug, Clone)]
+pub(super) struct ProbeLanes {
+    point: [Lane; 3],
+    direction: [Lane; 3],
+    plane_point: [Lane; 3],
+    plane_normal: [Lane; 3],
+}
+
+impl ProbeLanes {
+    pub(super) fn of(probes: &[Probe; 6]) -> Self {
+        // The idle lanes repeat the first probe, so that nothing there is undefined.
+        let lanes = |of: fn(&Probe) -> Three| -> [Lane; 3] {
+            std::array::from_fn(|axis| std::array::from_fn(|k| of(&probes[if k < 6 { k } else { 0 }])[axis]))
+        };
+        Self {
+            point: lanes(|probe| probe.point),
+            direction: lanes(|probe| probe.direction),
+            plane_point: lanes(|probe| probe.plane_point),
+            plane_normal: lanes(|probe| probe.plane_normal),
+        }
+    }
+
+    /// [`Probe::distance`] of each, to the bit.
+    pub(super) fn distances(&self, height: f64, pose: &Six, turn: &Matrix3) -> Six {
+        let above = [pose[0], pose[1], height + pose[2]];
+        let (mut along, mut facing) = ([0.0; LANES], [0.0; LANES]);
+        for (axis, row) in turn.iter().enumerate() {
+            let (mut at, mut normal) = ([0.0; LANES], [0.0; LANES]);
+            for k in 0..LANES {
+                at[k] = (row[0] * self.plane_point[0][k] + row[1] * self.plane_point[1][k])
+                    + row[2] * self.plane_point[2][k];
+            }
+            for k in 0..LANES {
+                normal[k] = (row[0] * self.plane_normal[0][k] + row[1] * self.plane_normal[1][k])
+                    + row[2] * self.plane_normal[2][k];
+            }
+            for k in 0..LANES {
+                along[k] += ((above[axis] + at[k]) - self.point[axis][k]) * normal[k];
+                facing[k] += self.direction[axis][k] * normal[k];
+            }
+        }
+        std::array::from_fn(|k| along[k] / facing[k])
     }
 }
 
@@ -107,6 +150,21 @@ mod tests {
         // A turn about y: a z probe at x = 80 mm meets the plane at −x tan θ, wherever the target slid to.
         let tilted = read([0.0, 0.0, 0.0, 0.0, theta, 0.0]);
         assert!((tilted[0] + 0.08 * libm::tan(theta)).abs() < 1e-15, "{tilted:?}");
+    }
+
+    #[test]
+    fn lanes_measure_what_each_probe_does() {
+        let parameters = PlatformParameters::reference();
+        let mut probes = parameters.probes;
+        // A skew one, for terms that are zero in the others.
+        let third = libm::sqrt(1.0 / 3.0);
+        probes[4].plane_normal = [third, -third, third];
+        probes[4].direction = [0.6, 0.0, 0.8];
+        for pose in [[0.0; 6], [1e-6, -2e-6, 33e-6, 4e-4, -3e-4, 2e-4], [5e-3, 1e-3, -2e-3, 0.02, -0.03, 0.1]] {
+            let found = ProbeLanes::of(&probes).distances(0.18, &pose, &rotation(angles(&pose)));
+            let expected = probes.map(|probe| probe.distance(0.18, &pose));
+            assert_eq!(found.map(f64::to_bits), expected.map(f64::to_bits), "{found:?} {expected:?}");
+        }
     }
 
     #[test]

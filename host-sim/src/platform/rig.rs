@@ -9,7 +9,7 @@
 mod bench;
 mod run;
 
-use super::gauge::{GaugeSignal, Probe};
+use super::gauge::{GaugeSignal, ProbeLanes};
 use super::geometry::{angles, rotation};
 use super::linear::Six;
 use super::plant::PlatformPlant;
@@ -61,7 +61,7 @@ pub struct PlatformRig {
     lowest_voltage: f64,
     /// Voltage at which the legs rest, V.
     rest_voltage: f64,
-    probes: [Probe; 6],
+    probes: ProbeLanes,
     /// Distance of each probe from its plane at rest, m.
     rest_distances: Six,
     gauges: [Gauge; 6],
@@ -83,7 +83,7 @@ impl PlatformRig {
             height: nominal.height_m,
             lowest_voltage: nominal.lowest_voltage_v,
             rest_voltage: nominal.rest_voltage_v,
-            probes: nominal.probes,
+            probes: ProbeLanes::of(&nominal.probes),
             rest_distances: nominal.probes.map(|probe| probe.distance(nominal.height_m, &[0.0; 6])),
             gauges: std::array::from_fn(|k| Gauge::new(&noise.channels, seed, k as u64)),
             range: nominal.gauge_range_m,
@@ -135,12 +135,11 @@ impl PlatformRig {
     /// Reads the six gauges, in m or V.
     pub fn read_gauges(&mut self) -> Six {
         let pose = self.plant.seen();
-        let turn = rotation(angles(&pose));
+        let distances = self.probes.distances(self.height, &pose, &rotation(angles(&pose)));
         let [low, high] = self.range;
         for k in 0..6 {
             // Drawn whatever the fault, so that a fault does not shift the noise of a run.
-            let moved = self.probes[k].distance_turned(self.height, &pose, &turn) - self.rest_distances[k];
-            let reading = self.gauges[k].read(moved);
+            let reading = self.gauges[k].read(distances[k] - self.rest_distances[k]);
             let held = if reading > high {
                 high
             } else if reading < low {

@@ -1,7 +1,7 @@
 //! Many runs of one platform from one state: armed and settled once, then cloned, with the noise of the runs drawn once.
 //!
 //! A run takes other settings over while the controller stands at its bias pose, which it does without a bump, and then
-//! follows the trajectory as a stream. The plant takes whole ticks, see [`super::PlatformPlant::step_whole_ticks`].
+//! follows the trajectory as a stream. The plant takes long steps, see [`super::PlatformPlant::step_whole_ticks`], or small ones.
 
 use std::ops::ControlFlow;
 
@@ -34,7 +34,7 @@ pub struct Moment<'a> {
 }
 
 impl PlatformStudy {
-    /// Arms a fork of `controller`, configured as it is, on a plant of `scenario` in steps of whole ticks or the usual
+    /// Arms a fork of `controller`, configured as it is, on a plant of `scenario` in steps of whole ticks or in small
     /// ones, and settles it. Runs follow `trajectory` from there.
     ///
     /// # Errors
@@ -53,8 +53,9 @@ impl PlatformStudy {
             (wanted, pose_of(options, &wanted))
         });
         let mut rig = scenario.rig().clone();
-        if whole_ticks {
-            rig.plant_mut().step_whole_ticks(interval);
+        match whole_ticks {
+            true => rig.plant_mut().step_whole_ticks(interval),
+            false => rig.plant_mut().step_small(),
         }
         let mut controller = controller.fork();
         let (bench, _) = rig.ready(&mut controller, options)?;

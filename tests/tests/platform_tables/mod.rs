@@ -11,4 +11,5 @@ mod learning;
 mod limits;
 mod oracle;
 mod response;
+mod steps;
 mod tables;

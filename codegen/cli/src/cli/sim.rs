@@ -54,6 +54,10 @@ pub struct Arguments {
     /// With [control]: control intervals by which voltages reach the amplifiers late.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=100))]
     latency: u32,
+    /// With [control]: the machine in steps of 20 µs, which the usual ones, as long as the control interval, are held against.
+    /// Several times slower.
+    #[arg(long, conflicts_with = "record")]
+    small_steps: bool,
     /// Instead of the experiments: a wave on all axes under the supervisor, every tick of it recorded in this file for
     /// `specgen replay`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "plot", "paper", "samples", "frequency", "trajectory"])]

@@ -88,7 +88,7 @@ pub struct Conditions {
     pub machine: Option<u64>,
     /// Control intervals by which voltages come late.
     pub latency: usize,
-    /// One step per control interval where that is offered, or the small steps of `specgen sim`.
+    /// Steps as long as the control interval, as usual, or the small ones that these are held against.
     pub whole_ticks: bool,
 }
 

@@ -1,22 +1,27 @@
-//! The structure of [`Structure`], without contact, in one step per control interval: legs in lanes.
+//! The structure of [`Structure`] in steps as long as a control interval: legs in lanes.
 //!
-//! Behind amplifiers that hold their inputs a free displacement goes, over one interval, along the exponential of its
-//! amplifier's lag and not along a straight line. Here each leg has that shape, so that an interval of 100 µs is one exact
-//! step of the linear part; what the exact forces differ is extrapolated over it as ever.
+//! Behind amplifiers that hold their inputs a free displacement goes, over one step, along the exponential of its
+//! amplifier's lag and not along a straight line. Here each leg has that shape, and by how much it is off that on the way as
+//! a mean and a first moment ([`Way`]): those of 6 s (1 − s) and 120 s (1 − s) (s − 1/2), the response to which is exact.
+//! What the exact forces differ from the linear ones is extrapolated over the step as ever.
 
-use super::{STATES, Structure};
-use crate::plant::lanes::{LANES, Lane};
-use crate::platform::linear::{Matrix6, Six, exponential, inverse, product};
+use super::{STATES, Structure, sum};
+use crate::plant::lanes::{LANES, Lane, Way};
+use crate::platform::contact::Contact;
+use crate::platform::geometry::{angles, attitude, rate_matrix};
+use crate::platform::linear::{Matrix6, Six, apply, exponential, inverse, product};
 
 type Column = [f64; STATES];
 
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::platform) struct StructureLanes {
     from_state: [Column; STATES],
-    /// Of a leg's displacement held at 1 m; of its way to 1 m along its lag, and straight.
+    /// Of a leg's displacement held at 1 m; of its way to 1 m along its lag; of being off that by 1 m on average, and by 1 m as
+    /// the first moment.
     from_held: [Column; 6],
     from_lagged: [Column; 6],
-    from_straight: [Column; 6],
+    from_mean: [Column; 6],
+    from_skew: [Column; 6],
     /// Of a generalised force at the beginning of a step and its way to the end.
     from_force: [Column; 6],
     from_force_change: [Column; 6],
@@ -29,6 +34,8 @@ pub(in crate::platform) struct StructureLanes {
     damping: Lane,
     /// Columns of J at rest.
     jacobian: [Lane; 6],
+    /// What never lets go, with its stiffness in coordinates h.
+    contact: Option<(Contact, Matrix6)>,
     state: Column,
     displacement: Lane,
     difference: Six,
@@ -41,7 +48,8 @@ fn lane(of: impl Fn(usize) -> f64) -> Lane {
 }
 
 impl StructureLanes {
-    /// The structure as it is, for steps of `step` (s); `lag` of each leg's amplifier, s.
+    /// The structure as it is, for steps of `step` (s); `lag` of each leg's amplifier, s. A part in touch is taken
+    /// as one that holds both ways.
     pub(in crate::platform) fn of(structure: &Structure, step: f64, lag: &Six) -> Self {
         let parameters = &structure.parameters;
         let geometry = &parameters.geometry;
@@ -50,10 +58,12 @@ impl StructureLanes {
             std::array::from_fn(|leg| structure.jacobian[leg][axis] * parameters.stiffness[leg])
         });
         let driven = product(&flexibility, &forces);
-        let (spring, damper) = (product(&flexibility, &structure.stiffness), product(&flexibility, &structure.damping));
-        // [h, ḣ] and per column of inputs a pair [u, u̇] with u̇ held, or one decaying input, in units of one step.
-        let respond = |input: &Matrix6, decay: Option<&Six>| {
-            let n = STATES + 12;
+        let stiffness = sum(&structure.stiffness, &structure.contact_stiffness);
+        let (spring, damper) = (product(&flexibility, &stiffness), product(&flexibility, &structure.damping));
+        // [h, ḣ] and per column of inputs u with its first `order` derivatives, the last one held; or u alone, decaying. In
+        // units of one step.
+        let respond = |input: &Matrix6, order: usize, decay: &Six| {
+            let n = STATES + 6 * (order + 1);
             let mut rates = vec![vec![0.0; n]; n];
             for row in 0..6 {
                 rates[row][6 + row] = step;
@@ -62,21 +72,27 @@ impl StructureLanes {
                     rates[6 + row][6 + column] = -step * damper[row][column];
                     rates[6 + row][12 + column] = step * input[row][column];
                 }
-                match decay {
-                    Some(per_step) => rates[12 + row][12 + row] = -per_step[row],
-                    None => rates[12 + row][18 + row] = 1.0,
+                for below in 0..order {
+                    rates[12 + 6 * below + row][18 + 6 * below + row] = 1.0;
                 }
+                rates[12 + row][12 + row] = -decay[row];
             }
             exponential(&rates)
         };
         let column = |out: &[Vec<f64>], k: usize| -> Column { std::array::from_fn(|row| out[row][k]) };
         let columns =
             |out: &[Vec<f64>], first: usize| -> [Column; 6] { std::array::from_fn(|k| column(out, first + k)) };
-        let by_force = respond(&flexibility, None);
-        let by_leg = respond(&driven, None);
+        let by_force = respond(&flexibility, 1, &[0.0; 6]);
+        let by_leg = respond(&driven, 3, &[0.0; 6]);
+        // Of s, s²/2 and s³/6.
+        let powers = |factors: [f64; 3]| -> [Column; 6] {
+            std::array::from_fn(|leg| {
+                std::array::from_fn(|row| (0..3).map(|k| factors[k] * by_leg[row][STATES + 6 * (k + 1) + leg]).sum())
+            })
+        };
         // Faster than a ten-thousandth of the step is at once.
         let decays = lag.map(|lag| if lag * 1e4 > step { step / lag } else { 0.0 });
-        let decaying = respond(&driven, Some(&decays));
+        let decaying = respond(&driven, 0, &decays);
         let from_held = columns(&by_leg, STATES);
         let from_lagged = std::array::from_fn(|leg| {
             if decays[leg] == 0.0 {
@@ -90,7 +106,8 @@ impl StructureLanes {
             from_state: std::array::from_fn(|k| column(&by_force, k)),
             from_held,
             from_lagged,
-            from_straight: columns(&by_leg, STATES + 6),
+            from_mean: powers([6.0, -12.0, 0.0]),
+            from_skew: powers([-60.0, 360.0, -720.0]),
             from_force: columns(&by_force, STATES),
             from_force_change: columns(&by_force, STATES + 6),
             rest,
@@ -102,6 +119,7 @@ impl StructureLanes {
             stiffness: std::array::from_fn(|leg| if leg < 6 { parameters.stiffness[leg] } else { 0.0 }),
             damping: std::array::from_fn(|leg| if leg < 6 { parameters.damping[leg] } else { 0.0 }),
             jacobian: std::array::from_fn(|axis| lane(|leg| structure.jacobian[leg][axis])),
+            contact: structure.contact.map(|contact| (contact, structure.contact_stiffness)),
             state: structure.state,
             displacement: lane(|leg| structure.displacement[leg]),
             difference: [0.0; 6],
@@ -127,9 +145,9 @@ impl StructureLanes {
         self.displacement[leg]
     }
 
-    /// One step to the free displacements `displacement` (m), each along its lag, or straight where `straight` says so.
+    /// One step, over which the free displacements go along `free` (m).
     #[inline(always)]
-    pub(in crate::platform) fn advance(&mut self, displacement: &Lane, straight: Option<&[bool; LANES]>) {
+    pub(in crate::platform) fn advance(&mut self, free: &Way) {
         let mut of_state = [0.0; STATES];
         let mut of_legs = [0.0; STATES];
         let mut of_forces = [0.0; STATES];
@@ -139,13 +157,10 @@ impl StructureLanes {
             }
         }
         for leg in 0..6 {
-            let way = displacement[leg] - self.displacement[leg];
-            let shape = match straight {
-                Some(flags) if flags[leg] => &self.from_straight[leg],
-                _ => &self.from_lagged[leg],
-            };
+            let way = free.end[leg] - self.displacement[leg];
             for row in 0..STATES {
-                of_legs[row] += self.from_held[leg][row] * self.displacement[leg] + shape[row] * way;
+                of_legs[row] += (self.from_held[leg][row] * self.displacement[leg] + self.from_lagged[leg][row] * way)
+                    + (self.from_mean[leg][row] * free.mean[leg] + self.from_skew[leg][row] * free.skew[leg]);
             }
         }
         for k in 0..6 {
@@ -158,16 +173,16 @@ impl StructureLanes {
         for row in 0..STATES {
             self.state[row] = of_state[row] + (of_legs[row] + of_forces[row]);
         }
-        self.displacement = *displacement;
+        self.displacement = free.end;
         self.before = self.difference;
         self.difference = self.force_difference();
     }
 
-    /// Jᵀ f at h with the exact extensions, less J₀ᵀ f₀ with the linear ones.
+    /// Jᵀ f at h with the exact extensions, less J₀ᵀ f₀ with the linear ones; the same of a part in touch.
     #[inline(always)]
     fn force_difference(&self) -> Six {
         let [x, y, z, tx, ty, tz, ..] = self.state;
-        let (turn, rates) = crate::platform::geometry::attitude([tx, ty, tz]);
+        let (turn, rates) = attitude([tx, ty, tz]);
         let mut jacobian = [[0.0; LANES]; 6];
         let mut force = [0.0; LANES];
         let mut linear = [0.0; LANES];
@@ -214,6 +229,14 @@ impl StructureLanes {
                 part[k] = jacobian[axis][k] * force[k] - self.jacobian[axis][k] * linear[k];
             }
             out[axis] = ((part[0] + part[1]) + (part[2] + part[3])) + ((part[4] + part[5]) + (part[6] + part[7]));
+        }
+        if let Some((contact, stiffness)) = &self.contact {
+            let pose = self.pose();
+            let pushed = contact.wrench_when_closed(&pose).generalised(&rate_matrix(angles(&pose)));
+            let spring = apply(stiffness, &pose);
+            for k in 0..6 {
+                out[k] += pushed[k] + spring[k];
+            }
         }
         out
     }

@@ -33,9 +33,13 @@ const LOST: f64 = 0.1;
 
 /// Refuses arguments that are for a platform alone, and an interval at which the laws are unstable.
 pub(super) fn check(arguments: &Arguments, compiled: &Compiled) -> Result<(), Failure> {
-    if arguments.trajectory.is_some() || arguments.latency != 0 || (arguments.paper && arguments.frequency.is_some()) {
+    if arguments.trajectory.is_some()
+        || arguments.latency != 0
+        || arguments.small_steps
+        || (arguments.paper && arguments.frequency.is_some())
+    {
         return Err(Failure::Usage(
-            "--trajectory, --latency and the paper's --frequency are for a platform that six gauges see; this spec has no [control]".to_owned(),
+            "--trajectory, --latency, --small-steps and the paper's --frequency are for a platform that six gauges see; this spec has no [control]".to_owned(),
         ));
     }
     if arguments.record.is_some() {

@@ -92,6 +92,9 @@ pub(super) fn run(
     ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
     let mut scenario = machine::scenario(&compiled.model, task, &specimen, &noise, seed);
     scenario.options.latency = arguments.latency as usize;
+    if arguments.small_steps {
+        scenario.rig_mut().plant_mut().step_small();
+    }
     let drawn = arguments.plot.wanted()?;
     if arguments.traces || drawn {
         scenario.options.record = Record::Samples;
