@@ -85,7 +85,7 @@ mod app {
         let machine = converters::at_reset(context.local.machine);
         exchange.record(context.local.record, converters::kept(context.local.kept, machine));
         exchange.play(context.local.passes);
-        let mut board = converters::board(wiring.adc, wiring.dac, machine, intact);
+        let mut board = converters::board(wiring.adc, wiring.dac, wiring.lines, machine, intact);
         let Some(period) = timer::period(timer::hertz()) else { safe::stop() };
         board.start(&mut exchange.report);
         exchange.prepare();
