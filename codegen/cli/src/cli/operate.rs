@@ -5,6 +5,7 @@ mod health;
 mod operator;
 mod passes;
 mod platform;
+mod triggers;
 
 use std::io::{BufRead, IsTerminal};
 use std::path::PathBuf;
