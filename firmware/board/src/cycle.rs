@@ -60,8 +60,10 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         assert!(controller::limits::DAC_BITS == A::BITS, "dac.bits of the spec is not what the DAC of this board has");
 
     /// Every trigger of the spec has a line.
-    const LINE_EACH: () =
-        assert!(triggers::LINES <= L::COUNT, "the spec has more [[trigger]] than this board has lines for");
+    const LINE_EACH: () = assert!(
+        L::COUNT.checked_sub(triggers::LINES).is_some(),
+        "the spec has more [[trigger]] than this board has lines for"
+    );
 
     /// At power-up, before [`Self::start`]: its converters, and a line for each trigger of the spec, `()` for none. `machine` is at reset;
     /// `intact`: the result of `controller::integrity`.
@@ -217,7 +219,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
     /// Sets the output lines; a fault is an event of the next tick.
     #[inline]
     fn show(&mut self, report: &mut Report, high: u32) {
-        if triggers::LINES > 0
+        if triggers::LINES != 0
             && let Err(fault) = self.lines.set(high)
         {
             report.converter(fault);

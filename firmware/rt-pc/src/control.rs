@@ -118,7 +118,7 @@ impl<D: Device> Loop<'_, D> {
                 driven = self.device.enable(false);
             }
             driven = driven.and(self.device.write(&output.tick.dac_code));
-            if triggers::LINES > 0 {
+            if triggers::LINES != 0 {
                 driven = driven.and(self.device.set(triggers::lines(output.tick.status)));
             }
             if output.amplifier_on && !enabled {

@@ -78,11 +78,8 @@ fn spi_config(mode: spi::Mode, frequency: Hertz) -> spi::Config {
 /// The pins of the spec's triggers as outputs, low; the others stay as they are after reset.
 #[must_use]
 pub fn trigger_pins(pins: [Peri<'static, AnyPin>; MOST]) -> TriggerPins {
-    let mut line = 0;
-    pins.map(|pin| {
-        line += 1;
-        (line <= LINES).then(|| Output::new(pin, Level::Low, Speed::Medium))
-    })
+    let mut lines = [(); LINES].into_iter();
+    pins.map(|pin| lines.next().map(|()| Output::new(pin, Level::Low, Speed::Medium)))
 }
 
 /// The machine at reset, made where it stays. A function of its own, so that the compiler fills the memory instead of a copy

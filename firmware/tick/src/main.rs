@@ -80,11 +80,8 @@ fn run() -> Result<(), Exit> {
     exchange.orders.request = Request::Run;
     let wave = Wave::new(waves::limits(&exchange.config));
     let bench = &Bench::new(rates()?);
-    let mut line = 0;
-    let lines = [(); triggers::MOST].map(|()| {
-        line += 1;
-        (line <= triggers::LINES).then_some(Pin { bench })
-    });
+    let mut lines = [(); triggers::LINES].into_iter();
+    let lines = [(); triggers::MOST].map(|()| lines.next().map(|()| Pin { bench }));
     let board = Board::with_lines(adc(bench), dacs(bench), lines, &mut machine, true);
     let mut timed = Timed {
         board,

@@ -68,7 +68,7 @@ pub(super) fn above_noise(facts: &Facts, found: &mut Found) {
                     amount(trigger.axis, hysteresis),
                     amount(trigger.axis, noise[trigger.axis])
                 ),
-                &format!("take it out, or write \"{}\" or more", amount(trigger.axis, quiet)),
+                &format!("take it out, or write \"{}\" or more", amount(trigger.axis, 1.01 * quiet)),
             );
         }
     }
@@ -87,7 +87,7 @@ pub(super) fn pulses_apart(facts: &Facts, found: &mut Found) {
                 codes::TRIGGERS_MERGE,
                 &format!("trigger[{index}].width"),
                 format!(
-                    "a pulse of trigger[{index}] takes {ticks} tick{} and one between, but at {}/s a position is passed every {}",
+                    "a pulse of trigger[{index}] takes {ticks} tick{} and one between, but at {}/s a position is passed every {} ticks",
                     if ticks == 1 { "" } else { "s" },
                     amount(trigger.axis, speed),
                     figure(between)

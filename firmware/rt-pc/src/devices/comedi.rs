@@ -66,12 +66,12 @@ impl<'a> Comedi<'a> {
         if !input.set_line(line, 0, false) {
             return Err(format!("{path}: digital line 0 cannot be set: amplifiers could not be switched off"));
         }
-        if lines as usize <= LINES {
+        if (lines as usize).checked_sub(1 + LINES).is_none() {
             return Err(format!(
                 "{path}: {name} has {lines} digital lines; the amplifiers need one, the triggers of the spec {LINES} more"
             ));
         }
-        for number in 1..=LINES as u32 {
+        for (number, ()) in (1..).zip([(); LINES]) {
             input
                 .make_output(line, number)
                 .map_err(|error| format!("{path}: digital line {number} as an output: {error}"))?;
@@ -183,7 +183,7 @@ impl Lines for Comedi<'_> {
 
     fn set(&mut self, high: u32) -> Result<(), Fault> {
         let mut good = true;
-        for number in 0..LINES as u32 {
+        for (number, ()) in (0_u32..).zip([(); LINES]) {
             let bit = 1 << number;
             if (high ^ self.high) & bit != 0 {
                 if self.input.set_line(self.line, number + 1, high & bit != 0) {
