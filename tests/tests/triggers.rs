@@ -43,7 +43,9 @@ fn goes(bench: &mut Bench<'_>, x: f64) {
         let status = bench.tick(&request).unwrap().status;
         if tick > 2 && status & BUSY == 0 {
             // Noise alone, from here on.
-            (0..300).for_each(|_| drop(bench.tick(&request).unwrap()));
+            for _ in 0..300 {
+                bench.tick(&request).unwrap();
+            }
             return;
         }
     }
@@ -83,7 +85,9 @@ fn record(emitted: &Emitted) -> Vec<u8> {
     goes(&mut bench, 5e-6);
     let mut target = PoseTarget::default();
     target.pose[0] = 5e-6;
-    (0..95).for_each(|_| drop(bench.tick(&Request::stream(target)).unwrap()));
+    for _ in 0..95 {
+        bench.tick(&Request::stream(target)).unwrap();
+    }
     bench.configure(&other).unwrap();
     for sweep in 0..SWEEPS {
         goes(&mut bench, if sweep % 2 == 0 { -SWEEP } else { SWEEP });

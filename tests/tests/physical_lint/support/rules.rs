@@ -317,11 +317,7 @@ pub const RULES: &[Rule] = &[
     of(
         "W0875",
         "trigger[0].hysteresis",
-        [
-            "step  = \"1 um\"",
-            "step  = \"1 um\"\nhysteresis = \"27 nm\"",
-            "step  = \"1 um\"\nhysteresis = \"27.2 nm\"",
-        ],
+        ["step  = \"1 um\"", "step  = \"1 um\"\nhysteresis = \"27 nm\"", "step  = \"1 um\"\nhysteresis = \"27.2 nm\""],
     )
     .on("features/triggers.toml")
     .at("hysteresis = \"27 nm\""),

@@ -49,7 +49,7 @@ impl<P: Port> Operator<P> {
             Err(ClientError::Refused(Refusal::Word { index })) => {
                 let names = &self.session.description().config_names;
                 let name = names.get(usize::from(index)).map_or("?", String::as_str);
-                Err(Ended::Refused(format!("`{name}` is out of its range (docs/settings.md); the settings stay")))
+                Err(Ended::Refused(format!("`{name}` is out of its range (docs/triggers.md); the settings stay")))
             }
             other => Ok(other?),
         }
