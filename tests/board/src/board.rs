@@ -148,7 +148,15 @@ impl Board {
     /// `bits`: of the ADC and of a gauge; `modelled`: cycles by the model of [`Cost`].
     pub fn new(part: &'static Part, code: [Vec<u8>; 2], bits: [u32; 2], plant: Plant, modelled: bool) -> Self {
         let devices = Devices::new(part);
-        let levels = Levels { convst: true, select: true, reset: false, sync: [true; 2], ldac: true, enable: false, triggers: [false; 4] };
+        let levels = Levels {
+            convst: true,
+            select: true,
+            reset: false,
+            sync: [true; 2],
+            ldac: true,
+            enable: false,
+            triggers: [false; 4],
+        };
         let mut board = Self {
             part,
             samples: 0,
