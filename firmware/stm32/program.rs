@@ -88,7 +88,7 @@ mod app {
         exchange.record(context.local.record, converters::kept(context.local.kept, machine));
         exchange.play(context.local.passes);
         exchange.show(context.local.samples, serial::BAUD);
-        let mut board = converters::board(wiring.adc, wiring.dac, machine, intact);
+        let mut board = converters::board(wiring.adc, wiring.dac, wiring.lines, machine, intact);
         let Some(period) = timer::period(timer::hertz()) else { safe::stop() };
         board.start(&mut exchange.report);
         exchange.prepare();

@@ -79,6 +79,12 @@ impl fmt::Display for DescriptionError {
 impl std::error::Error for DescriptionError {}
 
 impl Description {
+    /// Output lines of triggers.
+    #[must_use]
+    pub fn lines(&self) -> usize {
+        self.config_names.iter().filter(|name| name.starts_with("trigger_kind[")).count()
+    }
+
     /// Parses `key=value` lines. Keys that are not known are left alone; they may belong to a later version.
     ///
     /// # Errors

@@ -3,6 +3,8 @@
 //! Every input, output and configuration value travels as a `u64`: the bits of an f64, the bits of an f32 with zeros above,
 //! or an integer.
 
+use specgen_runtime::trigger;
+
 /// Floating-point type of a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scalar {
@@ -80,7 +82,7 @@ pub enum WordKind {
 }
 
 /// Names (without index) of the words that are integers; all others are real. Part of the controller's interface.
-const INTEGERS: [&str; 17] = [
+const INTEGERS: [&str; 25] = [
     "dac_code",
     "status",
     "state_digest",
@@ -98,6 +100,14 @@ const INTEGERS: [&str; 17] = [
     "events",
     "supervisor",
     "conditions",
+    "missed",
+    "trigger_kind",
+    "trigger_axis",
+    "trigger_direction",
+    "trigger_first",
+    "trigger_every",
+    "trigger_last",
+    "trigger_width",
 ];
 
 impl WordKind {
@@ -126,10 +136,13 @@ pub fn status_words(status: u32) -> String {
         (18, "moving"),
         (19, "wrench fault"),
         (20, "correction limited"),
+        (21, "trigger missed"),
     ] {
         words.extend((status >> bit & 1 == 1).then(|| what.to_owned()));
     }
-    let known = 0x3f | 0x3f << 8 | 0x1f << 16 | 0x3f << 24;
+    let high = trigger::lines(status);
+    words.extend((0..trigger::MOST).filter(|line| high >> line & 1 == 1).map(|line| format!("trigger {line} high")));
+    let known = 0xffff | 0x3f << 16 | 0x3f << 24;
     words.extend((0..u32::BITS).filter(|bit| status & !known & 1 << bit != 0).map(|bit| format!("bit {bit}")));
     words.join("+")
 }
@@ -145,7 +158,7 @@ mod tests {
         assert_eq!(status_words(0x2_2000), "gauge 5 fault+set-point stale");
         let texts: std::collections::BTreeSet<String> = (0..32).map(|bit| status_words(1 << bit)).collect();
         let unknown = texts.iter().filter(|text| text.starts_with("bit ")).count();
-        assert_eq!((texts.len(), unknown), (32, 9), "each bit has a text of its own");
+        assert_eq!((texts.len(), unknown), (32, 4), "each bit has a text of its own");
     }
 
     #[test]

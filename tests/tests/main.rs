@@ -53,4 +53,5 @@ mod stability_refusal;
 mod supervisor;
 mod support;
 mod tables_from_identify;
+mod triggers;
 mod unsafe_code;

@@ -110,6 +110,7 @@ fn every_value_of_the_reference_is_in_si() {
             paper("case-2", PaperPath::Case2),
             paper("machining", PaperPath::Machining),
         ],
+        triggers: Vec::new(),
     };
     assert_eq!(model.task_space, Some(expected));
 }

@@ -4,6 +4,7 @@
 
 mod faults;
 mod session;
+mod triggers;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -29,6 +30,8 @@ const TESTED: &str = "target/tests/boards";
 const TARGETS: [&str; 2] = ["stm32h743", "stm32f4"];
 /// When the record of a played motion ends, s after its order: rest and knots take half a second, then it moves.
 const RECORD: f64 = 0.7;
+/// A record of triggers that is worth comparing has so many edges.
+const LEAST_EDGES: usize = 4;
 /// In the answer to `status`.
 const STANDS: &str = "; status 0x";
 const WAVE: &str = "ramp = 0.05\nseconds = 0.4\n[[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-6, frequency = 5.0 }\n";
@@ -213,8 +216,16 @@ fn run(trial: &Trial, brief: bool) -> Result<(), String> {
     if trial.cycles {
         hold(trial, &report)?;
     }
+    let log = std::mem::take(&mut session.log);
     drop(session);
-    replay(trial, "run.rec", &[])?;
+    replay(trial, "run.rec", &["--csv", "run.csv"])?;
+    if !brief && has_triggers(&trial.spec)? {
+        let edges = triggers::check(&trial.folder.join("run.csv"), &log)?;
+        println!("{}: triggers, {edges} edges of pins in the ticks that the record has", trial.target);
+        if edges < LEAST_EDGES {
+            return Err(format!("{}: expected {LEAST_EDGES} edges of triggers and more", trial.target));
+        }
+    }
     if motion.is_none() {
         return Ok(());
     }
@@ -254,6 +265,14 @@ fn corrected(table: &str) -> usize {
                 .any(|(place, text)| is(place) && text.parse().is_ok_and(|value: f64| value != 0.0))
         })
         .count()
+}
+
+/// Whether a machine of this spec has output lines.
+fn has_triggers(path: &Path) -> Result<bool, String> {
+    let source = SpecSource::read(path).map_err(|finding| finding.message)?;
+    let (model, _) = spec::load(&source);
+    let model = model.ok_or_else(|| format!("{} is refused", path.display()))?;
+    Ok(model.task_space.is_some_and(|task| !task.triggers.is_empty()))
 }
 
 /// A motion that is learned.

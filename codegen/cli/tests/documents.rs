@@ -181,7 +181,9 @@ fn status_bits_are_those_that_are_emitted() {
         ("17", "SETPOINT_STALE", 1 << 17),
         ("18", "GENERATOR_BUSY", 1 << 18),
         ("19", "WRENCH_FAULT", 1 << 19),
+        ("6, 7, 14, 15", "TRIGGER_HIGH", 0xc0c0),
         ("20", "CORRECTION_LIMITED", 1 << 20),
+        ("21", "TRIGGER_MISSED", 1 << 21),
     ] {
         assert!(page.contains(&format!("\n| {rows} | ")), "no row {rows}");
         let line = step.lines().find(|line| line.contains(&format!("const {constant}: u32"))).unwrap();

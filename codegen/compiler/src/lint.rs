@@ -28,6 +28,7 @@ mod motion;
 pub mod paths;
 mod requirements;
 mod timing;
+mod triggers;
 mod weights;
 
 pub use allow::{allow, unused};
@@ -107,6 +108,9 @@ const RULES: &[Rule] = &[
     motion::streams_keep_up,
     motion::streams_within_slew,
     motion::workspace_is_used,
+    triggers::steps_apart,
+    triggers::above_noise,
+    triggers::pulses_apart,
     requirements::ask_something,
     budget::tables_fit,
 ];

@@ -15,6 +15,7 @@ mod sensing;
 pub mod setpoint;
 mod supervision;
 mod task_space;
+pub mod triggers;
 
 pub use dynamics::{GRAVITY, platform};
 pub(crate) use integrity::digest;
@@ -23,7 +24,9 @@ pub use load::describe as describe_load;
 pub(crate) use sensing::seen;
 pub use sensing::{PoseNoise, pose_noise};
 
-use crate::ir::{Bounds, Defaults, Hysteresis, Ir, Law, Load, Scalar, Sensing, Setpoint, Setpoints, TaskSpace};
+use crate::ir::{
+    Bounds, Defaults, Hysteresis, Ir, Law, Load, PlatformDefaults, Scalar, Sensing, Setpoint, Setpoints, TaskSpace,
+};
 use crate::stability::platform::{Design, RestDynamics};
 use specgen_identify::everett::EverettTable;
 use specgen_language::diagnostic::Diagnostic;
@@ -108,7 +111,14 @@ pub fn lower(
             stroke: self::stroke(model, tables),
         },
         gauge_converter,
-        permitted: permitted::lower(&actuation, max_step, model.sensor.range, task_space.as_ref(), scalar),
+        permitted: permitted::lower(
+            &actuation,
+            max_step,
+            model.sensor.range,
+            task_space.as_ref(),
+            &model.workspace.bounds(),
+            scalar,
+        ),
         actuation,
         defaults,
         task_space,
@@ -152,12 +162,16 @@ fn task_space(
     let platform = platform(model)?;
     let rest = RestDynamics::of(&platform);
     let rest_force = platform.leg_forces(&Motion::new());
+    let noise = pose_noise(model)?.map_or([0.0; 6], |noise| noise.pose);
     Ok(TaskSpace {
         sensing: sensing::lower(model, task, scalar)?,
         setpoints,
         load,
         law: task_space::law(model, task, scalar, &rest, &rest_force, design),
-        defaults: task_space::defaults(model, task, scalar, design),
+        defaults: PlatformDefaults {
+            triggers: triggers::lower(model, task, &noise, scalar),
+            ..task_space::defaults(model, task, scalar, design)
+        },
     })
 }
 

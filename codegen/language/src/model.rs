@@ -11,6 +11,7 @@ mod mechanics;
 mod supervisor;
 mod target;
 mod task_space;
+mod trigger;
 
 use std::collections::BTreeMap;
 use std::ops;
@@ -29,6 +30,7 @@ pub use task_space::{
     ControlMode, DynamicsChoice, Environment, Frames, Gains, Interaction, LARGEST_GAIN, PaperPath, Probe,
     SetpointRules, TaskSpace, Trajectory, TrajectoryKind,
 };
+pub use trigger::{MAX_TRIGGERS, Trigger, TriggerDirection, TriggerKind};
 
 /// Every section, in the order of the reference. Sections that hold others come before them.
 pub const SECTIONS: &[Section] = &[
@@ -50,6 +52,7 @@ pub const SECTIONS: &[Section] = &[
     Gains::OF_POSITION,
     Probe::SECTION,
     Trajectory::SECTION,
+    Trigger::SECTION,
     Timing::SECTION,
     Workspace::SECTION,
     ControllerOptions::SECTION,

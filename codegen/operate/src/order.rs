@@ -6,6 +6,7 @@ use std::time::Duration;
 use specgen_link::RecorderAction;
 use specgen_link::samples::MOST_EVERY;
 use specgen_runtime::supervisor::{Phase, Request};
+use specgen_runtime::trigger::MOST;
 
 use crate::place::{Named, Pace, named, pace};
 
@@ -19,9 +20,9 @@ const WATCHED: f64 = 10.0;
 const AFTER: u32 = 1000;
 const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, \
                         move|jog AXIS=QUANTITY…, where, limits, can-i-go AXIS=QUANTITY… [speed=QUANTITY], frame [none | work|tool AXIS=QUANTITY…], mark NAME, goto NAME, \
-                        play TRAJECTORY [correction=FILE machine=NAME], mode p|f|pf, gains [NAME=VALUE…], wait PHASE|arrived|SECONDS [TIMEOUT], config, \
-                        config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, \
-                        watch [EVERY [SECONDS [FILE]]], stop";
+                        play TRAJECTORY [correction=FILE machine=NAME], mode p|f|pf, gains [NAME=VALUE…], trigger LINE NAME=VALUE…, \
+                        wait PHASE|arrived|SECONDS [TIMEOUT], config, config write SPEC, \
+                        record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, watch [EVERY [SECONDS [FILE]]], stop";
 
 /// One order.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,6 +68,13 @@ pub enum Order {
     Mode(Wanted),
     /// Show the gains, or set these.
     Gains(Vec<(String, f64)>),
+    /// Let an output line show something else.
+    Trigger {
+        /// Its number.
+        line: usize,
+        /// Settings of a line, `trigger_` left out, in SI; kind, axis and direction by their words.
+        settings: Vec<(String, f64)>,
+    },
     /// Go on when something is so.
     Wait {
         /// What.
@@ -220,6 +228,12 @@ impl Order {
             }
             ["mode", mode] => Self::Mode(Wanted::parse(mode)?),
             ["gains", ref rest @ ..] => Self::Gains(rest.iter().map(|text| gain(text)).collect::<Result<_, _>>()?),
+            ["trigger", line, first, ref rest @ ..] => {
+                let line = line.parse().ok().filter(|line| *line < MOST);
+                let line = line.ok_or_else(|| format!("expected the number of a trigger, 0 to {}", MOST - 1))?;
+                let settings = std::iter::once(&first).chain(rest).map(|text| of_trigger(text));
+                Self::Trigger { line, settings: settings.collect::<Result<_, _>>()? }
+            }
             ["wait", until] => Self::wait(until, None)?,
             ["wait", until, limit] => Self::wait(until, Some(limit))?,
             ["config"] => Self::Config,
@@ -290,6 +304,25 @@ fn gain(text: &str) -> Result<(String, f64), String> {
     Ok((name, value))
 }
 
+/// Words of the settings that are choices, by number.
+const CHOICES: [(&str, &[&str]); 3] = [
+    ("kind", &["off", "position", "level", "motion", "points", "ticks"]),
+    ("axis", &["x", "y", "z", "theta_x", "theta_y", "theta_z"]),
+    ("direction", &["both", "up", "down"]),
+];
+
+fn of_trigger(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = assignment(text)
+        .map_err(|_| format!("expected a setting of a trigger such as step=1e-6 in SI, found `{text}`"))?;
+    let words = CHOICES.iter().find(|(choice, _)| *choice == name).map(|(_, words)| *words);
+    let found = match words {
+        Some(words) => words.iter().position(|word| *word == value).map(|place| place as f64),
+        None => value.parse().ok().filter(|value: &f64| value.is_finite()),
+    };
+    let expected = words.map_or("a number in SI".to_owned(), |words| words.join(", "));
+    Ok((name.clone(), found.ok_or_else(|| format!("`{name}` of a trigger: expected {expected}, found `{value}`"))?))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -310,6 +343,13 @@ mod tests {
             ("where", Some(Order::Where)),
             ("gains", Some(Order::Gains(Vec::new()))),
             ("gains ki[2]=1e9", Some(Order::Gains(vec![("ki[2]".into(), 1e9)]))),
+            (
+                "trigger 1 kind=position axis=theta_z start=-1e-4",
+                Some(Order::Trigger {
+                    line: 1,
+                    settings: vec![("kind".into(), 1.0), ("axis".into(), 5.0), ("start".into(), -1e-4)],
+                }),
+            ),
             ("frame tool z=40mm", Some(Order::Frame(Some(Framed::Tool([0.0, 0.0, 0.04]))))),
             ("goto zero", Some(Order::Goto("zero".into()))),
             ("mode pf-ewma", Some(Order::Mode(Wanted { terms: [true, true], law: Some(1) }))),
@@ -353,6 +393,9 @@ mod tests {
             ("record arm 0", "1 or more"),
             ("record arm -1", "1 or more"),
             ("config write", "is none of"),
+            ("trigger 4 step=1e-6", "0 to 3"),
+            ("trigger 0 kind=hold", "expected off, position"),
+            ("trigger 0 step=1um", "expected a number in SI, found `1um`"),
             ("arm now", "is none of"),
             ("watch 0", "`watch 0`: expected ticks of a row, 1 to 1000000"),
             ("watch 1 0", "expected a time of more than 0"),

@@ -2,8 +2,8 @@
 
 use controller::snapshot::record_after;
 use controller::supervised::{CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, Request, STOP};
-use controller::{Real, passes, sensing};
-use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
+use controller::{Real, passes, sensing, triggers};
+use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges, Lines};
 use specgen_link::Silence;
 
 use crate::exchange::{self, Exchange, Orders};
@@ -21,9 +21,10 @@ pub struct Noticed {
 
 /// The machine with its converters. Owned by the interrupt that ticks.
 #[derive(Debug)]
-pub struct Board<'m, G, A> {
+pub struct Board<'m, G, A, L = ()> {
     gauges: G,
     amplifiers: A,
+    lines: L,
     /// Not a part of it: some kilobytes, which no move is to carry over the stack.
     machine: &'m mut Machine,
     /// Whether tables and settings in flash are what the compiler wrote.
@@ -41,6 +42,14 @@ pub struct Board<'m, G, A> {
 }
 
 impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
+    /// [`Self::with_lines`], of a spec without triggers.
+    #[must_use]
+    pub const fn new(gauges: G, amplifiers: A, machine: &'m mut Machine, intact: bool) -> Self {
+        Self::with_lines(gauges, amplifiers, (), machine, intact)
+    }
+}
+
+impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
     /// Bits that a code of the ADC has more than the controller expects.
     const SPARE_BITS: u32 = {
         assert!(GAUGE_BITS <= G::BITS, "sensor.bits of the spec is more than the ADC of this board has");
@@ -50,13 +59,22 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     const SAME_CODES: () =
         assert!(controller::limits::DAC_BITS == A::BITS, "dac.bits of the spec is not what the DAC of this board has");
 
-    /// At power-up, before [`Self::start`]. `machine` is at reset; `intact`: the result of `controller::integrity`.
+    /// Every trigger of the spec has a line.
+    const LINE_EACH: () = assert!(
+        L::COUNT.checked_sub(triggers::LINES).is_some(),
+        "the spec has more [[trigger]] than this board has lines for"
+    );
+
+    /// At power-up, before [`Self::start`]: its converters, and a line for each trigger of the spec, `()` for none. `machine` is at reset;
+    /// `intact`: the result of `controller::integrity`.
     #[must_use]
-    pub const fn new(gauges: G, amplifiers: A, machine: &'m mut Machine, intact: bool) -> Self {
+    pub const fn with_lines(gauges: G, amplifiers: A, lines: L, machine: &'m mut Machine, intact: bool) -> Self {
         let () = Self::SAME_CODES;
+        let () = Self::LINE_EACH;
         Self {
             gauges,
             amplifiers,
+            lines,
             machine,
             intact,
             started: false,
@@ -153,6 +171,7 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         }
         self.codes = Some(output.tick.dac_code);
         self.done(report, |amplifiers| amplifiers.write(&output.tick.dac_code));
+        self.show(report, triggers::lines(output.tick.status));
         report.gave_out(now().wrapping_sub(sampled));
         // Converters that did not answer do not get power, whatever the supervisor has not seen yet.
         if output.amplifier_on && self.started {
@@ -191,6 +210,7 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         if let Some(codes) = self.codes {
             self.done(report, |amplifiers| amplifiers.write(&codes));
         }
+        self.show(report, 0);
         report.tick += 1;
         report.missed = report.missed.saturating_add(noticed.missed);
         if noticed.stop {
@@ -198,6 +218,17 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         }
         if exchange.lockstep.as_mut().is_none_or(Silence::tick) {
             exchange.leave_lockstep(self.machine);
+        }
+    }
+
+    /// Sets the output lines; a fault is an event of the next tick.
+    #[inline]
+    fn show(&mut self, report: &mut Report, high: u32) {
+        if triggers::LINES != 0
+            && let Err(fault) = self.lines.set(high)
+        {
+            report.converter(fault);
+            self.pending |= CONVERTER;
         }
     }
 

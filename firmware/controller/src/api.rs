@@ -10,8 +10,8 @@ pub use crate::state::{LegState, State};
 pub use crate::step::{actuate, step};
 pub use crate::tick::{
     COMMAND_WORDS, CORRECTION_LIMITED, GAUGE_FAULT, GENERATOR_BUSY, INPUT_NAMES, INPUT_WORDS, LEG_LIMITED,
-    OUTPUT_NAMES, OUTPUT_WORDS, PLACE_WORDS, SETPOINT_FAULT, SETPOINT_STALE, STATIC_INVERSE, TickInput, TickOutput,
-    WRENCH_FAULT, output_words, place_words,
+    OUTPUT_NAMES, OUTPUT_WORDS, PLACE_WORDS, SETPOINT_FAULT, SETPOINT_STALE, STATIC_INVERSE, TRIGGER_HIGH,
+    TRIGGER_MISSED, TickInput, TickOutput, WRENCH_FAULT, output_words, place_words,
 };
 pub use specgen_runtime::setpoint::{Command, CommandKind, Target};
 pub use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};

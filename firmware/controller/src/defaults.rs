@@ -3,6 +3,7 @@
 
 //! The spec's settings: what `Config::new` holds.
 
+use specgen_runtime::trigger::Line;
 use specgen_runtime::{ControlMode, Gains, Interaction, Law};
 use crate::Real;
 
@@ -55,3 +56,9 @@ pub(crate) const ENVIRONMENT_STIFFNESS: [Real; 6] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.
 
 /// h_e; from `environment`.
 pub(crate) const ENVIRONMENT_REST: [Real; 6] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+
+/// Output lines; from `trigger`.
+pub const LINES: usize = 0;
+
+/// What each shows.
+pub(crate) const TRIGGERS: [Line<Real>; LINES] = [];

@@ -55,6 +55,7 @@ pub mod supervised;
 pub mod supervision;
 pub mod task_space;
 mod tick;
+pub mod triggers;
 pub mod waves;
 mod words;
 

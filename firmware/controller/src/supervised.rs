@@ -12,6 +12,7 @@ use crate::standing::{begin, come_to_rest, expectation, look, readings, run_law,
 use crate::step::outputs;
 use crate::supervision::SUPERVISION;
 use crate::tick::{GAUGE_FAULT, LEG_LIMITED};
+use crate::triggers::act;
 use crate::{Config, LEGS, Real, State, TickInput};
 
 /// One supervised tick.
@@ -35,6 +36,7 @@ pub fn supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -
     } else {
         stand(config, state, supervisor, &input.tick, channel, expected)
     };
+    let status = status | act(config, state, phase, &input.tick, status);
     // Of the state and at the end: what is as large as an output is slow to move.
     MachineOutput { tick: outputs(state, status), phase, cause, amplifier_on: phase.is_powered() }
 }

@@ -5,6 +5,7 @@
 
 use crate::limits::DAC;
 use crate::task_space::{CORRECTED, MODES_TO_LEGS};
+use crate::triggers::LINES;
 use crate::words::{names, numbers, six};
 use crate::{LEGS, Real, State};
 use specgen_runtime::Real as _;
@@ -33,6 +34,12 @@ pub const WRENCH_FAULT: u32 = 0x8_0000;
 /// Bit 20: correction not a number, or larger or faster than it may be; followed as far as the limits let it.
 pub const CORRECTION_LIMITED: u32 = 0x10_0000;
 
+/// Bits 6, 7, 14 and 15: output line 0, 1, 2, 3 is high over the coming interval. Under the supervisor alone.
+pub const TRIGGER_HIGH: u32 = 0xc0c0;
+
+/// Bit 21: some output line has missed a pulse since its settings were given. Under the supervisor alone.
+pub const TRIGGER_MISSED: u32 = 0x20_0000;
+
 /// Bits 24 to 29: the rate-dependent inverse of the leg was not safe to use; the static one stood in for it. Never set by models
 /// with one inverse.
 pub const STATIC_INVERSE: u32 = 0x3f00_0000;
@@ -44,7 +51,7 @@ pub const INPUT_WORDS: usize = COMMAND_WORDS + 12;
 pub const COMMAND_WORDS: usize = 21 + CORRECTED;
 
 /// Words of a tick's output.
-pub const OUTPUT_WORDS: usize = 55;
+pub const OUTPUT_WORDS: usize = if LINES == 0 { 55 } else { 56 };
 
 /// Words of where a platform is, see [`place_words`].
 pub const PLACE_WORDS: usize = 24;
@@ -67,9 +74,21 @@ const EVERY_NAME: [&str; 39] = names![
     "setpoint", "setpoint_rate", "setpoint_acceleration", "correction", "gauge", "wrench";
 ];
 
-/// Names of the output words.
-pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] =
-    names![; "voltage", "requested", "demand", "level", "drift", "dac_code", "pose", "target", "load"; "status"];
+/// Names of the output words. `missed` stands there if the spec has a `trigger`: the pulses that each line has missed since its settings were
+/// given, 15 bits a line, the first lowest.
+pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] = {
+    let every = names![;
+        "voltage", "requested", "demand", "level", "drift", "dac_code", "pose", "target", "load";
+        "status", "missed"
+    ];
+    let mut names = [""; OUTPUT_WORDS];
+    let mut k = 0;
+    while k < OUTPUT_WORDS {
+        names[k] = every[k];
+        k += 1;
+    }
+    names
+};
 
 /// What a tick reads.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,7 +111,7 @@ pub struct TickOutput {
     /// Converter code of each leg.
     pub dac_code: [i32; LEGS],
     /// [`LEG_LIMITED`], [`GAUGE_FAULT`], [`SETPOINT_FAULT`], [`SETPOINT_STALE`], [`GENERATOR_BUSY`], [`WRENCH_FAULT`],
-    /// [`CORRECTION_LIMITED`].
+    /// [`CORRECTION_LIMITED`], [`TRIGGER_HIGH`], [`TRIGGER_MISSED`].
     pub status: u32,
 }
 
@@ -155,6 +174,9 @@ pub fn output_words(output: &TickOutput, state: &State) -> [u64; OUTPUT_WORDS] {
         words[8 * LEGS + index] = state.load[index].to_word();
     }
     words[9 * LEGS] = output.status as u64;
+    if let Some(missed) = words.get_mut(9 * LEGS + 1) {
+        *missed = state.triggers.missed();
+    }
     words
 }
 

@@ -7,6 +7,7 @@
 //! | --- | --- |
 //! | [`Gauges`] | [`ad7606`]: AD7606, AD7606B (16 bits), AD7608, AD7606C-18 (18 bits) |
 //! | [`Amplifiers`] | [`ad5686r`]: two AD5686R (16 bits) |
+//! | [`Lines`] | pins of a microcontroller |
 //!
 //! Nothing here allocates, panics or waits without a bound: a wait for a part is counted out and ends in a [`Fault`].
 #![no_std]
@@ -17,9 +18,11 @@ pub mod ad5686r;
 pub mod ad7606;
 mod edge;
 mod fault;
+mod lines;
 
 pub use edge::{Edge, Pulse};
 pub use fault::Fault;
+pub use lines::Lines;
 
 /// Legs of a platform, and gauges.
 pub const CHANNELS: usize = 6;

@@ -13,7 +13,7 @@ use controller::snapshot::recorder;
 use controller::supervised::{
     CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, supervise,
 };
-use controller::{Config, LEGS, Real, place_words};
+use controller::{Config, LEGS, Real, place_words, triggers};
 use specgen_rt::account::{Account, Stamps};
 use specgen_rt::clock::{self, Usage};
 use specgen_rt::{allocation, scheduling};
@@ -118,6 +118,9 @@ impl<D: Device> Loop<'_, D> {
                 driven = self.device.enable(false);
             }
             driven = driven.and(self.device.write(&output.tick.dac_code));
+            if triggers::LINES != 0 {
+                driven = driven.and(self.device.set(triggers::lines(output.tick.status)));
+            }
             if output.amplifier_on && !enabled {
                 // The codes are there before the amplifiers show them.
                 driven = driven.and(self.device.enable(true));

@@ -4,10 +4,10 @@
 pub mod comedi;
 pub mod simulated;
 
-use specgen_hal::{Amplifiers, CHANNELS, Gauges};
+use specgen_hal::{Amplifiers, CHANNELS, Gauges, Lines};
 
 /// A machine as the loop sees it.
-pub trait Device: Gauges + Amplifiers {
+pub trait Device: Gauges + Amplifiers + Lines {
     /// Tick `tick`, counted from 0, begins. Called once before its [`Gauges::read`]; numbers rise, and leave out skipped ticks.
     fn tick(&mut self, tick: u64);
 

@@ -34,6 +34,7 @@
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`snapshot`] | a state as words and back, checked | |
 //! | [`wave`] | set-points on board: sine, chirp, multisine, reversal curves | |
+//! | [`trigger`] | output lines at positions, levels, in motion, at set-points and ticks | |
 //! | [`playback`] | a table of corrections, interpolated | |
 //! | [`pass`] | a motion that repeats: its correction played, its error kept | |
 //! | [`recorder`], [`record`] | ticks kept in fixed memory, and the format they leave in | |
@@ -75,6 +76,7 @@ pub mod snapshot;
 pub mod supervisor;
 pub mod transfer;
 pub mod trig;
+pub mod trigger;
 pub mod velocity;
 pub mod wave;
 

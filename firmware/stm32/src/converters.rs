@@ -3,9 +3,10 @@
 use core::mem::MaybeUninit;
 
 use controller::supervised::Machine;
-use embassy_stm32::gpio::{Input, Output};
-use embassy_stm32::spi;
+use controller::triggers::{LINES, MOST};
+use embassy_stm32::gpio::{AnyPin, Input, Level, Output, Speed};
 use embassy_stm32::time::Hertz;
+use embassy_stm32::{Peri, spi};
 use specgen_board::{Board, GAUGE_BITS, Kept};
 use specgen_hal::ad5686r::Ad5686rPair;
 use specgen_hal::ad7606::{Ad7606, Window};
@@ -26,9 +27,11 @@ pub type Adc<BUS, const CYCLES: u32> =
 /// The DACs.
 pub type Dacs<BUS, const OUTPUT: usize, const CYCLES: u32> =
     Ad5686rPair<Device<BUS, CYCLES>, Device<BUS, CYCLES>, pulses::Output<OUTPUT>, Enable, CycleDelay<CYCLES>>;
+/// Pins of triggers, those of the spec alone.
+pub type TriggerPins = [Option<Output<'static>>; MOST];
 /// The machine on them. `OUTPUT`: the channel of LDAC, see [`pulses`].
 pub type OnBoard<BUS, const OUTPUT: usize, const CYCLES: u32> =
-    Board<'static, Adc<BUS, CYCLES>, Dacs<BUS, OUTPUT, CYCLES>>;
+    Board<'static, Adc<BUS, CYCLES>, Dacs<BUS, OUTPUT, CYCLES>, TriggerPins>;
 
 /// The pins of the ADC.
 pub struct AdcPins<BUS, const CYCLES: u32> {
@@ -72,6 +75,13 @@ fn spi_config(mode: spi::Mode, frequency: Hertz) -> spi::Config {
     config
 }
 
+/// The pins of the spec's triggers as outputs, low; the others stay as they are after reset.
+#[must_use]
+pub fn trigger_pins(pins: [Peri<'static, AnyPin>; MOST]) -> TriggerPins {
+    let mut lines = [(); LINES].into_iter();
+    pins.map(|pin| lines.next().map(|()| Output::new(pin, Level::Low, Speed::Medium)))
+}
+
 /// The machine at reset, made where it stays. A function of its own, so that the compiler fills the memory instead of a copy
 /// of it on the stack; `tests/tests/boards.rs` adds up the stack.
 #[inline(never)]
@@ -89,6 +99,7 @@ pub fn kept(memory: &'static mut MaybeUninit<Kept>, machine: &Machine) -> &'stat
 pub fn board<BUS: Burst, const OUTPUT: usize, const CYCLES: u32>(
     adc: AdcPins<BUS, CYCLES>,
     dac: DacPins<BUS, OUTPUT, CYCLES>,
+    lines: TriggerPins,
     machine: &'static mut Machine,
     intact: bool,
 ) -> OnBoard<BUS, OUTPUT, CYCLES> {
@@ -96,5 +107,5 @@ pub fn board<BUS: Burst, const OUTPUT: usize, const CYCLES: u32>(
     let [first, second] = dac.spi;
     let adc = Ad7606::new(adc.spi, adc.start, adc.busy, adc.reset, delay, REFERENCE);
     let dacs = Ad5686rPair::new(first, second, dac.load, dac.enable, delay);
-    Board::new(adc, dacs, machine, intact)
+    Board::with_lines(adc, dacs, lines, machine, intact)
 }

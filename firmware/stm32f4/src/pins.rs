@@ -12,7 +12,7 @@ use embassy_stm32::timer::{Ch1, Ch2};
 use embassy_stm32::usart::{ConfigError, Uart};
 use embassy_stm32::{Peri, bind_interrupts, dma, pac, peripherals, rcc, usart};
 use specgen_stm32::burst::Device;
-use specgen_stm32::converters::{AdcPins, DacPins, adc_spi, dac_spi};
+use specgen_stm32::converters::{AdcPins, DacPins, TriggerPins, adc_spi, dac_spi, trigger_pins};
 use specgen_stm32::enable::{self, Stop};
 use specgen_stm32::pulses::Pulses;
 use specgen_stm32::serial;
@@ -42,6 +42,8 @@ pub struct Wiring {
     pub adc: AdcPins<Registers, DELAY>,
     /// DACs and amplifiers.
     pub dac: DacPins<Registers, OUTPUT, DELAY>,
+    /// Triggers of the spec, in their order.
+    pub lines: TriggerPins,
     /// Emergency stop: a closed contact to ground, at the break input of TIM1; open is stop.
     pub stop: Stop,
     /// Virtual COM port of the ST-LINK.
@@ -78,6 +80,7 @@ pub fn take(p: Peripherals) -> Wiring {
             load,
             enable,
         },
+        lines: trigger_pins([p.PC0.into(), p.PC1.into(), p.PC2.into(), p.PC3.into()]),
         stop,
         link: Link { usart: p.USART2, pins: (p.PA3, p.PA2), channels: (p.DMA1_CH6, p.DMA1_CH5) },
         watchdog: p.IWDG,

@@ -23,7 +23,7 @@ mod start;
 use controller::sensing::CONVERTER;
 use controller::supervised::{Machine, Phase, Request};
 use controller::waves::{self, Wave};
-use controller::{COMMAND_WORDS, Config, INPUT_WORDS, Real, passes};
+use controller::{COMMAND_WORDS, Config, INPUT_WORDS, Real, passes, triggers};
 use parts::{ADC_BITS, Bench, Bus, Delay, Line, Pin, REFERENCE, Rates, Role};
 use semihosting::{Exit, File, exit};
 use specgen_board::{Board, Exchange, Kept, Noticed, SampleMemory, catch_up, gather};
@@ -52,7 +52,7 @@ type Dacs<'b> = Ad5686rPair<Bus<'b>, Bus<'b>, Line<'b>, Pin<'b>, Delay<'b>>;
 
 /// What a tick works on.
 struct Timed<'m> {
-    board: Board<'m, Adc<'m>, Dacs<'m>>,
+    board: Board<'m, Adc<'m>, Dacs<'m>, [Option<Pin<'m>>; triggers::MOST]>,
     exchange: Exchange,
     /// Settings that a host wrote.
     settings: Config,
@@ -85,7 +85,9 @@ fn run() -> Result<(), Exit> {
     exchange.orders.request = Request::Run;
     let wave = Wave::new(waves::limits(&exchange.config));
     let bench = &Bench::new(rates()?);
-    let board = Board::new(adc(bench), dacs(bench), &mut machine, true);
+    let mut lines = [(); triggers::LINES].into_iter();
+    let lines = [(); triggers::MOST].map(|()| lines.next().map(|()| Pin { bench }));
+    let board = Board::with_lines(adc(bench), dacs(bench), lines, &mut machine, true);
     let mut timed = Timed {
         board,
         exchange,

@@ -3,6 +3,8 @@
 
 use std::io::{self, Write};
 
+use specgen_runtime::trigger;
+
 use super::{Block, Header};
 use crate::controller::MachineWord;
 use crate::word::{Scalar, WordKind, status_words};
@@ -33,13 +35,17 @@ pub fn write_csv(
 ) -> io::Result<()> {
     let names = header.input_names();
     let scalar = header.description.scalar;
-    let more = again.map_or_else(Vec::new, |again| Column::all(&names, again.names));
+    let lines = header.description.lines();
+    let more = again.map_or_else(Vec::new, |again| Column::all(&names, again.names, lines));
     if first {
         write!(sink, "tick,time_s")?;
         for name in &names {
             write!(sink, ",{}", title(name))?;
         }
         write!(sink, ",{OUTPUTS}")?;
+        for line in 0..lines {
+            write!(sink, ",trigger[{line}]")?;
+        }
         for column in &more {
             write!(sink, ",{}", column.title)?;
         }
@@ -60,11 +66,17 @@ pub fn write_csv(
         let [phase, cause, on, _] = row.supervisor.to_le_bytes();
         let supervisor = MachineWord::of(u64::from(row.supervisor));
         write!(sink, ",{},{phase},{cause},{on},{supervisor},{}", row.status, status_words(row.status))?;
+        for line in 0..lines {
+            write!(sink, ",{}", trigger::lines(row.status) >> line & 1)?;
+        }
         let given = again.and_then(|again| again.rows.get(index));
         for column in &more {
             match (given, &column.of) {
                 (None, _) => write!(sink, ",")?,
                 (Some(given), Of::Output(place)) => real(sink, scalar, given[*place])?,
+                (Some(given), Of::Missed(place, line)) => {
+                    write!(sink, ",{}", given[*place] >> (15 * line) & trigger::MOST_MISSED as u64)?;
+                }
                 (Some(given), Of::Difference(target, place)) => {
                     write!(sink, ",{:.6e}", scalar.decode(given[*target]) - scalar.decode(given[*place]))?;
                 }
@@ -95,6 +107,8 @@ struct Column {
 enum Of {
     /// An output word.
     Output(usize),
+    /// Pulses that a line has missed, in this output word.
+    Missed(usize, usize),
     /// An output word less another: target less pose.
     Difference(usize, usize),
     /// An output word less an input word: demand of a leg less its gauge.
@@ -102,8 +116,8 @@ enum Of {
 }
 
 impl Column {
-    /// Volts, then for a platform pose, target and error, for legs demand and error.
-    fn all(inputs: &[String], outputs: &[String]) -> Vec<Self> {
+    /// Volts, then for a platform pose, target, what its `lines` missed and error, for legs demand and error.
+    fn all(inputs: &[String], outputs: &[String], lines: usize) -> Vec<Self> {
         let place =
             |names: &[String], stem: &str, k: usize| names.iter().position(|name| *name == format!("{stem}[{k}]"));
         let mut columns = Vec::new();
@@ -118,6 +132,10 @@ impl Column {
                 let of = Of::Output(place(outputs, stem, k)?);
                 Some(Self { title: format!("{stem}[{k}]_{}", units[k / 3]), of })
             }));
+        }
+        if let Some(missed) = outputs.iter().position(|name| name == "missed") {
+            let column = |line| Self { title: format!("missed[{line}]"), of: Of::Missed(missed, line) };
+            columns.extend((0..lines).map(column));
         }
         for k in 0..6 {
             let platform = place(outputs, "target", k).zip(place(outputs, "pose", k));

@@ -92,7 +92,7 @@ impl Devices {
     }
 }
 
-/// Pins that lead to a part, and how they stand: CONVST, CS, RESET of the ADC, both SYNC, LDAC, enable.
+/// Pins that lead to a part, and how they stand: CONVST, CS, RESET of the ADC, both SYNC, LDAC, enable, triggers.
 #[derive(Clone, Copy, PartialEq)]
 struct Levels {
     convst: bool,
@@ -101,6 +101,7 @@ struct Levels {
     sync: [bool; 2],
     ldac: bool,
     enable: bool,
+    triggers: [bool; 4],
 }
 
 pub struct Board {
@@ -109,6 +110,8 @@ pub struct Board {
     /// From `part.flash` on, and what is copied from it to address 0 and on.
     code: [Vec<u8>; 2],
     pub now: Time,
+    /// Edges of CONVST that the ADC took.
+    samples: u64,
     /// Of the core.
     cycle: Time,
     advanced: Time,
@@ -145,9 +148,18 @@ impl Board {
     /// `bits`: of the ADC and of a gauge; `modelled`: cycles by the model of [`Cost`].
     pub fn new(part: &'static Part, code: [Vec<u8>; 2], bits: [u32; 2], plant: Plant, modelled: bool) -> Self {
         let devices = Devices::new(part);
-        let levels = Levels { convst: true, select: true, reset: false, sync: [true; 2], ldac: true, enable: false };
+        let levels = Levels {
+            convst: true,
+            select: true,
+            reset: false,
+            sync: [true; 2],
+            ldac: true,
+            enable: false,
+            triggers: [false; 4],
+        };
         let mut board = Self {
             part,
+            samples: 0,
             cycle: cycle(devices.clocks.core),
             devices,
             code,
@@ -402,6 +414,7 @@ impl Board {
                 (pin, channel) if gpio.alternate(pin).is_some() => self.devices.enable.level(channel),
                 (pin, _) => level(pin, false),
             },
+            triggers: part.triggers.map(|pin| level(pin, false)),
         };
         let before = std::mem::replace(&mut self.levels, levels);
         if before == levels {
@@ -426,12 +439,18 @@ impl Board {
         }
         if levels.convst != before.convst && adc.convst(levels.convst, now, violations) {
             self.meter.sampled(now);
+            self.samples += 1;
             match self.plant.sample(now, self.bits[1]) {
                 Ok(codes) => {
                     let reference = self.dacs[0].reference();
                     self.adc.sample(codes.map(|code| code << (self.bits[0] - self.bits[1])), reference);
                 }
                 Err(text) => self.broken = Some(text),
+            }
+        }
+        for (line, (after, before)) in levels.triggers.into_iter().zip(before.triggers).enumerate() {
+            if after != before {
+                self.say(&format!("trigger {line} {} after sample {}", u8::from(after), self.samples));
             }
         }
         if levels.enable != before.enable {

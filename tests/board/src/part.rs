@@ -36,6 +36,8 @@ pub struct Part {
     pub ldac: Pin,
     /// With its channel of TIM1.
     pub enable: (Pin, usize),
+    /// Triggers, in their order.
+    pub triggers: [Pin; 4],
 }
 
 /// The same on both.
@@ -84,6 +86,7 @@ pub const H743: Part = Part {
     dac_select: [(D, 2), (G, 2)],
     ldac: (D, 13),
     enable: ((E, 11), 2),
+    triggers: [(E, 7), (E, 8), (E, 10), (E, 12)],
 };
 
 pub const F446: Part = Part {
@@ -109,4 +112,5 @@ pub const F446: Part = Part {
     dac_select: [(D, 2), (C, 8)],
     ldac: (C, 6),
     enable: ((A, 8), 1),
+    triggers: [(C, 0), (C, 1), (C, 2), (C, 3)],
 };

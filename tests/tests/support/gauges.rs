@@ -52,6 +52,7 @@ pub fn model(probes: [Probe; 6]) -> Model {
         },
         frames: Frames { work: [0.0; 6], tool: [0.0; 3] },
         trajectories: Vec::new(),
+        triggers: Vec::new(),
     });
     model
 }

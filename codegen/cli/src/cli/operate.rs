@@ -6,6 +6,7 @@ mod operator;
 pub mod panel;
 mod passes;
 mod platform;
+mod triggers;
 mod watch;
 mod waves;
 

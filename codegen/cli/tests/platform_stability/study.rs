@@ -90,6 +90,7 @@ pub fn model() -> (Model, TaskSpace) {
         },
         frames: Frames { work: [0.0; 6], tool: [0.0; 3] },
         trajectories: Vec::new(),
+        triggers: Vec::new(),
     };
     (model, task)
 }

@@ -3,7 +3,7 @@
 use crate::ir::Ir;
 
 /// Modules that a user of the crate sees; what stands at its root is in the law's `api.rs`.
-const PUBLIC: [&str; 15] = [
+const PUBLIC: [&str; 16] = [
     "dynamics",
     "hysteresis",
     "integrity",
@@ -18,6 +18,7 @@ const PUBLIC: [&str; 15] = [
     "supervised",
     "supervision",
     "task_space",
+    "triggers",
     "waves",
 ];
 

@@ -2,10 +2,10 @@
 //! and, of a platform, [`ir::PlatformDefaults`](crate::ir::PlatformDefaults).
 
 use proc_macro2::TokenStream;
-use quote::quote;
+use quote::{format_ident, quote};
 
 use super::literal;
-use crate::ir::{Gains, Interaction, Ir, Law, Mode, PlatformDefaults, Setpoint};
+use crate::ir::{self, Gains, Interaction, Ir, Law, Mode, PlatformDefaults, Setpoint};
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let leg_gain = literal::real(ir.scalar, ir.scalar.round(ir.defaults.leg_gain));
@@ -88,6 +88,7 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
     let (combined, position) = (gains(&d.gains), gains(&d.position_gains));
     let (stiffness, rest) = (six(&d.environment_stiffness), six(&d.environment_rest));
     let (level_weight, drift_weight) = (real(d.level_weight), real(d.drift_weight));
+    let (lines, triggers) = (literal::count(d.triggers.len()), d.triggers.iter().map(|line| of_line(ir, line)));
     let constants = quote! {
         /// From `control.mode` and `adaptation.mode`.
         pub(crate) const MODE: ControlMode = #mode;
@@ -105,6 +106,40 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
         pub(crate) const ENVIRONMENT_STIFFNESS: [Real; 6] = [#stiffness];
         /// h_e; from `environment`.
         pub(crate) const ENVIRONMENT_REST: [Real; 6] = [#rest];
+        /// Output lines; from `trigger`.
+        pub const LINES: usize = #lines;
+        /// What each shows.
+        pub(crate) const TRIGGERS: [Line<Real>; LINES] = [#(#triggers),*];
     };
-    (quote! { use specgen_runtime::{ControlMode, Gains, Interaction #import_law}; }, constants)
+    let imports = quote! {
+        use specgen_runtime::trigger::Line;
+        use specgen_runtime::{ControlMode, Gains, Interaction #import_law};
+    };
+    (imports, constants)
+}
+
+fn of_line(ir: &Ir, line: &ir::Line) -> TokenStream {
+    let real = |value| literal::real(ir.scalar, value);
+    let whole = |value| literal::count(value as usize);
+    let (kind, direction) =
+        (format_ident!("{}", format!("{:?}", line.kind)), format_ident!("{}", format!("{:?}", line.direction)));
+    let axis = literal::count(line.axis);
+    let [start, stop, step, hysteresis] = [line.start, line.stop, line.step, line.hysteresis].map(real);
+    let [first, every, last] = [line.first, line.every, line.last].map(whole);
+    let width = literal::integer(line.width);
+    quote! {
+        Line {
+            kind: specgen_runtime::trigger::Kind::#kind,
+            axis: #axis,
+            direction: specgen_runtime::trigger::Direction::#direction,
+            start: #start,
+            stop: #stop,
+            step: #step,
+            hysteresis: #hysteresis,
+            first: #first,
+            every: #every,
+            last: #last,
+            width: #width,
+        }
+    }
 }

@@ -18,7 +18,7 @@ macro_rules! files {
 /// Of six legs with their own gauges.
 pub const LEGS: &[File] = files! {
     "common": "description", "dynamics", "integrity", "kinematics", "machine", "snapshot", "stage", "supervised", "words";
-    "legs": "api", "config", "passes", "sensing", "stages", "standing", "state", "step", "tick", "waves";
+    "legs": "api", "config", "passes", "sensing", "stages", "standing", "state", "step", "tick", "triggers", "waves";
 };
 
 /// Documentation of their crate.
@@ -27,7 +27,7 @@ pub const LEGS_PAGE: &str = include_str!("../../../../firmware/controller/law/le
 /// Of a platform.
 pub const PLATFORM: &[File] = files! {
     "common": "description", "dynamics", "integrity", "kinematics", "machine", "snapshot", "stage", "supervised", "words";
-    "platform": "api", "config", "notch", "passes", "sensing", "stages", "standing", "state", "step", "tick", "waves";
+    "platform": "api", "config", "notch", "passes", "sensing", "stages", "standing", "state", "step", "tick", "triggers", "waves";
 };
 
 /// Documentation of its crate.

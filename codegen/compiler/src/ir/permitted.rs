@@ -21,6 +21,9 @@ pub struct Setting {
     pub name: &'static str,
     /// Whether there are six of it.
     pub six: bool,
+    /// Number of the output line that it is of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<usize>,
     /// Unit; empty without dimension. Of six, that of the first three and of the others.
     pub unit: [&'static str; 2],
     /// Least and largest value, of the first three and of the others.
@@ -55,10 +58,10 @@ pub struct State {
 impl Setting {
     /// Its words: name and range.
     pub fn words(&self) -> impl Iterator<Item = (String, Range)> {
-        let Self { name, six, range: [first, last], .. } = *self;
+        let Self { name, six, line, range: [first, last], .. } = *self;
         (0..if six { LEGS } else { 1 }).map(move |index| {
             let range = if index < LEGS / 2 { first } else { last };
-            (if six { format!("{name}[{index}]") } else { name.to_owned() }, range)
+            (line.or(six.then_some(index)).map_or(name.to_owned(), |index| format!("{name}[{index}]")), range)
         })
     }
 }

@@ -1,6 +1,7 @@
 //! What a controller in task space has beyond one of six legs.
 
 use serde::Serialize;
+use specgen_runtime::trigger;
 
 use super::{LEGS, Law, Scalar};
 
@@ -201,6 +202,43 @@ pub struct PlatformDefaults {
     pub environment_stiffness: [f64; 6],
     /// h_e.
     pub environment_rest: [f64; 6],
+    /// Output lines.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub triggers: Vec<Line>,
+}
+
+/// What an output line shows; the constants of `specgen_runtime::trigger::Line`, where each is explained.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Line {
+    /// A word of `specgen_runtime::trigger::Kind`.
+    #[serde(serialize_with = "by_name")]
+    pub kind: trigger::Kind,
+    /// 0 to 5.
+    pub axis: usize,
+    /// A word of `specgen_runtime::trigger::Direction`.
+    #[serde(serialize_with = "by_name")]
+    pub direction: trigger::Direction,
+    /// m or rad.
+    pub start: f64,
+    /// m or rad.
+    pub stop: f64,
+    /// m or rad.
+    pub step: f64,
+    /// m or rad.
+    pub hysteresis: f64,
+    /// Set-points or ticks.
+    pub first: u32,
+    /// Set-points or ticks.
+    pub every: u32,
+    /// 0: no last one.
+    pub last: u32,
+    /// Ticks.
+    pub width: i32,
+}
+
+/// The name of a variant.
+fn by_name<S: serde::Serializer>(choice: &impl core::fmt::Debug, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&format_args!("{choice:?}"))
 }
 
 /// Gauges to pose and its rate. The constants are those of `specgen_runtime::sensing::Gauges`.

@@ -148,6 +148,11 @@ fn of_platform(
     ];
     let numbers =
         [gains(&d.gains), gains(&d.position_gains), d.environment_stiffness.to_vec(), d.environment_rest.to_vec()];
-    settings.extend(numbers.iter().flatten().map(word));
+    settings.extend(numbers.iter().flatten().map(&word));
+    for line in &d.triggers {
+        settings.extend([line.kind.word(), line.axis as u64, line.direction.word()]);
+        settings.extend([line.start, line.stop, line.step, line.hysteresis].iter().map(&word));
+        settings.extend([line.first, line.every, line.last, line.width.cast_unsigned()].map(u64::from));
+    }
     settings
 }

@@ -1,7 +1,9 @@
 //! The table of what settings may be: nothing beyond what the spec itself says or could say.
 
 use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE};
+use specgen_runtime::trigger::LONGEST;
 
+use super::triggers;
 use crate::ir::{Actuation, ControlLaw, Notch, Permitted, Range, Resonator, Scalar, Setting, State, TaskSpace};
 use specgen_language::model::{LARGEST_GAIN, LARGEST_RUN_INTERVAL, LARGEST_TRAVEL, LARGEST_TURN};
 use specgen_numerics::Matrix6;
@@ -11,12 +13,13 @@ const MARGIN: f64 = 16.0;
 /// No number of a state is larger: products with constants stay finite in both scalars.
 const FINITE: f64 = 1e30;
 
-/// `max_step` is the slew limit in codes a tick.
+/// `max_step` is the slew limit in codes a tick, `bounds` are those of the workspace, m and rad.
 pub(super) fn lower(
     actuation: &Actuation,
     max_step: i32,
     sensor: [f64; 2],
     task: Option<&TaskSpace>,
+    bounds: &[f64; 6],
     scalar: Scalar,
 ) -> Permitted {
     let codes = Range::Whole(actuation.code_min, actuation.code_max);
@@ -89,6 +92,7 @@ pub(super) fn lower(
             settings.extend(weights);
             settings.extend(code_limits);
             settings.extend(of_gains(scalar));
+            settings.extend((0..task.defaults.triggers.len()).flat_map(|line| of_line(line, bounds, scalar)));
             (settings, largest_request(&task.law), readings(&task.sensing.raw_limits))
         }
     };
@@ -99,14 +103,14 @@ pub(super) fn lower(
 }
 
 fn one(name: &'static str, range: Range, unit: &'static str, doc: &'static str, from: &'static str) -> Setting {
-    Setting { name, six: false, unit: [unit; 2], range: [range; 2], doc, from }
+    Setting { name, six: false, line: None, unit: [unit; 2], range: [range; 2], doc, from }
 }
 
 /// Gains of (7) and the environment.
 fn of_gains(scalar: Scalar) -> [Setting; 8] {
     let round = |value: f64| scalar.round(value);
     let gain = [Range::Number(0.0, round(LARGEST_GAIN)); 2];
-    let six = |name, unit, doc, from| Setting { name, six: true, unit, range: gain, doc, from };
+    let six = |name, unit, doc, from| Setting { name, six: true, line: None, unit, range: gain, doc, from };
     let rest = [LARGEST_TRAVEL, LARGEST_TURN].map(|most| Range::Number(round(-most), round(most)));
     let (p, i, v) = (["N/m", "N m/rad"], ["N/(m s)", "N m/(rad s)"], ["N s/m", "N m s/rad"]);
     [
@@ -127,6 +131,40 @@ fn of_gains(scalar: Scalar) -> [Setting; 8] {
             )
         },
     ]
+}
+
+/// An output line. Positions of any axis have one range, for the axis is a setting, too.
+fn of_line(line: usize, bounds: &[f64; 6], scalar: Scalar) -> [Setting; 11] {
+    let [most, least] = triggers::extent(bounds).map(|value| scalar.round(value));
+    let places = Range::Number(-most, most);
+    let counts = |least| Range::Whole(least, i32::MAX);
+    let from = "`trigger`";
+    [
+        one("trigger_kind", Range::Whole(0, 5), "", "0 off, 1 position, 2 level, 3 motion, 4 points, 5 ticks.", from),
+        one("trigger_axis", Range::Whole(0, 5), "", "Axis of the pose: x y z θx θy θz.", from),
+        one("trigger_direction", Range::Whole(0, 2), "", "0 both, 1 up, 2 down.", from),
+        one("trigger_start", places, "m or rad", "First position, or lower end of the level.", from),
+        one(
+            "trigger_stop",
+            places,
+            "m or rad",
+            "Last position, or upper end of the level; at least `trigger_start`.",
+            from,
+        ),
+        one("trigger_step", Range::Number(least, 2.0 * most), "m or rad", "From position to position.", from),
+        one(
+            "trigger_hysteresis",
+            Range::Number(0.0, 2.0 * most),
+            "m or rad",
+            "How far from a position it counts again.",
+            from,
+        ),
+        one("trigger_first", counts(1), "", "First set-point or tick with a pulse, counted from 1.", from),
+        one("trigger_every", counts(1), "", "Set-points or ticks from pulse to pulse.", from),
+        one("trigger_last", counts(0), "", "Last one that may have a pulse; 0: there is no last.", from),
+        one("trigger_width", Range::Whole(1, LONGEST), "ticks", "Length of a pulse.", from),
+    ]
+    .map(|setting| Setting { line: Some(line), ..setting })
 }
 
 /// The largest that a leg is asked for under any settings, and what the estimates and the notch make of it. Poses are taken to be

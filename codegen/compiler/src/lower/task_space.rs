@@ -150,5 +150,6 @@ pub(super) fn defaults(model: &Model, task: &model::TaskSpace, scalar: Scalar, d
         position_gains: gains(&design.position),
         environment_stiffness: task.environment.stiffness.map(round),
         environment_rest: task.environment.rest.map(round),
+        triggers: Vec::new(),
     }
 }

@@ -132,6 +132,9 @@ codes! {
     TICK_TOO_LONG = "E0334";
     TICK_TIGHT = "W0335";
     CORRECTION_TOO_LARGE = "E0336";
+    TRIGGER_KEY = "E0337";
+    TRIGGER_OUTSIDE = "E0338";
+    TOO_MANY_TRIGGERS = "E0339";
 
     // Stability, reach, set-points, gauges, supervisor.
     UNSTABLE_STATIC = "E0401";
@@ -320,6 +323,9 @@ codes! {
     BUDGET_LOOSE = "W0871";
     ESTIMATED = "N0872";
     BUDGET_SWAPPED = "W0873";
+    TRIGGER_STEP = "E0874";
+    TRIGGER_IN_NOISE = "W0875";
+    TRIGGERS_MERGE = "W0876";
     PRECISION_POOR = "W0880";
     FAR_OFF = "E0890";
     ALLOWED = "N0891";

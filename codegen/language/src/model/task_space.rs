@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use super::electronics::CALIBRATION;
 use super::hysteresis::BANDWIDTH;
+use super::trigger::Trigger;
 use super::{LARGEST_TRAVEL, LARGEST_TURN};
 use crate::keys::MAX_TABLES;
 use crate::keys::declare::*;
@@ -146,6 +147,10 @@ section! {
         /// Trajectories by the word `selector`, in the order of the spec; names are unique.
         trajectories: Vec<Trajectory> = (0..fields.count("trajectory"))
             .map(|index| Trajectory::read(fields, &format!("trajectory[{index}]")))
+            .collect::<Option<_>>()?;
+        /// Output lines in the order of the spec; names are unique.
+        triggers: Vec<Trigger> = (0..fields.count("trigger"))
+            .map(|index| Trigger::read(fields, &format!("trigger[{index}]")))
             .collect::<Option<_>>()?;
     }
 }

@@ -14,6 +14,7 @@ mod records;
 mod robust;
 mod target;
 mod trajectories;
+mod triggers;
 
 use std::path::Path;
 
@@ -65,6 +66,10 @@ const CHECKS: &[Check] = &[
     trajectories::names_differ,
     trajectories::limits,
     trajectories::not_too_many,
+    triggers::keys_of_kind,
+    triggers::names_differ,
+    triggers::inside_workspace,
+    triggers::not_too_many,
 ];
 
 /// Runs every check. `dir` is the folder that records are relative to.

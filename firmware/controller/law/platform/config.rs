@@ -1,12 +1,13 @@
 //! What may change while running. Its defaults are the spec's; another tuning is another `Config`, never another build.
 
 use crate::defaults::{
-    DRIFT_WEIGHT, ENVIRONMENT_REST, ENVIRONMENT_STIFFNESS, GAINS, INTERACTION, LEVEL_WEIGHT, MAX_STEP, MODE,
-    POSITION_GAINS,
+    DRIFT_WEIGHT, ENVIRONMENT_REST, ENVIRONMENT_STIFFNESS, GAINS, INTERACTION, LEVEL_WEIGHT, LINES, MAX_STEP, MODE,
+    POSITION_GAINS, TRIGGERS,
 };
 use crate::words::six;
 use crate::{Real, limits, permitted};
-use specgen_runtime::snapshot::{LARGEST_PLACE, Writer};
+use specgen_runtime::snapshot::{Field, LARGEST_PLACE, Reader, Snapshot, Writer};
+use specgen_runtime::trigger::Line;
 use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Permitted, Real as _};
 
 /// Words of the settings.
@@ -16,10 +17,15 @@ pub const CONFIG_WORDS: usize = permitted::WORDS;
 /// neglected, 1 modelled, 2 measured. `kp`, `ki`, `kv` are the gains of P/F, `position_…` those of P.
 pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = permitted::NAMES;
 
-/// First word of the weights, of the code limits and of the gains in [`CONFIG_NAMES`].
+/// First word of the weights, of the code limits, of the gains and of the output lines in [`CONFIG_NAMES`].
 const CONFIG_WEIGHTS: usize = 2;
 const CONFIG_CODES: usize = 4;
 const CONFIG_GAINS: usize = 7;
+const CONFIG_LINES: usize = CONFIG_GAINS + 48;
+
+/// Words of a line, and the place of its end among them.
+const LINE_WORDS: usize = Line::<Real>::WORDS;
+const LINE_STOP: usize = 4;
 
 /// A value that a [`Config`] cannot hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +57,7 @@ pub struct Config {
     position_gains: Gains<Real>,
     environment: Environment,
     damps: [bool; 2],
+    triggers: [Line<Real>; LINES],
 }
 
 impl Default for Config {
@@ -73,6 +80,7 @@ impl Config {
             position_gains: POSITION_GAINS,
             environment: Environment { stiffness: ENVIRONMENT_STIFFNESS, rest: ENVIRONMENT_REST },
             damps: [damps(&GAINS), damps(&POSITION_GAINS)],
+            triggers: TRIGGERS,
         }
     }
 
@@ -153,6 +161,13 @@ impl Config {
         &self.environment
     }
 
+    /// What the output lines show; from `trigger`.
+    #[inline]
+    #[must_use]
+    pub const fn triggers(&self) -> &[Line<Real>; LINES] {
+        &self.triggers
+    }
+
     /// The same in another mode. While running the change is bumpless.
     #[must_use]
     pub const fn with_mode(self, mode: ControlMode) -> Self {
@@ -200,6 +215,14 @@ impl Config {
         Self { code_limits, ..self }.checked()
     }
 
+    /// The same with other output lines. Each whose settings are other than before begins anew, low.
+    ///
+    /// # Errors
+    /// A number outside its range, or a line that ends before it starts.
+    pub fn with_triggers(self, triggers: [Line<Real>; LINES]) -> Result<Self, ConfigError> {
+        Self { triggers, ..self }.checked()
+    }
+
     /// From words in the order of [`CONFIG_NAMES`].
     ///
     /// # Errors
@@ -232,6 +255,7 @@ impl Config {
             gains,
             position_gains,
             environment: Environment { stiffness: six(words, CONFIG_GAINS + 36), rest: six(words, CONFIG_GAINS + 42) },
+            triggers: lines(words)?,
         })
     }
 
@@ -255,6 +279,9 @@ impl Config {
         }
         words.reals(&self.environment.stiffness);
         words.reals(&self.environment.rest);
+        for line in &self.triggers {
+            line.save(&mut words);
+        }
         all
     }
 
@@ -277,8 +304,23 @@ impl Config {
         if words[CONFIG_CODES + 2] < words[CONFIG_CODES + 1] {
             return Err(ConfigError { word: CONFIG_CODES + 2 });
         }
+        for (index, line) in lines(words)?.iter().enumerate() {
+            if line.stop < line.start {
+                return Err(ConfigError { word: CONFIG_LINES + index * LINE_WORDS + LINE_STOP });
+            }
+        }
         Ok(())
     }
+}
+
+/// The output lines of the words of settings.
+fn lines(words: &[u64; CONFIG_WORDS]) -> Result<[Line<Real>; LINES], ConfigError> {
+    let mut lines = TRIGGERS;
+    let mut reader = Reader::new(words.get(CONFIG_LINES..).unwrap_or_default());
+    for line in &mut lines {
+        line.restore(&mut reader).map_err(|invalid| ConfigError { word: CONFIG_LINES + invalid.word })?;
+    }
+    Ok(lines)
 }
 
 /// Whether any k_v is other than zero.

@@ -4,9 +4,11 @@ use crate::config::Environment;
 use crate::hysteresis::{GRID, Memory};
 use crate::supervision::{code_at_rest, displacement_at_rest, memory_at_rest};
 use crate::task_space::{CORRECTED, DAMPED};
+use crate::triggers::LINES;
 use crate::{LEGS, Real, limits};
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE, Snapshot};
+use specgen_runtime::trigger::Triggers;
 use specgen_runtime::{
     ControlMode, Correction, Damping, Digest, Estimate, Integral, Interaction, LastLine, NotchState, Rate, Transfer,
 };
@@ -69,6 +71,8 @@ specgen_runtime::state! { |words|
         pub interaction: Interaction = Interaction::Neglected, choice;
         /// Its model of the environment.
         pub environment: Environment = Environment::new(), part;
+        /// Output lines.
+        pub triggers: Triggers<Real, LINES> = Triggers::new(), part;
         /// Legs 0 to 5. They stand last, for they are large: what comes before them is within reach of one instruction of a Cortex-M.
         pub legs: [LegState; LEGS] =
             [LegState::new(0), LegState::new(1), LegState::new(2), LegState::new(3), LegState::new(4), LegState::new(5)], parts;

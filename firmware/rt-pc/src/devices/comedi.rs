@@ -1,8 +1,8 @@
 //! Data acquisition cards by libcomedi: single synchronous readings and outputs, no streams.
 //!
 //! Gauges are the first six differential inputs of one card, amplifiers the first outputs of one or more cards (an NI PCI-6229
-//! has four), and the enable line is the first digital line of the first card, high for on. Codes are straight binary over the
-//! range of the channel: what volts they are, the spec says.
+//! has four), and the enable line is the first digital line of the first card, high for on; the triggers of the spec are the lines
+//! behind it. Codes are straight binary over the range of the channel: what volts they are, the spec says.
 
 pub mod library;
 
@@ -10,7 +10,8 @@ use std::path::PathBuf;
 
 use controller::limits::CODES;
 use controller::sensing::CONVERTER;
-use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
+use controller::triggers::LINES;
+use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges, Lines};
 
 use super::Device;
 use library::{ANALOG_INPUT, ANALOG_OUTPUT, Card, Comedilib, DIGITAL, Reference, channel};
@@ -42,6 +43,8 @@ pub struct Comedi<'a> {
     input: Card<'a>,
     gauges: (u32, [u32; CHANNELS]),
     line: u32,
+    /// Triggers as they are set, bit by bit.
+    high: u32,
     banks: Vec<Bank<'a>>,
     name: String,
 }
@@ -55,13 +58,26 @@ impl<'a> Comedi<'a> {
         let path = settings.input.display();
         let input = library.card(&settings.input)?;
         let name = input.name();
-        let (line, _) = input
+        let (line, lines) = input
             .subdevice(DIGITAL)
             .ok_or_else(|| format!("{path}: {name} has no digital line to enable amplifiers"))?;
         input.make_output(line, 0).map_err(|error| format!("{path}: digital line 0 as an output: {error}"))?;
         // Before anything else.
         if !input.set_line(line, 0, false) {
             return Err(format!("{path}: digital line 0 cannot be set: amplifiers could not be switched off"));
+        }
+        if (lines as usize).checked_sub(1 + LINES).is_none() {
+            return Err(format!(
+                "{path}: {name} has {lines} digital lines; the amplifiers need one, the triggers of the spec {LINES} more"
+            ));
+        }
+        for (number, ()) in (1..).zip([(); LINES]) {
+            input
+                .make_output(line, number)
+                .map_err(|error| format!("{path}: digital line {number} as an output: {error}"))?;
+            if !input.set_line(line, number, false) {
+                return Err(format!("{path}: digital line {number} cannot be set"));
+            }
         }
         let (subdevice, count) =
             input.subdevice(ANALOG_INPUT).ok_or_else(|| format!("{path}: {name} has no analog inputs"))?;
@@ -98,7 +114,7 @@ impl<'a> Comedi<'a> {
                 "the cards have {first} analog outputs, six amplifiers need {CHANNELS}: name more cards, such as --comedi-out {path} --comedi-out /dev/comedi1"
             ));
         }
-        Ok(Self { input, gauges: (subdevice, channels), line, banks, name: format!("{name} at {path}") })
+        Ok(Self { input, gauges: (subdevice, channels), line, high: 0, banks, name: format!("{name} at {path}") })
     }
 }
 
@@ -161,6 +177,26 @@ impl Amplifiers for Comedi<'_> {
     }
 }
 
+/// A call of the system each, so that only those that change are set.
+impl Lines for Comedi<'_> {
+    const COUNT: usize = LINES;
+
+    fn set(&mut self, high: u32) -> Result<(), Fault> {
+        let mut good = true;
+        for (number, ()) in (0_u32..).zip([(); LINES]) {
+            let bit = 1 << number;
+            if (high ^ self.high) & bit != 0 {
+                if self.input.set_line(self.line, number + 1, high & bit != 0) {
+                    self.high ^= bit;
+                } else {
+                    good = false;
+                }
+            }
+        }
+        if good { Ok(()) } else { Err(Fault::Pin) }
+    }
+}
+
 impl Device for Comedi<'_> {
     fn tick(&mut self, _tick: u64) {}
 
@@ -176,6 +212,7 @@ impl Device for Comedi<'_> {
 impl Drop for Comedi<'_> {
     fn drop(&mut self) {
         // Whatever ended the run.
+        let _ = self.set(0);
         let _ = self.input.set_line(self.line, 0, false);
     }
 }

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use controller::sensing::CONVERTER;
-use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
+use controller::triggers::LINES;
+use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges, Lines};
 use specgen_rt::clock;
 use specgen_rt::exchange::Client;
 
@@ -90,6 +91,15 @@ impl Amplifiers for Simulated {
     fn enable(&mut self, on: bool) -> Result<(), Fault> {
         self.enabled = on;
         self.client.actuate(self.tick, on, &self.codes);
+        Ok(())
+    }
+}
+
+/// A simulated machine has nothing that they lead to: they stand in the record.
+impl Lines for Simulated {
+    const COUNT: usize = LINES;
+
+    fn set(&mut self, _high: u32) -> Result<(), Fault> {
         Ok(())
     }
 }

@@ -18,5 +18,6 @@ mod setpoint;
 mod snapshot;
 mod supervisor;
 mod trig;
+mod trigger;
 mod velocity;
 mod wave;

@@ -311,6 +311,23 @@ pub const RULES: &[Rule] = &[
     .on("minimal.toml")
     .at("[target.budget]"),
     of("W0873", "target.budget.ram", ["\"32 KiB\"", "\"129 KiB\"", "\"128 KiB\""]),
+    of("E0874", "trigger[0].step", ["step  = \"1 um\"", "step  = \"27 nm\"", "step  = \"27.2 nm\""])
+        .on("features/triggers.toml")
+        .also(&["W0876"]),
+    of(
+        "W0875",
+        "trigger[0].hysteresis",
+        ["step  = \"1 um\"", "step  = \"1 um\"\nhysteresis = \"27 nm\"", "step  = \"1 um\"\nhysteresis = \"27.2 nm\""],
+    )
+    .on("features/triggers.toml")
+    .at("hysteresis = \"27 nm\""),
+    of(
+        "W0876",
+        "trigger[0].width",
+        ["step  = \"1 um\"", "step  = \"1 um\"\nwidth = \"1 ms\"", "step  = \"1 um\"\nwidth = \"0.9 ms\""],
+    )
+    .on("features/triggers.toml")
+    .at("width = \"1 ms\""),
     of("W0880", "controller.scalar", ["\"2.2 nm\"", "\"0.21 nm\"", "\"0.25 nm\""])
         .on("features/platform-f32.toml")
         .with(&[("bits  = 17", "bits  = 20")])

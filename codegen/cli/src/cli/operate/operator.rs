@@ -188,6 +188,7 @@ impl<P: Port> Operator<P> {
             Order::Goto(name) if name != ZERO && !marks.contains(&name.as_str()) => Err(nonsense(self.no_mark(name))),
             Order::Play { name, correction } => self.playable(name, correction.as_ref()).map(|_| ()).map_err(nonsense),
             Order::Gains(gains) => self.gains_of(gains).map(|_| ()).map_err(nonsense),
+            Order::Trigger { line, settings } => self.places_of(*line, settings).map(|_| ()).map_err(nonsense),
             Order::Move { .. }
             | Order::Frame(_)
             | Order::Where
@@ -272,6 +273,7 @@ impl<P: Port> Operator<P> {
                 self.session.command(words).map_err(waving)?;
             }
             Order::WriteConfig(spec) => self.write_config(spec)?,
+            Order::Trigger { line, settings } => self.set_trigger(*line, settings)?,
             Order::Wave(path) => self.wave(path)?,
             Order::StopWave => self.session.stop_wave()?,
             Order::Stop => self.session.stop().map_err(unsupported)?,

@@ -15,5 +15,6 @@ pub const PART: Part = Part {
         "src/edge.rs",
         "src/fault.rs",
         "src/lib.rs",
+        "src/lines.rs",
     },
 };

@@ -63,6 +63,7 @@ pub const PART: Part = Part {
         "src/supervisor/watch.rs",
         "src/transfer.rs",
         "src/trig.rs",
+        "src/trigger.rs",
         "src/velocity.rs",
         "src/wave.rs",
         "src/wave/shape.rs",

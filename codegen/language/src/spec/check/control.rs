@@ -20,7 +20,7 @@ pub(super) fn parts_need_it(f: &Fields, findings: &mut Findings) -> Option<()> {
     if there(f).is_some() {
         return Some(());
     }
-    let tables = ["gauge", "trajectory"].map(|section| format!("{section}[0]"));
+    let tables = ["gauge", "trajectory", "trigger"].map(|section| format!("{section}[0]"));
     let parts = tables.iter().filter_map(|path| Some((path.as_str(), f.table(path)?)));
     let key = "sensor.calibration";
     let calibration = f.given(key).then(|| (key, f.span(key)));

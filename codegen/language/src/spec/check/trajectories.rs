@@ -47,20 +47,25 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
 }
 
 pub(super) fn names_differ(f: &Fields, findings: &mut Findings) -> Option<()> {
-    for index in 0..f.count("trajectory") {
-        let path = format!("trajectory[{index}].name");
+    differ(f, findings, "trajectory")
+}
+
+/// No two tables of a repeated section have one name.
+pub(super) fn differ(f: &Fields, findings: &mut Findings, section: &str) -> Option<()> {
+    for index in 0..f.count(section) {
+        let path = format!("{section}[{index}].name");
         let Some(name) = f.name(&path) else {
             continue;
         };
-        let Some(first) = (0..index).find(|other| f.name(&format!("trajectory[{other}].name")) == Some(name)) else {
+        let Some(first) = (0..index).find(|other| f.name(&format!("{section}[{other}].name")) == Some(name)) else {
             continue;
         };
         findings.add(
             codes::NAME_TAKEN,
             &path,
             f.span(&path),
-            format!("trajectory[{first}] is called \"{name}\" as well"),
-            "give each trajectory a name of its own".to_owned(),
+            format!("{section}[{first}] is called \"{name}\" as well"),
+            format!("give each {section} a name of its own"),
         );
     }
     Some(())

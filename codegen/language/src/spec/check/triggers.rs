@@ -1,0 +1,162 @@
+//! Output lines: which keys go with which kind and axis, and where positions may lie.
+
+use super::trajectories::differ;
+use crate::diagnostic::codes;
+use crate::keys::fields::Fields;
+use crate::model::MAX_TRIGGERS;
+use crate::spec::findings::Findings;
+use crate::spec::keys;
+use crate::spec::text::number;
+
+/// Keys whose values are lengths, or angles under `KEY_angle`.
+const PLACES: [&str; 4] = ["start", "stop", "step", "hysteresis"];
+const COUNTS: [&str; 3] = ["first", "every", "last"];
+
+/// Keys that a kind takes besides `name` and `kind`; those of [`PLACES`] in either form.
+fn keys_of(kind: &str) -> &'static [&'static str] {
+    match kind {
+        "position" => &["axis", "direction", "start", "stop", "step", "hysteresis", "width"],
+        "level" => &["axis", "start", "stop", "hysteresis"],
+        "motion" => &[],
+        _ => &["first", "every", "last", "width"],
+    }
+}
+
+/// Keys that it needs.
+fn needed_by(kind: &str) -> &'static [&'static str] {
+    match kind {
+        "position" => &["start", "step"],
+        "level" => &["start"],
+        _ => &[],
+    }
+}
+
+pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
+    for index in 0..f.count("trigger") {
+        let table = format!("trigger[{index}]");
+        let (Some(kind), Some(axis)) = (f.choice(&keys::join(&table, "kind")), f.choice(&keys::join(&table, "axis")))
+        else {
+            continue;
+        };
+        let turns = axis.starts_with("theta");
+        // What a key is called for this axis, and for the others.
+        let forms = |key: &str| {
+            if turns { [format!("{key}_angle"), key.to_owned()] } else { [key.to_owned(), format!("{key}_angle")] }
+        };
+        let mut refuse = |path: &str, message: String, help: String| {
+            findings.add(codes::TRIGGER_KEY, path, f.span(path), message, help);
+        };
+        let others = ["axis", "direction", "width"].into_iter().chain(COUNTS);
+        let takes = keys_of(kind);
+        for (key, form) in others
+            .map(|key| (key, key.to_owned()))
+            .chain(PLACES.iter().flat_map(|key| forms(key).map(|form| (*key, form))))
+        {
+            let path = keys::join(&table, &form);
+            if !f.given(&path) {
+                continue;
+            }
+            if !takes.contains(&key) {
+                let list = if takes.is_empty() { "no other key".to_owned() } else { takes.join(", ") };
+                refuse(
+                    &path,
+                    format!("`{path}` has no meaning for a trigger of kind \"{kind}\""),
+                    format!("take it out; kind \"{kind}\" takes {list}"),
+                );
+            } else if PLACES.contains(&key) && form != forms(key)[0] {
+                let what = if turns { ["a length", "a rotation"] } else { ["an angle", "a translation"] };
+                let [right, _] = forms(key);
+                refuse(
+                    &path,
+                    format!("`{path}` is {}, but {axis} is {}", what[0], what[1]),
+                    format!("write {right} = {}", keys::key(&keys::join("trigger", &right))?.example),
+                );
+            }
+        }
+        for key in needed_by(kind) {
+            let paths = forms(key).map(|form| keys::join(&table, &form));
+            let mentioned = findings.mentions(&[&paths[0]]) || findings.mentions(&[&paths[1]]);
+            if mentioned || paths.iter().any(|path| f.get(path).is_some()) {
+                continue;
+            }
+            let [path, _] = paths;
+            let key = keys::key(&path)?;
+            findings.add(
+                codes::MISSING_KEY,
+                &path,
+                f.table(&table).unwrap_or(0..0),
+                format!("`{path}` is missing: kind \"{kind}\" needs it"),
+                format!("write, in [[trigger]]: {} = {}. {}", key.name, key.example, key.doc),
+            );
+        }
+    }
+    Some(())
+}
+
+pub(super) fn names_differ(f: &Fields, findings: &mut Findings) -> Option<()> {
+    differ(f, findings, "trigger")
+}
+
+/// No pose is measured beyond the workspace in good order, so that a position there would never be passed.
+pub(super) fn inside_workspace(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let bounds = [f.list::<3>("workspace.translation")?, f.list::<3>("workspace.rotation")?];
+    for index in 0..f.count("trigger") {
+        let table = format!("trigger[{index}]");
+        let Some(axis) = f.choice(&keys::join(&table, "axis")) else { continue };
+        let turns = axis.starts_with("theta");
+        let place = usize::from(axis.ends_with('y')) + 2 * usize::from(axis.ends_with('z'));
+        let bound = bounds[usize::from(turns)][place];
+        let (unit, suffix) = if turns { ("urad", "_angle") } else { ("um", "") };
+        let path = |key: &str| keys::join(&table, &format!("{key}{suffix}"));
+        let ends = [path("start"), path("stop")];
+        for path in &ends {
+            if let Some(value) = f.number(path)
+                && value.abs() > bound
+            {
+                findings.add(
+                    codes::TRIGGER_OUTSIDE,
+                    path,
+                    f.span(path),
+                    format!(
+                        "{} {unit} is outside the workspace of {} {unit} along {axis}",
+                        number(value * 1e6),
+                        number(bound * 1e6)
+                    ),
+                    format!(
+                        "positions count from rest with the bias in them: write \"{} {unit}\", or widen `workspace.{}`",
+                        number(if value < 0.0 { -bound } else { bound } * 1e6),
+                        if turns { "rotation" } else { "translation" }
+                    ),
+                );
+            }
+        }
+        if let (Some(start), Some(stop)) = (f.number(&ends[0]), f.number(&ends[1]))
+            && stop < start
+        {
+            findings.add(
+                codes::WRONG_ORDER,
+                &ends[1],
+                f.span(&ends[1]),
+                format!("`{}` is below `{}`: positions are counted upward", ends[1], ends[0]),
+                "write the smaller value as start; direction = \"down\" is for passages with the pose falling"
+                    .to_owned(),
+            );
+        }
+    }
+    Some(())
+}
+
+pub(super) fn not_too_many(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let count = f.count("trigger");
+    if count > MAX_TRIGGERS {
+        let path = format!("trigger[{MAX_TRIGGERS}]");
+        findings.add(
+            codes::TOO_MANY_TRIGGERS,
+            &path,
+            f.table(&path).unwrap_or(0..0),
+            format!("there are {count} triggers, expected at most {MAX_TRIGGERS}: a board has so many pins for them"),
+            "take some out; what a line shows may be changed while the controller runs".to_owned(),
+        );
+    }
+    Some(())
+}

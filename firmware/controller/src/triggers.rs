@@ -1,0 +1,34 @@
+// Carried over by specgen 0.1.0: the same for every spec. Its constants are in the generated files beside it.
+
+//! Output lines at positions, levels, in motion, at set-points and ticks: what a tick under the supervisor gives them to see.
+
+pub use crate::defaults::LINES;
+pub use specgen_runtime::trigger::{Direction, HIGH, Kind, Line, MISSED, MOST, lines};
+
+use crate::tick::{GENERATOR_BUSY, SETPOINT_FAULT, SETPOINT_STALE};
+use crate::{Config, State, TickInput};
+use specgen_runtime::setpoint::CommandKind;
+use specgen_runtime::supervisor::Phase;
+use specgen_runtime::trigger::Seen;
+
+/// After the law: the bits of the status that say how the lines are over the coming interval, by the pose measured at its beginning. They are
+/// low unless the law runs.
+#[inline]
+pub(crate) fn act(config: &Config, state: &mut State, phase: Phase, input: &TickInput, status: u32) -> u32 {
+    if LINES == 0 {
+        return 0;
+    }
+    let State { triggers, pose, generator, .. } = state;
+    if phase != Phase::Running {
+        return triggers.rest();
+    }
+    let command = &input.command;
+    let follows = status & (SETPOINT_FAULT | SETPOINT_STALE | GENERATOR_BUSY) == 0;
+    let seen = Seen {
+        pose,
+        moves: status & GENERATOR_BUSY != 0 || generator.can_stop(),
+        streams: command.kind == CommandKind::Stream && follows,
+        sequence: command.sequence,
+    };
+    triggers.tick(config.triggers(), &seen)
+}

@@ -1,0 +1,45 @@
+//! Output lines of triggers.
+
+use embedded_hal::digital::OutputPin;
+
+use crate::Fault;
+
+/// Digital outputs that a controller sets in every tick.
+pub trait Lines {
+    /// How many there are.
+    const COUNT: usize;
+
+    /// Sets line k high where bit k of `high` is set, else low; lines beyond [`Self::COUNT`] are left out.
+    ///
+    /// # Errors
+    /// [`Fault::Pin`] if a line cannot be driven.
+    fn set(&mut self, high: u32) -> Result<(), Fault>;
+}
+
+/// No lines.
+impl Lines for () {
+    const COUNT: usize = 0;
+
+    #[inline]
+    fn set(&mut self, _high: u32) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+/// Pins, each of which may be left out.
+impl<PIN: OutputPin, const N: usize> Lines for [Option<PIN>; N] {
+    const COUNT: usize = N;
+
+    #[inline]
+    fn set(&mut self, high: u32) -> Result<(), Fault> {
+        let mut left = high;
+        for pin in self.iter_mut() {
+            if let Some(pin) = pin {
+                let driven = if left & 1 == 1 { pin.set_high() } else { pin.set_low() };
+                driven.map_err(|_| Fault::Pin)?;
+            }
+            left >>= 1;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,99 @@
+//! The pins of triggers as the emulated board saw them, against the record of the same ticks.
+
+use std::fs;
+use std::path::Path;
+
+/// A change of a pin: line, level, and the tick or sample that it belongs to.
+type Edge = (usize, bool, i64);
+
+/// The edges of a record's table: by line, in the order of the ticks.
+fn recorded(table: &str) -> (Vec<Edge>, [i64; 2]) {
+    let mut lines = table.lines();
+    let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let columns: Vec<usize> = (0..names.len()).filter(|place| names[*place].starts_with("trigger[")).collect();
+    let (mut edges, mut before, mut span) = (Vec::new(), None::<Vec<bool>>, [i64::MAX, i64::MIN]);
+    for row in lines {
+        let values: Vec<&str> = row.split(',').collect();
+        let tick: i64 = values[0].parse().unwrap_or_default();
+        let high: Vec<bool> = columns.iter().map(|place| values[*place] == "1").collect();
+        if let Some(before) = &before {
+            for (line, (after, before)) in high.iter().zip(before).enumerate() {
+                if after != before {
+                    edges.push((line, *after, tick));
+                }
+            }
+        }
+        before = Some(high);
+        span = [span[0].min(tick), span[1].max(tick)];
+    }
+    (edges, span)
+}
+
+/// The edges that the board wrote down.
+fn seen(log: &[String]) -> Vec<Edge> {
+    let edge = |line: &String| {
+        let words: Vec<&str> = line.split(" ms: trigger ").nth(1)?.split(' ').collect();
+        let [line, level, "after", "sample", sample] = words[..] else { return None };
+        Some((line.parse().ok()?, level == "1", sample.parse().ok()?))
+    };
+    log.iter().filter_map(edge).collect()
+}
+
+/// How many edges the record has, each of which the board saw in the same tick, and no others.
+///
+/// Samples count from power-up, as ticks do, but for those that starting the converters takes: the first edge says how many.
+fn compare(recorded: &[Edge], seen: &[Edge], [begin, end]: [i64; 2]) -> Result<usize, String> {
+    let mut best = None;
+    for (_, _, sample) in seen {
+        let Some((_, _, first)) = recorded.first() else { break };
+        let offset = sample - first;
+        // The record says nothing of what was before its first row.
+        let within: Vec<Edge> = seen
+            .iter()
+            .map(|(line, level, sample)| (*line, *level, sample - offset))
+            .filter(|(_, _, tick)| *tick > begin && *tick <= end)
+            .collect();
+        if within == recorded {
+            return Ok(recorded.len());
+        }
+        let wrong = within.iter().zip(recorded).position(|(seen, recorded)| seen != recorded);
+        let wrong = wrong.unwrap_or(within.len().min(recorded.len()));
+        if best.is_none_or(|best| wrong > best) {
+            best = Some(wrong);
+        }
+    }
+    Err(format!(
+        "the pins of triggers are not those of the record: {} edges recorded, {} seen, {} of them in order",
+        recorded.len(),
+        seen.len(),
+        best.unwrap_or(0)
+    ))
+}
+
+/// Compares a record's table with what the board wrote down.
+pub fn check(table: &Path, log: &[String]) -> Result<usize, String> {
+    let text = fs::read_to_string(table).map_err(|error| format!("{}: {error}", table.display()))?;
+    let (edges, span) = recorded(&text);
+    compare(&edges, &seen(log), span)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_that_is_a_tick_off_or_missing_is_found() {
+        let table = "tick,trigger[0],trigger[1]\n10,0,0\n11,1,0\n12,0,1\n13,0,1\n14,1,0\n";
+        let (edges, span) = recorded(table);
+        assert_eq!(edges.len(), 5);
+        let log: Vec<String> = [(0, 1, 3), (0, 1, 14), (0, 0, 15), (1, 1, 15), (0, 1, 17), (1, 0, 17)]
+            .map(|(line, level, sample)| format!("1.000 ms: trigger {line} {level} after sample {sample}"))
+            .to_vec();
+        assert_eq!(compare(&edges, &seen(&log), span), Ok(5));
+        let mut late = log.clone();
+        late[4] = "1.000 ms: trigger 0 1 after sample 18".to_owned();
+        assert!(compare(&edges, &seen(&late), span).is_err());
+        assert!(compare(&edges, &seen(&log[..5]), span).is_err());
+        assert!(compare(&edges, &[], span).is_err());
+    }
+}
