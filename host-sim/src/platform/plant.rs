@@ -81,11 +81,11 @@ impl PlatformPlant {
     }
 
     /// From here on intervals of `interval` (s) are one step each, some ten times as fast and not of the same bits. Second
-    /// order as well: at 100 µs half a nanometre at the peak of 56 µm at 10 Hz, a thousandth of what a kick makes ring. Contact, [`PlatformPlant::prepare`] and other intervals
+    /// order as well: at 100 µs half a nanometre at the peak of 56 µm at 10 Hz, a thousandth of what a kick makes ring. Contact, disturbance, [`PlatformPlant::prepare`] and other intervals
     /// end it. Legs that differ in the number of their operators, or have Bouc-Wen hysteresis, are left as they are.
     pub fn step_whole_ticks(&mut self, interval: f64) {
         self.step_small();
-        if self.structure.contact().is_none() {
+        if self.structure.contact().is_none() && self.structure.disturbance() == Wrench::default() {
             let amplifiers = self.actuators.each_ref().map(|actuator| &actuator.amplifier);
             let stacks = self.actuators.each_ref().map(|actuator| &actuator.stack);
             let rest = self.actuators.each_ref().map(|actuator| actuator.rest);
@@ -237,10 +237,19 @@ impl PlatformPlant {
         self.structure.release();
     }
 
-    /// What the part puts on the platform.
+    /// Puts a wrench on the platform, besides that of a part, until it is changed.
+    pub fn disturb(&mut self, wrench: &Wrench) {
+        if *wrench != self.structure.disturbance() {
+            self.step_small();
+            self.structure.disturb(wrench);
+        }
+    }
+
+    /// What part and disturbance put on the platform.
     #[must_use]
     pub fn wrench(&self) -> Wrench {
-        self.structure.contact().map_or_else(Wrench::default, |contact| contact.wrench(&self.pose()))
+        let disturbance = self.structure.disturbance();
+        self.structure.contact().map_or(disturbance, |contact| contact.wrench(&self.pose()).and(&disturbance))
     }
 }
 
