@@ -344,6 +344,12 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
         }
     }
 
+    /// Where the legs are, from the zeros of their gauges, m.
+    #[must_use]
+    pub fn displacements(&self) -> [f64; LEGS] {
+        self.channels.each_ref().map(|channel| channel.gauge.from_zero(channel.leg.displacement()))
+    }
+
     /// Reads the six gauges, m.
     pub fn read(&mut self) -> [f64; LEGS] {
         self.channels.each_mut().map(|channel| channel.gauge.read(channel.leg.seen()))

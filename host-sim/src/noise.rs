@@ -97,9 +97,15 @@ impl Gauge {
         self.zero = displacement;
     }
 
+    /// `displacement` (m) from the zero, without noise and steps.
+    #[must_use]
+    pub fn from_zero(&self, displacement: f64) -> f64 {
+        displacement - self.zero
+    }
+
     /// Reading (m) of `displacement` (m).
     pub fn read(&mut self, displacement: f64) -> f64 {
-        let analogue = (displacement - self.zero) + self.noise.draw();
+        let analogue = self.from_zero(displacement) + self.noise.draw();
         if self.lsb > 0.0 { nearest(analogue / self.lsb) * self.lsb } else { analogue }
     }
 }

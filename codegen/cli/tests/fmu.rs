@@ -1,10 +1,12 @@
-//! `specgen export fmu` as a user runs it: every output word of the unit is that of the same controller under Rust.
+//! `specgen export fmu` as a user runs it: every output word of the controller's unit is that of the same controller under Rust, and
+//! those of the plant's are what `specgen sim` has.
 
 use std::fs;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use crate::support::{Folder, repository, skipped};
 use host_sim::controller::{Controller, Supervised, TickController};
+use host_sim::record::{Reader, replay};
 use host_sim::word::WordKind;
 use rawzip::ZipArchive;
 
@@ -43,13 +45,26 @@ fn bytes(words: impl Iterator<Item = u64>) -> Vec<u8> {
     words.flat_map(u64::to_ne_bytes).collect()
 }
 
+/// Builds the importer of these tests, and lets it step the library of the unit in `unit/` through `inputs.bin`.
+fn drive(folder: &Folder, library: &str, inputs: usize, kinds: &str) -> Vec<u8> {
+    let driver = repository().join("codegen/cli/tests/support/fmu.c");
+    let built = Command::new("cc").arg(driver).args(["-o", "driver", "-ldl"]).current_dir(folder.path("")).status();
+    assert!(built.unwrap().success());
+    let text = folder.read("unit/modelDescription.xml");
+    let attribute = |name: &str| text.split(&format!(" {name}=\"")).nth(1).unwrap().split('"').next().unwrap();
+    let mut command = Command::new(folder.path("driver"));
+    command.arg(folder.path(library)).args([attribute("guid"), "inputs.bin", "outputs.bin"]);
+    command.args([attribute("stepSize"), &inputs.to_string(), kinds]);
+    assert_eq!(command.current_dir(folder.path("")).status().unwrap().code(), Some(0), "{library}");
+    fs::read(folder.path("outputs.bin")).unwrap()
+}
+
 #[test]
 fn an_importer_gets_the_bits_of_the_controller() {
     if !cfg!(target_os = "linux") {
         skipped("the importer of this test is written for Linux");
         return;
     }
-    let driver = repository().join("codegen/cli/tests/support/fmu.c");
     for (spec, name) in [("reference.toml", "reference"), ("legs.toml", "legs")] {
         let folder = Folder::new();
         for output in ["fmu", "again"] {
@@ -59,9 +74,6 @@ fn an_importer_gets_the_bits_of_the_controller() {
         let file = format!("fmu/{name}.fmu");
         assert!(fs::read(folder.path(&file)).unwrap() == fs::read(folder.path(format!("again/{name}.fmu"))).unwrap());
         extract(&folder, &file);
-        let built =
-            Command::new("cc").arg(&driver).args(["-o", "driver", "-ldl"]).current_dir(folder.path("")).status();
-        assert!(built.unwrap().success());
 
         assert_eq!(folder.run(&["export", "c", spec, "-o", "c"]).code, 0);
         let library = Controller::load(&folder.path("c/libcontroller.so")).unwrap();
@@ -80,15 +92,7 @@ fn an_importer_gets_the_bits_of_the_controller() {
         let kind = |name: &String| if WordKind::of(name) == WordKind::Real { 'r' } else { 'i' };
         let kinds: String = names.iter().map(kind).collect();
         folder.write("inputs.bin", bytes(inputs.iter().flatten().copied()));
-        let text = folder.read("unit/modelDescription.xml");
-        let attribute = |name: &str| text.split(&format!(" {name}=\"")).nth(1).unwrap().split('"').next().unwrap();
-        let run = |library: &str| {
-            let mut command = Command::new(folder.path("driver"));
-            command.arg(folder.path(library)).args([attribute("guid"), "inputs.bin", "outputs.bin"]);
-            command.args([attribute("stepSize"), &inputs[0].len().to_string(), &kinds]);
-            assert_eq!(command.current_dir(folder.path("")).status().unwrap().code(), Some(0), "{name}");
-            fs::read(folder.path("outputs.bin")).unwrap()
-        };
+        let run = |library: &str| drive(&folder, library, inputs[0].len(), &kinds);
         let found = run(&format!("unit/binaries/linux64/{name}.so"));
         let wanted = bytes(expected.iter().copied());
         assert!(found == wanted, "{name}: words differ");
@@ -103,4 +107,122 @@ fn an_importer_gets_the_bits_of_the_controller() {
             assert!(run("unit/sources/made.so") == wanted, "from its sources");
         }
     }
+}
+
+/// What `specgen sim --record` wrote, run again: input and output words of every tick.
+fn recorded(folder: &Folder, record: &str, machine: &mut Supervised) -> [Vec<Vec<u64>>; 2] {
+    let mut reader = Reader::new(fs::File::open(folder.path(record)).unwrap()).unwrap();
+    let [mut inputs, mut outputs] = [Vec::new(), Vec::new()];
+    let found = replay(&mut reader, machine, |_, block, given| {
+        inputs.extend(block.rows.iter().map(|row| row.input.clone()));
+        outputs.extend_from_slice(given);
+    });
+    let found = found.unwrap();
+    assert!(found.divergence.is_none() && inputs.len() == outputs.len() && inputs.len() > TICKS as usize, "{found:?}");
+    [inputs, outputs]
+}
+
+/// Places of the names that begin with these stems, in their order.
+fn places(names: &[String], stems: &[&str]) -> Vec<usize> {
+    let of =
+        |stem: &&str| (0..6).map(|k| names.iter().position(|name| *name == format!("{stem}[{k}]")).unwrap()).collect();
+    stems.iter().flat_map(|stem: &&str| -> Vec<usize> { of(stem) }).collect()
+}
+
+/// Words that differ.
+fn differing<'a>(found: impl Iterator<Item = &'a u64>, wanted: impl Iterator<Item = &'a u64>) -> usize {
+    found.zip(wanted).filter(|(a, b)| a != b).count()
+}
+
+fn words(bytes: &[u8]) -> Vec<u64> {
+    bytes.chunks_exact(8).map(|word| u64::from_ne_bytes(word.try_into().unwrap())).collect()
+}
+
+#[test]
+fn a_controller_on_the_unit_of_its_plant_gets_the_bits_of_specgen_sim() {
+    if !cfg!(target_os = "linux") {
+        skipped("the importer of this test is written for Linux");
+        return;
+    }
+    for (spec, name) in [("reference.toml", "reference"), ("legs.toml", "legs")] {
+        let folder = Folder::new();
+        let run = folder.run(&["export", "fmu", spec, "-o", "fmu", "--plant"]);
+        assert!(run.code == 0 && run.stdout.contains(&format!("{name}_plant.fmu, FMI 2.0")), "{run:#?}");
+        assert_eq!(folder.run(&["export", "c", spec, "-o", "c"]).code, 0);
+        let run = folder.run(&["sim", spec, "--record", "run.rec", "--seconds", "1.1"]);
+        assert_eq!(run.code, 0, "{run:#?}");
+        let mut machine = Supervised::new(Controller::load(&folder.path("c/libcontroller.so")).unwrap()).unwrap();
+        let (inputs, outputs) = (machine.input_names(), machine.output_names());
+        let [given, answers] = recorded(&folder, "run.rec", &mut machine);
+
+        // The plant by itself, on the voltages of the record, must read what the record has a tick later.
+        let readings: &[&str] = if name == "legs" { &["displacement"] } else { &["gauge", "wrench"] };
+        let (voltages, read) = (places(&outputs, &["voltage"]), places(&inputs, readings));
+        let pick = |row: &[u64], places: &[usize]| places.iter().map(|place| row[*place]).collect::<Vec<_>>();
+        let own = if name == "legs" { (6, 12) } else { (12, 30) };
+        let fed = |fault: Option<usize>| {
+            let mut rows: Vec<Vec<u64>> = answers[..TICKS as usize].iter().map(|row| pick(row, &voltages)).collect();
+            rows.iter_mut().for_each(|row| row.resize(own.0, 0));
+            if let Some(tick) = fault {
+                rows[tick][2] ^= 1;
+            }
+            bytes(rows.into_iter().flatten())
+        };
+        extract(&folder, &format!("fmu/{name}_plant.fmu"));
+        let driven = |library: &str, inputs: Vec<u8>| {
+            folder.write("inputs.bin", inputs);
+            let found = drive(&folder, library, own.0, &"r".repeat(own.0 + own.1));
+            words(&found).chunks(own.1).map(<[u64]>::to_vec).collect::<Vec<_>>()
+        };
+        let library = format!("unit/binaries/linux64/{name}_plant.so");
+        let found = driven(&library, fed(None));
+        let mut wanted: Vec<Vec<u64>> = given[1..=TICKS as usize].iter().map(|row| pick(row, &read)).collect();
+        assert_eq!(found.len(), TICKS as usize);
+        let compare = |wanted: &[Vec<u64>]| {
+            found.iter().zip(wanted).map(|(row, wanted)| differing(row.iter(), wanted.iter())).sum::<usize>()
+        };
+        assert_eq!(compare(&wanted), 0, "{name}: words differ");
+        // One ulp of one reading is found, and one of a voltage moves the machine.
+        wanted[TICKS as usize / 2][1] ^= 1;
+        assert_eq!(compare(&wanted), 1, "{name}");
+        let faulty = driven(&library, fed(Some(TICKS as usize / 2)));
+        let first = faulty.iter().zip(&found).position(|(a, b)| a != b);
+        assert_eq!(first, Some(TICKS as usize / 2), "{name}");
+        if name == "legs" {
+            let made = Command::new("sh").arg(folder.path("unit/sources/build.sh")).arg("made.so").output().unwrap();
+            assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+            assert!(driven("unit/sources/made.so", fed(None)) == found, "from its sources");
+        }
+        let setpoint = places(&inputs, &["setpoint"])[2];
+        with_fmpy(&folder, name, &given[..TICKS as usize], &answers, setpoint);
+    }
+}
+
+/// Both units under fmpy, which validates them: the closed loop, against the record.
+fn with_fmpy(folder: &Folder, name: &str, given: &[Vec<u64>], answers: &[Vec<u64>], setpoint: usize) {
+    let python = std::env::var("SPECGEN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let has = Command::new(&python).args(["-c", "import fmpy"]).stderr(Stdio::null()).status();
+    if !has.is_ok_and(|status| status.success()) {
+        skipped("no Python with fmpy: units are not validated, nor connected (pip install fmpy, SPECGEN_PYTHON)");
+        return;
+    }
+    let run = |given: &[Vec<u64>]| {
+        folder.write("given.bin", bytes(given.iter().flatten().copied()));
+        let mut command = Command::new(&python);
+        command.arg(repository().join("codegen/cli/tests/support/fmu.py"));
+        command.args([&format!("fmu/{name}.fmu"), &format!("fmu/{name}_plant.fmu"), "given.bin"]);
+        let done = command.args([&given.len().to_string(), "loop.bin"]).current_dir(folder.path("")).output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let found = words(&fs::read(folder.path("loop.bin")).unwrap());
+        let wanted: Vec<u64> =
+            given.iter().zip(answers).flat_map(|(input, output)| [&input[..], output].concat()).collect();
+        assert_eq!(found.len(), wanted.len());
+        differing(found.iter(), wanted.iter())
+    };
+    assert_eq!(run(given), 0, "{name}: words differ in the loop");
+    // A set-point of another bit, late in the run.
+    let mut given = given.to_vec();
+    let at = given.len() - 100;
+    given[at][setpoint] ^= 1 << 20;
+    assert!(run(&given) > 0, "{name}");
 }

@@ -51,18 +51,18 @@ pub fn build_program(dir: &Path, folder: &str, target_dir: &Path) -> Result<Path
     Ok(program.path)
 }
 
-/// Builds `sources/fmu.c` together with the controller of the workspace `dir` into one shared library, `target_dir/NAME` with the
-/// ending of this host, and returns its path. Nothing of the controller is visible from outside, so that a process may load several.
+/// Builds `sources/fmu.c` together with the static library of `package` into one shared library, `target_dir/NAME` with the
+/// ending of this host, and returns its path. Nothing of the package is visible from outside, so that a process may load several.
+/// Its dependencies are those of the lock file beside its folder, if there is one.
 ///
 /// # Errors
 /// [`TargetError::MissingTool`] without cargo or a C compiler, [`TargetError::PanicPath`] if the controller can panic,
 /// [`TargetError::BuildFailed`] for everything else that these say.
-pub fn build_unit(sources: &Path, dir: &Path, target_dir: &Path, name: &str) -> Result<PathBuf, TargetError> {
-    let package = dir.join("host");
+pub fn build_unit(sources: &Path, package: &Path, target_dir: &Path, name: &str) -> Result<PathBuf, TargetError> {
     let mut command = clean_command(cargo()?);
     command.args(["rustc", "--release", "--lib", "--crate-type", "staticlib"]);
-    let request =
-        BuildRequest { package: &package, target_dir: &target_dir.join("unit"), rustc_args: &[], locked: false };
+    let locked = package.with_file_name("Cargo.lock").is_file();
+    let request = BuildRequest { package, target_dir: &target_dir.join("unit"), rustc_args: &[], locked };
     let archive = cargo_artifact(&mut command, &request, &package.display().to_string(), |message| {
         let files = message["filenames"].as_array()?.iter().filter_map(|file| file.as_str());
         files.map(PathBuf::from).find(|file| file.extension().is_some_and(|extension| extension == "a"))
@@ -78,7 +78,7 @@ pub fn build_unit(sources: &Path, dir: &Path, target_dir: &Path, name: &str) -> 
     command.arg(sources.join("fmu.c")).arg(&archive.path).arg("-o").arg(&library);
     if cfg!(target_os = "linux") {
         // Nothing undefined: what calls a panic does not link.
-        command.args(["-Wl,-z,defs", "-Wl,--exclude-libs,ALL", "-lc"]);
+        command.args(["-Wl,-z,defs", "-Wl,--exclude-libs,ALL", "-lm", "-lpthread", "-ldl", "-lc"]);
     }
     let what = sources.join("fmu.c").display().to_string();
     let done = command.output().map_err(|error| TargetError::io("running cc on", sources.join("fmu.c"), error))?;

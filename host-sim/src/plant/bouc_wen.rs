@@ -1,11 +1,11 @@
 //! Bouc-Wen hysteresis: a second class of leg, smooth where plays have corners.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::Bound;
 
 /// Parameters of a [`BoucWen`].
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoucWenParameters {
     /// α: what the hysteresis takes of a small change of voltage, in (0, 1).

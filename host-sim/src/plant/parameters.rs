@@ -3,13 +3,13 @@
 use std::fmt;
 use std::path::Path;
 
-use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 use super::bouc_wen::BoucWenParameters;
 
 /// Parameters of [`super::LegPlant`], field for field as in the file. Its module has the equations.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LegParameters {
     /// What the plant is called in reports.
@@ -69,7 +69,7 @@ pub struct LegParameters {
 }
 
 /// Noise and quantisation around a leg. All zero: none.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseParameters {
     /// Gauge, white, per reading, nm rms.

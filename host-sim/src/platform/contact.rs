@@ -73,6 +73,13 @@ impl Wrench {
         out
     }
 
+    /// Both together.
+    #[must_use]
+    pub fn and(&self, other: &Self) -> Self {
+        let sum = |a: &Three, b: &Three| [0, 1, 2].map(|k| a[k] + b[k]);
+        Self { force: sum(&self.force, &other.force), torque: sum(&self.torque, &other.torque) }
+    }
+
     /// Force, then torque.
     #[must_use]
     pub fn numbers(&self) -> Six {

@@ -1,13 +1,13 @@
 //! Six gauges that see the platform: exact readings of any pose.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::geometry::{angles, rotation};
 use super::linear::{Matrix3, Six, Three, apply, dot};
 use crate::plant::lanes::{LANES, Lane};
 
 /// A gauge fixed to the base that measures along its line to a plane on the platform.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
     /// A point of the line in {B}, m.

@@ -1,7 +1,7 @@
 //! Parameter file of a platform plant: JSON, SI units. What the paper does not give is assumed, as in the spec of the
 //! reference platform; the legs have a file of their own ([`LegParameters`]).
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::gauge::Probe;
 use super::geometry::Geometry;
@@ -10,7 +10,7 @@ use super::linear::{Matrix3, Six, Three, dot};
 use crate::plant::{Bound, ParameterError, checked};
 
 /// Places of the joints.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Joints {
     /// B_i in {B}, m.
@@ -22,7 +22,7 @@ pub struct Joints {
 }
 
 /// Parameters of a platform, field for field as in the file.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlatformParameters {
     /// What the plant is called in reports.

@@ -97,7 +97,7 @@ impl PlatformPlant {
     /// of the finest small steps at 56 µm and 10 Hz, where small steps of 20 µs are off by 0.13 nm; behind amplifiers that are faster than
     /// a step within 0.3 nm, and at their current limit within 1 nm.
     ///
-    /// A part in touch that may let go is simulated in small steps, and so are legs that differ in the number of their operators or
+    /// A part in touch that may let go and a disturbance are simulated in small steps, and so are legs that differ in the number of their operators or
     /// the class of their hysteresis. `interval` (s) is that of the holds to come; others may follow.
     pub fn step_whole_ticks(&mut self, interval: f64) {
         self.long_steps = true;
@@ -287,10 +287,19 @@ impl PlatformPlant {
         self.structure.release();
     }
 
-    /// What the part puts on the platform.
+    /// Puts a wrench on the platform, besides that of a part, until it is changed.
+    pub fn disturb(&mut self, wrench: &Wrench) {
+        if *wrench != self.structure.disturbance() {
+            self.shorten();
+            self.structure.disturb(wrench);
+        }
+    }
+
+    /// What part and disturbance put on the platform.
     #[must_use]
     pub fn wrench(&self) -> Wrench {
-        self.structure.contact().map_or_else(Wrench::default, |contact| contact.wrench(&self.pose()))
+        let disturbance = self.structure.disturbance();
+        self.structure.contact().map_or(disturbance, |contact| contact.wrench(&self.pose()).and(&disturbance))
     }
 }
 

@@ -12,7 +12,7 @@
 //! displacements that change linearly over the step. What the exact forces differ from the linear ones, some 1e-4 of
 //! them, is extrapolated linearly over the step. Second order; without that difference the step has no error at all.
 
-use super::contact::{Contact, WorkPart};
+use super::contact::{Contact, WorkPart, Wrench};
 use super::geometry::{Geometry, angles, rate_matrix};
 use super::inertia::Masses;
 use super::linear::{
@@ -154,6 +154,8 @@ pub struct Structure {
     damping: Matrix6,
     contact: Option<Contact>,
     contact_stiffness: Matrix6,
+    /// None is zero, and adds nothing.
+    disturbance: Option<Wrench>,
     step: f64,
     free: Propagator,
     touching: Propagator,
@@ -186,6 +188,7 @@ impl Structure {
             damping,
             contact: None,
             contact_stiffness: [[0.0; 6]; 6],
+            disturbance: None,
             step,
             touching: free.clone(),
             free,
@@ -248,6 +251,32 @@ impl Structure {
     #[must_use]
     pub fn contact(&self) -> Option<&Contact> {
         self.contact.as_ref()
+    }
+
+    /// Puts a wrench on the platform that stays as it is until it is changed.
+    pub fn disturb(&mut self, wrench: &Wrench) {
+        let before = self.disturbing();
+        self.disturbance = (*wrench != Wrench::default()).then_some(*wrench);
+        let after = self.disturbing();
+        // It jumps between two steps, and what is extrapolated over them does not.
+        for k in 0..6 {
+            let jump = after[k] - before[k];
+            self.difference[k] += jump;
+            if let Some((_, earlier)) = &mut self.earlier {
+                earlier[k] += jump;
+            }
+        }
+    }
+
+    /// The wrench that was put on it.
+    #[must_use]
+    pub fn disturbance(&self) -> Wrench {
+        self.disturbance.unwrap_or_default()
+    }
+
+    /// Generalised force of the disturbance.
+    fn disturbing(&self) -> Six {
+        self.disturbance.map_or([0.0; 6], |wrench| wrench.generalised(&rate_matrix(angles(&self.pose()))))
     }
 
     /// h, m and rad.
@@ -313,6 +342,12 @@ impl Structure {
             let spring = apply(&self.contact_stiffness, &pose);
             for k in 0..6 {
                 out[k] += pushed[k] + spring[k];
+            }
+        }
+        if self.disturbance.is_some() {
+            let pushed = self.disturbing();
+            for k in 0..6 {
+                out[k] += pushed[k];
             }
         }
         out

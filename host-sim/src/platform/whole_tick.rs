@@ -10,6 +10,7 @@
 #![allow(unsafe_code)]
 
 use super::amplifier::Amplifier;
+use super::contact::Wrench;
 use super::linear::Six;
 use super::structure::{Structure, StructureLanes};
 use crate::plant::Stack;
@@ -47,7 +48,7 @@ fn skew_of(r: f64) -> f64 {
 
 impl WholeTick {
     /// The plant as it is, for steps of `step` (s). `rest` is the free displacement at rest of each leg, µm. None if the legs
-    /// have different numbers of operators or classes of hysteresis, or a part is in touch that may let go.
+    /// have different numbers of operators or classes of hysteresis, or a part is in touch that may let go, or something else pushes.
     pub(super) fn of(
         amplifiers: &[&Amplifier; 6],
         stacks: &[&Stack; 6],
@@ -55,7 +56,8 @@ impl WholeTick {
         structure: &Structure,
         step: f64,
     ) -> Option<Self> {
-        if structure.contact().is_some_and(|contact| contact.part.one_sided) {
+        let disturbed = structure.disturbance() != Wrench::default();
+        if disturbed || structure.contact().is_some_and(|contact| contact.part.one_sided) {
             return None;
         }
         let lag: Six = std::array::from_fn(|leg| amplifiers[leg].time_constant);

@@ -249,7 +249,8 @@ Examples:
 
 pub const EXPORT_FMU: &str = "\
 Examples:
-  specgen export fmu platform.toml -o fmu   # for Simulink, Dymola, OMSimulator";
+  specgen export fmu platform.toml -o fmu   # for Simulink, Dymola, OMSimulator
+  specgen export fmu platform.toml -o fmu --plant   # and the machine";
 
 pub const GAINS: &str = "\
 Examples:

@@ -55,7 +55,7 @@ pub struct Arguments {
 enum Kind {
     /// A C header, the library for this host, and two sources that use them: `tick.c` for firmware, `example.c` that runs it.
     C(C),
-    /// An FMI 2.0 co-simulation unit of the controller under its supervisor, sources included.
+    /// FMI 2.0 co-simulation units of the controller under its supervisor and of the simulated machine, sources included.
     Fmu(fmu::Arguments),
 }
 

@@ -27,6 +27,57 @@ fn asymmetric() -> StructureParameters {
     p
 }
 
+/// Settles for a second.
+fn at_rest(structure: &mut Structure) -> Six {
+    (0..50_000).for_each(|_| structure.advance(&[0.0; 6]));
+    assert!(structure.rate().iter().all(|rate| rate.abs() < 1e-12), "{:?}", structure.rate());
+    structure.pose()
+}
+
+#[test]
+fn a_disturbance_is_carried_by_the_legs_and_gone_when_it_ends() {
+    let parameters = asymmetric();
+    let mut structure = Structure::new(parameters.clone(), 2e-5);
+    let wrench = Wrench { force: [12.0, -7.0, 30.0], torque: [0.3, 0.2, -0.4] };
+    structure.disturb(&wrench);
+    let pose = at_rest(&mut structure);
+    // Virtual work: what the legs do is what is put on, but for the moments of the weight.
+    let carried = apply_transposed(&parameters.geometry.jacobian(&pose), &structure.leg_forces());
+    let weight = apply(&parameters.weight_stiffness(), &pose);
+    let put_on = wrench.generalised(&rate_matrix(angles(&pose)));
+    for k in 0..6 {
+        let left = carried[k] + put_on[k];
+        assert!(left.abs() < 1e-6 + 2.0 * weight[k].abs(), "{k}: {left} of {put_on:?}");
+    }
+    let stiffness = sum(&parameters.stiffness_matrix(), &parameters.weight_stiffness());
+    let expected = apply(&inverse(&stiffness), &wrench.numbers());
+    for k in 0..6 {
+        assert!((pose[k] / expected[k] - 1.0).abs() < 2e-3, "{k}: {pose:?}, {expected:?}");
+    }
+    structure.disturb(&Wrench::default());
+    assert!(at_rest(&mut structure).iter().all(|x| x.abs() < 1e-15));
+}
+
+#[test]
+fn a_disturbance_that_swings_is_second_order_in_the_step() {
+    let after = |step: f64| {
+        let mut structure = Structure::new(parameters(0.03), step);
+        let ticks = (0.02 / 1e-4) as u32;
+        for tick in 0..ticks {
+            // Held for 100 µs, as a rig holds it.
+            let swing = libm::sin(TAU * 150.0 * 1e-4 * f64::from(tick));
+            structure.disturb(&Wrench { force: [0.0, 0.0, 50.0 * swing], torque: [2.0 * swing, 0.0, 0.0] });
+            (0..(1e-4 / step + 0.5) as u32).for_each(|_| structure.advance(&[0.0; 6]));
+        }
+        structure.pose()
+    };
+    let [coarse, middle, fine] = [2e-5, 1e-5, 5e-6].map(after);
+    for k in 2..4 {
+        let ratio = (coarse[k] - middle[k]) / (middle[k] - fine[k]);
+        assert!((3.0..5.2).contains(&ratio), "{k}: {ratio}");
+    }
+}
+
 #[test]
 fn modes_of_the_study_ring_at_their_frequencies() {
     let parameters = parameters(0.0);

@@ -1,20 +1,20 @@
-//! `specgen export fmu`: the controller as an FMI 2.0 co-simulation unit, with its sources.
+//! `specgen export fmu`: controller and simulated machine as FMI 2.0 co-simulation units, with their sources.
+
+mod controller;
+mod plant;
+mod sources;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{self, Cursor, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use host_sim::controller::{Controller, Supervised, TickController};
-use host_sim::word::WordKind;
+use host_sim::word::{Scalar, WordKind};
 use rawzip::ZipArchiveWriter;
 use serde::Serialize;
 use specgen_compiler::compile::Compiled;
-use specgen_compiler::workspace;
-use specgen_language::interrupt::Scratch;
-use specgen_toolchain::host::{build_library, build_unit};
 
 use crate::cli::file::{claim, write_folder};
 use crate::cli::sim::environment;
@@ -27,8 +27,8 @@ const PLATFORM: &str = match (cfg!(target_os = "windows"), cfg!(target_os = "mac
     (_, true) => "darwin64",
     _ => "linux64",
 };
-const UNIT: &str = include_str!("fmu.c");
-const BUILD: &str = include_str!("fmu.sh");
+const UNIT: &str = include_str!("fmu/unit.c");
+const BUILD: &str = include_str!("fmu/build.sh");
 
 /// Arguments of `export fmu`.
 #[derive(Args, Debug)]
@@ -36,50 +36,38 @@ const BUILD: &str = include_str!("fmu.sh");
 pub(super) struct Arguments {
     /// The spec file.
     spec: PathBuf,
-    /// Folder for the unit, which is called after the platform.
+    /// Folder for the units, which are called after the platform.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    /// Write the simulated machine of `specgen sim`, too, as NAME_plant.fmu.
+    #[arg(long)]
+    plant: bool,
 }
 
 pub(super) fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = spec::compiled(&arguments.spec, ui)?;
     let _claimed = claim(&arguments.output)?;
-    let scratch = Scratch::new().map_err(environment)?;
-    let sources = scratch.path().join("sources");
-    let rust = sources.join("rust");
-    workspace::write_scratch(&rust, &compiled.files)?;
-    ui.progress("building the emitted controller for this host");
-    let target = scratch.path().join("target");
-    let library = build_library(&rust, &target)?;
-    let machine = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;
-    super::fits(&machine)?;
-
-    let unit = Unit::of(&compiled, &machine);
-    let own: [(&str, String); 4] = [
-        ("controller.h", super::header(&machine)),
-        ("fmu.h", unit.header()),
-        ("fmu.c", UNIT.to_owned()),
-        ("build.sh", BUILD.replace("{IDENTIFIER}", &unit.identifier)),
-    ];
-    for (name, text) in &own {
-        fs::write(sources.join(name), text).map_err(environment)?;
+    let mut built = vec![controller::built(&compiled, ui)?];
+    if arguments.plant {
+        built.push(plant::built(&compiled, ui)?);
     }
-    let binary = build_unit(&sources, &rust, &target, &unit.identifier)?;
-    let mut files: BTreeMap<String, Vec<u8>> = BTreeMap::new();
-    files.insert("modelDescription.xml".to_owned(), unit.description().into_bytes());
-    let extension = std::env::consts::DLL_SUFFIX;
-    files
-        .insert(format!("binaries/{PLATFORM}/{}{extension}", unit.identifier), fs::read(&binary).map_err(environment)?);
-    for (name, text) in own {
-        files.insert(format!("sources/{name}"), text.into_bytes());
-    }
-    for (name, text) in &compiled.files {
-        files.insert(format!("sources/rust/{name}"), text.clone().into_bytes());
-    }
-    let name = format!("{}.fmu", unit.identifier);
-    write_folder(&arguments.output, &[(name.clone(), zipped(&files).map_err(environment)?)])?;
-    ui.result(&Exported { file: arguments.output.join(name).display().to_string(), variables: unit.variables.len() });
+    let shown = |built: &Built| Exported {
+        file: arguments.output.join(&built.name).display().to_string(),
+        variables: built.variables,
+        bytes: built.bytes.len(),
+    };
+    let exported = built.iter().map(shown).collect();
+    let files: Vec<_> = built.into_iter().map(|built| (built.name, built.bytes)).collect();
+    write_folder(&arguments.output, &files)?;
+    ui.result(&AllExported { units: exported });
     Ok(())
+}
+
+/// A unit, ready to be written.
+struct Built {
+    name: String,
+    bytes: Vec<u8>,
+    variables: usize,
 }
 
 /// In the order of the names, without times: the same files give the same bytes.
@@ -99,14 +87,24 @@ fn zipped(files: &BTreeMap<String, Vec<u8>>) -> io::Result<Vec<u8>> {
 
 /// What was written.
 #[derive(Serialize)]
+struct AllExported {
+    units: Vec<Exported>,
+}
+
+#[derive(Serialize)]
 struct Exported {
     file: String,
     variables: usize,
+    bytes: usize,
 }
 
-impl Outcome for Exported {
+impl Outcome for AllExported {
     fn text(&self) -> String {
-        format!("wrote {}, FMI 2.0 co-simulation, {} variables\n", self.file, self.variables)
+        let line = |unit: &Exported| {
+            let megabytes = unit.bytes as f64 / 1e6;
+            format!("wrote {}, FMI 2.0 co-simulation, {} variables, {megabytes:.1} MB\n", unit.file, unit.variables)
+        };
+        self.units.iter().map(line).collect()
     }
 }
 
@@ -116,73 +114,107 @@ struct Variable {
     /// In the words of FMI.
     causality: &'static str,
     kind: WordKind,
-    /// Of an input or a setting, as it stands in XML.
-    start: Option<String>,
+    /// Its word before anything is set.
+    start: u64,
 }
 
-/// What is said of the unit.
+/// What is said of a unit.
 struct Unit<'a> {
     compiled: &'a Compiled,
-    /// Name of the platform as an identifier of C.
+    /// Name of the platform, and what kind of unit it is, as an identifier of C.
     identifier: String,
-    period: f64,
+    /// What it is, before the name of the platform.
+    what: &'static str,
+    scalar: Scalar,
+    /// Whether settings may change while it runs.
+    tunable: bool,
     /// By value reference: inputs, outputs, settings.
     variables: Vec<Variable>,
 }
 
 impl<'a> Unit<'a> {
-    fn of(compiled: &'a Compiled, machine: &Supervised) -> Self {
-        let controller = machine.controller();
-        let about = controller.description();
-        let mut variables = Vec::new();
-        let mut add = |name: String, causality, word: Option<u64>| {
-            let kind = WordKind::of(&name);
-            let start = word.map(|word| match kind {
-                WordKind::Integer => (word as u32).cast_signed().to_string(),
-                WordKind::Real => format!("{:?}", about.scalar.decode(word)),
-            });
-            variables.push(Variable { name, causality, kind, start });
-        };
-        machine.input_names().into_iter().for_each(|name| add(name, "input", Some(0)));
-        machine.output_names().into_iter().for_each(|name| add(name, "output", None));
-        // Outputs may have the names of settings.
-        let settings = about.config_names.iter().zip(controller.default_config());
-        settings.for_each(|(name, word)| add(format!("settings.{name}"), "parameter", Some(word)));
+    fn new(
+        compiled: &'a Compiled,
+        suffix: &str,
+        what: &'static str,
+        scalar: Scalar,
+        tunable: bool,
+        variables: Vec<Variable>,
+    ) -> Self {
         let first = if compiled.ir.name.starts_with(|c: char| c.is_ascii_digit()) { "_" } else { "" };
         let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-        let identifier = format!("{first}{}", compiled.ir.name.chars().map(plain).collect::<String>());
-        Self { compiled, identifier, period: compiled.model.timing.period, variables }
+        let identifier = format!("{first}{}{suffix}", compiled.ir.name.chars().map(plain).collect::<String>());
+        Self { compiled, identifier, what, scalar, tunable, variables }
     }
 
     fn guid(&self) -> String {
-        format!("{{{}-{}}}", self.compiled.ir.digest, env!("CARGO_PKG_VERSION"))
+        let kind = if self.tunable { "" } else { "-plant" };
+        format!("{{{}-{}{kind}}}", self.compiled.ir.digest, env!("CARGO_PKG_VERSION"))
     }
 
-    /// `fmu.h`.
-    fn header(&self) -> String {
+    /// `fmu.h`, with what else is to be in it.
+    fn header(&self, more: &str) -> String {
+        let count = |causality| self.variables.iter().filter(|variable| variable.causality == causality).count();
         let kind = |variable: &Variable| if variable.kind == WordKind::Real { 'r' } else { 'i' };
+        let starts: Vec<String> = self.variables.iter().map(|variable| format!("{}u", variable.start)).collect();
+        let starts: Vec<String> = starts.chunks(6).map(|line| format!("    {}", line.join(", "))).collect();
         format!(
-            "/* Written by `specgen export fmu`. */\n#define FMU_GUID \"{}\"\n#define FMU_PERIOD {:e}\n/* By value reference: r real, i \
-             whole. */\nstatic const char FMU_KINDS[] = \"{}\";\n",
+            "/* Written by `specgen export fmu`. */\n#ifndef FMU_H\n#define FMU_H\n\n#include <stdint.h>\n\n#define FMU_GUID \"{}\"\n\
+             #define FMU_PERIOD {:e}\n#define FMU_TUNABLE {}\nenum {{ FMU_INPUTS = {}, FMU_OUTPUTS = {}, FMU_SETTINGS = {} }};\n\
+             /* By value reference: r real, i whole; words before anything is set. */\n\
+             static const char FMU_KINDS[] = \"{}\";\nstatic const uint64_t FMU_STARTS[] = {{\n{}\n}};\n{more}\n#endif\n",
             self.guid(),
-            self.period,
-            self.variables.iter().map(kind).collect::<String>()
+            self.compiled.model.timing.period,
+            i32::from(self.tunable),
+            count("input"),
+            count("output"),
+            count("parameter"),
+            self.variables.iter().map(kind).collect::<String>(),
+            starts.join(",\n"),
         )
+    }
+
+    /// Writes `own` and what all units have into a folder: package, archive and libraries are those of the build. All of them.
+    fn write_sources(
+        &self,
+        folder: &Path,
+        own: impl IntoIterator<Item = (&'static str, String)>,
+        (package, archive, libraries): (&str, &str, &str),
+    ) -> Result<Vec<(String, String)>, Failure> {
+        let build = BUILD.replace("{IDENTIFIER}", &self.identifier).replace("{PACKAGE}", package);
+        let build = build.replace("{ARCHIVE}", archive).replace("{LIBRARIES}", libraries);
+        let common = [("fmu.c", UNIT.to_owned()), ("build.sh", build)];
+        let files: Vec<_> = own.into_iter().chain(common).map(|(name, text)| (name.to_owned(), text)).collect();
+        for (name, text) in &files {
+            fs::write(folder.join(name), text).map_err(environment)?;
+        }
+        Ok(files)
+    }
+
+    /// The unit with its library and its sources.
+    fn packed(&self, library: &Path, sources: impl IntoIterator<Item = (String, String)>) -> Result<Built, Failure> {
+        let mut files = BTreeMap::from([("modelDescription.xml".to_owned(), self.description().into_bytes())]);
+        let place = format!("binaries/{PLATFORM}/{}{}", self.identifier, std::env::consts::DLL_SUFFIX);
+        files.insert(place, fs::read(library).map_err(environment)?);
+        files.extend(sources.into_iter().map(|(name, text)| (format!("sources/{name}"), text.into_bytes())));
+        let bytes = zipped(&files).map_err(environment)?;
+        Ok(Built { name: format!("{}.fmu", self.identifier), bytes, variables: self.variables.len() })
     }
 
     /// `modelDescription.xml`.
     fn description(&self) -> String {
-        let (version, period) = (env!("CARGO_PKG_VERSION"), self.period);
+        let (version, period) = (env!("CARGO_PKG_VERSION"), self.compiled.model.timing.period);
         let name = escaped(&self.compiled.ir.name);
         let mut text = format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription fmiVersion=\"2.0\" modelName=\"{name}\" guid=\"{}\" \
-             description=\"Supervised controller of {name}: words of a tick, in m, rad, N, V, s\" version=\"{version}\" \
+             description=\"{} {name}: words of a tick, in m, rad, N, V, s\" version=\"{version}\" \
              generationTool=\"specgen {version}\" variableNamingConvention=\"structured\">\n\
              <CoSimulation modelIdentifier=\"{}\" canHandleVariableCommunicationStepSize=\"true\" \
              canNotUseMemoryManagementFunctions=\"false\" canGetAndSetFMUstate=\"true\"/>\n\
              <LogCategories><Category name=\"logStatusError\"/></LogCategories>\n\
              <DefaultExperiment startTime=\"0\" stopTime=\"1\" stepSize=\"{period:e}\"/>\n<ModelVariables>\n",
             self.guid(),
+            self.what,
             self.identifier,
         );
         let mut outputs = String::new();
@@ -190,11 +222,16 @@ impl<'a> Unit<'a> {
             let Variable { name, causality, kind, start } = variable;
             let (variability, initial) = match *causality {
                 "output" => ("discrete", " initial=\"calculated\""),
-                "parameter" => ("tunable", " initial=\"exact\""),
+                "parameter" if self.tunable => ("tunable", " initial=\"exact\""),
+                "parameter" => ("fixed", " initial=\"exact\""),
                 _ => ("discrete", ""),
             };
+            let start = match (*causality, kind) {
+                ("output", _) => String::new(),
+                (_, WordKind::Integer) => format!(" start=\"{}\"", (*start as u32).cast_signed()),
+                (_, WordKind::Real) => format!(" start=\"{:?}\"", self.scalar.decode(*start)),
+            };
             let kind = if *kind == WordKind::Real { "Real" } else { "Integer" };
-            let start = start.as_ref().map_or_else(String::new, |start| format!(" start=\"{start}\""));
             // Writing to a String cannot fail, here and below.
             let _ = writeln!(
                 text,

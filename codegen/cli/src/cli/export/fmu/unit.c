@@ -1,12 +1,12 @@
-/* FMI 2.0 co-simulation of the supervised controller, over controller.h. Variables are the words of a tick: inputs, outputs, settings, in
+/* FMI 2.0 co-simulation of what model.h has, the controller or the plant. Variables are the words of a tick: inputs, outputs, settings, in
    this order; fmu.h has their kinds. A step from t to t + h runs the ticks k with t <= k*period < t + h, t counted from the start of
-   the experiment, all of them with the inputs as they are: with h = period it is one tick. Outputs are zero before the first. */
+   the experiment, all of them with the inputs as they are: with h = period it is one tick. */
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
-#include "controller.h"
 #include "fmu.h"
+#include "model.h"
 
 #if defined(_WIN32)
 #define FMI2_EXPORT __declspec(dllexport)
@@ -37,20 +37,17 @@ typedef struct {
     fmi2ComponentEnvironment componentEnvironment;
 } fmi2CallbackFunctions;
 
-enum {
-    FIRST_OUTPUT = SPECGEN_MACHINE_INPUT_WORDS,
-    FIRST_SETTING = FIRST_OUTPUT + SPECGEN_MACHINE_OUTPUT_WORDS,
-    VARIABLES = FIRST_SETTING + SPECGEN_CONFIG_WORDS
-};
+enum { FIRST_OUTPUT = FMU_INPUTS, FIRST_SETTING = FIRST_OUTPUT + FMU_OUTPUTS, VARIABLES = FIRST_SETTING + FMU_SETTINGS };
 
 /* What a step changes: this is the state of the FMU. */
 typedef struct {
-    specgen_config config;
-    specgen_machine machine;
+    Model model;
     uint64_t words[VARIABLES];
     double start;
     uint64_t ticks;
     int settings_changed;
+    /* After the initialization mode. */
+    int running;
 } Content;
 
 typedef struct {
@@ -67,20 +64,28 @@ static fmi2Status refuse(const Instance *instance, const char *message) {
     return fmi2Error;
 }
 
-static void reset(Content *content) {
-    memset(content, 0, sizeof *content);
-    specgen_config_default(content->words + FIRST_SETTING);
-    specgen_machine_reset(&content->machine);
+/* In memory that is zero. */
+static int create(Content *content) {
+    memcpy(content->words, FMU_STARTS, sizeof content->words);
     content->settings_changed = 1;
+    return model_create(&content->model);
 }
 
-/* Settings act together: single ones may be out of range until the last of them is set. */
+static void copy(Content *to, const Content *from) {
+    Model model = to->model;
+    model_copy(&model, &from->model);
+    *to = *from;
+    to->model = model;
+}
+
 static fmi2Status take_settings(Instance *instance) {
-    if (instance->content.settings_changed) {
-        if (specgen_config_load(&instance->content.config, instance->content.words + FIRST_SETTING) != 0) {
-            return refuse(instance, "a setting is out of its range: docs/settings.md of specgen has them");
+    Content *content = &instance->content;
+    if (content->settings_changed) {
+        const char *wrong = model_settings(&content->model, content->words + FIRST_SETTING, content->words + FIRST_OUTPUT);
+        if (wrong != NULL) {
+            return refuse(instance, wrong);
         }
-        instance->content.settings_changed = 0;
+        content->settings_changed = 0;
     }
     return fmi2OK;
 }
@@ -102,10 +107,10 @@ FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2St
                                           const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
     Instance *instance;
     size_t length;
-    char *copy;
+    char *own;
     (void)resources, (void)visible, (void)logging;
     if (callbacks == NULL || callbacks->allocateMemory == NULL || callbacks->freeMemory == NULL || name == NULL ||
-        guid == NULL || type != fmi2CoSimulation || strcmp(guid, FMU_GUID) != 0 || specgen_check() != 0) {
+        guid == NULL || type != fmi2CoSimulation || strcmp(guid, FMU_GUID) != 0) {
         return NULL;
     }
     length = strlen(name) + 1;
@@ -113,16 +118,20 @@ FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2St
     if (instance == NULL) {
         return NULL;
     }
-    copy = (char *)(instance + 1);
-    memcpy(copy, name, length);
+    own = (char *)(instance + 1);
+    memcpy(own, name, length);
     instance->callbacks = callbacks;
-    instance->name = copy;
-    reset(&instance->content);
+    instance->name = own;
+    if (create(&instance->content) != 0) {
+        callbacks->freeMemory(instance);
+        return NULL;
+    }
     return instance;
 }
 
 FMI2_EXPORT void fmi2FreeInstance(fmi2Component c) {
     if (c != NULL) {
+        model_destroy(&((Instance *)c)->content.model);
         ((Instance *)c)->callbacks->freeMemory(c);
     }
 }
@@ -140,7 +149,11 @@ FMI2_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 }
 
 FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-    return take_settings((Instance *)c);
+    if (take_settings((Instance *)c) != fmi2OK) {
+        return fmi2Error;
+    }
+    ((Instance *)c)->content.running = 1;
+    return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component c) {
@@ -149,33 +162,47 @@ FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component c) {
 }
 
 FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c) {
-    reset(&((Instance *)c)->content);
-    return fmi2OK;
+    Instance *instance = (Instance *)c;
+    model_destroy(&instance->content.model);
+    memset(&instance->content, 0, sizeof instance->content);
+    return create(&instance->content) == 0 ? fmi2OK : refuse(instance, "there is no memory for the model");
 }
 
 static int is_a(fmi2ValueReference variable, char kind) {
     return variable < VARIABLES && FMU_KINDS[variable] == kind;
 }
 
-static int is_settable(fmi2ValueReference variable) {
-    return variable < FIRST_OUTPUT || variable >= FIRST_SETTING;
+/* Inputs and settings; of the settings of a plant, which is prepared by them, only before it runs. */
+static int is_settable(const Instance *instance, fmi2ValueReference variable) {
+    return variable < FIRST_OUTPUT || (variable >= FIRST_SETTING && (FMU_TUNABLE || !instance->content.running));
+}
+
+/* Outputs in the initialization mode are those of the settings as they are. */
+static fmi2Status up_to_date(Instance *instance) {
+    return instance->content.running || FMU_TUNABLE ? fmi2OK : take_settings(instance);
 }
 
 FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference variables[], size_t count, fmi2Real values[]) {
-    const Instance *instance = (const Instance *)c;
+    Instance *instance = (Instance *)c;
     size_t k;
+    if (up_to_date(instance) != fmi2OK) {
+        return fmi2Error;
+    }
     for (k = 0; k < count; k++) {
         if (!is_a(variables[k], 'r')) {
             return refuse(instance, "fmi2GetReal: a variable is not real");
         }
-        values[k] = specgen_to_real(instance->content.words[variables[k]]);
+        values[k] = model_to_real(instance->content.words[variables[k]]);
     }
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference variables[], size_t count, fmi2Integer values[]) {
-    const Instance *instance = (const Instance *)c;
+    Instance *instance = (Instance *)c;
     size_t k;
+    if (up_to_date(instance) != fmi2OK) {
+        return fmi2Error;
+    }
     for (k = 0; k < count; k++) {
         if (!is_a(variables[k], 'i')) {
             return refuse(instance, "fmi2GetInteger: a variable is not whole");
@@ -186,8 +213,8 @@ FMI2_EXPORT fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference 
 }
 
 static fmi2Status set(Instance *instance, fmi2ValueReference variable, char kind, uint64_t word) {
-    if (!is_a(variable, kind) || !is_settable(variable)) {
-        return refuse(instance, "a variable is of another type or cannot be set");
+    if (!is_a(variable, kind) || !is_settable(instance, variable)) {
+        return refuse(instance, "a variable is of another type, or cannot be set, or no more");
     }
     instance->content.words[variable] = word;
     instance->content.settings_changed |= variable >= FIRST_SETTING;
@@ -198,7 +225,7 @@ FMI2_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference var
     fmi2Status status = fmi2OK;
     size_t k;
     for (k = 0; k < count && status == fmi2OK; k++) {
-        status = set((Instance *)c, variables[k], 'r', specgen_of_real((specgen_real)values[k]));
+        status = set((Instance *)c, variables[k], 'r', model_of_real(values[k]));
     }
     return status;
 }
@@ -241,22 +268,25 @@ FMI2_EXPORT fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference v
 FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     Instance *instance = (Instance *)c;
     if (*state == NULL) {
-        *state = instance->callbacks->allocateMemory(1, sizeof(Content));
-        if (*state == NULL) {
+        Content *content = (Content *)instance->callbacks->allocateMemory(1, sizeof(Content));
+        if (content == NULL || create(content) != 0) {
+            instance->callbacks->freeMemory(content);
             return refuse(instance, "there is no memory for a state");
         }
+        *state = content;
     }
-    memcpy(*state, &instance->content, sizeof(Content));
+    copy((Content *)*state, &instance->content);
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
-    memcpy(&((Instance *)c)->content, state, sizeof(Content));
+    copy(&((Instance *)c)->content, (const Content *)state);
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
     if (*state != NULL) {
+        model_destroy(&((Content *)*state)->model);
         ((Instance *)c)->callbacks->freeMemory(*state);
         *state = NULL;
     }
@@ -311,8 +341,10 @@ FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real from, fmi2Real step,
         return refuse(instance, "the end of a step is not a time");
     }
     while ((double)content->ticks < end) {
-        specgen_machine_step(
-            &content->config, &content->machine, content->words, content->words + FIRST_OUTPUT);
+        const char *wrong = model_step(&content->model, content->words, content->words + FIRST_OUTPUT);
+        if (wrong != NULL) {
+            return refuse(instance, wrong);
+        }
         content->ticks++;
     }
     return fmi2OK;
