@@ -53,9 +53,10 @@ impl PlatformStudy {
             (wanted, pose_of(options, &wanted))
         });
         let mut rig = scenario.rig().clone();
-        match whole_ticks {
-            true => rig.plant_mut().step_whole_ticks(interval),
-            false => rig.plant_mut().step_small(),
+        if whole_ticks {
+            rig.plant_mut().step_whole_ticks(interval);
+        } else {
+            rig.plant_mut().step_small();
         }
         let mut controller = controller.fork();
         let (bench, _) = rig.ready(&mut controller, options)?;
