@@ -70,7 +70,7 @@ fn a_lead_of_its_own_is_that_of_a_trajectory_alone() {
     );
     // Streams do not know of it, to the bit.
     assert!(own_stream == usual_stream);
-    assert!((own / less - 1.0).abs() < 0.05 && (usual / less - 1.0).abs() > 0.1);
+    assert!((own / less - 1.0).abs() < 0.01 && (usual / less - 1.0).abs() > 0.03);
 }
 
 #[test]
