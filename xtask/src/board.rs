@@ -292,28 +292,23 @@ fn learnable(path: &Path) -> Result<Option<Repeated>, String> {
     Ok(task.and_then(|task| task.trajectories.first().map(|first| Repeated { name: first.name.clone(), record })))
 }
 
-/// Learns a motion over the link, which has to take a good part of its error, and plays it with a record.
+/// Learns a motion over the link, on the host and in the background of the board, which has to take a good part of its error, and plays it
+/// with a record.
 fn learn(trial: &Trial, session: &mut Session, motion: &Repeated) -> Result<(), String> {
     let Repeated { name: motion, record } = motion;
-    let mut command = session.command_of(trial, "learn");
-    command.args([
-        "--trajectory",
-        motion,
-        "--machine",
-        "emulated",
-        "--passes",
-        "2",
-        "--output",
-        "learned.json",
-        "--json",
-    ]);
-    let output = command.output().map_err(|error| format!("specgen learn: {error}"))?;
-    let found: Value = serde_json::from_slice(&output.stdout).map_err(|error| format!("specgen learn: {error}"))?;
-    let passes = found["result"]["passes"].as_array().ok_or_else(|| format!("specgen learn: {found}"))?;
-    let errors: Vec<f64> = passes.iter().filter_map(|pass| pass["translation_nm"].as_f64()).collect();
-    println!("{}: {motion}, passes of {errors:.1?} nm rms by the gauges", trial.target);
-    if !matches!(errors[..], [first, _, last] if last < 0.7 * first) {
-        return Err(format!("{motion} was not learned"));
+    let room = if trial.target.ends_with("f4") { "768" } else { "4096" };
+    for (who, more) in [("board", &["--on-device", room][..]), ("host", &[])] {
+        let mut command = session.command_of(trial, "learn");
+        command.args(["--trajectory", motion, "--machine", "emulated", "--passes", "2"]).args(more);
+        command.args(["--output", "learned.json", "--json"]);
+        let output = command.output().map_err(|error| format!("specgen learn: {error}"))?;
+        let found: Value = serde_json::from_slice(&output.stdout).map_err(|error| format!("specgen learn: {error}"))?;
+        let passes = found["result"]["passes"].as_array().ok_or_else(|| format!("specgen learn: {found}"))?;
+        let errors: Vec<f64> = passes.iter().filter_map(|pass| pass["translation_nm"].as_f64()).collect();
+        println!("{}: {motion}, learned by the {who}, passes of {errors:.1?} nm rms by the gauges", trial.target);
+        if !matches!(errors[..], [first, _, last] if last < 0.7 * first) {
+            return Err(format!("{motion} was not learned by the {who}"));
+        }
     }
     let mut host = Host::of(session.command_of(trial, "operate"))?;
     let play =

@@ -10,7 +10,9 @@ use host_sim::platform::rig::Bench;
 use host_sim::trajectory::{PaperPath, PaperPose};
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::TaskSpace;
-use specgen_studies::learning::{Convergence, LARGEST_RADIUS, LearnError, Learnable, Learned, Learner, Motion, Update, learn};
+use specgen_studies::learning::{
+    Convergence, LARGEST_RADIUS, LearnError, Learnable, Learned, Learner, Motion, Update, learn,
+};
 use specgen_studies::reproduce::write::digits;
 use specgen_studies::robust::Factors;
 

@@ -28,7 +28,8 @@ use specgen_language::model::TaskSpace;
 use specgen_report::learning::BANDWIDTH;
 use specgen_runtime::playback::Knot;
 use specgen_studies::learning::{
-    Convergence, LearnError, Learnable, Learned, Learner, Motion, Pass, Plan, Repeating, Response, Table, Update, knots, learn,
+    Convergence, LearnError, Learnable, Learned, Learner, Motion, Pass, Plan, Repeating, Response, Table, Update,
+    knots, learn,
 };
 use specgen_studies::machine as plant;
 use specgen_studies::robust::Factors;

@@ -72,9 +72,10 @@ impl Learning {
         let latency = member.deviation.delay_ticks as usize;
         let mut bench = Bench::new(&mut rig, &mut controller, model.timing.period, latency)?;
         bench.arm(scenario.options.arming)?;
-        let learned = learn(&mut bench, &self.motion, Learner::Host(&self.update), &[], self.spacing, self.passes, |_, _| {
-            ControlFlow::Continue(())
-        })?;
+        let learned =
+            learn(&mut bench, &self.motion, Learner::Host(&self.update), &[], self.spacing, self.passes, |_, _| {
+                ControlFlow::Continue(())
+            })?;
         let best = &learned.passes[learned.best];
         Ok(Some(Learnt { error_nm: best.translation_nm, passes: learned.best as u32, grew: learned.grew }))
     }

@@ -107,7 +107,8 @@ impl<P: Port> Repeating for Remote<'_, P> {
     /// The device makes it, and the same kernel here finds whether it made it to the bit.
     fn next(&mut self, plan: &Plan, played: &[Knot], seen: &Seen) -> Result<Vec<Knot>, LearnError> {
         let expected = plan.next(played, &seen.kept).ok_or(LearnError::Refused)?;
-        let made = self.operator.plan(seen.kept.len(), &plan.rows).and_then(|()| self.operator.learn(plan.settings, self.ui));
+        let made =
+            self.operator.plan(seen.kept.len(), &plan.rows).and_then(|()| self.operator.learn(plan.settings, self.ui));
         match made {
             Ok(made) if made == expected => {
                 self.made = Some(made.clone());
