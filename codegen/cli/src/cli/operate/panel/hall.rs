@@ -12,7 +12,7 @@ use tungstenite::Message;
 use super::browser::{Heard, Outbox};
 
 /// A page that has the orders is gone when it is silent for so long.
-const SILENCE: Duration = Duration::from_secs(1);
+const SILENCE: Duration = Duration::from_secs(2);
 /// How long the page that has the orders may think about giving them, and an offer stands.
 const ANSWER: Duration = Duration::from_secs(10);
 /// Messages with samples that a page may have taken without showing them: two seconds of them. Then it is left out until it catches up.
