@@ -159,12 +159,16 @@ fn a_controller_on_the_unit_of_its_plant_gets_the_bits_of_specgen_sim() {
         let readings: &[&str] = if name == "legs" { &["displacement"] } else { &["gauge", "wrench"] };
         let (voltages, read) = (places(&outputs, &["voltage"]), places(&inputs, readings));
         let pick = |row: &[u64], places: &[usize]| places.iter().map(|place| row[*place]).collect::<Vec<_>>();
+        // It arms before the plant moves: until then rows repeat the first readings.
+        let moved = given.iter().position(|row| pick(row, &read) != pick(&given[0], &read)).unwrap();
+        let start = moved - 1;
         let own = if name == "legs" { (6, 12) } else { (12, 30) };
         let fed = |fault: Option<usize>| {
-            let mut rows: Vec<Vec<u64>> = answers[..TICKS as usize].iter().map(|row| pick(row, &voltages)).collect();
+            let mut rows: Vec<Vec<u64>> =
+                answers[start..start + TICKS as usize].iter().map(|row| pick(row, &voltages)).collect();
             rows.iter_mut().for_each(|row| row.resize(own.0, 0));
             if let Some(tick) = fault {
-                rows[tick][2] ^= 1;
+                rows[tick][2] ^= 1 << 20;
             }
             bytes(rows.into_iter().flatten())
         };
@@ -176,30 +180,32 @@ fn a_controller_on_the_unit_of_its_plant_gets_the_bits_of_specgen_sim() {
         };
         let library = format!("unit/binaries/linux64/{name}_plant.so");
         let found = driven(&library, fed(None));
-        let mut wanted: Vec<Vec<u64>> = given[1..=TICKS as usize].iter().map(|row| pick(row, &read)).collect();
+        let mut wanted: Vec<Vec<u64>> =
+            given[moved..moved + TICKS as usize].iter().map(|row| pick(row, &read)).collect();
         assert_eq!(found.len(), TICKS as usize);
         let compare = |wanted: &[Vec<u64>]| {
             found.iter().zip(wanted).map(|(row, wanted)| differing(row.iter(), wanted.iter())).sum::<usize>()
         };
         assert_eq!(compare(&wanted), 0, "{name}: words differ");
-        // One ulp of one reading is found, and one of a voltage moves the machine.
+        // One ulp of one reading is found, and a bit of a voltage that its noise does not round away moves the machine.
         wanted[TICKS as usize / 2][1] ^= 1;
         assert_eq!(compare(&wanted), 1, "{name}");
         let faulty = driven(&library, fed(Some(TICKS as usize / 2)));
         let first = faulty.iter().zip(&found).position(|(a, b)| a != b);
-        assert_eq!(first, Some(TICKS as usize / 2), "{name}");
+        // A stack may take some ticks to be off by a bit of its voltage.
+        assert!(first.is_some_and(|tick| tick >= TICKS as usize / 2), "{name}: {first:?}");
         if name == "legs" {
             let made = Command::new("sh").arg(folder.path("unit/sources/build.sh")).arg("made.so").output().unwrap();
             assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
             assert!(driven("unit/sources/made.so", fed(None)) == found, "from its sources");
         }
         let setpoint = places(&inputs, &["setpoint"])[2];
-        with_fmpy(&folder, name, &given[..TICKS as usize], &answers, setpoint);
+        with_fmpy(&folder, name, &given[..TICKS as usize], &answers, setpoint, start);
     }
 }
 
 /// Both units under fmpy, which validates them: the closed loop, against the record.
-fn with_fmpy(folder: &Folder, name: &str, given: &[Vec<u64>], answers: &[Vec<u64>], setpoint: usize) {
+fn with_fmpy(folder: &Folder, name: &str, given: &[Vec<u64>], answers: &[Vec<u64>], setpoint: usize, first: usize) {
     let python = std::env::var("SPECGEN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let has = Command::new(&python).args(["-c", "import fmpy"]).stderr(Stdio::null()).status();
     if !has.is_ok_and(|status| status.success()) {
@@ -211,7 +217,11 @@ fn with_fmpy(folder: &Folder, name: &str, given: &[Vec<u64>], answers: &[Vec<u64
         let mut command = Command::new(&python);
         command.arg(repository().join("codegen/cli/tests/support/fmu.py"));
         command.args([&format!("fmu/{name}.fmu"), &format!("fmu/{name}_plant.fmu"), "given.bin"]);
-        let done = command.args([&given.len().to_string(), "loop.bin"]).current_dir(folder.path("")).output().unwrap();
+        let done = command
+            .args([&given.len().to_string(), "loop.bin", &first.to_string()])
+            .current_dir(folder.path(""))
+            .output()
+            .unwrap();
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
         let found = words(&fs::read(folder.path("loop.bin")).unwrap());
         let wanted: Vec<u64> =

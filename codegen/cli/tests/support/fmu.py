@@ -1,5 +1,6 @@
 """Validates units with fmpy and connects two of them, tick by tick: a controller, its plant, a file of input words of the controller
-(64 bits each, native order), ticks, a file for what comes of it: in each tick the inputs as they were, then the outputs, as words.
+(64 bits each, native order), ticks, a file for what comes of it, the tick at which the plant
+begins to move (`specgen sim --record` arms before): in each tick the inputs as they were, then the outputs, as words.
 What the plant gives is taken from the plant, the rest of the inputs from the file. A second plant runs beside the first with another
 seed, in the same process."""
 
@@ -26,7 +27,7 @@ def instance(path: str, name: str):
     return unit, about, folder
 
 
-def main(controller_path: str, plant_path: str, inputs_path: str, ticks: int, out_path: str) -> None:
+def main(controller_path: str, plant_path: str, inputs_path: str, ticks: int, out_path: str, first: int) -> None:
     controller, about, first_folder = instance(controller_path, "controller")
     plant, plant_about, second_folder = instance(plant_path, "plant")
     other, _, third_folder = instance(plant_path, "other")
@@ -34,7 +35,7 @@ def main(controller_path: str, plant_path: str, inputs_path: str, ticks: int, ou
     other.setInteger([of_plant["settings.seed"]], [2])
     for unit in (controller, plant, other):
         unit.exitInitializationMode()
-    period = about.defaultExperiment.stepSize
+    period = float(about.defaultExperiment.stepSize)
     inputs = [variable for variable in about.modelVariables if variable.causality == "input"]
     outputs = [variable for variable in about.modelVariables if variable.causality == "output"]
     readings = {k: of_plant[v.name] for k, v in enumerate(inputs) if v.name in of_plant}
@@ -67,9 +68,9 @@ def main(controller_path: str, plant_path: str, inputs_path: str, ticks: int, ou
                 get = controller.getReal if variable.type == "Real" else controller.getInteger
                 words.append(as_word(get([variable.valueReference])[0], variable))
             out.write(struct.pack(f"={len(words)}Q", *words))
-            for unit in (plant, other):
+            for unit in (plant, other) if tick >= first else ():
                 unit.setReal(voltages, controller.getReal(given))
-                unit.doStep(currentCommunicationPoint=tick * period, communicationStepSize=period)
+                unit.doStep(currentCommunicationPoint=(tick - first) * period, communicationStepSize=period)
     assert seeds_differ, "two plants with two seeds are the same"
     for unit, folder in ((controller, first_folder), (plant, second_folder), (other, third_folder)):
         unit.terminate()
@@ -78,4 +79,4 @@ def main(controller_path: str, plant_path: str, inputs_path: str, ticks: int, ou
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2], sys.argv[3], int(sys.argv[4]), sys.argv[5])
+    main(sys.argv[1], sys.argv[2], sys.argv[3], int(sys.argv[4]), sys.argv[5], int(sys.argv[6]))
