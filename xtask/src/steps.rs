@@ -55,7 +55,7 @@ const SHARED_MEMORY: Trial = Trial { manifest: LOOM, judges: &[("firmware/rt/src
 /// Time that the soak gives each target of the fuzzer, s.
 const FUZZING: u32 = 300;
 /// Members of the workspace that people write.
-const HAND_WRITTEN: [&str; 19] = [
+const HAND_WRITTEN: [&str; 20] = [
     "specgen",
     "specgen-cycles",
     "specgen-numerics",
@@ -72,6 +72,7 @@ const HAND_WRITTEN: [&str; 19] = [
     "specgen-board",
     "specgen-rt",
     "host-sim",
+    "plant-unit",
     "oracle",
     "specgen-tests",
     "xtask",

@@ -30,8 +30,8 @@ use crate::limits::DAC;
 use crate::notch::{modal_error, notch_error, notch_innovation};
 use crate::setpoint::SETPOINTS;
 use crate::task_space::{
-    AFFINE_LOAD, CELLS_PER_METRE, COMPLIANCE, CORRECTION, DAMPING, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH,
-    METRES_PER_CELL, MODES_TO_LEGS, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT,
+    AFFINE_LOAD, CELLS_PER_METRE, COMPLIANCE, CORRECTION, DAMPING, FORCE_TO_MODES, LEAD, LED, LEGS_TO_MODES,
+    LEGS_TO_WRENCH, METRES_PER_CELL, MODES_TO_LEGS, OWN_LEADS, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT,
     WRENCH_TO_LEGS,
 };
 use crate::tick::{CORRECTION_LIMITED, WRENCH_FAULT};
@@ -58,11 +58,17 @@ pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, inp
     }
     let wrench_good = take_wrench(config, state, &input.wrench);
     let damping = damping(config, state);
+    let played = state.generator.plays();
     let setpoint_status = state.generator.tick_as(&SETPOINTS, kind, &input.command);
     let (demand, load) = known_load(config, state);
     let correction_held = state.correction.follow(&CORRECTION, &input.correction);
     let reaction = reaction(config, state);
-    state.load = if LEAD == 0.0 { load } else { each(|leg| load[leg] + (demand[leg] - state.demand[leg]) * LEAD) };
+    if LEAD == 0.0 && LED == 0 {
+        state.load = load;
+    } else {
+        let lead = lead(played.or(state.generator.plays()));
+        state.load = each(|leg| load[leg] + (demand[leg] - state.demand[leg]) * lead);
+    }
     state.demand = demand;
     if let Some(damping) = &damping {
         state.load = each(|leg| state.load[leg] + damping[leg]);
@@ -90,6 +96,15 @@ pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, inp
     }
     let inputs = if wrench_good { 0 } else { WRENCH_FAULT } | if correction_held { CORRECTION_LIMITED } else { 0 };
     static_inverse | limited | gauge_faults << 8 | setpoint_status | inputs
+}
+
+/// Lead of a trajectory that is played, or of any other motion.
+#[inline]
+fn lead(played: Option<u32>) -> Real {
+    match played {
+        Some(selector) if LED > 0 => OWN_LEADS.get(selector as usize).copied().unwrap_or(LEAD),
+        _ => LEAD,
+    }
 }
 
 /// What goes out, of the state that the tick left.

@@ -184,6 +184,12 @@ pub const WRENCH_LIMIT: [Real; 6] = [3600.0, 3600.0, 3600.0, 360.0, 360.0, 360.0
 /// Lead of the leg displacements, in periods; from `control.lead`. Zero: none.
 pub const LEAD: Real = 3.176570186778669;
 
+/// Trajectories with a lead of their own: all or none; from `trajectory.lead`.
+pub const LED: usize = 0;
+
+/// Lead of each, in periods.
+pub const OWN_LEADS: [Real; LED] = [];
+
 /// Part of the offset of a change of mode that is left after a tick; from `control.transfer_time`.
 pub const TRANSFER_KEEP: Real = 0.9980019986673331;
 

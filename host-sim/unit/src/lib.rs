@@ -171,6 +171,8 @@ impl Description {
                 if let Some(calibration) = calibration {
                     rig = rig.with_signal(GaugeSignal::Volts(calibration.clone()));
                 }
+                // As `specgen sim` takes them.
+                rig.plant_mut().step_whole_ticks(self.period);
                 Plant::Platform(Box::new(rig))
             }
             Kind::Legs { voltages } => {

@@ -29,8 +29,8 @@ use crate::notch::{modal_error, notch_error, notch_innovation};
 use crate::setpoint::SETPOINTS;
 use crate::task_space::{
     AFFINE_LOAD, CELLS_PER_METRE, COMPLIANCE, CORRECTION, DAMPING, FORCE_TO_MODES, LEAD, LED, LEGS_TO_MODES,
-    LEGS_TO_WRENCH, METRES_PER_CELL, MODES_TO_LEGS, OWN_LEADS, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT,
-    WRENCH_TO_LEGS,
+    LEGS_TO_WRENCH, METRES_PER_CELL, MODES_TO_LEGS, OWN_LEADS, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE,
+    WRENCH_LIMIT, WRENCH_TO_LEGS,
 };
 use crate::tick::{CORRECTION_LIMITED, WRENCH_FAULT};
 use crate::{Config, LEGS, LegState, Real, State, TickInput, TickOutput, dynamics, kinematics, sensing};

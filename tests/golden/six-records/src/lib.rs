@@ -49,6 +49,7 @@ mod step;
 pub mod supervised;
 pub mod supervision;
 mod tick;
+pub mod triggers;
 pub mod waves;
 mod words;
 
