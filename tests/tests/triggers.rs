@@ -104,8 +104,11 @@ fn record(emitted: &Emitted) -> Vec<u8> {
     writer.finish().unwrap()
 }
 
+/// Words of settings, input and output of a tick.
+type Words = (Vec<u64>, Vec<u64>, Vec<u64>);
+
 /// The record, run again.
-fn ticks(bytes: &[u8], machine: &mut Supervised) -> (Vec<Tick>, Vec<(Vec<u64>, Vec<u64>, Vec<u64>)>) {
+fn ticks(bytes: &[u8], machine: &mut Supervised) -> (Vec<Tick>, Vec<Words>) {
     let place = |name: &str| machine.output_names().iter().position(|known| known == name).unwrap();
     let (pose, missed) = (place("pose[0]"), place("missed"));
     let names = machine.controller().description().config_names.clone();

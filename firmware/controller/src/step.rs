@@ -31,8 +31,8 @@ use crate::notch::{modal_error, notch_error, notch_innovation};
 use crate::setpoint::SETPOINTS;
 use crate::task_space::{
     AFFINE_LOAD, CELLS_PER_METRE, COMPLIANCE, CORRECTION, DAMPING, FORCE_TO_MODES, LEAD, LED, LEGS_TO_MODES,
-    LEGS_TO_WRENCH, METRES_PER_CELL, MODES_TO_LEGS, OWN_LEADS, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT,
-    WRENCH_TO_LEGS,
+    LEGS_TO_WRENCH, METRES_PER_CELL, MODES_TO_LEGS, OWN_LEADS, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE,
+    WRENCH_LIMIT, WRENCH_TO_LEGS,
 };
 use crate::tick::{CORRECTION_LIMITED, WRENCH_FAULT};
 use crate::{Config, LEGS, LegState, Real, State, TickInput, TickOutput, dynamics, kinematics, sensing};
@@ -102,7 +102,7 @@ pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, inp
 #[inline]
 fn lead(played: Option<u32>) -> Real {
     match played {
-        Some(selector) if LED > 0 => OWN_LEADS.get(selector as usize).copied().unwrap_or(LEAD),
+        Some(selector) if LED != 0 => OWN_LEADS.get(selector as usize).copied().unwrap_or(LEAD),
         _ => LEAD,
     }
 }

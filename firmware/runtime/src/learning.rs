@@ -135,17 +135,17 @@ impl Learning {
         let mut sum = 0.0;
         let past = old.get(first..=knot).unwrap_or_default();
         for (value, tap) in past.iter().zip(smoothing.get(..=knot - first).unwrap_or_default().iter().rev()) {
-            sum = sum + number(*tap) * number(*value);
+            sum += number(*tap) * number(*value);
         }
         let ahead = old.get(knot + 1..=last).unwrap_or_default();
         for (value, tap) in ahead.iter().zip(smoothing.get(1..).unwrap_or_default()) {
-            sum = sum + number(*tap) * number(*value);
+            sum += number(*tap) * number(*value);
         }
         let seen = errors.get(first..=last).unwrap_or_default();
         let taps = taps.get(reach + knot - last..=reach + knot - first).unwrap_or_default();
         for (error, tap) in seen.iter().zip(taps.iter().rev()) {
             if let (Some(tap), Some(error)) = (tap.get(mode), error.get(mode)) {
-                sum = sum + number(*tap) * number(*error);
+                sum += number(*tap) * number(*error);
             }
         }
         sum
@@ -170,7 +170,7 @@ fn mapped(plan: &[Knot], first: usize, vector: &[f32; 6]) -> [f32; 6] {
     let mut found = [0.0; 6];
     for (slot, row) in found.iter_mut().zip(plan.iter().skip(first)) {
         for (factor, value) in row.iter().zip(vector) {
-            *slot = *slot + number(*factor) * *value;
+            *slot += number(*factor) * *value;
         }
     }
     found

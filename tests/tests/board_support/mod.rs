@@ -80,9 +80,12 @@ pub struct Rig {
     pub pace: u32,
     /// The background has no time for samples.
     pub busy: bool,
-    /// What every tick showed, where it is wanted: its number, status, phase, and where the platform was.
-    pub shown: Option<Vec<(u64, u32, u8, [u64; PLACE_WORDS])>>,
+    /// What every tick showed, where it is wanted.
+    pub shown: Option<Vec<Shown>>,
 }
+
+/// A tick: its number, status, phase, and where the platform was.
+pub type Shown = (u64, u32, u8, [u64; PLACE_WORDS]);
 
 /// The rig as a line, and to look at.
 #[derive(Clone)]

@@ -6,7 +6,7 @@ use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{Bench as Rig, Noise};
 use host_sim::trajectory::{PaperPath, PaperPose};
 use specgen::learning::{
-    Convergence, Excitation, LearnError, Learnable, Learned, Motion, Repeating, Response, Seen, Update, learn,
+    Convergence, Excitation, LearnError, Learnable, Learned, Learner, Motion, Repeating, Response, Seen, Update, learn,
 };
 use specgen::machine;
 use specgen::robust::factors::Given;
@@ -49,7 +49,7 @@ fn on<T>(
 fn learned(machine: &mut dyn Repeating, learnable: &Learnable, convergence: &Convergence, count: usize) -> Learned {
     let (motion, spacing) = (motion(), convergence.spacing(PERIOD));
     let update = Update::new(learnable, &motion, convergence, spacing);
-    learn(machine, &motion, &update, &[], spacing, count, |_, _| ControlFlow::Continue(())).unwrap()
+    learn(machine, &motion, Learner::Host(&update), &[], spacing, count, |_, _| ControlFlow::Continue(())).unwrap()
 }
 
 fn measured(machine: &mut dyn Repeating, learnable: &Learnable) -> Response {

@@ -98,7 +98,7 @@ pub struct Arguments {
 
 /// Who makes the corrections, and by what.
 enum Rule {
-    Host(Update),
+    Host(Box<Update>),
     Device(Plan),
 }
 
@@ -237,7 +237,8 @@ fn study(arguments: &Arguments, compiled: Compiled) -> Result<Study, Failure> {
     let convergence = plan.as_ref().map_or(convergence, |plan| plan.convergence.clone());
     let (begin, spacing) =
         begin(arguments, &compiled, &learnable, &motion, &convergence, [&machine_name, &motion_name])?;
-    let rule = plan.map_or_else(|| Rule::Host(Update::new(&learnable, &motion, &convergence, spacing)), Rule::Device);
+    let rule = plan
+        .map_or_else(|| Rule::Host(Box::new(Update::new(&learnable, &motion, &convergence, spacing))), Rule::Device);
     Ok(Study { compiled, convergence, motion, rule, motion_name, machine_name, begin, spacing })
 }
 

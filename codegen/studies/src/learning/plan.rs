@@ -75,14 +75,13 @@ impl Plan {
                 let grid = Grid { period, spacing, reach };
                 let taps = grid.taps(learnable, &wish);
                 let frequencies = looked_at(learnable, &wish, grid.apart());
-                let [mut radius, mut at] = [0.0; 2];
+                let [mut radius, mut at] = [0.0_f64; 2];
                 for (closed_loop, conditions) in &machines {
                     let real = learnable.response(closed_loop, conditions, &frequencies);
                     for (real, hertz) in real.iter().zip(&frequencies) {
                         let found = spectral_radius(&grid.left(&taps, real, *hertz));
-                        if !(found <= radius) {
-                            [radius, at] = [found, *hertz];
-                        }
+                        // A NaN is no convergence, and stays.
+                        [radius, at] = if radius.is_nan() || found <= radius { [radius, at] } else { [found, *hertz] };
                     }
                 }
                 if radius <= LARGEST_RADIUS {

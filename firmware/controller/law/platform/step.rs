@@ -100,7 +100,7 @@ pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, inp
 #[inline]
 fn lead(played: Option<u32>) -> Real {
     match played {
-        Some(selector) if LED > 0 => OWN_LEADS.get(selector as usize).copied().unwrap_or(LEAD),
+        Some(selector) if LED != 0 => OWN_LEADS.get(selector as usize).copied().unwrap_or(LEAD),
         _ => LEAD,
     }
 }

@@ -135,7 +135,7 @@ fn a_player_learns_between_passes_only() {
     assert!(!player.learn(SETTINGS), "no pass was made");
     assert!(player.begin(course) && !player.learn(SETTINGS));
     while player.is_running() {
-        player.give();
+        assert!(player.give().is_some());
         player.keep(&[1e-9; 6], &[0.0; 6], 0);
     }
     let errors = player.errors().to_vec();

@@ -148,7 +148,7 @@ impl Window {
     }
 
     /// Whatever it was, nothing went wrong in the page.
-    fn is_sound(mut self) {
+    fn sound(mut self) {
         assert_eq!(self.value("document.documentElement.dataset.errors"), "0", "the page's own count of errors");
         assert_eq!(self.console, Vec::<String>::new(), "console");
     }
@@ -228,6 +228,6 @@ pub fn a_browser_draws_it(panel: &Panel) {
     // Key Esc ramps down from the page that looks.
     page.value("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'Escape', bubbles: true }))");
     page.wait(&chip("disarmed"));
-    page.is_sound();
-    other.is_sound();
+    page.sound();
+    other.sound();
 }
