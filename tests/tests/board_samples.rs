@@ -79,7 +79,7 @@ fn a_board_shows_every_tick_and_what_it_could_not() {
 
     // Over a line that spoils one byte in a thousand, nothing is lost.
     line.with(|rig| rig.spoilt = 1);
-    let blocks: Vec<Block> = (0..300).map(|_| take(&mut client)).filter(|block| !block.rows.is_empty()).collect();
+    let blocks: Vec<Block> = (0..900).map(|_| take(&mut client)).filter(|block| !block.rows.is_empty()).collect();
     line.with(|rig| rig.spoilt = 0);
     assert!(blocks.iter().all(|block| block.every == LEAST) && check(&line, &blocks) > 100);
     for pair in blocks.windows(2) {

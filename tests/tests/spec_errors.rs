@@ -2,10 +2,10 @@
 
 // Clippy sees the helpers of an integration test as production code.
 use crate::support::specs::{
-    Choice, LEGS, PLATFORM, errors, every_key, folder_with_records, line_of, source, spec_files,
+    Choice, LEGS, PLATFORM, errors, every_key, folder_with_records, line_of, sections, source, spec_files,
 };
 use specgen::diagnostic::{Code, Diagnostic, codes, render};
-use specgen::spec::keys::{Item, Key, Kind, Presence, SECTIONS, Section, Shape};
+use specgen::spec::keys::{Item, Key, Kind, Presence, Section, Shape};
 use specgen::spec::{self, SpecSource};
 use specgen::stability;
 
@@ -225,7 +225,7 @@ fn bad_literals(item: Item) -> Vec<(&'static str, String, Code)> {
 fn every_key_is_checked_in_every_way() {
     let mut bench = Bench { folder: folder_with_records(), cases: 0 };
     assert!(errors(&bench.findings(&every_key())).is_empty());
-    for section in SECTIONS {
+    for section in sections() {
         for key in section.keys {
             let path = Bench::path(section, key.name);
             let case = |lines: String, code, about: &str, what| Case {
@@ -285,7 +285,7 @@ fn every_key_is_checked_in_every_way() {
 #[test]
 fn every_key_may_be_missing_only_if_it_has_a_default() {
     let bench = Bench { folder: folder_with_records(), cases: 0 };
-    for section in SECTIONS {
+    for section in sections() {
         for key in section.keys {
             let path = Bench::path(section, key.name);
             let (text, _) = Bench::with(section, key, "");
@@ -330,7 +330,7 @@ fn every_section_may_be_missing_only_if_nothing_in_it_is_required() {
     let whole = every_key();
     // Without [control] its parts are refused; repeated sections are counted: both have tests of their own.
     let apart = |section: &Section| matches!(section.kind, Kind::Repeated(..)) || section.name == "control";
-    for section in SECTIONS.iter().filter(|s| !s.name.is_empty() && s.name != "target" && !apart(s)) {
+    for section in sections().iter().filter(|s| !s.name.is_empty() && s.name != "target" && !apart(s)) {
         let start = whole.find(&format!("[{}]\n", section.name)).expect("section");
         let end = whole[start + 1..].find("\n[").map_or(whole.len(), |i| start + 2 + i);
         let text = format!("{}{}", &whole[..start], &whole[end..]);

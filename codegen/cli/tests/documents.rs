@@ -126,7 +126,7 @@ fn commands_and_options_of_the_documents_are_those_of_the_program() {
             main.clone()
         } else {
             let below: &[&str] = match words[0] {
-                "identify" => &words[..words.len().min(2)],
+                "identify" | "export" => &words[..words.len().min(2)],
                 _ => &words[..1],
             };
             let is_command =

@@ -144,12 +144,13 @@ fn a_controller_on_the_unit_of_its_plant_gets_the_bits_of_specgen_sim() {
         skipped("the importer of this test is written for Linux");
         return;
     }
-    for (spec, name) in [("reference.toml", "reference"), ("legs.toml", "legs")] {
+    // The periods are 100 and 200 us.
+    for (spec, name, seconds) in [("reference.toml", "reference", "1.1"), ("legs.toml", "legs", "2.1")] {
         let folder = Folder::new();
         let run = folder.run(&["export", "fmu", spec, "-o", "fmu", "--plant"]);
         assert!(run.code == 0 && run.stdout.contains(&format!("{name}_plant.fmu, FMI 2.0")), "{run:#?}");
         assert_eq!(folder.run(&["export", "c", spec, "-o", "c"]).code, 0);
-        let run = folder.run(&["sim", spec, "--record", "run.rec", "--seconds", "1.1"]);
+        let run = folder.run(&["sim", spec, "--record", "run.rec", "--seconds", seconds]);
         assert_eq!(run.code, 0, "{run:#?}");
         let mut machine = Supervised::new(Controller::load(&folder.path("c/libcontroller.so")).unwrap()).unwrap();
         let (inputs, outputs) = (machine.input_names(), machine.output_names());

@@ -328,6 +328,7 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
         "stream_speed = [\"8 mm/s\", \"8 mm/s\", \"8 mm/s\"",
         1,
     );
+    let text = text.replacen("stale_ticks  = 10", "stale_ticks = 3", 1);
     std::fs::write(folder.path("learning.toml"), text).unwrap();
     let fixed =
         ["mass", "stiffness", "damping", "hysteresis", "creep", "lag", "noise"].map(|name| format!("{name}=1:1"));

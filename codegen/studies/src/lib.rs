@@ -1,5 +1,6 @@
 //! Many runs of a compiled controller against simulated machines and images.
 
+pub mod factors;
 pub mod lead;
 pub mod learning;
 pub mod machine;

@@ -7,7 +7,6 @@
 //! Each member of a plan is a machine of its own, prepared from the start, under the spec's own settings.
 
 pub mod deviation;
-pub mod factors;
 pub mod gate;
 pub mod learning;
 pub mod plan;
@@ -15,8 +14,8 @@ pub mod quantiles;
 pub mod run;
 pub mod shard;
 
+pub use crate::factors::{self, Factor, Factors, Origin};
 pub use deviation::Deviation;
-pub use factors::{Factor, Factors, Origin};
 pub use gate::Gate;
 pub use learning::{Learning, Learnt};
 pub use plan::{Member, Plan};

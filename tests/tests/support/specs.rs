@@ -46,6 +46,12 @@ pub fn source(text: &str, name: &str, folder: &tempfile::TempDir) -> SpecSource 
     SpecSource { display_name: name.to_owned(), text: text.to_owned(), dir: folder.path().join("specs") }
 }
 
+/// Sections whose keys can stand beside each other. Those of a trigger exclude each other by its kind and axis: the examples of its findings
+/// try them.
+pub fn sections() -> impl Iterator<Item = &'static Section> {
+    SECTIONS.iter().filter(|section| section.name != "trigger")
+}
+
 /// Sections that a spec without `[control]` does not have.
 pub fn is_task_space(section: &Section) -> bool {
     section.name.starts_with("control") && section.name != "controller"
@@ -108,7 +114,7 @@ impl Choice {
 
     /// A spec with every key of the key table that can stand beside the others, each on a line of its own.
     pub fn text(self) -> String {
-        let sections = SECTIONS.iter().filter(|section| self.control || !is_task_space(section));
+        let sections = sections().filter(|section| self.control || !is_task_space(section));
         let tables = |section: &Section| match section.kind {
             Kind::Repeated(least, _) => self.table(section).repeat(least.max(1)),
             Kind::Plain | Kind::Optional => self.table(section),

@@ -10,8 +10,7 @@ use specgen_language::model::{AdaptationMode, ControlMode};
 use specgen_numerics::nyquist::{Complex, over, plus, square, times};
 
 use super::response::Response;
-use crate::robust::Factors;
-use crate::robust::factors::Factor;
+use crate::factors::{Factor, Factors};
 
 /// Largest spectral radius of Q (I − T L) that is let pass: the error of a pass against that of the one before.
 pub const LARGEST_RADIUS: f64 = 0.9;

@@ -12,7 +12,7 @@ use specgen_runtime::playback::Knot;
 use super::convergence::{Convergence, LARGEST_RADIUS, Learnable, Matrix6c, spectral_radius};
 use super::motion::Motion;
 use super::update::FADE;
-use crate::robust::Factors;
+use crate::factors::Factors;
 
 /// Knots to both sides at most: what reaches further is what the feedback does.
 const REACH: usize = 512;

@@ -204,10 +204,10 @@ fn what_is_no_pass_is_refused() {
     assert_eq!(player.stage(), Stage::Complete);
     assert!(player.begin(good));
     assert_eq!((player.errors().len(), player.begun()), (0, None));
-    for stage in [Stage::None, Stage::Running, Stage::Complete, Stage::Aborted] {
+    for stage in [Stage::None, Stage::Running, Stage::Complete, Stage::Aborted, Stage::Learning] {
         assert_eq!(Stage::from_word(stage.word()), Some(stage));
     }
-    assert_eq!(Stage::from_word(4), None);
+    assert_eq!(Stage::from_word(5), None);
 }
 
 #[test]

@@ -245,7 +245,8 @@ fn is_order(rows: &[(usize, f64); 6]) -> bool {
 pub fn judge(expected: &Matrix, measured: &Matrix) -> Verdict {
     let (gauges, left) = matched(expected, measured);
     let (legs, left_by_legs) = matched(&transposed(expected), &transposed(measured));
-    let is_plain = |rows: &[(usize, f64); 6]| rows.iter().enumerate().all(|(place, row)| row.0 == place && row.1 > 0.0);
+    let is_plain =
+        |rows: &[(usize, f64); 6]| rows.iter().enumerate().all(|(place, row)| row.0 == place && !is_off(row.1));
     let own = core::array::from_fn(|place| (place, 1.0));
     let by_gauges = left <= LEFT && is_order(&gauges);
     let by_legs = left_by_legs <= LEFT && is_order(&legs);
