@@ -330,7 +330,7 @@ fn every_section_may_be_missing_only_if_nothing_in_it_is_required() {
     let whole = every_key();
     // Without [control] its parts are refused; repeated sections are counted: both have tests of their own.
     let apart = |section: &Section| matches!(section.kind, Kind::Repeated(..)) || section.name == "control";
-    for section in sections().iter().filter(|s| !s.name.is_empty() && s.name != "target" && !apart(s)) {
+    for section in sections().filter(|s| !s.name.is_empty() && s.name != "target" && !apart(s)) {
         let start = whole.find(&format!("[{}]\n", section.name)).expect("section");
         let end = whole[start + 1..].find("\n[").map_or(whole.len(), |i| start + 2 + i);
         let text = format!("{}{}", &whole[..start], &whole[end..]);

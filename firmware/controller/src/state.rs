@@ -3,10 +3,10 @@
 //! What the controller remembers from tick to tick. No NaN or infinity is ever stored here.
 
 use crate::config::Environment;
+use crate::defaults::LINES;
 use crate::hysteresis::{GRID, Memory};
 use crate::supervision::{code_at_rest, displacement_at_rest, memory_at_rest};
 use crate::task_space::{CORRECTED, DAMPED};
-use crate::triggers::LINES;
 use crate::{LEGS, Real, limits};
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE, Snapshot};
