@@ -17,9 +17,10 @@ use specgen_runtime::wave::{self, Settings};
 use crate::catch_up::catch_up;
 use crate::download::{self, Download};
 use crate::exchange::{Access, Exchange};
+use crate::gather::with_rows;
 use crate::recording;
 use crate::report::Probes;
-use crate::samples::{self, with_rows};
+use crate::samples;
 use crate::stepper::{Costs, Stepper, Stopwatch};
 
 /// Words of the longest answer: settings, what a step gives, a piece of a record or of errors.

@@ -6,11 +6,10 @@ use controller::{LEGS, PLACE_WORDS, Real, passes};
 use specgen_link::Refusal;
 use specgen_link::samples::{AXES, Block, Collector, MOST_EVERY, ROW, ROW_OF_ONE, Sample};
 
-use crate::exchange::Access;
 use crate::words::PERIOD_NANOSECONDS;
 
 /// Copies that may wait: what comes while the background makes a frame of 1 KiB.
-const COPIES: usize = 32;
+pub(crate) const COPIES: usize = 32;
 /// Blocks: one that is being filled, and two that wait.
 const BLOCKS: usize = 3;
 /// Bits that a byte takes on the line.
@@ -22,7 +21,7 @@ pub(crate) const POSSIBLE: bool = PLACE_WORDS > 0;
 
 /// What a tick leaves.
 #[derive(Debug, Clone, Copy)]
-struct Copied {
+pub(crate) struct Copied {
     tick: u64,
     status: u32,
     phase: u8,
@@ -32,7 +31,7 @@ struct Copied {
 }
 
 impl Copied {
-    fn sample(&self) -> Sample {
+    pub(crate) fn sample(&self) -> Sample {
         let [target, pose] = self.shown;
         let (mut error, mut volts) = ([0.0; AXES], [0.0; AXES]);
         for (slot, (target, pose)) in error.iter_mut().zip(target.iter().zip(&pose)) {
@@ -54,7 +53,7 @@ pub struct SampleMemory {
     rows: Rows,
 }
 
-type Rows = Collector<[Block; BLOCKS]>;
+pub(crate) type Rows = Collector<[Block; BLOCKS]>;
 
 impl Default for SampleMemory {
     fn default() -> Self {
@@ -75,15 +74,15 @@ impl SampleMemory {
 #[derive(Debug)]
 pub(crate) struct Samples {
     /// Ticks of a row; 0 while nobody looks on.
-    every: u32,
+    pub(crate) every: u32,
     /// Rows begin anew; also at power-up, when nothing is known of their memory.
-    anew: bool,
+    pub(crate) anew: bool,
     /// A ring: the oldest, and how many wait.
     copies: &'static mut [Copied; COPIES],
     first: usize,
     waiting: usize,
     /// None while the background is at it.
-    rows: Option<&'static mut Rows>,
+    pub(crate) rows: Option<&'static mut Rows>,
     /// Bits a second of the line.
     baud: u32,
 }
@@ -124,7 +123,7 @@ impl Samples {
         }
     }
 
-    fn pop(&mut self) -> Option<Copied> {
+    pub(crate) fn pop(&mut self) -> Option<Copied> {
         self.waiting = self.waiting.checked_sub(1)?;
         let oldest = self.first;
         self.first = (oldest + 1) % COPIES;
@@ -152,45 +151,4 @@ fn least(baud: u32) -> u32 {
         }
     }
     high
-}
-
-/// Work of the background, best after each tick: makes rows of what the ticks left. The tick is held off for each copy that is taken.
-pub fn gather(with: &mut Access<'_>) {
-    with_rows(with, |_| {});
-}
-
-/// Brings the rows up to date and does something with them; nothing if another one is at it, whom this one has interrupted.
-pub(crate) fn with_rows(with: &mut Access<'_>, action: impl FnOnce(&mut Rows)) {
-    let mut taken = None;
-    with(&mut |exchange, _| {
-        if let Some(samples) = &mut exchange.samples
-            && (samples.every > 0 || samples.anew)
-        {
-            taken = samples.rows.take();
-        }
-    });
-    let Some(rows) = taken else { return };
-    // No more than a ring of them, so that it ends.
-    for _ in 0..COPIES {
-        let (mut copied, mut anew) = (None, None);
-        with(&mut |exchange, _| {
-            if let Some(samples) = &mut exchange.samples {
-                anew = samples.anew.then_some(samples.every);
-                samples.anew = false;
-                copied = samples.pop();
-            }
-        });
-        if let Some(every) = anew {
-            rows.start(every);
-        }
-        let Some(copied) = copied else { break };
-        rows.add(&copied.sample());
-    }
-    action(rows);
-    let mut rows = Some(rows);
-    with(&mut |exchange, _| {
-        if let Some(samples) = &mut exchange.samples {
-            samples.rows = rows.take();
-        }
-    });
 }

@@ -3,9 +3,9 @@
 //! What a tick reads and yields, and both as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every target
 //! reads and writes these, so that two of them can be compared bit for bit.
 
+use crate::defaults::LINES;
 use crate::limits::DAC;
 use crate::task_space::{CORRECTED, MODES_TO_LEGS};
-use crate::triggers::LINES;
 use crate::words::{names, numbers, six};
 use crate::{LEGS, Real, State};
 use specgen_runtime::Real as _;

@@ -15,6 +15,7 @@ pub const PART: Part = Part {
         "src/desk.rs",
         "src/download.rs",
         "src/exchange.rs",
+        "src/gather.rs",
         "src/health.rs",
         "src/lib.rs",
         "src/learn.rs",
