@@ -228,8 +228,11 @@ fn matched(expected: &Matrix, measured: &Matrix) -> ([(usize, f64); 6], f64) {
         let gain = |which: usize| dot(row, &expected[which]) / dot(&expected[which], &expected[which]);
         // What is explained of the row's power; its own place first, where that is as good.
         let explained = |which: usize| gain(which) * dot(row, &expected[which]);
-        let best =
-            (0..6).fold(index, |best, which| if explained(which) > 1.02 * explained(best) { which } else { best });
+        // What does not move is in no other's place.
+        let own = dot(&expected[index], &expected[index]);
+        let still = dot(row, row) < NOTHING * NOTHING * own;
+        let better = |best: usize, which: usize| !still && explained(which) > 1.02 * explained(best);
+        let best = (0..6).fold(index, |best, which| if better(best, which) { which } else { best });
         left += dot(row, row) - explained(best);
         (best, gain(best))
     });
