@@ -5,14 +5,13 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
 use host_sim::controller::MachineWord;
-use serde::Serialize;
 use specgen_language::interrupt;
 use specgen_operate::gcs::{Axes, Bridge, Stage};
 
 use super::line::Line;
-use super::operate::Operator;
+use super::operate::{Operator, Served};
 use super::spec;
-use super::ui::{Failure, Outcome, Ui};
+use super::ui::{Failure, Ui};
 
 /// Arguments of `gcs`.
 #[derive(Args, Debug)]
@@ -30,20 +29,6 @@ pub struct Arguments {
     /// more.
     #[arg(long = "axis", value_name = "NAME=AXIS")]
     axes: Vec<String>,
-}
-
-/// What was served.
-#[derive(Serialize)]
-struct Summary {
-    device: String,
-    listened: String,
-    stands: String,
-}
-
-impl Outcome for Summary {
-    fn text(&self) -> String {
-        String::new()
-    }
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
@@ -82,6 +67,6 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut operator = Operator::new(bridge.into_session(), stop);
     let stands =
         if operator.is_powered() { operator.ramp_down(ui).map_err(|error| lost(&error))? } else { operator.stands() };
-    ui.result(&Summary { device: name, listened: address.to_string(), stands });
+    ui.result(&Served { device: name, listened: address.to_string(), stands });
     Ok(())
 }

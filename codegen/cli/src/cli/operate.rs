@@ -15,11 +15,12 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 
 use clap::{ArgGroup, Args};
+use serde::Serialize;
 use specgen_link::client::Port;
 
 use super::line::Line;
 use super::spec;
-use super::ui::{Failure, Ui};
+use super::ui::{Failure, Outcome, Ui};
 use answer::{Mistake, Report};
 pub use operator::{Ended, Operator};
 pub use passes::motion_name;
@@ -59,6 +60,20 @@ enum Source {
     List(Vec<Order>),
     /// Lines as they come, from a person or program that sees what happens.
     Lines,
+}
+
+/// What was served to clients that connect, and how the machine stands then.
+#[derive(Serialize)]
+pub(super) struct Served {
+    pub device: String,
+    pub listened: String,
+    pub stands: String,
+}
+
+impl Outcome for Served {
+    fn text(&self) -> String {
+        String::new()
+    }
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {

@@ -23,7 +23,6 @@ use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
 use clap::{ArgGroup, Args};
-use serde::Serialize;
 use serde_json::{Value, json};
 use specgen_compiler::compile::Compiled;
 use specgen_language::interrupt;
@@ -34,10 +33,10 @@ use specgen_operate::samples::Block;
 use specgen_runtime::supervisor::{Phase, Request};
 
 use super::operator::Pulse;
-use super::{Ended, Operator, mistake};
+use super::{Ended, Operator, Served, mistake};
 use crate::cli::line::Line;
 use crate::cli::spec;
-use crate::cli::ui::{Failure, Outcome, Ui};
+use crate::cli::ui::{Failure, Ui};
 use hall::{Hall, now};
 use orders::{ask, begin, carry_out, question};
 
@@ -69,20 +68,6 @@ pub struct Arguments {
     /// machine.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8020")]
     listen: SocketAddr,
-}
-
-/// What was served.
-#[derive(Serialize)]
-struct Summary {
-    device: String,
-    listened: String,
-    stands: String,
-}
-
-impl Outcome for Summary {
-    fn text(&self) -> String {
-        String::new()
-    }
 }
 
 /// What the panel knows and tells.
@@ -175,7 +160,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     panel.borrow_mut().hall.publish(&json!({ "k": "end", "why": why }));
     // The threads of the pages send it.
     std::thread::sleep(FRAME);
-    ui.result(&Summary { device: name.clone(), listened: address.to_string(), stands: left? });
+    ui.result(&Served { device: name.clone(), listened: address.to_string(), stands: left? });
     Ok(())
 }
 
