@@ -65,10 +65,12 @@ impl Words {
     /// moved on from `seen`; none after `timeout` (ns). It looks for `look` (ns) before it sleeps.
     pub(super) fn wait(&self, seen: &mut u32, look: u64, timeout: u64) -> Option<(Actuation, [u64; 2])> {
         *seen = wait_for(&self.bells[0], *seen, look, timeout)?;
+        // First what is waited for: an actuation read before it could lack the tick that the controller ended just before it
+        // asked, and the machine would go through that tick under the codes of the one before.
+        let wanted = [&self.wanted[0], &self.wanted[1]].map(|word| word.load(Ordering::Acquire));
         let mut block = [0; 3 + CHANNELS];
         read_block(&self.actuation_count, &self.actuation, &mut block)?;
         let [session, tick, enable, codes @ ..] = block;
-        let wanted = [&self.wanted[0], &self.wanted[1]].map(|word| word.load(Ordering::Acquire));
         Some((Actuation { session, tick, enable: enable == 1, codes: codes.map(|code| code as i32) }, wanted))
     }
 
@@ -105,7 +107,8 @@ impl Words {
                 });
             }
             if !asked {
-                self.wanted[1].store(tick, Ordering::Relaxed);
+                // Who sees this tick sees the actuation of the one before.
+                self.wanted[1].store(tick, Ordering::Release);
                 self.wanted[0].store(session, Ordering::Release);
                 ring(&self.bells[0]);
                 asked = true;

@@ -180,6 +180,26 @@ mod tests {
         controller.join().unwrap();
     }
 
+    /// A controller gives two orders out and asks for the tick after them: no machine goes through that tick under an older order.
+    fn asking() {
+        let words = Arc::new(Words::default());
+        let controller = {
+            let words = words.clone();
+            thread::spawn(move || {
+                (3..=4).for_each(|tick| words.actuate(SESSION, tick, true, &[9]));
+                let _ = words.sense(SESSION, 5, 0);
+            })
+        };
+        let mut seen = 0;
+        let mut asked = 0;
+        while asked != 5 {
+            let Some((order, wanted)) = words.wait(&mut seen, 0, FOR_EVER) else { continue };
+            asked = wanted[1];
+            assert!(asked != 5 || order.tick == 4, "wanted without the order before it");
+        }
+        controller.join().unwrap();
+    }
+
     /// Two ticks of a controller on a machine: each waits for the other, and nobody sleeps for ever.
     fn ticking() {
         let words = Arc::new(Words::default());
@@ -215,6 +235,11 @@ mod tests {
     #[test]
     fn an_order_is_never_half_written_nor_slept_through() {
         explore("waiting", 10_000, waiting);
+    }
+
+    #[test]
+    fn who_sees_a_tick_asked_for_sees_the_order_of_the_one_before() {
+        explore("asking", 1_000, asking);
     }
 
     #[test]
