@@ -5,12 +5,13 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 #![cfg(target_os = "linux")]
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use host_sim::controller::{Controller, Supervised, TickController};
@@ -48,11 +49,59 @@ const ACKNOWLEDGE: u8 = 5;
 /// Bit of a platform's status: it goes to its bias pose, or plays.
 const BUSY: u32 = 1 << 18;
 
-/// A spec's workspace with the built binary, the host library and a running machine.
-struct Bench {
-    folder: tempfile::TempDir,
+/// The real-time program and the host library of a spec.
+struct Programs {
     binary: PathBuf,
     library: PathBuf,
+}
+
+impl Programs {
+    /// Of a spec: built once, for most tests take the same.
+    fn of(spec: &Path) -> Arc<Self> {
+        // Cargo's folder is kept between runs and shared by all specs, so that dependencies are compiled once; the programs are
+        // called alike.
+        static BUILT: Mutex<BTreeMap<PathBuf, Arc<Programs>>> = Mutex::new(BTreeMap::new());
+        let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
+        built.entry(spec.to_owned()).or_insert_with(|| Arc::new(Self::built(spec))).clone()
+    }
+
+    fn built(spec: &Path) -> Self {
+        let name = spec.file_name().unwrap().to_str().unwrap();
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc-of").join(name);
+        let _ = fs::remove_dir_all(&folder);
+        let compiled = compile::compile(spec).unwrap_or_else(|_| panic!("{name} compiles"));
+        let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &["rt-pc"]);
+        let root = folder.join("controller");
+        workspace::write_scratch(&root, &files).unwrap();
+        let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc");
+        let cargo = |verb: &[&str]| {
+            let mut command = Command::new("cargo");
+            command.args(verb).args(["--release", "--locked", "--quiet", "--features", "comedi"]);
+            command.arg("--target-dir").arg(&kept).current_dir(root.join("rt-pc"));
+            for leak in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "CARGO_TARGET_DIR"] {
+                command.env_remove(leak);
+            }
+            // Fat link-time optimisation costs the test more than all the rest.
+            command.env("CARGO_PROFILE_RELEASE_LTO", "off").env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "16");
+            let output = command.output().unwrap();
+            assert!(output.status.success(), "cargo {verb:?}: {}", String::from_utf8_lossy(&output.stderr));
+        };
+        // Its own tests are those of the emitted copy, which differs little from spec to spec.
+        if crate::support::length(name == "reference.toml", true) {
+            cargo(&["test"]);
+        }
+        cargo(&["build"]);
+        let binary = folder.join("rt-pc");
+        fs::copy(kept.join("release/rt-pc"), &binary).unwrap();
+        let library = target::host::build_library(&root, &root.join("target")).unwrap();
+        Self { binary, library }
+    }
+}
+
+/// Programs of a spec and a running machine, with a folder of their own.
+struct Bench {
+    programs: Arc<Programs>,
+    folder: tempfile::TempDir,
     plant: Child,
     name: String,
     spec: PathBuf,
@@ -74,51 +123,20 @@ impl Bench {
         Self::with(spec_file, name)
     }
 
-    fn with(spec_file: &Path, name: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let spec_file = spec_file.to_owned();
-        let spec = spec_file.file_name().unwrap().to_str().unwrap();
-        let compiled = compile::compile(&spec_file).unwrap_or_else(|_| panic!("{spec} compiles"));
-        let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &["rt-pc"]);
-        let root = folder.path().join("controller");
-        workspace::write_scratch(&root, &files).unwrap();
-        // Kept between runs and shared by both specs, so that dependencies are compiled once; the programs are called alike.
-        static BUILD: Mutex<()> = Mutex::new(());
-        let one = BUILD.lock().unwrap_or_else(PoisonError::into_inner);
-        let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc");
-        let cargo = |verb: &[&str]| {
-            let mut command = Command::new("cargo");
-            command.args(verb).args(["--release", "--locked", "--quiet", "--features", "comedi"]);
-            command.arg("--target-dir").arg(&kept).current_dir(root.join("rt-pc"));
-            for leak in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "CARGO_TARGET_DIR"] {
-                command.env_remove(leak);
-            }
-            // Fat link-time optimisation costs the test more than all the rest.
-            command.env("CARGO_PROFILE_RELEASE_LTO", "off").env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "16");
-            let output = command.output().unwrap();
-            assert!(output.status.success(), "cargo {verb:?}: {}", String::from_utf8_lossy(&output.stderr));
-        };
-        // Its own tests are those of the emitted copy, which differs little from spec to spec.
-        if crate::support::length(spec == "reference.toml", true) {
-            cargo(&["test"]);
-        }
-        cargo(&["build"]);
-        let binary = folder.path().join("rt-pc");
-        fs::copy(kept.join("release/rt-pc"), &binary).unwrap();
-        let library = target::host::build_library(&root, &root.join("target")).unwrap();
-        drop(one);
+    fn with(spec: &Path, name: &str) -> Self {
+        let programs = Programs::of(spec);
         let name = format!("test-{name}-{}", std::process::id());
         // Under real-time priority where that is granted: other tests want the processors too.
         let plant = |more: &[&str]| {
             let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
-            command.args(["plant", spec_file.to_str().unwrap(), "--name", &name]).args(more);
+            command.args(["plant", spec.to_str().unwrap(), "--name", &name]).args(more);
             command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
         };
         let granted = Command::new("chrt").args(["-f", "50", "true"]).stderr(Stdio::null()).status();
         let plant = plant(if granted.is_ok_and(|status| status.success()) { &["--priority", "50"] } else { &[] });
         let place = Path::new("/dev/shm").join(format!("specgen-plant-{name}"));
         wait_for("the machine", || place.exists());
-        Self { binary, folder, library, plant, name, spec: spec_file.clone() }
+        Self { programs, folder: tempfile::tempdir().unwrap(), plant, name, spec: spec.to_owned() }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -129,14 +147,14 @@ impl Bench {
     fn command(&self, record: &str) -> Command {
         // Whatever the umask, nobody else may connect.
         let mut command = Command::new("sh");
-        command.args(["-c", "umask 0; exec \"$@\"", "sh"]).arg(&self.binary);
+        command.args(["-c", "umask 0; exec \"$@\"", "sh"]).arg(&self.programs.binary);
         command.args(["--sim", &self.name, "--allow-no-rt", "--json", "--record"]).arg(self.path(record));
         command
     }
 
     /// The host's own build of the same controller.
     fn machine(&self) -> Supervised {
-        Supervised::new(Controller::load(&self.library).unwrap()).unwrap()
+        Supervised::new(Controller::load(&self.programs.library).unwrap()).unwrap()
     }
 
     /// Checks what holds of every run, whatever the machine did and however loaded this computer is.
@@ -375,7 +393,7 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
 fn a_record_that_finds_no_room_brings_the_machine_down(bench: &Bench) {
     let script = "ulimit -f 800; trap '' XFSZ; exec \"$@\"";
     let mut command = Command::new("sh");
-    command.args(["-c", script, "sh"]).arg(&bench.binary).args(["--sim", &bench.name, "--allow-no-rt", "--json"]);
+    command.args(["-c", script, "sh"]).arg(&bench.programs.binary).args(["--sim", &bench.name, "--allow-no-rt", "--json"]);
     command.args(["--elastic", "--sim-timeout", "5000", "--set", "command=3", "--record"]).arg(bench.path("cut.rec"));
     let output = command.output().unwrap();
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -402,7 +420,7 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
     let built = built.unwrap();
     assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
     let run = |variables: &[(&str, &str)], arguments: &[&str]| {
-        let mut command = Command::new(&bench.binary);
+        let mut command = Command::new(&bench.programs.binary);
         command.args(["--allow-no-rt", "--json", "--seconds", "0.4", "--arm", "--comedi-library"]).arg(&library);
         command.args(["--comedi", "/dev/fake1"]).args(arguments).arg("--record").arg(bench.path("card.rec"));
         command.env("FAKE_LOG", bench.path("card.log")).envs(variables.iter().copied()).output().unwrap()

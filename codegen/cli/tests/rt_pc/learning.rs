@@ -7,6 +7,8 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use super::host::Host;
+use crate::support::length;
+
 use super::{Bench, DISARMED, Running, wait_for};
 
 fn specgen(bench: &Bench, arguments: &[&str], link: &Path) -> Output {
@@ -38,8 +40,9 @@ fn a_motion_is_learned_over_the_link_and_played_under_what_was_learned() {
     wait_for("the link", || link.exists());
 
     let spec = spec.to_str().unwrap();
+    let count = length("2", "4");
     let learn = |more: &[&str]| {
-        let given = ["learn", spec, "--trajectory", "case-1", "--passes", "4", "--output", "t.json", "--json"];
+        let given = ["learn", spec, "--trajectory", "case-1", "--passes", count, "--output", "t.json", "--json"];
         specgen(&bench, &[&given[..], more].concat(), &link)
     };
     let unnamed = learn(&[]);
@@ -56,7 +59,7 @@ fn a_motion_is_learned_over_the_link_and_played_under_what_was_learned() {
         let (passes, best) = (found["passes"].as_array().unwrap(), found["best"].as_u64().unwrap() as usize);
         nm = passes.iter().map(|pass| pass["translation_nm"].as_f64().unwrap()).collect();
         println!("over the link, nm by the gauges: {nm:.2?}");
-        assert!(passes.len() == 5 && nm[best] < 0.5 * nm[0], "{found}");
+        assert!(passes.len() == count.parse::<usize>().unwrap() + 1 && nm[best] < 0.5 * nm[0], "{found}");
         let mut host = Host::open(&link, 9).unwrap();
         host.wait("rest", |status| status.phase == DISARMED && !status.amplifier_on);
     }

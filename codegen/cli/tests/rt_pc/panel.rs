@@ -201,7 +201,7 @@ impl Page {
 
 /// A program on the simulated machine, at a link.
 fn program(bench: &Bench, name: &str, plant: &str, link: &Path) -> Running {
-    let mut command = Command::new(&bench.binary);
+    let mut command = Command::new(&bench.programs.binary);
     command.args([
         "--sim",
         plant,
