@@ -393,7 +393,12 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
 fn a_record_that_finds_no_room_brings_the_machine_down(bench: &Bench) {
     let script = "ulimit -f 800; trap '' XFSZ; exec \"$@\"";
     let mut command = Command::new("sh");
-    command.args(["-c", script, "sh"]).arg(&bench.programs.binary).args(["--sim", &bench.name, "--allow-no-rt", "--json"]);
+    command.args(["-c", script, "sh"]).arg(&bench.programs.binary).args([
+        "--sim",
+        &bench.name,
+        "--allow-no-rt",
+        "--json",
+    ]);
     command.args(["--elastic", "--sim-timeout", "5000", "--set", "command=3", "--record"]).arg(bench.path("cut.rec"));
     let output = command.output().unwrap();
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
