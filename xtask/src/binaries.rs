@@ -253,6 +253,7 @@ mod tests {
         for folder in [
             "tests/tests",
             "codegen/cli/tests",
+            "codegen/compiler/tests/all",
             "host-sim/oracle/tests/all",
             "firmware/runtime/tests/all",
             "firmware/link/tests/all",

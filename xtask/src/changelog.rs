@@ -30,6 +30,22 @@ pub fn release(root: &Path, version: &str) -> Result<(), String> {
     Ok(())
 }
 
+/// Whether CHANGELOG.md has `version`, and no fragment is left out.
+///
+/// # Errors
+/// What is missing, with the command that adds it.
+pub fn is_released(root: &Path, version: &str) -> Result<(), String> {
+    let path = root.join("CHANGELOG.md");
+    let text = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let left = fragments(&root.join(FOLDER))?.len();
+    if left > 0 || !text.lines().any(|line| line == format!("## {version}")) {
+        return Err(format!(
+            "{left} fragments are not in CHANGELOG.md, or it has no {version}: cargo xtask changelog {version}, and commit it"
+        ));
+    }
+    Ok(())
+}
+
 /// Path, section and text of each, by name.
 fn fragments(folder: &Path) -> Result<Vec<(PathBuf, &'static str, String)>, String> {
     let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;

@@ -10,6 +10,7 @@ mod judged;
 mod mutants;
 mod packages;
 mod progress;
+mod release;
 mod run;
 mod setup;
 mod skips;
@@ -32,6 +33,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   wheel   the Python package: builds it into target/wheel/dist, and tries it in a fresh environment
   bless   writes the generated files that are committed anew
   changelog VERSION: puts the fragments in changelog/ into CHANGELOG.md, as a release
+  release VERSION [-o DIR]: sources, the command for Linux with glibc and static, the wheel, and their digests, into target/dist
   fresh   the two commands of the README in minimal Debian roots; `cargo xtask fresh --help`
 
 With SPECGEN_ALLOW_MISSING=1, what needs a tool that cannot be installed is skipped, and said so.";
@@ -54,6 +56,7 @@ fn main() -> ExitCode {
                 ExitCode::FAILURE
             }
         },
+        ["release", ref arguments @ ..] => release::command(&root(), arguments).unwrap_or_else(misused),
         ["fresh", "--help" | "-h"] => {
             println!("{}", fresh::usage());
             ExitCode::SUCCESS

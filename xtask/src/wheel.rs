@@ -9,17 +9,19 @@ use crate::run::{Outcome, Report, cargo, expect_success};
 
 /// Its own workspace: no other build needs Python.
 pub const MANIFEST: &str = "codegen/python/Cargo.toml";
-const FOLDER: &str = "codegen/python";
+pub const FOLDER: &str = "codegen/python";
 /// Where everything is made.
 const MADE: &str = "target/wheel";
+/// The environment of what builds it.
+pub const TOOLS: &str = "target/wheel/tools";
 
 /// `cargo xtask wheel`
 pub fn command(root: &Path) -> ExitCode {
     let mut report = Report::new(9);
     let made = root.join(MADE);
-    let (tools, fresh, wheels) = (made.join("tools"), made.join("fresh"), made.join("dist"));
+    let (tools, fresh, wheels) = (root.join(TOOLS), made.join("fresh"), made.join("dist"));
     report.step("tools", || environment(&tools, &[OsStr::new("-r"), root.join(FOLDER).join("tools.txt").as_ref()]));
-    report.step("wheel", || build(root, &tools, &wheels));
+    report.step("wheel", || build(root, &tools, &wheels, |_| {}));
     if report.has_failed() {
         return report.finish();
     }
@@ -62,7 +64,7 @@ pub fn command(root: &Path) -> ExitCode {
 }
 
 /// A virtual environment, anew, with packages.
-fn environment(folder: &Path, packages: &[&OsStr]) -> Outcome {
+pub fn environment(folder: &Path, packages: &[&OsStr]) -> Outcome {
     let mut python = Command::new("python3");
     python.args(["-m", "venv", "--clear"]).arg(folder);
     match expect_success(
@@ -77,7 +79,8 @@ fn environment(folder: &Path, packages: &[&OsStr]) -> Outcome {
     expect_success(pip, "see above")
 }
 
-fn build(root: &Path, tools: &Path, wheels: &Path) -> Outcome {
+/// Builds it, with what `more` adds to the builder's arguments and environment.
+pub fn build(root: &Path, tools: &Path, wheels: &Path, more: impl FnOnce(&mut Command)) -> Outcome {
     if let Err(error) = fs::remove_dir_all(wheels)
         && error.kind() != std::io::ErrorKind::NotFound
     {
@@ -90,11 +93,12 @@ fn build(root: &Path, tools: &Path, wheels: &Path) -> Outcome {
         .arg(wheels);
     // Most of what it is made of is the command's.
     maturin.env("CARGO_TARGET_DIR", target(root));
+    more(&mut maturin);
     expect_success(maturin, "see above")
 }
 
-/// The one that was built.
-fn wheel(folder: &Path) -> Result<PathBuf, String> {
+/// The one in a folder.
+pub fn wheel(folder: &Path) -> Result<PathBuf, String> {
     let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
     paths.find(|path| path.extension() == Some(OsStr::new("whl"))).ok_or_else(|| "there is no wheel".to_owned())

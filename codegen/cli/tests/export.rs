@@ -1,5 +1,5 @@
-//! `specgen export c` as a user runs it: the header is C11 and C++17 without a warning, and the program gives the digest of the same
-//! library under Rust, after as many ticks.
+//! `specgen export` as a user runs it: the header is C11 and C++17 without a warning, and programs in C and Python give the digest of
+//! the same library under Rust, after as many ticks.
 
 use std::process::Command;
 
@@ -63,5 +63,61 @@ fn a_program_in_c_links_the_controller_and_gets_its_bits() {
         assert!(Command::new("cc").args(source).current_dir(folder.path(dir)).status().unwrap().success());
         let ran = Command::new(folder.path(dir).join("example")).output().unwrap();
         assert!(!ran.status.success() && String::from_utf8_lossy(&ran.stderr).contains("do not belong together"));
+    }
+}
+
+/// What the test in C does, and what a hand could do wrong.
+const SCRIPT: &str = "
+import sys
+from controller import Controller
+
+law = Controller()
+gauges = 'gauge' if 'gauge' in law.inputs else 'displacement'
+for tick in range(int(sys.argv[1])):
+    law.step(request=int(tick > 0), **{gauges: [1e-9 * ((tick + leg) % 7) for leg in range(6)]})
+print(f'digest {law.state_digest:016x}')
+row = law.step()
+assert row['supervisor'] & 255 in (1, 3) and row['dac_code'] == [code for code in row['dac_code'] if abs(code) < 2**24], row
+law.configure(mode=1)
+for wrong, error in ((dict(mode=99), ValueError), (dict(modus=1), KeyError), (dict(code_min=[1, 2]), ValueError)):
+    try:
+        law.configure(**wrong)
+    except error as said:
+        print(said)
+    else:
+        raise AssertionError(wrong)
+law.reset()
+assert Controller(supervised=False).step(**{gauges: [0.0] * 6})['voltage'][0] == Controller().step()['voltage'][0]
+";
+
+#[test]
+fn a_module_in_python_steps_the_controller_and_gets_its_bits() {
+    let folder = Folder::new();
+    let single = folder.read("reference.toml").replace("scalar = \"f64\"", "scalar = \"f32\"");
+    folder.write("single.toml", single);
+    for (spec, dir) in [("reference.toml", "python"), ("single.toml", "single"), ("legs.toml", "six/python")] {
+        let run = folder.run(&["export", "python", spec, "-o", dir]);
+        assert!(run.code == 0 && run.stdout.contains("controller.py"), "{}{}", run.stdout, run.stderr);
+        let python = |script: &str| {
+            let mut python = Command::new("python3");
+            python.args(["-I", "-c", &format!("import sys; sys.path.insert(0, '.'){script}"), &TICKS.to_string()]);
+            python.current_dir(folder.path(dir)).output()
+        };
+        let Ok(ran) = python(SCRIPT) else { return skipped("there is no python3 here") };
+        let text = String::from_utf8(ran.stdout).unwrap();
+        let wanted = format!("digest {:016x}", digest(&folder, dir, 0));
+        assert!(
+            ran.status.success() && text.contains(&wanted),
+            "{text} for {wanted}: {}",
+            String::from_utf8_lossy(&ran.stderr)
+        );
+        assert!(text.contains("mode is out of its range") && text.contains("modus: expected one of mode, "), "{text}");
+        // The library of another spec is not taken.
+        let module = folder.read(&format!("{dir}/controller.py"));
+        let other = module.replace("DIGEST = \"", "DIGEST = \"0");
+        folder.write(&format!("{dir}/controller.py"), other);
+        let ran = python("\nimport controller; controller.Controller()").unwrap();
+        let text = String::from_utf8_lossy(&ran.stderr).into_owned();
+        assert!(!ran.status.success() && text.contains("the controller of another spec: export both again"), "{text}");
     }
 }

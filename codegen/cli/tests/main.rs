@@ -25,7 +25,6 @@ mod output_folder;
 mod pil;
 mod platform_check;
 mod platform_reach;
-mod platform_stability;
 mod rate_specs;
 mod recording;
 mod records;

@@ -189,6 +189,17 @@ def export_c(spec: StrPath, output: StrPath) -> list[Path]:
     return [Path(output, name) for name in command("export", "c", spec, "-o", output)["files"]]
 
 
+def export_python(spec: StrPath, output: StrPath) -> list[Path]:
+    """Writes the library and ``controller.py``, which steps it in any Python, without this package or numpy."""
+    return [Path(output, name) for name in command("export", "python", spec, "-o", output)["files"]]
+
+
+def export_fmu(spec: StrPath, output: StrPath, *, plant: bool = False, progress: Progress = False) -> list[Path]:
+    """Writes FMI 2.0 units for Simulink, Dymola, OMSimulator: of the controller, with ``plant`` of the simulated machine, too."""
+    exported = command("export", "fmu", spec, "-o", output, *_options(plant=plant), progress=progress)
+    return [Path(unit["file"]) for unit in exported["units"]]
+
+
 class Simulation(Result):
     """`simulate`; `traces` has every tick of every run by the name of the run, if they were asked for."""
 
@@ -459,3 +470,71 @@ def record(
     """Records a simulated run of a wave under the supervisor, for `replay`: ``specgen sim --record``."""
     options = _options(record=output, seconds=seconds, no_noise=not noise, seed=seed)
     return command("sim", spec, *options, progress=progress)
+
+
+def learn(
+    spec: StrPath,
+    *,
+    trajectory: str | None = None,
+    frequency: float | None = None,
+    passes: int | None = None,
+    bandwidth: float | None = None,
+    vary: Mapping[str, str] | None = None,
+    prepare: bool = False,
+    start: StrPath | None = None,
+    excite: StrPath | None = None,
+    response: StrPath | None = None,
+    on_device: int | None = None,
+    output: StrPath | None = None,
+    socket: StrPath | None = None,
+    port: StrPath | None = None,
+    baud: int | None = None,
+    machine: str | None = None,
+    plant: StrPath | None = None,
+    noise: bool = True,
+    seed: int = 1,
+    progress: Progress = False,
+) -> Result:
+    """Learns the correction of a repeated motion, on the simulated machine or, over ``socket`` or ``port``, on a real one, which is armed
+    for it and ramped down after it: ``specgen learn``.
+
+    Args:
+        trajectory: Of the spec, or ``case-1``, ``case-2``, ``machining``, ``multisine``; ``case-1`` if not given.
+        frequency: Its operating frequency, Hz; 10, or that of the spec.
+        passes: That are learned from; 5.
+        bandwidth: Highest frequency to be learned, Hz; lowered to where every machine within ``[robust]`` converges.
+        vary: Ranges in place of those of ``[robust]``: ``{"stiffness": "2%"}``.
+        prepare: Begin with what the model says lag and modes would leave.
+        start: Begin with this correction, of the same spec, machine and motion.
+        excite: Learn nothing: measure the response of the running loop, and write it here.
+        response: Learn with the response that was measured, not with the model's.
+        on_device: Let the device make each correction, in room for so many knots.
+        output: Where the correction of the best pass goes; `Machine.play` takes it.
+        machine: What the machine at the end of the link is called; a correction is played on no other.
+        plant: Shape of the simulated legs' hysteresis: ``plays``, ``bouc-wen``, or a file of leg parameters.
+        noise: Whether gauges and amplifiers of the simulated machine have any.
+        seed: Of noise and tolerances.
+    """
+    options = _options(
+        trajectory=trajectory,
+        frequency=frequency,
+        passes=passes,
+        bandwidth=bandwidth,
+        prepare=prepare,
+        excite=excite,
+        response=response,
+        on_device=on_device,
+        output=output,
+        socket=socket,
+        port=port,
+        baud=baud,
+        machine=machine,
+        plant=plant,
+        no_noise=not noise,
+        seed=seed,
+    )
+    if start is not None:
+        options.append(f"--from={fspath(start)}")
+    for pair in _pairs(vary) or []:
+        options.append(f"--vary={pair}")
+    return command("learn", spec, *options, progress=progress)

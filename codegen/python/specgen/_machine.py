@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from os import PathLike, fspath
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from ._commands import Progress, Result, StrPath, listener, result_of
 from ._findings import Error
 from ._native import Session
+from ._table import Table, read_table
 
 
 class Machine:
@@ -110,10 +113,18 @@ class Machine:
         answer = self.order(" ".join([order, *_quantities(axes)]))
         return [float(part) for part in answer["pose"]]
 
-    def can_go(self, **axes: float | str) -> str | None:
-        """None if it can go there, or what binds; nothing moves."""
-        binds: str | None = self.order(" ".join(["can-i-go", *_quantities(axes)]))["binds"]
+    def can_go(self, *, speed: str | None = None, **axes: float | str) -> str | None:
+        """None if it can go there, or what binds; nothing moves. With a ``speed``, ``"1 mm/s"`` or ``"1 mrad/s"``, at that at least."""
+        words = [] if speed is None else [f"speed={speed.replace(' ', '')}"]
+        binds: str | None = self.order(" ".join(["can-i-go", *_quantities(axes), *words]))["binds"]
         return binds
+
+    def frame(self, kind: str | None = None, **axes: float | str) -> dict[str, Any]:
+        """Frames in force, um and urad; with ``"work"`` or ``"tool"`` and axes (0 if not given) poses are said in that one from here on,
+        with ``"none"`` in that of the spec."""
+        words = [] if kind is None else [kind, *_quantities(axes)]
+        frame: dict[str, Any] = self.order(" ".join(["frame", *words]))
+        return frame
 
     def where(self) -> dict[str, Any]:
         """Pose by the gauges, set-point and error, um and urad; voltage of each leg, V."""
@@ -133,9 +144,34 @@ class Machine:
         """Goes to a mark, or to ``"zero"``."""
         self.order(f"goto {name}")
 
-    def play(self, trajectory: str) -> None:
-        """Plays a trajectory of the spec."""
-        self.order(f"play {trajectory}")
+    def play(self, trajectory: str, *, correction: StrPath | None = None, machine: str | None = None) -> dict[str, Any] | None:
+        """Plays a trajectory of the spec; under a ``correction`` that `learn` wrote for it on this ``machine``, with its error, nm and
+        nrad rms."""
+        words = ["play", trajectory]
+        if correction is not None:
+            words += [f"correction={fspath(correction)}", f"machine={machine}"]
+        played = self.order(" ".join(words))
+        return played if isinstance(played, dict) else None
+
+    def gains(self, **gains: float) -> dict[str, Any]:
+        """Gains in force; sets those that are given first, in SI: ``machine.gains(**{"ki[2]": 1e9})``, or a list for all axes. Those that
+        the margins of the spec do not bear raise `Error`."""
+        words = [f"{name}={float(value)!r}" for name, value in gains.items()]
+        found: dict[str, Any] = self.order(" ".join(["gains", *words]))
+        return found
+
+    def output_line(self, line: int, **settings: float | str) -> None:
+        """Lets an output line (``[[trigger]]``) show something else: ``machine.output_line(0, kind="position", step=1e-6)``, in SI."""
+        words = [f"{name}={value if isinstance(value, str) else repr(value)}" for name, value in settings.items()]
+        self.order(" ".join(["trigger", str(line), *words]))
+
+    def watch(self, seconds: float, *, every: int = 1000) -> Table:
+        """Samples of the running machine for so long: least, mean and largest value over ``every`` ticks. Gaps are rows that are not
+        there."""
+        with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
+            file = Path(folder, "samples.csv")
+            self.order(f"watch {every} {float(seconds)!r} {file}")
+            return read_table(file)
 
     def mode(self, mode: str) -> None:
         """Terms of the law, such as ``"pf-pcc"``."""
@@ -165,8 +201,16 @@ class Machine:
 
     def trigger(self) -> dict[str, Any]:
         """Triggers the recorder."""
-        recorder: dict[str, Any] = self.order("record trigger")
+        return self.recorder("trigger")
+
+    def recorder(self, action: str = "look") -> dict[str, Any]:
+        """How the recorder stands; ``"stop"`` stops it first, ``"trigger"`` triggers it."""
+        recorder: dict[str, Any] = self.order(f"record {action}")
         return recorder
+
+    def stop(self) -> None:
+        """Ramps down and ends the program that serves the link; a board only ramps down, and raises `Error`."""
+        self.order("stop")
 
     def download(self, file: StrPath) -> None:
         """Writes the recording to a file, for `replay`."""

@@ -1,5 +1,7 @@
 """Functions give what the commands give."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -121,3 +123,26 @@ def test_tuning_and_other_commands(tmp_path: Path) -> None:
     assert found.data == theirs
     with pytest.raises(specgen.UsageError):
         specgen.command("chek", str(REFERENCE))
+
+
+def test_what_is_learned_and_exported_is_what_the_commands_give(tmp_path: Path) -> None:
+    spec = tmp_path / "learning.toml"
+    (tmp_path / "records").symlink_to(REPOSITORY / "specs/records")
+    spec.write_text(REFERENCE.read_text().replace("[control]\n", '[control]\ncorrection = "2 um"\n', 1))
+    first, second = tmp_path / "first.json", tmp_path / "second.json"
+    ours = specgen.learn(spec, passes=1, vary={"stiffness": "1%"}, output=first)
+    theirs = command("learn", spec, "--passes", 1, "--vary", "stiffness=1%", "-o", second)["result"]
+    assert ours.data == theirs and first.read_bytes() == second.read_bytes()
+    assert specgen.learn(spec, passes=0, start=first)["passes"][0] == ours["passes"][ours["best"]]
+    with pytest.raises(specgen.Refused, match="correction"):
+        specgen.learn(REFERENCE)
+    with pytest.raises(specgen.UsageError):
+        specgen.learn(spec, prepare=True, start=first)
+    (unit,) = specgen.export_fmu(LEGS, tmp_path / "fmu")
+    assert unit.name == "legs.fmu" and unit.stat().st_size > 10_000
+    module, library = specgen.export_python(LEGS, tmp_path / "python")
+    script = "from controller import Controller; law = Controller(); law.step(request=1); print(law.state_digest)"
+    ran = subprocess.run([sys.executable, "-c", script], cwd=module.parent, check=True, capture_output=True, text=True)
+    law = specgen.Controller(library, supervised=True)
+    law.step(request=1)
+    assert int(ran.stdout) == law.state_digest

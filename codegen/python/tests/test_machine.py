@@ -77,7 +77,25 @@ def test_a_machine_is_operated(link: Path, tmp_path: Path) -> None:
             machine.move(z=1e-3)
         assert machine.where()["target"][2] == pytest.approx(6.0)
         assert machine.can_go(z=1e-6) is None and "leg" in (machine.can_go(z="1 mm") or "")
+        assert machine.can_go(z=1e-6, speed="1 um/s") is None and "speed" in (machine.can_go(z=1e-6, speed="1 m/s") or "")
         assert machine.limits()[2][1] > 6.0
+        assert machine.frame("work", z="1 um")["work"][2] == pytest.approx(1.0)
+        assert machine.where()["target"][2] == pytest.approx(5.0)
+        assert machine.frame("none") == machine.frame() and machine.frame()["work"] == [0.0] * 6
+        gains = machine.gains()["gains"]
+        assert machine.gains(**{"ki[2]": 0.9 * gains[1][2]})["gains"][1][2] == pytest.approx(0.9 * gains[1][2])
+        with pytest.raises(specgen.Error):
+            machine.gains(ki=1e3 * gains[1][2])
+        machine.gains(**{"ki[2]": gains[1][2]})
+        samples = machine.watch(0.5, every=100)
+        assert len(samples["tick"]) > 10 and samples["tick"][1] - samples["tick"][0] == 100
+        with pytest.raises(specgen.Error):
+            machine.output_line(0, kind="motion")
+        assert machine.recorder()["running"]
+        assert machine.play("case-1") is None
+        machine.wait("arrived", 60)
+        with pytest.raises(specgen.Error, match="none.json"):
+            machine.play("case-1", correction="none.json", machine="here")
         machine.mark("here")
         machine.jog(y=-2e-6)
         machine.wait("arrived", 60)
@@ -87,7 +105,7 @@ def test_a_machine_is_operated(link: Path, tmp_path: Path) -> None:
         assert machine.settings() == specgen.compile(REFERENCE).controller().settings
         machine.ramp_down()
         machine.wait("disarmed", 60)
-        machine.order("record stop")
+        assert not machine.recorder("stop")["running"]
         machine.download(tmp_path / "run.rec")
     assert machine.close() is None
     with pytest.raises(specgen.Error, match="ended"):
@@ -103,6 +121,15 @@ def test_a_machine_is_operated(link: Path, tmp_path: Path) -> None:
     with specgen.Machine(socket=link) as machine:
         status = machine.status()
         assert status["stands"] == "disarmed" and not status["amplifiers_on"]
+        machine.stop()
+    waited_for_end(link)
+
+
+def waited_for_end(path: Path) -> None:
+    begun = time.monotonic()
+    while path.exists():
+        assert time.monotonic() < begun + 30, f"{path} is still there"
+        time.sleep(0.05)
 
 
 def test_what_is_not_there_is_said(tmp_path: Path) -> None:

@@ -170,6 +170,9 @@ fn damping(closed_loop: &ClosedLoop) -> [f64; 6] {
 
 #[test]
 fn no_start_rule_is_unstable_on_any_machine() {
+    if length(true, false) {
+        return println!("skipped: only in the soak: start rules on random machines");
+    }
     let machines = random_machines();
     let count = length(1, plants());
     let unstable: Vec<String> = in_parallel(count, |number| {
@@ -203,6 +206,9 @@ fn no_start_rule_is_unstable_on_any_machine() {
 /// The criterion can fail: well above the predicted limit a loop does not settle.
 #[test]
 fn a_loop_beyond_its_limit_does_not_settle() {
+    if length(true, false) {
+        return println!("skipped: only in the soak: a loop above its limit, simulated");
+    }
     let bench = &random_machines()[0].notched;
     let design = bench.design();
     let limit = design.bandwidth_limit / design.combined.level_bandwidth;

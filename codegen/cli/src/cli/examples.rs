@@ -247,6 +247,10 @@ pub const EXPORT: &str = "\
 Examples:
   specgen export c platform.toml -o c      # prints the line that compiles it";
 
+pub const EXPORT_PYTHON: &str = "\
+Examples:
+  specgen export python platform.toml -o python   # controller.py and its library";
+
 pub const EXPORT_FMU: &str = "\
 Examples:
   specgen export fmu platform.toml -o fmu   # for Simulink, Dymola, OMSimulator

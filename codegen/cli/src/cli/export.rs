@@ -2,6 +2,7 @@
 
 mod fmu;
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
@@ -10,6 +11,7 @@ use clap::{Args, Subcommand};
 use std::alloc::Layout;
 
 use host_sim::controller::{ABI_VERSION, Controller, Supervised, TickController};
+use host_sim::word::WordKind;
 use serde::Serialize;
 use specgen_language::interrupt::Scratch;
 use specgen_runtime::supervisor::{self, Request};
@@ -42,6 +44,9 @@ const EVENTS: [(&str, u32); 5] = [
 const ALIGNMENT: usize = 8;
 const TICK: &str = include_str!("export/tick.c");
 const EXAMPLE: &str = include_str!("export/example.c");
+const PYTHON: &str = include_str!("export/controller.py");
+/// What compiles the example in C.
+const COMPILE: &str = "cc -std=c11 -Wall example.c tick.c -L. -lcontroller -Wl,-rpath,'$ORIGIN' -o example";
 
 /// Arguments of `export`.
 #[derive(Args, Debug)]
@@ -54,27 +59,50 @@ pub struct Arguments {
 #[derive(Subcommand, Debug)]
 enum Kind {
     /// A C header, the library for this host, and two sources that use them: `tick.c` for firmware, `example.c` that runs it.
-    C(C),
+    #[command(after_help = super::examples::EXPORT)]
+    C(Folder),
+    /// The library for this host, and a module that steps it in any Python, without the package `specgen` or numpy.
+    #[command(after_help = super::examples::EXPORT_PYTHON)]
+    Python(Folder),
     /// FMI 2.0 co-simulation units of the controller under its supervisor and of the simulated machine, sources included.
     Fmu(fmu::Arguments),
 }
 
-/// Arguments of `export c`.
+/// Arguments of `export c` and `export python`.
 #[derive(Args, Debug)]
-#[command(after_help = super::examples::EXPORT)]
-struct C {
+struct Folder {
     /// The spec file.
     spec: PathBuf,
-    /// Folder for controller.h, the library, tick.c and example.c.
+    /// Folder for the library and what uses it.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let C { spec, output } = match &arguments.kind {
-        Kind::C(arguments) => arguments,
-        Kind::Fmu(arguments) => return fmu::run(arguments, ui),
-    };
+    match &arguments.kind {
+        Kind::C(folder) => export(folder, ui, |machine| {
+            fits(machine)?;
+            let sources = [("tick.c", TICK.to_owned()), ("example.c", EXAMPLE.to_owned())];
+            Ok((vec![("controller.h", header(machine)), sources[0].clone(), sources[1].clone()], COMPILE))
+        }),
+        Kind::Python(folder) => {
+            export(folder, ui, |machine| Ok((vec![("controller.py", python(machine))], "python3 -i controller.py")))
+        }
+        Kind::Fmu(arguments) => fmu::run(arguments, ui),
+    }
+}
+
+/// Name of the library.
+fn library_name() -> String {
+    format!("{}controller{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX)
+}
+
+/// Builds the library of a spec, and writes it beside texts that use it; those come with the line that begins with them.
+fn export(
+    Folder { spec, output }: &Folder,
+    ui: &mut Ui,
+    texts: impl FnOnce(&Supervised) -> Result<(Vec<(&'static str, String)>, &'static str), Failure>,
+) -> Result<(), Failure> {
     let compiled = spec::compiled(spec, ui)?;
     let _claimed = claim(output)?;
     let scratch = Scratch::new().map_err(environment)?;
@@ -84,18 +112,37 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let library = build_library(&folder, &scratch.path().join("target"))?;
     let bytes = fs::read(&library).map_err(environment)?;
     let machine = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;
-    fits(&machine)?;
-    let name = format!("{}controller{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
-    let files = [
-        ("controller.h".to_owned(), header(&machine).into_bytes()),
-        (name, bytes),
-        ("tick.c".to_owned(), TICK.as_bytes().to_vec()),
-        ("example.c".to_owned(), EXAMPLE.as_bytes().to_vec()),
-    ];
+    let (texts, next) = texts(&machine)?;
+    let mut files: Vec<(String, Vec<u8>)> =
+        texts.into_iter().map(|(name, text)| (name.to_owned(), text.into_bytes())).collect();
+    files.push((library_name(), bytes));
     write_folder(output, &files)?;
     let names = files.iter().map(|(name, _)| name.clone()).collect();
-    ui.result(&Exported { folder: output.display().to_string(), files: names });
+    ui.result(&Exported { folder: output.display().to_string(), files: names, next });
     Ok(())
+}
+
+/// `controller.py`.
+fn python(machine: &Supervised) -> String {
+    let about = machine.controller().description();
+    let (inputs, outputs) = (machine.input_names(), machine.output_names());
+    let list = |names: &[String]| {
+        let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+        format!("[{}]", quoted.join(", "))
+    };
+    let more = [&inputs[about.input_names.len()..], &outputs[about.output_names.len()..]].map(list);
+    let names = about.config_names.iter().chain(&inputs).chain(&outputs);
+    let whole: BTreeSet<&str> = names
+        .filter(|name| WordKind::of(name) == WordKind::Integer)
+        .filter_map(|name| name.split('[').next())
+        .collect();
+    let whole: Vec<String> = whole.into_iter().map(str::to_owned).collect();
+    PYTHON
+        .replace("@library@", &library_name())
+        .replace("@digest@", &about.digest)
+        .replace("@abi@", &ABI_VERSION.to_string())
+        .replace("@supervised@", &format!("({})", more.join(", ")))
+        .replace("@whole@", &list(&whole))
 }
 
 /// Whether its memory can be that of a C header.
@@ -114,15 +161,14 @@ fn fits(machine: &Supervised) -> Result<(), Failure> {
 struct Exported {
     folder: String,
     files: Vec<String>,
+    /// The line that begins with them.
+    #[serde(skip)]
+    next: &'static str,
 }
 
 impl Outcome for Exported {
     fn text(&self) -> String {
-        format!(
-            "wrote {} to {}\n  cc -std=c11 -Wall example.c tick.c -L. -lcontroller -Wl,-rpath,'$ORIGIN' -o example\n",
-            self.files.join(", "),
-            self.folder
-        )
+        format!("wrote {} to {}\n  {}\n", self.files.join(", "), self.folder, self.next)
     }
 }
 

@@ -2,6 +2,8 @@
 //! with it.
 
 #![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
 mod design;
 mod plant;
 mod simulation;
@@ -9,12 +11,16 @@ mod study;
 
 use std::f64::consts::TAU;
 
-use crate::support::length;
 use simulation::{Run, settles};
-use specgen::stability::platform::{
+use specgen_compiler::stability::platform::{
     Adapting, ClosedLoop, Conditions, Law, ModalBasis, RestDynamics, Tuning, bandwidth_limit, closed_loop_of, design,
 };
 use study::{model, rest};
+
+/// How much of what only gains by length is run: the long length in the soak.
+fn length<T>(short: T, long: T) -> T {
+    if std::env::var_os("SPECGEN_SOAK").is_some() { long } else { short }
+}
 
 const EWMA: Law = Law::Feedforward(Adapting::Ewma);
 const PCC: Law = Law::Feedforward(Adapting::Pcc);

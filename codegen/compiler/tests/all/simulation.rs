@@ -2,7 +2,7 @@
 //! the plant, no matrix exponential, no eigenvalue.
 
 use nalgebra::{Matrix6, SymmetricEigen, Vector6};
-use specgen::stability::platform::RestDynamics;
+use specgen_compiler::stability::platform::RestDynamics;
 
 /// Everything that a run needs; gains in pose coordinates, weights per tick.
 #[derive(Debug, Clone)]

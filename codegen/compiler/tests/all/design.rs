@@ -1,11 +1,13 @@
 //! What the design gives, refuses and points out.
 
-use specgen::model::{AdaptationMode, Gains, Interaction, Model, TaskSpace};
-use specgen::stability::platform::{Design, Law, Tuning, describe, design};
+use specgen_compiler::stability::platform::{Design, Law, Tuning, describe, design};
+use specgen_language::model::{AdaptationMode, Gains, Interaction, Model, TaskSpace};
 
 use super::study::{model, rest};
 
-fn designed(edit: impl Fn(&mut Model, &mut TaskSpace)) -> Result<Design, Vec<specgen::diagnostic::Diagnostic>> {
+fn designed(
+    edit: impl Fn(&mut Model, &mut TaskSpace),
+) -> Result<Design, Vec<specgen_language::diagnostic::Diagnostic>> {
     let (mut model, mut task) = model();
     edit(&mut model, &mut task);
     design(&model, &task, &rest())

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use specgen::model::{
+use specgen_compiler::stability::platform::RestDynamics;
+use specgen_language::model::{
     ControlMode, DynamicsChoice, Environment, Frames, Interaction, Model, Probe, SetpointRules, TaskSpace,
 };
-use specgen::spec::{self, SpecSource};
-use specgen::stability::platform::RestDynamics;
+use specgen_language::spec::{self, SpecSource};
 
 /// Home state of the dynamics vectors.
 pub fn rest() -> RestDynamics {
