@@ -56,7 +56,10 @@ fn no_arrow_goes_up() {
 fn the_compiler_does_not_see_the_simulator() {
     for name in &FLOORS[..6] {
         let path = repository().join("codegen").join(name).join("Cargo.toml");
-        assert!(!std::fs::read_to_string(path).unwrap().contains("host-sim"), "{name}");
+        let manifest = std::fs::read_to_string(path).unwrap();
+        // Its tests may: margins are held against a simulation that shares nothing with them.
+        let shipped = manifest.split("[dev-dependencies]").next().unwrap();
+        assert!(!shipped.contains("host-sim"), "{name}");
     }
 }
 

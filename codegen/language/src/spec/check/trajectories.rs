@@ -33,14 +33,7 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
             if f.get(&path).is_some() || findings.mentions(&[&path]) {
                 continue;
             }
-            let key = keys::key(&path)?;
-            findings.add(
-                codes::MISSING_KEY,
-                &path,
-                f.table(&table).unwrap_or(0..0),
-                format!("`{path}` is missing: kind \"{kind}\" needs it"),
-                format!("write, in [[trajectory]]: {} = {}. {}", key.name, key.example, key.doc),
-            );
+            missing(f, findings, &table, &path, kind)?;
         }
     }
     Some(())
@@ -48,6 +41,20 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
 
 pub(super) fn names_differ(f: &Fields, findings: &mut Findings) -> Option<()> {
     differ(f, findings, "trajectory")
+}
+
+/// What a table of a repeated section lacks, which its kind needs.
+pub(super) fn missing(f: &Fields, findings: &mut Findings, table: &str, path: &str, kind: &str) -> Option<()> {
+    let key = keys::key(path)?;
+    let section = table.split('[').next()?;
+    findings.add(
+        codes::MISSING_KEY,
+        path,
+        f.table(table).unwrap_or(0..0),
+        format!("`{path}` is missing: kind \"{kind}\" needs it"),
+        format!("write, in [[{section}]]: {} = {}. {}", key.name, key.example, key.doc),
+    );
+    Some(())
 }
 
 /// No two tables of a repeated section have one name.

@@ -1,6 +1,6 @@
 //! Output lines: which keys go with which kind and axis, and where positions may lie.
 
-use super::trajectories::differ;
+use super::trajectories::{differ, missing};
 use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
 use crate::model::MAX_TRIGGERS;
@@ -79,15 +79,7 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
             if mentioned || paths.iter().any(|path| f.get(path).is_some()) {
                 continue;
             }
-            let [path, _] = paths;
-            let key = keys::key(&path)?;
-            findings.add(
-                codes::MISSING_KEY,
-                &path,
-                f.table(&table).unwrap_or(0..0),
-                format!("`{path}` is missing: kind \"{kind}\" needs it"),
-                format!("write, in [[trigger]]: {} = {}. {}", key.name, key.example, key.doc),
-            );
+            missing(f, findings, &table, &paths[0], kind)?;
         }
     }
     Some(())
