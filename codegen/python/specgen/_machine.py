@@ -154,7 +154,7 @@ class Machine:
         return played if isinstance(played, dict) else None
 
     def gains(self, **gains: float) -> dict[str, Any]:
-        """Gains in force; sets those that are given first, in SI: ``machine.gains(**{"ki[2]": 1e9})``, or a list for all axes. Those that
+        """Gains in force; sets those that are given first, in SI: ``machine.gains(**{"ki[2]": 1e9})``. Those that
         the margins of the spec do not bear raise `Error`."""
         words = [f"{name}={float(value)!r}" for name, value in gains.items()]
         found: dict[str, Any] = self.order(" ".join(["gains", *words]))

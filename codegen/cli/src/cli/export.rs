@@ -82,8 +82,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     match &arguments.kind {
         Kind::C(folder) => export(folder, ui, |machine| {
             fits(machine)?;
-            let sources = [("tick.c", TICK.to_owned()), ("example.c", EXAMPLE.to_owned())];
-            Ok((vec![("controller.h", header(machine)), sources[0].clone(), sources[1].clone()], COMPILE))
+            let [tick, example] = [TICK, EXAMPLE].map(str::to_owned);
+            Ok((vec![("controller.h", header(machine)), ("tick.c", tick), ("example.c", example)], COMPILE))
         }),
         Kind::Python(folder) => {
             export(folder, ui, |machine| Ok((vec![("controller.py", python(machine))], "python3 -i controller.py")))
