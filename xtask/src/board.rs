@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use serde_json::Value;
+use specgen_language::model::{Trigger, TriggerKind};
 use specgen_language::{SpecSource, spec};
 use specgen_toolchain::provision;
 
@@ -202,7 +203,9 @@ fn run(trial: &Trial, brief: bool) -> Result<(), String> {
     fs::write(trial.folder.join("wave.toml"), WAVE).map_err(failed)?;
     let mut session = Session::begin(trial)?;
     let motion = if brief { None } else { learnable(&trial.spec)? };
+    let has_input = !brief && has_triggers(&trial.spec, |trigger| trigger.kind == TriggerKind::Input)?;
     let operated = operate(trial, &mut session, brief)
+        .and_then(|()| if has_input { wait_for_edge(trial, &mut session) } else { Ok(()) })
         .and_then(|()| motion.as_ref().map_or(Ok(()), |motion| learn(trial, &mut session, motion)));
     let report = session.report()?;
     println!("{}: {}", trial.target, report.text);
@@ -219,7 +222,12 @@ fn run(trial: &Trial, brief: bool) -> Result<(), String> {
     let log = std::mem::take(&mut session.log);
     drop(session);
     replay(trial, "run.rec", &["--csv", "run.csv"])?;
-    if !brief && has_triggers(&trial.spec)? {
+    if has_input {
+        replay(trial, "edge.rec", &["--csv", "edge.csv"])?;
+        let ticks = triggers::started(&trial.folder.join("edge.csv"))?;
+        println!("{}: the input line rose in tick {}, what waited began in tick {}", trial.target, ticks[0], ticks[1]);
+    }
+    if !brief && has_triggers(&trial.spec, |trigger| trigger.kind != TriggerKind::Input)? {
         let edges = triggers::check(&trial.folder.join("run.csv"), &log)?;
         println!("{}: triggers, {edges} edges of pins in the ticks that the record has", trial.target);
         if edges < LEAST_EDGES {
@@ -267,12 +275,12 @@ fn corrected(table: &str) -> usize {
         .count()
 }
 
-/// Whether a machine of this spec has output lines.
-fn has_triggers(path: &Path) -> Result<bool, String> {
+/// Whether a machine of this spec has such a line.
+fn has_triggers(path: &Path, such: impl Fn(&Trigger) -> bool) -> Result<bool, String> {
     let source = SpecSource::read(path).map_err(|finding| finding.message)?;
     let (model, _) = spec::load(&source);
     let model = model.ok_or_else(|| format!("{} is refused", path.display()))?;
-    Ok(model.task_space.is_some_and(|task| !task.triggers.is_empty()))
+    Ok(model.task_space.is_some_and(|task| task.triggers.iter().any(such)))
 }
 
 /// A motion that is learned.
@@ -317,6 +325,28 @@ fn learn(trial: &Trial, session: &mut Session, motion: &Repeated) -> Result<(), 
         ("arm\nwait holding 600\nrun\nwait running 600\nset command=0\nwait arrived 600\nstatus", ": running"),
         (&play, STANDS),
         ("record stop\nrecord download pass.rec", "wrote "),
+        ("ramp-down\nwait disarmed 600\nstatus", "disarmed, amplifiers off"),
+    ] {
+        host.order(orders, words)?;
+    }
+    Ok(())
+}
+
+/// Lets a move wait for the input line, and the line rise.
+fn wait_for_edge(trial: &Trial, session: &mut Session) -> Result<(), String> {
+    let mut host = Host::of(session.command_of(trial, "operate"))?;
+    session.command("input low")?;
+    for (orders, words) in [
+        ("arm\nwait holding 600\nrun\nwait running 600\nwait arrived 600\nset command=hold\nstatus", ": running"),
+        ("record arm 400\nrecord trigger\non-edge move z=0.2um\non-edge", "waits for the edge"),
+    ] {
+        host.order(orders, words)?;
+    }
+    session.command("input high")?;
+    session.pass(10.0)?;
+    for (orders, words) in [
+        ("on-edge", "begun at the edge of tick "),
+        ("record stop\nrecord download edge.rec", "wrote "),
         ("ramp-down\nwait disarmed 600\nstatus", "disarmed, amplifiers off"),
     ] {
         host.order(orders, words)?;

@@ -22,6 +22,7 @@ use specgen_link::{Bytes, RecorderAction, Refusal, Request, WaveAction};
 use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
 
 mod clients;
+mod edge;
 mod gcs;
 mod host;
 mod learning;

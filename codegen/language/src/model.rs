@@ -30,7 +30,7 @@ pub use task_space::{
     ControlMode, DynamicsChoice, Environment, Frames, Gains, Interaction, LARGEST_GAIN, PaperPath, Probe,
     SetpointRules, TaskSpace, Trajectory, TrajectoryKind,
 };
-pub use trigger::{MAX_TRIGGERS, Trigger, TriggerDirection, TriggerKind};
+pub use trigger::{MAX_OUTPUTS, Trigger, TriggerDirection, TriggerKind};
 
 /// Every section, in the order of the reference. Sections that hold others come before them.
 pub const SECTIONS: &[Section] = &[

@@ -18,11 +18,13 @@ const LONGEST: f64 = 86_400.0;
 const WATCHED: f64 = 10.0;
 /// Rows after a trigger, if nothing else is said.
 const AFTER: u32 = 1000;
+/// What an edge of the input line may start.
+const EDGE_STARTS: &str = "move, jog, goto, play without a correction, or wave FILE";
 const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, \
                         move|jog AXIS=QUANTITY…, where, limits, can-i-go AXIS=QUANTITY… [speed=QUANTITY], frame [none | work|tool AXIS=QUANTITY…], mark NAME, goto NAME, \
                         play TRAJECTORY [correction=FILE machine=NAME], mode p|f|pf, gains [NAME=VALUE…], trigger LINE NAME=VALUE…, \
                         wait PHASE|arrived|SECONDS [TIMEOUT], config, config write SPEC, \
-                        record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, watch [EVERY [SECONDS [FILE]]], stop";
+                        record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, on-edge [drop | move … | jog … | goto … | play … | wave FILE], watch [EVERY [SECONDS [FILE]]], stop";
 
 /// One order.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,6 +96,12 @@ pub enum Order {
     Wave(PathBuf),
     /// End the wave under way.
     StopWave,
+    /// Say how it stands with the input line, and with what waits for its edge.
+    Edge,
+    /// Let nothing wait for the edge any more.
+    DropEdge,
+    /// Begin this at the next rising edge of the input line: a move, a trajectory, or a wave.
+    OnEdge(Box<Order>),
     /// Show samples of the running machine, or write them to a file.
     Watch {
         /// Ticks of a row; those of 0.1 s if it is not said.
@@ -250,6 +258,14 @@ impl Order {
             ["record", "download", file] => Self::Download(file.into()),
             ["wave", "stop"] => Self::StopWave,
             ["wave", file] => Self::Wave(file.into()),
+            ["on-edge"] => Self::Edge,
+            ["on-edge", "drop"] => Self::DropEdge,
+            ["on-edge", ref rest @ ..] => match Self::parse(&rest.join(" "))? {
+                Some(
+                    order @ (Self::Move { .. } | Self::Goto(_) | Self::Play { correction: None, .. } | Self::Wave(_)),
+                ) => Self::OnEdge(Box::new(order)),
+                _ => return Err(format!("`{line}`: an edge starts {EDGE_STARTS}")),
+            },
             ["watch", ref rest @ ..] if rest.len() <= 3 => Self::watch(rest)?,
             ["stop"] => Self::Stop,
             _ => return Err(format!("`{line}` is none of: {COMMANDS}")),
@@ -361,6 +377,10 @@ mod tests {
             ("record download run.rec", Some(Order::Download("run.rec".into()))),
             ("wave stop", Some(Order::StopWave)),
             ("stop", Some(Order::Stop)),
+            ("on-edge", Some(Order::Edge)),
+            ("on-edge drop", Some(Order::DropEdge)),
+            ("on-edge goto zero", Some(Order::OnEdge(Box::new(Order::Goto("zero".into()))))),
+            ("on-edge wave w.toml", Some(Order::OnEdge(Box::new(Order::Wave("w.toml".into()))))),
             ("watch", Some(Order::Watch { every: None, seconds: 10.0, file: None })),
             ("watch 20 0.5 w.csv", Some(Order::Watch { every: Some(20), seconds: 0.5, file: Some("w.csv".into()) })),
             ("wave w.toml", Some(Order::Wave("w.toml".into()))),
@@ -397,6 +417,10 @@ mod tests {
             ("trigger 0 kind=hold", "expected off, position"),
             ("trigger 0 step=1um", "expected a number in SI, found `1um`"),
             ("arm now", "is none of"),
+            ("on-edge arm", "`on-edge arm`: an edge starts move, jog"),
+            ("on-edge wave stop", "an edge starts move, jog"),
+            ("on-edge on-edge goto zero", "an edge starts move, jog"),
+            ("on-edge move z=1", "z wants a unit of"),
             ("watch 0", "`watch 0`: expected ticks of a row, 1 to 1000000"),
             ("watch 1 0", "expected a time of more than 0"),
             ("watch 1 1 a b", "is none of"),

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use host_sim::description::Description;
 use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::{
-    Health, Identity, KNOT, KNOTS, PassAction, PassStatus, RecorderAction, RecorderStatus, Reply, Request, Status,
-    WORDS, WaveAction, put_words,
+    EdgeStatus, Health, Identity, KNOT, KNOTS, PassAction, PassStatus, RecorderAction, RecorderStatus, Reply, Request,
+    Status, WORDS, WaveAction, put_words,
 };
 use specgen_runtime::playback::Knot;
 use specgen_runtime::supervisor;
@@ -242,6 +242,21 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
+    /// Has a command wait for the rising edge of the input line.
+    pub fn command_on_edge(&mut self, words: &[u64]) -> Result<(), ClientError> {
+        let mut bytes = [0; WORDS * size_of::<u64>()];
+        let words = put_words(words, &mut bytes).ok_or(ClientError::TooLong)?;
+        self.done(&Request::SetpointOnEdge { words })
+    }
+
+    /// How it stands with the input line; what waits for its edge is dropped first, if that is asked for.
+    pub fn edge(&mut self, drop: bool) -> Result<EdgeStatus, ClientError> {
+        match self.client.ask(&Request::Edge { drop })? {
+            Reply::Edge(status) => Ok(status),
+            _ => Err(ClientError::Unexpected),
+        }
+    }
+
     /// Words of a move to `pose`, m and rad.
     ///
     /// # Errors
@@ -314,10 +329,12 @@ impl<P: Port> Session<P> {
         Ok(specgen_link::Bytes(&bytes).knots().ok_or(ClientError::Unexpected)?.collect())
     }
 
-    /// Starts the wave of these words. Where it ends, at its center, is what is commanded from then on.
-    pub fn start_wave(&mut self, words: &[u64], center: &[u64; 6]) -> Result<(), ClientError> {
+    /// Starts the wave of these words, at once or at the rising edge of the input line. Where it ends, at its center, is what is commanded from
+    /// then on.
+    pub fn start_wave(&mut self, words: &[u64], center: &[u64; 6], on_edge: bool) -> Result<(), ClientError> {
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-        self.done(&Request::Wave { action: WaveAction::Start, words: specgen_link::Bytes(&bytes) })?;
+        let action = if on_edge { WaveAction::StartOnEdge } else { WaveAction::Start };
+        self.done(&Request::Wave { action, words: specgen_link::Bytes(&bytes) })?;
         let first = self.free_names().iter().position(|name| name == "setpoint[0]").unwrap_or_default();
         for (slot, word) in self.command.iter_mut().skip(first).zip(center) {
             *slot = *word;

@@ -5,6 +5,7 @@ use controller::supervised::{CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machi
 use controller::{Real, passes, sensing, triggers};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges, Lines};
 use specgen_link::Silence;
+use specgen_runtime::pending::EDGE;
 
 use crate::exchange::{self, Exchange, Orders};
 use crate::report::Report;
@@ -64,6 +65,9 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         L::COUNT.checked_sub(triggers::LINES).is_some(),
         "the spec has more [[trigger]] than this board has lines for"
     );
+    /// So has its input.
+    const HAS_INPUT: () =
+        assert!(L::INPUT || !triggers::INPUT, "the spec has a [[trigger]] of kind \"input\", this board no input line");
 
     /// At power-up, before [`Self::start`]: its converters, and a line for each trigger of the spec, `()` for none. `machine` is at reset;
     /// `intact`: the result of `controller::integrity`.
@@ -71,6 +75,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
     pub const fn with_lines(gauges: G, amplifiers: A, lines: L, machine: &'m mut Machine, intact: bool) -> Self {
         let () = Self::SAME_CODES;
         let () = Self::LINE_EACH;
+        let () = Self::HAS_INPUT;
         Self {
             gauges,
             amplifiers,
@@ -121,7 +126,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             self.stand_by(exchange, noticed);
             return false;
         }
-        let Exchange { orders, config, report, silence, recorder, orphaned, .. } = exchange;
+        let Exchange { orders, config, report, silence, recorder, orphaned, pending, .. } = exchange;
         let acknowledged = orders.request == Request::Acknowledge && self.request != Request::Acknowledge;
         self.request = orders.request;
         let restart = acknowledged && !report.amplifier_on;
@@ -162,7 +167,14 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             }
         };
 
-        let input = take(&mut self.input, orders, &readings, request, events);
+        // Sampled beside the gauges; none of the supervisor's business.
+        let rose = triggers::INPUT
+            && pending.sense(self.lines.input().map_err(|fault| {
+                report.converter(fault);
+                self.pending |= CONVERTER;
+            }));
+        let seen = if rose { events | EDGE } else { events };
+        let input = take(&mut self.input, orders, &readings, request, seen);
         let output = exchange::step(config, self.machine, input);
 
         // Off before the codes change, on only after they are out.

@@ -2,12 +2,12 @@
 
 use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
 use controller::waves::{self, Wave};
-use controller::{COMMAND_WORDS, CONFIG_WORDS, DESCRIPTION, PLACE_WORDS, Real, passes, place_words};
+use controller::{COMMAND_WORDS, CONFIG_WORDS, DESCRIPTION, PLACE_WORDS, Real, passes, place_words, triggers};
 use specgen_link::lockstep::{Session, piece};
 use specgen_link::samples::Block;
 use specgen_link::{
-    Bytes, Counted, Counters, Device, Health, Identity, KNOT, KNOTS, PassAction, PassStatus, RecorderAction, Refusal,
-    Reply, Request, Status, WaveAction, put_knots,
+    Bytes, Counted, Counters, Device, EdgeStatus, Health, Identity, KNOT, KNOTS, PassAction, PassStatus,
+    RecorderAction, Refusal, Reply, Request, Status, WaveAction, put_knots,
 };
 use specgen_runtime::learning::Settings as Plan;
 use specgen_runtime::pass::{Course, Player};
@@ -16,7 +16,7 @@ use specgen_runtime::wave::{self, Settings};
 
 use crate::catch_up::catch_up;
 use crate::download::{self, Download};
-use crate::exchange::{Access, Exchange};
+use crate::exchange::{Access, Awaited, Exchange};
 use crate::gather::with_rows;
 use crate::recording;
 use crate::report::Probes;
@@ -70,6 +70,7 @@ impl Visit<'_, '_> {
             // A host that comes anew has asked for nothing yet.
             exchange.orders.request = Wanted::None;
             exchange.leave_lockstep(machine);
+            exchange.cancel_awaited();
             if let Some(wave) = &mut exchange.wave {
                 wave.stop();
             }
@@ -152,18 +153,41 @@ impl Visit<'_, '_> {
     }
 
     #[inline(never)]
-    fn command(&mut self, words: Bytes<'_>) -> Reply<'static> {
+    fn command(&mut self, words: Bytes<'_>, on_edge: bool) -> Reply<'static> {
         let mut command = [0; COMMAND_WORDS];
         if !words.read_words(&mut command) {
             return Reply::Refused(Refusal::Length { expected: COMMAND_WORDS as u16 });
         }
+        if on_edge {
+            return self.wait_for_edge(Awaited::Command(command), None);
+        }
         self.order(|exchange| {
             let free = !exchange.is_engaged();
             if free {
+                exchange.cancel_awaited();
                 exchange.orders.command = command;
             }
             free
         })
+    }
+
+    fn wait_for_edge(&mut self, awaited: Awaited, wave: Option<Wave>) -> Reply<'static> {
+        let mut done = Ok(());
+        (self.with)(&mut |exchange, _| done = exchange.wait_for_edge(awaited, wave));
+        done.map_or_else(Reply::Refused, |()| Reply::Done)
+    }
+
+    fn edge(&mut self, drop: bool) -> Reply<'static> {
+        let mut reply = Reply::Refused(Refusal::Unsupported);
+        (self.with)(&mut |exchange, _| {
+            if drop {
+                exchange.cancel_awaited();
+            }
+            let pending = &exchange.pending;
+            let (stage, edges, tick) = (pending.stage().word() as u8, pending.edges(), pending.tick());
+            reply = Reply::Edge(EdgeStatus { stage, edges, tick });
+        });
+        reply
     }
 
     #[inline(never)]
@@ -215,8 +239,10 @@ impl Visit<'_, '_> {
 
     fn wave(&mut self, action: WaveAction, words: Bytes<'_>) -> Reply<'static> {
         match action {
-            WaveAction::Start => self.start_wave(words),
+            WaveAction::Start => self.start_wave(words, false),
+            WaveAction::StartOnEdge => self.start_wave(words, true),
             WaveAction::Stop => self.order(|exchange| {
+                exchange.cancel_awaited();
                 if let Some(wave) = &mut exchange.wave {
                     wave.stop();
                 }
@@ -227,23 +253,26 @@ impl Visit<'_, '_> {
 
     /// Checks a wave while ticks go on, then hands it over.
     #[inline(never)]
-    fn start_wave(&mut self, bytes: Bytes<'_>) -> Reply<'static> {
+    fn start_wave(&mut self, bytes: Bytes<'_>, on_edge: bool) -> Reply<'static> {
         let mut limits = None;
         (self.with)(&mut |exchange, _| limits = Some(waves::limits(exchange.settings())));
         let Some(limits) = limits else { return Reply::Refused(Refusal::State) };
         match &settings(bytes) {
             None => Reply::Refused(Refusal::Length { expected: wave::WORDS as u16 }),
             Some(Err(refused)) => Reply::Refused(refusal(*refused)),
-            Some(Ok(settings)) => self.begin_wave(limits, settings),
+            Some(Ok(settings)) => self.begin_wave(limits, settings, on_edge),
         }
     }
 
     /// Hands a wave over, if the machine runs and none is under way.
     #[inline(never)]
-    fn begin_wave(&mut self, limits: wave::Limits<Real>, settings: &Settings<Real>) -> Reply<'static> {
+    fn begin_wave(&mut self, limits: wave::Limits<Real>, settings: &Settings<Real>, on_edge: bool) -> Reply<'static> {
         let mut wave = Wave::new(limits);
         if let Err(refused) = wave.set(settings) {
             return Reply::Refused(refusal(refused));
+        }
+        if on_edge {
+            return self.wait_for_edge(Awaited::Wave, Some(wave));
         }
         wave.start();
         let center = settings.center;
@@ -257,6 +286,7 @@ impl Visit<'_, '_> {
                     Err(_) => Reply::Refused(Refusal::State),
                 };
                 if reply == Reply::Done {
+                    exchange.cancel_awaited();
                     exchange.wave = Some(wave);
                 }
             }
@@ -427,7 +457,10 @@ impl Device for Visit<'_, '_> {
             Request::Health => self.health(),
             Request::Place => self.place(),
             Request::Supervise { request } => self.supervise(request),
-            Request::Setpoint { words } => self.command(words),
+            Request::Setpoint { words } => self.command(words, false),
+            Request::SetpointOnEdge { words } => self.command(words, true),
+            Request::Edge { .. } if !triggers::INPUT => Reply::Refused(Refusal::Unsupported),
+            Request::Edge { drop } => self.edge(drop),
             Request::ReadConfig => self.config(),
             Request::WriteConfig { words } => {
                 let Desk { stopwatch, costs, session, .. } = &mut *self.desk;

@@ -4,10 +4,12 @@ use controller::snapshot::recorder::Recorder;
 use controller::supervised::{Machine, MachineInput, MachineOutput, Phase, Request, supervise};
 use controller::supervision::HOST_TICKS;
 use controller::waves::{self, Wave};
-use controller::{COMMAND_WORDS, Config, Real, passes};
+use controller::{COMMAND_WORDS, Config, Real, passes, triggers};
 use specgen_link::{PassStatus, Refusal, Silence};
 use specgen_runtime::pass::{Course, Player};
+use specgen_runtime::pending::Pending;
 use specgen_runtime::playback::Knot;
+use specgen_runtime::setpoint::BUSY;
 use specgen_runtime::wave::Stage;
 
 use crate::recording::{Kept, recorder};
@@ -27,6 +29,15 @@ pub struct Orders {
     pub command: [u64; COMMAND_WORDS],
     /// Of the supervisor; it holds for as long as it stands here.
     pub request: Request,
+}
+
+/// What waits for the edge of the input line.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Awaited {
+    /// This command.
+    Command([u64; COMMAND_WORDS]),
+    /// The wave of [`Exchange::wave`], which has not begun.
+    Wave,
 }
 
 /// Orders one way, reports the other. Whoever holds it holds off the tick: copy and let go.
@@ -54,6 +65,8 @@ pub struct Exchange {
     pub(crate) kept: Option<&'static mut Kept>,
     /// Makes the set-points while it is under way.
     pub wave: Option<Wave>,
+    /// The input line, and what waits for it.
+    pub(crate) pending: Pending<Awaited>,
     /// Corrects the motion while a pass is under way, where a memory was given for it.
     pub player: Option<Player<'static, Real>>,
     /// How the player stands while the background has it, which learns.
@@ -89,6 +102,7 @@ impl Exchange {
             recorder: None,
             kept: None,
             wave: None,
+            pending: Pending::new(),
             player: None,
             away: None,
             samples: None,
@@ -170,17 +184,71 @@ impl Exchange {
                 recorder.settings_changed();
             }
         }
+        if triggers::INPUT {
+            self.begin_awaited();
+        }
         self.advance_wave();
         if passes::POSSIBLE {
             self.advance_pass();
         }
     }
 
+    /// Begins what waited, with the tick that follows that of the edge. A machine that does not run waits for nothing.
+    #[inline(never)]
+    fn begin_awaited(&mut self) {
+        if self.report.phase != Phase::Running {
+            self.cancel_awaited();
+        }
+        let Some(awaited) = self.pending.due() else { return };
+        let (free, status) = (!self.is_engaged() && self.report.status & BUSY == 0, self.report.status);
+        let begun = match (awaited, &mut self.wave) {
+            (Awaited::Command(command), _) if free => {
+                self.orders.command = command;
+                true
+            }
+            (Awaited::Wave, Some(wave)) if free => {
+                let limits = waves::limits(&self.config);
+                let may = waves::may_begin(status, &self.orders.command, wave.center(), &limits).is_ok();
+                if may {
+                    wave.start();
+                }
+                may
+            }
+            _ => false,
+        };
+        self.pending.settle(self.report.tick - 1, begun);
+    }
+
+    /// Nothing waits for the edge any more.
+    pub(crate) fn cancel_awaited(&mut self) {
+        self.pending.cancel();
+        if !self.waves() {
+            self.wave = None;
+        }
+    }
+
+    /// Waits for the edge, in place of what waited.
+    ///
+    /// # Errors
+    /// The machine does not run at rest, or plays something; there is no input line.
+    pub(crate) fn wait_for_edge(&mut self, awaited: Awaited, wave: Option<Wave>) -> Result<(), Refusal> {
+        if !triggers::INPUT {
+            return Err(Refusal::Unsupported);
+        }
+        let rests = self.report.phase == Phase::Running && self.report.status & BUSY == 0;
+        if !rests || self.in_lockstep() || self.is_engaged() {
+            return Err(Refusal::State);
+        }
+        self.wave = wave;
+        self.pending.wait(awaited);
+        Ok(())
+    }
+
     /// Writes the set-point of a wave into the command, from where it stays when the wave has ended; only a running machine
     /// follows one. Not inlined: what it works with is done with before the law needs the stack.
     #[inline(never)]
     fn advance_wave(&mut self) {
-        let Some(wave) = &mut self.wave else { return };
+        let Some(wave) = self.wave.as_mut().filter(|wave| wave.stage() != Stage::Idle) else { return };
         if self.report.phase != Phase::Running {
             self.wave = None;
             return;
@@ -204,6 +272,7 @@ impl Exchange {
         if !player.begin(course) {
             return Err(Refusal::Word { index: 0 });
         }
+        self.cancel_awaited();
         self.advance_pass();
         Ok(())
     }

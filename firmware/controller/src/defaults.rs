@@ -60,5 +60,8 @@ pub(crate) const ENVIRONMENT_REST: [Real; 6] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 /// Output lines; from `trigger`.
 pub const LINES: usize = 0;
 
-/// What each shows.
+/// Whether there is an input line; from `trigger`.
+pub const INPUT: bool = false;
+
+/// What each output shows.
 pub(crate) const TRIGGERS: [Line<Real>; LINES] = [];

@@ -1,19 +1,30 @@
-//! Output lines of triggers.
+//! Digital lines of triggers.
 
-use embedded_hal::digital::OutputPin;
+use embedded_hal::digital::{InputPin, OutputPin};
 
 use crate::Fault;
 
-/// Digital outputs that a controller sets in every tick.
+/// Digital outputs that a controller sets in every tick, and an input that it samples.
 pub trait Lines {
     /// How many there are.
     const COUNT: usize;
+    /// Whether there is an input.
+    const INPUT: bool = false;
 
     /// Sets line k high where bit k of `high` is set, else low; lines beyond [`Self::COUNT`] are left out.
     ///
     /// # Errors
     /// [`Fault::Pin`] if a line cannot be driven.
     fn set(&mut self, high: u32) -> Result<(), Fault>;
+
+    /// Whether the input is high; low without one.
+    ///
+    /// # Errors
+    /// [`Fault::Pin`] if it cannot be read.
+    #[inline]
+    fn input(&mut self) -> Result<bool, Fault> {
+        Ok(false)
+    }
 }
 
 /// No lines.
@@ -41,5 +52,21 @@ impl<PIN: OutputPin, const N: usize> Lines for [Option<PIN>; N] {
             left >>= 1;
         }
         Ok(())
+    }
+}
+
+/// Outputs, and a pin of the input, which may be left out.
+impl<L: Lines, PIN: InputPin> Lines for (L, Option<PIN>) {
+    const COUNT: usize = L::COUNT;
+    const INPUT: bool = true;
+
+    #[inline]
+    fn set(&mut self, high: u32) -> Result<(), Fault> {
+        self.0.set(high)
+    }
+
+    #[inline]
+    fn input(&mut self) -> Result<bool, Fault> {
+        self.1.as_mut().map_or(Ok(false), |pin| pin.is_high().map_err(|_| Fault::Pin))
     }
 }

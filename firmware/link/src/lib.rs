@@ -31,8 +31,8 @@ pub use counters::Counters;
 pub use endpoint::{Device, Endpoint, telemetry};
 pub use frame::{Damage, FRAME, Header, Kind, MESSAGE, VERSION};
 pub use message::{
-    Counted, Health, Identity, PassAction, PassStatus, RecorderAction, RecorderStatus, Refusal, Reply, Request, Stage,
-    Status, WaveAction,
+    Counted, EdgeStatus, Health, Identity, PassAction, PassStatus, RecorderAction, RecorderStatus, Refusal, Reply,
+    Request, Stage, Status, WaveAction,
 };
 pub use receiver::Receiver;
 pub use silence::Silence;

@@ -70,7 +70,7 @@ pub enum Request<'a> {
     Wave {
         /// What the wave generator is to do.
         action: WaveAction,
-        /// Words of its settings, for [`WaveAction::Start`].
+        /// Words of its settings, for [`WaveAction::Start`] and [`WaveAction::StartOnEdge`].
         #[serde(borrow)]
         words: Bytes<'a>,
     },
@@ -111,6 +111,18 @@ pub enum Request<'a> {
     Correction {
         /// First byte wanted.
         offset: u32,
+    },
+    /// As [`Request::Setpoint`], from the tick after the rising edge of the input line on. One order waits, the last one; any that is in force
+    /// at once drops it. The machine runs, at rest then and at the edge. Answered by [`Reply::Done`].
+    SetpointOnEdge {
+        /// The words.
+        #[serde(borrow)]
+        words: Bytes<'a>,
+    },
+    /// Answered by [`Reply::Edge`].
+    Edge {
+        /// Drop what waits, before the answer.
+        drop: bool,
     },
 }
 
@@ -164,6 +176,8 @@ pub enum WaveAction {
     Start,
     /// Come to rest.
     Stop,
+    /// As [`WaveAction::Start`], but begin as [`Request::SetpointOnEdge`] says.
+    StartOnEdge,
 }
 
 /// From the device.
@@ -238,6 +252,8 @@ pub enum Reply<'a> {
         #[serde(borrow)]
         rows: Bytes<'a>,
     },
+    /// How it stands with the input line.
+    Edge(EdgeStatus),
 }
 
 /// Why a request was not carried out.
@@ -378,6 +394,17 @@ pub struct RecorderStatus {
     pub ticks: u32,
     /// Most that it can hold.
     pub capacity: u32,
+}
+
+/// How it stands with the input line, and with what waits for its edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct EdgeStatus {
+    /// Number of the `pending::Stage` of the last order.
+    pub stage: u8,
+    /// Rising edges since power-up.
+    pub edges: u32,
+    /// Tick of the edge at which that order began or was refused.
+    pub tick: u64,
 }
 
 /// How a player of passes stands.

@@ -5,15 +5,17 @@ use std::collections::VecDeque;
 
 use controller::waves::{self, Wave};
 use controller::{Config, PLACE_WORDS, Real, passes};
-use specgen_link::Health;
+use specgen_link::{EdgeStatus, Health};
 use specgen_runtime::pass::Course;
+use specgen_runtime::pending::{self, EDGE};
 use specgen_runtime::playback::Knot;
 use specgen_runtime::wave::Settings;
 
 use crate::capture::{CAPACITY, Capture};
-use crate::handover::{Order, Player, Row};
+use crate::handover::{Awaited, Order, Player, Row};
 use crate::operator::{Operator, Said};
 use crate::passes::Passes;
+use crate::words::Command;
 
 /// Orders that may wait for room in the ring: the loop takes one a tick.
 const MOST_ORDERS: usize = 64;
@@ -44,6 +46,10 @@ pub struct Console {
     number: u32,
     /// Number of the order that began the last wave.
     wave: Option<u32>,
+    /// How it stands with the input line.
+    pub edge: EdgeStatus,
+    /// Number of the last order that is to wait for it, and its command; none for a wave.
+    awaited: Option<(u32, Option<Command>)>,
 }
 
 impl Console {
@@ -62,6 +68,8 @@ impl Console {
             orders: VecDeque::new(),
             number: 0,
             wave: None,
+            edge: EdgeStatus { stage: pending::Stage::None.word() as u8, edges: 0, tick: 0 },
+            awaited: None,
         }
     }
 
@@ -69,9 +77,23 @@ impl Console {
     pub fn update(&mut self, row: &Row, said: Said) {
         self.said = Some(said);
         self.place = row.place;
-        self.events |= row.input.events;
+        self.events |= row.input.events & !EDGE;
+        self.edge = row.edge;
         self.capture.update(row.recorded, row.triggered);
-        if !said.waving && self.wave.is_some_and(|number| said.orders.wrapping_sub(number).cast_signed() >= 0) {
+        let taken = |number: u32| said.orders.wrapping_sub(number).cast_signed() >= 0;
+        if let Some((number, command)) = self.awaited.filter(|(number, _)| taken(*number)) {
+            let stage = pending::Stage::from_word(u64::from(row.edge.stage));
+            match (stage, command) {
+                (Some(pending::Stage::Waiting), _) => {}
+                (Some(pending::Stage::Begun), Some(command)) => self.operator.has_begun_at_edge(&command),
+                (Some(pending::Stage::Begun), None) => self.wave = Some(number),
+                _ => {}
+            }
+            if stage != Some(pending::Stage::Waiting) {
+                self.awaited = None;
+            }
+        }
+        if !said.waving && self.wave.is_some_and(taken) {
             self.wave = None;
         }
     }
@@ -100,7 +122,7 @@ impl Console {
     ///
     /// # Errors
     /// The machine does not run, or plays something else; a wave or a pass is under way; the word of the axis that would go beyond its limits.
-    pub fn start_wave(&mut self, settings: &Settings<Real>) -> Result<(), No> {
+    pub fn start_wave(&mut self, settings: &Settings<Real>, on_edge: bool) -> Result<(), No> {
         let limits = waves::limits(&self.config);
         let running = self.said.filter(|said| said.phase == controller::supervised::Phase::Running);
         let Some(said) = running.filter(|_| !self.is_engaged()) else { return Err(No::State) };
@@ -109,8 +131,35 @@ impl Console {
         // What is wanted when it is over goes first.
         self.operator.rest_at(&settings.center);
         self.wish();
-        self.wave = Some(self.order(Order::Wave(*settings)));
+        if on_edge {
+            let number = self.order(Order::Await(Awaited::Wave(*settings)));
+            self.awaited = Some((number, None));
+        } else {
+            self.wave = Some(self.order(Order::Wave(*settings)));
+        }
         Ok(())
+    }
+
+    /// Has a command wait for the edge of the input line.
+    ///
+    /// # Errors
+    /// The machine does not run at rest; a wave or a pass is under way.
+    pub fn command_on_edge(&mut self, command: Command) -> Result<(), No> {
+        let rests = self.said.is_some_and(|said| {
+            said.phase == controller::supervised::Phase::Running && said.status & specgen_runtime::setpoint::BUSY == 0
+        });
+        if !rests || self.is_engaged() {
+            return Err(No::State);
+        }
+        self.wish();
+        let number = self.order(Order::Await(Awaited::Command(command)));
+        self.awaited = Some((number, Some(command)));
+        Ok(())
+    }
+
+    /// Nothing waits for the edge any more.
+    pub fn stop_waiting(&mut self) {
+        self.order(Order::StopWaiting);
     }
 
     /// Brings the wave to rest, if there is one.

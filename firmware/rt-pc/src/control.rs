@@ -17,6 +17,7 @@ use controller::{Config, LEGS, Real, place_words, triggers};
 use specgen_rt::account::{Account, Stamps};
 use specgen_rt::clock::{self, Usage};
 use specgen_rt::{allocation, scheduling};
+use specgen_runtime::pending::EDGE;
 use specgen_runtime::supervisor::OF_GAUGES;
 
 use crate::devices::Device;
@@ -100,6 +101,12 @@ impl<D: Device> Loop<'_, D> {
                 // The last codes stay: an event says that they are old.
                 Err(_) => broken = true,
             }
+            let mut rose = false;
+            if triggers::INPUT {
+                let line = self.device.input();
+                broken |= line.is_err();
+                rose = setpoints.sense(line);
+            }
             let usage = Usage::of_this_thread();
             let read = clock::now();
 
@@ -109,7 +116,9 @@ impl<D: Device> Loop<'_, D> {
             let command = setpoints.next(phase, &self.config);
             let (gauge, wrench) =
                 (codes.map(|code| sensing::CONVERTER.reading(code)), self.device.wrench().map(|value| value as Real));
-            let input = MachineInput::measured(&command, &gauge, &wrench, setpoints.request(), events);
+            // None of the supervisor's business, and in every record.
+            let seen = if rose { events | EDGE } else { events };
+            let input = MachineInput::measured(&command, &gauge, &wrench, setpoints.request(), seen);
             let output = supervise(&self.config, &mut machine, &input);
             let computed = clock::now();
 
@@ -148,9 +157,13 @@ impl<D: Device> Loop<'_, D> {
                 orders: 0,
                 opens: false,
                 waving: setpoints.waving(),
+                edge: setpoints.edge(),
                 recorded: None,
                 triggered: false,
             });
+            if triggers::INPUT {
+                setpoints.begin_awaited(tick, phase, output.tick.status, &self.config);
+            }
             count += 1;
             let mut configured = false;
             if let Ok(order) = orders.pop() {
@@ -160,6 +173,8 @@ impl<D: Device> Loop<'_, D> {
                     Order::Configure(config) => (self.config, configured) = (config, true),
                     Order::Wave(settings) => setpoints.start(&settings, &self.config),
                     Order::StopWave => setpoints.stop(),
+                    Order::Await(awaited) => setpoints.wait_for_edge(awaited),
+                    Order::StopWaiting => setpoints.stop_waiting(),
                     Order::Pass(player) => setpoints.pass(player),
                     Order::AbortPass => setpoints.abort_pass(),
                     Order::Tape(tape) => keeper.take(tape, count),

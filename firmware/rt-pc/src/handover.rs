@@ -7,7 +7,7 @@ use controller::snapshot::recorder::{self, Recorder};
 use controller::supervised::{MachineInput, Request};
 use controller::{Config, PLACE_WORDS, Real};
 use rtrb::{Consumer, Producer, RingBuffer};
-use specgen_link::Health;
+use specgen_link::{EdgeStatus, Health};
 use specgen_runtime::{pass, wave};
 
 use crate::words::Command;
@@ -48,6 +48,8 @@ pub struct Row {
     pub opens: bool,
     /// Whether the set-point is a wave's.
     pub waving: bool,
+    /// How it stands with the input line.
+    pub edge: EdgeStatus,
     /// Rows that the recorder of the loop holds, if it has one.
     pub recorded: Option<u64>,
     /// Whether that recorder has seen its trigger.
@@ -65,8 +67,18 @@ pub struct Snapshot {
 /// What the operator wants from the next tick on: the words that are his, and the request.
 #[derive(Debug, Clone, Copy)]
 pub struct Wish {
-    pub command: Command,
+    /// None where only the request is another.
+    pub command: Option<Command>,
     pub request: Request,
+}
+
+/// What waits for the edge of the input line.
+// As orders: a box would have to be released by the real-time thread.
+#[allow(clippy::large_enum_variant)]
+#[derive(Debug, Clone, Copy)]
+pub enum Awaited {
+    Command(Command),
+    Wave(wave::Settings<Real>),
 }
 
 /// Something for the loop to do between two ticks.
@@ -79,6 +91,10 @@ pub enum Order {
     /// A wave begins, if none is under way.
     Wave(wave::Settings<Real>),
     StopWave,
+    /// To begin at the edge, in place of what waited.
+    Await(Awaited),
+    /// Nothing waits any more.
+    StopWaiting,
     /// The pass that this player was told begins, if no wave is under way.
     Pass(Player),
     /// End the pass under way.

@@ -85,7 +85,8 @@ fn open(options: &Options) -> Result<(), Failure> {
     match &options.hardware {
         options::Hardware::Simulated(name) => {
             let path = exchange::path_of(name).map_err(|text| Failure::Usage(format!("--sim: {text}")))?;
-            let device = Simulated::open(&path, options.sim_timeout);
+            let edges = options.sim_edge_every.zip(words::period()).map(|(every, period)| every.div_ceil(period));
+            let device = Simulated::open(&path, options.sim_timeout, edges);
             run(options, &mut device.map_err(Failure::Environment)?)
         }
         #[cfg(feature = "comedi")]

@@ -95,7 +95,9 @@ pub struct Operator {
     assignments: Vec<(usize, u64)>,
     /// Why the plan could not be carried out.
     pub failure: Option<String>,
+    /// Since the last wish.
     changed: bool,
+    commanded: bool,
     owner: Owner,
     requests: u64,
     /// The host from which the orders were taken last.
@@ -117,6 +119,7 @@ impl Operator {
             assignments: Vec::new(),
             failure: None,
             changed: true,
+            commanded: true,
             owner: Owner::Here,
             requests: 0,
             evicted: None,
@@ -160,6 +163,7 @@ impl Operator {
             (Step::Arming, Phase::Running) | (Step::Starting, Phase::Running) => {
                 for (place, word) in std::mem::take(&mut self.assignments) {
                     self.command[place] = word;
+                    self.commanded = true;
                 }
                 self.go(Step::Playing, Request::None, now);
             }
@@ -300,7 +304,13 @@ impl Operator {
     pub fn set_by_link(&mut self, words: specgen_link::Bytes<'_>) -> bool {
         let fits = words.read_words(&mut self.command);
         self.changed |= fits;
+        self.commanded |= fits;
         fits
+    }
+
+    /// What waited for the edge has begun, and is what is commanded.
+    pub fn has_begun_at_edge(&mut self, command: &Command) {
+        self.command = *command;
     }
 
     /// The command as it is wanted.
@@ -312,18 +322,19 @@ impl Operator {
     /// What is wanted once a wave about `center` has come to rest: to stay there.
     pub fn rest_at(&mut self, center: &[Real; 6]) {
         waves::rest(center, &mut self.command);
-        self.changed = true;
+        (self.changed, self.commanded) = (true, true);
     }
 
     /// A pass has begun this trajectory: it is what is wanted until another order.
     pub fn has_begun(&mut self, trajectory: u32) {
         passes::begin(trajectory, &mut self.command);
-        self.changed = true;
+        (self.changed, self.commanded) = (true, true);
     }
 
     /// What is to be sent to the loop, if it changed since the last call.
     pub fn wish(&mut self) -> Option<Wish> {
-        std::mem::take(&mut self.changed).then_some(Wish { command: self.command, request: self.request })
+        let command = std::mem::take(&mut self.commanded).then_some(self.command);
+        std::mem::take(&mut self.changed).then_some(Wish { command, request: self.request })
     }
 
     fn go(&mut self, step: Step, request: Request, now: u64) {
@@ -387,7 +398,8 @@ mod tests {
         operator.update(&said(Phase::Running, true), 2);
         let wish = operator.wish().unwrap();
         let index = place("setpoint[0]").unwrap();
-        assert_eq!((wish.request, wish.command[index]), (Request::None, word_of(index, 1e-6).unwrap()));
+        assert_eq!(wish.request, Request::None);
+        assert_eq!(wish.command.unwrap()[index], word_of(index, 1e-6).unwrap());
         operator.ramp_down(3);
         assert_eq!(operator.wish().unwrap().request, Request::RampDown);
         operator.update(&said(Phase::RampingDown, true), 4);

@@ -18,6 +18,7 @@ Machine
   --comedi-out-range LOW:HIGH   voltages that the range of an amplifier's output must hold (default -10:10)
   --comedi-library FILE         another libcomedi than the system's
   --sim-timeout MS     how long a reading of the simulated machine may take before it counts as broken (default 20)
+  --sim-edge-every S   the input line of the simulated machine rises every S seconds (default: never)
 
 Time
   --seconds S          ramp down and end after S seconds (default: at a signal)
@@ -62,6 +63,8 @@ pub struct Options {
     pub comedi_library: Option<PathBuf>,
     /// ns.
     pub sim_timeout: u64,
+    /// ns.
+    pub sim_edge_every: Option<u64>,
     /// ns.
     pub duration: Option<u64>,
     /// Share of the period.
@@ -109,6 +112,7 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
         comedi_ranges: [[-10.0, 10.0]; 2],
         comedi_library: None,
         sim_timeout: 20_000_000,
+        sim_edge_every: None,
         duration: None,
         late_after: 0.5,
         elastic: false,
@@ -142,6 +146,10 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
             Long("comedi-library") => options.comedi_library = Some(parser.value()?.into()),
             Long("sim-timeout") => {
                 options.sim_timeout = (number(&mut parser, "--sim-timeout", 0.1, 10_000.0)? * 1e6) as u64
+            }
+            Long("sim-edge-every") => {
+                let every = number(&mut parser, "--sim-edge-every", 0.01, 1e4)?;
+                options.sim_edge_every = Some((every * SECOND as f64) as u64);
             }
             Long("seconds") => {
                 options.duration = Some((number(&mut parser, "--seconds", 0.01, 1e7)? * SECOND as f64) as u64);

@@ -36,6 +36,7 @@
 //! | [`wave`] | set-points on board: sine, chirp, multisine, reversal curves | |
 //! | [`trigger`] | output lines at positions, levels, in motion, at set-points and ticks | |
 //! | [`playback`] | a table of corrections, interpolated | |
+//! | [`pending`] | what waits for the rising edge of the input line | |
 //! | [`pass`] | a motion that repeats: its correction played, its error kept | |
 //! | [`recorder`], [`record`] | ticks kept in fixed memory, and the format they leave in | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
@@ -65,6 +66,7 @@ pub mod mode;
 pub mod motion;
 pub mod notch;
 pub mod pass;
+pub mod pending;
 pub mod permitted;
 pub mod playback;
 pub mod real;

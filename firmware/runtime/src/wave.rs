@@ -135,6 +135,12 @@ impl<T: Real> Wave<T> {
         self.stage
     }
 
+    /// Where it begins and ends.
+    #[must_use]
+    pub fn center(&self) -> &[T; 6] {
+        &self.settings.center
+    }
+
     /// Set-points given so far: the `sequence` of a stream.
     #[must_use]
     pub fn sequence(&self) -> u32 {

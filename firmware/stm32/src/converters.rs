@@ -3,8 +3,8 @@
 use core::mem::MaybeUninit;
 
 use controller::supervised::Machine;
-use controller::triggers::{LINES, MOST};
-use embassy_stm32::gpio::{AnyPin, Input, Level, Output, Speed};
+use controller::triggers::{INPUT, LINES, MOST};
+use embassy_stm32::gpio::{AnyPin, Input, Level, Output, Pull, Speed};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Peri, spi};
 use specgen_board::{Board, GAUGE_BITS, Kept};
@@ -28,7 +28,7 @@ pub type Adc<BUS, const CYCLES: u32> =
 pub type Dacs<BUS, const OUTPUT: usize, const CYCLES: u32> =
     Ad5686rPair<Device<BUS, CYCLES>, Device<BUS, CYCLES>, pulses::Output<OUTPUT>, Enable, CycleDelay<CYCLES>>;
 /// Pins of triggers, those of the spec alone.
-pub type TriggerPins = [Option<Output<'static>>; MOST];
+pub type TriggerPins = ([Option<Output<'static>>; MOST], Option<Input<'static>>);
 /// The machine on them. `OUTPUT`: the channel of LDAC, see [`pulses`].
 pub type OnBoard<BUS, const OUTPUT: usize, const CYCLES: u32> =
     Board<'static, Adc<BUS, CYCLES>, Dacs<BUS, OUTPUT, CYCLES>, TriggerPins>;
@@ -75,11 +75,12 @@ fn spi_config(mode: spi::Mode, frequency: Hertz) -> spi::Config {
     config
 }
 
-/// The pins of the spec's triggers as outputs, low; the others stay as they are after reset.
+/// The pins of the spec's triggers: outputs, low, and the input, pulled down; the others stay as they are after reset.
 #[must_use]
-pub fn trigger_pins(pins: [Peri<'static, AnyPin>; MOST]) -> TriggerPins {
+pub fn trigger_pins(outputs: [Peri<'static, AnyPin>; MOST], input: Peri<'static, AnyPin>) -> TriggerPins {
     let mut lines = [(); LINES].into_iter();
-    pins.map(|pin| lines.next().map(|()| Output::new(pin, Level::Low, Speed::Medium)))
+    let outputs = outputs.map(|pin| lines.next().map(|()| Output::new(pin, Level::Low, Speed::Medium)));
+    (outputs, INPUT.then(|| Input::new(input, Pull::Down)))
 }
 
 /// The machine at reset, made where it stays. A function of its own, so that the compiler fills the memory instead of a copy

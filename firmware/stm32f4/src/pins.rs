@@ -80,7 +80,7 @@ pub fn take(p: Peripherals) -> Wiring {
             load,
             enable,
         },
-        lines: trigger_pins([p.PC0.into(), p.PC1.into(), p.PC2.into(), p.PC3.into()]),
+        lines: trigger_pins([p.PC0.into(), p.PC1.into(), p.PC2.into(), p.PC3.into()], p.PC4.into()),
         stop,
         link: Link { usart: p.USART2, pins: (p.PA3, p.PA2), channels: (p.DMA1_CH6, p.DMA1_CH5) },
         watchdog: p.IWDG,

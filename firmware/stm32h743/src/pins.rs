@@ -80,7 +80,7 @@ pub fn take(p: Peripherals) -> Wiring {
             load,
             enable,
         },
-        lines: trigger_pins([p.PE7.into(), p.PE8.into(), p.PE10.into(), p.PE12.into()]),
+        lines: trigger_pins([p.PE7.into(), p.PE8.into(), p.PE10.into(), p.PE12.into()], p.PE14.into()),
         stop,
         link: Link { usart: p.USART3, pins: (p.PD9, p.PD8), channels: (p.DMA1_CH0, p.DMA1_CH1) },
         watchdog: p.IWDG1,

@@ -394,6 +394,12 @@ impl Board {
         });
     }
 
+    /// Drives the input line.
+    pub fn drive_input(&mut self, high: bool) {
+        self.devices.gpio.drive(self.part.input, high);
+        self.say(&format!("input {} after sample {}", u8::from(high), self.samples));
+    }
+
     /// What pins that changed do.
     fn pins(&mut self) {
         let gpio = &self.devices.gpio;

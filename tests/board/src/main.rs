@@ -49,7 +49,7 @@ const USAGE: &str = "usage: emulated-board --library FILE --target stm32h743|stm
   --socket PATH   where a host finds the link: `specgen operate --socket PATH`
   --cycles        times by the model of specgen-cycles; one cycle an instruction if not given
 
-Commands on standard input: run MS, fail FAULT, heal, time, report, registers, quit. Without --socket the board runs by `run` alone.";
+Commands on standard input: run MS, input high|low, fail FAULT, heal, time, report, registers, quit. Without --socket the board runs by `run` alone.";
 
 struct Options {
     library: PathBuf,
@@ -214,6 +214,10 @@ fn obey(machine: &mut Machine, command: &str, until: &mut Time) -> Option<String
             }
             _ => format!("expected milliseconds, found {time}"),
         },
+        ["input", level @ ("high" | "low")] => {
+            machine.board().drive_input(level == "high");
+            "driven".to_owned()
+        }
         ["fail", name] => match Fault::of(name) {
             Some(fault) => {
                 machine.fail(fault);

@@ -36,8 +36,9 @@ pub struct Part {
     pub ldac: Pin,
     /// With its channel of TIM1.
     pub enable: (Pin, usize),
-    /// Triggers, in their order.
+    /// Triggers, in their order, and the input.
     pub triggers: [Pin; 4],
+    pub input: Pin,
 }
 
 /// The same on both.
@@ -87,6 +88,7 @@ pub const H743: Part = Part {
     ldac: (D, 13),
     enable: ((E, 11), 2),
     triggers: [(E, 7), (E, 8), (E, 10), (E, 12)],
+    input: (E, 14),
 };
 
 pub const F446: Part = Part {
@@ -113,4 +115,5 @@ pub const F446: Part = Part {
     ldac: (C, 6),
     enable: ((A, 8), 1),
     triggers: [(C, 0), (C, 1), (C, 2), (C, 3)],
+    input: (C, 4),
 };

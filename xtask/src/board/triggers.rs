@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use specgen_runtime::pending::EDGE;
+
 /// A change of a pin: line, level, and the tick or sample that it belongs to.
 type Edge = (usize, bool, i64);
 
@@ -77,9 +79,56 @@ pub fn check(table: &Path, log: &[String]) -> Result<usize, String> {
     compare(&edges, &seen(log), span)
 }
 
+/// The tick in which a record's table has the one edge of the input line, and the one in which the command became a move, which is the next.
+pub fn started(table: &Path) -> Result<[i64; 2], String> {
+    let text = fs::read_to_string(table).map_err(|error| format!("{}: {error}", table.display()))?;
+    rose_and_moved(&text)
+}
+
+fn rose_and_moved(table: &str) -> Result<[i64; 2], String> {
+    let mut lines = table.lines();
+    let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let place = |name: &str| names.iter().position(|known| *known == name).ok_or(format!("the record has no {name}"));
+    let [tick, events, command] = [place("tick")?, place("events")?, place("command")?];
+    let rows: Vec<Vec<u64>> = lines
+        .map(|row| {
+            let values: Vec<&str> = row.split(',').collect();
+            [tick, events, command]
+                .map(|place| values.get(place).and_then(|text| text.parse().ok()).unwrap_or(0))
+                .to_vec()
+        })
+        .collect();
+    let rose: Vec<u64> = rows.iter().filter(|row| row[1] & u64::from(EDGE) != 0).map(|row| row[0]).collect();
+    let moved = rows.windows(2).find(|pair| pair[0][2] != pair[1][2]).map(|pair| pair[1][0]);
+    match (&rose[..], moved) {
+        ([rose], Some(moved)) if moved == rose + 1 => Ok([*rose as i64, moved as i64]),
+        _ => Err(format!(
+            "the input line rose in ticks {rose:?}, and what waited began in tick {moved:?}, expected the next"
+        )),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_waits_begins_in_the_tick_after_the_edge_or_is_found() {
+        let table = |events: [u64; 4], commands: [u64; 4]| {
+            let rows = (0..4).map(|row| format!("{},{},{}\n", 10 + row, events[row], commands[row]));
+            format!("tick,events,command\n{}", rows.collect::<String>())
+        };
+        assert_eq!(rose_and_moved(&table([0, 32, 0, 0], [0, 0, 1, 1])), Ok([11, 12]));
+        for (events, commands) in [
+            ([0, 32, 0, 0], [0, 1, 1, 1]),
+            ([0, 32, 0, 0], [0, 0, 0, 1]),
+            ([0, 0, 0, 0], [0, 0, 1, 1]),
+            ([32, 32, 0, 0], [0, 0, 1, 1]),
+            ([0, 32, 0, 0], [0; 4]),
+        ] {
+            assert!(rose_and_moved(&table(events, commands)).is_err());
+        }
+    }
 
     #[test]
     fn an_edge_that_is_a_tick_off_or_missing_is_found() {

@@ -170,6 +170,7 @@ Commands: status, arm, run, hold, ramp-down, acknowledge, none,
   frame [none | work|tool AXIS=QUANTITY…], mode p|f|pf, gains [NAME=VALUE…],
   wait PHASE|arrived|SECONDS [TIMEOUT], config, config write SPEC,
   record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop,
+  on-edge [drop | move … | jog … | goto … | play … | wave FILE],
   watch [EVERY [SECONDS [FILE]]], stop (ends the program at a socket)
 
 The link lives as long as this command does; without it the machine holds after

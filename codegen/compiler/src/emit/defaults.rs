@@ -89,6 +89,7 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
     let (stiffness, rest) = (six(&d.environment_stiffness), six(&d.environment_rest));
     let (level_weight, drift_weight) = (real(d.level_weight), real(d.drift_weight));
     let (lines, triggers) = (literal::count(d.triggers.len()), d.triggers.iter().map(|line| of_line(ir, line)));
+    let input = d.input;
     let constants = quote! {
         /// From `control.mode` and `adaptation.mode`.
         pub(crate) const MODE: ControlMode = #mode;
@@ -108,7 +109,9 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
         pub(crate) const ENVIRONMENT_REST: [Real; 6] = [#rest];
         /// Output lines; from `trigger`.
         pub const LINES: usize = #lines;
-        /// What each shows.
+        /// Whether there is an input line; from `trigger`.
+        pub const INPUT: bool = #input;
+        /// What each output shows.
         pub(crate) const TRIGGERS: [Line<Real>; LINES] = [#(#triggers),*];
     };
     let imports = quote! {

@@ -205,6 +205,9 @@ pub struct PlatformDefaults {
     /// Output lines.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub triggers: Vec<Line>,
+    /// Whether there is an input line.
+    #[serde(skip_serializing_if = "core::ops::Not::not")]
+    pub input: bool,
 }
 
 /// What an output line shows; the constants of `specgen_runtime::trigger::Line`, where each is explained.

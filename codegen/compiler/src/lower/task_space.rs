@@ -151,5 +151,6 @@ pub(super) fn defaults(model: &Model, task: &model::TaskSpace, scalar: Scalar, d
         environment_stiffness: task.environment.stiffness.map(round),
         environment_rest: task.environment.rest.map(round),
         triggers: Vec::new(),
+        input: task.triggers.iter().any(|trigger| trigger.kind == model::TriggerKind::Input),
     }
 }

@@ -1,4 +1,4 @@
-//! Output lines: what the spec leaves out, and times in ticks.
+//! Digital lines: what the spec leaves out, and times in ticks.
 
 use crate::ir::{Line, Scalar};
 use specgen_language::model::{Model, TaskSpace, Trigger, TriggerDirection, TriggerKind};
@@ -27,21 +27,16 @@ pub fn width(trigger: &Trigger, period: f64) -> i32 {
     (if ticks < 1.0 { 1.0 } else { ticks } as i32).min(LONGEST)
 }
 
-/// The lines of a spec, whose pose has `noise` on each axis, m and rad.
+/// The output lines of a spec, whose pose has `noise` on each axis, m and rad.
 pub(super) fn lower(model: &Model, task: &TaskSpace, noise: &[f64; 6], scalar: Scalar) -> Vec<Line> {
     let bounds = model.workspace.bounds();
     let [most, _] = extent(&bounds);
     let line = |trigger: &Trigger| {
+        let kind = kind(trigger.kind)?;
         let places = matches!(trigger.kind, TriggerKind::Position | TriggerKind::Level);
         let of_place = |value: f64| if places { scalar.round(value) } else { 0.0 };
-        Line {
-            kind: match trigger.kind {
-                TriggerKind::Position => Kind::Position,
-                TriggerKind::Level => Kind::Level,
-                TriggerKind::Motion => Kind::Motion,
-                TriggerKind::Points => Kind::Points,
-                TriggerKind::Ticks => Kind::Ticks,
-            },
+        Some(Line {
+            kind,
             axis: trigger.axis,
             direction: match trigger.direction {
                 TriggerDirection::Both => Direction::Both,
@@ -56,7 +51,19 @@ pub(super) fn lower(model: &Model, task: &TaskSpace, noise: &[f64; 6], scalar: S
             every: trigger.every,
             last: trigger.last.unwrap_or(0),
             width: width(trigger, model.timing.period),
-        }
+        })
     };
-    task.triggers.iter().map(line).collect()
+    task.triggers.iter().filter_map(line).collect()
+}
+
+/// What an output line shows; none of the input.
+fn kind(kind: TriggerKind) -> Option<Kind> {
+    Some(match kind {
+        TriggerKind::Position => Kind::Position,
+        TriggerKind::Level => Kind::Level,
+        TriggerKind::Motion => Kind::Motion,
+        TriggerKind::Points => Kind::Points,
+        TriggerKind::Ticks => Kind::Ticks,
+        TriggerKind::Input => return None,
+    })
 }

@@ -91,6 +91,14 @@ macro_rules! choice {
 
         impl $enum {
             pub(crate) const WORDS: &[&str] = &[$($word),+];
+
+            /// As the spec says it.
+            #[must_use]
+            pub const fn word(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $word,)+
+                }
+            }
         }
 
         impl Value for $enum {

@@ -1,10 +1,12 @@
-//! Output lines that show where the platform is measured to be, or what it does.
+//! Digital lines: outputs that show where the platform is measured to be, or what it does, and an input that starts a motion.
 
 use super::{LARGEST_TRAVEL, LARGEST_TURN};
 use crate::keys::declare::*;
 
 /// Most output lines: as many as the boards have pins for.
-pub const MAX_TRIGGERS: usize = 4;
+pub const MAX_OUTPUTS: usize = 4;
+/// And an input.
+pub const MAX_TRIGGERS: usize = MAX_OUTPUTS + 1;
 /// Names of the axes, x y z θx θy θz.
 const AXES: &[&str] = &["x", "y", "z", "theta_x", "theta_y", "theta_z"];
 /// Longest pulse, s.
@@ -20,7 +22,7 @@ const ROOM: Shape = one(Dimension::LENGTH, Range::closed(0.0, LARGEST_TRAVEL), "
 const TURN_ROOM: Shape = one(Dimension::ANGLE, Range::closed(0.0, LARGEST_TURN), "nrad");
 
 choice! {
-    /// What an output line shows.
+    /// What an output line shows, or that it is the input.
     TriggerKind {
         /// A pulse at each position that the pose passes.
         Position = "position",
@@ -32,6 +34,8 @@ choice! {
         Points = "points",
         /// A pulse at ticks of the run.
         Ticks = "ticks",
+        /// No output: the line whose rising edge starts what was ordered for it.
+        Input = "input",
     }
 }
 
@@ -48,13 +52,13 @@ choice! {
 }
 
 section! {
-    /// A digital output line, numbered from 0 in the order of the file: pulses at positions that the measured pose passes, at set-points of a wave or at ticks, or a level; with [control] alone. docs/triggers.md says when it changes and where it is wired to.
+    /// A digital output line, outputs numbered from 0 in the order of the file: pulses at positions that the measured pose passes, at set-points of a wave or at ticks, or a level; or the input line, whose rising edge starts the motion or wave ordered for it; with [control] alone. docs/triggers.md says when it changes and where it is wired to.
     ///
     /// Positions in m or rad from rest, the bias included; times in s.
-    "trigger" ["output", "digital_output"], Repeated(0, MAX_TRIGGERS) => Trigger {
+    "trigger" ["output", "digital_output", "input"], Repeated(0, MAX_TRIGGERS) => Trigger {
         /// Its name, once in the file.
         name: String = NAME, Required, "", "camera";
-        /// What it shows: positions passed, the pose within bounds, the set-point in motion, set-points of a stream or wave, ticks of the run.
+        /// What it shows: positions passed, the pose within bounds, the set-point in motion, set-points of a stream or wave, ticks of the run; `input` is the input line.
         kind: TriggerKind = one_of(TriggerKind::WORDS), Required, "" ["mode"], "position";
         /// Axis of the measured pose that positions and levels are of.
         axis = one_of(AXES), Default("x"), "", "x";

@@ -1,6 +1,6 @@
 //! Output lines at positions, levels, in motion, at set-points and ticks: what a tick under the supervisor gives them to see.
 
-pub use crate::defaults::LINES;
+pub use crate::defaults::{INPUT, LINES};
 pub use specgen_runtime::trigger::{Direction, HIGH, Kind, Line, MISSED, MOST, lines};
 
 use crate::tick::{GENERATOR_BUSY, SETPOINT_FAULT, SETPOINT_STALE};

@@ -3,34 +3,93 @@
 use controller::supervised::{Phase, Request};
 use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, Config, Real, State, passes};
+use specgen_link::EdgeStatus;
+use specgen_runtime::pending::Pending;
+use specgen_runtime::setpoint::BUSY;
 use specgen_runtime::wave::{Settings, Stage};
 
-use crate::handover::{Player, Wish};
+use crate::handover::{Awaited, Player, Wish};
 use crate::words::Command;
 
 /// Command, wave and pass of the loop.
 pub struct Setpoints {
-    wish: Wish,
+    command: Command,
+    request: Request,
     wave: Wave,
     /// Set-points given by waves so far: a new wave goes on counting, or its first would look like an old one's last.
     sequence: u32,
     waving: bool,
     /// Of the pass under way; or one that is over, until it is handed back.
     player: Option<Player>,
+    /// The input line, and what waits for it.
+    pending: Pending<Awaited>,
 }
 
 impl Setpoints {
     pub fn new(config: &Config) -> Self {
-        let wish = Wish { command: [0; COMMAND_WORDS], request: Request::None };
-        Self { wish, wave: Wave::new(waves::limits(config)), sequence: 0, waving: false, player: None }
+        Self {
+            command: [0; COMMAND_WORDS],
+            request: Request::None,
+            wave: Wave::new(waves::limits(config)),
+            sequence: 0,
+            waving: false,
+            player: None,
+            pending: Pending::new(),
+        }
     }
 
     /// During a pass the command is its own: only the request is taken.
     pub fn wish(&mut self, wish: Wish) {
-        if !self.passes() {
-            self.wish.command = wish.command;
+        if let Some(command) = wish.command.filter(|_| !self.passes()) {
+            self.pending.cancel();
+            self.command = command;
         }
-        self.wish.request = wish.request;
+        self.request = wish.request;
+    }
+
+    /// The input line in a tick, as [`Pending::sense`].
+    pub fn sense<E>(&mut self, high: Result<bool, E>) -> bool {
+        self.pending.sense(high)
+    }
+
+    pub fn wait_for_edge(&mut self, awaited: Awaited) {
+        self.pending.wait(awaited);
+    }
+
+    pub fn stop_waiting(&mut self) {
+        self.pending.cancel();
+    }
+
+    /// How it stands with the input line.
+    pub fn edge(&self) -> EdgeStatus {
+        let pending = &self.pending;
+        EdgeStatus { stage: pending.stage().word() as u8, edges: pending.edges(), tick: pending.tick() }
+    }
+
+    /// Behind a tick: begins what waited, with the next one, if the line rose in this one, which ended with this phase and status. A machine
+    /// that does not run waits for nothing.
+    pub fn begin_awaited(&mut self, tick: u64, phase: Phase, status: u32, config: &Config) {
+        if phase != Phase::Running {
+            self.pending.cancel();
+        }
+        let Some(awaited) = self.pending.due() else { return };
+        let free = self.wave.stage() == Stage::Idle && !self.passes() && status & BUSY == 0;
+        let begun = free
+            && match awaited {
+                Awaited::Command(command) => {
+                    self.command = command;
+                    true
+                }
+                Awaited::Wave(settings) => {
+                    let limits = waves::limits(config);
+                    let may = waves::may_begin(status, &self.command, &settings.center, &limits).is_ok();
+                    if may {
+                        self.start(&settings, config);
+                    }
+                    may && self.wave.stage() != Stage::Idle
+                }
+            };
+        self.pending.settle(tick, begun);
     }
 
     fn passes(&self) -> bool {
@@ -38,11 +97,12 @@ impl Setpoints {
     }
 
     pub fn request(&self) -> Request {
-        self.wish.request
+        self.request
     }
 
-    /// Begins a wave, if none is under way. What it asks for was looked at when it was ordered, and is looked at again here.
+    /// Begins a wave, in place of what waits for the edge, if none is under way. What it asks for was looked at when it was ordered, and is looked at again here.
     pub fn start(&mut self, settings: &Settings<Real>, config: &Config) {
+        self.pending.cancel();
         if self.wave.stage() == Stage::Idle {
             self.wave = Wave::new(waves::limits(config));
             if self.wave.set(settings).is_ok() {
@@ -52,11 +112,13 @@ impl Setpoints {
     }
 
     pub fn stop(&mut self) {
+        self.pending.cancel();
         self.wave.stop();
     }
 
     /// Begins the pass that a player was told, if no wave is under way. The loop never has two.
     pub fn pass(&mut self, mut player: Player) {
+        self.pending.cancel();
         if self.wave.stage() != Stage::Idle {
             player.abort();
         }
@@ -82,7 +144,7 @@ impl Setpoints {
     /// The player of a pass that is over: nothing is corrected from here on.
     pub fn take_player(&mut self) -> Option<Player> {
         let player = self.player.take_if(|player| !player.is_running())?;
-        passes::end(&mut self.wish.command);
+        passes::end(&mut self.command);
         Some(player)
     }
 
@@ -103,9 +165,9 @@ impl Setpoints {
             self.abort_pass();
         }
         if let Some(given) = self.player.as_mut().and_then(|player| player.give()) {
-            passes::write(&given, &mut self.wish.command);
+            passes::write(&given, &mut self.command);
         }
-        let mut command = self.wish.command;
+        let mut command = self.command;
         self.waving = false;
         if self.wave.stage() != Stage::Idle {
             if phase != Phase::Running {

@@ -2,7 +2,7 @@
 //!
 //! Gauges are the first six differential inputs of one card, amplifiers the first outputs of one or more cards (an NI PCI-6229
 //! has four), and the enable line is the first digital line of the first card, high for on; the triggers of the spec are the lines
-//! behind it. Codes are straight binary over the range of the channel: what volts they are, the spec says.
+//! behind it, its input the last of them. Codes are straight binary over the range of the channel: what volts they are, the spec says.
 
 pub mod library;
 
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 use controller::limits::CODES;
 use controller::sensing::CONVERTER;
-use controller::triggers::LINES;
+use controller::triggers::{INPUT, LINES};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges, Lines};
 
 use super::Device;
@@ -27,6 +27,9 @@ pub struct Settings {
     /// Voltages that an output's range must hold, V.
     pub output_volts: [f64; 2],
 }
+
+/// Digital line of the input, behind the enable line and the outputs.
+const INPUT_LINE: u32 = LINES as u32 + 1;
 
 /// Outputs of one card.
 struct Bank<'a> {
@@ -66,10 +69,16 @@ impl<'a> Comedi<'a> {
         if !input.set_line(line, 0, false) {
             return Err(format!("{path}: digital line 0 cannot be set: amplifiers could not be switched off"));
         }
-        if (lines as usize).checked_sub(1 + LINES).is_none() {
+        let triggers = LINES + usize::from(INPUT);
+        if (lines as usize).checked_sub(1 + triggers).is_none() {
             return Err(format!(
-                "{path}: {name} has {lines} digital lines; the amplifiers need one, the triggers of the spec {LINES} more"
+                "{path}: {name} has {lines} digital lines; the amplifiers need one, the triggers of the spec {triggers} more"
             ));
+        }
+        if INPUT {
+            input
+                .make_input(line, INPUT_LINE)
+                .map_err(|error| format!("{path}: digital line {INPUT_LINE} as an input: {error}"))?;
         }
         for (number, ()) in (1..).zip([(); LINES]) {
             input
@@ -180,6 +189,7 @@ impl Amplifiers for Comedi<'_> {
 /// A call of the system each, so that only those that change are set.
 impl Lines for Comedi<'_> {
     const COUNT: usize = LINES;
+    const INPUT: bool = true;
 
     fn set(&mut self, high: u32) -> Result<(), Fault> {
         let mut good = true;
@@ -194,6 +204,10 @@ impl Lines for Comedi<'_> {
             }
         }
         if good { Ok(()) } else { Err(Fault::Pin) }
+    }
+
+    fn input(&mut self) -> Result<bool, Fault> {
+        self.input.line(self.line, INPUT_LINE).ok_or(Fault::Pin)
     }
 }
 

@@ -23,14 +23,16 @@ pub struct Simulated {
     wrench: [f64; CHANNELS],
     codes: [i32; CHANNELS],
     enabled: bool,
+    /// Ticks from rising edge to rising edge of the input line; none without.
+    edges: Option<u64>,
 }
 
 impl Simulated {
-    /// Opens it and waits until it gives its first reading. Later ones may take `timeout`, ns.
+    /// Opens it and waits until it gives its first reading. Later ones may take `timeout`, ns. Its input line rises every `edges` ticks.
     ///
     /// # Errors
     /// In words: if there is no such machine, it is of another spec, or it does not answer.
-    pub fn open(path: &Path, timeout: u64) -> Result<Self, String> {
+    pub fn open(path: &Path, timeout: u64, edges: Option<u64>) -> Result<Self, String> {
         let client = Client::open(path, controller::SPEC_DIGEST).map_err(|error| error.to_string())?;
         let start = clock::now();
         while client.sense(0, FIRST / 100).is_none() {
@@ -54,6 +56,7 @@ impl Simulated {
             wrench: [0.0; CHANNELS],
             codes: [0; CHANNELS],
             enabled: false,
+            edges,
         })
     }
 }
@@ -95,12 +98,18 @@ impl Amplifiers for Simulated {
     }
 }
 
-/// A simulated machine has nothing that they lead to: they stand in the record.
+/// A simulated machine has nothing that outputs lead to: they stand in the record.
 impl Lines for Simulated {
     const COUNT: usize = LINES;
+    const INPUT: bool = true;
 
     fn set(&mut self, _high: u32) -> Result<(), Fault> {
         Ok(())
+    }
+
+    /// High for half of the time between two edges.
+    fn input(&mut self) -> Result<bool, Fault> {
+        Ok(self.edges.is_some_and(|edges| self.tick >= edges && self.tick % edges < edges.div_ceil(2)))
     }
 }
 

@@ -1,7 +1,7 @@
 //! What is answered over the link.
 
 use controller::supervised::{Cause, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
-use controller::{COMMAND_WORDS, CONFIG_WORDS, Config, DESCRIPTION, PLACE_WORDS, Real, passes};
+use controller::{COMMAND_WORDS, CONFIG_WORDS, Config, DESCRIPTION, PLACE_WORDS, Real, passes, triggers};
 use specgen_link::{
     Bytes, Counted, Counters, Device, Health, Identity, KNOT, KNOTS, PassAction, RecorderAction, RecorderStatus,
     Refusal, Reply, Request, Status, WaveAction, put_knots, put_words,
@@ -119,18 +119,44 @@ impl<'a> Desk<'a> {
         Ok(())
     }
 
-    fn wave(&mut self, action: WaveAction, words: Bytes<'_>) -> Result<(), Refusal> {
-        if action == WaveAction::Stop {
-            self.console.stop_wave();
-            return Ok(());
+    fn command_on_edge(&mut self, words: Bytes<'_>) -> Result<(), Refusal> {
+        let mut command = [0; COMMAND_WORDS];
+        if !words.read_words(&mut command) {
+            return Err(Refusal::Length { expected: COMMAND_WORDS as u16 });
         }
+        self.console.command_on_edge(command).map_err(refusal)
+    }
+
+    fn edge(&mut self, drop: bool) -> Reply<'static> {
+        if drop {
+            let dropped = self.ordered(|desk| {
+                desk.console.stop_waiting();
+                Ok(())
+            });
+            if dropped != Reply::Done {
+                return dropped;
+            }
+        }
+        Reply::Edge(self.console.edge)
+    }
+
+    fn wave(&mut self, action: WaveAction, words: Bytes<'_>) -> Result<(), Refusal> {
+        let on_edge = match action {
+            WaveAction::Start => false,
+            WaveAction::StartOnEdge if triggers::INPUT => true,
+            WaveAction::StartOnEdge => return Err(Refusal::Unsupported),
+            WaveAction::Stop => {
+                self.console.stop_wave();
+                return Ok(());
+            }
+        };
         let mut settings = [0; wave::WORDS];
         if !words.read_words(&mut settings) {
             return Err(Refusal::Length { expected: wave::WORDS as u16 });
         }
         let settings = Settings::<Real>::from_words(&settings)
             .map_err(|refused| refused.word().map_or(Refusal::State, |index| Refusal::Word { index: index as u16 }))?;
-        self.console.start_wave(&settings).map_err(refusal)
+        self.console.start_wave(&settings, on_edge).map_err(refusal)
     }
 
     fn knots(&mut self, first: u32, knots: Bytes<'_>) -> Result<(), Refusal> {
@@ -234,6 +260,11 @@ impl Device for Desk<'_> {
             Request::Place => self.place(),
             Request::Supervise { request } => self.supervise(request).map_or_else(Reply::Refused, |()| Reply::Done),
             Request::Setpoint { words } => self.ordered(|desk| desk.command(words)),
+            Request::SetpointOnEdge { .. } | Request::Edge { .. } if !triggers::INPUT => {
+                Reply::Refused(Refusal::Unsupported)
+            }
+            Request::SetpointOnEdge { words } => self.ordered(|desk| desk.command_on_edge(words)),
+            Request::Edge { drop } => self.edge(drop),
             Request::ReadConfig => match put_words(&self.console.config().to_words(), &mut self.words) {
                 Some(words) => Reply::Config { words },
                 None => Reply::Refused(Refusal::TooLong),

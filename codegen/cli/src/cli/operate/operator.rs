@@ -21,7 +21,6 @@ use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
 use specgen_language::model::Model;
 use specgen_operate::frame::Frame;
-use specgen_operate::place::meant;
 use specgen_operate::{Order, Session, Until};
 
 /// How long ramping down may take.
@@ -185,6 +184,7 @@ impl<P: Port> Operator<P> {
                 marks.push(name);
                 self.motion().map(|_| ()).map_err(nonsense)
             }
+            Order::OnEdge(order) => self.check(std::slice::from_ref(order)),
             Order::Goto(name) if name != ZERO && !marks.contains(&name.as_str()) => Err(nonsense(self.no_mark(name))),
             Order::Play { name, correction } => self.playable(name, correction.as_ref()).map(|_| ()).map_err(nonsense),
             Order::Gains(gains) => self.gains_of(gains).map(|_| ()).map_err(nonsense),
@@ -221,11 +221,18 @@ impl<P: Port> Operator<P> {
                 self.wait(*until, *limit, ui)?;
                 self.note(&line, &Plain(self.stands()), ui);
             }
-            Order::Move { relative, axes } => {
-                let from = self.target()?;
-                let pose = meant(&from, *relative, axes);
-                self.go(self.user(&pose)?)?;
-                self.note(&line, &Moves { pose }, ui);
+            Order::Move { .. } => {
+                let user = self.user_of(order)?;
+                self.go(user)?;
+                self.note(&line, &Moves { pose: self.seen(&user) }, ui);
+            }
+            Order::OnEdge(order) => {
+                self.on_edge(order)?;
+                self.note(&line, &Plain("done".to_owned()), ui);
+            }
+            Order::Edge | Order::DropEdge => {
+                let edge = self.edge(*order == Order::DropEdge)?;
+                self.note(&line, &edge, ui);
             }
             Order::Where
             | Order::Limits
@@ -274,7 +281,7 @@ impl<P: Port> Operator<P> {
             }
             Order::WriteConfig(spec) => self.write_config(spec)?,
             Order::Trigger { line, settings } => self.set_trigger(*line, settings)?,
-            Order::Wave(path) => self.wave(path)?,
+            Order::Wave(path) => self.wave(path, false)?,
             Order::StopWave => self.session.stop_wave()?,
             Order::Stop => self.session.stop().map_err(unsupported)?,
             // The others have an answer of their own.
@@ -283,9 +290,8 @@ impl<P: Port> Operator<P> {
         Ok(())
     }
 
-    /// Sends a move, and waits until the machine has taken or refused it. Where a motion is under way a machine looks at a
-    /// command only after it, so that nothing could be said of this one.
-    pub(super) fn go(&mut self, pose: [f64; 6]) -> Result<(), Ended> {
+    /// Words of a move to `pose`, in the controller's coordinates, that the machine can make from rest.
+    pub(super) fn words_of_move(&self, pose: &[f64; 6]) -> Result<Vec<u64>, Ended> {
         let status = self.session.status();
         if u64::from(status.phase) != Phase::Running.word() {
             return Err(Ended::Refused(format!("the machine is {}: it moves when it runs", self.stands())));
@@ -293,12 +299,18 @@ impl<P: Port> Operator<P> {
         if status.status & BUSY != 0 {
             return Err(Ended::Refused("a motion is under way; `wait arrived` first".to_owned()));
         }
-        if let Some(binding) = self.motion().map_err(Ended::Refused)?.binding(&pose) {
-            let to = self.frame.pose(&pose).unwrap_or(pose);
+        if let Some(binding) = self.motion().map_err(Ended::Refused)?.binding(pose) {
+            let to = self.seen(pose);
             let (to, binds) = (specgen_operate::place::in_words(&to), in_words(&binding));
             return Err(Ended::Refused(format!("it cannot go to {to}: {binds}; nothing moves")));
         }
-        let words = self.session.move_words(&pose).map_err(Ended::Refused)?;
+        self.session.move_words(pose).map_err(Ended::Refused)
+    }
+
+    /// Sends a move, and waits until the machine has taken or refused it. Where a motion is under way a machine looks at a
+    /// command only after it, so that nothing could be said of this one.
+    pub(super) fn go(&mut self, pose: [f64; 6]) -> Result<(), Ended> {
+        let words = self.words_of_move(&pose)?;
         self.send(words)?;
         let (sent, start) = (self.session.status().tick, Instant::now());
         while self.session.status().tick < sent + SEEN {

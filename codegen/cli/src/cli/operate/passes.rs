@@ -83,9 +83,7 @@ impl<P: Port> Operator<P> {
     ) -> Result<(), Ended> {
         let (number, table) = self.playable(name, correction).map_err(Ended::Refused)?;
         let Some((table, (path, _))) = table.zip(correction) else {
-            let command = [("command", "trajectory".to_owned()), ("selector", number.to_string())];
-            let command = command.map(|(name, value)| (name.to_owned(), value));
-            let words = self.session.assign(&command).map_err(Ended::Refused)?;
+            let words = self.words_of_trajectory(number)?;
             self.send(words)?;
             self.note(line, &super::answer::Plain("done".to_owned()), ui);
             return Ok(());
@@ -98,6 +96,13 @@ impl<P: Port> Operator<P> {
         let error_nm = translation_nm(motion);
         self.note(line, &Played { correction: shown(path), error_nm, status: passed.status }, ui);
         Ok(())
+    }
+
+    /// Words that play a trajectory.
+    pub(super) fn words_of_trajectory(&self, number: usize) -> Result<Vec<u64>, Ended> {
+        let command = [("command", "trajectory".to_owned()), ("selector", number.to_string())];
+        let command = command.map(|(name, value)| (name.to_owned(), value));
+        self.session.assign(&command).map_err(Ended::Refused)
     }
 
     /// Knots that the device has room for in a pass.

@@ -182,13 +182,26 @@ impl<P: Port> Operator<P> {
     }
 
     /// A pose of the controller as the session says it.
-    fn seen(&self, user: &[f64; 6]) -> [f64; 6] {
+    pub(super) fn seen(&self, user: &[f64; 6]) -> [f64; 6] {
         self.frame.pose(user).unwrap_or(*user)
     }
 
     /// The controller's coordinates of a pose in the session's frame.
     pub(super) fn user(&self, pose: &[f64; 6]) -> Result<[f64; 6], Ended> {
         self.frame.user(pose).ok_or_else(|| Ended::Refused(format!("it cannot go there: {BEYOND}")))
+    }
+
+    /// Where a move, a step or a way to a name goes, in the controller's coordinates.
+    pub(super) fn user_of(&mut self, order: &Order) -> Result<[f64; 6], Ended> {
+        match order {
+            Order::Goto(name) if name == ZERO => Ok([0.0; 6]),
+            Order::Goto(name) => self.marks.get(name).copied().ok_or_else(|| Ended::Refused(self.no_mark(name))),
+            Order::Move { relative, axes } => {
+                let from = self.target()?;
+                self.user(&meant(&from, *relative, axes))
+            }
+            _ => Err(Ended::Refused("it goes nowhere".to_owned())),
+        }
     }
 
     /// Where it is, in the session's frame.
@@ -280,9 +293,8 @@ impl<P: Port> Operator<P> {
                 self.marks.insert(name.clone(), target);
                 self.note(line, &Plain("done".to_owned()), ui);
             }
-            Order::Goto(name) => {
-                let pose = if name == ZERO { Some([0.0; 6]) } else { self.marks.get(name).copied() };
-                let user = pose.ok_or_else(|| Ended::Refused(self.no_mark(name)))?;
+            Order::Goto(_) => {
+                let user = self.user_of(order)?;
                 self.go(user)?;
                 self.note(line, &Moves { pose: self.seen(&user) }, ui);
             }

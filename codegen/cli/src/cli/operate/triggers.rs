@@ -1,10 +1,37 @@
-//! Output lines: other settings while the machine runs.
+//! Digital lines: other settings of outputs while the machine runs, and what waits for the edge of the input.
 
 use host_sim::word::WordKind;
-use specgen_link::Refusal;
+use serde::Serialize;
 use specgen_link::client::{ClientError, Port};
+use specgen_link::{EdgeStatus, Refusal};
+use specgen_operate::Order;
+use specgen_runtime::pending::Stage;
 
 use super::operator::{Ended, Operator};
+use crate::cli::ui::Outcome;
+
+/// How it stands with the input line.
+#[derive(Serialize)]
+pub struct EdgeState {
+    /// Number of the stage of the last order.
+    stage: u8,
+    stands: &'static str,
+    /// Rising edges since power-up.
+    edges: u32,
+    /// Tick of the edge at which that order began or was refused.
+    tick: Option<u64>,
+}
+
+impl Outcome for EdgeState {
+    fn text(&self) -> String {
+        let edges = match self.edges {
+            1 => "1 edge".to_owned(),
+            count => format!("{count} edges"),
+        };
+        let of_tick = self.tick.map(|tick| format!(" of tick {tick}")).unwrap_or_default();
+        format!("{}{of_tick}; {edges} of the input line so far\n", self.stands)
+    }
+}
 
 impl<P: Port> Operator<P> {
     /// Places and words of settings of a trigger.
@@ -54,4 +81,47 @@ impl<P: Port> Operator<P> {
             other => Ok(other?),
         }
     }
+
+    /// Has a move, a trajectory or a wave wait for the edge of the input line.
+    pub(super) fn on_edge(&mut self, order: &Order) -> Result<(), Ended> {
+        let words = match order {
+            Order::Wave(path) => return self.wave(path, true),
+            Order::Play { name, .. } => {
+                let number = self.trajectory(name).map_err(Ended::Refused)?;
+                self.words_of_trajectory(number)?
+            }
+            order => {
+                let user = self.user_of(order)?;
+                self.words_of_move(&user)?
+            }
+        };
+        self.ordered = true;
+        self.session.command_on_edge(&words).map_err(|error| match error {
+            ClientError::Refused(Refusal::Unsupported) => no_input(),
+            ClientError::Refused(Refusal::State) => {
+                Ended::Refused(format!("not now; the machine must run, at rest: {}", self.stands()))
+            }
+            other => other.into(),
+        })
+    }
+
+    /// How it stands with the input line; what waits is dropped first, if that is asked for.
+    pub(super) fn edge(&mut self, drop: bool) -> Result<EdgeState, Ended> {
+        self.ordered |= drop;
+        let EdgeStatus { stage, edges, tick } = self.session.edge(drop).map_err(|error| match error {
+            ClientError::Refused(Refusal::Unsupported) => no_input(),
+            other => other.into(),
+        })?;
+        let known = Stage::from_word(u64::from(stage));
+        let settled = matches!(known, Some(Stage::Begun | Stage::Refused));
+        Ok(EdgeState { stage, stands: known.map_or("?", Stage::name), edges, tick: settled.then_some(tick) })
+    }
+}
+
+/// Why nothing waits for an edge.
+pub(super) fn no_input() -> Ended {
+    Ended::Refused(
+        "the machine has no input line; declare one in its spec: [[trigger]] with name = \"start\" and kind = \"input\""
+            .to_owned(),
+    )
 }

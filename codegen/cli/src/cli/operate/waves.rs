@@ -7,6 +7,7 @@ use specgen_link::client::{ClientError, Port};
 use specgen_operate::{read_wave, refused_wave};
 
 use super::operator::{Ended, Operator};
+use super::triggers::no_input;
 
 impl<P: Port> Operator<P> {
     pub(super) fn wave_of(&self, path: &Path) -> Result<(Vec<u64>, [u64; 6]), String> {
@@ -21,15 +22,22 @@ impl<P: Port> Operator<P> {
         read_wave(text, self.session.period(), single).map_err(|error| error.trim_end().to_owned())
     }
 
-    pub(super) fn wave(&mut self, path: &Path) -> Result<(), Ended> {
+    pub(super) fn wave(&mut self, path: &Path, on_edge: bool) -> Result<(), Ended> {
         let (words, center) = self.wave_of(path).map_err(Ended::Refused)?;
-        self.start_wave(&path.display().to_string(), &words, &center)
+        self.start_wave(&path.display().to_string(), &words, &center, on_edge)
     }
 
-    /// Starts a wave of this name.
-    pub(super) fn start_wave(&mut self, name: &str, words: &[u64], center: &[u64; 6]) -> Result<(), Ended> {
+    /// Starts a wave of this name, at once or at the edge of the input line.
+    pub(super) fn start_wave(
+        &mut self,
+        name: &str,
+        words: &[u64],
+        center: &[u64; 6],
+        on_edge: bool,
+    ) -> Result<(), Ended> {
         self.ordered = true;
-        self.session.start_wave(words, center).map_err(|error| match error {
+        self.session.start_wave(words, center, on_edge).map_err(|error| match error {
+            ClientError::Refused(Refusal::Unsupported) => no_input(),
             ClientError::Refused(Refusal::Word { index }) => Ended::Refused(format!("{name}: {}", refused_wave(index))),
             ClientError::Refused(Refusal::State) => Ended::Refused(format!(
                 "{name}: not now; the machine must be running and stand at the wave's center, with no wave or move under way: {}",

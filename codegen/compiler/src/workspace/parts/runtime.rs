@@ -38,6 +38,7 @@ pub const PART: Part = Part {
         "src/motion.rs",
         "src/notch.rs",
         "src/pass.rs",
+        "src/pending.rs",
         "src/permitted.rs",
         "src/playback.rs",
         "src/real.rs",

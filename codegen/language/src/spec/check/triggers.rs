@@ -1,9 +1,9 @@
-//! Output lines: which keys go with which kind and axis, and where positions may lie.
+//! Digital lines: which keys go with which kind and axis, and where positions may lie.
 
 use super::trajectories::{differ, missing};
 use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
-use crate::model::MAX_TRIGGERS;
+use crate::model::{MAX_OUTPUTS, TriggerKind};
 use crate::spec::findings::Findings;
 use crate::spec::keys;
 use crate::spec::text::number;
@@ -17,7 +17,7 @@ fn keys_of(kind: &str) -> &'static [&'static str] {
     match kind {
         "position" => &["axis", "direction", "start", "stop", "step", "hysteresis", "width"],
         "level" => &["axis", "start", "stop", "hysteresis"],
-        "motion" => &[],
+        "motion" | "input" => &[],
         _ => &["first", "every", "last", "width"],
     }
 }
@@ -139,16 +139,25 @@ pub(super) fn inside_workspace(f: &Fields, findings: &mut Findings) -> Option<()
 }
 
 pub(super) fn not_too_many(f: &Fields, findings: &mut Findings) -> Option<()> {
-    let count = f.count("trigger");
-    if count > MAX_TRIGGERS {
-        let path = format!("trigger[{MAX_TRIGGERS}]");
-        findings.add(
-            codes::TOO_MANY_TRIGGERS,
-            &path,
-            f.table(&path).unwrap_or(0..0),
-            format!("there are {count} triggers, expected at most {MAX_TRIGGERS}: a board has so many pins for them"),
-            "take some out; what a line shows may be changed while the controller runs".to_owned(),
-        );
+    let (inputs, outputs): (Vec<usize>, Vec<usize>) = (0..f.count("trigger"))
+        .partition(|index| f.choice(&format!("trigger[{index}].kind")) == Some(TriggerKind::Input.word()));
+    for (lines, most, what, help) in [
+        (outputs, MAX_OUTPUTS, "outputs", "take some out; what a line shows may be changed while the controller runs"),
+        (inputs, 1, "inputs", "keep one of them"),
+    ] {
+        if let Some(first) = lines.get(most) {
+            let path = format!("trigger[{first}]");
+            findings.add(
+                codes::TOO_MANY_TRIGGERS,
+                &path,
+                f.table(&path).unwrap_or(0..0),
+                format!(
+                    "{} triggers are {what}, expected at most {most}: a board has so many pins for them",
+                    lines.len()
+                ),
+                help.to_owned(),
+            );
+        }
     }
     Some(())
 }

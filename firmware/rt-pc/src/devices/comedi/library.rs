@@ -21,6 +21,7 @@ pub const DIGITAL: c_int = 5;
 const UNIT_VOLT: c_uint = 0;
 /// Direction of a digital line.
 const OUTPUT: c_uint = 1;
+const INPUT: c_uint = 0;
 const READ: c_uint = 0x0400_0000;
 const WRITE: c_uint = 0x0800_0001;
 
@@ -71,6 +72,7 @@ struct Functions {
     find_range: unsafe extern "C" fn(Handle, c_uint, c_uint, c_uint, c_double, c_double) -> c_int,
     perform: unsafe extern "C" fn(Handle, *mut List) -> c_int,
     configure_line: unsafe extern "C" fn(Handle, c_uint, c_uint, c_uint) -> c_int,
+    read_line: unsafe extern "C" fn(Handle, c_uint, c_uint, *mut c_uint) -> c_int,
     write_line: unsafe extern "C" fn(Handle, c_uint, c_uint, c_uint) -> c_int,
     /// Last, so that it is unloaded after everything else.
     _library: Library,
@@ -154,6 +156,7 @@ impl Functions {
                 find_range: *library.get(b"comedi_find_range\0")?,
                 perform: *library.get(b"comedi_do_insnlist\0")?,
                 configure_line: *library.get(b"comedi_dio_config\0")?,
+                read_line: *library.get(b"comedi_dio_read\0")?,
                 write_line: *library.get(b"comedi_dio_write\0")?,
                 _library: library,
             })
@@ -201,8 +204,20 @@ impl Card<'_> {
     /// # Errors
     /// What the library says.
     pub fn make_output(&self, subdevice: u32, line: u32) -> Result<(), String> {
+        self.configure_line(subdevice, line, OUTPUT)
+    }
+
+    /// Makes a digital line an input.
+    ///
+    /// # Errors
+    /// What the library says.
+    pub fn make_input(&self, subdevice: u32, line: u32) -> Result<(), String> {
+        self.configure_line(subdevice, line, INPUT)
+    }
+
+    fn configure_line(&self, subdevice: u32, line: u32, direction: c_uint) -> Result<(), String> {
         // SAFETY: an open handle and numbers.
-        let answer = unsafe { (self.library.functions.configure_line)(self.handle, subdevice, line, OUTPUT) };
+        let answer = unsafe { (self.library.functions.configure_line)(self.handle, subdevice, line, direction) };
         if answer < 0 { Err(self.library.last_error()) } else { Ok(()) }
     }
 
@@ -211,6 +226,15 @@ impl Card<'_> {
     pub fn set_line(&self, subdevice: u32, line: u32, on: bool) -> bool {
         // SAFETY: an open handle and numbers.
         unsafe { (self.library.functions.write_line)(self.handle, subdevice, line, c_uint::from(on)) >= 0 }
+    }
+
+    /// A digital line; none if it cannot be read.
+    #[must_use]
+    pub fn line(&self, subdevice: u32, line: u32) -> Option<bool> {
+        let mut bit: c_uint = 0;
+        // SAFETY: an open handle, numbers, and a word that the library fills.
+        let answer = unsafe { (self.library.functions.read_line)(self.handle, subdevice, line, &raw mut bit) };
+        (answer >= 0).then_some(bit != 0)
     }
 
     /// Reads channels one after the other in one call; false if not all were read.

@@ -85,7 +85,7 @@ pub(super) fn carry_out<P: Port + 'static>(
         }
         Asked::Wave { name, text, .. } => {
             let (words, center) = operator.wave_of_text(text).map_err(Ended::Refused)?;
-            operator.start_wave(name, &words, &center)?;
+            operator.start_wave(name, &words, &center, false)?;
             let mut panel = panel.borrow_mut();
             panel.wave = json!({ "name": name, "tick": operator.status().tick });
             panel.hall.note("note", &format!("Page {page} started the wave {name}."), "", None);
