@@ -379,3 +379,24 @@ fn all_findings_of_a_file_come_in_one_run() {
     }
     assert_eq!(found.len(), 8, "{findings:#?}");
 }
+
+/// Four outputs and an input are taken; an output or an input more is refused at its own place, whatever stands between.
+#[test]
+fn a_spec_has_at_most_four_output_lines_and_an_input() {
+    let of = |kinds: &[&str]| {
+        let lines = kinds.iter().enumerate();
+        let lines = lines.map(|(line, kind)| format!("\n[[trigger]]\nname = \"line{line}\"\nkind = \"{kind}\"\n"));
+        let text = PLATFORM.text() + &lines.collect::<String>();
+        Bench { folder: folder_with_records(), cases: 0 }.findings(&text)
+    };
+    let accepted = of(&["motion", "input", "ticks", "motion", "points"]);
+    assert!(errors(&accepted).is_empty(), "{accepted:?}");
+    for (kinds, place) in [
+        (&["motion", "input", "ticks", "motion", "points", "motion"][..], "trigger[5]"),
+        (&["input", "motion", "ticks", "input"], "trigger[3]"),
+    ] {
+        let found = of(kinds);
+        let one = matches!(&errors(&found)[..], [one] if one.code == codes::TOO_MANY_TRIGGERS.id && one.key == place);
+        assert!(one, "{found:?}");
+    }
+}
