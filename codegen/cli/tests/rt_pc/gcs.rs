@@ -93,6 +93,12 @@ impl Client {
         self.answer()
     }
 
+    /// Sends bytes as they are; an answer for each that asks.
+    fn exchange<const N: usize>(&mut self, bytes: &[u8]) -> [String; N] {
+        self.0.write_all(bytes).unwrap();
+        std::array::from_fn(|_| self.answer())
+    }
+
     fn error(&mut self) -> String {
         self.ask("ERR?")
     }
@@ -132,6 +138,7 @@ pub fn clients_move_it_and_none_disturbs_it(bench: &Bench) {
     who_is_there(&mut first, &mut look);
     moves_are_made_or_refused_before_anything_moves(&mut first, &mut look);
     latency(&mut first, &mut look);
+    clients_that_were_tried_are_answered(&mut first);
     let mut second = bridge.client();
     others_look_and_stop_and_are_no_burden((&bridge, &link), &mut first, &mut second, &mut look);
     one_that_leaves_leaves_the_orders(first, &mut second, &mut look);
@@ -153,7 +160,8 @@ pub fn clients_move_it_and_none_disturbs_it(bench: &Bench) {
     let mut client = bridge.client();
     assert_eq!(client.ask("SAI?"), "1");
     assert_eq!(client.ask("SPA? 1 0X7000601"), "1 0X7000601=um");
-    assert_eq!([client.order("SVO 1 1"), client.order("MOV 1 3"), client.order("MOV Z 3")], ["0", "0", "15"]);
+    assert_eq!([client.order("SVO 1 1"), client.order("MOV Z 3")], ["0", "15"]);
+    assert_eq!(client.exchange(b"MOV 1 3\nERR?\n\x05"), ["0", "1"]);
     client.settle();
     assert!((client.value("POS? 1") - 3.0).abs() < THERE);
     assert_eq!(client.order("SVO 1 0"), "0");
@@ -297,6 +305,39 @@ fn latency(client: &mut Client, look: &mut impl FnMut() -> Place) {
         "gcs: MOV to the first tick that follows: {:.2} ms (median), {:.2} ms (longest of 50)",
         times[25], times[49]
     );
+}
+
+/// What Micro-Manager's `PI_GCS_2` and EPICS' `motorPIGCS2` sent when they were tried, byte by byte.
+fn clients_that_were_tried_are_answered(client: &mut Client) {
+    // Micro-Manager: its start, which goes on without `EAX`, and a move. It reads the mask as C does: `3F` would be no number to it, and
+    // the platform at rest.
+    assert_eq!(client.exchange::<5>(b"*IDN?\nTPC?\nERR?\nJON? 1\nERR?\n")[1..], ["0", "0", "1=0", "0"]);
+    assert_eq!(client.exchange(b"EAX X 1\nERR?\nSVO X 1\nERR?\nHIN? X\nCSV?\nERR?\n"), ["2", "0", "X=0", "2.0", "0"]);
+    assert_eq!(client.exchange(b"MOV X -5.12 Y 2.25\nERR?\n\x05ERR?\n"), ["0", "0x3F", "0"]);
+    client.settle();
+    let [both] = client.exchange(b"POS? X Y\n");
+    let lines: Vec<_> = both.split(" \n").map(|line| line.split_at(2)).collect();
+    let near = |(name, text): (&str, &str), expected: (&str, f64)| {
+        name == expected.0 && (text.parse::<f64>().unwrap() - expected.1).abs() < THERE
+    };
+    assert!(lines.len() == 2 && near(lines[0], ("X=", -5.12)) && near(lines[1], ("Y=", 2.25)), "{both}");
+    assert_eq!(client.exchange(b"MOV X 5 Y 0\nERR?\n"), ["0"]);
+    assert_eq!(client.exchange(b"HLT X\nERR?\n"), ["10"]);
+    client.send("HLT Y");
+    client.settle();
+    // It has not asked what became of the second stop: the next move is made, and that is what it is told of it.
+    assert_eq!(client.exchange(b"MOV X 0 Y 0\nERR?\nMOV X 1 Y 0\nERR?\n"), ["10", "0"]);
+    client.settle();
+    assert_eq!(client.exchange(b"FRF X Y \nERR?\n\x07"), ["0", "\u{b1}"]);
+    // EPICS: its start, a move, a stop, a move beyond reach, home.
+    assert_eq!(client.exchange::<4>(b"\x04SPI? R S T\nSVO W 1\nERR?\nVLS?\n")[2..], ["0", "100.000000"]);
+    assert_eq!(client.exchange(b"VLS 100.000000\nMOV Z 30.000000\n\x05"), ["0x3F"]);
+    assert_eq!(client.exchange(b"\x18ERR?\n"), ["10"]);
+    client.settle();
+    assert_eq!(client.exchange(b"VLS 100.000000\nMOV Z 100.000000\n\x05ERR?\n"), ["0", "7"]);
+    assert_eq!(client.exchange(b"SVO Z 1\nERR?\nFRF Z\nERR?\n\x05"), ["0", "0", "0"]);
+    assert_eq!(client.order("MOV X 0 Z 15"), "0");
+    client.settle();
 }
 
 fn others_look_and_stop_and_are_no_burden(

@@ -116,12 +116,19 @@ fn single<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, byte: u8) -> Out
             bits.iter().filter(|(_, is)| *is).map(|(bit, _)| bit).sum::<u32>().to_string()
         }
         // A platform moves as a whole.
-        5 if stage.moves() => format!("{:X}", (1_u32 << asked.axes.iter().count()) - 1),
+        5 if stage.moves() => mask(asked.axes.iter().count()),
         7 => return Ok(Some(char::from(if stage.is_rising() { 0xb0 } else { 0xb1 }).to_string())),
         // Nothing in motion, no macro, no wave.
         _ => "0".to_owned(),
     };
     Ok(Some(text))
+}
+
+/// So many lowest bits, as a hexadecimal number. With `0x` where clients that read numbers as C does would stop at a letter, and take
+/// a platform in motion for one at rest.
+fn mask(count: usize) -> String {
+    let mask = (1_u32 << count) - 1;
+    if mask > 9 { format!("{mask:#X}") } else { mask.to_string() }
 }
 
 fn stop<P: Port>(stage: &mut Stage<P>) -> Outcome {
