@@ -338,6 +338,18 @@ fn clients_that_were_tried_are_answered(client: &mut Client) {
     assert_eq!(client.exchange(b"SVO Z 1\nERR?\nFRF Z\nERR?\n\x05"), ["0", "0", "0"]);
     assert_eq!(client.order("MOV X 0 Z 15"), "0");
     client.settle();
+    // Sockets as most clients have them: what follows a command without an answer waits until that has been acknowledged.
+    client.0.set_nodelay(false).unwrap();
+    let mut times: Vec<f64> = (0..20)
+        .map(|_| {
+            let start = Instant::now();
+            assert_eq!(client.order("VLS 100"), "0");
+            start.elapsed().as_secs_f64() * 1e3
+        })
+        .collect();
+    client.0.set_nodelay(true).unwrap();
+    times.sort_by(f64::total_cmp);
+    println!("gcs: order and ERR? without TCP_NODELAY: {:.2} ms (median)", times[10]);
 }
 
 fn others_look_and_stop_and_are_no_burden(
