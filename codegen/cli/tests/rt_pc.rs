@@ -417,20 +417,32 @@ fn a_record_that_finds_no_room_brings_the_machine_down(bench: &Bench) {
     );
 }
 
-/// The same binary on a library that stands in for comedilib.
-fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
+/// Outputs of two cards.
+const TWO_CARDS: [&str; 4] = ["--comedi-out", "/dev/fake1", "--comedi-out", "/dev/fake2"];
+
+/// A library of cards that stand still.
+fn fake_comedi(bench: &Bench) -> PathBuf {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rt_pc/fake_comedi.rs");
     let library = bench.path("libcomedi.so");
     let built =
         Command::new("rustc").args(["--edition=2024", "--crate-type=cdylib", "-o"]).arg(&library).arg(source).output();
     let built = built.unwrap();
     assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
-    let run = |variables: &[(&str, &str)], arguments: &[&str]| {
-        let mut command = Command::new(&bench.programs.binary);
-        command.args(["--allow-no-rt", "--json", "--seconds", "0.4", "--arm", "--comedi-library"]).arg(&library);
-        command.args(["--comedi", "/dev/fake1"]).args(arguments).arg("--record").arg(bench.path("card.rec"));
-        command.env("FAKE_LOG", bench.path("card.log")).envs(variables.iter().copied()).output().unwrap()
-    };
+    library
+}
+
+/// A short run on them.
+fn on_card(bench: &Bench, library: &Path, variables: &[(&str, &str)], arguments: &[&str]) -> Output {
+    let mut command = Command::new(&bench.programs.binary);
+    command.args(["--allow-no-rt", "--json", "--seconds", "0.4", "--arm", "--comedi-library"]).arg(library);
+    command.args(["--comedi", "/dev/fake1"]).args(arguments).arg("--record").arg(bench.path("card.rec"));
+    command.env("FAKE_LOG", bench.path("card.log")).envs(variables.iter().copied()).output().unwrap()
+}
+
+/// The same binary on a library that stands in for comedilib.
+fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
+    let library = fake_comedi(bench);
+    let run = |variables: &[(&str, &str)], arguments: &[&str]| on_card(bench, &library, variables, arguments);
     // Whether the amplifiers were ever to be on.
     let was_on = |record: &Record| record.rows.iter().any(|row| row.supervisor >> 16 & 1 == 1);
     let log = || {
@@ -438,10 +450,10 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
         let field = |key: &str| text.lines().find_map(|line| line.strip_prefix(key)).unwrap().to_owned();
         let numbers =
             ["reads=", "writes1=", "writes2=", "lowest=", "highest="].map(|key| field(key).parse::<u64>().unwrap());
-        (numbers, field("line="), field("configured=") == "true" && field("bad=").is_empty())
+        (numbers, field("line="), field("directions=") == "0:1" && field("bad=").is_empty())
     };
 
-    let two = ["--comedi-out", "/dev/fake1", "--comedi-out", "/dev/fake2"];
+    let two = TWO_CARDS;
     let output = run(&[], &two);
     let (_, record) = bench.check(&output, "card.rec");
     let ([reads, first, second, _, highest], line, sound) = log();

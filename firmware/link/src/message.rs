@@ -407,6 +407,11 @@ pub struct EdgeStatus {
     pub tick: u64,
 }
 
+impl EdgeStatus {
+    /// No edge seen, nothing ordered for one.
+    pub const NONE: Self = Self { stage: 0, edges: 0, tick: 0 };
+}
+
 /// How a player of passes stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PassStatus {

@@ -68,7 +68,7 @@ impl Console {
             orders: VecDeque::new(),
             number: 0,
             wave: None,
-            edge: EdgeStatus { stage: pending::Stage::None.word() as u8, edges: 0, tick: 0 },
+            edge: EdgeStatus::NONE,
             awaited: None,
         }
     }

@@ -94,4 +94,20 @@ fn an_edge_of_the_input_line_starts_what_waits_for_it_in_the_next_tick() {
         assert_eq!((kind(*tick), kind(tick + 1)), (CommandKind::Hold, expected), "tick {tick}");
     }
     assert!(bench.replay("edge.rec").status.success());
+    a_card_has_lines_for_triggers(&bench);
+}
+
+/// Outputs behind the enable line, the input behind them, which is looked at once a tick.
+fn a_card_has_lines_for_triggers(bench: &Bench) {
+    let library = super::fake_comedi(bench);
+    let output = super::on_card(bench, &library, &[("FAKE_HIGH_AFTER", "100")], &super::TWO_CARDS);
+    let (_, record) = bench.check(&output, "card.rec");
+    let events = record.place("events");
+    let rose = record.rows.iter().enumerate().filter(|(_, row)| row.input[events] & u64::from(EDGE) != 0);
+    assert_eq!(rose.map(|(row, _)| row).collect::<Vec<_>>(), [100]);
+    let text = fs::read_to_string(bench.path("card.log")).unwrap();
+    let looks = format!("looks={}", record.rows.len());
+    for line in ["directions=0:1,5:0,1:1,2:1,3:1,4:1", &looks, "bad="] {
+        assert!(text.lines().any(|known| known == line), "{line}: {text}");
+    }
 }

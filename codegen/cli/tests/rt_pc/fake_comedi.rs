@@ -1,5 +1,6 @@
 //! A stand-in for libcomedi, built by the test: a card with sixteen inputs and four outputs whose inputs stand still. On closing
 //! it writes what was done with it. `FAKE_CODE`: code of every input; `FAKE_FAIL_AFTER`: readings after which it fails;
+//! `FAKE_HIGH_AFTER`: looks at a digital line after which that is high;
 //! `FAKE_LOG`: file to write.
 
 use std::ffi::{c_char, c_double, c_int, c_uint, c_void};
@@ -27,7 +28,10 @@ struct Log {
     writes: [u64; 3],
     codes: [u32; 2],
     lines: Vec<u32>,
-    configured: bool,
+    /// Digital lines with their directions, and how often one was looked at or, but for the first, set.
+    directions: Vec<(u32, u32)>,
+    looks: u64,
+    sets: u64,
     bad: Vec<String>,
 }
 
@@ -37,7 +41,9 @@ static LOG: Mutex<Log> = Mutex::new(Log {
     writes: [0; 3],
     codes: [u32::MAX, 0],
     lines: Vec::new(),
-    configured: false,
+    directions: Vec::new(),
+    looks: 0,
+    sets: 0,
     bad: Vec::new(),
 });
 
@@ -66,15 +72,18 @@ pub extern "C" fn comedi_close(_: *mut c_void) -> c_int {
     log.cards -= 1;
     if let (0, Ok(file)) = (log.cards, std::env::var("FAKE_LOG")) {
         let lines: Vec<String> = log.lines.iter().map(u32::to_string).collect();
+        let directions: Vec<String> = log.directions.iter().map(|(line, way)| format!("{line}:{way}")).collect();
         let text = format!(
-            "reads={}\nwrites1={}\nwrites2={}\nlowest={}\nhighest={}\nline={}\nconfigured={}\nbad={}\n",
+            "reads={}\nwrites1={}\nwrites2={}\nlowest={}\nhighest={}\nline={}\ndirections={}\nlooks={}\nsets={}\nbad={}\n",
             log.reads,
             log.writes[1],
             log.writes[2],
             log.codes[0],
             log.codes[1],
             lines.join(","),
-            log.configured,
+            directions.join(","),
+            log.looks,
+            log.sets,
             log.bad.join(";")
         );
         std::fs::write(file, text).unwrap();
@@ -154,12 +163,30 @@ pub unsafe extern "C" fn comedi_do_insnlist(card: *mut c_void, list: *mut List) 
 
 #[unsafe(no_mangle)]
 pub extern "C" fn comedi_dio_config(_: *mut c_void, subdevice: c_uint, line: c_uint, direction: c_uint) -> c_int {
-    LOG.lock().unwrap().configured = (subdevice, line, direction) == (2, 0, 1);
+    let mut log = LOG.lock().unwrap();
+    if subdevice != 2 {
+        log.bad.push(format!("line {line} of subdevice {subdevice}"));
+    }
+    log.directions.push((line, direction));
+    1
+}
+
+// SAFETY: as libcomedi's: the word is the caller's.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn comedi_dio_read(_: *mut c_void, _: c_uint, _: c_uint, bit: *mut c_uint) -> c_int {
+    let mut log = LOG.lock().unwrap();
+    log.looks += 1;
+    // SAFETY: see above.
+    unsafe { *bit = c_uint::from(log.looks > number("FAKE_HIGH_AFTER", u64::MAX)) };
     1
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn comedi_dio_write(_: *mut c_void, _: c_uint, _: c_uint, bit: c_uint) -> c_int {
-    LOG.lock().unwrap().lines.push(bit);
+pub extern "C" fn comedi_dio_write(_: *mut c_void, _: c_uint, line: c_uint, bit: c_uint) -> c_int {
+    let mut log = LOG.lock().unwrap();
+    match line {
+        0 => log.lines.push(bit),
+        _ => log.sets += 1,
+    }
     1
 }

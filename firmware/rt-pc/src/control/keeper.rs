@@ -142,6 +142,7 @@ mod tests {
     use controller::snapshot::recorder;
     use controller::supervised::{MACHINE_INPUT_WORDS, MachineInput};
     use rtrb::RingBuffer;
+    use specgen_link::EdgeStatus;
 
     fn row(count: u64, digest: u64) -> Row {
         let output = recorder::Row { codes: [0; 6], status: 0, supervisor: 0 };
@@ -159,6 +160,7 @@ mod tests {
             orders: 0,
             opens,
             waving,
+            edge: EdgeStatus::NONE,
             recorded: None,
             triggered,
         }
