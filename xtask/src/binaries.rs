@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::progress::{Durations, Progress};
-use crate::run::{Outcome, cargo, expect_success};
+use crate::run::{Outcome, cargo};
 use crate::skips;
 
 /// How tests are run.
@@ -77,17 +77,27 @@ pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut Ran) -> Outc
     }
     ran.tests.sort();
     ran.skipped.sort();
-    if !failed.is_empty() {
-        failed.sort();
-        return Outcome::Failed(format!("see the failed tests above, of {}", failed.join(", ")));
+    let skipped = skips::judge(root, &ran.skipped);
+    let good = ran.tests.iter().filter(|(_, good)| *good).count();
+    println!("\ntests: {good} passed, {} failed, {} skipped", ran.tests.len() - good, ran.skipped.len());
+    if failed.is_empty() {
+        return skipped;
     }
-    skips::judge(root, &ran.skipped)
+    failed.sort();
+    Outcome::Failed(format!("see the failed tests above, of {}", failed.join(", ")))
 }
 
-/// The examples in the documentation.
+/// The examples in the documentation, of which one is shown where it fails: most crates have none.
 pub fn examples(root: &Path) -> Outcome {
-    let doc = cargo(root, &["test", "--release", "--workspace", "--doc", "--quiet"]);
-    expect_success(doc, "see the failed examples above")
+    match cargo(root, &["test", "--release", "--workspace", "--doc", "--quiet"]).output() {
+        Ok(output) if output.status.success() => Outcome::Passed,
+        Ok(output) => {
+            let text = [output.stdout, output.stderr].concat();
+            println!("{}", String::from_utf8_lossy(&text).trim());
+            Outcome::Failed("see the failed examples above".to_owned())
+        }
+        Err(error) => Outcome::Failed(format!("cargo cannot be run: {error}")),
+    }
 }
 
 /// A compiled test binary.

@@ -19,7 +19,7 @@ pub fn of(text: &str) -> Vec<String> {
 
 /// Prints them. Under CI, where nobody reads them, one that is not expected fails.
 pub fn judge(root: &Path, skipped: &[(String, String)]) -> Outcome {
-    println!("\n{} skipped", skipped.len());
+    println!("\nskipped, wholly or in part:");
     for (job, reason) in skipped {
         println!("  {job}: {reason}");
     }
