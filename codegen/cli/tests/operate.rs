@@ -191,6 +191,7 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
     }
     operate(&["gains ki=1"]).says(2, &["name the spec"]);
     operate(&["reference.toml", MOVE]).says(1, &["disarmed: it moves when it runs"]);
+    operate(&["on-edge"]).says(1, &["no input line; declare one in its spec: [[trigger]] with name = \"start\""]);
 
     let script = [
         "wait arrived 20",
@@ -271,8 +272,9 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
         assert!((value - expected).abs() < 1e-15, "{name}: {value}");
     }
 
-    // Gains that are unstable are not sent, as the spec would be refused.
-    let run = operate(&[&UP[..], &["wait arrived 20", "gains kp=1e9"]].concat());
+    // A trajectory that was asked for is waited for. Gains that are unstable are not sent, as the spec would be refused.
+    let script = ["wait arrived 20", "play case-1", "wait arrived 20", "jog z=0.1um", "gains kp=1e9"];
+    let run = operate(&[&UP[..], &script].concat());
     run.says(1, &["not sent: E04"]);
     recover();
     let run = operate(&["reference.toml", "status"]);

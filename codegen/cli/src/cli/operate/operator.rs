@@ -311,15 +311,7 @@ impl<P: Port> Operator<P> {
     /// command only after it, so that nothing could be said of this one.
     pub(super) fn go(&mut self, pose: [f64; 6]) -> Result<(), Ended> {
         let words = self.words_of_move(&pose)?;
-        self.send(words)?;
-        let (sent, start) = (self.session.status().tick, Instant::now());
-        while self.session.status().tick < sent + SEEN {
-            if start.elapsed() >= ANSWERED {
-                return Err(Ended::Fault(format!("the machine makes no ticks, and is {}", self.stands())));
-            }
-            std::thread::sleep(Duration::from_millis(1));
-            self.look()?;
-        }
+        self.send_and_see(words)?;
         let status = self.session.status();
         if u64::from(status.phase) != Phase::Running.word() {
             return Err(Ended::Fault(format!("the machine is {} and does not move", self.stands())));
@@ -329,6 +321,20 @@ impl<P: Port> Operator<P> {
                 "the machine refuses to move to {}: outside the workspace; it stands where it stood",
                 specgen_operate::place::in_words(&pose)
             )));
+        }
+        Ok(())
+    }
+
+    /// Sends a command, and waits until the status says what became of it.
+    pub(super) fn send_and_see(&mut self, words: Vec<u64>) -> Result<(), Ended> {
+        self.send(words)?;
+        let (sent, start) = (self.session.status().tick, Instant::now());
+        while self.session.status().tick < sent + SEEN {
+            if start.elapsed() >= ANSWERED {
+                return Err(Ended::Fault(format!("the machine makes no ticks, and is {}", self.stands())));
+            }
+            std::thread::sleep(Duration::from_millis(1));
+            self.look()?;
         }
         Ok(())
     }

@@ -84,7 +84,7 @@ impl<P: Port> Operator<P> {
         let (number, table) = self.playable(name, correction).map_err(Ended::Refused)?;
         let Some((table, (path, _))) = table.zip(correction) else {
             let words = self.words_of_trajectory(number)?;
-            self.send(words)?;
+            self.send_and_see(words)?;
             self.note(line, &super::answer::Plain("done".to_owned()), ui);
             return Ok(());
         };
