@@ -32,6 +32,8 @@ pub enum TargetError {
         /// The useful part of what it printed.
         text: String,
     },
+    /// This program is linked statically and cannot load a library: what needs the built controller is left out.
+    Static,
     /// The compiler or the linker refused the emitted workspace.
     BuildFailed {
         /// What was being built.
@@ -92,7 +94,7 @@ impl TargetError {
     /// True if what is missing or broken is a tool that not every machine has: what needs it can be left out.
     #[must_use]
     pub fn is_of_a_tool(&self) -> bool {
-        matches!(self, Self::MissingTool { .. } | Self::SetUpFailed { .. } | Self::BrokenTool { .. })
+        matches!(self, Self::MissingTool { .. } | Self::SetUpFailed { .. } | Self::BrokenTool { .. } | Self::Static)
     }
 
     /// A failure of the operating system while `doing` something with `path`.
@@ -111,6 +113,11 @@ impl fmt::Display for TargetError {
                 write!(f, "{tool} could not be set up: {}; by hand: {command}", tried.join("; "))
             }
             Self::BrokenTool { tool, text } => write!(f, "{tool} does not work on this machine: {text}"),
+            Self::Static => f.write_str(
+                "this specgen is linked statically and cannot load the controller that it would build; take the command \
+                 for glibc (specgen-VERSION-x86_64-unknown-linux-gnu.tar.gz), or build it from the sources: \
+                 cargo install --path codegen/cli --locked",
+            ),
             Self::BuildFailed { what, text } => write!(f, "building {what} failed:\n{text}"),
             Self::PanicPath { what, text } => write!(
                 f,

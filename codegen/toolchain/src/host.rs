@@ -35,6 +35,18 @@ pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetErr
     keep(&library.path, &library.bytes)
 }
 
+/// [`build_library`] for a caller that loads it into this process.
+///
+/// # Errors
+/// As there; [`TargetError::Static`] before anything is built, if this process cannot load a library.
+pub fn build_loadable(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
+    // musl's loader is no part of a static program.
+    if cfg!(all(target_env = "musl", target_feature = "crt-static")) {
+        return Err(TargetError::Static);
+    }
+    build_library(dir, target_dir)
+}
+
 /// Builds the program in `dir/folder` for this machine and returns its path. Its dependencies are those of its lock file.
 ///
 /// # Errors

@@ -149,7 +149,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> Result<(), Failure> {
     let target_dir = output.join("target");
     ui.progress("building the host library");
-    let library = target::host::build_library(output, &target_dir)?;
+    let library = target::host::build_loadable(output, &target_dir)?;
     summary.host_library = Some(library.display().to_string());
     ui.progress(&format!("host library: {}", library.display()));
     let sim = |error: host_sim::controller::ControllerError| Failure::Environment(error.to_string());

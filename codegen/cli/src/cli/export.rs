@@ -15,7 +15,7 @@ use host_sim::word::WordKind;
 use serde::Serialize;
 use specgen_language::interrupt::Scratch;
 use specgen_runtime::supervisor::{self, Request};
-use specgen_toolchain::host::build_library;
+use specgen_toolchain::host::build_loadable;
 
 use super::file::{claim, write_folder};
 use super::sim::environment;
@@ -109,7 +109,7 @@ fn export(
     let folder = scratch.path().join("controller");
     workspace::write_scratch(&folder, &compiled.files)?;
     ui.progress("building the emitted controller for this host");
-    let library = build_library(&folder, &scratch.path().join("target"))?;
+    let library = build_loadable(&folder, &scratch.path().join("target"))?;
     let bytes = fs::read(&library).map_err(environment)?;
     let machine = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;
     let (texts, next) = texts(&machine)?;

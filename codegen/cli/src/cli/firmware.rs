@@ -327,7 +327,13 @@ fn emulate(
     let mcu = compiled.model.target.mcu;
     let Folders { output, target: target_dir } = *folders;
     ui.progress(&format!("counting instructions on {}", mcu.part().emulated));
-    let library = target::host::build_library(output, &output.join("target"))?;
+    let library = match target::host::build_loadable(output, &output.join("target")) {
+        Err(error @ TargetError::Static) => {
+            notes.push(format!("instructions not counted: {error}"));
+            return Ok(None);
+        }
+        built => built?,
+    };
     let environment = |error: String| Failure::Environment(error);
     let mut controller = Controller::load(&library).map_err(|error| environment(error.to_string()))?;
     let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS)

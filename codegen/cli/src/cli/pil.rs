@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let hold = workspace::write(&output, &compiled.files)?;
     let target_dir = output.join("target");
     ui.progress(&format!("building the host library in {}", output.display()));
-    let library = target::host::build_library(&output, &target_dir)?;
+    let library = target::host::build_loadable(&output, &target_dir)?;
     let host = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;
 
     match (line, emulator) {

@@ -312,7 +312,7 @@ fn build(compiled: &Compiled, no_target: bool, ui: &Ui) -> Result<Built, Failure
     let cache = scratch.path().join("target");
     workspace::write_scratch(&folder, &compiled.files)?;
     ui.progress("building the emitted controller for this host");
-    let library = target::host::build_library(&folder, &cache)?;
+    let library = target::host::build_loadable(&folder, &cache)?;
     let mut controller = Controller::load(&library).map_err(environment)?;
     let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS).map_err(environment)?;
     let measured = if no_target {

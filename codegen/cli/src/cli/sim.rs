@@ -190,6 +190,6 @@ pub(super) fn emitted(compiled: &compile::Compiled, ui: &Ui) -> Result<Controlle
     let workspace = scratch.path().join("controller");
     workspace::write_scratch(&workspace, &compiled.files)?;
     ui.progress("building the emitted controller for this host");
-    let library = target::host::build_library(&workspace, &scratch.path().join("target"))?;
+    let library = target::host::build_loadable(&workspace, &scratch.path().join("target"))?;
     Controller::load(&library).map_err(environment)
 }

@@ -5,7 +5,7 @@ use host_sim::word::WordKind;
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::workspace;
 use specgen_language::interrupt::Scratch;
-use specgen_toolchain::host::{build_library, build_unit};
+use specgen_toolchain::host::{build_loadable, build_unit};
 
 use super::{Built, Unit, Variable};
 use crate::cli::export::{fits, header};
@@ -21,7 +21,7 @@ pub(super) fn built(compiled: &Compiled, ui: &Ui) -> Result<Built, Failure> {
     workspace::write_scratch(&rust, &compiled.files)?;
     ui.progress("building the emitted controller for this host");
     let target = scratch.path().join("target");
-    let library = build_library(&rust, &target)?;
+    let library = build_loadable(&rust, &target)?;
     let machine = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;
     fits(&machine)?;
     let unit = unit(compiled, &machine);
