@@ -6,7 +6,7 @@
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::{Command, ExitCode, Stdio};
 
 use specgen_toolchain::sha256;
 
@@ -169,7 +169,8 @@ impl Builds<'_> {
         done(Command::new("tar").current_dir(&folder).arg("-xzf").arg(output.join(format!("{name}.tar.gz"))))?;
         let sources = folder.join(name).join("codegen/cli");
         let place = folder.join("installed");
-        let mut install = cargo(&folder, &["install", "--quiet", "--locked", "--path"]);
+        // Which takes what is not specgen's from the build of the command.
+        let mut install = cargo(&folder, &["install", "--quiet", "--locked", "--target", TARGETS[0], "--path"]);
         install.arg(sources).arg("--root").arg(&place);
         self.environment(&mut install);
         done(&mut install)?;
@@ -219,19 +220,31 @@ fn tried(root: &Path, name: &str, output: &Path) -> Result<(), String> {
         let archive = format!("{name}-{target}");
         done(Command::new("tar").current_dir(&folder).arg("-xzf").arg(output.join(format!("{archive}.tar.gz"))))?;
         let specgen = folder.join(&archive).join("specgen");
-        let says = printed(Command::new(&specgen).arg("--version"))?;
+        let command = |words: &[&str]| {
+            let mut command = Command::new(&specgen);
+            command.current_dir(&folder).env_clear().args(words);
+            command
+        };
+        let says = printed(&mut command(&["--version"]))?;
         if !says.contains(version) {
             return Err(format!("{archive}/specgen --version says {says}"));
         }
-        done(
-            Command::new(&specgen).current_dir(&folder).args(["check", "--help"]).stdout(std::process::Stdio::null()),
-        )?;
+        done(command(&["check", "--help"]).stdout(Stdio::null()))?;
         let spec = root.join("specs/minimal.toml");
         fs::copy(&spec, folder.join("minimal.toml")).map_err(|error| format!("{}: {error}", spec.display()))?;
-        done(Command::new(&specgen).current_dir(&folder).args(["check", "minimal.toml"]))?;
+        done(&mut command(&["check", "minimal.toml"]))?;
+        if target != TARGETS[0] {
+            // What has to load a library is refused, with a mend.
+            let refused = command(&["sim", "minimal.toml"]).output().map_err(|error| format!("{archive}: {error}"))?;
+            let says = String::from_utf8_lossy(&refused.stderr);
+            if refused.status.code() != Some(3) || !says.contains(TARGETS[0]) {
+                return Err(format!("{archive}/specgen sim: {}: {says}", refused.status));
+            }
+        }
     }
     let fresh = folder.join("fresh");
-    let wheel = wheel::wheel(output)?;
+    let wheel =
+        output.join(made_of(output, name)?.into_iter().find(|file| file.ends_with(".whl")).ok_or("there is no wheel")?);
     if let Outcome::Failed(why) = wheel::environment(&fresh, &[wheel.as_ref()]) {
         return Err(why);
     }
@@ -239,12 +252,19 @@ fn tried(root: &Path, name: &str, output: &Path) -> Result<(), String> {
     done(Command::new(fresh.join("bin/python")).current_dir(&folder).args(["-c", script]))
 }
 
-/// Writes the digests, and prints what there is.
-fn digests(output: &Path, name: &str) -> Result<(), String> {
+/// Names of the files of this version in the folder: those of others may be beside them.
+fn made_of(output: &Path, name: &str) -> Result<Vec<String>, String> {
     let read = fs::read_dir(output).map_err(|error| format!("{}: {error}", output.display()))?;
     let mut files: Vec<String> = read.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect();
-    files.retain(|file| file.starts_with(name));
+    let of_it = |file: &String| file.strip_prefix(name).is_some_and(|rest| rest.starts_with(['.', '-']));
+    files.retain(of_it);
     files.sort();
+    Ok(files)
+}
+
+/// Writes the digests, and prints what there is.
+fn digests(output: &Path, name: &str) -> Result<(), String> {
+    let files = made_of(output, name)?;
     let mut sums = String::new();
     println!("{:58}{:>9}  SHA-256", "", "bytes");
     for file in &files {
