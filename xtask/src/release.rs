@@ -25,6 +25,8 @@ const VERSIONS: [(&str, &str); 3] = [
     ("codegen/python/Cargo.toml", "[package]"),
     ("codegen/python/pyproject.toml", "[project]"),
 ];
+/// The spec of `specgen new mine`.
+const MADE_ANEW: &str = "mine/platform.toml";
 /// Digests of all that was made.
 const SUMS: &str = "SHA256SUMS";
 
@@ -206,7 +208,7 @@ fn zip(archive: &Path) -> Result<(), String> {
     done(Command::new("gzip").args(["-9", "-n", "-f"]).arg(archive))
 }
 
-/// Each command says its version and checks a spec, in a folder that has nothing else; the wheel is imported.
+/// Each command says its version, makes a spec and checks it, in a folder that has nothing else; the wheel compiles it.
 fn tried(root: &Path, name: &str, output: &Path) -> Result<(), String> {
     let version = name.trim_start_matches("specgen-");
     let folder = root.join(MADE).join("tried");
@@ -219,10 +221,10 @@ fn tried(root: &Path, name: &str, output: &Path) -> Result<(), String> {
     for target in TARGETS {
         let archive = format!("{name}-{target}");
         done(Command::new("tar").current_dir(&folder).arg("-xzf").arg(output.join(format!("{archive}.tar.gz"))))?;
-        let specgen = folder.join(&archive).join("specgen");
+        let place = folder.join(&archive);
         let command = |words: &[&str]| {
-            let mut command = Command::new(&specgen);
-            command.current_dir(&folder).env_clear().args(words);
+            let mut command = Command::new(place.join("specgen"));
+            command.current_dir(&place).env_clear().args(words);
             command
         };
         let says = printed(&mut command(&["--version"]))?;
@@ -230,12 +232,11 @@ fn tried(root: &Path, name: &str, output: &Path) -> Result<(), String> {
             return Err(format!("{archive}/specgen --version says {says}"));
         }
         done(command(&["check", "--help"]).stdout(Stdio::null()))?;
-        let spec = root.join("specs/minimal.toml");
-        fs::copy(&spec, folder.join("minimal.toml")).map_err(|error| format!("{}: {error}", spec.display()))?;
-        done(&mut command(&["check", "minimal.toml"]))?;
+        done(&mut command(&["new", "mine", "--like", "reference"]))?;
+        done(&mut command(&["check", MADE_ANEW]))?;
         if target != TARGETS[0] {
             // What has to load a library is refused, with a mend.
-            let refused = command(&["sim", "minimal.toml"]).output().map_err(|error| format!("{archive}: {error}"))?;
+            let refused = command(&["sim", MADE_ANEW]).output().map_err(|error| format!("{archive}: {error}"))?;
             let says = String::from_utf8_lossy(&refused.stderr);
             if refused.status.code() != Some(3) || !says.contains(TARGETS[0]) {
                 return Err(format!("{archive}/specgen sim: {}: {says}", refused.status));
@@ -248,8 +249,9 @@ fn tried(root: &Path, name: &str, output: &Path) -> Result<(), String> {
     if let Outcome::Failed(why) = wheel::environment(&fresh, &[wheel.as_ref()]) {
         return Err(why);
     }
-    let script = "import specgen; print(specgen.compile('minimal.toml').digest)";
-    done(Command::new(fresh.join("bin/python")).current_dir(&folder).args(["-c", script]))
+    let script = format!("import specgen; print(specgen.compile('{MADE_ANEW}').digest)");
+    let place = folder.join(format!("{name}-{}", TARGETS[0]));
+    done(Command::new(fresh.join("bin/python")).current_dir(place).args(["-c", &script]))
 }
 
 /// Names of the files of this version in the folder: those of others may be beside them.
