@@ -1,7 +1,8 @@
 //! What is released: sources, the command for two kinds of Linux, the Python package, and the digests of all.
 //!
-//! Of one commit two runs give the same bytes: times are the commit's, folders of this computer are not in the binaries, archives are in the
-//! order of names.
+//! Times are the commit's, folders of this computer are not in the binaries, archives are in the order of names. So two runs of one
+//! commit in one folder should give the same bytes with the same compiler. In another folder the objects of the command are the same
+//! (compared over 122 packages), but not those of the wheel: cargo names what its workspace takes from outside by the whole path.
 
 use std::ffi::OsStr;
 use std::fs;
