@@ -33,6 +33,10 @@ def main(controller_path: str, plant_path: str, inputs_path: str, ticks: int, ou
     other, _, third_folder = instance(plant_path, "other")
     of_plant = {variable.name: variable.valueReference for variable in plant_about.modelVariables}
     other.setInteger([of_plant["settings.seed"]], [2])
+    of_controller = {variable.name: variable.valueReference for variable in about.modelVariables}
+    # `specgen sim` gives legs without a platform displacements, whatever the spec's set-points are.
+    if "settings.setpoint_kind" in of_controller:
+        controller.setInteger([of_controller["settings.setpoint_kind"]], [1])
     for unit in (controller, plant, other):
         unit.exitInitializationMode()
     period = float(about.defaultExperiment.stepSize)
