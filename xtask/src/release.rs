@@ -1,8 +1,9 @@
 //! What is released: sources, the command for two kinds of Linux, the Python package, and the digests of all.
 //!
 //! Times are the commit's, folders of this computer are not in the binaries, archives are in the order of names. So two runs of one
-//! commit in one folder should give the same bytes with the same compiler. In another folder the objects of the command are the same
-//! (compared over 122 packages), but not those of the wheel: cargo names what its workspace takes from outside by the whole path.
+//! commit in one folder give the same bytes with the same compiler: seen of the command for glibc, with all of specgen's own packages
+//! compiled again. In another folder its objects are the same (compared over 122 packages); those of the wheel need not be: cargo
+//! names what its workspace takes from outside by the whole path.
 
 use std::ffi::OsStr;
 use std::fs;
