@@ -142,8 +142,11 @@
       heading(now);
     }
     strips.draw(NAMES, shown5.error);
-    legs.draw(live ? shown5.volts || volts : null);
-    if (now - shown5.at >= DIGITS) Object.assign(shown5, { at: now, error, volts });
+    // Over 30 s a pixel is longer than that.
+    if (now - shown5.at >= DIGITS || !live) {
+      Object.assign(shown5, { at: now, error, volts });
+      legs.draw(live ? volts : null);
+    }
     if (!live) Object.assign(shown5, { error: null, volts: null });
     if (now - spectra >= SPECTRUM) {
       spectra = now;

@@ -138,6 +138,20 @@ function written(to, text, x, y, size, color, align, weight) {
   to.fillText(text, x, y);
 }
 
+// Gaps as a lane shows them, from the oldest: those that are a pixel wide or touch, as boxes; shorter ones as marks at its edge, which hide nothing.
+function gapsIn(samples, seconds, left, wide) {
+  const { last, period } = samples, x = tick => left + wide * (1 - (last - tick) * period / seconds), boxes = [], marks = [];
+  for (const [from, to] of samples.gaps) {
+    const a = x(from), b = x(to);
+    if (b < left) continue;
+    if (b - a < 1) { if (!marks.length || a - marks[marks.length - 1] >= 1) marks.push(a); continue; }
+    const box = boxes[boxes.length - 1];
+    if (box && a <= box[1] + 1) box[1] = b;
+    else boxes.push([a, Math.max(b, a + 3)]);
+  }
+  return { boxes, marks };
+}
+
 // A lane: band from least to largest, mean as a line, gaps hatched and never crossed.
 function lane(to, samples, ring, channel, box, seconds, scale) {
   const [left, top, wide, tall] = box, { last, period } = samples;
@@ -180,8 +194,10 @@ function lane(to, samples, ring, channel, box, seconds, scale) {
     part.push([x(tick + ring.ticks / 2), least, mean, most]);
   });
   flush();
-  for (const [from, to_] of gaps) {
-    const a = x(from), b = Math.max(x(to_), x(from) + 3);
+  const { boxes, marks } = gapsIn(samples, seconds, left, wide);
+  to.fillStyle = inks.ink2;
+  for (const at of marks) to.fillRect(at, top, 1.5, 4);
+  for (const [a, b] of boxes) {
     to.fillStyle = inks.card;
     to.fillRect(a, top, b - a, tall);
     to.save();
@@ -244,15 +260,27 @@ class Strips {
       written(to, "rms " + (live && isFinite(stats[k].rms) ? fixed(stats[k].rms * 1e9, this.first ? 0 : 1) : "–"), wide, top + box[3] / 2 + 14, 12, inks.ink2, "right");
     }
     const x = tick => left + inner * (1 - (samples.last - tick) * samples.period / seconds);
-    let edge = -Infinity;
+    // Gaps whose labels would touch have one, of how many they are and how long together.
+    let group = null;
+    const label = () => {
+      if (!group) return;
+      const text = (group.count > 1 ? group.count + " gaps " : "gap ") + duration(group.ticks * samples.period);
+      written(to, text, Math.min(Math.max(group.from, left + 30), left + inner - 34), 10, 12, inks.ink, "center", 600);
+    };
     for (const [from, behind] of samples.gaps) {
       const at = x((from + behind) / 2);
-      if (at < left + 20 || at - edge < 62) continue;
-      edge = at;
-      written(to, "gap " + duration((behind - from) * samples.period), Math.min(at, left + inner - 24), 10, 12, inks.ink, "center", 600);
+      if (at < left) continue;
+      if (group && at - group.from < 100) {
+        group.count++;
+        group.ticks += behind - from;
+        continue;
+      }
+      label();
+      group = { from: at, count: 1, ticks: behind - from };
     }
+    label();
     // From the newest on; a label that would stand on another is left out.
-    edge = Infinity;
+    let edge = Infinity;
     for (const [tick, text, bad] of [...samples.marks].reverse()) {
       const at = x(tick), room = 6.2 * text.length;
       if (at < left) break;
