@@ -339,7 +339,8 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
     let mut study = vec!["robust", "learning.toml", "--draws", "1", "--learn", "2", "--vary", "delay_ticks=0:0"];
     fixed.iter().for_each(|vary| study.extend(["--vary", vary]));
     let run = |more: &[&str]| folder.run(&[&study[..], more].concat());
-    let single = run(&["-o", "single"]);
+    let single = run(&["-o", "single", "--plot", "robust.svg"]);
+    assert!(folder.read("robust.svg").contains("the same, learned"));
     assert_eq!(single.code, 1, "{single:#?}");
     assert!(single.stderr.contains("largest rms learned error is"), "{single:#?}");
     assert!(single.stdout.contains("learned from 2 passes on each") && single.stdout.contains("learned, nm rms"));
@@ -360,7 +361,7 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
         assert_eq!(contents(&folder.path("merged")), contents(&folder.path("single")));
     }
     // The option goes before the spec, whose limit is none where nothing is learned.
-    run(&["--replay", "gain-low", "--max-learned", "1 um"]).says(0, &["learned"]);
+    run(&["--replay", "gain-low", "--max-learned", "1 um"]).says(0, &[]);
     let without: Vec<&str> = study.iter().copied().filter(|word| !["--learn", "2"].contains(word)).collect();
     folder.run(&[&without[..], &["--replay", "gain-low"]].concat()).says(0, &[]);
     // A spec without a correction has nothing to learn with; a limit needs something learned.

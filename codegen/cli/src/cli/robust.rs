@@ -234,7 +234,7 @@ impl Results<'_> {
         let found = report::Found { work, gate: &gate, reasons: &reasons, alone, planned, runs };
         let report = found.report();
         let below = "rms error by share of the machines";
-        if let Some(line) = self.plot.charts(&work.name, below, &[found.chart()])? {
+        if let Some(line) = self.plot.charts(&work.name, below, &found.charts())? {
             ui.progress(line.trim_end());
         }
         if let Some(folder) = self.output {
