@@ -31,7 +31,8 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
             );
         }
         for path in needed.iter().map(|key| keys::join(&table, key)) {
-            if f.get(&path).is_some() || findings.mentions(&[&path]) {
+            // What is wrong within a list is told of its element.
+            if f.given(&path) || findings.mentions(&[&path]) {
                 continue;
             }
             missing(f, findings, &table, &path, kind)?;
