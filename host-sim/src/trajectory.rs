@@ -3,9 +3,11 @@
 mod jet;
 mod multisine;
 mod paper;
+mod step;
 
 pub use multisine::Multisine;
 pub use paper::{Jump, PaperPath, PaperPose, Reading};
+pub use step::Step;
 
 /// A motion of the six legs from time 0.
 pub trait LegTrajectory {

@@ -4,7 +4,7 @@
 use std::fs;
 
 use host_sim::controller::{Controller, TickController};
-use host_sim::trajectory::{PaperPath, PaperPose, PoseTrajectory, Reading};
+use host_sim::trajectory::{PaperPath, PaperPose, PoseTrajectory, Reading, Step};
 use specgen::diagnostic::Diagnostic;
 use specgen::ir::{self, Scalar};
 use specgen::lower::setpoint;
@@ -140,7 +140,7 @@ fn play<T: Real + Into<f64>>(model: &Model, plan: &Setpoints<T, Parallel>, selec
 }
 
 /// Largest deviation of pose, rate and acceleration from the host's formulas, of lengths (index 0) and angles (1).
-fn deviation(targets: &[Target<f64>], host: &PaperPose, period: f64) -> [[f64; 2]; 3] {
+fn deviation(targets: &[Target<f64>], host: &dyn PoseTrajectory, period: f64) -> [[f64; 2]; 3] {
     let mut worst = [[0.0_f64; 2]; 3];
     for (tick, target) in (1..).zip(targets) {
         let expected = host.target(f64::from(tick) * period);
@@ -180,6 +180,29 @@ fn paths_on_board_are_the_hosts_to_a_picometre_in_f64_and_a_tenth_of_a_nanometre
             assert!(f32s[1][0] <= 1e-5 * fast && f32s[2][0] <= 1e-5 * sharp, "{path:?} {frequency}: {f32s:?}");
         }
     }
+}
+
+#[test]
+fn a_step_on_board_is_the_hosts_without_a_corner_and_refused_where_it_is_too_fast() {
+    let to = [10e-6, 0.0, -4e-6, 20e-6, 0.0, 0.0];
+    let step = |time: f64| with_trajectories(vec![TrajectoryKind::Step { to, time }]);
+    let (model, host) = (step(5e-3), Step { to, time: 5e-3 });
+    let (_, warnings) = setpoint::lower(&model, model.task_space.as_ref().unwrap(), &[], Scalar::F64).unwrap();
+    assert!(warnings.is_empty(), "{warnings:#?}");
+    let double = play(&model, &plan::<f64>(&model, &lowered(&model, &[], Scalar::F64).unwrap()), 0);
+    let single = play(&model, &plan::<f32>(&model, &lowered(&model, &[], Scalar::F32).unwrap()), 0);
+    assert_eq!(double.len(), 50);
+    let [f64s, f32s] = [&double, &single].map(|targets| deviation(targets, &host, model.timing.period));
+    println!("step: f64 {:.1e} m, f32 {:.1e} m", f64s[0][0], f32s[0][0]);
+    assert!(f64s[0][0] <= 1e-12 && f64s[1][0] <= 1e-9 && f32s[0][0] <= 0.1e-9, "{f64s:?} {f32s:?}");
+    let last = double.last().unwrap();
+    assert!((0..6).all(|axis| (last.pose[axis] - to[axis]).abs() < 1e-15 && last.rate[axis].abs() < 1e-12), "{last:?}");
+    // 10 µm in 3 ms are 6.7 mm/s in the middle.
+    let found = lowered(&step(3e-3), &[], Scalar::F64).unwrap_err();
+    assert_eq!(codes(&found), ["E0455"]);
+    let needed: f64 = found[0].help.split(' ').nth(2).unwrap().parse().unwrap();
+    assert!(needed > 3.9 && lowered(&step(1e-3 * needed), &[], Scalar::F64).is_ok(), "{found:#?}");
+    assert_eq!(codes(&lowered(&step(1e-4), &[], Scalar::F64).unwrap_err()), ["E0456"]);
 }
 
 #[test]

@@ -47,7 +47,11 @@ impl Bench {
             (_, Presence::Form(form)) => Choice { joints: form.contains("one by one"), ..PLATFORM },
             ("hysteresis", _) if key.name == "rate_tables" => Choice { dynamic: true, ..PLATFORM },
             ("hysteresis", _) if key.name == "dead_time" => LEGS,
-            ("trajectory", _) => Choice { waveform: matches!(key.name, "file" | "period" | "repeat"), ..PLATFORM },
+            ("trajectory", _) => Choice {
+                waveform: matches!(key.name, "file" | "period" | "repeat"),
+                step: matches!(key.name, "to" | "time"),
+                ..PLATFORM
+            },
             _ => PLATFORM,
         }
     }

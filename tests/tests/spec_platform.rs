@@ -83,6 +83,7 @@ fn every_value_of_the_reference_is_in_si() {
         modal_damping: 0.02,
         notch_damping: Some(1.0),
         active_damping: false,
+        hand_over: false,
         correction: None,
         gains: None,
         position_gains: None,

@@ -207,7 +207,11 @@ fn run(trial: &Trial, brief: bool) -> Result<(), String> {
     let operated = operate(trial, &mut session, brief)
         .and_then(|()| if has_input { wait_for_edge(trial, &mut session) } else { Ok(()) })
         .and_then(|()| motion.as_ref().map_or(Ok(()), |motion| learn(trial, &mut session, motion)));
-    let report = session.report()?;
+    // A board that is gone ended what was under way, which says more.
+    let report = match (session.report(), &operated) {
+        (Err(gone), Err(why)) => return Err(format!("{}: {why}; then {gone}", trial.target)),
+        (report, _) => report?,
+    };
     println!("{}: {}", trial.target, report.text);
     operated.map_err(|why| format!("{}: {why}", trial.target))?;
     if let Some(text) = report.violations.first() {

@@ -332,13 +332,15 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
         1,
     );
     let text = text.replacen("stale_ticks  = 10", "stale_ticks = 3", 1);
+    let text = text + "\n[robust]\nmax_learned = \"1 nm\"\n";
     std::fs::write(folder.path("learning.toml"), text).unwrap();
     let fixed =
         ["mass", "stiffness", "damping", "hysteresis", "creep", "lag", "noise"].map(|name| format!("{name}=1:1"));
     let mut study = vec!["robust", "learning.toml", "--draws", "1", "--learn", "2", "--vary", "delay_ticks=0:0"];
     fixed.iter().for_each(|vary| study.extend(["--vary", vary]));
     let run = |more: &[&str]| folder.run(&[&study[..], more].concat());
-    let single = run(&["--max-learned", "1 nm", "-o", "single"]);
+    let single = run(&["-o", "single", "--plot", "robust.svg"]);
+    assert!(folder.read("robust.svg").contains("the same, learned"));
     assert_eq!(single.code, 1, "{single:#?}");
     assert!(single.stderr.contains("largest rms learned error is"), "{single:#?}");
     assert!(single.stdout.contains("learned from 2 passes on each") && single.stdout.contains("learned, nm rms"));
@@ -351,13 +353,17 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
     // Parts are merged as those of any study, which short tests show.
     if length(false, true) {
         for index in ["1/2", "2/2"] {
-            let part = run(&["--max-learned", "1 nm", "--shard", index, "-o", &format!("part-{}.json", &index[..1])]);
+            let part = run(&["--shard", index, "-o", &format!("part-{}.json", &index[..1])]);
             assert_eq!(part.code, 0, "{part:#?}");
         }
         let merged = folder.run(&["robust", "merge", "part-2.json", "part-1.json", "-o", "merged"]);
         assert_eq!((merged.code, &merged.stdout), (1, &single.stdout));
         assert_eq!(contents(&folder.path("merged")), contents(&folder.path("single")));
     }
+    // The option goes before the spec, whose limit is none where nothing is learned.
+    run(&["--replay", "gain-low", "--max-learned", "1 um"]).says(0, &[]);
+    let without: Vec<&str> = study.iter().copied().filter(|word| !["--learn", "2"].contains(word)).collect();
+    folder.run(&[&without[..], &["--replay", "gain-low"]].concat()).says(0, &[]);
     // A spec without a correction has nothing to learn with; a limit needs something learned.
     folder.run(&["robust", "reference.toml", "--learn", "2"]).says(1, &["write correction = \"2 um\" in [control]"]);
     folder.run(&["robust", "learning.toml", "--max-learned", "1 nm"]).says(2, &["--learn"]);

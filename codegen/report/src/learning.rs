@@ -135,7 +135,7 @@ fn by_pass(learned: &Learned) -> Chart {
     let mut chart = Chart::new(
         "passes",
         "Error of case 1 at 10\u{2009}Hz by pass",
-        Axis::linear("passes learned from", ""),
+        Axis::linear("pass", ""),
         Axis::log("translation", "nm rms"),
     )
     .with("", DOTS, points)

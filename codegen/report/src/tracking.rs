@@ -125,7 +125,7 @@ pub fn follow(
                     all.push(Followed { name: name.clone(), frequency: Some(hertz), own, run: kept(run) });
                 }
             }
-            TrajectoryKind::Waveform { .. } => {
+            TrajectoryKind::Step { .. } | TrajectoryKind::Waveform { .. } => {
                 progress(&format!("{name} on board"));
                 let run = sampled.play(controller, number as u32, PLAYED)?;
                 all.push(Followed { name, frequency: None, own: true, run: kept(run) });

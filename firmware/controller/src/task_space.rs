@@ -254,6 +254,9 @@ pub const DAMPED: usize = 0;
 /// Active damping of each.
 pub const DAMPING: [Resonator<Real>; DAMPED] = [];
 
+/// Whether the integral is handed to the estimates when the set-point comes to rest; from `control.hand_over`.
+pub const HANDS_OVER: bool = false;
+
 /// Axes with a correction of the request; from `control.correction`.
 pub const CORRECTED: usize = 0;
 

@@ -29,6 +29,7 @@ pub fn model(probes: [Probe; 6]) -> Model {
         modal_damping: 0.02,
         notch_damping: Some(1.0),
         active_damping: false,
+        hand_over: false,
         correction: None,
         gains: None,
         position_gains: None,

@@ -69,20 +69,25 @@ pub struct Choice {
     pub joints: bool,
     /// The first trajectory is a waveform instead of a path of the paper.
     pub waveform: bool,
+    /// It is a step.
+    pub step: bool,
     /// Dynamic Preisach instead of creep.
     pub dynamic: bool,
 }
 
 /// The task-space controller, with joint circles and a path of the paper.
-pub const PLATFORM: Choice = Choice { control: true, weights: false, joints: false, waveform: false, dynamic: false };
+pub const PLATFORM: Choice =
+    Choice { control: true, weights: false, joints: false, waveform: false, step: false, dynamic: false };
 
 /// The leg feed-forward, with weights per run.
-pub const LEGS: Choice = Choice { control: false, weights: true, joints: false, waveform: false, dynamic: false };
+pub const LEGS: Choice =
+    Choice { control: false, weights: true, joints: false, waveform: false, step: false, dynamic: false };
 
 impl Choice {
     /// Whether the key stands in the text.
     fn takes(self, section: &Section, key: &Key) -> bool {
         let of_waveform = matches!(key.name, "file" | "period" | "repeat");
+        let of_step = matches!(key.name, "to" | "time");
         match (section.name, key.presence) {
             (_, Presence::InsteadOf(_)) => key.name.ends_with("_weight") == self.weights,
             (_, Presence::Form(form)) => form.contains("one by one") == self.joints,
@@ -90,7 +95,9 @@ impl Choice {
             ("hysteresis", _) if key.name.starts_with("creep_") => !self.dynamic,
             ("hysteresis", _) if key.name == "dead_time" => !self.control,
             ("sensor", _) if matches!(key.name, "calibration" | "input_range") => self.control,
-            ("trajectory", Presence::Rule(_)) if key.name != "lead" => of_waveform == self.waveform,
+            ("trajectory", Presence::Rule(_)) if key.name != "lead" => {
+                (of_waveform, of_step) == (self.waveform, self.step)
+            }
             _ => true,
         }
     }
@@ -100,10 +107,11 @@ impl Choice {
         let header = section.header();
         let mut text = if header.is_empty() { header } else { header + "\n" };
         for key in section.keys.iter().filter(|key| self.takes(section, key)) {
-            let waveform = section.name == "trajectory" && key.name == "kind" && self.waveform;
+            let kind = section.name == "trajectory" && key.name == "kind";
             let dynamic = section.name == "hysteresis" && key.name == "rate" && self.dynamic;
-            let value = match (waveform, dynamic) {
-                (true, _) => "\"waveform\"",
+            let value = match (kind, dynamic) {
+                (true, _) if self.waveform => "\"waveform\"",
+                (true, _) if self.step => "\"step\"",
                 (_, true) => "\"dynamic-preisach\"",
                 _ => key.example,
             };

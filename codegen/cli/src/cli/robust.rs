@@ -82,7 +82,7 @@ struct StudyArguments {
     /// Learn the motion on each machine, from so many passes, and show what is left; for a spec with control.correction.
     #[arg(long, value_name = "PASSES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1000))]
     learn: Option<u32>,
-    /// Gate: largest rms error of the translation once learned, such as "6 nm"; learning must grow on no machine, either.
+    /// Gate: largest rms error of the translation once learned, such as "6 nm", that of [robust] if not given; learning must grow on no machine, either.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true, requires = "learn")]
     max_learned: Option<f64>,
     /// Quantile of the draws that the gate compares, %; the largest of draws and corners if not given.
@@ -234,7 +234,7 @@ impl Results<'_> {
         let found = report::Found { work, gate: &gate, reasons: &reasons, alone, planned, runs };
         let report = found.report();
         let below = "rms error by share of the machines";
-        if let Some(line) = self.plot.charts(&work.name, below, &[found.chart()])? {
+        if let Some(line) = self.plot.charts(&work.name, below, &found.charts())? {
             ui.progress(line.trim_end());
         }
         if let Some(folder) = self.output {

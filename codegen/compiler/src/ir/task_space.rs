@@ -104,6 +104,9 @@ pub struct ControlLaw {
     pub notch: Option<Notch>,
     /// Active damping of each mode, if declared.
     pub damping: Option<[Resonator; 6]>,
+    /// Whether the integral is handed to the estimates when the set-point comes to rest.
+    #[serde(skip_serializing_if = "core::ops::Not::not")]
+    pub hands_over: bool,
     /// Limits of the correction on each axis, if there is one.
     pub correction: Option<[CorrectionLimit; 6]>,
 }

@@ -64,6 +64,7 @@ pub fn check(
         demand.current = model.actuator.capacitance.map(|capacitance| capacitance * demand.slew);
         let key = match trajectory.kind {
             TrajectoryKind::Paper { .. } => format!("trajectory[{index}].frequency"),
+            TrajectoryKind::Step { .. } => format!("trajectory[{index}].time"),
             TrajectoryKind::Waveform { .. } => format!("trajectory[{index}].period"),
         };
         slew(model, &key, &demand, &mut found);

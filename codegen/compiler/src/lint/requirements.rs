@@ -9,9 +9,11 @@ const LOOSEST: f64 = 0.05;
 /// What the platform is for is finer than a twentieth of its stroke.
 pub(super) fn ask_something(facts: &Facts, found: &mut Found) {
     let (model, stroke) = (facts.model, facts.model.actuator.stroke);
-    for (key, limit) in
-        [("requirements.precision", model.requirements.precision), ("robust.max_error", model.robust.max_error)]
-    {
+    for (key, limit) in [
+        ("requirements.precision", model.requirements.precision),
+        ("robust.max_error", model.robust.max_error),
+        ("robust.max_learned", model.robust.max_learned),
+    ] {
         let Some(limit) = limit.filter(|limit| *limit > LOOSEST * stroke) else { continue };
         found.add(
             codes::ASKS_NOTHING,

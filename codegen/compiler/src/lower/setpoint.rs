@@ -66,6 +66,9 @@ pub fn lower(
             (TrajectoryKind::Paper { path, as_printed, frequency }, _) => {
                 segments::lower(model, task, &user, index, paper::pieces(*path, *as_printed, *frequency), *frequency)
             }
+            (TrajectoryKind::Step { to, time }, _) => {
+                segments::lower(model, task, &user, index, paper::step(to, *time), 1.0 / time)
+            }
             (TrajectoryKind::Waveform { period, repeat, .. }, Some(waveform)) => {
                 table::lower(model, task, &user, index, waveform, *period, *repeat)
             }

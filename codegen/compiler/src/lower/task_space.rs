@@ -73,6 +73,7 @@ pub(super) fn law(
         damping: design.damping.as_ref().map(|damping| {
             damping.sections.map(|section| Resonator { b: section.b.map(round), a: section.a.map(round) })
         }),
+        hands_over: task.hand_over,
         correction: task.correction.map(|most| {
             let turn = most / model.geometry.joint_radius();
             [most, most, most, turn, turn, turn].map(|most| CorrectionLimit {

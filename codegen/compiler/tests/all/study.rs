@@ -67,6 +67,7 @@ pub fn model() -> (Model, TaskSpace) {
         modal_damping: 0.02,
         notch_damping: Some(1.0),
         active_damping: false,
+        hand_over: false,
         correction: None,
         gains: None,
         position_gains: None,

@@ -71,5 +71,7 @@ section! {
         max_error: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "", "200 nm";
         /// Gate: largest rms error of the angles.
         max_orientation: Option<f64> = one(Dimension::ANGLE, Range::closed(1e-12, 0.1), "nrad"), Optional, "", "1 urad";
+        /// Gate: largest rms error of the translation once the motion is learned, with `--learn`; learning must grow on no machine, either.
+        max_learned: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "", "6 nm";
     }
 }

@@ -103,6 +103,8 @@ section! {
         active_damping = FLAG, Default(false), "", true;
         /// Largest correction of the request along each axis that a tick takes beside the set-point, for what `specgen learn` finds, about each axis as much at the platform joints; at most a tenth of `actuator.stroke`. It goes from nothing to there in 1 ms at the fastest. Without it a controller has no such input.
         correction: Option<f64> = one(Dimension::LENGTH, Range::above(0.0, 1e-3), "um"), Optional, "", "2 um";
+        /// Whether the integral of (7) is handed to the run-to-run estimates whenever the set-point comes to rest, in P/F with EWMA or PCC. The voltages do not move; what the integral gathered on the way is then unlearned by the estimates, which are faster. Steps settle sooner.
+        hand_over = FLAG, Default(false), "", true;
         /// First-order low-pass of the pose derivative, below half the tick rate (pi rad / period).
         velocity_cutoff = BANDWIDTH, Rule("0.6 pi rad / period"), "" ["cutoff", "velocity_filter"], "9e3 rad/s";
         /// Where the interaction force (5) in (7) comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words.
@@ -127,6 +129,8 @@ section! {
             fields.flag("control.notch")?.then(|| fields.number("control.notch_damping").unwrap_or(1.0));
         /// Whether the modes are damped actively in P/F.
         active_damping: bool = fields.flag("control.active_damping")?;
+        /// Whether the integral is handed to the estimates when the set-point comes to rest.
+        hand_over: bool = fields.flag("control.hand_over")?;
         /// Gains of P and F together. None: the compiler's start rule.
         gains: Option<Gains> = Gains::read(fields, "gains");
         /// Gains of P alone. None: the compiler's start rule.
@@ -288,14 +292,18 @@ section! {
     "trajectory" ["path"], Repeated(0, MAX_TABLES) => Trajectory {
         /// Its name, once in the file.
         name: String = NAME, Required, "", "circle";
-        /// One of the paper's paths, or a table of poses.
-        kind = one_of(&["case-1", "case-2", "machining", "waveform"]), Required, "", "case-1";
+        /// One of the paper's paths, a step, or a table of poses.
+        kind = one_of(&["case-1", "case-2", "machining", "step", "waveform"]), Required, "", "case-1";
         /// Time by which the leg displacements are asked for early while the controller plays it; `specgen check --details` proposes less than control.lead where corners ask for that.
         lead: Option<f64> = one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Rule("that of `control.lead`"), "", "0.2 ms";
         /// Of a paper's path: operating frequency.
-        frequency = one(Dimension::FREQUENCY, Range::closed(1e-3, 1e3), "Hz"), Rule("error, but for a waveform"), "f_c" ["f", "rate"], "1 Hz";
+        frequency = one(Dimension::FREQUENCY, Range::closed(1e-3, 1e3), "Hz"), Rule("error for a paper's path"), "f_c" ["f", "rate"], "1 Hz";
         /// Of a paper's path: the formulas as printed, with their jumps.
         as_printed = FLAG, Rule("`false`"), "", false;
+        /// Of a step: the pose that it goes to, from zero, without a corner in its speed.
+        to = list(POSE), Rule("error for a step"), "", ["10 um", "0 um", "0 um", "0 urad", "0 urad", "0 urad"];
+        /// Of a step: how long that takes.
+        time = one(Dimension::TIME, Range::closed(1e-5, 3600.0), "ms"), Rule("error for a step"), "", "4 ms";
         /// Of a waveform: the table of poses, a CSV file relative to the spec.
         file = Shape::One(Item::File), Rule("error for a waveform"), "", "waveforms/circle.csv";
         /// Of a waveform: time from one row to the next.
@@ -320,6 +328,13 @@ pub enum TrajectoryKind {
         as_printed: bool,
         /// f_c, Hz.
         frequency: f64,
+    },
+    /// A step from zero, whose speed rises and falls as a period of 1 − cos.
+    Step {
+        /// m and rad.
+        to: [f64; 6],
+        /// s.
+        time: f64,
     },
     /// A table of poses in a CSV file.
     Waveform {
@@ -346,6 +361,7 @@ impl TrajectoryKind {
             "case-1" => paper(PaperPath::Case1),
             "case-2" => paper(PaperPath::Case2),
             "machining" => paper(PaperPath::Machining),
+            "step" => Some(Self::Step { to: fields.list(&key("to"))?, time: fields.number(&key("time"))? }),
             _ => Some(Self::Waveform {
                 file: fields.name(&key("file"))?.to_owned(),
                 period: fields.number(&key("period"))?,

@@ -3,7 +3,7 @@
 //! ```text
 //! c_k = ± V a H_k s(t)        s: sine of rising frequency, each octave for as long;  H_k: row k of a conference matrix, H Hᵀ = 5 I
 //! y_k = T c_k + y₀ + noise    y₀: what the motion itself leaves, the same in every pass
-//! T = Σ y_k c_kᴴ (Σ c_k c_kᴴ)⁻¹       over twelve passes and the bins of 2.5 Hz;  what is left of y_k gives its standard error
+//! T = Σ y_k c_kᴴ (Σ c_k c_kᴴ)⁻¹       over twelve passes and the bins of 2.5 Hz or 2 %;  what is left of y_k gives its standard error
 //! ```
 //! Each sweep is made with both signs, so that y₀ and what is even in c cancel. The loop is closed and the machine moves as it does when it
 //! learns: hysteresis, delay and stiffness are in T as they are. H1 of several inputs: Bendat and Piersol, Random Data, 7.4.
@@ -46,8 +46,8 @@ const SLOW: [f64; 2] = [100.0, 10.0];
 const ONSET: f64 = 1e-3;
 /// Over which a sweep fades in and out, s.
 const FADE: f64 = 5e-3;
-/// Width of a bin, Hz: half of the narrowest resonance that feedback leaves on usual platforms.
-const WIDTH: f64 = 2.5;
+/// Width of a bin, Hz, and where it is more as a part of its frequency: half of the narrowest resonance that feedback leaves on usual platforms.
+const WIDTH: [f64; 2] = [2.5, 0.02];
 /// Digits that a file keeps.
 const DIGITS: usize = 5;
 
@@ -139,14 +139,20 @@ impl Excitation {
         }
         let hertz = |bin: usize| bin as f64 / (length as f64 * period);
         let [first, end] = self.band.map(|edge| libm::ceil(edge * length as f64 * period) as usize);
-        let width = libm::floor(WIDTH / hertz(1));
-        let width = if width > 1.0 { width as usize } else { 1 };
+        let width = |low: usize| {
+            let [least, part] = [WIDTH[0], WIDTH[1] * hertz(low)].map(|width| libm::floor(width / hertz(1)));
+            let width = if part > least { part } else { least };
+            if width > 1.0 { width as usize } else { 1 }
+        };
         // Zeros behind the signals tie bins together.
         let tied = length as f64 / motion.corrected as f64;
         let held = f64::from(self.spacing) * period;
         let mut bins = Vec::new();
-        for low in (first..end).step_by(width) {
-            let group = low..if low + width < end { low + width } else { end };
+        let mut low = first;
+        while low < end {
+            let above = low + width(low);
+            let group = low..if above < end { above } else { end };
+            low = group.end;
             let middle = 0.5 * (hertz(group.start) + hertz(group.end - 1));
             let (response, error) = regression(&pairs, group, tied);
             let scale = 1.0 / kept(middle * held);

@@ -17,7 +17,7 @@ use host_sim::platform::rig::Noise;
 use host_sim::platform::study::PlatformStudy;
 use host_sim::platform::{PlatformScenario, Specimen};
 use host_sim::scenario::LegScenario;
-use host_sim::trajectory::{LegTrajectory, Multisine, PaperLeg, PaperPath, PaperPose, PoseTrajectory, Reading};
+use host_sim::trajectory::{LegTrajectory, Multisine, PaperLeg, PaperPath, PaperPose, PoseTrajectory, Reading, Step};
 use serde::Serialize;
 
 pub use observe::Observed;
@@ -61,6 +61,8 @@ pub enum TrajectoryChoice {
         /// Hz.
         frequency: f64,
     },
+    /// A step of a spec.
+    Step(Step),
 }
 
 impl TrajectoryChoice {
@@ -68,6 +70,7 @@ impl TrajectoryChoice {
     #[must_use]
     pub fn of_platform(self, model: &Model, task: &TaskSpace) -> Box<dyn PoseTrajectory> {
         match self {
+            Self::Step(step) => Box::new(step),
             Self::Paper { path, frequency } => Box::new(PaperPose { path, reading: Reading::Corrected, frequency }),
             Self::Multisine { frequency, seconds, seed, corners } => {
                 let sines = Multisine::new(seconds, frequency, [0.0; 6], reach(model, task), seed);
@@ -194,6 +197,7 @@ impl Case {
         let mut scenario = machine::legs(model, legs, &noise, conditions.noise.unwrap_or_default(), 1);
         let trajectory: Box<dyn LegTrajectory + Sync + Send> = match conditions.trajectory {
             TrajectoryChoice::Paper { frequency, .. } => Box::new(PaperLeg { frequency }),
+            TrajectoryChoice::Step(Step { time, .. }) => Box::new(PaperLeg { frequency: 1.0 / time }),
             TrajectoryChoice::Multisine { frequency, seconds, seed, corners } => {
                 let stroke = model.actuator.stroke;
                 let sines = Multisine::new(seconds, frequency, [0.4 * stroke; 6], [REACH * stroke; 6], seed);

@@ -28,9 +28,9 @@ use crate::limits::DAC;
 use crate::notch::{modal_error, notch_error, notch_innovation};
 use crate::setpoint::SETPOINTS;
 use crate::task_space::{
-    AFFINE_LOAD, CELLS_PER_METRE, COMPLIANCE, CORRECTION, DAMPING, FORCE_TO_MODES, LEAD, LED, LEGS_TO_MODES,
-    LEGS_TO_WRENCH, METRES_PER_CELL, MODES_TO_LEGS, OWN_LEADS, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE,
-    WRENCH_LIMIT, WRENCH_TO_LEGS,
+    AFFINE_LOAD, CELLS_PER_METRE, COMPLIANCE, CORRECTION, DAMPING, FORCE_TO_MODES, HANDS_OVER, LEAD, LED,
+    LEGS_TO_MODES, LEGS_TO_WRENCH, METRES_PER_CELL, MODES_TO_LEGS, OWN_LEADS, PERIOD, REST_FORCE, TRANSFER_KEEP,
+    TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
 };
 use crate::tick::{CORRECTION_LIMITED, WRENCH_FAULT};
 use crate::{Config, LEGS, LegState, Real, State, TickInput, TickOutput, dynamics, kinematics, sensing};
@@ -57,7 +57,11 @@ pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, inp
     let wrench_good = take_wrench(config, state, &input.wrench);
     let damping = damping(config, state);
     let played = state.generator.plays();
+    let moved = HANDS_OVER && state.generator.can_stop();
     let setpoint_status = state.generator.tick_as(&SETPOINTS, kind, &input.command);
+    if moved && !state.generator.can_stop() {
+        rest(config, state);
+    }
     let (demand, load) = known_load(config, state);
     let correction_held = state.correction.follow(&CORRECTION, &input.correction);
     let reaction = reaction(config, state);
@@ -177,6 +181,20 @@ fn hand_over(config: &Config, state: &mut State, request: &[Real; LEGS]) {
         offset = held;
     }
     state.transfer.begin(offset);
+}
+
+/// The set-point has come to rest: the estimates take over what the integral gathered on the way. Nothing else of the request changes. Both
+/// work on one error; the integral would give back at the rate of k_I/(1 + k_p) what the estimates unlearn at theirs.
+#[cold]
+fn rest(config: &Config, state: &mut State) {
+    let mode = config.mode();
+    if mode.feeds_back() && mode.law() != Law::Invhys {
+        let held = transform(&FORCE_TO_MODES, &state.integral.force);
+        for (estimate, held) in state.estimates.iter_mut().zip(held) {
+            estimate.level -= held;
+        }
+        state.integral = Integral::new();
+    }
 }
 
 /// h and ḣ from the gauges; returns the gauges that are not believed, bit by bit. With any such the last pose is held.

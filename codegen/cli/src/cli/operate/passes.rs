@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use host_sim::word::status_words;
 use serde::Serialize;
@@ -23,8 +23,8 @@ use crate::cli::ui::{Outcome, Ui};
 const REST: f64 = 0.1;
 /// How often a pass is looked at.
 const LOOK: Duration = Duration::from_millis(5);
-/// How much longer than its ticks a pass may take.
-const LATER: Duration = Duration::from_secs(10);
+/// How much longer than its ticks a pass may take, and how long learning, s: by the ticks of the device, which on an emulated one take longer.
+const LATER: f64 = 10.0;
 
 /// What a pass showed.
 pub struct Passed {
@@ -136,8 +136,7 @@ impl<P: Port> Operator<P> {
         let Course { spacing, before, ticks, trajectory } = course;
         self.ordered = true;
         self.session.pass(PassAction::Begin { spacing, before, ticks, trajectory }).map_err(refused)?;
-        let limit = Duration::from_secs_f64(f64::from(ticks) * self.session.period()) + LATER;
-        let begun = Instant::now();
+        let limit = self.session.status().tick + u64::from(ticks) + self.later();
         let status = loop {
             std::thread::sleep(LOOK);
             self.look()?;
@@ -146,7 +145,7 @@ impl<P: Port> Operator<P> {
             if Stage::from_word(status.stage) != Some(Stage::Running) {
                 break status;
             }
-            if begun.elapsed() > limit {
+            if self.session.status().tick > limit {
                 self.session.pass(PassAction::Abort).map_err(refused)?;
                 return Err(Ended::Fault(format!("the pass does not end; the machine is {}", self.stands())));
             }
@@ -162,6 +161,11 @@ impl<P: Port> Operator<P> {
 
 /// Learning in the device.
 impl<P: Port> Operator<P> {
+    /// Ticks of the device after which something takes too long.
+    fn later(&self) -> u64 {
+        (LATER / self.session.period()) as u64
+    }
+
     /// Sends what the device learns with, behind the knots of its passes.
     pub fn plan(&mut self, knots: usize, rows: &[Knot]) -> Result<(), Ended> {
         self.session.put_knots(knots, rows).map_err(refused)
@@ -170,9 +174,9 @@ impl<P: Port> Operator<P> {
     /// Lets the device make the correction of the next pass; it then has the knots that this gives.
     pub fn learn(&mut self, Settings { reach, fade }: Settings, ui: &Ui) -> Result<Vec<Knot>, Ended> {
         let mut status = self.session.pass(PassAction::Learn { reach, fade }).map_err(refused)?;
-        let begun = Instant::now();
+        let limit = self.session.status().tick + self.later();
         while Stage::from_word(status.stage) == Some(Stage::Learning) {
-            if begun.elapsed() > LATER {
+            if self.session.status().tick > limit {
                 return Err(Ended::Fault("the device does not come to an end of learning".to_owned()));
             }
             std::thread::sleep(LOOK);

@@ -149,16 +149,25 @@ impl<'a> Found<'a> {
         }
     }
 
-    /// Errors of the draws in their order, and of the corners; diverged ones are left out.
-    pub(super) fn chart(&self) -> Chart {
+    /// Errors of the draws in their order, and of the corners, and what is left where they learned; diverged ones are left out.
+    pub(super) fn charts(&self) -> Vec<Chart> {
+        let mut charts = vec![self.chart("error of each machine", |figures| Some(figures.error_nm))];
+        if self.work.learning.is_some() {
+            let learned = |figures: &Figures| figures.learned.map(|learned| learned.error_nm);
+            charts.push(self.chart("the same, learned", learned));
+        }
+        charts
+    }
+
+    fn chart(&self, caption: &str, of: impl Fn(&Figures) -> Option<f64>) -> Chart {
         let errors = |drawn: bool| {
             let chosen = self.runs.iter().filter(|(member, _)| member.drawn == drawn);
-            let mut errors: Vec<f64> = chosen.filter_map(|(_, outcome)| Some(outcome.figures()?.error_nm)).collect();
+            let mut errors: Vec<f64> = chosen.filter_map(|(_, outcome)| of(outcome.figures()?)).collect();
             errors.sort_by(f64::total_cmp);
             let count = errors.len() as f64;
             errors.into_iter().enumerate().map(|(k, nm)| [100.0 * (k as f64 + 0.5) / count, nm]).collect()
         };
-        Chart::new("", "error of each machine", Axis::linear("share", "%"), Axis::linear("error", "nm rms"))
+        Chart::new("", caption, Axis::linear("share", "%"), Axis::linear("error", "nm rms"))
             .with("drawn", DOTS, errors(true))
             .with("corners", DOTS, errors(false))
     }

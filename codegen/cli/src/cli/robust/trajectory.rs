@@ -1,6 +1,6 @@
 //! What is followed, by the name that a user gives.
 
-use host_sim::trajectory::PaperPath;
+use host_sim::trajectory::{PaperPath, Step};
 
 use crate::cli::ui::Failure;
 use specgen_compiler::compile::Compiled;
@@ -41,6 +41,10 @@ pub(in crate::cli) fn chosen(
         return match own.kind {
             TrajectoryKind::Paper { path, as_printed: false, frequency } => {
                 paper(streamed(path), asked.unwrap_or(frequency))
+            }
+            TrajectoryKind::Step { to, time } => {
+                let time = asked.map_or(time, |hertz| 1.0 / hertz);
+                followed(1.0 / time, TrajectoryChoice::Step(Step { to, time }))
             }
             _ => Err(Failure::Usage(format!(
                 "the spec's trajectory `{name}` is a waveform or as printed, which this command does not follow; name \

@@ -107,7 +107,7 @@ impl Work {
             quantile: arguments.quantile,
             learning: learning
                 .map(|learning| Lessons { passes: arguments.learn.unwrap_or(0), band: learning.convergence.band }),
-            max_learned: arguments.max_learned,
+            max_learned: arguments.max_learned.or(declared.max_learned.filter(|_| learning.is_some())),
             options: options(arguments),
         })
     }

@@ -35,6 +35,7 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let (cells_per_metre, metres_per_cell) = (real(law.cells_per_metre), real(law.metres_per_cell));
     let lead = real(law.lead);
     let own_leads: Vec<_> = law.own_leads.iter().map(|lead| real(*lead)).collect();
+    let hands_over = law.hands_over;
     let led = proc_macro2::Literal::usize_unsuffixed(own_leads.len());
     let notch = law.notch.as_ref().map_or_else(|| quote! { None }, |notch| with_sections(ir, notch, &matrix));
     let (damped, damping) = with_damping(ir, law.damping.as_ref());
@@ -87,6 +88,8 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         pub const DAMPED: usize = #damped;
         /// Active damping of each.
         pub const DAMPING: [Resonator<Real>; DAMPED] = [#(#damping),*];
+        /// Whether the integral is handed to the estimates when the set-point comes to rest; from `control.hand_over`.
+        pub const HANDS_OVER: bool = #hands_over;
         /// Axes with a correction of the request; from `control.correction`.
         pub const CORRECTED: usize = #corrected;
         /// How far and how fast that of each goes.

@@ -1,4 +1,4 @@
-//! The paper's platform trajectories as segments: corrected as in the errata, or as printed.
+//! The paper's platform trajectories, and steps, as segments: corrected as in the errata, or as printed.
 //!
 //! With s = t·tf every coordinate of a piece is a line and a sinusoid whose amplitude grows with time:
 //! h = (line₀ + line₁ s) + (radius₀ + radius₁ s) sin(2π (f_c t + turns)). Lengths in µm, angles in mrad; A = π/72.
@@ -50,6 +50,12 @@ pub(super) fn pieces(path: PaperPath, as_printed: bool, frequency: f64) -> Vec<P
         .into_iter()
         .map(|(end, coordinates)| Piece { end: end / factor, coordinates: in_time(coordinates, factor) })
         .collect()
+}
+
+/// A step from zero to a pose (m and rad) within a time (s): h = to (t/T − sin(2π t/T)/(2π)), whose sinusoid has the frequency 1/T.
+pub(super) fn step(to: &[f64; 6], time: f64) -> Vec<Piece> {
+    let coordinates = to.map(|to| Coordinate { line: [0.0, to / time], radius: [-to / (2.0 * PI), 0.0], turns: 0.0 });
+    vec![Piece { end: time, coordinates }]
 }
 
 /// From scaled time, µm and mrad to s, m and rad.

@@ -43,6 +43,7 @@ pub(super) fn along(kind: &TrajectoryKind, path: &Path) -> Vec<Stretch> {
         (TrajectoryKind::Paper { path, as_printed, frequency }, _) => {
             analytic(*frequency, &paper::pieces(*path, *as_printed, *frequency))
         }
+        (TrajectoryKind::Step { to, time }, _) => analytic(1.0 / time, &paper::step(to, *time)),
         (TrajectoryKind::Waveform { period, .. }, Path::Table { rows, .. }) => {
             let between = rows.windows(2).flat_map(|pair| {
                 (0..A_ROW).map(|k| table::at(&pair[0], &pair[1], f64::from(k) / f64::from(A_ROW), 1.0).0)

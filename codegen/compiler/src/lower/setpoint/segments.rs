@@ -7,7 +7,7 @@ use super::paper::{Coordinate, Piece};
 use super::{AXES, LONGEST, User, amount};
 use crate::ir::{Path, Segment, SegmentAxis};
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
-use specgen_language::model::{Model, TaskSpace};
+use specgen_language::model::{Model, TaskSpace, TrajectoryKind};
 
 /// A step at a joint that is none: below what a gauge sees. m and rad.
 const NO_JUMP: [f64; 6] = [1e-9, 1e-9, 1e-9, 10e-9, 10e-9, 10e-9];
@@ -26,7 +26,8 @@ pub(super) fn lower(
     frequency: f64,
 ) -> Result<(Path, Vec<Diagnostic>), Vec<Diagnostic>> {
     let period = model.timing.period;
-    let key = format!("trajectory[{index}].frequency");
+    let steps = matches!(task.trajectories[index].kind, TrajectoryKind::Step { .. });
+    let key = format!("trajectory[{index}].{}", if steps { "time" } else { "frequency" });
     let refuse = |code: Code, message: String, help: &str| {
         let message = format!("trajectory \"{}\": {message}", task.trajectories[index].name);
         Diagnostic::at(&model.spans, &[&key], code, message, help)
@@ -35,9 +36,17 @@ pub(super) fn lower(
         core::iter::once(0.0).chain(pieces.iter().map(|piece| libm::ceil(piece.end / period - AT_TICK))).collect();
     let ticks = firsts.last().copied().unwrap_or_default();
     if firsts.windows(2).any(|pair| pair[1] - pair[0] < 1.0) || frequency * period >= 0.5 || ticks > LONGEST {
-        let message = format!("{frequency} Hz is too high or too low for ticks of {:.3} us", period * 1e6);
-        let help = "choose a frequency whose pieces last from a tick to some minutes";
-        return Err(vec![refuse(codes::TRAJECTORY_TICKS, message, help)]);
+        let [message, help] = if steps {
+            let time = 1e3 / frequency;
+            [
+                format!("{time} ms are too short or too long for ticks of {:.3} us", period * 1e6),
+                "choose from three ticks to some minutes".to_owned(),
+            ]
+        } else {
+            let help = "choose a frequency whose pieces last from a tick to some minutes";
+            [format!("{frequency} Hz is too high or too low for ticks of {:.3} us", period * 1e6), help.to_owned()]
+        };
+        return Err(vec![refuse(codes::TRAJECTORY_TICKS, message, &help)]);
     }
     let mut findings = Vec::new();
     let joints = joints(&pieces, frequency);
@@ -59,7 +68,12 @@ pub(super) fn lower(
     }
     if let Some((_, message)) = speed {
         let slower = excesses.fix_of_frequency(frequency, period).unwrap_or_default();
-        let help = format!("at most {slower} Hz is slow enough; or {}", excesses.fix_of_speed().unwrap_or_default());
+        let enough = if steps {
+            format!("at least {} ms is slow enough", libm::ceil(1e6 / slower) * 1e-3)
+        } else {
+            format!("at most {slower} Hz is slow enough")
+        };
+        let help = format!("{enough}; or {}", excesses.fix_of_speed().unwrap_or_default());
         findings.push(refuse(codes::TRAJECTORY_TOO_FAST, message, &help));
     }
     if !findings.is_empty() {

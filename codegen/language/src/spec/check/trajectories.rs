@@ -6,6 +6,7 @@ use crate::spec::findings::Findings;
 use crate::spec::keys::{self, MAX_TABLES};
 
 const OF_PAPER: [&str; 2] = ["frequency", "as_printed"];
+const OF_STEP: [&str; 2] = ["to", "time"];
 const OF_WAVEFORM: [&str; 3] = ["file", "period", "repeat"];
 
 pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
@@ -14,23 +15,24 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
         let Some(kind) = f.choice(&keys::join(&table, "kind")) else {
             continue;
         };
-        let is_waveform = kind == "waveform";
-        let foreign: &[&str] = if is_waveform { &OF_PAPER } else { &OF_WAVEFORM };
-        for path in foreign.iter().map(|key| keys::join(&table, key)).filter(|path| f.given(path)) {
+        let (own, needed): (&[&str], &[&str]) = match kind {
+            "waveform" => (&OF_WAVEFORM, &["file", "period"]),
+            "step" => (&OF_STEP, &OF_STEP),
+            _ => (&OF_PAPER, &["frequency"]),
+        };
+        let foreign = [&OF_PAPER[..], &OF_STEP, &OF_WAVEFORM].into_iter().filter(|keys| *keys != own).flatten();
+        for path in foreign.map(|key| keys::join(&table, key)).filter(|path| f.given(path)) {
             findings.add(
                 codes::TRAJECTORY_KEY,
                 &path,
                 f.span(&path),
                 format!("`{path}` has no meaning for a trajectory of kind \"{kind}\""),
-                format!(
-                    "take it out; kind \"{kind}\" takes {}",
-                    if is_waveform { OF_WAVEFORM.join(", ") } else { OF_PAPER.join(", ") }
-                ),
+                format!("take it out; kind \"{kind}\" takes {}", own.join(", ")),
             );
         }
-        let needed: &[&str] = if is_waveform { &["file", "period"] } else { &["frequency"] };
         for path in needed.iter().map(|key| keys::join(&table, key)) {
-            if f.get(&path).is_some() || findings.mentions(&[&path]) {
+            // What is wrong within a list is told of its element.
+            if f.given(&path) || findings.mentions(&[&path]) {
                 continue;
             }
             missing(f, findings, &table, &path, kind)?;

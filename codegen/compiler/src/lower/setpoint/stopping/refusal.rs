@@ -77,6 +77,9 @@ pub(super) fn leaves(model: &Model, index: usize, name: &str, kind: &TrajectoryK
         TrajectoryKind::Paper { frequency, .. } => {
             ("frequency", format!("at most {} Hz stops within", down(frequency * leaves.share)))
         }
+        TrajectoryKind::Step { time, .. } => {
+            ("time", format!("at least {} ms stops within", up(time / leaves.share * 1e3)))
+        }
         TrajectoryKind::Waveform { period, .. } => {
             ("period", format!("a period of at least {} ms stops within", up(period / leaves.share * 1e3)))
         }
