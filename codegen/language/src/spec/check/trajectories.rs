@@ -32,7 +32,7 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
         }
         for path in needed.iter().map(|key| keys::join(&table, key)) {
             // What is wrong within a list is told of its element.
-            if f.given(&path) || findings.mentions(&[&path]) {
+            if f.given(&path) || findings.mentions_item(&path) {
                 continue;
             }
             missing(f, findings, &table, &path, kind)?;
