@@ -270,7 +270,7 @@ class Strips {
     for (const [from, behind] of samples.gaps) {
       const at = x((from + behind) / 2);
       if (at < left) continue;
-      if (group && at - group.from < 100) {
+      if (group && at - group.from < 125) {
         group.count++;
         group.ticks += behind - from;
         continue;

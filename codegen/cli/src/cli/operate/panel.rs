@@ -41,7 +41,7 @@ use hall::{Hall, now};
 use orders::{ask, begin, carry_out, question};
 
 /// Between two messages with samples.
-const FRAME: Duration = Duration::from_millis(50);
+const FRAME: Duration = Duration::from_millis(25);
 /// Between two looks at the samples that wait.
 const LOOK: Duration = Duration::from_millis(10);
 /// Between two words about how the machine stands.
