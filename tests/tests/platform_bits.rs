@@ -37,6 +37,11 @@ const MODES: [(&str, f64, f64); 7] = [
     ("P/F pcc", 6.0, 1.0),
 ];
 const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
+/// Every part of the law that a spec has to ask for.
+const PARTS: (&str, &str) = (
+    "interaction     = \"none\"",
+    "active_damping  = true\nhand_over       = true\ncorrection      = \"2 um\"\ninteraction     = \"none\"",
+);
 /// On-board trajectories ten times as fast, so that a stretch of the hostile record sees most of one.
 const FAST: (&str, &str) = ("frequency = \"1 Hz\"", "frequency = \"10 Hz\"");
 
@@ -67,7 +72,8 @@ fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
 fn tracks(trace: &Trace, what: &str) {
     let status = integers(trace, "status");
     let held = status.iter().filter(|word| **word & 0xb_3f3f != 0).count();
-    assert!(held < status.len() / 100, "{what}: {held} ticks with a limit or a fault");
+    // Some at the beginning, where a damped mode P/F begins without estimates.
+    assert!(held < status.len() / 50, "{what}: {held} ticks with a limit or a fault");
     let (target, pose) = (column(trace, "target[2]"), column(trace, "pose[2]"));
     let way = target.iter().fold(0.0_f64, |way, z| way.max(*z)) - 10e-6;
     assert!(way > 10e-6, "{what}: {way} m of way");
@@ -133,7 +139,7 @@ fn f64_on_the_host_and_the_m7_is_equal_in_every_bit_of_every_mode() {
 fn f32_on_the_host_the_m7_and_the_m4f_is_equal_in_every_bit_of_every_mode() {
     // The core that computes them so; in the soak the M7, too.
     let mcus = [Mcu::Mps2An386, Mcu::Mps2An500];
-    compare("platform-bits-f32", &[F32, FAST], specgen_tests::length(&mcus[..1], &mcus));
+    compare("platform-bits-f32", &[F32, FAST, PARTS], specgen_tests::length(&mcus[..1], &mcus));
 }
 
 /// The comparison is falsifiable: one flipped ulp of one constant of each emitted file is found, and named.

@@ -200,7 +200,8 @@ fn settled(bench: &Bench, [size, time]: [f64; 2], prepared: bool) -> [f64; 2] {
 
 #[test]
 fn what_lag_and_modes_would_leave_is_prepared_by_the_model() {
-    let classes: [(&str, fn() -> &'static Bench); 2] = [("plays", plays), ("Bouc-Wen", other)];
+    type Made = fn() -> &'static Bench;
+    let classes: [(&str, Made); 2] = [("plays", plays), ("Bouc-Wen", other)];
     for (class, (name, usual)) in classes.into_iter().enumerate().take(length(1, 2)) {
         let [bare, prepared] = [false, true].map(|with| case_1_error(usual(), with));
         println!("{name}: case 1 at 10 Hz {bare:.1} -> {prepared:.1} nm");

@@ -71,6 +71,7 @@ pub(super) const SIMULATOR: &[(&str, &str)] = files! { "" as "host-sim":
     "src/trajectory/jet.rs",
     "src/trajectory/multisine.rs",
     "src/trajectory/paper.rs",
+    "src/trajectory/step.rs",
     "src/word.rs",
 };
 
