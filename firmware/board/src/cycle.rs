@@ -33,7 +33,7 @@ pub struct Board<'m, G, A, L = ()> {
     /// Whether both converters were started and proved.
     started: bool,
     /// Events that came up after the supervisor had been called: for the next tick.
-    pending: u32,
+    carried: u32,
     /// The request of the last tick, to see a new one.
     request: Request,
     /// What the last tick read. Here and not on the stack, which the law needs.
@@ -83,7 +83,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             machine,
             intact,
             started: false,
-            pending: 0,
+            carried: 0,
             request: Request::None,
             input: None,
             codes: None,
@@ -136,14 +136,13 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             asked => asked,
         };
         if restart {
-            self.pending = 0;
+            self.carried = 0;
             self.start(report);
         }
 
         let sampled = now();
         let begun = self.gauges.begin();
-        let mut events = self.pending;
-        self.pending = 0;
+        let mut events = core::mem::take(&mut self.carried);
         // While the gauges are converted.
         self.done(report, A::ask);
         for (happened, event) in [
@@ -171,7 +170,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         let rose = triggers::INPUT
             && pending.sense(self.lines.input().map_err(|fault| {
                 report.converter(fault);
-                self.pending |= CONVERTER;
+                self.carried |= CONVERTER;
             }));
         let seen = if rose { events | EDGE } else { events };
         let input = take(&mut self.input, orders, &readings, request, seen);
@@ -240,7 +239,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             && let Err(fault) = self.lines.set(high)
         {
             report.converter(fault);
-            self.pending |= CONVERTER;
+            self.carried |= CONVERTER;
         }
     }
 
@@ -259,7 +258,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
     fn done(&mut self, report: &mut Report, action: impl FnOnce(&mut A) -> Result<(), Fault>) {
         if let Err(fault) = action(&mut self.amplifiers) {
             report.converter(fault);
-            self.pending |= CONVERTER;
+            self.carried |= CONVERTER;
         }
     }
 }

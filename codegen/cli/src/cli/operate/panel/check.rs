@@ -1,7 +1,8 @@
 //! The first-power check: each leg is driven a little, by feed-forward alone, and what the gauges show is held against the spec.
 //!
 //! The law that inverts the hysteresis and feeds nothing back does not mind what gauges say, so a gauge with a wrong sign or in the wrong
-//! place cannot make it run away; the supervisor looks on as always. The way to the bias is left as soon as every leg has room.
+//! place cannot make it run away; the supervisor looks on as always, and may end the way to the bias, where every leg has room. What
+//! the gauges showed until then tells what is turned.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -22,7 +23,7 @@ use crate::cli::ui::Ui;
 
 /// How far a leg is driven, as part of its stroke.
 const STEP: f64 = 0.02;
-/// How long the platform may take to where there is room, and to arrive after a step.
+/// How long the platform may take to its bias, and to arrive after a step.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// How long it may take until it runs.
 const COMES: Duration = Duration::from_secs(2);
@@ -36,8 +37,27 @@ const LEFT: f64 = 0.05;
 const GAIN: [f64; 2] = [0.75, 1.25];
 /// Less than this part of what is expected is nothing.
 const NOTHING: f64 = 0.2;
+/// A way on which the gauges show less than this, m each, tells nothing.
+const SHORTEST: f64 = 0.1e-6;
 
 type Matrix = [[f64; 6]; 6];
+
+/// The way to the bias, as far as the platform came, m.
+#[derive(Default)]
+struct Way {
+    /// What each leg lengthens on the whole of it.
+    legs: [f64; 6],
+    /// What each gauge showed, where that was the most.
+    gauges: [f64; 6],
+}
+
+impl Way {
+    fn seen(&mut self, legs: [f64; 6], gauges: [f64; 6]) {
+        if dot(&gauges, &gauges) > dot(&self.gauges, &self.gauges) {
+            *self = Self { legs, gauges };
+        }
+    }
+}
 
 /// What was found of one gauge or leg.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -85,7 +105,8 @@ pub(super) fn run<P: Port + 'static>(
     panel.borrow_mut().check = json!({ "runs": true, "done": 0 });
     ask(operator, &Order::Mode(Wanted { terms: [false, true], law: Some(0) }), quiet)?;
     let step = STEP * panel.borrow().compiled.model.actuator.stroke;
-    let measured = measure(operator, panel, quiet, &expected, [&jacobian, &inverse], step);
+    let mut way = Way::default();
+    let measured = measure(operator, panel, quiet, &expected, [&jacobian, &inverse], step, &mut way);
     // Whatever came of it, it is to stand and to be as it was.
     operator.session.supervise(Request::Hold)?;
     operator.wait(Until::Phase(Phase::Holding), PATIENCE, quiet).or_else(|ended| match ended {
@@ -96,7 +117,13 @@ pub(super) fn run<P: Port + 'static>(
     if let Some(mode) = mode {
         ask(operator, &mode, quiet)?;
     }
-    let verdict = judge(&expected, &measured?);
+    // What is turned shows a platform that is far from its set-point: the supervisor holds it, and the way until then names it.
+    let on_the_way = || at_first_sight(&expected, &way.legs, &way.gauges);
+    let verdict = match measured {
+        Ok(measured) => judge(&expected, &measured),
+        Err(Ended::Fault(why)) => on_the_way().ok_or(Ended::Fault(why))?,
+        Err(ended) => return Err(ended),
+    };
     let (kind, advice) = if verdict.good {
         ("note", "")
     } else {
@@ -108,7 +135,7 @@ pub(super) fn run<P: Port + 'static>(
     Ok(json!(verdict))
 }
 
-/// Readings of the gauges (rows) per displacement of a leg (columns).
+/// Readings of the gauges (rows) per displacement of a leg (columns); `way` is what was seen before a leg was driven.
 fn measure<P: Port + 'static>(
     operator: &mut Operator<P>,
     panel: &Rc<RefCell<Panel>>,
@@ -116,40 +143,34 @@ fn measure<P: Port + 'static>(
     expected: &Matrix,
     [jacobian, inverse]: [&Matrix; 2],
     step: f64,
+    way: &mut Way,
 ) -> Result<Matrix, Ended> {
     let motion = operator.motion().map_err(Ended::Refused)?.clone();
     let along = |leg: usize, standing: &[f64; 6]| -> Option<[f64; 6]> {
         let from = motion.platform(standing)?;
         motion.user(&core::array::from_fn(|axis| from[axis] + inverse[axis][leg] * step))
     };
-    let has_room = |standing: &[f64; 6]| {
-        (0..6).all(|leg| along(leg, standing).is_some_and(|pose| motion.admits(&pose))) && motion.admits(standing)
-    };
     begin(operator, Request::Run)?;
-    // Asked without a pause: the way is 100 um/s fast, say, and a micrometre is enough.
     let since = Instant::now();
-    loop {
+    let start = loop {
         let place = operator.place()?;
         let runs = u64::from(place.phase) == Phase::Running.word();
-        if runs && (has_room(&place.target) || place.status & BUSY == 0) {
-            break;
+        if runs {
+            let shown = times(expected, &times(jacobian, &motion.platform(&place.pose).unwrap_or(place.pose)));
+            way.seen(times(jacobian, &motion.platform(&place.target).unwrap_or(place.target)), shown);
+            if place.status & BUSY == 0 {
+                break place.target;
+            }
         }
         let comes = u64::from(place.phase) == Phase::Holding.word() && since.elapsed() < COMES;
         if !runs && !comes || since.elapsed() > PATIENCE {
             operator.look()?;
             return Err(Ended::Fault(format!(
-                "the legs do not come to where they have room: the machine is {}",
+                "the platform does not come to its bias: the machine is {}",
                 operator.stands()
             )));
         }
-    }
-    // A stop on the way to the bias, at once: further up a gauge that is turned shows a platform that is astray. Then on without moving.
-    operator.session.supervise(Request::Hold)?;
-    operator.wait(Until::Phase(Phase::Holding), PATIENCE, quiet)?;
-    begin(operator, Request::Run)?;
-    operator.wait(Until::Phase(Phase::Running), PATIENCE, quiet)?;
-    operator.wait(Until::Arrived, PATIENCE, quiet)?;
-    let start = operator.place()?.target;
+    };
     let mut measured = [[0.0; 6]; 6];
     for leg in 0..6 {
         let before = readings(operator, panel, &motion, expected, jacobian)?;
@@ -272,6 +293,41 @@ pub fn judge(expected: &Matrix, measured: &Matrix) -> Verdict {
         Some(first) => format!("{}, and {} more.", first.what, bad.len() - 1),
     };
     Verdict { good: bad.is_empty(), what, legs, gauges }
+}
+
+/// What is wrong, from a way of all legs together of which only the direction is known: one gauge or one leg that is turned, if
+/// that explains what was seen and nothing else does.
+fn at_first_sight(per_leg: &Matrix, legs: &[f64; 6], gauges: &[f64; 6]) -> Option<Verdict> {
+    let power = dot(gauges, gauges);
+    // What is left unexplained by these readings, of whatever size.
+    let left = |expected: [f64; 6]| {
+        let along = dot(&expected, gauges);
+        if along > 0.0 { 1.0 - along * along / (dot(&expected, &expected) * power) } else { 1.0 }
+    };
+    let plain = times(per_leg, legs);
+    if power < 6.0 * SHORTEST * SHORTEST || left(plain) <= LEFT {
+        return None;
+    }
+    let turned = |mut all: [f64; 6], which: usize| {
+        all[which] = -all[which];
+        all
+    };
+    let gauge = |which| (left(turned(plain, which)), true, which);
+    let leg = |which| (left(times(per_leg, &turned(*legs, which))), false, which);
+    let mut all: Vec<_> = (0..6).map(gauge).chain((0..6).map(leg)).collect();
+    all.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
+    let (best, is_gauge, which) = all[0];
+    if best > LEFT || all[1].0 <= 2.0 * LEFT {
+        return None;
+    }
+    let (legs, gauges) = if is_gauge {
+        (Vec::new(), vec![of_gauge(which, (which, -1.0))])
+    } else {
+        (vec![of_leg(which, (which, -1.0))], Vec::new())
+    };
+    let found = legs.iter().chain(&gauges).map(|one: &Found| one.what.as_str()).collect::<String>();
+    let what = format!("{found}. The way to the bias shows it; the supervisor ended that.");
+    Some(Verdict { good: false, what, legs, gauges })
 }
 
 fn is_off(gain: f64) -> bool {
@@ -407,5 +463,37 @@ mod tests {
         both.swap(1, 4);
         let verdict = judge(&expected, &both);
         assert!(!verdict.good && verdict.gauges.is_empty(), "{verdict:?}");
+    }
+
+    /// One way up names what is turned where it shows there: where nothing else would look alike, and nothing where all is well.
+    #[test]
+    fn what_is_turned_is_named_on_the_way_up_or_nothing_is() {
+        let expected = expected();
+        let legs = [2e-6; 6];
+        let good = times(&measured(&expected), &legs);
+        assert_eq!(at_first_sight(&expected, &legs, &good), None);
+        let mut short = good.map(|value| 1e-3 * value);
+        short[1] = -short[1];
+        assert_eq!(at_first_sight(&expected, &legs, &short), None, "too short a way");
+        let mut named = 0;
+        for one in 0..6 {
+            let mut turned = good;
+            turned[one] = -turned[one];
+            let mut shortened = legs;
+            shortened[one] = -shortened[one];
+            let cases = [
+                (turned, format!("gauge {one} runs the wrong way")),
+                (times(&measured(&expected), &shortened), format!("leg {one} shortens with its voltage")),
+            ];
+            for (seen, what) in cases {
+                let Some(verdict) = at_first_sight(&expected, &legs, &seen) else { continue };
+                assert!(!verdict.good);
+                assert_eq!(bad(&verdict), [what]);
+                named += 1;
+            }
+        }
+        // The three upright gauges carry the way up, and so do the legs beside them.
+        println!("{named} of 12 named");
+        assert!(named >= 3, "{named}");
     }
 }
