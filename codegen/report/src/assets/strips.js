@@ -265,12 +265,12 @@ class Strips {
     const label = () => {
       if (!group) return;
       const text = (group.count > 1 ? group.count + " gaps " : "gap ") + duration(group.ticks * samples.period);
-      written(to, text, Math.min(Math.max(group.from, left + 30), left + inner - 34), 10, 12, inks.ink, "center", 600);
+      written(to, text, Math.min(group.from, left + inner - 34), 10, 12, inks.ink, "center", 600);
     };
     for (const [from, behind] of samples.gaps) {
-      const at = x((from + behind) / 2);
-      if (at < left) continue;
-      if (group && at - group.from < 125) {
+      const middle = x((from + behind) / 2), at = Math.max(middle, left + 48);
+      if (middle < left) continue;
+      if (group && at - group.from < 140) {
         group.count++;
         group.ticks += behind - from;
         continue;

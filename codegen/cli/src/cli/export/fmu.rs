@@ -217,7 +217,13 @@ impl<'a> Unit<'a> {
             self.what,
             self.identifier,
         );
-        let mut outputs = String::new();
+        // Outputs change by steps alone: none depends on an input of the same moment, so that units in a ring are no algebraic loop.
+        // Before the first step a machine is what its fixed settings made of it.
+        let of_start = |(reference, variable): (usize, &Variable)| {
+            (variable.causality == "parameter" && !self.tunable).then(|| (reference + 1).to_string())
+        };
+        let settings: Vec<String> = self.variables.iter().enumerate().filter_map(of_start).collect();
+        let (mut outputs, mut first) = (String::new(), String::new());
         for (reference, variable) in self.variables.iter().enumerate() {
             let Variable { name, causality, kind, start } = variable;
             let (variability, initial) = match *causality {
@@ -240,12 +246,14 @@ impl<'a> Unit<'a> {
                 escaped(name),
             );
             if *causality == "output" {
-                let _ = writeln!(outputs, "<Unknown index=\"{}\"/>", reference + 1);
+                let index = reference + 1;
+                let _ = writeln!(outputs, "<Unknown index=\"{index}\" dependencies=\"\"/>");
+                let _ = writeln!(first, "<Unknown index=\"{index}\" dependencies=\"{}\"/>", settings.join(" "));
             }
         }
         let _ = write!(
             text,
-            "</ModelVariables>\n<ModelStructure>\n<Outputs>\n{outputs}</Outputs>\n<InitialUnknowns>\n{outputs}</InitialUnknowns>\n\
+            "</ModelVariables>\n<ModelStructure>\n<Outputs>\n{outputs}</Outputs>\n<InitialUnknowns>\n{first}</InitialUnknowns>\n\
              </ModelStructure>\n</fmiModelDescription>\n"
         );
         text
