@@ -33,7 +33,7 @@ impl Bench {
     /// Compiles the reference spec for `specimen`: its nominal stiffness and damping, and a record of each leg as a user
     /// takes it before assembly, with the gauge's noise. Everything else, gains and notch too, is the compiler's.
     pub fn new(name: &str, specimen: Specimen, edits: &[(&str, &str)]) -> Self {
-        let records = records(&specimen.legs);
+        let records = records(&specimen.legs, 32);
         Self::with_records(name, specimen, &records, edits)
     }
 
@@ -79,12 +79,12 @@ pub fn scenario(specimen: &Specimen) -> PlatformScenario {
     PlatformScenario::new(specimen, &Noise::of(specimen), SEED, RunOptions::new(PERIOD, BIAS))
 }
 
-/// Reversal curves of six legs as built; equal legs share one.
-pub fn records(legs: &[LegParameters; 6]) -> [String; 6] {
+/// Reversal curves of six legs as built, for a grid of so many cells; equal legs share one.
+pub fn records(legs: &[LegParameters; 6], grid: u32) -> [String; 6] {
     let of = |leg: usize| {
         let mut gauge = Gauge::new(&legs[leg].noise, SEED, leg as u64);
         // Drive values held for 10 mV: below what the plays and the gauge's noise show.
-        let experiment = ReversalExperiment { update: 5e-4, ..ReversalExperiment::reference(32) };
+        let experiment = ReversalExperiment { update: 5e-4, ..ReversalExperiment::reference(grid) };
         experiment.run(&mut LegPlant::new(&legs[leg]), &mut gauge).to_csv()
     };
     let first = of(0);
@@ -144,7 +144,7 @@ pub fn plants() -> u32 {
 
 fn of(what: &str, number: u32, edits: &[(&str, &str)]) -> Bench {
     let specimen = Specimen::random(SEED, number);
-    let records = records(&specimen.legs);
+    let records = records(&specimen.legs, 32);
     Bench::with_records(&format!("tables-{what}-{number}"), specimen, &records, edits)
 }
 

@@ -8,7 +8,8 @@ use host_sim::platform::{PlatformParameters, Specimen};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use specgen_tests::length;
 
-use super::bench::{Bench, reference_machine};
+use super::bench::{Bench, records, reference_machine};
+use super::damping::DAMPED;
 
 /// A circle in x and y that grows from its middle and shrinks to it again, each within `RAMP`.
 pub struct Circle {
@@ -87,5 +88,36 @@ fn both_classes_of_legs_follow_a_path_with_corners_and_a_fast_circle() {
             bouc_wen("classes-lead-bouc-wen", &edits)
         };
         show(&format!("{name}, lead 0.1 ms"), errors(&bench));
+    }
+}
+
+/// What a grid of 64 takes off that of 32: a record of each leg on either grid, both classes, damped.
+#[test]
+fn a_finer_grid_is_no_worse() {
+    // Two more records of twelve legs: in the soak.
+    for class in length(&[][..], &["plays", "Bouc-Wen"]) {
+        let specimen = match *class {
+            "plays" => Specimen::reference(),
+            _ => Specimen::within_tolerances(&PlatformParameters::reference(), &LegParameters::bouc_wen(), 1),
+        };
+        let [coarse, fine] = [32, 64].map(|grid| {
+            let cells = format!("grid    = {grid}");
+            let edits = [
+                ("grid    = 32", cells.as_str()),
+                DAMPED,
+                ("flash        = \"128 KiB\"", "flash        = \"256 KiB\""),
+            ];
+            let bench = Bench::with_records(
+                &format!("grid-{grid}-{class}"),
+                specimen.clone(),
+                &records(&specimen.legs, grid),
+                &edits,
+            );
+            let found = errors(&bench);
+            println!("{class}, grid {grid}: case 1 at 10 Hz {:.1} nm, circle {:.1} nm", found[0], found[1]);
+            found
+        });
+        let bound = if *class == "plays" { 16.0 } else { 1.02 * coarse[0] };
+        assert!(fine[0] <= bound, "{class}: {} nm", fine[0]);
     }
 }

@@ -14,7 +14,7 @@ use super::bench::{Bench, PERIOD, in_parallel, reference_machine};
 use super::classes::{bouc_wen, errors};
 use super::limits::closed_loop;
 
-const DAMPED: (&str, &str) = ("notch_damping   = 1.0", "notch_damping   = 1.0\nactive_damping  = true");
+pub const DAMPED: (&str, &str) = ("notch_damping   = 1.0", "notch_damping   = 1.0\nactive_damping  = true");
 
 /// The reference machine, damped.
 fn damped_machine() -> &'static Bench {
