@@ -1,5 +1,6 @@
 //! The plant in long steps, on which everything runs, against the plant in small ones: every figure of Tables 5 to 9, in both
-//! classes of legs. The small ones are of 4 µs: those of 20 µs are themselves up to 0.17 nm off.
+//! classes of legs. The small ones are of 4 µs: those of 20 µs are themselves up to 0.24 nm off. Shorter ones are no better judge:
+//! with 2 and 1 µs a converter code that rounds another way takes estimates, and figures at 10 Hz, 0.10 and 0.13 nm away from those.
 
 use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, select};
 use host_sim::platform::table::PoseErrors;
@@ -12,9 +13,6 @@ use super::classes::bouc_wen;
 
 /// How far a figure of a table may be from that of small steps, nm; of an angle at the radius of the joints.
 const BOUND: f64 = 0.1;
-/// The same of Bouc-Wen legs: estimates at 10 Hz end up to 0.11 nm apart whenever a converter rounds another way, between
-/// steps of 20 and of 4 µs as well.
-const BOUND_BOUC_WEN: f64 = 0.15;
 /// Small steps, s.
 const SMALL: f64 = 4e-6;
 /// m
@@ -71,7 +69,7 @@ fn apart(rows: &[(String, Vec<f64>)], judge: &[(String, Vec<f64>)]) -> (f64, Str
 #[test]
 fn tables_in_long_steps_are_those_of_small_steps() {
     let other = bouc_wen("steps-bouc-wen", &[]);
-    for (class, bench, bound) in [("plays", reference_machine(), BOUND), ("Bouc-Wen", &other, BOUND_BOUC_WEN)] {
+    for (class, bench) in [("plays", reference_machine()), ("Bouc-Wen", &other)] {
         let mut small = scenario(&bench.specimen);
         let mut long = small.clone();
         small.rig_mut().plant_mut().set_longest_step(SMALL);
@@ -79,7 +77,7 @@ fn tables_in_long_steps_are_those_of_small_steps() {
         let (found, judge) = (table(bench, &long), table(bench, &small));
         let (distance, worst) = apart(&found, &judge);
         println!("{class}: {distance:.4} nm apart at most, {worst}; {} runs", found.len());
-        assert!(distance > 0.0 && distance <= bound, "{class}: {distance} nm, {worst}");
+        assert!(distance > 0.0 && distance <= BOUND, "{class}: {distance} nm, {worst}");
     }
 }
 
