@@ -122,7 +122,9 @@ class Plot {
   defs(x0, x1, y0, y1) {
     this.clip = "clip-" + this.data.id + (this.small ? "-s" : "-l") + (this.options.tag || "");
     const clip = element("clipPath", { id: this.clip }, this.svg);
-    element("rect", { x: x0, y: y1 - 1, width: Math.max(x1 - x0, 1), height: y0 - y1 + 2 }, clip);
+    // A dot at the edge is a whole one.
+    const room = this.data.series.every(s => s.style === "dots") ? 4 : 0;
+    element("rect", { x: x0 - room, y: y1 - 1 - room, width: Math.max(x1 - x0, 1) + 2 * room, height: y0 - y1 + 2 + 2 * room }, clip);
   }
 
   // Bands: what is usual, and what lies beyond a limit.
