@@ -61,8 +61,7 @@ pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut Ran) -> Outc
         Ok(jobs) => jobs,
         Err(why) => return Outcome::Failed(why),
     };
-    // One more than there are processors: some wait for a simulated machine, an emulator or a file.
-    let workers = std::thread::available_parallelism().map_or(1, usize::from) + 1;
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
     // What earlier runs left; a folder that cannot be removed is nobody's matter, as names are not used twice.
     let _ = std::fs::remove_dir_all(kept.join("scratch"));
     println!("{} modules of {} test binaries, {workers} at a time", jobs.len(), binaries.len());
