@@ -100,7 +100,9 @@ pub(super) fn run<P: Port + 'static>(
             "the check begins with a machine that was armed and holds at rest: ramp down if it is not, then arm",
         ));
     }
-    let mode = panel.borrow().known["gains"]["mode"].as_str().map(str::to_owned);
+    // Asked now: what the page knows may be of a check that was ended a moment ago.
+    let gains = ask(operator, &Order::Gains(Vec::new()), quiet)?;
+    let mode = gains["mode"].as_str().map(str::to_owned);
     let mode = mode.and_then(|mode| Order::parse(&format!("mode {mode}")).ok().flatten());
     panel.borrow_mut().check = json!({ "runs": true, "done": 0 });
     ask(operator, &Order::Mode(Wanted { terms: [false, true], law: Some(0) }), quiet)?;
@@ -153,6 +155,7 @@ fn measure<P: Port + 'static>(
     begin(operator, Request::Run)?;
     let since = Instant::now();
     let start = loop {
+        heed(operator, panel)?;
         let place = operator.place()?;
         let runs = u64::from(place.phase) == Phase::Running.word();
         if runs {
@@ -164,7 +167,6 @@ fn measure<P: Port + 'static>(
         }
         let comes = u64::from(place.phase) == Phase::Holding.word() && since.elapsed() < COMES;
         if !runs && !comes || since.elapsed() > PATIENCE {
-            operator.look()?;
             return Err(Ended::Fault(format!(
                 "the platform does not come to its bias: the machine is {}",
                 operator.stands()
@@ -188,19 +190,25 @@ fn measure<P: Port + 'static>(
     Ok(measured)
 }
 
-/// Looks, and ends where the page asks for it or the machine does not run.
-fn looked<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Panel>>) -> Result<(), Ended> {
+/// Looks, which serves the pages, and ends where one asks for it.
+fn heed<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Panel>>) -> Result<(), Ended> {
     operator.look()?;
     if std::mem::take(&mut panel.borrow_mut().hall.ends) {
         return Err(Ended::Refused("the check was ended".to_owned()));
     }
+    std::thread::sleep(Duration::from_millis(2));
+    Ok(())
+}
+
+/// The same, and ends where the machine does not run.
+fn looked<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Panel>>) -> Result<(), Ended> {
+    heed(operator, panel)?;
     if u64::from(operator.phase()) != Phase::Running.word() {
         return Err(Ended::Fault(format!(
             "the machine is {}: gauges or legs are not as the spec says, or something holds the platform",
             operator.stands()
         )));
     }
-    std::thread::sleep(Duration::from_millis(2));
     Ok(())
 }
 
