@@ -10,7 +10,11 @@ from pathlib import Path
 import pytest
 from conftest import REFERENCE, REPOSITORY
 
-HEAD = "import specgen, sys\ndef said(line): print(line, flush=True)\n"
+# A program that a shell starts in the background ignores the signal; a notebook does not.
+HEAD = """import signal, specgen, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+def said(line): print(line, flush=True)
+"""
 
 
 def interrupted(body: str, when: str, after: float = 0.0) -> tuple[float, str, int]:

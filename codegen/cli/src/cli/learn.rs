@@ -352,7 +352,21 @@ fn keep(arguments: &Arguments, study: &Study, learned: Learned, start: [f64; 6],
         machine: machine_name.clone(),
         convergence: convergence.clone(),
         learned,
+        help: help(arguments, study),
     })
+}
+
+/// What lets a machine learn up to the bandwidth that was asked for, where not every one within the intervals would converge.
+fn help(arguments: &Arguments, study: &Study) -> Option<String> {
+    let Study { compiled, convergence, .. } = study;
+    let [_, highest] = convergence.band;
+    let damped = compiled.model.task_space.as_ref().is_some_and(|task| task.active_damping);
+    let mend = match (damped, convergence.measured) {
+        (false, _) => "damp the modes: `control.active_damping = true`",
+        (true, false) => "measure the response: --excite, then --response",
+        (true, true) => return None,
+    };
+    (highest < arguments.bandwidth).then(|| format!("to learn beyond {highest:.0} Hz, {mend}"))
 }
 
 fn gate(error: impl Into<LearnError>) -> Failure {
@@ -406,11 +420,14 @@ struct Found {
     convergence: Convergence,
     #[serde(flatten)]
     learned: Learned,
+    /// What lets it learn to higher frequencies, where it was asked to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    help: Option<String>,
 }
 
 impl Outcome for Found {
     fn text(&self) -> String {
-        let Self { name, motion, machine, convergence, learned } = self;
+        let Self { name, motion, machine, convergence, learned, help } = self;
         let [low, high] = convergence.band;
         let (first, best) = (&learned.passes[0], &learned.passes[learned.best]);
         let mut text = format!(
@@ -449,6 +466,9 @@ impl Outcome for Found {
         }
         if learned.grew {
             text.push_str("  the error grew: learning ended, the best pass is kept\n");
+        }
+        if let Some(help) = help {
+            let _ = writeln!(text, "help: {help}");
         }
         text.lines().map(|line| format!("{}\n", line.trim_end())).collect()
     }

@@ -150,15 +150,11 @@ impl Outcome for RecorderState {
             (false, true) => "is complete",
             (false, false) => "is stopped",
         };
-        let mut text = format!(
+        format!(
             "the recorder {does}; it holds {} ticks, {:.4} s; {} fit whatever changes\n",
             self.ticks,
             f64::from(self.ticks) * self.period,
             self.capacity
-        );
-        if self.running && self.ticks == 0 {
-            text += "help: a board begins where its next tick leaves time to copy the machine; if this stays at 0, lengthen `timing.period`\n";
-        }
-        text
+        )
     }
 }
