@@ -1,5 +1,6 @@
 """The panel's page for hours, in headless Chromium: a simulated machine that runs and is jogged, and every 30 s what the page counts of
-itself, its memory after collection, and late ticks. At the end what the real-time program says of its ticks.
+itself, its memory after collection, and late ticks. At the end what the real-time program says of its ticks. Behind the seconds, `client`: no
+browser, but a client that takes every row and draws nothing; `alone`: no panel. What they differ by is what the panel costs.
 
     specgen build specs/reference.toml --target rt-pc -o controller
     pip install websocket-client
@@ -9,6 +10,7 @@ itself, its memory after collection, and late ticks. At the end what the real-ti
 import contextlib
 import json
 import re
+import struct
 import subprocess
 import sys
 import tempfile
@@ -89,7 +91,29 @@ def watch(page: Page, seconds: float) -> None:
         page.value("document.querySelectorAll('#jog button:not([disabled])')[0]?.click()")
 
 
-def main(spec: str, program: str, seconds: float) -> None:
+def take(address: str, seconds: float) -> None:
+    """Takes every row, as the page does, and counts the gaps between blocks."""
+    host, token = re.fullmatch(r"http://([^/]+)/\S*?(\w{16,})", address).groups()  # type: ignore[union-attr]
+    socket = create_connection(f"ws://{host}/socket?token={token}", origin=f"http://{host}")
+    rows, gaps, due = 0, 0, None
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        message = socket.recv()
+        if isinstance(message, str):
+            continue
+        blocks, number = struct.unpack_from("<II", message, 4)
+        place = 72
+        for _ in range(blocks):
+            tick, _, every, count, _ = struct.unpack_from("<dIIII", message, place)
+            gaps += due is not None and tick != due
+            rows, due = rows + count, tick + every * count
+            place += 24 + 200 * count
+        socket.send(json.dumps({"do": "seen", "number": number}))
+    print(f"{rows} rows, {gaps} gaps")
+    socket.close()
+
+
+def main(spec: str, program: str, seconds: float, who: str = "page") -> None:
     started: list[subprocess.Popen[str]] = []
 
     def start(*words: str, **streams: Any) -> subprocess.Popen[str]:
@@ -110,13 +134,19 @@ def main(spec: str, program: str, seconds: float) -> None:
             with summary.open("w") as file:
                 start(program, *ticks, "--link", str(link), stdout=file, stderr=subprocess.DEVNULL)
             there(link)
-            panel = ["panel", spec, "--socket", str(link), "--listen", "127.0.0.1:8133"]
-            lines = start("specgen", *panel, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE).stderr
-            assert lines
-            address = next(found[0] for line in lines if (found := re.search(r"http://\S+", line)))
-            threading.Thread(target=lines.read, daemon=True).start()
-            start(*CHROMIUM, f"--remote-debugging-port={PORT}", f"--user-data-dir={folder}/profile", address, **quiet)
-            watch(Page(), seconds)
+            if who == "alone":
+                time.sleep(seconds)
+            else:
+                panel = ["panel", spec, "--socket", str(link), "--listen", "127.0.0.1:8133"]
+                lines = start("specgen", *panel, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE).stderr
+                assert lines
+                address = next(found[0] for line in lines if (found := re.search(r"http://\S+", line)))
+                threading.Thread(target=lines.read, daemon=True).start()
+                if who == "client":
+                    take(address, seconds)
+                else:
+                    start(*CHROMIUM, f"--remote-debugging-port={PORT}", f"--user-data-dir={folder}/profile", address, **quiet)
+                    watch(Page(), seconds)
         finally:
             for one in reversed(started):
                 one.terminate()
@@ -126,4 +156,4 @@ def main(spec: str, program: str, seconds: float) -> None:
         print({key: told[key] for key in ["planned", "on_time", "late", "skipped", "last_phase", "failure", "link"]})
 
 
-main(sys.argv[1], sys.argv[2], float(sys.argv[3]))
+main(sys.argv[1], sys.argv[2], float(sys.argv[3]), *sys.argv[4:])
