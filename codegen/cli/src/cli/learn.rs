@@ -362,6 +362,8 @@ fn help(arguments: &Arguments, study: &Study) -> Option<String> {
     let [_, highest] = convergence.band;
     let damped = compiled.model.task_space.as_ref().is_some_and(|task| task.active_damping);
     let mend = match (damped, convergence.measured) {
+        // Its room for knots may be what ends it, and it takes no measured response.
+        _ if arguments.on_device.is_some() => return None,
         (false, _) => "damp the modes: `control.active_damping = true`",
         (true, false) => "measure the response: --excite, then --response",
         (true, true) => return None,
