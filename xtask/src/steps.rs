@@ -87,7 +87,7 @@ pub fn setup() -> ExitCode {
 
 /// `cargo xtask test`
 pub fn test(root: &Path) -> ExitCode {
-    let mut report = Report::new(13 + LOCKED.len());
+    let mut report = Report::new(12 + LOCKED.len());
     report.step("cross compiler and QEMU", setup::microcontroller);
     let mode = Mode { tools_missing: report.has_failed(), ..Mode::default() };
     report.step("formatting", || formatting(root));
