@@ -32,6 +32,7 @@ mod robust;
 mod sim;
 mod spec;
 mod table;
+mod trajectory;
 mod tune;
 mod ui;
 

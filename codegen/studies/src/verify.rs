@@ -20,6 +20,8 @@ use specgen_toolchain::targets::{Kind, Target};
 use specgen_toolchain::time::{Clocks, Estimate};
 use specgen_toolchain::{self as target, Image, TargetError, image, size, stack};
 
+/// Ticks of the exercise that a build, `size` and a report run on host and emulated machine.
+pub const TICKS: u32 = 20_000;
 /// Seed of the noise in the exercise.
 const SEED: u64 = 1;
 /// The stage that is the whole tick.

@@ -19,9 +19,6 @@ use specgen_studies::verify::{self, Inspection, Measurement};
 use specgen_toolchain as target;
 use specgen_toolchain::budget::{self, group};
 
-/// Ticks of the exercise that is run on host and emulated machine.
-pub(super) const TICKS: u32 = 20_000;
-
 /// Arguments of the main job.
 #[derive(Args, Debug)]
 pub struct Arguments {
@@ -154,7 +151,7 @@ fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> 
     ui.progress(&format!("host library: {}", library.display()));
     let sim = |error: host_sim::controller::ControllerError| Failure::Environment(error.to_string());
     let mut controller = Controller::load(&library).map_err(sim)?;
-    let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS)
+    let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, verify::TICKS)
         .map_err(|error| Failure::Environment(error.to_string()))?;
 
     let toolchain = target::toolchain::find()?;

@@ -14,7 +14,6 @@ use host_sim::controller::{Controller, TickController};
 use host_sim::trace::Trace;
 use serde::Serialize;
 
-use super::build::TICKS;
 use super::spec;
 use super::ui::{Failure, Ui};
 use crate::{emit, workspace};
@@ -336,7 +335,7 @@ fn emulate(
     };
     let environment = |error: String| Failure::Environment(error);
     let mut controller = Controller::load(&library).map_err(|error| environment(error.to_string()))?;
-    let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS)
+    let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, verify::TICKS)
         .map_err(|error| environment(error.to_string()))?;
     let built;
     let image = match image {

@@ -3,6 +3,7 @@
 //! `specgen identify RECORD` identifies the Everett table; other kinds have a command of their own. A record that has the
 //! name of such a command is given as `./linear`.
 
+mod cause;
 mod everett;
 mod gains;
 mod gauge;

@@ -1,11 +1,13 @@
 //! `specgen operate`: one session with a machine over the link, from the command line, a script, or line by line.
 
 mod answer;
+mod ended;
 mod health;
 mod operator;
 pub mod panel;
 mod passes;
 mod platform;
+mod pose;
 mod triggers;
 mod watch;
 mod waves;
@@ -22,7 +24,8 @@ use super::line::Line;
 use super::spec;
 use super::ui::{Failure, Outcome, Ui};
 use answer::{Mistake, Report};
-pub use operator::{Ended, Operator};
+pub use ended::Ended;
+pub use operator::Operator;
 pub use passes::motion_name;
 use specgen_compiler::compile;
 use specgen_language::interrupt;

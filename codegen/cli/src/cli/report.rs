@@ -4,6 +4,7 @@ mod beside;
 mod paper;
 mod recorded;
 mod simulated;
+mod words;
 
 use std::path::{Path, PathBuf};
 
@@ -30,8 +31,6 @@ use specgen_studies::verify::{self, Measurement};
 
 /// Seed of machine, noise and strings.
 const SEED: u64 = 1;
-/// Ticks of the exercise of bits, as in the main job.
-const TICKS: u32 = 20_000;
 
 /// Arguments of `report`.
 #[derive(Args, Debug)]
@@ -314,7 +313,7 @@ fn build(compiled: &Compiled, no_target: bool, ui: &Ui) -> Result<Built, Failure
     ui.progress("building the emitted controller for this host");
     let library = target::host::build_loadable(&folder, &cache)?;
     let mut controller = Controller::load(&library).map_err(environment)?;
-    let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS).map_err(environment)?;
+    let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, verify::TICKS).map_err(environment)?;
     let measured = if no_target {
         Err("left out by --no-target".to_owned())
     } else {

@@ -3,7 +3,6 @@
 
 mod merge;
 mod report;
-pub(super) mod trajectory;
 mod work;
 
 use std::path::{Path, PathBuf};
@@ -17,6 +16,7 @@ use super::learn::{NOWHERE, takes_correction};
 use super::plot::Plot;
 use super::sim::{PlantArguments, emitted, environment, frequency};
 use super::spec;
+use super::trajectory;
 use super::ui::{Failure, Ui};
 use specgen_language::interrupt;
 use specgen_language::spec::quantity::{self, Dimension};

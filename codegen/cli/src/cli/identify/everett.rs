@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
+use super::cause::account;
 use super::predict;
 use super::reading::ReadingArguments;
 use super::refused;
@@ -13,7 +14,7 @@ use crate::cli::file::write_file;
 use crate::cli::plot::{Plot, wrote};
 use crate::cli::table::{right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
-use specgen_identify::{self as identify, Cause, DeadTime, GridChoice, Options, Prediction, Report};
+use specgen_identify::{self as identify, DeadTime, GridChoice, Options, Prediction, Report};
 use specgen_language::diagnostic::Diagnostic;
 use specgen_report::identification as figure;
 
@@ -192,35 +193,6 @@ fn details(report: &Report, text: &mut String) {
             region.down[0],
             region.down[1]
         );
-    }
-}
-
-pub(super) fn account(cause: &Cause) -> String {
-    let shares: Vec<String> =
-        cause.shares.iter().map(|(s, share)| format!("{} {:.0} %", short(*s), share * 100.0)).collect();
-    let which = match (cause.main, cause.hum) {
-        (identify::Source::DeadTime, _) => format!(" of {:.3} ms", cause.rate_delay * 1e3),
-        (identify::Source::Hum, Some(frequency)) => format!(" at {frequency:.1} Hz"),
-        _ => String::new(),
-    };
-    format!(
-        "mainly {}{which} (of its mean square: {}); linear drift taken out: {:.2} nm rms",
-        cause.main.name(),
-        shares.join(", "),
-        cause.drift_rms * 1e9
-    )
-}
-
-fn short(source: identify::Source) -> &'static str {
-    match source {
-        identify::Source::Drift => "drift",
-        identify::Source::DeadTime => "dead time",
-        identify::Source::Resonance => "resonance",
-        identify::Source::BentDrift => "bent drift",
-        identify::Source::Creep => "creep",
-        identify::Source::Hum => "hum",
-        identify::Source::Noise => "noise",
-        identify::Source::Model => "model",
     }
 }
 

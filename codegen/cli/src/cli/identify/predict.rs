@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::everett::account;
+use super::cause::account;
 use super::reading::ReadingArguments;
 use super::{Identified, refused};
 use crate::cli::file::write_file;

@@ -8,7 +8,7 @@ use specgen_link::Health;
 use specgen_runtime::supervisor::Cause;
 
 use super::answer::MachineStatus;
-use super::platform::Located;
+use super::pose::Located;
 use crate::cli::ui::Outcome;
 
 /// Answer to `status`: how the machine stands, and what it noticed.

@@ -13,9 +13,9 @@ use specgen_runtime::setpoint::{BUSY, REFUSED};
 use specgen_runtime::supervisor::{Phase, Request};
 
 use super::answer::{Answer, Downloaded, MachineStatus, Moves, Plain, RecorderState, Settings};
+use super::ended::{Ended, unsupported, waving};
 use super::health::Standing;
-use super::platform::{ZERO, in_words};
-use super::waves::waving;
+use super::pose::{ZERO, in_words};
 use crate::cli::file::{check_place, write_file};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
@@ -29,28 +29,6 @@ const DOWN: Duration = Duration::from_secs(60);
 const SEEN: u64 = 10;
 /// How long these may take.
 const ANSWERED: Duration = Duration::from_secs(2);
-
-/// Why a session ends before its orders do.
-pub enum Ended {
-    /// An order makes no sense here, or the device refuses it.
-    Refused(String),
-    /// The machine faulted, or did not do in time what was waited for.
-    Fault(String),
-    Failed(Failure),
-    Link(ClientError),
-    Interrupted,
-    /// The program that served the link was asked to end, and has.
-    Stopped,
-}
-
-impl From<ClientError> for Ended {
-    fn from(error: ClientError) -> Self {
-        match error {
-            ClientError::Refused(_) => Self::Refused(error.to_string()),
-            other => Self::Link(other),
-        }
-    }
-}
 
 /// What is done whenever a machine is looked at. An error ends what is under way.
 pub type Pulse<P> = Box<dyn FnMut(&mut Operator<P>) -> Result<(), Ended>>;
@@ -489,15 +467,5 @@ impl<P: Port> Operator<P> {
             std::thread::sleep(self.session.due());
         }
         Ok(format!("the machine is still {} after {} s", self.stands(), DOWN.as_secs()))
-    }
-}
-
-/// Why a board cannot be stopped.
-fn unsupported(error: ClientError) -> Ended {
-    match error {
-        ClientError::Refused(Refusal::Unsupported) => {
-            Ended::Refused("a board does not end; `ramp-down` switches its amplifiers off".to_owned())
-        }
-        other => other.into(),
     }
 }

@@ -7,6 +7,7 @@
 //! One thread has the machine. Whatever an order waits for, the machine is looked at meanwhile, and at every look the pages get their
 //! samples and *hold* and *ramp down* are carried out. What a browser does, or fails to do, keeps nothing waiting.
 
+mod ask;
 mod browser;
 mod check;
 mod feed;
@@ -38,7 +39,7 @@ use crate::cli::line::Line;
 use crate::cli::spec;
 use crate::cli::ui::{Failure, Ui};
 use hall::{Hall, now};
-use orders::{ask, begin, carry_out, question};
+use orders::{carry_out, question};
 
 /// Between two messages with samples.
 const FRAME: Duration = Duration::from_millis(25);

@@ -9,52 +9,25 @@ use specgen_language::model::Gains;
 use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
 use specgen_operate::frame::Frame;
-use specgen_operate::motion::{self, Binding, Motion};
+use specgen_operate::motion::{self, Motion};
 use specgen_operate::place::{self, AXES, Named, Pace, amount, meant};
 use specgen_operate::{Framed, Order, Place, Wanted};
 use specgen_runtime::setpoint::{BUSY, REFUSED, STALE};
 use specgen_runtime::supervisor::{Cause, Phase};
 
 use super::answer::{Moves, Plain};
-use super::operator::{Ended, Operator};
+use super::ended::Ended;
+use super::operator::Operator;
+use super::pose::{Located, ZERO, in_words, unit};
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::Outcome;
 
-/// The name that the user's zero always has.
-pub const ZERO: &str = "zero";
 /// Gains of each kind, in the order of the settings; those of P alone have `position_` before them.
 const GAINS: [&str; 3] = ["kp", "ki", "kv"];
 /// Why a frame has no such pose.
 const BEYOND: &str = "an angle is beyond what a frame is meant for, 15 deg";
 /// Modes by the word `mode`.
 const MODES: [&str; 7] = ["p", "f-invhys", "f-ewma", "f-pcc", "pf-invhys", "pf-ewma", "pf-pcc"];
-
-/// Where a platform is: µm and µrad, V.
-#[derive(Serialize)]
-pub struct Located {
-    tick: u64,
-    pose: [f64; 6],
-    target: [f64; 6],
-    error: [f64; 6],
-    voltage: [f64; 6],
-    moves: bool,
-}
-
-impl Outcome for Located {
-    fn text(&self) -> String {
-        let mut text = String::new();
-        let columns = [left(6), right(12), right(14), right(12), left(0).behind("  ")];
-        row(&mut text, &columns, &[&"", &"pose", &"set-point", &"error"]);
-        for (axis, name) in AXES.iter().enumerate() {
-            let cells = [self.pose[axis], self.target[axis], self.error[axis]].map(|value| format!("{value:.4}"));
-            row(&mut text, &columns, &[&format!("  {name}"), &cells[0], &cells[1], &cells[2], &unit(axis)]);
-        }
-        let volts: Vec<String> = self.voltage.iter().map(|voltage| format!("{voltage:.2}")).collect();
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "  legs 0 to 5: {} V{}", volts.join(", "), if self.moves { "; moving" } else { "" });
-        text
-    }
-}
 
 /// What poses of this session are said in: µm and µrad.
 #[derive(Serialize)]
@@ -141,28 +114,6 @@ impl Outcome for GainsInForce {
 pub(super) fn is_gain(name: &str) -> bool {
     let stem = name.split('[').next().unwrap_or(name);
     GAINS.contains(&stem.strip_prefix("position_").unwrap_or(stem))
-}
-
-fn unit(axis: usize) -> &'static str {
-    if axis < 3 { "um" } else { "urad" }
-}
-
-/// What binds, in words.
-pub fn in_words(binding: &Binding) -> String {
-    match *binding {
-        Binding::Axis { axis, at, bound } => format!(
-            "{} would be at {} from rest, outside the workspace of +-{}",
-            AXES[axis],
-            amount(axis, at),
-            amount(axis, bound)
-        ),
-        Binding::Leg { leg, at, range: [low, high] } => format!(
-            "leg {leg} would be {} from rest, beyond what it can do, {} to {}",
-            amount(0, at),
-            amount(0, low),
-            amount(0, high)
-        ),
-    }
 }
 
 impl<P: Port> Operator<P> {

@@ -7,7 +7,8 @@ use specgen_link::{EdgeStatus, Refusal};
 use specgen_operate::Order;
 use specgen_runtime::pending::Stage;
 
-use super::operator::{Ended, Operator};
+use super::ended::{Ended, no_input};
+use super::operator::Operator;
 use crate::cli::ui::Outcome;
 
 /// How it stands with the input line.
@@ -116,12 +117,4 @@ impl<P: Port> Operator<P> {
         let settled = matches!(known, Some(Stage::Begun | Stage::Refused));
         Ok(EdgeState { stage, stands: known.map_or("?", Stage::name), edges, tick: settled.then_some(tick) })
     }
-}
-
-/// Why nothing waits for an edge.
-pub(super) fn no_input() -> Ended {
-    Ended::Refused(
-        "the machine has no input line; declare one in its spec: [[trigger]] with name = \"start\" and kind = \"input\""
-            .to_owned(),
-    )
 }

@@ -10,7 +10,8 @@ use specgen_link::client::{ClientError, Port};
 use specgen_operate::place::AXES;
 use specgen_operate::samples::{Block, Row};
 
-use super::operator::{Ended, Operator};
+use super::ended::Ended;
+use super::operator::Operator;
 use crate::cli::file::{PendingFile, unwritten};
 use crate::cli::table::{Column, right, row};
 use crate::cli::ui::{Outcome, Ui};

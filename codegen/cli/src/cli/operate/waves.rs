@@ -6,8 +6,8 @@ use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
 use specgen_operate::{read_wave, refused_wave};
 
-use super::operator::{Ended, Operator};
-use super::triggers::no_input;
+use super::ended::{Ended, no_input};
+use super::operator::Operator;
 
 impl<P: Port> Operator<P> {
     pub(super) fn wave_of(&self, path: &Path) -> Result<(Vec<u64>, [u64; 6]), String> {
@@ -45,15 +45,5 @@ impl<P: Port> Operator<P> {
             )),
             other => other.into(),
         })
-    }
-}
-
-/// Why set-points are refused while a wave makes them.
-pub(super) fn waving(error: ClientError) -> Ended {
-    match error {
-        ClientError::Refused(Refusal::State) => {
-            Ended::Refused("not while a wave is under way or a host steps the machine; `wave stop` first".to_owned())
-        }
-        other => other.into(),
     }
 }

@@ -12,7 +12,7 @@ use specgen_runtime::record::Reason;
 use specgen_runtime::supervisor::MISSED_TICK;
 
 use super::SEED;
-use super::recorded::Words;
+use super::words::Words;
 use crate::machine;
 
 /// How long a machine takes that is led to where a record goes on, and until what that set swinging is over, s.

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use super::StudyArguments;
-use super::trajectory::Followed;
 use crate::cli::file::write_file;
+use crate::cli::trajectory::Followed;
 use crate::cli::ui::{Failure, Outcome as Shown, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_studies::robust::{Factors, Gate, Learning, Member, Outcome, Plan, Shard, shard};

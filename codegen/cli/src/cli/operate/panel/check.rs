@@ -19,7 +19,8 @@ use specgen_runtime::setpoint::BUSY;
 use specgen_runtime::supervisor::{Phase, Request};
 
 use self::judge::{Matrix, Way, at_first_sight, judge, times};
-use super::{Panel, ask, begin};
+use super::Panel;
+use super::ask::{ask, begin};
 use crate::cli::operate::{Ended, Operator};
 use crate::cli::ui::Ui;
 

@@ -2,31 +2,22 @@
 
 use std::cell::RefCell;
 use std::rc::Rc;
-use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use specgen_link::RecorderAction;
 use specgen_link::client::Port;
-use specgen_operate::{ALIVE, Order};
+use specgen_operate::Order;
 use specgen_runtime::supervisor::Request;
 use tungstenite::Message;
 
+use super::ask::{ask, begin};
 use super::hall::{Asked, Begin};
 use super::{Panel, check};
 use crate::cli::operate::{Ended, Operator, mistake};
 use crate::cli::ui::Ui;
 
-/// How long a request that is to begin to be given is not given before, ticks.
-const BEFORE: u64 = 10;
 /// Kind of a message with a record.
 const RECORD: u32 = 2;
-
-/// The answer to an order as `operate` gives it.
-pub(super) fn ask<P: Port>(operator: &mut Operator<P>, order: &Order, quiet: &Ui) -> Result<Value, Ended> {
-    operator.answers.clear();
-    operator.obey(order, quiet)?;
-    Ok(operator.answers.pop().map_or(Value::Null, |answer| answer.answer))
-}
 
 /// What it noticed, what each axis can still do, recorder and gains. What a device does not have is nothing.
 pub(super) fn question<P: Port>(operator: &mut Operator<P>, quiet: &mut Ui) -> Result<Value, Ended> {
@@ -117,20 +108,6 @@ pub(super) fn carry_out<P: Port + 'static>(
         }
         _ => Ok(Value::Null),
     }
-}
-
-/// Asks for what counts when it begins to be given.
-pub(super) fn begin<P: Port>(operator: &mut Operator<P>, request: Request) -> Result<(), Ended> {
-    operator.ordered = true;
-    operator.session.supervise(Request::None)?;
-    let (sent, since) = (operator.status().tick, Instant::now());
-    // A machine without ticks is asked all the same.
-    while operator.status().tick < sent + BEFORE && since.elapsed() < ALIVE {
-        std::thread::sleep(Duration::from_millis(1));
-        operator.look()?;
-    }
-    operator.session.supervise(request)?;
-    operator.look()
 }
 
 /// What a page may order by a line.

@@ -2,7 +2,7 @@
 
 use host_sim::trajectory::{PaperPath, Step};
 
-use crate::cli::ui::Failure;
+use super::ui::Failure;
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::TrajectoryKind;
 use specgen_studies::lead::streamed;
@@ -14,17 +14,17 @@ const FREQUENCY: f64 = 10.0;
 const SECONDS: f64 = 1.0;
 
 /// A trajectory with what it is called.
-pub(in crate::cli) struct Followed {
-    pub(in crate::cli) name: String,
-    pub(in crate::cli) frequency: f64,
-    pub(in crate::cli) choice: TrajectoryChoice,
+pub(super) struct Followed {
+    pub(super) name: String,
+    pub(super) frequency: f64,
+    pub(super) choice: TrajectoryChoice,
 }
 
 /// What `--trajectory` and `--frequency` mean for this spec.
 ///
 /// The spec's own paths are known by their names, with their own frequency unless one is asked for. The paper's names mean
 /// the paper's paths at the usual frequency, unless the spec gives another path that name.
-pub(in crate::cli) fn chosen(
+pub(super) fn chosen(
     trajectory: Option<&str>,
     frequency: Option<f64>,
     seed: u64,
