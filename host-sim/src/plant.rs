@@ -1,6 +1,7 @@
 //! What the simulator drives: one leg, from amplifier input to displacement.
 
 mod bouc_wen;
+mod bound;
 mod creep;
 mod filter;
 pub(crate) mod lanes;
@@ -10,9 +11,10 @@ mod play;
 mod stack;
 
 pub use bouc_wen::{BoucWen, BoucWenParameters};
+pub(crate) use bound::Bound;
 pub(crate) use filter::SmoothLag;
 pub use leg::LegPlant;
-pub(crate) use parameters::{Bound, checked};
+pub(crate) use parameters::checked;
 pub use parameters::{LegParameters, NoiseParameters, ParameterError, REFERENCE_LEG, SHIPPED};
 pub use stack::Stack;
 

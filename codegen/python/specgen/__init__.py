@@ -14,7 +14,6 @@ from ._commands import (
     Identification,
     Prediction,
     Replayed,
-    Result,
     Robustness,
     Simulation,
     command,
@@ -34,7 +33,7 @@ from ._commands import (
     tune,
 )
 from ._controller import Controller
-from ._findings import Error, Finding, Interrupted, Refused, Unavailable, UsageError
+from ._findings import Error, Finding, Interrupted, Refused, Result, Unavailable, UsageError
 from ._machine import Machine
 from ._table import Table, read_table
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from os import PathLike, fspath
 from pathlib import Path
@@ -13,39 +13,11 @@ from typing import Any, TypeAlias
 
 from . import _native
 from ._controller import Controller
-from ._findings import Error, Finding, Interrupted, Refused, Unavailable, UsageError, findings_of
+from ._findings import Error, Interrupted, Refused, Result, Unavailable, UsageError, findings_of
 from ._table import Table, read_table
 
 StrPath: TypeAlias = str | PathLike[str]
 Progress: TypeAlias = bool | Callable[[str], object]
-
-
-class Result(Mapping[str, Any]):
-    """What a command found: the fields of its JSON."""
-
-    def __init__(self, data: dict[str, Any], findings: list[Finding], reason: str | None) -> None:
-        self.data = data
-        self.findings = findings
-        """About the spec or the record."""
-        self.reason = reason
-        """Why it does not pass, if it does not."""
-
-    @property
-    def passed(self) -> bool:
-        """Whether it is good: what makes the command's exit code 0."""
-        return self.reason is None
-
-    def __getitem__(self, name: str) -> Any:
-        return self.data[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.data)
-
-    def __len__(self) -> int:
-        return len(self.data)
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(self.data)}{'' if self.passed else f'; not passed: {self.reason}'})"
 
 
 def command(*arguments: str | PathLike[str], progress: Progress = False) -> Result:

@@ -1,14 +1,12 @@
-"""Findings, and what is raised."""
+"""What a command gives: findings, a result, or what is raised."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from ._native import Error as Error
-
-if TYPE_CHECKING:
-    from ._commands import Result
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +30,34 @@ class Finding:
     def __str__(self) -> str:
         place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
         return f"{self.severity}[{self.code}]: {self.message}\n  --> {place or self.key}\n   = help: {self.help}"
+
+
+class Result(Mapping[str, Any]):
+    """What a command found: the fields of its JSON."""
+
+    def __init__(self, data: dict[str, Any], findings: list[Finding], reason: str | None) -> None:
+        self.data = data
+        self.findings = findings
+        """About the spec or the record."""
+        self.reason = reason
+        """Why it does not pass, if it does not."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is good: what makes the command's exit code 0."""
+        return self.reason is None
+
+    def __getitem__(self, name: str) -> Any:
+        return self.data[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.data)
+
+    def __len__(self) -> int:
+        return len(self.data)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(self.data)}{'' if self.passed else f'; not passed: {self.reason}'})"
 
 
 class Refused(Error):

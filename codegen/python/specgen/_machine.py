@@ -9,8 +9,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from ._commands import Progress, Result, StrPath, listener, result_of
-from ._findings import Error
+from ._commands import Progress, StrPath, listener, result_of
+from ._findings import Error, Result
 from ._native import Session
 from ._table import Table, read_table
 

@@ -11,6 +11,8 @@
 
 mod convergence;
 mod excitation;
+mod heard;
+mod matrix;
 mod motion;
 mod passes;
 mod plan;
@@ -20,9 +22,10 @@ mod update;
 
 pub use convergence::{Convergence, LARGEST_RADIUS, Learnable};
 pub use excitation::{Excitation, PASSES};
+pub use heard::Heard;
 pub use motion::Motion;
 pub use passes::{LearnError, Learned, Learner, Pass, Repeating, Seen, course, held, learn, translation_nm};
 pub use plan::Plan;
-pub use response::{Bin, Heard, Response};
+pub use response::{Bin, Response};
 pub use table::{Table, TableError, knots};
 pub use update::Update;

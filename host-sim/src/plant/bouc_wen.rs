@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Bound;
+use super::bound::Bound;
 
 /// Parameters of a [`BoucWen`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

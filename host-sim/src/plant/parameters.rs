@@ -7,6 +7,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::bouc_wen::BoucWenParameters;
+use super::bound::Bound;
 
 /// Parameters of [`super::LegPlant`], field for field as in the file. Its module has the equations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -260,43 +261,6 @@ pub(crate) fn checked<P: DeserializeOwned>(
         serde_json::from_str(text).map_err(|error| refused(vec![format!("{error}; compare with plants/{example}")]))?;
     let findings = findings(&parameters);
     if findings.is_empty() { Ok(parameters) } else { Err(refused(findings)) }
-}
-
-/// One end of a range.
-#[derive(Clone, Copy)]
-pub(crate) enum Bound {
-    Above(f64),
-    AtLeast(f64),
-    AtMost(f64),
-    Below(f64),
-}
-
-impl Bound {
-    fn holds(self, value: f64) -> bool {
-        match self {
-            Self::Above(bound) => value > bound,
-            Self::AtLeast(bound) => value >= bound,
-            Self::AtMost(bound) => value <= bound,
-            Self::Below(bound) => value < bound,
-        }
-    }
-
-    /// What is wrong with `value`, which is to keep both bounds. A NaN holds no bound, so it is found too.
-    pub(crate) fn and(self, other: Self, field: &str, value: f64) -> Option<String> {
-        let good = self.holds(value) && other.holds(value);
-        (!good).then(|| format!("`{field}` is {value}; expected a number {self} and {other}"))
-    }
-}
-
-impl fmt::Display for Bound {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Above(bound) => write!(f, "> {bound}"),
-            Self::AtLeast(bound) => write!(f, ">= {bound}"),
-            Self::AtMost(bound) => write!(f, "<= {bound}"),
-            Self::Below(bound) => write!(f, "< {bound}"),
-        }
-    }
 }
 
 #[cfg(test)]

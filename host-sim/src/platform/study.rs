@@ -6,7 +6,7 @@
 use std::ops::ControlFlow;
 
 use super::linear::Six;
-use super::rig::{Bench, Paused, PlatformRig, Request, RunOptions, Tick};
+use super::rig::{Bench, Paused, PlatformRig, Request, Tick};
 use super::scenario::PlatformScenario;
 use crate::closed_loop::{RunError, ticks_within};
 use crate::controller::{Controller, TickController};
@@ -50,7 +50,7 @@ impl PlatformStudy {
         let ticks = ticks_within(trajectory.duration(), interval)?;
         let targets = (1..=ticks).map(|tick| {
             let wanted = trajectory.target(tick as f64 * interval);
-            (wanted, pose_of(options, &wanted))
+            (wanted, options.pose_of(&wanted))
         });
         let mut rig = scenario.rig().clone();
         if whole_ticks {
@@ -109,10 +109,4 @@ impl PlatformStudy {
         }
         Ok(())
     }
-}
-
-/// The true pose that a set-point asks for, from rest.
-pub(super) fn pose_of(options: &RunOptions, wanted: &PoseTarget) -> Six {
-    let moved = options.frames.map_or(wanted.pose, |frames| frames.pose(&wanted.pose));
-    std::array::from_fn(|k| options.bias[k] + moved[k])
 }

@@ -8,8 +8,7 @@ use host_sim::platform::{PlatformParameters, Specimen};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use specgen_tests::length;
 
-use super::bench::{Bench, records, reference_machine};
-use super::damping::DAMPED;
+use super::bench::{Bench, DAMPED, records, reference_machine};
 
 /// A circle in x and y that grows from its middle and shrinks to it again, each within `RAMP`.
 pub struct Circle {

@@ -10,11 +10,9 @@ use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, Tuning
 use specgen::tuning::relay;
 use specgen_tests::length;
 
-use super::bench::{Bench, PERIOD, in_parallel, reference_machine};
+use super::bench::{Bench, DAMPED, PERIOD, in_parallel, reference_machine};
 use super::classes::{bouc_wen, errors};
 use super::limits::closed_loop;
-
-pub const DAMPED: (&str, &str) = ("notch_damping   = 1.0", "notch_damping   = 1.0\nactive_damping  = true");
 
 /// The reference machine, damped.
 fn damped_machine() -> &'static Bench {

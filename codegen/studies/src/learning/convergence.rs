@@ -7,9 +7,9 @@ use specgen_compiler::compile::Compiled;
 use specgen_compiler::lower;
 use specgen_compiler::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDynamics, Tuning};
 use specgen_language::model::{AdaptationMode, ControlMode};
-use specgen_numerics::nyquist::{Complex, over, plus, square, times};
 
-use super::response::Response;
+use super::matrix::{Matrix6c, inverse, left, multiply, norm, spectral_radius};
+use super::response::{Bin, Response};
 use crate::factors::{Factor, Factors};
 
 /// Largest spectral radius of Q (I − T L) that is let pass: the error of a pass against that of the one before.
@@ -22,6 +22,8 @@ const LEAST_LEFT: f64 = 0.004;
 const SHARES: [f64; 7] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4];
 /// Knots in a period of f_c.
 const KNOTS: f64 = 3.5;
+/// Behind the last frequency nothing is learned.
+const JUST_BEYOND: f64 = 1.001;
 /// Radius at which the whole inverse is good enough.
 const FAST: f64 = 0.5;
 /// Frequencies looked at between a hundredth of the highest and it, and as many more about each mode.
@@ -30,11 +32,6 @@ const GRID: u32 = 160;
 const ABOUT: f64 = 0.25;
 /// Stiffnesses over masses looked at, evenly spaced, ends included.
 const STIFFNESSES: u32 = 5;
-/// Squarings of the matrix whose norm bounds its spectral radius: ‖M³²‖^(1/32).
-const SQUARINGS: i32 = 5;
-
-/// Six by six, complex.
-pub(super) type Matrix6c = [[Complex; 6]; 6];
 
 /// A loop that can learn, as it starts.
 pub struct Learnable {
@@ -76,8 +73,44 @@ impl Convergence {
         spacing(self.band[1], period)
     }
 
+    /// The band about the best known frequency in which learning with T⁻¹ converges whatever T is within three standard errors of what was
+    /// measured, up to `wish` (Hz); none if there is no such band.
+    fn measured(response: &Response, wish: f64) -> Option<Self> {
+        let bins = &response.bins;
+        let radii: Vec<f64> = bins.iter().map(Bin::doubt).collect();
+        let inside = |k: &usize| bins[*k].hertz <= wish;
+        let best = (0..radii.len()).filter(inside).min_by(|a, b| radii[*a].total_cmp(&radii[*b]))?;
+        // A NaN is not known.
+        let known = |k: &usize| radii[*k] <= LARGEST_RADIUS;
+        if !known(&best) {
+            return None;
+        }
+        let first = (0..best).rev().find(|k| !known(k)).map_or(0, |k| k + 1);
+        let behind = (best..radii.len()).find(|k| !known(k)).unwrap_or(radii.len());
+        let low = bins[first].hertz;
+        // What is not known is not learned: there Q alone decides.
+        let learned = |k: usize| k >= first && k < behind;
+        let radius = |k: usize| if learned(k) { radii[k] } else { 1.0 };
+        let above: Vec<[f64; 2]> = (first..radii.len()).map(|k| [bins[k].hertz, radius(k)]).collect();
+        // Nothing is known beyond the last.
+        let end = [bins.last()?.hertz, 1.0];
+        let high = highest_passed(above.into_iter().chain([end]), wish)?;
+        if low >= high {
+            return None;
+        }
+        let mut shares: Vec<[f64; 2]> = vec![[0.0, 0.0]];
+        shares.extend(bins.iter().enumerate().map(|(k, bin)| [bin.hertz, f64::from(u8::from(learned(k)))]));
+        shares.push([JUST_BEYOND * end[0], 0.0]);
+        let mut found =
+            Self { band: [low, high], radius: 0.0, at: 0.0, measured: true, edge: low, bounds: Vec::new(), shares };
+        for (k, bin) in bins.iter().enumerate() {
+            found.meet(bin.hertz, radius(k));
+        }
+        Some(found)
+    }
+
     /// Takes in what an error is multiplied with at a frequency (Hz) before Q.
-    pub(super) fn meet(&mut self, hertz: f64, radius: f64) {
+    fn meet(&mut self, hertz: f64, radius: f64) {
         self.bounds.push([hertz, radius]);
         let radius = radius * self.passed(hertz);
         if radius > self.radius {
@@ -183,7 +216,7 @@ impl Learnable {
     #[must_use]
     pub fn convergence(&self, factors: &Factors, wish: f64) -> Option<Convergence> {
         if let Some(response) = &self.measured {
-            return Some(self.slower(response.convergence(wish)?, factors, wish));
+            return Some(self.slower(Convergence::measured(response, wish)?, factors, wish));
         }
         let frequencies = self.grid(wish);
         let (inverses, shares, radii) = self.modelled(&frequencies, factors);
@@ -300,7 +333,7 @@ impl Learnable {
 }
 
 /// The highest f_c up to `wish` (Hz) whose Q leaves each radius at its frequency (Hz) below the largest; none where one is no number.
-pub(super) fn highest_passed(radii: impl Iterator<Item = [f64; 2]>, wish: f64) -> Option<f64> {
+fn highest_passed(radii: impl Iterator<Item = [f64; 2]>, wish: f64) -> Option<f64> {
     let mut highest = wish;
     for [hertz, radius] in radii {
         let excess = radius / LARGEST_RADIUS - 1.0;
@@ -330,91 +363,4 @@ pub(super) fn highest(bandwidth: f64, period: f64) -> f64 {
 /// |Q| at its upper end.
 pub(super) fn cut(hertz: f64, bandwidth: f64) -> f64 {
     1.0 / (1.0 + libm::pow(hertz / bandwidth, ORDERS[0]))
-}
-
-/// I − share · product.
-fn left(product: &Matrix6c, share: f64) -> Matrix6c {
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| [f64::from(i == j) - share * product[i][j][0], -share * product[i][j][1]])
-    })
-}
-
-pub(super) fn multiply(a: &Matrix6c, b: &Matrix6c) -> Matrix6c {
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..6).fold([0.0; 2], |sum, k| plus(sum, times(a[i][k], b[k][j])))))
-}
-
-/// Bound of the spectral radius from above, close: ‖M^n‖^(1/n).
-pub(super) fn spectral_radius(matrix: &Matrix6c) -> f64 {
-    let mut power = *matrix;
-    let mut scale = 0.0;
-    for _ in 0..SQUARINGS {
-        let norm = norm(&power);
-        if norm == 0.0 || !norm.is_finite() {
-            return norm;
-        }
-        // Kept near 1, with its logarithm beside it.
-        power = power.map(|row| row.map(|value| value.map(|part| part / norm)));
-        power = multiply(&power, &power);
-        scale = 2.0 * (scale + libm::log(norm));
-    }
-    libm::exp((scale + libm::log(norm(&power))) / libm::exp2(f64::from(SQUARINGS)))
-}
-
-/// Largest sum of magnitudes of a row.
-fn norm(matrix: &Matrix6c) -> f64 {
-    let sums = matrix.iter().map(|row| row.iter().map(|value| libm::sqrt(square(*value))).sum::<f64>());
-    sums.fold(0.0, |most, sum| if sum <= most { most } else { sum })
-}
-
-/// By elimination with row pivots; not finite where there is none.
-pub(super) fn inverse(matrix: &Matrix6c) -> Matrix6c {
-    let mut a = *matrix;
-    let mut b: Matrix6c = std::array::from_fn(|i| std::array::from_fn(|j| [f64::from(i == j), 0.0]));
-    for k in 0..6 {
-        let pivot = (k..6).max_by(|i, j| square(a[*i][k]).total_cmp(&square(a[*j][k]))).unwrap_or(k);
-        a.swap(k, pivot);
-        b.swap(k, pivot);
-        let leading = a[k][k];
-        a[k] = a[k].map(|value| over(value, leading));
-        b[k] = b[k].map(|value| over(value, leading));
-        for i in (0..6).filter(|i| *i != k) {
-            let factor = a[i][k].map(|part| -part);
-            a[i] = std::array::from_fn(|j| plus(a[i][j], times(factor, a[k][j])));
-            b[i] = std::array::from_fn(|j| plus(b[i][j], times(factor, b[k][j])));
-        }
-    }
-    b
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_inverse_is_one_and_the_radius_is_bounded_closely() {
-        let mut state = 1_u32;
-        let mut draw = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(state >> 8) / f64::from(1 << 24) - 0.5
-        };
-        let matrix: Matrix6c = std::array::from_fn(|_| std::array::from_fn(|_| [draw(), draw()]));
-        let off = left(&multiply(&matrix, &inverse(&matrix)), 1.0);
-        assert!(norm(&off) < 1e-13, "{off:?}");
-        // Similar to a triangle: its eigenvalues are those on the diagonal.
-        let triangle: Matrix6c = std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                if j < i {
-                    [0.0; 2]
-                } else if i == j {
-                    [0.1 * i as f64, 0.3]
-                } else {
-                    [draw(), 0.0]
-                }
-            })
-        });
-        let similar = multiply(&multiply(&matrix, &triangle), &inverse(&matrix));
-        let radius = spectral_radius(&similar);
-        let expected = libm::hypot(0.5, 0.3);
-        assert!(radius >= expected * (1.0 - 1e-9) && radius < 1.15 * expected, "{radius} {expected}");
-    }
 }

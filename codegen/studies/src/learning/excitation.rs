@@ -16,7 +16,8 @@ use rustfft::num_complex::Complex64;
 use specgen_numerics::nyquist::{Complex, plus, times};
 use specgen_runtime::playback::{self, Knot};
 
-use super::convergence::{Learnable, Matrix6c, inverse, multiply, spacing};
+use super::convergence::{Learnable, spacing};
+use super::matrix::{Matrix6c, inverse, multiply};
 use super::motion::Motion;
 use super::passes::{LearnError, Repeating, followed, unlimited};
 use super::response::{Bin, Response};

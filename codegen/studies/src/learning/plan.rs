@@ -9,7 +9,8 @@ use specgen_numerics::nyquist::{Complex, times};
 use specgen_runtime::learning::{HEAD, Learning, Settings, plan_rows};
 use specgen_runtime::playback::Knot;
 
-use super::convergence::{Convergence, LARGEST_RADIUS, Learnable, Matrix6c, spectral_radius};
+use super::convergence::{Convergence, LARGEST_RADIUS, Learnable};
+use super::matrix::{Matrix6c, spectral_radius};
 use super::motion::Motion;
 use super::update::FADE;
 use crate::factors::Factors;

@@ -1,23 +1,18 @@
-//! The response of a running loop to a correction, as it was measured: its file, and how far learning with it converges.
+//! The response of a running loop to a correction, as it was measured: its file, and how well it is known.
 
-use std::f64::consts::TAU;
 use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use specgen_numerics::nyquist::square;
 
-use super::convergence::{
-    Convergence, LARGEST_RADIUS, Learnable, Matrix6c, highest_passed, inverse, multiply, spectral_radius,
-};
+use super::matrix::{Matrix6c, inverse, multiply, spectral_radius};
 use super::table::TableError;
 
 /// Version of the file.
 const FORMAT: &str = "specgen response 1";
 /// Standard errors that the response may be off in every entry.
 const ERRORS: f64 = 3.0;
-/// Behind the last frequency nothing is learned.
-const JUST_BEYOND: f64 = 1.001;
 
 /// T at one frequency.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -120,91 +115,12 @@ impl Response {
             (None, None) => [[[0.0; 2]; 6]; 6],
         }
     }
-
-    /// The band about the best known frequency in which learning with T⁻¹ converges whatever T is within three standard errors of what was
-    /// measured, up to `wish` (Hz); none if there is no such band.
-    pub(super) fn convergence(&self, wish: f64) -> Option<Convergence> {
-        let radii: Vec<f64> = self.bins.iter().map(Bin::doubt).collect();
-        let inside = |k: &usize| self.bins[*k].hertz <= wish;
-        let best = (0..radii.len()).filter(inside).min_by(|a, b| radii[*a].total_cmp(&radii[*b]))?;
-        // A NaN is not known.
-        let known = |k: &usize| radii[*k] <= LARGEST_RADIUS;
-        if !known(&best) {
-            return None;
-        }
-        let first = (0..best).rev().find(|k| !known(k)).map_or(0, |k| k + 1);
-        let behind = (best..radii.len()).find(|k| !known(k)).unwrap_or(radii.len());
-        let low = self.bins[first].hertz;
-        // What is not known is not learned: there Q alone decides.
-        let learned = |k: usize| k >= first && k < behind;
-        let radius = |k: usize| if learned(k) { radii[k] } else { 1.0 };
-        let above: Vec<[f64; 2]> = (first..radii.len()).map(|k| [self.bins[k].hertz, radius(k)]).collect();
-        // Nothing is known beyond the last.
-        let end = [self.bins.last()?.hertz, 1.0];
-        let high = highest_passed(above.into_iter().chain([end]), wish)?;
-        if low >= high {
-            return None;
-        }
-        let mut shares: Vec<[f64; 2]> = vec![[0.0, 0.0]];
-        shares.extend(self.bins.iter().enumerate().map(|(k, bin)| [bin.hertz, f64::from(u8::from(learned(k)))]));
-        shares.push([JUST_BEYOND * end[0], 0.0]);
-        let mut found = Convergence {
-            band: [low, high],
-            radius: 0.0,
-            at: 0.0,
-            measured: true,
-            edge: low,
-            bounds: Vec::new(),
-            shares,
-        };
-        for (k, bin) in self.bins.iter().enumerate() {
-            found.meet(bin.hertz, radius(k));
-        }
-        Some(found)
-    }
 }
 
 impl Bin {
     /// Bound of ρ(I − T_real T⁻¹) for every T_real within three standard errors in every entry: that of the matrix of magnitudes.
-    fn doubt(&self) -> f64 {
+    pub(super) fn doubt(&self) -> f64 {
         let inverse = inverse(&self.response).map(|row| row.map(|value| [libm::sqrt(square(value)), 0.0]));
         spectral_radius(&multiply(&self.error.map(|row| row.map(|error| [ERRORS * error, 0.0])), &inverse))
-    }
-}
-
-/// What was measured of a mode.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Heard {
-    /// By the model, Hz.
-    pub frequency: f64,
-    /// Where (Hz) its response to its own correction is largest, and how large, between half and one and a half times that frequency.
-    pub largest: [f64; 2],
-    /// The same by the model.
-    pub modelled: [f64; 2],
-    /// Standard error where it is largest, relative.
-    pub error: f64,
-}
-
-impl Learnable {
-    /// What a response says of each mode.
-    #[must_use]
-    pub fn heard(&self, response: &Response) -> [Heard; 6] {
-        let frequencies: Vec<f64> = response.bins.iter().map(|bin| bin.hertz).collect();
-        let model = self.nominal(&frequencies);
-        std::array::from_fn(|mode| {
-            let frequency = self.closed_loop.basis.frequencies[mode] / TAU;
-            let near: Vec<usize> =
-                (0..frequencies.len()).filter(|k| (frequencies[*k] / frequency - 1.0).abs() <= 0.5).collect();
-            let gain = |matrix: &Matrix6c| libm::sqrt(square(matrix[mode][mode]));
-            let largest = |gains: &dyn Fn(usize) -> f64| {
-                near.iter()
-                    .copied()
-                    .max_by(|a, b| gains(*a).total_cmp(&gains(*b)))
-                    .map_or((0, [frequency, 0.0]), |k| (k, [frequencies[k], gains(k)]))
-            };
-            let (at, measured) = largest(&|k| gain(&response.bins[k].response));
-            let (_, modelled) = largest(&|k| gain(&model[k]));
-            Heard { frequency, largest: measured, modelled, error: response.bins[at].error[mode][mode] / measured[1] }
-        })
     }
 }

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlannerScalar};
 
-use super::convergence::{Convergence, Learnable, Matrix6c, cut, highest, inverse};
+use super::convergence::{Convergence, Learnable, cut, highest};
+use super::matrix::{Matrix6c, inverse};
 use super::motion::Motion;
 use specgen_numerics::Matrix6;
 

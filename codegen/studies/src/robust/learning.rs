@@ -1,14 +1,10 @@
 //! Learning of a motion that repeats, on machines that are not their data sheet.
 
-use std::ops::ControlFlow;
-
 use host_sim::closed_loop::RunError;
-use host_sim::platform::rig::{Bench, Noise};
 use serde::{Deserialize, Serialize};
 
-use super::{Factors, Member, Study};
-use crate::learning::{Convergence, LearnError, Learnable, Learner, Motion, Update, learn};
-use crate::machine;
+use super::Factors;
+use crate::learning::{Convergence, Learnable, Motion, Update};
 use crate::tuning::TrajectoryChoice;
 use specgen_compiler::compile::Compiled;
 
@@ -16,10 +12,10 @@ use specgen_compiler::compile::Compiled;
 pub struct Learning {
     /// How far up.
     pub convergence: Convergence,
-    motion: Motion,
-    update: Update,
-    spacing: u32,
-    passes: usize,
+    pub(super) motion: Motion,
+    pub(super) update: Update,
+    pub(super) spacing: u32,
+    pub(super) passes: usize,
 }
 
 /// What a machine learned.
@@ -54,29 +50,5 @@ impl Learning {
         let spacing = convergence.spacing(period);
         let update = Update::new(&learnable, &motion, &convergence, spacing);
         Ok(Some(Self { convergence, motion, update, spacing, passes: passes as usize }))
-    }
-
-    /// On one machine.
-    ///
-    /// # Errors
-    /// If it does not come to its bias pose, or does not make the motion.
-    pub(super) fn on(&self, study: &Study<'_>, member: &Member) -> Result<Option<Learnt>, LearnError> {
-        let model = &study.compiled.model;
-        let Some(task) = &model.task_space else { return Ok(None) };
-        let specimen = member.deviation.specimen(model, task, study.leg);
-        let noise = if study.noise { Noise::of(&specimen) } else { Noise::NONE };
-        let scenario = machine::scenario(model, task, &specimen, &noise, member.seed);
-        let mut rig = scenario.rig().clone();
-        rig.plant_mut().step_whole_ticks(model.timing.period);
-        let mut controller = study.controller.fork();
-        let latency = member.deviation.delay_ticks as usize;
-        let mut bench = Bench::new(&mut rig, &mut controller, model.timing.period, latency)?;
-        bench.arm(scenario.options.arming)?;
-        let learned =
-            learn(&mut bench, &self.motion, Learner::Host(&self.update), &[], self.spacing, self.passes, |_, _| {
-                ControlFlow::Continue(())
-            })?;
-        let best = &learned.passes[learned.best];
-        Ok(Some(Learnt { error_nm: best.translation_nm, passes: learned.best as u32, grew: learned.grew }))
     }
 }

@@ -8,11 +8,13 @@ use std::sync::mpsc;
 use host_sim::closed_loop::RunError;
 use host_sim::controller::Controller;
 use host_sim::plant::LegParameters;
+use host_sim::platform::rig::{Bench, Noise};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::learning::{Learning, Learnt};
 use super::plan::{Member, Plan};
-use crate::learning::LearnError;
+use crate::learning::{LearnError, Learner, learn};
+use crate::machine;
 use crate::tuning::{Case, Conditions, Setting, TrajectoryChoice};
 use specgen_compiler::compile::Compiled;
 
@@ -119,12 +121,35 @@ impl Study<'_> {
     /// With what the machine learns, if it is asked to.
     fn learned(&self, member: &Member, figures: Figures) -> Result<Outcome, RunError> {
         let Some(learning) = &self.learning else { return Ok(Outcome::Ran(figures)) };
-        match learning.on(self, member) {
+        match self.learn(learning, member) {
             Ok(learned) => Ok(Outcome::Ran(Figures { learned, ..figures })),
             Err(LearnError::Run(error @ (RunError::NotReady { .. } | RunError::NotFinite { .. }))) => Ok(lost(&error)),
             Err(LearnError::Run(error)) => Err(error),
             Err(error) => Ok(lost(&format_args!("learning: {error}"))),
         }
+    }
+
+    /// What one machine learns; nothing for six legs.
+    ///
+    /// # Errors
+    /// If it does not come to its bias pose, or does not make the motion.
+    fn learn(&self, learning: &Learning, member: &Member) -> Result<Option<Learnt>, LearnError> {
+        let model = &self.compiled.model;
+        let Some(task) = &model.task_space else { return Ok(None) };
+        let specimen = member.deviation.specimen(model, task, self.leg);
+        let noise = if self.noise { Noise::of(&specimen) } else { Noise::NONE };
+        let scenario = machine::scenario(model, task, &specimen, &noise, member.seed);
+        let mut rig = scenario.rig().clone();
+        rig.plant_mut().step_whole_ticks(model.timing.period);
+        let mut controller = self.controller.fork();
+        let latency = member.deviation.delay_ticks as usize;
+        let mut bench = Bench::new(&mut rig, &mut controller, model.timing.period, latency)?;
+        bench.arm(scenario.options.arming)?;
+        let Learning { motion, update, spacing, passes, .. } = learning;
+        let learned =
+            learn(&mut bench, motion, Learner::Host(update), &[], *spacing, *passes, |_, _| ControlFlow::Continue(()))?;
+        let best = &learned.passes[learned.best];
+        Ok(Some(Learnt { error_nm: best.translation_nm, passes: learned.best as u32, grew: learned.grew }))
     }
 
     fn simulate(&self, member: &Member) -> Result<Outcome, RunError> {

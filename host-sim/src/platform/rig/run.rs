@@ -8,10 +8,9 @@ use crate::controller::TickController;
 use crate::platform::contact::WorkPart;
 use crate::platform::frames::UserFrames;
 use crate::platform::linear::Six;
-use crate::platform::study::pose_of;
 use crate::platform::table::PoseErrors;
 use crate::trace::Trace;
-use crate::trajectory::PoseTrajectory;
+use crate::trajectory::{PoseTarget, PoseTrajectory};
 use crate::word::status_words;
 
 /// What a run keeps besides its errors.
@@ -64,6 +63,12 @@ impl RunOptions {
             faults: Vec::new(),
             record: Record::Errors,
         }
+    }
+
+    /// The true pose that a set-point asks for, from rest.
+    pub(in crate::platform) fn pose_of(&self, wanted: &PoseTarget) -> Six {
+        let moved = self.frames.map_or(wanted.pose, |frames| frames.pose(&wanted.pose));
+        std::array::from_fn(|k| self.bias[k] + moved[k])
     }
 }
 
@@ -119,7 +124,7 @@ impl PlatformRig {
             let time = (tick + 1) as f64 * interval;
             let wanted = trajectory.target(time);
             let tick = bench.tick(&Request::stream(wanted))?;
-            let target = pose_of(options, &wanted);
+            let target = options.pose_of(&wanted);
             errors.add(&std::array::from_fn(|k| target[k] - tick.pose[k]));
             seen |= tick.status;
             if options.record != Record::Errors {

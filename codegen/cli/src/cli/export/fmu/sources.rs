@@ -25,6 +25,7 @@ pub(super) const SIMULATOR: &[(&str, &str)] = files! { "" as "host-sim":
     "src/lib.rs",
     "src/noise.rs",
     "src/plant.rs",
+    "src/plant/bound.rs",
     "src/plant/bouc_wen.rs",
     "src/plant/creep.rs",
     "src/plant/filter.rs",
