@@ -108,7 +108,7 @@ fn nested_loops(description: &Description) -> InputRecording {
 pub fn print(name: &str, m: &Measurement) {
     println!(
         "{name}, {}: flash {} ({} code, {} constants), RAM {}, tick code {}, stack {:?} bound {} painted",
-        m.compiler, m.flash, m.code, m.constants, m.ram, m.tick_code, m.stack_bound, m.stack_painted
+        m.compiler, m.flash, m.code, m.constants, m.ram_without_stack, m.tick_code, m.stack_bound, m.stack_painted
     );
     for stage in &m.stages {
         println!("  {:<12} {:>8.1} mean {:>6} min {:>6} max", stage.name, stage.mean, stage.min, stage.max);

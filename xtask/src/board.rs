@@ -321,14 +321,18 @@ fn learn(trial: &Trial, session: &mut Session, motion: &Repeated) -> Result<(), 
         let found: Value = serde_json::from_slice(&output.stdout).map_err(|error| format!("specgen learn: {error}"))?;
         let passes = found["result"]["passes"].as_array().ok_or_else(|| format!("specgen learn: {found}"))?;
         let errors: Vec<f64> = passes.iter().filter_map(|pass| pass["translation_nm"].as_f64()).collect();
-        println!("{}: {motion}, learned by the {who}, passes of {errors:.1?} nm rms by the gauges", trial.target);
-        match errors[..] {
-            [first, _, last] if first < 2.0 * noise && last < 2.0 * noise => {
+        let best = found["result"]["best"].as_u64().ok_or_else(|| format!("specgen learn: {found}"))? as usize;
+        println!(
+            "{}: {motion}, learned by the {who}, passes of {errors:.1?} nm rms by the gauges; kept: pass {best}",
+            trial.target
+        );
+        match (errors.first(), errors.get(best)) {
+            (Some(first), Some(kept)) if *first < 2.0 * noise && *kept < 2.0 * noise => {
                 println!(
                     "note: the error of {motion} is near the gauges' noise, {noise:.1} nm rms: there is nothing to learn"
                 );
             }
-            [first, _, last] if last < 0.7 * first => {}
+            (Some(first), Some(kept)) if *kept < 0.7 * first => {}
             _ => return Err(format!("{motion} was not learned by the {who}")),
         }
     }

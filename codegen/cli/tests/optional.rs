@@ -99,6 +99,13 @@ fn without_the_emulator_alone_the_image_is_built_and_looked_at() {
     assert!(missing.starts_with("left out: running the image"), "{missing}");
     assert!(missing.contains("apt-get install qemu-system-arm"), "{missing}");
     assert_eq!(missing.lines().count(), 1);
+    // State and settings are not in what is known of the RAM: there is no figure of it, and it says so.
+    let verdict = &document["result"]["verdict"];
+    let figures: Vec<&str> =
+        verdict["figures"].as_array().unwrap().iter().filter_map(|one| one["name"].as_str()).collect();
+    assert!(figures.contains(&"flash") && figures.contains(&"stack") && !figures.contains(&"RAM"), "{figures:?}");
+    assert_eq!(verdict["unmeasured"], "running the image (time, RAM, bits)");
+    assert!(image["used"]["ram"].is_null() && image["ram_static"].is_u64(), "{document:#}");
 }
 
 /// At most ten lines of at most eighty letters, built and measured; and why not, where it is not ready.

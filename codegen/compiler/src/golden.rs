@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::compile::check_stability;
 use crate::ir::Ir;
 use crate::lower::setpoint;
-use crate::{lint, lower};
+use crate::{demand, lint, lower, reach, requirements};
 use specgen_identify::everett::EverettTable;
 use specgen_identify::waveform::{self, Waveform};
 use specgen_language::diagnostic::{Diagnostic, Place, Severity};
@@ -253,6 +253,7 @@ fn constants() {
 
 /// A finding with all its words and what stands in the spec at its place.
 fn line(source: &SpecSource, finding: &Diagnostic) -> String {
+    assert_numbers(source, finding);
     let Diagnostic { severity, code, key, place, message, help, .. } = finding;
     let place = match place {
         Place::Spec(span) => format!("{:?}", &source.text[span.clone()]),
@@ -377,6 +378,45 @@ fn multiplied(value: &str, factor: f64) -> Option<String> {
         }
     }
     any.then_some(changed)
+}
+
+/// A number in a text is a number: neither message nor help of a finding has `NaN` or `inf` in it.
+fn assert_numbers(source: &SpecSource, finding: &Diagnostic) {
+    let words = format!("{} {}", finding.message, finding.help);
+    let mut words = words.split(|letter: char| !letter.is_alphanumeric());
+    assert!(!words.any(|word| word == "NaN" || word == "inf"), "{}: {finding:?}", source.display_name);
+}
+
+/// All that is found before anything is emitted, of specs with the numbers of one line multiplied, by nothing, too.
+#[test]
+fn no_finding_says_a_number_that_is_none() {
+    let soak = std::env::var_os("SPECGEN_SOAK").is_some();
+    let (specs, factors): (&[&str], &[f64]) = if soak {
+        (&SPECS, &[0.0, -1.0, 1e-9, 1e-3, 0.3, 10.0, 1e3, 1e9])
+    } else {
+        (&["features/platform-calibration.toml"], &[0.0, 1e3])
+    };
+    let mut count = 0;
+    for name in specs {
+        let source = read(name);
+        for (_, slip) in factors.iter().flat_map(|factor| slips(&source.text, *factor)) {
+            let source = SpecSource { text: slip, ..source.clone() };
+            let (model, mut found) = spec::load_as_far(&source);
+            if let Some(model) = &model {
+                found.extend(reach::check_bounds(model));
+                found.extend(requirements::check(model).err().unwrap_or_default());
+                let declared = setpoint::declared(model, &source.dir);
+                let setpoints = declared.as_ref().ok().and_then(|declared| declared.setpoints.as_ref());
+                found.extend(demand::check(model, setpoints, &[]).map_or_else(|found| found, |demand| demand.warnings));
+                found.extend(declared.map_or_else(|found| found, |declared| declared.warnings));
+            }
+            found.extend(build(&source, None).map_or_else(|found| found, |built| built.findings));
+            found.iter().for_each(|finding| assert_numbers(&source, finding));
+            count += found.len();
+        }
+    }
+    println!("{count} findings");
+    assert!(count > 100, "{count} findings");
 }
 
 #[test]

@@ -201,7 +201,10 @@ impl<'a> Found<'a> {
         if times < FAR_OFF || times.is_nan() {
             return self.add(code, key, message, help);
         }
-        let message = format!("{message}: {} times beyond what passes", figure(times));
+        let message = match times.is_finite() {
+            true => format!("{message}: {} times beyond what passes", figure(times)),
+            false => format!("{message}: further beyond what passes than any factor says"),
+        };
         let help = format!("{help}; if it is meant, say why in [lint]: allow = [\"{key}: REASON\"]");
         self.add(codes::FAR_OFF, key, message, &help);
     }

@@ -140,7 +140,9 @@ pub fn budget(target: &Target, measured: Result<&Measurement, &str>, command: &s
     };
     row("flash, bytes", m.used.flash as f64, budget.flash);
     row("of which code a tick can reach, bytes", m.tick_code as f64, None);
-    row("RAM, bytes, stack of a tick included", m.used.ram as f64, budget.ram);
+    if let Some(ram) = m.used.ram {
+        row("RAM, bytes, stack of a tick included", ram as f64, budget.ram);
+    }
     row("of which State, bytes", m.state as f64, None);
     if let Some(bound) = m.stack_bound {
         row("stack of a tick, bytes (static bound)", bound as f64, budget.stack);

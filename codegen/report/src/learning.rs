@@ -55,15 +55,7 @@ pub fn section(
         }
         Err(error) => return Err(error),
     };
-    let [first, best] = [0, learned.best].map(|pass| learned.passes[pass].translation_nm);
-    let [low, high] = convergence.band.map(hertz);
-    let lead = format!(
-        "{} passes take case 1 at {FREQUENCY:.0}\u{2009}Hz from {} to {}\u{2009}nm; from {low} to {high}\u{2009}Hz each leaves {} or less of the error on every machine within the declared intervals.",
-        learned.best,
-        short(first),
-        short(best),
-        short(convergence.radius)
-    );
+    let lead = lead(&learned, &convergence);
     let mut table = Grid::new("Passes of case 1 at 10 Hz", &["pass", "nm rms", "nrad rms", "by the gauges, nm"]);
     for (number, pass) in learned.passes.iter().enumerate() {
         let values = [pass.translation_nm, pass.orientation_nrad, pass.measured_nm].map(digits);
@@ -73,6 +65,22 @@ pub fn section(
     Ok(Some(section.lead(&lead).part(Part::Columns(columns)).text(
         "What is left of the error after a pass is bounded frequency by frequency by the spectral radius of Q (I − T L), over all corners of gain, stiffness over mass, damping, lag and delay. The passes are of the simulated machine with its tolerances, errors those of the true pose.",
     ).table(table)))
+}
+
+/// What learning gained, and what it leaves.
+fn lead(learned: &Learned, convergence: &Convergence) -> String {
+    let [first, best] = [0, learned.best].map(|pass| short(learned.passes[pass].translation_nm));
+    let [low, high] = convergence.band.map(hertz);
+    let case = format!("case 1 at {FREQUENCY:.0}\u{2009}Hz");
+    let gained = match learned.best {
+        0 => format!("Learning gains nothing on {case}, {first}\u{2009}nm, beyond what passes differ by"),
+        1 => format!("1 pass takes {case} from {first} to {best}\u{2009}nm"),
+        many => format!("{many} passes take {case} from {first} to {best}\u{2009}nm"),
+    };
+    format!(
+        "{gained}; from {low} to {high}\u{2009}Hz each leaves {} or less of the error on every machine within the declared intervals.",
+        short(convergence.radius)
+    )
 }
 
 fn passes(

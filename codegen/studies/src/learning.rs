@@ -11,6 +11,7 @@
 
 mod convergence;
 mod excitation;
+mod gain;
 mod heard;
 mod matrix;
 mod motion;
@@ -24,7 +25,7 @@ pub use convergence::{Convergence, LARGEST_RADIUS, Learnable};
 pub use excitation::{Excitation, PASSES};
 pub use heard::Heard;
 pub use motion::Motion;
-pub use passes::{LearnError, Learned, Learner, Pass, Repeating, Seen, course, held, learn, translation_nm};
+pub use passes::{Ending, LearnError, Learned, Learner, Pass, Repeating, Seen, course, held, learn, translation_nm};
 pub use plan::Plan;
 pub use response::{Bin, Response};
 pub use table::{Table, TableError, knots};

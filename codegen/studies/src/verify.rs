@@ -54,8 +54,8 @@ pub struct Measurement {
     pub code: u64,
     /// Of these, constants (tables).
     pub constants: u64,
-    /// Bytes of RAM taken statically, plus Config and State.
-    pub ram: u64,
+    /// Bytes of RAM taken statically, plus Config and State: all but the stack, which [`Used::ram`] has, too.
+    pub ram_without_stack: u64,
     /// Bytes of State.
     pub state: u64,
     /// Bytes of code that a tick can reach.
@@ -94,7 +94,7 @@ pub struct Inspection {
     /// Of these, constants (tables).
     pub constants: u64,
     /// Bytes of RAM taken statically. Config and State are not in it: their size is only known in a run.
-    pub ram: u64,
+    pub ram_static: u64,
     /// Bytes of code that a tick can reach.
     pub tick_code: u64,
     /// Static bound of a tick's stack, bytes; none if the call graph cannot be bounded.
@@ -145,7 +145,7 @@ pub fn inspect(image: &Image) -> Result<Inspection, TargetError> {
         flash: footprint.flash,
         code: footprint.code,
         constants: footprint.constants,
-        ram: footprint.ram,
+        ram_static: footprint.ram,
         tick_code: bound.code_bytes,
         stack_bound: bound.is_complete().then_some(bound.bytes),
         forbidden_symbols: footprint.panic_symbols.into_iter().chain(footprint.allocator_symbols).collect(),
@@ -177,7 +177,7 @@ pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measuremen
         flash: seen.flash,
         code: seen.code,
         constants: seen.constants,
-        ram: seen.ram + stats.state_bytes + stats.config_bytes,
+        ram_without_stack: seen.ram_static + stats.state_bytes + stats.config_bytes,
         state: stats.state_bytes,
         tick_code: seen.tick_code,
         stack_bound: seen.stack_bound,
@@ -233,7 +233,7 @@ pub fn time_board(
     Ok(())
 }
 
-/// What the replay image uses, and who of it; without a run, neither Config and State nor instructions.
+/// What the replay image uses, and who of it. Without a run neither Config and State are known, nor with them the RAM, nor instructions.
 fn used(image: &Image, stats: Option<&target::replay::ReplayStats>, checks: &Checked) -> Result<Used, TargetError> {
     let size = size::size(&image.elf)?;
     let stack = checks.stack.unwrap_or(0);
@@ -246,10 +246,12 @@ fn used(image: &Image, stats: Option<&target::replay::ReplayStats>, checks: &Che
         .chain([("stack of a tick".to_owned(), stack)])
         .chain(size.variables.iter().cloned())
         .collect();
+    let ram_least = size.ram() + words.iter().map(|(_, bytes)| bytes).sum::<u64>() + stack;
     Ok(Used {
         flash: size.flash(),
         flash_by: size.owners.iter().map(|owner| (owner.name.clone(), owner.flash())).collect(),
-        ram: size.ram() + words.iter().map(|(_, bytes)| bytes).sum::<u64>() + stack,
+        ram: stats.is_some().then_some(ram_least).filter(|_| checks.stack.is_some()),
+        ram_least,
         ram_by,
         stack: checks.stack,
         stack_by: checks.path.clone(),

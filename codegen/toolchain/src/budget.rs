@@ -14,8 +14,10 @@ pub struct Used {
     pub flash: u64,
     /// Who takes them: name, bytes.
     pub flash_by: Vec<(String, u64)>,
-    /// Bytes of RAM, the stack of a tick included.
-    pub ram: u64,
+    /// Bytes of RAM, State, settings and the stack of a tick included; none if a part of them is not known.
+    pub ram: Option<u64>,
+    /// Bytes of the parts that are known: it takes at least these.
+    pub ram_least: u64,
     /// Who takes them: name, bytes.
     pub ram_by: Vec<(String, u64)>,
     /// Bytes of the stack of a tick at most; none without a bound.
@@ -39,7 +41,8 @@ pub struct Held {
     pub most: Option<(u64, String)>,
 }
 
-/// Every figure with its limit; a stack without a bound and instructions that were not counted are left out.
+/// Every figure with its limit. What is not known is left out: RAM of which a part is missing, a stack without a bound, instructions that were
+/// not counted.
 #[must_use]
 pub fn held(target: &Target, used: &Used) -> Vec<Held> {
     let (part, budget) = (target.mcu.part(), &target.budget);
@@ -47,10 +50,9 @@ pub fn held(target: &Target, used: &Used) -> Vec<Held> {
         Some(bytes) => (bytes, format!("target.budget.{key}")),
         None => (has, part.name.to_owned()),
     };
-    let mut held = vec![
-        Held { what: "flash", used: used.flash, most: Some(limit(budget.flash, "flash", part.flash)) },
-        Held { what: "RAM", used: used.ram, most: Some(limit(budget.ram, "ram", part.ram)) },
-    ];
+    let mut held = vec![Held { what: "flash", used: used.flash, most: Some(limit(budget.flash, "flash", part.flash)) }];
+    let ram = || Some(limit(budget.ram, "ram", part.ram));
+    held.extend(used.ram.map(|ram_used| Held { what: "RAM", used: ram_used, most: ram() }));
     if let Some(stack) = used.stack {
         held.push(Held { what: "stack", used: stack, most: Some(limit(budget.stack, "stack", part.ram)) });
     }
@@ -65,7 +67,13 @@ pub fn held(target: &Target, used: &Used) -> Vec<Held> {
 #[must_use]
 pub fn over(target: &Target, used: &Used) -> Vec<String> {
     let mut over = Vec::new();
-    for Held { what, used: amount, most } in held(target, used) {
+    let mut held = held(target, used);
+    if used.ram.is_none() {
+        // A part that is too much is enough.
+        let part = Used { ram: Some(used.ram_least), ..Used::default() };
+        held.extend(self::held(target, &part).into_iter().filter(|one| one.what == "RAM"));
+    }
+    for Held { what, used: amount, most } in held {
         let Some((most, from)) = most.filter(|(most, _)| amount > *most) else { continue };
         let (unit, by) = match what {
             "flash" => ("bytes", &used.flash_by),
@@ -75,7 +83,8 @@ pub fn over(target: &Target, used: &Used) -> Vec<String> {
         };
         let verb = if from.contains('.') { "allows" } else { "has" };
         over.push(format!(
-            "{what} takes {} {unit}, {from} {verb} {}: shrink it by {}{}",
+            "{what} takes {}{} {unit}, {from} {verb} {}: shrink it by {}{}",
+            if what == "RAM" && used.ram.is_none() { "at least " } else { "" },
             group(amount),
             group(most),
             group(amount - most),
@@ -125,7 +134,8 @@ mod tests {
         Used {
             flash: 60_000,
             flash_by: list(&[("core", 5000), ("controller", 40_000), ("runtime", 15_000)]),
-            ram: 9000,
+            ram: Some(9000),
+            ram_least: 9000,
             ram_by: list(&[("State", 8000)]),
             stack: Some(1672),
             stack_by: list(&[("step", 1600), ("memcpy", 72)]),
@@ -155,6 +165,17 @@ mod tests {
         (target.budget.ram, target.budget.stack) = (Some(1), Some(1));
         assert_eq!(over(&target, &used()).len(), 4);
         assert!(over(&target, &Used { stack: None, ..used() }).iter().any(|words| words.contains("cannot be bounded")));
+    }
+
+    #[test]
+    fn ram_of_which_a_part_is_missing_is_no_figure_and_may_be_too_much_all_the_same() {
+        let mut target = Target { mcu: Mcu::Mps2An500, budget: Budget { ram: Some(2000), ..Budget::NONE } };
+        let part = Used { ram: None, ram_least: 1440, ..used() };
+        assert!(held(&target, &part).iter().all(|one| one.what != "RAM"));
+        assert_eq!(over(&target, &part), Vec::<String>::new());
+        target.budget.ram = Some(1439);
+        let words = over(&target, &part).join("\n");
+        assert!(words.contains("RAM takes at least 1,440 bytes") && words.contains("shrink it by 1"), "{words}");
     }
 
     #[test]

@@ -201,26 +201,41 @@ fn crate_of_symbol(name: &str) -> &str {
     }
 }
 
-/// The crate that a source file belongs to: by the registry's `name-version`, the library of the compiler, else the folder
-/// that holds `src`. Never a path of the machine.
-fn crate_of_file(path: &str) -> String {
+/// Crates of the compiler's library that an image may hold.
+const LIBRARY: [&str; 5] = ["core", "alloc", "compiler-builtins", "stdarch", "portable-simd"];
+
+/// The crate that a source file belongs to: by the registry's `name-version`, the library of the compiler, else the folder that holds `src`. Folders
+/// of the machine above that count for nothing, whatever their names.
+pub(super) fn crate_of_file(path: &str) -> String {
+    source_of(path).0
+}
+
+/// The crate of a source file, and the file within its folder `src`.
+pub(super) fn source_of(path: &str) -> (String, String) {
     let path = path.replace('\\', "/");
     let parts: Vec<&str> = path.split('/').collect();
-    let after = |mark: &[&str]| parts.windows(mark.len()).position(|window| window == mark).map(|at| at + mark.len());
-    if let Some(at) = after(&["registry", "src"])
-        && let Some(package) = parts.get(at + 1)
-    {
-        return without_version(package).to_owned();
+    let from = |at: usize| parts.get(at..).unwrap_or_default().join("/");
+    let part = |at: usize| parts.get(at).copied().unwrap_or_default();
+    // `…/registry/src/INDEX/NAME-VERSION/…`.
+    let package = parts.windows(2).rposition(|pair| pair == ["registry", "src"]).map(|at| at + 3);
+    if let Some(at) = package.filter(|at| without_version(part(*at)) != part(*at)) {
+        return (without_version(part(at)).to_owned(), from(at + 2));
     }
-    if let Some(library) = after(&["library"]).and_then(|at| parts.get(at)) {
-        return (*library).to_owned();
+    // `…/rust/library/core/…`, or `rustc-1.96` or a digest in place of `rust`.
+    let of_compiler = |at: usize| {
+        let above = |by: usize| at.checked_sub(by).map_or("", part);
+        above(1) == "rust" || above(1).starts_with("rustc") || above(2) == "rustc"
+    };
+    let library = parts.iter().rposition(|part| *part == "library").filter(|at| of_compiler(*at)).map(|at| at + 1);
+    if let Some(at) = library.filter(|at| LIBRARY.contains(&part(*at))) {
+        return (part(at).to_owned(), from(at + 2));
     }
-    let source = parts.iter().rposition(|part| *part == "src").and_then(|at| at.checked_sub(1));
-    match source.and_then(|at| parts.get(at)).copied() {
-        Some(folder) if !folder.is_empty() && folder != "." => folder.to_owned(),
+    let source = parts.iter().rposition(|part| *part == "src");
+    match source.map(|at| (at, at.checked_sub(1).map_or("", part))) {
+        Some((at, folder)) if !folder.is_empty() && folder != "." => (folder.to_owned(), from(at + 1)),
         // Paths of the package that is built itself start with `src`.
-        _ if parts.first() == Some(&"src") => "firmware".to_owned(),
-        _ => NO_LINES.to_owned(),
+        Some((0, _)) => ("firmware".to_owned(), from(1)),
+        _ => (NO_LINES.to_owned(), String::new()),
     }
 }
 
@@ -260,9 +275,18 @@ mod tests {
             ("src/main.rs", "firmware"),
             ("qemu/src/main.rs", "qemu"),
             ("asm.S", NO_LINES),
+            // Wherever a user builds.
+            ("/home/runtime/controller/out/board/src/cycle.rs", "board"),
+            ("/home/me/library/core/controller/src/step.rs", "controller"),
+            ("/rustc/0123abcd/library/alloc/src/vec/mod.rs", "alloc"),
+            ("/home/me/registry/src/work/out/runtime/src/memory.rs", "runtime"),
+            ("/home/me/src/controller/out/hal/src/lib.rs", "hal"),
+            ("/home/controller/.rustup/toolchains/x/lib/rustlib/src/rust/library/core/src/num/f64.rs", "core"),
+            ("/home/runtime/.cargo/registry/src/index-0123/crc-3.4.0/src/lib.rs", "crc"),
         ] {
             assert_eq!(crate_of_file(path), expected, "{path}");
         }
+        assert_eq!(source_of("/w/src/o/runtime/src/snapshot/walk.rs").1, "snapshot/walk.rs");
         assert_eq!(crate_of_symbol("controller::hysteresis::EVERETT_0"), "controller");
         assert_eq!(crate_of_symbol("<specgen_runtime::crc::Crc32 as x>::TABLE"), "runtime");
         assert_eq!(crate_of_symbol(".Lanon.1"), UNNAMED);

@@ -96,7 +96,7 @@ fn a_machine_that_is_not_its_spec_learns_with_its_own_response() {
             "{legs}, {what}: model, declared: f_c {limited:.0?} Hz; model, not declared: {:.1?} nm, grew {}; measured {low:.1} to {high:.0} Hz, radius \
              {:.2} at {:.0} Hz: {:.1?} nm, {:.0} nrad",
             errors(blind),
-            blind.grew,
+            blind.grew(),
             convergence.radius,
             convergence.at,
             errors(own),
@@ -106,9 +106,9 @@ fn a_machine_that_is_not_its_spec_learns_with_its_own_response() {
             println!("    {one:?}");
         }
         assert!(limited.is_none_or(|hertz| hertz < 600.0), "{limited:?}");
-        assert!(blind.grew || blind.passes[blind.best].translation_nm > 6.0, "{blind:?}");
+        assert!(blind.grew() || blind.passes[blind.best].translation_nm > 6.0, "{blind:?}");
         assert!(high >= 600.0 && convergence.radius <= 0.9, "{convergence:?}");
-        assert!(!own.grew && own.passes[own.best].translation_nm <= 6.0, "{own:?}");
+        assert!(!own.grew() && own.passes[own.best].translation_nm <= 6.0, "{own:?}");
     }
 }
 

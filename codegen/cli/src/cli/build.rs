@@ -201,7 +201,7 @@ impl Summary {
         match (&self.host_library, &self.image) {
             (None, _) => "building",
             (_, None) => "the image for the microcontroller (time, memory, bits)",
-            (_, Some(_)) => "running the image (time, bits)",
+            (_, Some(_)) => "running the image (time, RAM, bits)",
         }
     }
 
@@ -264,19 +264,17 @@ impl Summary {
         if let Some(i) = &self.image {
             let _ = writeln!(out, "  {} ({}), not run:", i.machine, i.compiler);
             flash(&mut out, [i.flash, i.code, i.constants, i.tick_code]);
-            let _ = writeln!(out, "    RAM           {}{} bytes static, without State", group(i.ram), of(budget.ram));
+            out.push_str("    RAM           not measured: State and settings are known only in a run\n");
             let _ = writeln!(out, "    stack a tick  {} (static)", bound(i.stack_bound));
         }
         if let Some(m) = &self.measurement {
             let _ = writeln!(out, "  {} ({}):", m.machine, m.compiler);
             flash(&mut out, [m.flash, m.code, m.constants, m.tick_code]);
-            let _ = writeln!(
-                out,
-                "    RAM           {}{} bytes with the stack of a tick, of which State {}",
-                group(m.used.ram),
-                of(budget.ram),
-                group(m.state)
+            let ram = m.used.ram.map_or_else(
+                || "not known, the stack of a tick has no bound".to_owned(),
+                |ram| format!("{}{} bytes with the stack of a tick", group(ram), of(budget.ram)),
             );
+            let _ = writeln!(out, "    RAM           {ram}, of which State {}", group(m.state));
             let _ =
                 writeln!(out, "    stack a tick  {} (static), {} seen", bound(m.stack_bound), group(m.stack_painted));
             for stage in &m.stages {

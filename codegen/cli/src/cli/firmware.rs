@@ -358,7 +358,9 @@ fn hold_against_budget(made: &mut Made, compiled: &Compiled, target: Target) {
         (_, Some(size), Some(checks)) => Some(Used {
             flash: size.flash(),
             flash_by: size.owners.iter().map(|owner| (owner.name.clone(), owner.flash())).collect(),
-            ram: size.ram() + checks.stack.unwrap_or(0),
+            // State and settings of the image that is replayed are on its stack, and known only in a run.
+            ram: checks.stack.filter(|_| target.kind != Kind::Emulated).map(|stack| size.ram() + stack),
+            ram_least: size.ram() + checks.stack.unwrap_or(0),
             ram_by: size
                 .variables
                 .iter()

@@ -28,8 +28,8 @@ use specgen_language::model::TaskSpace;
 use specgen_report::learning::BANDWIDTH;
 use specgen_runtime::playback::Knot;
 use specgen_studies::learning::{
-    Convergence, LearnError, Learnable, Learned, Learner, Motion, Pass, Plan, Repeating, Response, Table, Update,
-    knots, learn,
+    Convergence, Ending, LearnError, Learnable, Learned, Learner, Motion, Pass, Plan, Repeating, Response, Table,
+    Update, course, knots, learn,
 };
 use specgen_studies::machine as plant;
 use specgen_studies::robust::Factors;
@@ -57,7 +57,7 @@ pub struct Arguments {
     /// Its operating frequency, Hz; 10, or that of the spec, if not given.
     #[arg(long, value_name = "HZ", value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<f64>,
-    /// Passes that are learned from; one more shows what came of them.
+    /// Passes that are learned from at most; one more shows what came of them. The first that gains no more than its noise ends learning.
     #[arg(long, value_name = "N", default_value_t = 5, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=1000))]
     passes: u32,
     /// Highest frequency to be learned, Hz; lowered to where every machine within [robust] converges.
@@ -83,7 +83,7 @@ pub struct Arguments {
     #[arg(long, value_name = "KNOTS", num_args = 0..=1, default_missing_value = "4096", conflicts_with_all = ["excite", "response"],
           value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     on_device: Option<u32>,
-    /// Write the correction of the best pass here (JSON).
+    /// Write the correction that is kept here (JSON): that of the last pass that gained more than its noise.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Learn on this machine, which is armed for it and ramped down after it.
@@ -145,12 +145,12 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     match (found, why) {
         (Some(found), Some(why)) => ui.judged(&found, Some(why)),
         (None, Some(why)) => Err(Failure::Gate(why)),
-        (Some(found), None) if found.learned.passes.len() > arguments.passes as usize || found.learned.grew => {
+        (Some(found), None) if !matches!(found.learned.ending, Ending::Interruption | Ending::Machine) => {
             ui.result(&found);
             Ok(())
         }
         (Some(found), None) => {
-            let message = format!("interrupted: the best pass so far is kept{down}");
+            let message = format!("interrupted: what was learned so far is kept{down}");
             Err(Failure::Interrupted { message, result: ui.shown(&found) })
         }
         (None, None) => Err(Failure::Gate(format!("interrupted before the first pass was over{down}"))),
@@ -307,7 +307,7 @@ fn on_machine<T, F>(
             arguments.spec.display()
         )));
     }
-    let mut remote = Remote { operator: &mut operator, ui, own, made: None, ended: None };
+    let mut remote = Remote { operator: &mut operator, ui, own, has: None, ended: None };
     let done = match remote.arm() {
         Ok(()) => work(&mut remote, ui),
         Err(ended) => {
@@ -342,9 +342,13 @@ fn keep(arguments: &Arguments, study: &Study, learned: Learned, start: [f64; 6],
     let Study { compiled, convergence, motion, motion_name, machine_name, spacing, .. } = study;
     if let Some(path) = &arguments.output {
         let names = [compiled.ir.digest.as_str(), machine_name, motion_name];
-        let table = Table::new(names, [*spacing, motion.scored.start as u32], start, learned.knots.clone());
+        let mut knots = learned.knots.clone();
+        // Nothing learned, from nothing: a correction of zeros, which plays as none.
+        knots.resize(course(motion, *spacing, 0).knots() as usize, [0; 6]);
+        let zeros = if knots.iter().all(|knot| *knot == [0; 6]) { ", all of them zero," } else { "" };
+        let table = Table::new(names, [*spacing, motion.scored.start as u32], start, knots);
         write_file(path, table.to_json().as_bytes())?;
-        ui.progress(&format!("wrote {} knots to {}", learned.knots.len(), path.display()));
+        ui.progress(&format!("wrote {} knots{zeros} to {}", table.knots.len(), path.display()));
     }
     Ok(Found {
         name: compiled.ir.name.clone(),
@@ -413,6 +417,25 @@ fn begin(
     Ok((table.knots, table.spacing))
 }
 
+/// Why learning ended, and whose correction is kept.
+fn kept(learned: &Learned) -> Vec<String> {
+    // Without passes to learn from there is nothing to say.
+    let Some(noise) = learned.noise_nm else { return Vec::new() };
+    let last = learned.passes.len() - 1;
+    let why = match learned.ending {
+        Ending::NoGain => Some(format!("pass {last} gained nothing: learning ended")),
+        Ending::Growth => Some(format!("the error grew in pass {last}: learning ended")),
+        Ending::AllPasses | Ending::Interruption | Ending::Machine => None,
+    };
+    let which = match learned.best {
+        0 => "kept: the correction of pass 0, which learning began with".to_owned(),
+        best => format!("kept: the correction of pass {best}"),
+    };
+    let noise =
+        format!("passes under one correction differ by {noise:.2} nm by the gauges, and a gain is more than that");
+    why.into_iter().chain([which, noise]).collect()
+}
+
 /// What came of it.
 #[derive(Serialize)]
 struct Found {
@@ -432,10 +455,12 @@ impl Outcome for Found {
         let Self { name, motion, machine, convergence, learned, help } = self;
         let [low, high] = convergence.band;
         let (first, best) = (&learned.passes[0], &learned.passes[learned.best]);
-        let mut text = format!(
-            "{name}: {motion}, {:.1} -> {:.1} nm rms in {} passes ({machine})\n",
-            first.translation_nm, best.translation_nm, learned.best
-        );
+        let gained = match learned.best {
+            0 => format!("{:.1} nm rms", first.translation_nm),
+            1 => format!("{:.1} -> {:.1} nm rms in 1 pass", first.translation_nm, best.translation_nm),
+            many => format!("{:.1} -> {:.1} nm rms in {many} passes", first.translation_nm, best.translation_nm),
+        };
+        let mut text = format!("{name}: {motion}, {gained} ({machine})\n");
         // Writing to a String cannot fail, here and below.
         let _ = writeln!(
             text,
@@ -452,7 +477,7 @@ impl Outcome for Found {
         row(&mut text, &columns, &[&"pass", &"nm rms", &"nrad rms", &"gauges, nm", &""]);
         for (number, pass) in learned.passes.iter().enumerate() {
             let Pass { translation_nm, orientation_nrad, measured_nm, status } = pass;
-            let said = [if number == learned.best { "best" } else { "" }.to_owned(), status_words(*status)];
+            let said = [if number == learned.best { "kept" } else { "" }.to_owned(), status_words(*status)];
             let said: Vec<String> = said.into_iter().filter(|text| !text.is_empty()).collect();
             row(
                 &mut text,
@@ -466,8 +491,8 @@ impl Outcome for Found {
                 ],
             );
         }
-        if learned.grew {
-            text.push_str("  the error grew: learning ended, the best pass is kept\n");
+        for line in kept(learned) {
+            let _ = writeln!(text, "  {line}");
         }
         if let Some(help) = help {
             let _ = writeln!(text, "help: {help}");

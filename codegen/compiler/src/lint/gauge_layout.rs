@@ -103,7 +103,7 @@ pub(super) fn slip_of_one(facts: &Facts, found: &mut Found) {
     }
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
     let Some((best, first)) = tried.first() else { return };
-    if now < MUCH_BETTER * best {
+    if !best.is_finite() || now < MUCH_BETTER * best {
         return;
     }
     // Others do as well, or nearly: the slip may be in any of them.

@@ -4,6 +4,7 @@ mod rest;
 
 use super::kinematics::inverse_jacobian;
 use super::sensing::{PoseNoise, pose_noise, readings_per_pose};
+use crate::figure::AXES;
 use crate::ir::{Actuation, Hysteresis, Scalar, Supervision};
 use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::Model;
@@ -15,6 +16,8 @@ const CHANNELS: f64 = 6.0;
 const FEWEST_SAMPLES: f64 = 2.0;
 /// Times the noise (rms) that a bound must keep off: what noise alone does once in 10^15 samples.
 const NOISE_MARGIN: f64 = 8.0;
+/// Largest `supervisor.tracking_error` that a spec may declare.
+const LARGEST_SHARE: f64 = 10.0;
 /// Of `supervisor.stuck_motion` without the key: times the noise, and steps of the gauge's converter.
 const STUCK_MARGIN: f64 = 10.0;
 /// Fewest steps of the converter by which a sound gauge must have moved.
@@ -210,14 +213,12 @@ fn tracking(model: &Model, noise: Option<&PoseNoise>, findings: &mut Vec<Diagnos
         Some(noise) => (model.workspace.bounds(), noise.pose),
         None => ([model.actuator.stroke; 6], [model.sensor.noise; 6]),
     };
-    let mut least = 0.0;
-    for (full, noise) in full.iter().zip(&noise) {
-        let needed = NOISE_MARGIN * noise / full;
-        if needed > least {
-            least = needed;
-        }
-    }
-    if share < least {
+    let needed: [f64; 6] = core::array::from_fn(|axis| NOISE_MARGIN * noise[axis] / full[axis]);
+    let worst = (0..6).fold(0, |worst, axis| if needed[axis] > needed[worst] { axis } else { worst });
+    let least = needed[worst];
+    if share < least && least > LARGEST_SHARE {
+        findings.push(no_range(model, worst, full[worst], NOISE_MARGIN * noise[worst]));
+    } else if share < least {
         findings.push(finding(
             model,
             codes::SUPERVISOR_BOUND,
@@ -229,6 +230,39 @@ fn tracking(model: &Model, noise: Option<&PoseNoise>, findings: &mut Vec<Diagnos
         ));
     }
     full.map(|full| share * full)
+}
+
+/// An axis, or a leg, of which noise alone makes more than any share of its range that may be declared.
+fn no_range(model: &Model, axis: usize, full: f64, noise: f64) -> Diagnostic {
+    let share = model.supervisor.tracking_error;
+    if model.task_space.is_none() {
+        return Diagnostic::at(
+            &model.spans,
+            &["sensor.noise", "sensor"],
+            codes::SUPERVISOR_BOUND,
+            format!("the gauges' noise makes {:.4} um of a leg whose stroke is {:.4} um", noise * 1e6, full * 1e6),
+            format!("write noise = \"{:.4} nm\" or less", share * full / NOISE_MARGIN * 1e9 * 0.999),
+        );
+    }
+    let (table, item, unit) =
+        if axis < 3 { ("workspace.translation", axis, "um") } else { ("workspace.rotation", axis - 3, "urad") };
+    let message = format!(
+        "the gauges' noise makes {:.4} {unit} of {}, whose range is {:.4} {unit}: no share of that is above it",
+        noise * 1e6,
+        AXES[axis],
+        full * 1e6
+    );
+    let help = format!(
+        "write at least {:.4} {unit} there, so that a tracking error of {share} of the range is above the noise",
+        above(noise / share * 1e6)
+    );
+    Diagnostic::at(
+        &model.spans,
+        &[&format!("{table}[{item}]"), table, "workspace"],
+        codes::SUPERVISOR_BOUND,
+        message,
+        help,
+    )
 }
 
 /// Codes of a step, and ticks from one to the next: no faster than asked.

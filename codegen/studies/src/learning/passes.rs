@@ -1,5 +1,6 @@
 //! Passes over a machine, simulated or real, until learning is done.
 
+use std::cmp::Ordering;
 use std::fmt;
 use std::ops::ControlFlow;
 
@@ -10,6 +11,7 @@ use serde::Serialize;
 use specgen_runtime::pass::{Course, Player};
 use specgen_runtime::playback::{self, Knot, UNIT};
 
+use super::gain::{Judge, Score, Verdict};
 use super::motion::Motion;
 use super::plan::Plan;
 use super::table::knots;
@@ -23,7 +25,7 @@ const GAUGES: u32 = 0x3f00;
 const LEGS: u32 = 0x3f;
 /// Status bit of a correction that the limits held back.
 const CORRECTION_LIMITED: u32 = 1 << 20;
-/// An error above this part of the least one ends learning: it grows.
+/// An error above this part of the least one grows.
 const GROWS: f64 = 1.5;
 
 /// Why nothing is learned.
@@ -93,6 +95,26 @@ pub enum Learner<'a> {
     Device(&'a Plan),
 }
 
+impl Learner<'_> {
+    /// The correction of the next pass, of the one that was `played` and what was `seen`.
+    fn next(
+        self,
+        machine: &mut dyn Repeating,
+        motion: &Motion,
+        (played, seen): (&[Knot], &Seen),
+        spacing: u32,
+    ) -> Result<Vec<Knot>, LearnError> {
+        match self {
+            Self::Device(plan) => machine.next(plan, played, seen),
+            Self::Host(update) => {
+                let ticks = 0..motion.corrected as u32;
+                let correction: Vec<[f64; 6]> = ticks.map(|tick| playback::at(played, spacing, tick)).collect();
+                Ok(knots(&update.next(&correction, &seen.measured[..motion.corrected]), spacing))
+            }
+        }
+    }
+}
+
 /// A machine that can repeat a motion.
 pub trait Repeating {
     /// A pass of the motion under the correction of these knots, so many ticks apart.
@@ -107,6 +129,14 @@ pub trait Repeating {
     /// If the device does not learn with this plan.
     fn next(&mut self, plan: &Plan, played: &[Knot], seen: &Seen) -> Result<Vec<Knot>, LearnError> {
         plan.next(played, &seen.kept).ok_or(LearnError::Refused)
+    }
+
+    /// Learning is over, and this correction is kept: a machine that has another one in its memory gets this one.
+    ///
+    /// # Errors
+    /// If the machine does not take it.
+    fn keep(&mut self, _motion: &Motion, _knots: &[Knot], _spacing: u32) -> Result<(), LearnError> {
+        Ok(())
     }
 }
 
@@ -191,23 +221,51 @@ impl Pass {
     }
 }
 
+/// Why no more passes were made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ending {
+    /// All were made that were asked for.
+    AllPasses,
+    /// The last one was worse than the best one by more than the noise, or two one after the other were no better than it by more than that.
+    NoGain,
+    /// The error of the last one was half as large again as that of the best one, or more.
+    Growth,
+    /// Whoever watched them ended them.
+    Interruption,
+    /// The machine ended a pass.
+    Machine,
+}
+
 /// What came of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Learned {
     /// The first is without correction, or with the one that learning began with.
     pub passes: Vec<Pass>,
-    /// The pass with the least error.
+    /// The pass whose correction is kept: the last one that was better than those before it by more than the noise; 0 if none was.
     pub best: usize,
     /// Its knots.
     #[serde(skip)]
     pub knots: Vec<Knot>,
-    /// Whether learning ended because the error grew.
-    pub grew: bool,
+    /// What two passes under one correction differ by in [`Pass::measured_nm`], nm; none where no pass was to be learned from.
+    pub noise_nm: Option<f64>,
+    /// Why it ended.
+    pub ending: Ending,
 }
 
-/// Makes `count` passes beyond the first and learns from each; the best is kept, and an error that grows ends it. One pass before them
-/// is not counted: only after it is the hysteresis as in every repetition. `begin` is the
-/// correction of the first pass, none of no knots. A machine that ends a pass later than the first ends learning. `watch` hears of each pass and may end it.
+impl Learned {
+    /// Whether the error grew in the last pass.
+    #[must_use]
+    pub fn grew(&self) -> bool {
+        self.ending == Ending::Growth
+    }
+}
+
+/// Makes up to `count` passes beyond the first and learns from each. A correction is kept if its pass is better than the best one before it by
+/// more than the noise of both, and worse than the first neither in translation nor in angles. A pass that is worse by more than the noise ends
+/// learning, and so do two one after the other that gain nothing. Two passes before the first are not counted: only after one is the hysteresis
+/// as in every repetition, and the second shows what repetitions differ by. `begin` is the correction of these three, none of no knots. A
+/// machine that ends a pass later than the first ends learning. `watch` hears of each pass and may end it.
 ///
 /// # Errors
 /// If the machine does not make a pass, or not the motion.
@@ -221,36 +279,56 @@ pub fn learn(
     mut watch: impl FnMut(usize, &Pass) -> ControlFlow<()>,
 ) -> Result<Learned, LearnError> {
     let mut played: Vec<Knot> = begin.to_vec();
-    let mut learned = Learned { passes: Vec::new(), best: 0, knots: played.clone(), grew: false };
-    followed(machine.pass(motion, &played, spacing)?)?;
-    for number in 0..=count {
-        let seen = match machine.pass(motion, &played, spacing) {
-            // What was learned so far is worth keeping.
-            Err(LearnError::Ended) if number > 0 => break,
-            seen => followed(seen?)?,
-        };
-        let pass = Pass::of(&seen, motion);
-        let go_on = watch(number, &pass);
-        learned.passes.push(pass);
-        let least = learned.passes[learned.best].measured_nm;
-        if pass.measured_nm < least {
-            learned.best = number;
-            learned.knots.clone_from(&played);
-        }
-        // A NaN grows, too.
-        let kept = pass.measured_nm <= GROWS * least;
-        learned.grew = number > 0 && !kept;
-        if number == count || learned.grew || go_on.is_break() {
+    let mut equal = || followed(machine.pass(motion, begin, spacing)?);
+    equal()?;
+    let repeated = if count > 0 { Some(Score::of(&equal()?, motion)) } else { None };
+    let mut seen = equal()?;
+    let mut judge = repeated.map(|before| Judge::new(Score::of(&seen, motion), &before));
+    let mut learned = Learned {
+        passes: vec![Pass::of(&seen, motion)],
+        best: 0,
+        knots: played.clone(),
+        noise_nm: judge.as_ref().map(Judge::noise_nm),
+        ending: Ending::AllPasses,
+    };
+    let mut number = 0;
+    let mut go_on = watch(0, &learned.passes[0]);
+    while number < count {
+        if go_on.is_break() {
+            learned.ending = Ending::Interruption;
             break;
         }
-        played = match learner {
-            Learner::Device(plan) => machine.next(plan, &played, &seen)?,
-            Learner::Host(update) => {
-                let correction: Vec<[f64; 6]> =
-                    (0..motion.corrected as u32).map(|tick| playback::at(&played, spacing, tick)).collect();
-                knots(&update.next(&correction, &seen.measured[..motion.corrected]), spacing)
+        number += 1;
+        let made = learner.next(machine, motion, (&played, &seen), spacing);
+        let passed = made.and_then(|made| {
+            played = made;
+            followed(machine.pass(motion, &played, spacing)?)
+        });
+        seen = match passed {
+            // What was learned so far is worth keeping.
+            Err(LearnError::Ended) => {
+                learned.ending = Ending::Machine;
+                return Ok(learned);
             }
+            passed => passed?,
         };
+        let pass = Pass::of(&seen, motion);
+        let least = learned.passes[learned.best].measured_nm;
+        learned.passes.push(pass);
+        go_on = watch(number, &pass);
+        let found = judge.as_mut().map_or(Verdict::Stop, |judge| judge.judge(Score::of(&seen, motion)));
+        if found == Verdict::Keep {
+            (learned.best, learned.knots) = (number, played.clone());
+        } else if found == Verdict::Stop {
+            // A NaN grows, too.
+            let within =
+                matches!(pass.measured_nm.partial_cmp(&(GROWS * least)), Some(Ordering::Less | Ordering::Equal));
+            learned.ending = if within { Ending::NoGain } else { Ending::Growth };
+            break;
+        }
+    }
+    if machine.keep(motion, &learned.knots, spacing).is_err() {
+        learned.ending = Ending::Machine;
     }
     Ok(learned)
 }

@@ -149,7 +149,7 @@ impl Study<'_> {
         let learned =
             learn(&mut bench, motion, Learner::Host(update), &[], *spacing, *passes, |_, _| ControlFlow::Continue(()))?;
         let best = &learned.passes[learned.best];
-        Ok(Some(Learnt { error_nm: best.translation_nm, passes: learned.best as u32, grew: learned.grew }))
+        Ok(Some(Learnt { error_nm: best.translation_nm, passes: learned.best as u32, grew: learned.grew() }))
     }
 
     fn simulate(&self, member: &Member) -> Result<Outcome, RunError> {

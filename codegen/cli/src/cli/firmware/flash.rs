@@ -140,7 +140,13 @@ fn of_image(arguments: &Arguments, elf: &[u8], ui: &mut Ui) -> Result<Ready, Fai
     let checked = checks::check(elf, None, Rules { single: !part.double, whole_image: false })?;
     let size = size(elf)?;
     let limits = model::Target { mcu, budget: model::Budget::NONE };
-    let used = budget::Used { flash: size.flash(), ram: size.ram(), stack: checked.stack, ..budget::Used::default() };
+    let used = budget::Used {
+        flash: size.flash(),
+        ram: checked.stack.map(|stack| size.ram() + stack),
+        ram_least: size.ram(),
+        stack: checked.stack,
+        ..budget::Used::default()
+    };
     let mut failures: Vec<String> = checked.faults.iter().map(|fault| fault.text.clone()).collect();
     failures.extend(budget::over(&limits, &used));
     if size.identity.is_none() {

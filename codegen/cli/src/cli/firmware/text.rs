@@ -61,8 +61,12 @@ impl Made {
         let of = |budget: Option<u64>| budget.map_or(String::new(), |budget| format!(" of {}", group(budget)));
         let limits = &self.limits.budget;
         let _ = writeln!(out, "  flash         {}{} bytes", group(used.flash), of(limits.flash));
-        let _ =
-            writeln!(out, "  RAM           {}{} bytes, the stack of a tick included", group(used.ram), of(limits.ram));
+        let ram = match used.ram {
+            Some(ram) => format!("{}{} bytes, the stack of a tick included", group(ram), of(limits.ram)),
+            None if used.stack.is_none() => "not known: the stack of a tick has no bound".to_owned(),
+            None => "not measured: State and settings are known only in a run".to_owned(),
+        };
+        let _ = writeln!(out, "  RAM           {ram}");
         let bound = used
             .stack
             .map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes at most", group(bytes), of(limits.stack)));

@@ -53,8 +53,8 @@ pub struct Remote<'a, P> {
     pub operator: &'a mut Operator<P>,
     pub ui: &'a Ui,
     pub own: &'a Own,
-    /// The correction that its device made and has.
-    pub made: Option<Vec<Knot>>,
+    /// The correction that its device has in its memory, once that is known.
+    pub has: Option<Vec<Knot>>,
     /// Why it ended a pass.
     pub ended: Option<Ended>,
 }
@@ -90,10 +90,11 @@ impl<P: Port> Remote<'_, P> {
 impl<P: Port> Repeating for Remote<'_, P> {
     fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, LearnError> {
         let course = course(motion, spacing, self.own.number);
-        // What the device made stays there.
-        let sent = if self.made.as_deref() == Some(knots) { None } else { Some(knots) };
+        // What the device has stays there.
+        let sent = if self.has.as_deref() == Some(knots) { None } else { Some(knots) };
         match self.operator.pass(&self.own.start, course, sent, self.ui) {
             Ok(passed) => {
+                self.has = Some(knots.to_vec());
                 let measured = held(&passed.errors, spacing, motion.corrected);
                 Ok(Seen { real: measured.clone(), measured, kept: passed.errors, status: passed.status })
             }
@@ -111,7 +112,7 @@ impl<P: Port> Repeating for Remote<'_, P> {
             self.operator.plan(seen.kept.len(), &plan.rows).and_then(|()| self.operator.learn(plan.settings, self.ui));
         match made {
             Ok(made) if made == expected => {
-                self.made = Some(made.clone());
+                self.has = Some(made.clone());
                 Ok(made)
             }
             Ok(_) => Err(LearnError::Refused),
@@ -120,5 +121,16 @@ impl<P: Port> Repeating for Remote<'_, P> {
                 Err(LearnError::Ended)
             }
         }
+    }
+
+    /// What is not kept does not stay in the device, either.
+    fn keep(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<(), LearnError> {
+        if self.has.as_deref() == Some(knots) {
+            return Ok(());
+        }
+        self.operator.correct(knots, course(motion, spacing, self.own.number)).map_err(|ended| {
+            self.ended = Some(ended);
+            LearnError::Ended
+        })
     }
 }

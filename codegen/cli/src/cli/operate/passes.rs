@@ -110,6 +110,13 @@ impl<P: Port> Operator<P> {
         self.session.pass(PassAction::Look).map(|status| status.capacity).map_err(refused)
     }
 
+    /// Sends the correction of passes of a course, zeros behind its knots.
+    pub fn correct(&mut self, knots: &[Knot], course: Course) -> Result<(), Ended> {
+        let mut whole = knots.to_vec();
+        whole.resize(course.knots() as usize, [0; 6]);
+        self.session.put_knots(0, &whole).map_err(refused)
+    }
+
     /// Goes to `start` (the controller's coordinates, m and rad), rests there, and makes a pass under the correction of these knots, or of those that
     /// the device has.
     pub fn pass(&mut self, start: &[f64; 6], course: Course, knots: Option<&[Knot]>, ui: &Ui) -> Result<Passed, Ended> {
@@ -129,9 +136,7 @@ impl<P: Port> Operator<P> {
             self.look()?;
         }
         if let Some(knots) = knots {
-            let mut whole = knots.to_vec();
-            whole.resize(course.knots() as usize, [0; 6]);
-            self.session.put_knots(0, &whole).map_err(refused)?;
+            self.correct(knots, course)?;
         }
         let Course { spacing, before, ticks, trajectory } = course;
         self.ordered = true;

@@ -5,6 +5,9 @@ use super::{Leaves, Stopping};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Model, TrajectoryKind};
 
+/// A stop of which less than this is within begins at the end, or beyond it.
+const LEAST_SHARE: f64 = 1e-6;
+
 /// A stop that its axis has no room for. An axis without any room at all is kept still, and needs none.
 pub(super) fn too_long(
     model: &Model,
@@ -84,6 +87,9 @@ pub(super) fn leaves(model: &Model, index: usize, name: &str, kind: &TrajectoryK
             ("period", format!("a period of at least {} ms stops within", up(period / leaves.share * 1e3)))
         }
     };
+    // On the way it is outside before it stops: no time helps.
+    let fix =
+        if leaves.share > LEAST_SHARE { fix } else { "the path itself goes that far: make it smaller".to_owned() };
     let message =
         format!("trajectory \"{name}\": another command on the way would bring it to rest with {}", leaves.end);
     let help = format!("{fix}; or raise control.setpoint.stop_acceleration and stop_jerk");
