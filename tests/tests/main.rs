@@ -55,3 +55,4 @@ mod support;
 mod tables_from_identify;
 mod triggers;
 mod unsafe_code;
+mod user_files;

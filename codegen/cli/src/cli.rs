@@ -20,6 +20,7 @@ mod identify;
 mod learn;
 mod line;
 mod lsp;
+mod named;
 mod new;
 mod operate;
 mod pil;
@@ -38,21 +39,21 @@ mod ui;
 
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::Receiver;
 
 use clap::error::{ContextKind, ErrorKind};
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use serde::Serialize;
 use serde_json::Value;
 
+pub use named::{Role, role};
 use specgen_compiler::compile::{Compiled, Refused};
 use specgen_compiler::ir::Ir;
 use specgen_language::diagnostic::{Diagnostic, Severity};
-use specgen_language::interrupt;
 use specgen_language::spec::nearest;
+use specgen_language::{files, interrupt};
 use specgen_toolchain as target;
 pub use ui::Said;
 use ui::{Failure, Outcome, Ui};
@@ -159,7 +160,7 @@ enum Command {
     #[command(after_help = examples::DUMP_IR)]
     DumpIr {
         /// The spec file.
-        spec: PathBuf,
+        spec: named::InputFile,
     },
     /// Show how much of what was built is kept, or remove it.
     Cache(cache::Arguments),
@@ -170,14 +171,16 @@ enum Command {
 /// The command line as clap sees it: commands, options and their help.
 #[must_use]
 pub fn command() -> clap::Command {
-    Cli::command()
+    named::with_hints(Cli::command())
 }
 
 /// Runs the command that the process was started with.
 #[must_use]
 pub fn run() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
+    // A file that grows beyond the limit is an error to report, not the end of the process.
+    specgen_rt::signals::ignore_file_size();
+    let (cli, matches) = match parsed(std::env::args_os()) {
+        Ok(parsed) => parsed,
         Err(error) => return refuse_arguments(error),
     };
     let mut ui = Ui::new(cli.common.json);
@@ -185,7 +188,7 @@ pub fn run() -> ExitCode {
     if cli.common.no_cache {
         target::cache::switch_off();
     }
-    let done = perform(&cli, &mut ui);
+    let done = perform(&cli, &matches, &mut ui);
     if done.is_err() {
         interrupt::settle();
     }
@@ -214,11 +217,13 @@ pub fn call(
         interrupt::point();
     };
     let mut ui = Ui::called(said, orders);
-    let done = match Cli::try_parse_from(std::iter::once("specgen".into()).chain(arguments)) {
+    let done = match parsed(std::iter::once("specgen".into()).chain(arguments)) {
         // What it has not shown when it unwinds is not looked at.
-        Ok(cli) => catch_unwind(AssertUnwindSafe(|| perform(&cli, &mut ui))).unwrap_or_else(|cause| {
-            if cause.is::<interrupt::Ended>() { Err(Failure::ended_early()) } else { resume_unwind(cause) }
-        }),
+        Ok((cli, matches)) => {
+            catch_unwind(AssertUnwindSafe(|| perform(&cli, &matches, &mut ui))).unwrap_or_else(|cause| {
+                if cause.is::<interrupt::Ended>() { Err(Failure::ended_early()) } else { resume_unwind(cause) }
+            })
+        }
         Err(error) => {
             let text = error.render().to_string();
             Err(Failure::Usage(text.trim().trim_start_matches("error: ").to_owned()))
@@ -230,8 +235,18 @@ pub fn call(
     ui.taken()
 }
 
+/// The arguments, as values and by their names.
+fn parsed(arguments: impl IntoIterator<Item = OsString>) -> Result<(Cli, ArgMatches), clap::Error> {
+    let mut command = command();
+    let matches = command.try_get_matches_from_mut(arguments)?;
+    let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
+    Ok((cli, matches))
+}
+
 /// What was asked for.
-fn perform(cli: &Cli, ui: &mut Ui) -> Result<(), Failure> {
+fn perform(cli: &Cli, matches: &ArgMatches, ui: &mut Ui) -> Result<(), Failure> {
+    files::begin();
+    named::check(matches)?;
     match &cli.command {
         None => match misspelt(cli.build.spec.as_deref()) {
             Some(failure) => Err(failure),
@@ -295,7 +310,13 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         let message = text.trim().trim_start_matches("error: ").to_owned();
         return ExitCode::from(Ui::new(true).failed(&Failure::Usage(message)));
     }
-    error.exit()
+    if error.use_stderr() {
+        error.exit()
+    }
+    // Help and version are results: that they are whole is known.
+    let ui = Ui::new(false);
+    ui.styled(&error.render());
+    ExitCode::from(ui.not_all_out().unwrap_or(0))
 }
 
 /// `specgen chek`: a spec that is not there, under the name of a command or nearly so.

@@ -11,7 +11,7 @@ pub use specgen_compiler::{
     compile, emit, ir, lint, lower, precision, reach, requirements, settings, stability, workspace,
 };
 pub use specgen_identify::{self as identify, everett, waveform};
-pub use specgen_language::{diagnostic, interrupt, lock, model, spec};
+pub use specgen_language::{diagnostic, files, interrupt, lock, model, shell, spec};
 pub use specgen_operate::{self as operate, doctor, pil, served};
 pub use specgen_report::{self as report, plot};
 pub use specgen_studies::{lead, learning, machine, paper, reproduce, robust, tuning, verify};

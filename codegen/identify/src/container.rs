@@ -4,6 +4,7 @@
 //! left out. Numbers are written so that they read back to the bit.
 
 use std::fmt::Write as _;
+use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -39,13 +40,13 @@ impl Kind {
         kinds.into_iter().find(|(magic, _)| first.starts_with(magic)).map(|(_, kind)| kind)
     }
 
-    /// The columns of the file at `path`, `bytes` long, as lines.
+    /// The columns of `file`, which lies at `path` and is `bytes` long, as lines.
     ///
     /// # Errors
     /// Why there are none, in words that follow the name of the file.
-    pub(crate) fn open(self, path: &Path, bytes: u64) -> Result<Lines, String> {
+    pub(crate) fn open(self, file: File, path: &Path, bytes: u64) -> Result<Lines, String> {
         let columns = match self {
-            Self::Mat => of_mat(path),
+            Self::Mat => of_mat(file),
             Self::Hdf5 => of_hdf5(path),
             Self::Tdms => of_tdms(path, bytes),
         };
@@ -59,8 +60,7 @@ impl Kind {
     }
 }
 
-fn of_mat(path: &Path) -> Result<Columns, String> {
-    let file = std::fs::File::open(path).map_err(|error| error.to_string())?;
+fn of_mat(file: File) -> Result<Columns, String> {
     let file = MatFile::parse(io::BufReader::new(file)).map_err(|error| error.to_string())?;
     Ok(file
         .arrays()

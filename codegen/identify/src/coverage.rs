@@ -13,6 +13,7 @@ use super::statistics::{extent, micrometres};
 use crate::everett::EverettTable;
 use specgen_language::diagnostic::codes;
 use specgen_language::model::MAX_GRID;
+use specgen_language::shell;
 
 /// The record may exceed the declared range by this share of it (amplifier overshoot, ADC noise).
 const BEYOND: f64 = 0.02;
@@ -96,9 +97,11 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
 /// The command that writes a drive which identifies the plane.
 pub(crate) fn such_a_drive(plane: &Plane) -> String {
     let ([low, high], grid) = (plane.range, plane.grid);
-    format!(
-        "`specgen forc --drive-only --drive {low}:{high} --grid {grid} -o drive.csv` writes such a drive for a generator"
-    )
+    let line = shell::line("specgen forc --drive-only --drive")
+        .word(&format!("{low}:{high}"))
+        .words(&format!("--grid {grid} -o"))
+        .path(shell::free("drive", ".csv"));
+    format!("`{line}` writes such a drive for a generator")
 }
 
 /// Time of the first sample whose drive fits, s.

@@ -8,9 +8,8 @@ use super::columns::foreign;
 use super::container::{Kind, Lines};
 use super::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
-
-/// Larger files whose text is kept, tables and what a spec names, are refused before they are read.
-pub const MAX_FILE_BYTES: u64 = 256 << 20;
+pub use specgen_language::files::MAX_BYTES as MAX_FILE_BYTES;
+use specgen_language::files::{self, Unread};
 
 /// The text of a data file, record or table, without a byte order mark.
 ///
@@ -23,19 +22,20 @@ pub fn read_file(path: &Path, shown_as: &str) -> Result<String, Vec<Diagnostic>>
 
 /// The text of the file without a byte order mark, or `None` after the reason was reported.
 fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
-    let bytes = match read_limited(path) {
+    findings.lies_at(path);
+    let bytes = match files::open_file(path).and_then(|file| files::content(file, MAX_FILE_BYTES)) {
         Ok(bytes) => bytes,
-        Err(e) => {
-            unreadable(&e, findings);
+        Err(Unread::Large(limit)) => {
+            let message = format!("is larger than {} MiB", limit >> 20);
+            let help = "name the table that `specgen identify RECORD -o table.csv` makes of a record of any size";
+            findings.add(codes::RECORD_TOO_LARGE, None, message, help);
+            return None;
+        }
+        Err(unread) => {
+            unreadable(&unread, findings);
             return None;
         }
     };
-    if bytes.len() as u64 > MAX_FILE_BYTES {
-        let message = format!("is larger than {} MiB", MAX_FILE_BYTES >> 20);
-        let help = "name the table that `specgen identify RECORD -o table.csv` makes of a record of any size";
-        findings.add(codes::RECORD_TOO_LARGE, None, message, help);
-        return None;
-    }
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
     if foreign::report(bytes, findings) {
         return None;
@@ -51,33 +51,20 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
     Some(String::from_utf8_lossy(bytes).into_owned())
 }
 
-/// At most one byte more than the limit, so that a huge file or a device costs neither time nor memory.
-fn read_limited(path: &Path) -> std::io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    regular(path)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
-    Ok(bytes)
-}
-
-fn regular(path: &Path) -> std::io::Result<File> {
-    let file = File::open(path)?;
-    if !file.metadata()?.is_file() {
-        return Err(std::io::Error::other("it is not a regular file"));
-    }
-    Ok(file)
-}
-
 /// A data file to read lines from, or `None` after the reason was reported. One of MATLAB, HDF5 or TDMS is as large as a text that is
 /// kept at most; another is read as it comes.
 pub(crate) fn open_file(path: &Path, findings: &mut Findings) -> Option<Source> {
-    let (mut file, mut first) = (regular(path).map_err(|e| unreadable(&e, findings)).ok()?, Vec::new());
+    findings.lies_at(path);
+    let (mut file, mut first) =
+        (files::open_file(path).map_err(|unread| unreadable(&unread, findings)).ok()?, Vec::new());
     let begun = (&mut file).take(Kind::TELLING as u64).read_to_end(&mut first).and_then(|_| file.rewind());
-    let bytes = begun.and_then(|()| file.metadata()).map_err(|e| unreadable(&e, findings)).ok()?.len();
+    let bytes = begun.and_then(|()| file.metadata()).map_err(|error| unreadable(&error.into(), findings)).ok()?.len();
     let Some(kind) = Kind::of(&first) else { return Some(Source::File(file)) };
     if bytes > MAX_FILE_BYTES {
         foreign::report_as(&first, &format!("and larger than {} MiB", MAX_FILE_BYTES >> 20), findings);
         return None;
     }
-    kind.open(path, bytes)
+    kind.open(file, path, bytes)
         .map(Source::Container)
         .map_err(|why| foreign::report_as(&first, &format!("and {why}"), findings))
         .ok()
@@ -101,6 +88,6 @@ impl Read for Source {
     }
 }
 
-fn unreadable(e: &std::io::Error, findings: &mut Findings) {
-    findings.add(codes::RECORD_IO, None, format!("cannot be read: {e}"), "name an existing CSV file");
+fn unreadable(unread: &Unread, findings: &mut Findings) {
+    findings.add(codes::RECORD_IO, None, format!("cannot be read: {unread}"), "name an existing CSV file");
 }

@@ -1,6 +1,7 @@
 //! Collects findings about one data file, so that one run reports all of them without drowning the reader.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use specgen_language::diagnostic::{Code, Diagnostic, Severity};
 
@@ -11,6 +12,8 @@ const SHOWN_PER_CODE: usize = 5;
 #[derive(Debug)]
 pub(crate) struct Findings {
     path: String,
+    /// Where it lies, as a command line names it.
+    place: String,
     found: Vec<Diagnostic>,
     count: BTreeMap<&'static str, (Code, usize)>,
 }
@@ -18,12 +21,22 @@ pub(crate) struct Findings {
 impl Findings {
     /// An empty collection for the file that the user knows as `path`.
     pub(crate) fn new(path: &str) -> Self {
-        Self { path: path.to_owned(), found: Vec::new(), count: BTreeMap::new() }
+        Self { path: path.to_owned(), place: path.to_owned(), found: Vec::new(), count: BTreeMap::new() }
     }
 
     /// The file as the user knows it.
     pub(crate) fn path(&self) -> &str {
         &self.path
+    }
+
+    /// The file is opened at `path`: one that a spec names is shown relative to the spec, but lies beside it.
+    pub(crate) fn lies_at(&mut self, path: &Path) {
+        self.place = path.strip_prefix(".").unwrap_or(path).display().to_string();
+    }
+
+    /// Where the file lies, as a command line names it.
+    pub(crate) fn place(&self) -> &str {
+        &self.place
     }
 
     /// Adds a finding about `line`, or about the whole file, as bad as its code.
@@ -52,7 +65,7 @@ impl Findings {
 
     /// All findings in the order found, followed by one line for each kind that was cut short.
     pub(crate) fn into_diagnostics(self) -> Vec<Diagnostic> {
-        let Self { path, mut found, count } = self;
+        let Self { path, mut found, count, .. } = self;
         for (code, n) in count.into_values().filter(|(_, n)| *n > SHOWN_PER_CODE) {
             let message = format!("and {} more lines like this ({})", n - SHOWN_PER_CODE, code.id);
             found.push(Diagnostic::in_file(&path, None, code, message, "fix the ones shown and run again"));

@@ -4,14 +4,17 @@
 //! TOML → spec (tables, keys, units, places) → model (SI, checked)
 //!          └─ diagnostic: findings, each with its place
 //! ```
-//! The one crate that reads TOML. [`interrupt`] and [`lock`] are here because everything that writes needs them.
+//! The one crate that reads TOML. [`files`], [`interrupt`] and [`lock`] are here because everything that reads or writes needs
+//! them, [`shell`] because messages of every crate print lines for one.
 
 pub mod diagnostic;
+pub mod files;
 pub mod interrupt;
 mod keys;
 pub mod lock;
 pub mod model;
 pub mod quantity;
+pub mod shell;
 mod source;
 pub mod spec;
 

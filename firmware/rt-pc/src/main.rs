@@ -16,6 +16,7 @@ mod devices;
 mod handover;
 mod operator;
 mod options;
+mod outputs;
 mod passes;
 mod record;
 mod samples;
@@ -62,12 +63,11 @@ enum Failure {
 }
 
 fn main() -> ExitCode {
+    // A record that outgrows the limit brings the machine down in order.
+    specgen_rt::signals::ignore_file_size();
     let asked = options::parse(std::env::args_os()).map_err(Failure::Usage);
     let done = asked.and_then(|asked| match asked {
-        Asked::Text(text) => {
-            print!("{text}");
-            Ok(())
-        }
+        Asked::Text(text) => outputs::print(&text).map_err(Failure::Environment),
         Asked::Run(options) => open(&options),
     });
     let (code, text) = match done {
@@ -136,6 +136,7 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
     let named = |path: &std::path::Path, error: std::io::Error| environment(format!("{}: {error}", path.display()));
     let link = options.link.as_deref().map(|path| Link::listen(path).map_err(|error| named(path, error)));
     let link = link.transpose()?;
+    outputs::check(options.record.as_deref(), options.capture.as_deref()).map_err(usage)?;
     let record = options.record.as_deref().map(|path| {
         let writer = record::Writer::create(path, &config).map_err(environment)?;
         Ok::<_, Failure>((path.to_owned(), writer))
@@ -200,8 +201,10 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
         period,
         missing_rights: missing.iter().map(ToString::to_string).collect(),
     };
-    print!("{}", if options.json { summary.to_json() } else { summary.to_text() });
-    summary.failure().map_or(Ok(()), |failure| Err(Failure::Run(failure)))
+    let printed = outputs::print(&if options.json { summary.to_json() } else { summary.to_text() });
+    // What became of the machine counts more than who reads it.
+    summary.failure().map_or(Ok(()), |failure| Err(Failure::Run(failure)))?;
+    printed.map_err(environment)
 }
 
 /// Rights of the whole process: what is missing, and what keeps processors awake. That one is a courtesy, not a need.

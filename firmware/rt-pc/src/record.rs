@@ -15,6 +15,7 @@ use rtrb::Consumer;
 use specgen_runtime::record::{write_block, write_header};
 
 use crate::handover::{Row, SNAPSHOT_EVERY, Snapshot};
+use crate::outputs;
 
 /// One block that is filled, and one that is written.
 const BLOCKS: usize = 2;
@@ -64,7 +65,7 @@ impl Writer {
     /// In words, if it cannot be written.
     pub fn create(path: &Path, config: &Config) -> Result<Self, String> {
         let named = |error: io::Error| format!("{}: {error}", path.display());
-        let mut file = BufWriter::with_capacity(1 << 16, File::create(path).map_err(named)?);
+        let mut file = BufWriter::with_capacity(1 << 16, outputs::create(path).map_err(named)?);
         // At once, so that a disk without room is known before anything moves.
         begin(&mut file).and_then(|()| file.flush()).map_err(named)?;
         let mut recorder = recorder(BLOCKS, BLOCK)?;

@@ -7,8 +7,9 @@
 //! histogram    times in fixed memory
 //! allocation   an allocator that notices when a real-time thread uses it
 //! exchange     shared memory between a controller and the machine that it moves
+//! signals      those that are no reason to end
 //! ```
-//! Linux alone. The calls of the system are in `clock`, `scheduling`, `exchange` and `allocation`, the only modules with unsafe code.
+//! Linux alone. The calls of the system are in `clock`, `scheduling`, `exchange`, `allocation` and `signals`, the only modules with unsafe code.
 
 pub mod account;
 pub mod allocation;
@@ -16,3 +17,4 @@ pub mod clock;
 pub mod exchange;
 pub mod histogram;
 pub mod scheduling;
+pub mod signals;

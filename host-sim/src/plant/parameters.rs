@@ -145,30 +145,19 @@ impl LegParameters {
         }
     }
 
-    /// The shipped leg of that name, or what a file of it says, see [`LegParameters::load`].
-    ///
-    /// # Errors
-    /// As [`LegParameters::load`].
-    pub fn named(name: &Path) -> Result<Self, ParameterError> {
-        let shipped = SHIPPED.iter().find(|(shipped, _)| name.as_os_str() == *shipped);
-        shipped.map_or_else(|| Self::load(name), |(name, text)| Self::from_json(text, name))
-    }
-
-    /// Makes its hysteresis `factor` (> 0) times as wide, V for V.
-    pub fn widen(&mut self, factor: f64) {
-        self.play_thresholds_v.iter_mut().for_each(|threshold| *threshold *= factor);
-        if let Some(bouc_wen) = &mut self.bouc_wen {
-            bouc_wen.widen(factor);
-        }
-    }
-
-    /// Reads and checks a parameter file.
+    /// The shipped leg of that name, or what a file of it says, whose text `read` gives.
     ///
     /// # Errors
     /// If the file cannot be read, is not JSON of this shape, or a value is out of range: all findings, each with its field.
-    pub fn load(path: &Path) -> Result<Self, ParameterError> {
-        let file = path.display().to_string();
-        match std::fs::read_to_string(path) {
+    pub fn named<E: fmt::Display>(
+        name: &Path,
+        read: impl FnOnce(&Path) -> Result<String, E>,
+    ) -> Result<Self, ParameterError> {
+        if let Some((name, text)) = SHIPPED.iter().find(|(shipped, _)| name.as_os_str() == *shipped) {
+            return Self::from_json(text, name);
+        }
+        let file = name.display().to_string();
+        match read(name) {
             Ok(text) => Self::from_json(&text, &file),
             Err(error) => {
                 let finding = format!(
@@ -179,10 +168,18 @@ impl LegParameters {
         }
     }
 
+    /// Makes its hysteresis `factor` (> 0) times as wide, V for V.
+    pub fn widen(&mut self, factor: f64) {
+        self.play_thresholds_v.iter_mut().for_each(|threshold| *threshold *= factor);
+        if let Some(bouc_wen) = &mut self.bouc_wen {
+            bouc_wen.widen(factor);
+        }
+    }
+
     /// Parses and checks the text of a parameter file; `file` names it in errors.
     ///
     /// # Errors
-    /// As [`LegParameters::load`].
+    /// If it is not JSON of this shape, or a value is out of range: all findings, each with its field.
     pub fn from_json(text: &str, file: &str) -> Result<Self, ParameterError> {
         checked(text, file, "reference-leg.json", Self::findings)
     }
@@ -284,7 +281,10 @@ mod tests {
     fn a_leg_of_bouc_wen_has_no_plays_and_never_shortens_while_its_voltage_rises() {
         let shipped = SHIPPED[1].1;
         assert!(LegParameters::bouc_wen().bouc_wen.is_some());
-        assert_eq!(LegParameters::named(Path::new("bouc-wen")).unwrap(), LegParameters::bouc_wen());
+        assert_eq!(
+            LegParameters::named(Path::new("bouc-wen"), std::fs::read_to_string).unwrap(),
+            LegParameters::bouc_wen()
+        );
         let refused = |from: &str, to: &str| {
             let text = shipped.replacen(from, to, 1);
             assert_ne!(text, shipped, "{from}");
@@ -304,7 +304,7 @@ mod tests {
             eprintln!("skipped: ../shared is not beside the repository");
             return;
         }
-        let mut study = LegParameters::load(&path).unwrap();
+        let mut study = LegParameters::named(&path, std::fs::read_to_string).unwrap();
         study.name = "reference-leg".to_owned();
         assert_eq!(study, LegParameters::reference());
     }
@@ -335,7 +335,7 @@ mod tests {
         assert!(unknown.contains("unknown field `capa`") && unknown.contains("line 7"), "{unknown}");
         assert!(refused("\"zeta\": 0.1", "\"zeta\": \"0.1\"").contains("invalid type: string"));
         assert!(refused("\"zeta\": 0.1", "\"zeta\": NaN").contains("line 12"));
-        let absent = LegParameters::load(Path::new("no/such.json")).unwrap_err().to_string();
+        let absent = LegParameters::named(Path::new("no/such.json"), std::fs::read_to_string).unwrap_err().to_string();
         assert!(absent.starts_with("no/such.json: not a usable plant\n  cannot be read"), "{absent}");
     }
 }

@@ -9,11 +9,13 @@ use serde::Serialize;
 
 use super::check::describe;
 use super::firmware::{self, late};
+use super::named::{InputFile, OutputFolder};
 use super::spec;
 use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::workspace;
 use specgen_language::model;
+use specgen_language::shell;
 use specgen_studies::verdict::Verdict;
 use specgen_studies::verify::{self, Inspection, Measurement};
 use specgen_toolchain as target;
@@ -24,10 +26,10 @@ use specgen_toolchain::budget::{self, group};
 pub struct Arguments {
     /// The spec file.
     #[arg(required = true)]
-    pub spec: Option<PathBuf>,
+    pub spec: Option<InputFile>,
     /// Output folder; `<name>-controller` if not given. Must be new, empty, or an unchanged earlier output.
     #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
+    output: Option<OutputFolder>,
     /// Write the source only.
     #[arg(long)]
     no_build: bool,
@@ -96,7 +98,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     } else {
         ui.findings_in_brief(&compiled.source, &compiled.findings);
     }
-    let output = arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)));
+    let output = arguments
+        .output
+        .as_deref()
+        .map_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)), Path::to_owned);
     let with_board = || workspace::files_with(&compiled.ir, &specgen_compiler::emit::emit(&compiled.ir), &["board"]);
     let files = if arguments.board { with_board() } else { compiled.files.clone() };
     let _hold = workspace::write(&output, &files)?;
@@ -311,17 +316,15 @@ impl Summary {
 
 /// Commands that come next.
 fn next(spec: &Path, output: &Path, summary: &Summary, mcu: model::Mcu) -> Vec<String> {
-    let (spec, output) = (spec.display(), output.display());
     if !summary.over_budget.is_empty() {
-        return vec![format!("specgen size {spec}")];
+        return vec![shell::on("specgen size", spec, "")];
     }
     if summary.measurement.is_none() {
-        let set_up = if summary.host_library.is_some() { " --setup" } else { "" };
-        return vec![format!("specgen {spec} -o {output}{set_up}")];
+        let set_up = if summary.host_library.is_some() { "--setup" } else { "" };
+        return vec![shell::line("specgen").path(spec).words("-o").path(output).words(set_up).into()];
     }
-    let mut next = vec![format!("specgen sim {spec}"), format!("specgen report {spec}")];
-    next.extend(mcu.part().chip.is_some().then(|| format!("specgen flash {spec}")));
-    next
+    let flash = mcu.part().chip.is_some().then_some("specgen flash");
+    ["specgen sim", "specgen report"].into_iter().chain(flash).map(|command| shell::on(command, spec, "")).collect()
 }
 
 /// What exceeds the spec's `[target.budget]` or the part, and what the image must not do, in words.

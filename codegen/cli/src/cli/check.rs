@@ -1,11 +1,11 @@
 //! `specgen check`: every finding about a spec, nothing written.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
 
+use super::named::InputFile;
 use super::spec;
 use super::ui::{Failure, Outcome, Ui};
 use crate::{lint, precision, reach, stability};
@@ -18,6 +18,7 @@ use specgen_compiler::reach::Reach;
 use specgen_compiler::stability::Margins;
 use specgen_compiler::stability::platform::Design;
 use specgen_identify::Report;
+use specgen_language::shell;
 use specgen_studies::lead::{self, LeadOf};
 use specgen_studies::verdict::Verdict;
 
@@ -26,7 +27,7 @@ use specgen_studies::verdict::Verdict;
 #[command(after_help = super::examples::CHECK)]
 pub struct Arguments {
     /// The spec file.
-    spec: PathBuf,
+    spec: InputFile,
     /// Everything that was found, below the verdict.
     #[arg(long)]
     details: bool,
@@ -81,9 +82,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         commanded: precision.commanded.ratio(),
         measured: precision.measured.map(|figures| figures.ratio()),
     };
-    let shown = arguments.spec.display();
     let mut verdict = Verdict::of(&compiled, "time, memory, bits: the next command measures them");
-    verdict.next = vec![format!("specgen {shown} -o DIR"), format!("specgen sim {shown}")];
+    let spec = &arguments.spec;
+    verdict.next = vec![shell::on("specgen", spec, "-o DIR"), shell::on("specgen sim", spec, "")];
     ui.result(&Checked {
         name: &compiled.ir.name,
         digest: &compiled.ir.digest,

@@ -1,12 +1,12 @@
 //! `specgen doctor`: whether this computer can run a controller in real time, and what to change.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
 use specgen_rt::histogram::{Histogram, time_text};
 
+use super::named::InputFile;
 use super::plot::Plot;
 use super::sim::environment;
 use super::spec;
@@ -23,7 +23,7 @@ const PERIOD: u64 = 100_000;
 #[command(after_help = super::examples::DOCTOR)]
 pub struct Arguments {
     /// A spec, whose period the computer is judged by; 100 µs without one.
-    spec: Option<PathBuf>,
+    spec: Option<InputFile>,
     /// How long wake-ups are measured, s.
     #[arg(long, value_name = "S", default_value_t = 3.0, value_parser = seconds, allow_negative_numbers = true)]
     seconds: f64,

@@ -1,8 +1,7 @@
 //! `specgen dynamics`: M, C ḣ, G, J and leg forces of a platform at given states, by the model that its controller uses.
 
 use std::f64::consts::FRAC_PI_4;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 use host_sim::controller::{Controller, Dynamics};
@@ -11,13 +10,16 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use specgen_runtime::Motion;
 
+use super::file::unread_file;
 use super::file::write_file;
+use super::named::{InputFile, OutputFile};
 use super::spec;
 use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::{Compiled, Refused};
 use specgen_compiler::lower;
 use specgen_compiler::workspace;
 use specgen_identify::states;
+use specgen_language::files;
 use specgen_language::interrupt::Scratch;
 use specgen_language::model::Model;
 use specgen_toolchain as target;
@@ -32,11 +34,11 @@ const LARGEST: u64 = 64 << 20;
 #[command(after_help = super::examples::DYNAMICS)]
 pub struct Arguments {
     /// The spec file.
-    spec: PathBuf,
+    spec: InputFile,
     /// States: JSON (a list, or an object with a list `vectors`, of objects with `h`, `hd`, `hdd`), or CSV with a line of
     /// names and 18 columns (pose, rate, acceleration). m, rad, s.
     #[arg(long, value_name = "FILE")]
-    states: PathBuf,
+    states: InputFile,
     /// Poses are from rest; without it their z counts from the base frame.
     #[arg(long)]
     from_rest: bool,
@@ -45,7 +47,7 @@ pub struct Arguments {
     generated: bool,
     /// Write the result (JSON) here instead of printing it.
     #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    output: Option<OutputFile>,
 }
 
 /// A state as given, with its name.
@@ -189,11 +191,7 @@ fn vector(state: &State, result: &Dynamics, rest_lengths: &[f64; 6]) -> Value {
 fn read_states(path: &Path) -> Result<Vec<State>, Failure> {
     let shown = path.display();
     let refuse = |text: String| Failure::Gate(format!("{shown}: {text}"));
-    let size = fs::metadata(path).map_err(|error| refuse(format!("cannot be read: {error}")))?.len();
-    if size > LARGEST {
-        return Err(refuse(format!("{size} bytes; at most {LARGEST} are read")));
-    }
-    let text = fs::read_to_string(path).map_err(|error| refuse(format!("cannot be read: {error}")))?;
+    let text = files::text_of(path, LARGEST).map_err(|unread| unread_file(path, &unread))?;
     let states = if text.trim_start().starts_with(['{', '[']) {
         from_json(&text).map_err(refuse)?
     } else {

@@ -5,7 +5,6 @@ mod fmu;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use std::alloc::Layout;
@@ -18,6 +17,7 @@ use specgen_runtime::supervisor::{self, Request};
 use specgen_toolchain::host::build_loadable;
 
 use super::file::{claim, write_folder};
+use super::named::{InputFile, OutputFolder};
 use super::sim::environment;
 use super::spec;
 use super::ui::{Failure, Outcome, Ui};
@@ -72,10 +72,10 @@ enum Kind {
 #[derive(Args, Debug)]
 struct Folder {
     /// The spec file.
-    spec: PathBuf,
+    spec: InputFile,
     /// Folder for the library and what uses it.
     #[arg(short, long, value_name = "DIR")]
-    output: PathBuf,
+    output: OutputFolder,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {

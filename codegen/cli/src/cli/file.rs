@@ -8,18 +8,56 @@ use tempfile::NamedTempFile;
 
 use super::ui::Failure;
 use crate::{lock, workspace};
+use specgen_language::files::{self, Unread, Unwritten, Way};
 use specgen_language::interrupt::{self, Claimed, Guard};
 
+/// The text of a file that is named to a command.
+pub fn read_text(path: &Path) -> Result<String, Failure> {
+    files::text(path).map_err(|unread| unread_file(path, &unread))
+}
+
+/// Refuses a file that cannot be read, before the minutes until it is.
+pub fn check_input(path: &Path) -> Result<(), Failure> {
+    files::look(path).map_err(|unread| unread_file(path, &unread))
+}
+
+/// Says which file could not be read. Its exit code is that of a spec or record which is refused, as it may be named in one.
+pub fn unread_file(path: &Path, unread: &Unread) -> Failure {
+    Failure::Gate(format!("`{}` cannot be read: {unread}; {}", path.display(), unread.help()))
+}
+
 /// Writes `path` so that a failure leaves no half file: beside it, then renamed. What is not a regular file, such as a
-/// device or a pipe, is written to and stays what it is; a link stays a link.
+/// device or a pipe, is written to and stays what it is; a link stays a link. An input of the command is refused, as everywhere
+/// here.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     PendingFile::with(path, bytes)?.keep()
 }
 
+/// The same for an input, which the command is there to edit.
+pub fn edit_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let mut pending = PendingFile::of(path, files::guard_edit)?;
+    pending.write_all(bytes).map_err(|error| unwritten(path, &error))?;
+    pending.keep()
+}
+
+/// Refuses an input that cannot be edited, before the minutes that its new content takes.
+pub fn check_edit(path: &Path) -> Result<(), Failure> {
+    files::guard_edit(path).map(|_| ()).map_err(|why| refused_output(path, &why))
+}
+
 /// Refuses a place where a file cannot be, before the minutes that its content takes.
 pub fn check_place(path: &Path) -> Result<(), Failure> {
-    // A pipe would wait for its reader.
-    if is_device(path) { Ok(()) } else { PendingFile::create(path).map(|_| ()) }
+    match files::guard(path) {
+        // A pipe would wait for its reader.
+        Ok(Way::Device) => Ok(()),
+        _ => PendingFile::create(path).map(|_| ()),
+    }
+}
+
+/// Writes a file in a temporary folder, whose folders are made.
+pub fn write_scratch(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let made = path.parent().map_or(Ok(()), fs::create_dir_all);
+    made.and_then(|()| fs::write(path, bytes)).map_err(|error| unwritten(path, &error))
 }
 
 /// Writes all files into a new or existing folder, all of them or none.
@@ -51,16 +89,25 @@ pub fn unwritten(path: &Path, reason: &dyn std::fmt::Display) -> Failure {
     Failure::Environment(format!("could not write `{}`: {reason}; nothing was changed", path.display()))
 }
 
-/// Neither a regular file nor a folder: it cannot be replaced by another one.
-fn is_device(path: &Path) -> bool {
-    fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+/// Says why a file may not be written. One that the command names twice is a mistake of its arguments.
+pub fn refused_output(path: &Path, why: &Unwritten) -> Failure {
+    match why {
+        Unwritten::Input(_) | Unwritten::Twice => {
+            Failure::Usage(format!("`{}` is not written: {why}; nothing was changed", path.display()))
+        }
+        _ => unwritten(path, why),
+    }
 }
 
 /// A file that is written piece by piece: beside its place, and put there when it is whole ([`PendingFile::keep`]).
 pub struct PendingFile {
     place: Place,
     target: PathBuf,
+    /// Whether it may be written.
+    guard: Permit,
 }
+
+type Permit = fn(&Path) -> Result<Way, Unwritten>;
 
 enum Place {
     Beside {
@@ -76,14 +123,17 @@ enum Place {
 
 impl PendingFile {
     pub fn create(path: &Path) -> Result<Self, Failure> {
-        if path.is_dir() {
-            return Err(unwritten(path, &"it is a folder, name a file in it"));
-        }
-        if is_device(path) {
-            let file = fs::OpenOptions::new().write(true).open(path).map_err(|error| unwritten(path, &error))?;
-            return Ok(Self { place: Place::Device(file), target: path.to_owned() });
-        }
-        let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        Self::of(path, files::guard)
+    }
+
+    fn of(path: &Path, guard: Permit) -> Result<Self, Failure> {
+        let target = match guard(path).map_err(|why| refused_output(path, &why))? {
+            Way::File(target) => target,
+            Way::Device => {
+                let file = files::open_device(path).map_err(|why| refused_output(path, &why))?;
+                return Ok(Self { place: Place::Device(file), target: path.to_owned(), guard });
+            }
+        };
         let folder = match target.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
@@ -91,9 +141,9 @@ impl PendingFile {
         let claimed = Claimed::new(folder).map_err(|error| {
             unwritten(path, &format_args!("could not create the folder `{}`: {error}", folder.display()))
         })?;
-        let (file, guard) = Guard::file(|| temporary_beside(&target, folder), |file| file.path().to_owned())
+        let (file, passing) = Guard::file(|| temporary_beside(&target, folder), |file| file.path().to_owned())
             .map_err(|error| unwritten(path, &plain(&error)))?;
-        Ok(Self { place: Place::Beside { file, _guard: guard, _claimed: claimed }, target })
+        Ok(Self { place: Place::Beside { file, _guard: passing, _claimed: claimed }, target, guard })
     }
 
     /// A file that needs only to be kept.
@@ -110,13 +160,20 @@ impl PendingFile {
     }
 
     fn put(self) -> Result<(), Failure> {
-        let Self { place, target } = self;
+        let Self { place, target, guard } = self;
         match place {
             Place::Device(_) => Ok(()),
             Place::Beside { file, _guard, _claimed } => {
+                // It may have been read, or changed, meanwhile.
+                guard(&target).map_err(|why| refused_output(&target, &why))?;
+                // A file that others may not read stays one.
+                if let Ok(before) = fs::metadata(&target) {
+                    let _ = fs::set_permissions(file.path(), before.permissions());
+                }
                 // On the disk before it takes the place of what was there.
                 workspace::sync(file.path()).map_err(|error| unwritten(&target, &error))?;
                 file.persist(&target).map_err(|error| unwritten(&target, &error.error))?;
+                files::note_output(&target);
                 let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
                 let _ = workspace::sync(folder.unwrap_or(Path::new(".")));
                 Ok(())

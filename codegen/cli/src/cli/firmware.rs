@@ -5,7 +5,7 @@ mod size;
 mod text;
 pub mod time;
 
-use std::io::Read;
+use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -14,11 +14,14 @@ use host_sim::controller::{Controller, TickController};
 use host_sim::trace::Trace;
 use serde::Serialize;
 
+use super::file::unread_file;
+use super::named::{InputFile, OutputFolder};
 use super::spec;
 use super::ui::{Failure, Ui};
 use crate::{emit, workspace};
 use specgen_compiler::compile::{Compiled, Refused};
 use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::files;
 use specgen_language::model::{self, Mcu};
 use specgen_studies::verify::{self, Measurement};
 use specgen_toolchain::budget::{self, Used, group};
@@ -39,11 +42,11 @@ pub struct Common {
     target: Option<String>,
     /// Output folder; `<name>-controller` if not given. Must be new, empty, or an unchanged earlier output.
     #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
+    output: Option<OutputFolder>,
     /// Where cargo builds for microcontrollers; `target` in the output folder if not given. Share it between outputs to
     /// build less.
     #[arg(long, value_name = "DIR")]
-    target_dir: Option<PathBuf>,
+    target_dir: Option<OutputFolder>,
     /// With lock-step for `specgen pil --port`: the host may step the machine of a board that stands at rest. For boards.
     #[arg(long)]
     lockstep: bool,
@@ -59,7 +62,7 @@ pub struct Common {
 #[command(after_help = super::examples::BUILD)]
 pub struct Arguments {
     /// The spec file.
-    spec: PathBuf,
+    spec: InputFile,
     #[command(flatten)]
     common: Common,
 }
@@ -103,19 +106,14 @@ const ELF: [u8; 4] = [0x7f, b'E', b'L', b'F'];
 
 /// The file if it is an ELF image; none if it is something else, which can only be a spec.
 fn read_image(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
-    let mut file = match std::fs::File::open(path) {
-        Ok(file) => file,
-        // The compiler has the words for a spec that cannot be read.
-        Err(_) => return Ok(None),
-    };
-    let mut bytes = Vec::new();
-    let reading = |error| TargetError::io("reading", path, error);
-    // A spec may be a pipe or a device; only what begins as an image is read to its end.
-    if file.by_ref().take(ELF.len() as u64).read_to_end(&mut bytes).is_err() || bytes != ELF {
+    // The compiler has the words for a spec that cannot be read, and reads one that comes through a pipe.
+    let Ok(mut file) = files::open_file(path) else { return Ok(None) };
+    let mut first = Vec::new();
+    let begun = file.by_ref().take(ELF.len() as u64).read_to_end(&mut first).and_then(|_| file.rewind());
+    if begun.is_err() || first != ELF {
         return Ok(None);
     }
-    file.read_to_end(&mut bytes).map_err(reading)?;
-    Ok(Some(bytes))
+    files::content(file, files::MAX_BYTES).map(Some).map_err(|unread| unread_file(path, &unread))
 }
 
 /// Why an image must not be used, if so.
@@ -156,11 +154,14 @@ fn make(spec: &Path, common: &Common, accept: fn(Target) -> Result<(), Failure>,
     if matches!(target.kind, Kind::Emulated | Kind::Board(_)) {
         target::toolchain::find()?;
     }
-    let output = common.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)));
+    let output = common
+        .output
+        .as_deref()
+        .map_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)), Path::to_owned);
     let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[target.folder]);
     let _hold = workspace::write(&output, &files)?;
     ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
-    let target_dir = common.target_dir.clone().unwrap_or_else(|| output.join("target"));
+    let target_dir = common.target_dir.as_deref().map_or_else(|| output.join("target"), Path::to_owned);
     let folders = Folders { output: &output, target: &target_dir };
     build(&compiled, target, &folders, common, ui)
 }

@@ -2,7 +2,6 @@
 //! or its drive alone, for a generator.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use clap::Args;
 use host_sim::forc::{ReversalExperiment, ReversalRecord, trimmed};
@@ -15,6 +14,7 @@ use specgen_studies::machine;
 
 use super::file::write_file;
 use super::identify::range;
+use super::named::{InputFile, OutputFile};
 use super::plot::Plot;
 use super::sim::PlantArguments;
 use super::spec;
@@ -31,10 +31,10 @@ const CROSSING: f64 = 5.0;
 pub struct Arguments {
     /// Simulate a leg of this spec: its stroke, voltages, amplifier and gauge noise. Without it, the reference leg. The records
     /// that the spec names need not be there.
-    spec: Option<PathBuf>,
+    spec: Option<InputFile>,
     /// File to write: CSV with time_s, drive_V, displacement_um; without displacement for --drive-only.
     #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    output: OutputFile,
     /// Reversal curves, and cells per axis of the grid that they identify; 32, or the grid of the spec.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=256))]
     grid: Option<u32>,

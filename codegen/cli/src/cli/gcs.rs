@@ -1,7 +1,6 @@
 //! `specgen gcs`: programs that speak the General Command Set move a machine over the link.
 
 use std::net::{SocketAddr, TcpListener};
-use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
 use host_sim::controller::MachineWord;
@@ -9,6 +8,7 @@ use specgen_language::interrupt;
 use specgen_operate::gcs::{Axes, Bridge, Stage};
 
 use super::line::Line;
+use super::named::InputFile;
 use super::operate::{Operator, Served};
 use super::spec;
 use super::ui::{Failure, Ui};
@@ -19,7 +19,7 @@ use super::ui::{Failure, Ui};
 pub struct Arguments {
     /// The spec that the device was built from; another controller is then refused.
     #[arg(value_name = "SPEC")]
-    spec: Option<PathBuf>,
+    spec: Option<InputFile>,
     #[command(flatten)]
     line: Line,
     /// Where clients connect. Whoever can reach it can move the machine: the command set knows no password.

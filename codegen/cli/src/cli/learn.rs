@@ -5,7 +5,6 @@ mod machine;
 
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
@@ -13,8 +12,9 @@ use host_sim::platform::rig::{Bench, Noise};
 use host_sim::word::status_words;
 use serde::Serialize;
 
-use super::file::{check_place, write_file};
+use super::file::{check_input, check_place, write_file};
 use super::line::Line;
+use super::named::{InputFile, OutputFile};
 use super::operate::{Ended, Operator, motion_name};
 use super::sim::{PlantArguments, emitted, environment, frequency};
 use super::spec;
@@ -49,7 +49,7 @@ const ARMING: f64 = 60.0;
 #[command(after_help = super::examples::LEARN)]
 pub struct Arguments {
     /// The spec file, with `control.correction`.
-    spec: PathBuf,
+    spec: InputFile,
     /// What is learned: case-1, case-2, machining or multisine, or a trajectory of the spec by its name; case-1 if not given. A machine
     /// at the end of a link learns the trajectories that it has.
     #[arg(long, value_name = "NAME")]
@@ -71,13 +71,13 @@ pub struct Arguments {
     prepare: bool,
     /// Begin with this correction, of the same spec, machine and motion.
     #[arg(long, value_name = "FILE")]
-    from: Option<PathBuf>,
+    from: Option<InputFile>,
     /// Learn nothing: measure the response of the running loop to a correction, by sweeps within passes of the motion, and write it here (JSON).
     #[arg(long, value_name = "FILE", conflicts_with_all = ["passes", "vary", "prepare", "from", "output", "response"])]
-    excite: Option<PathBuf>,
+    excite: Option<OutputFile>,
     /// Learn with the response that --excite measured on this machine, not with the model's and the intervals of [robust].
     #[arg(long, value_name = "FILE", conflicts_with = "vary")]
-    response: Option<PathBuf>,
+    response: Option<InputFile>,
     /// Let the machine's own device make each correction, in its background, in room for so many knots a pass: 4096 on an STM32H743, which is
     /// taken if no number is given, 768 on an STM32F446, 65536 on a PC.
     #[arg(long, value_name = "KNOTS", num_args = 0..=1, default_missing_value = "4096", conflicts_with_all = ["excite", "response"],
@@ -85,7 +85,7 @@ pub struct Arguments {
     on_device: Option<u32>,
     /// Write the correction that is kept here (JSON): that of the last pass that gained more than its noise.
     #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    output: Option<OutputFile>,
     /// Learn on this machine, which is armed for it and ramped down after it.
     #[command(flatten)]
     line: Line,
@@ -125,6 +125,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
                     trajectories of its spec";
         return Err(Failure::Usage(text.to_owned()));
     }
+    arguments.plant.leg()?;
+    [&arguments.from, &arguments.response].into_iter().flatten().try_for_each(|path| check_input(path))?;
     arguments.output.as_deref().map_or(Ok(()), check_place)?;
     arguments.excite.as_deref().map_or(Ok(()), check_place)?;
     let compiled = if named { spec::looked_up(&arguments.spec, ui)? } else { spec::compiled(&arguments.spec, ui)? };

@@ -1,12 +1,11 @@
 //! Where the device of a command is.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use specgen_link::client::{Port, Timeout};
 use specgen_operate::pil::{BAUD, OpenError, SerialLine};
 use specgen_operate::{Session, SocketLine};
 
+use super::named::Endpoint;
 use super::ui::Failure;
 
 /// A serial port or a socket.
@@ -14,13 +13,13 @@ use super::ui::Failure;
 pub struct Line {
     /// A board at this serial port.
     #[arg(long, value_name = "DEVICE")]
-    pub port: Option<PathBuf>,
+    pub port: Option<Endpoint>,
     /// Its rate, baud.
     #[arg(long, default_value_t = BAUD, requires = "port", conflicts_with = "socket", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
     baud: u32,
     /// A program that serves the link at this Unix socket.
     #[arg(long, value_name = "PATH")]
-    socket: Option<PathBuf>,
+    socket: Option<Endpoint>,
 }
 
 impl Line {

@@ -6,7 +6,7 @@ mod questions;
 
 use std::collections::BTreeMap;
 use std::io::{self, IsTerminal, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, ValueEnum};
 use serde::Serialize;
@@ -15,11 +15,13 @@ use specgen_compiler::lower;
 use specgen_compiler::reach::{self, Reach};
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::interrupt::Scratch;
+use specgen_language::shell;
 use specgen_language::spec::quantity;
 use specgen_language::spec::{self, SpecSource, json_schema};
 
-use super::file::write_folder;
+use super::file::{write_folder, write_scratch};
 use super::forc;
+use super::named::OutputFolder;
 use super::sim::environment;
 use super::ui::{Failure, Outcome, Ui};
 use draft::{Draft, Origin};
@@ -68,7 +70,7 @@ const REACH_FROM: &[&str] = &[
 #[command(after_help = super::examples::NEW)]
 pub struct Arguments {
     /// Name of the platform, and of the folder that is made; a path makes it elsewhere.
-    name: PathBuf,
+    name: OutputFolder,
     /// Ask nothing: what is not given is as in this spec.
     #[arg(long, value_enum)]
     like: Option<Like>,
@@ -145,7 +147,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 
     let mut files = vec![(SCHEMA.to_owned(), json_schema().into_bytes())];
     if let Some(record) = simulated_record(&draft, name, place) {
-        std::fs::write(place.join(RECORD), &record).map_err(environment)?;
+        write_scratch(&place.join(RECORD), record.as_bytes())?;
         files.push((RECORD.to_owned(), record.into_bytes()));
     }
     fit_workspace(&mut draft, name, place);
@@ -416,22 +418,21 @@ impl Outcome for Begun {
 fn report(folder: &Path, draft: &Draft, compiled: Result<Compiled, Refused>, ui: &mut Ui) -> Result<(), Failure> {
     let shown = folder.display().to_string();
     let spec = folder.join(SPEC);
-    let spec = spec.display();
+    let check = shell::on("specgen check", &spec, "");
     let compiled = match compiled {
         Ok(compiled) => compiled,
         Err(refused) => {
             ui.findings(refused.source.as_ref(), &refused.findings);
-            let message = format!(
-                "{shown} is written, but its spec is refused: change what is named above, then `specgen check {spec}`"
-            );
+            let message =
+                format!("{shown} is written, but its spec is refused: change what is named above, then `{check}`");
             return Err(Failure::Gate(message));
         }
     };
     ui.findings(Some(&compiled.source), &compiled.findings);
     let next = [
-        format!("specgen check {spec}"),
-        format!("specgen sim {spec} --frequency 10"),
-        format!("specgen {spec} -o {}", folder.join("controller").display()),
+        check,
+        shell::on("specgen sim", &spec, "--frequency 10"),
+        shell::line("specgen").path(&spec).words("-o").path(folder.join("controller")).into(),
     ];
     let files = [SPEC, RECORD, SCHEMA];
     ui.result(&Begun { folder: shown, files, assumed: draft.assumed(), reach: compiled.reach, next });

@@ -13,14 +13,15 @@ mod watch;
 mod waves;
 
 use std::io::{BufRead, IsTerminal};
-use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 
 use clap::{ArgGroup, Args};
 use serde::Serialize;
 use specgen_link::client::Port;
 
+use super::file::read_text;
 use super::line::Line;
+use super::named::InputFile;
 use super::spec;
 use super::ui::{Failure, Outcome, Ui};
 use answer::{Mistake, Report};
@@ -44,7 +45,7 @@ pub struct Arguments {
     line: Line,
     /// Commands from this file, one a line; `#` begins a comment.
     #[arg(long, value_name = "FILE")]
-    script: Option<PathBuf>,
+    script: Option<InputFile>,
     /// The spec that the device was built from (a name that ends in .toml), then commands, each one argument. Without any,
     /// commands come from standard input.
     #[arg(value_name = "SPEC] [COMMAND")]
@@ -126,8 +127,7 @@ fn read(arguments: &Arguments, commands: &[String]) -> Result<Source, Failure> {
             "commands as arguments and --script exclude each other: put all of them into the script".to_owned(),
         )),
         Some(path) => {
-            let text = std::fs::read_to_string(path)
-                .map_err(|error| Failure::Usage(format!("could not read `{}`: {error}", path.display())))?;
+            let text = read_text(path)?;
             for (index, line) in text.lines().enumerate() {
                 let place = |error| Failure::Usage(format!("{}:{}: {error}", path.display(), index + 1));
                 orders.extend(Order::parse(line).map_err(place)?);

@@ -14,6 +14,8 @@ use serde_json::json;
 use specgen_link::Counted;
 use specgen_link::client::{Port, Timeout};
 
+use super::file::unread_file;
+use super::named::{Endpoint, InputFile, OutputFolder};
 use super::plot::Plot;
 use super::sim::{PlantArguments, environment, frequency};
 use super::spec;
@@ -21,7 +23,7 @@ use super::ui::{Failure, Outcome, Ui};
 use report::Report;
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::workspace;
-use specgen_language::interrupt;
+use specgen_language::{files, interrupt};
 use specgen_operate::pil::{BAUD, Lockstep, OpenError, Pipes, SerialLine, Stop};
 use specgen_toolchain::emulator::Emulator;
 use specgen_toolchain::{self as target, Image, stack};
@@ -31,10 +33,10 @@ use specgen_toolchain::{self as target, Image, stack};
 #[command(after_help = super::examples::PIL)]
 pub struct Arguments {
     /// The spec file.
-    spec: PathBuf,
+    spec: InputFile,
     /// Workspace to write and build in, kept for the next run; NAME-controller if not given, as without a command.
-    #[arg(short, long, value_name = "DIR", value_parser = clap::builder::NonEmptyStringValueParser::new())]
-    output: Option<String>,
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<OutputFolder>,
     /// With [control]: case-1, case-2, glass or aluminium of the paper; case-1 if not given.
     #[arg(long, value_name = "NAME")]
     scenario: Option<String>,
@@ -58,13 +60,13 @@ pub struct Arguments {
     plant: PlantArguments,
     /// A board at this serial port, instead of QEMU.
     #[arg(long, value_name = "DEVICE", conflicts_with = "elf")]
-    port: Option<PathBuf>,
+    port: Option<Endpoint>,
     /// Its rate, baud.
     #[arg(long, default_value_t = BAUD, requires = "port", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
     baud: u32,
     /// Run this image in QEMU, instead of building one.
     #[arg(long, value_name = "FILE")]
-    elf: Option<PathBuf>,
+    elf: Option<InputFile>,
     #[command(flatten)]
     plot: Plot,
 }
@@ -84,14 +86,14 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Some(path) => Some(SerialLine::open(path, arguments.baud).map_err(Failure::Environment)?),
         None => None,
     };
-    let emulator = if line.is_none() { Some(Emulator::find()?) } else { None };
     let given = arguments.elf.as_deref().map(|path| given(path, &compiled)).transpose()?;
+    let emulator = if line.is_none() { Some(Emulator::find()?) } else { None };
     if given.is_none() && line.is_none() {
         target::toolchain::find()?;
     }
 
-    let output = arguments.output.clone().unwrap_or_else(|| format!("{}-controller", compiled.ir.name));
-    let output = PathBuf::from(output);
+    let own = PathBuf::from(format!("{}-controller", compiled.ir.name));
+    let output = arguments.output.as_deref().unwrap_or(&own).to_owned();
     let hold = workspace::write(&output, &compiled.files)?;
     let target_dir = output.join("target");
     ui.progress(&format!("building the host library in {}", output.display()));
@@ -124,8 +126,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 const SUPERVISE: &str = "specgen_supervise";
 
 fn given(path: &Path, compiled: &Compiled) -> Result<Image, Failure> {
-    let elf = std::fs::read(path)
-        .map_err(|error| Failure::Environment(format!("could not read the image `{}`: {error}", path.display())))?;
+    let elf = files::read(path, files::MAX_BYTES).map_err(|unread| unread_file(path, &unread))?;
     Ok(Image { mcu: compiled.model.target.mcu, elf, path: path.to_owned(), compiler: String::new() })
 }
 

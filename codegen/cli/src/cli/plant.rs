@@ -1,6 +1,5 @@
 //! `specgen plant`: the simulated machine of a spec in shared memory, for the real-time target on the same computer.
 
-use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
@@ -11,6 +10,7 @@ use specgen_rt::exchange::{self, OpenError, Server};
 use specgen_rt::histogram::{Histogram, time_text};
 use specgen_rt::scheduling;
 
+use super::named::InputFile;
 use super::sim::{PlantArguments, environment};
 use super::spec;
 use super::ui::{Failure, Outcome, Ui};
@@ -29,7 +29,7 @@ const NO_TRAJECTORY: u32 = 1;
 #[command(after_help = super::examples::PLANT)]
 pub struct Arguments {
     /// The spec file.
-    spec: PathBuf,
+    spec: InputFile,
     /// Name under which a controller finds the machine.
     #[arg(long, default_value = "plant")]
     name: String,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::file::{check_place, write_file};
+use super::named::OutputFile;
 use super::ui::Failure;
 use specgen_report::chart::Chart;
 use specgen_report::plot::{figure, html};
@@ -13,13 +14,13 @@ use specgen_report::plot::{figure, html};
 pub struct Plot {
     /// Draw the result here: .svg, or .html for a page.
     #[arg(long, value_name = "FILE", value_parser = drawable)]
-    plot: Option<PathBuf>,
+    plot: Option<OutputFile>,
 }
 
-fn drawable(text: &str) -> Result<PathBuf, String> {
+fn drawable(text: &str) -> Result<OutputFile, String> {
     let path = PathBuf::from(text);
     if kind(&path).is_some() {
-        Ok(path)
+        Ok(path.into())
     } else {
         Err(format!("expected a file that ends in .svg or .html, found `{text}`"))
     }

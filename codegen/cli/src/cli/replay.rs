@@ -7,7 +7,7 @@ mod messages;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 use host_sim::controller::{MachineWord, Supervised};
@@ -15,6 +15,8 @@ use host_sim::description::Description;
 use host_sim::record::{self, Again, Block, Header, PhaseChange, Piece, Reader, Replay, ReplayError};
 use serde::Serialize;
 
+use super::file::unread_file;
+use super::named::{InputFile, OutputFile};
 use super::plot::Plot;
 use super::sim;
 use super::spec;
@@ -22,6 +24,7 @@ use super::table::{left, right, row};
 use super::ui::{Failure, Outcome, Ui};
 use export::Exports;
 use specgen_compiler::compile::Compiled;
+use specgen_language::files;
 use specgen_report::chart::{Axis, Chart, DASHED, LINE};
 
 /// Changes of the phase that are shown.
@@ -31,17 +34,17 @@ const SHOWN: usize = 20;
 #[command(after_help = super::examples::REPLAY)]
 pub struct Arguments {
     /// The recording: from a target, from `specgen sim --record` or from `rt-pc --record`.
-    recording: PathBuf,
+    recording: InputFile,
     /// The spec that the target was built from. Without it the recording can only be exported.
     #[arg(long, value_name = "SPEC", required_unless_present_any = ["csv", "mcap"])]
-    spec: Option<PathBuf>,
+    spec: Option<InputFile>,
     /// Write the recording as CSV, with time and units; with --spec also volts, and of a platform pose, target and error.
     #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
+    csv: Option<OutputFile>,
     /// Write the recording as MCAP, a channel a signal, JSON with schemas: gauges, codes, status, phase, settings; with --spec
     /// also what --csv has.
     #[arg(long, value_name = "FILE")]
-    mcap: Option<PathBuf>,
+    mcap: Option<OutputFile>,
     /// With --spec: target less pose, or demand less gauge of the legs.
     #[command(flatten)]
     plot: Plot,
@@ -122,7 +125,7 @@ pub(super) fn same_build(
 
 pub(super) fn open(path: &Path) -> Result<Reader<BufReader<File>>, Failure> {
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{}: {error}", path.display()));
-    let file = File::open(path).map_err(|error| refuse(&format_args!("cannot be read: {error}")))?;
+    let file = files::open(path).map_err(|unread| unread_file(path, &unread))?;
     Reader::new(BufReader::with_capacity(1 << 20, file)).map_err(|error| refuse(&error))
 }
 

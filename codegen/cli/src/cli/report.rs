@@ -14,12 +14,14 @@ use serde::Serialize;
 
 use super::check::describe;
 use super::file::{check_place, write_file};
+use super::named::{InputFile, OutputFile};
 use super::sim::{emitted, environment};
 use super::ui::{Failure, Outcome, Ui};
 use crate::{precision, target, workspace};
 use specgen_compiler::compile::{self, Compiled, Refused};
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::interrupt::Scratch;
+use specgen_language::shell;
 use specgen_language::spec::{self, SpecSource};
 use specgen_report::budget::FINE_BITS;
 use specgen_report::evidence::{self, Bits};
@@ -37,10 +39,10 @@ const SEED: u64 = 1;
 #[command(after_help = super::examples::REPORT)]
 pub struct Arguments {
     /// The spec file.
-    spec: PathBuf,
+    spec: InputFile,
     /// File to write; `<name>-report.html` if not given.
     #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    output: Option<OutputFile>,
     /// A second page beside it, `<output>-paper.html`: the paper's figures and tables.
     #[arg(long)]
     paper: bool,
@@ -49,7 +51,7 @@ pub struct Arguments {
     generations: u32,
     /// A page about this run of the machine instead: beside the simulation of the same commands.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["paper", "no_target"])]
-    record: Option<PathBuf>,
+    record: Option<InputFile>,
     /// Without the emulated microcontroller: no time, memory and comparison of bits.
     #[arg(long)]
     no_target: bool,
@@ -103,7 +105,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     }
     let mut built = build(&compiled, arguments.no_target, ui)?;
     let name = file_name(&arguments.spec);
-    let command = again(arguments, &name);
+    let command = again(arguments, &name).to_string();
     let mut fine = fine(&compiled, ui)?;
     let simulated = simulated::of(&compiled, [&mut built.controller, &mut fine], &name, ui)?;
 
@@ -151,7 +153,7 @@ fn of_record(
 ) -> Result<(), Failure> {
     let run = recorded::read(record, compiled, ui)?;
     let (first, mut sections) = specgen_report::record::page(compiled, &run);
-    let command = format!("{} --record {}", again(arguments, &file_name(&arguments.spec)), file_name(record));
+    let command = again(arguments, &file_name(&arguments.spec)).words("--record").path(file_name(record)).to_string();
     for section in &mut sections {
         section.command.clone_from(&command);
     }
@@ -171,7 +173,7 @@ fn refused(arguments: &Arguments, refused: Refused, ui: &mut Ui) -> Result<(), F
     check_place(&output)?;
     let first = first::refused(source, &refused.findings, model.as_ref(), accepted(source, &refused.findings));
     let digest = target::sha256(source.text.as_bytes());
-    let mut head = head(&source.display_name, &digest, "refused", again(arguments, &file_name(&arguments.spec)));
+    let mut head = head(&source.display_name, &digest, "refused", again(arguments, &file_name(&arguments.spec)).into());
     head.versions = format!("specgen {}", env!("CARGO_PKG_VERSION"));
     head.refused = true;
     let lines = specgen_language::diagnostic::render(&refused.findings, source, false);
@@ -235,8 +237,8 @@ fn write(
 
 /// What needs no simulation, to be opened at the end.
 fn evidence_of(compiled: &Compiled, built: &Built, name: &str) -> Result<Vec<Section>, Failure> {
-    let check = format!("specgen check {name}");
-    let main = format!("specgen {name} -o DIR");
+    let check = shell::on("specgen check", name, "");
+    let main = shell::on("specgen", name, "-o DIR");
     let measured = built.measured.as_ref().map_err(String::as_str);
     let rounding = precision::of(&compiled.model, &compiled.ir)
         .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
@@ -276,7 +278,7 @@ fn fine(compiled: &Compiled, ui: &Ui) -> Result<Controller, Failure> {
 }
 
 fn place(arguments: &Arguments, name: &str) -> PathBuf {
-    arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}-report.html")))
+    arguments.output.as_deref().map_or_else(|| PathBuf::from(format!("{name}-report.html")), Path::to_owned)
 }
 
 /// The page of the paper's figures beside a report.
@@ -286,18 +288,18 @@ fn beside(output: &Path) -> PathBuf {
 }
 
 /// The command line with the name of the spec alone: its folder is the user's business.
-fn again(arguments: &Arguments, name: &str) -> String {
-    let mut command = format!("specgen report {name}");
+fn again(arguments: &Arguments, name: &str) -> shell::Line {
+    let mut options = Vec::new();
     if arguments.paper {
-        command.push_str(" --paper");
+        options.push("--paper".to_owned());
     }
     if arguments.generations != 10 {
-        command.push_str(&format!(" --generations {}", arguments.generations));
+        options.push(format!("--generations {}", arguments.generations));
     }
     if arguments.no_target {
-        command.push_str(" --no-target");
+        options.push("--no-target".to_owned());
     }
-    command
+    shell::line("specgen report").path(name).words(&options.join(" "))
 }
 
 fn file_name(path: &Path) -> String {

@@ -1,6 +1,5 @@
 //! `specgen reproduce`: the paper's whole list of experiments, ours beside the paper's.
 
-use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
@@ -11,6 +10,7 @@ use host_sim::platform::rig::Noise;
 use host_sim::platform::table::{MachiningTable, PoseTable};
 
 use super::file::{claim, write_folder};
+use super::named::OutputFolder;
 use super::plot::Plot;
 use super::sim::{emitted, environment};
 use super::ui::{Failure, Outcome, Ui};
@@ -38,7 +38,7 @@ const GENERATION: f64 = 1.2;
 pub struct Arguments {
     /// Folder for reproduction.md, reproduction.csv, reproduction.json and convergence.csv.
     #[arg(short, long, value_name = "DIR", default_value = "reproduction")]
-    output: PathBuf,
+    output: OutputFolder,
     /// Generations of the genetic algorithm of Table 3, 100 strings each.
     #[arg(long, default_value_t = 50, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     generations: u32,

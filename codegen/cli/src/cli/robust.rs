@@ -5,7 +5,7 @@ mod merge;
 mod report;
 mod work;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 use clap::{Args, Subcommand};
@@ -13,6 +13,7 @@ use serde_json::json;
 
 use super::file::{check_place, claim, write_folder};
 use super::learn::{NOWHERE, takes_correction};
+use super::named::{InputFile, OutputFolder};
 use super::plot::Plot;
 use super::sim::{PlantArguments, emitted, environment, frequency};
 use super::spec;
@@ -54,7 +55,7 @@ enum Kind {
 struct StudyArguments {
     /// The spec file.
     #[arg(required = true)]
-    spec: Option<PathBuf>,
+    spec: Option<InputFile>,
     /// Random machines, besides the corners.
     #[arg(long = "draws", value_name = "N", alias = "samples", default_value_t = 100, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     draws: u32,
@@ -100,7 +101,7 @@ struct StudyArguments {
     shard: Option<Shard>,
     /// Write runs (CSV) and report (JSON) here; with --shard the name of one file.
     #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
+    output: Option<OutputFolder>,
     #[command(flatten)]
     plot: Plot,
     #[command(flatten)]

@@ -6,7 +6,6 @@ pub(super) mod platform;
 mod record;
 
 use std::fmt::Display;
-use std::path::PathBuf;
 
 use clap::Args;
 use host_sim::controller::{Controller, ControllerError, TickController};
@@ -14,11 +13,13 @@ use host_sim::description::Description;
 use host_sim::plant::{LegParameters, NoiseParameters};
 
 use super::file::{check_place, claim, write_folder};
+use super::named::{InputFile, OutputFile, OutputFolder};
 use super::plot::Plot;
 use super::spec;
 use super::ui::{Failure, Ui};
 use specgen_compiler::compile;
 use specgen_compiler::workspace;
+use specgen_language::files;
 use specgen_language::interrupt::{self, Scratch};
 use specgen_toolchain as target;
 
@@ -27,10 +28,10 @@ use specgen_toolchain as target;
 #[command(after_help = super::examples::SIM)]
 pub struct Arguments {
     /// The spec file.
-    spec: PathBuf,
+    spec: InputFile,
     /// Write tables here; only print without it.
     #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
+    output: Option<OutputFolder>,
     /// Write every tick of every run there, too; their size is said first.
     #[arg(long, requires = "output")]
     traces: bool,
@@ -61,7 +62,7 @@ pub struct Arguments {
     /// Instead of the experiments: a wave on all axes under the supervisor, every tick of it recorded in this file for
     /// `specgen replay`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "plot", "paper", "samples", "frequency", "trajectory"])]
-    record: Option<PathBuf>,
+    record: Option<OutputFile>,
     /// Length of that wave, s.
     #[arg(long, value_name = "S", default_value_t = 1.0, requires = "record", allow_negative_numbers = true)]
     seconds: f64,
@@ -106,7 +107,7 @@ pub struct PlantArguments {
     /// Leg whose shape of hysteresis is taken and scaled to the legs of the spec: `plays`, as if not given, `bouc-wen`, or a file
     /// of leg parameters (JSON). The paper's experiments with six legs take them as they are.
     #[arg(long, value_name = "LEG")]
-    pub(super) plant: Option<PathBuf>,
+    pub(super) plant: Option<InputFile>,
     /// Without noise and quantisation of gauge and amplifier.
     #[arg(long)]
     pub(super) no_noise: bool,
@@ -118,7 +119,7 @@ pub struct PlantArguments {
 impl PlantArguments {
     pub(super) fn leg(&self) -> Result<LegParameters, Failure> {
         match &self.plant {
-            Some(path) => LegParameters::named(path).map_err(|error| Failure::Gate(error.to_string())),
+            Some(path) => LegParameters::named(path, files::text).map_err(|error| Failure::Gate(error.to_string())),
             None => Ok(LegParameters::reference()),
         }
     }

@@ -5,6 +5,7 @@ use host_sim::trajectory::{PaperPath, Step};
 use super::ui::Failure;
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::TrajectoryKind;
+use specgen_language::shell;
 use specgen_studies::lead::streamed;
 use specgen_studies::tuning::TrajectoryChoice;
 
@@ -48,7 +49,8 @@ pub(super) fn chosen(
             }
             _ => Err(Failure::Usage(format!(
                 "the spec's trajectory `{name}` is a waveform or as printed, which this command does not follow; name \
-                 another, or play it once by specgen sim --trajectory {name}"
+                 another, or play it once by `{}`",
+                shell::line("specgen sim SPEC --trajectory").word(name)
             ))),
         };
     }

@@ -4,7 +4,6 @@ mod evaluate;
 mod report;
 mod start;
 
-use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
@@ -13,7 +12,8 @@ use host_sim::plant::LegParameters;
 use host_sim::trajectory::PaperPath;
 use serde_json::json;
 
-use super::file::{claim, write_file, write_folder};
+use super::file::{check_edit, claim, edit_file, write_folder};
+use super::named::{InputFile, OutputFolder};
 use super::plot::Plot;
 use super::sim::{PlantArguments, emitted, environment, frequency};
 use super::spec;
@@ -37,7 +37,7 @@ use specgen_studies::tuning::{
 #[command(after_help = super::examples::TUNE)]
 pub struct Arguments {
     /// The spec file.
-    spec: PathBuf,
+    spec: InputFile,
     /// What is tuned: as far as the spec's mode uses it.
     #[arg(long, value_enum, default_value = "all")]
     what: WhatArgument,
@@ -81,10 +81,10 @@ pub struct Arguments {
     /// Search nothing: score the candidates of this file, for a search of your own. A JSON array of objects with numbers by the
     /// names of parameters, in the unit of --bounds; one that is left out stays as in the spec. `[]` shows names and bounds.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["optimiser", "compare", "evaluations", "population", "output", "write", "plot"])]
-    evaluate: Option<PathBuf>,
+    evaluate: Option<InputFile>,
     /// Write front, history, report and plot here.
     #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
+    output: Option<OutputFolder>,
     /// Write the result into the spec; without it the change is printed as a patch.
     #[arg(long)]
     write: bool,
@@ -181,6 +181,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     );
     let _claimed = arguments.output.as_deref().map(claim).transpose()?;
     arguments.plot.wanted()?;
+    if arguments.write {
+        check_edit(&arguments.spec)?;
+    }
     let controller = emitted(&compiled, ui)?;
     let job = Job { arguments, compiled, controller, leg, space, feasibility, threads };
     match asked {
@@ -252,7 +255,7 @@ impl Job<'_> {
             self.arguments.write && SpecSource::read(&self.arguments.spec).map_or(true, |now| now.text != source.text);
         let written = self.arguments.write && !edited;
         if written {
-            write_file(&self.arguments.spec, text.as_bytes())?;
+            edit_file(&self.arguments.spec, text.as_bytes())?;
             ui.progress(&format!("wrote the result into {}", self.arguments.spec.display()));
         }
         ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));

@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 use specgen_compiler::compile::Refused;
 use specgen_compiler::workspace::WriteError;
 use specgen_language::diagnostic::{self, Diagnostic, Place, Severity};
+use specgen_language::shell;
 use specgen_language::spec::SpecSource;
 use specgen_toolchain::TargetError;
 
@@ -211,7 +212,8 @@ impl Ui {
             self.findings(Some(source), findings);
         } else if !findings.is_empty() {
             let (count, s) = (findings.len(), if findings.len() == 1 { "" } else { "s" });
-            say!("{0}: {count} finding{s}, shown by `specgen check {0}`\n", source.display_name);
+            let check = shell::on("specgen check", &source.display_name, "");
+            say!("{}: {count} finding{s}, shown by `{check}`\n", source.display_name);
         }
     }
 
@@ -276,11 +278,21 @@ impl Ui {
     /// Plain text on standard output. A closed pipe is the reader's business, not an error of ours.
     pub fn out(&self, text: &str) {
         let mut stdout = io::stdout();
-        if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush())
+        self.keep_lost(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()));
+    }
+
+    fn keep_lost(&self, written: io::Result<()>) {
+        if let Err(error) = written
             && error.kind() != io::ErrorKind::BrokenPipe
         {
             self.lost.borrow_mut().get_or_insert(error);
         }
+    }
+
+    /// The same for a text with colours, which only a terminal shows.
+    pub fn styled(&self, text: &clap::builder::StyledStr) {
+        let mut stdout = anstream::stdout();
+        self.keep_lost(write!(stdout, "{}", text.ansi()).and_then(|()| stdout.flush()));
     }
 
     /// Says so and gives the exit code if standard output did not take all that was written to it.

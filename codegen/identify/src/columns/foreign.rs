@@ -2,6 +2,7 @@
 
 use crate::findings::Findings;
 use specgen_language::diagnostic::codes;
+use specgen_language::shell;
 
 /// Reports a file that is told by its first line; whether it is one.
 pub(crate) fn report(first: &[u8], findings: &mut Findings) -> bool {
@@ -10,20 +11,22 @@ pub(crate) fn report(first: &[u8], findings: &mut Findings) -> bool {
 
 /// The same, with what else is to be said of it.
 pub(crate) fn report_as(first: &[u8], more: &str, findings: &mut Findings) -> bool {
-    let Some((what, help)) = told(first, findings.path()) else { return false };
+    let Some((what, help)) = told(first, findings.place()) else { return false };
     findings.add(codes::RECORD_NOT_TEXT, Some(1), format!("is {what}, {more}"), &help);
     true
 }
 
-/// What a file is, and how it becomes CSV.
+/// What a file is, and how it becomes CSV. A line for the shell writes a new file, whatever the name of the old one.
 fn told(first: &[u8], path: &str) -> Option<(&'static str, String)> {
-    let stem = path.rsplit_once('.').map_or(path, |(stem, _)| stem);
-    let csv = format!("{}.csv", stem.strip_suffix(".csv").unwrap_or(stem));
+    let csv = shell::free(path, ".csv");
     let python = |import: &str, columns: &str| {
         let packages = import.split('.').next().unwrap_or(import);
+        let script = format!(
+            "import sys,numpy as n,{import};d={columns};n.savetxt(sys.argv[2],n.c_[tuple(d.values())],delimiter=\",\",header=\",\".join(d),comments=\"\")"
+        );
+        let line = shell::line("python3 -c").word(&script).path(path).path(&csv);
         format!(
-            "`python3 -c \"import numpy as n,{import};d={columns};n.savetxt('{csv}',n.c_[tuple(d.values())],delimiter=',',header=','.join(d),comments='')\"` \
-             writes {csv}: its columns must have one length, and the names have the units (needs `pip install {packages}`)"
+            "`{line}` writes {csv}: its columns must have one length, and the names have the units (needs `pip install {packages}`)"
         )
     };
     let found = [
@@ -31,38 +34,37 @@ fn told(first: &[u8], path: &str) -> Option<(&'static str, String)> {
             &b"MATLAB 5.0 MAT-file"[..],
             "a MAT-file of version 5",
             "scipy.io as s",
-            "{k:n.ravel(v) for k,v in s.loadmat('PATH').items() if k[0]!='_'}",
+            "{k:n.ravel(v) for k,v in s.loadmat(sys.argv[1]).items() if k[0]!=\"_\"}",
         ),
         (
             b"MATLAB 7.3 MAT-file",
             "a MAT-file of version 7.3",
             "h5py",
-            "{k:n.ravel(v) for k,v in h5py.File('PATH').items() if k[0]!='#'}",
+            "{k:n.ravel(v) for k,v in h5py.File(sys.argv[1]).items() if k[0]!=\"#\"}",
         ),
-        (b"\x89HDF", "an HDF5 file", "h5py", "{k:n.ravel(v) for k,v in h5py.File('PATH').items()}"),
+        (b"\x89HDF", "an HDF5 file", "h5py", "{k:n.ravel(v) for k,v in h5py.File(sys.argv[1]).items()}"),
         (
             b"TDSm",
             "a TDMS file of LabVIEW",
             "nptdms",
-            "{c.name:c[:] for g in nptdms.TdmsFile.read('PATH').groups() for c in g.channels()}",
+            "{c.name:c[:] for g in nptdms.TdmsFile.read(sys.argv[1]).groups() for c in g.channels()}",
         ),
     ];
     if let Some((_, what, import, columns)) = found.iter().find(|(magic, ..)| first.starts_with(magic)) {
-        return Some((what, python(import, &columns.replace("PATH", path))));
+        return Some((what, python(import, columns)));
     }
-    let others = [
-        (&b"PK\x03\x04"[..], "a ZIP archive, as spreadsheets are", "save the sheet as CSV in UTF-8".to_owned()),
-        (b"\xd0\xcf\x11\xe0", "a spreadsheet of an old kind", "save the sheet as CSV in UTF-8".to_owned()),
-        (b"\x1f\x8b", "packed by gzip", format!("`gunzip -c {path} > {csv}`")),
-        (b"\xff\xfe", "text in UTF-16", format!("`iconv -f UTF-16 -t UTF-8 {path} > {csv}`")),
-        (b"\xfe\xff", "text in UTF-16", format!("`iconv -f UTF-16 -t UTF-8 {path} > {csv}`")),
-        (
-            b"\x93NUMPY",
-            "an array of NumPy",
-            format!(
-                "`python3 -c \"import numpy as n;n.savetxt('{csv}',n.load('{path}'),delimiter=',')\"`, then name the columns by `--columns`"
-            ),
-        ),
-    ];
-    others.into_iter().find(|(magic, ..)| first.starts_with(magic)).map(|(_, what, help)| (what, help))
+    let sheet = || "save the sheet as CSV in UTF-8".to_owned();
+    let found = match first {
+        [b'P', b'K', 3, 4, ..] => ("a ZIP archive, as spreadsheets are", sheet()),
+        [0xd0, 0xcf, 0x11, 0xe0, ..] => ("a spreadsheet of an old kind", sheet()),
+        [0x1f, 0x8b, ..] => ("packed by gzip", shell::converted("gunzip -c <", path, ".csv")),
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => ("text in UTF-16", shell::as_utf8("UTF-16", path)),
+        [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => {
+            let script = "import sys,numpy as n;n.savetxt(sys.argv[2],n.load(sys.argv[1]),delimiter=\",\")";
+            let line = shell::line("python3 -c").word(script).path(path).path(&csv);
+            ("an array of NumPy", format!("`{line}`, then name {csv}, and its columns by `--columns`"))
+        }
+        _ => return None,
+    };
+    Some(found)
 }

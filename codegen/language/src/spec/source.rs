@@ -3,12 +3,12 @@
 // A finding is larger than clippy likes in a Result; there is one per run, and its type is shared by every phase.
 #![expect(clippy::result_large_err)]
 
-use std::fs::File;
-use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use crate::SpecSource;
 use crate::diagnostic::{Diagnostic, codes};
+use crate::files::{self, Unread};
+use crate::shell;
 
 /// Largest spec file, bytes.
 pub const MAX_BYTES: usize = 1 << 20;
@@ -28,35 +28,23 @@ impl SpecSource {
 }
 
 fn read_bytes(path: &Path, shown: &str) -> Result<Vec<u8>, Diagnostic> {
-    let unreadable = |reason: String, help: &str| {
-        Diagnostic::in_file(shown, None, codes::UNREADABLE, format!("the spec file cannot be read: {reason}"), help)
-    };
-    if path.is_dir() {
-        return Err(unreadable("this is a folder".to_owned(), "name the .toml file in it"));
-    }
-    let file = File::open(path).map_err(|error| {
-        let reason = match error.kind() {
-            ErrorKind::NotFound => "there is no such file".to_owned(),
-            ErrorKind::PermissionDenied => "reading it is not permitted".to_owned(),
-            _ => error.to_string(),
-        };
-        unreadable(reason, "check the path and its permissions")
-    })?;
-    let mut bytes = Vec::new();
-    // One byte past the limit tells "too large" without reading an endless file.
-    file.take(MAX_BYTES as u64 + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|e| unreadable(e.to_string(), "check that it is a regular file"))?;
-    if bytes.len() > MAX_BYTES {
-        return Err(Diagnostic::in_file(
+    files::read(path, MAX_BYTES as u64).map_err(|unread| match unread {
+        Unread::Large(_) => Diagnostic::in_file(
             shown,
             None,
             codes::TOO_LARGE,
             "the spec file is larger than 1 MiB, expected a few kilobytes",
             "name the .toml spec; measurements belong in CSV files that the spec refers to",
-        ));
-    }
-    Ok(bytes)
+        ),
+        Unread::Kind(kind) if path.is_dir() => {
+            let reason = format!("the spec file cannot be read: this is {kind}");
+            Diagnostic::in_file(shown, None, codes::UNREADABLE, reason, "name the .toml file in it")
+        }
+        unread => {
+            let reason = format!("the spec file cannot be read: {unread}");
+            Diagnostic::in_file(shown, None, codes::UNREADABLE, reason, unread.help())
+        }
+    })
 }
 
 fn into_text(bytes: Vec<u8>, shown: &str) -> Result<String, Diagnostic> {
@@ -91,11 +79,21 @@ fn other_encoding(bytes: &[u8], shown: &str) -> Option<Diagnostic> {
     let offset = if marked { 0 } else { zero.unwrap_or_default() };
     let line = 1 + bytes[..offset].iter().filter(|b| **b == b'\n').count();
     let looks = if marked { "it begins with the mark of UTF-16".to_owned() } else { format!("byte {offset} is zero") };
+    // The first letter of a spec is one of ASCII: half of it is zero.
+    let encoding = match (marked, offset) {
+        (true, _) => Some("UTF-16"),
+        (false, 0) => Some("UTF-16BE"),
+        (false, 1) => Some("UTF-16LE"),
+        (false, _) => None,
+    };
+    let by = encoding.map_or_else(String::new, |encoding| {
+        format!(", not as UTF-16 (\"Unicode\" in some editors): {}", shell::as_utf8(encoding, shown))
+    });
     Some(Diagnostic::in_file(
         shown,
         Some(line),
         codes::NOT_TEXT,
         format!("the spec file is not UTF-8 text: {looks} (line {line})"),
-        "save the file as UTF-8, not as UTF-16 (\"Unicode\" in some editors): iconv -f utf-16 -t utf-8 OLD > NEW",
+        format!("save the file as UTF-8{by}"),
     ))
 }

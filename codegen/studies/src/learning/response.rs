@@ -1,9 +1,9 @@
 //! The response of a running loop to a correction, as it was measured: its file, and how well it is known.
 
-use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use specgen_language::files;
 use specgen_numerics::nyquist::square;
 
 use super::matrix::{Matrix6c, inverse, multiply, spectral_radius};
@@ -62,7 +62,7 @@ impl Response {
     /// # Errors
     /// If it cannot be read, or is none.
     pub fn of_file(path: &Path) -> Result<Self, TableError> {
-        Self::read(&fs::read_to_string(path).map_err(|error| TableError::Unread(error.to_string()))?)
+        Self::read(&files::text(path).map_err(|unread| TableError::Unread(format!("it cannot be read: {unread}")))?)
     }
 
     /// The response of a file's text.

@@ -1,10 +1,10 @@
 //! The learned correction as a table: knots, and a file that says for what they were learned.
 
 use std::fmt;
-use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use specgen_language::files;
 use specgen_runtime::playback::{Knot, UNIT};
 
 /// Version of the file.
@@ -95,7 +95,7 @@ impl Table {
     /// # Errors
     /// If it cannot be read, or is none.
     pub fn of_file(path: &Path) -> Result<Self, TableError> {
-        Self::read(&fs::read_to_string(path).map_err(|error| TableError::Unread(error.to_string()))?)
+        Self::read(&files::text(path).map_err(|unread| TableError::Unread(format!("it cannot be read: {unread}")))?)
     }
 
     /// The table of a file's text.

@@ -20,10 +20,9 @@ const RECORD: (&str, &str) =
 /// If the record cannot be written.
 pub fn source(name: &str, text: &str, folder: &Path) -> io::Result<SpecSource> {
     let record = folder.join(RECORD.0);
-    if let Some(parent) = record.parent() {
-        fs::create_dir_all(parent)?;
-    }
-    fs::write(record, RECORD.1)?;
+    let made = record.parent().map_or(Ok(()), fs::create_dir_all);
+    made.and_then(|()| fs::write(&record, RECORD.1))
+        .map_err(|error| io::Error::new(error.kind(), format!("could not write `{}`: {error}", record.display())))?;
     Ok(SpecSource { display_name: format!("specs/{name}.toml"), text: text.to_owned(), dir: folder.to_owned() })
 }
 

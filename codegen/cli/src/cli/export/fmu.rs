@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{self, Cursor, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 use host_sim::word::{Scalar, WordKind};
@@ -16,7 +16,8 @@ use rawzip::ZipArchiveWriter;
 use serde::Serialize;
 use specgen_compiler::compile::Compiled;
 
-use crate::cli::file::{claim, write_folder};
+use crate::cli::file::{claim, write_folder, write_scratch};
+use crate::cli::named::{InputFile, OutputFolder};
 use crate::cli::sim::environment;
 use crate::cli::spec;
 use crate::cli::ui::{Failure, Outcome, Ui};
@@ -35,10 +36,10 @@ const BUILD: &str = include_str!("fmu/build.sh");
 #[command(after_help = crate::cli::examples::EXPORT_FMU)]
 pub(super) struct Arguments {
     /// The spec file.
-    spec: PathBuf,
+    spec: InputFile,
     /// Folder for the units, which are called after the platform.
     #[arg(short, long, value_name = "DIR")]
-    output: PathBuf,
+    output: OutputFolder,
     /// Write the simulated machine of `specgen sim`, too, as NAME_plant.fmu.
     #[arg(long)]
     plant: bool,
@@ -186,7 +187,7 @@ impl<'a> Unit<'a> {
         let common = [("fmu.c", UNIT.to_owned()), ("build.sh", build)];
         let files: Vec<_> = own.into_iter().chain(common).map(|(name, text)| (name.to_owned(), text)).collect();
         for (name, text) in &files {
-            fs::write(folder.join(name), text).map_err(environment)?;
+            write_scratch(&folder.join(name), text.as_bytes())?;
         }
         Ok(files)
     }

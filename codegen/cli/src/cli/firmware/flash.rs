@@ -1,15 +1,16 @@
 //! `specgen flash`: builds and checks an image, then lets probe-rs write it.
 
 use std::io::{BufRead, IsTerminal, Write};
-use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use clap::Args;
 use serde::Serialize;
 
 use super::{Common, make, read_image, refusal, text};
+use crate::cli::named::InputFile;
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_language::model::{self, Mcu};
+use specgen_language::shell;
 use specgen_toolchain::budget;
 use specgen_toolchain::checks::{self, Checked, Rules};
 use specgen_toolchain::find_program;
@@ -27,7 +28,7 @@ const INSTALL: &str = "cargo install probe-rs-tools --locked";
 pub struct Arguments {
     /// A spec, which is built first, or an ELF image that `specgen build` made.
     #[arg(value_name = "SPEC|ELF")]
-    file: PathBuf,
+    file: InputFile,
     #[command(flatten)]
     common: Common,
     /// The amplifiers are off: do not ask.
@@ -44,6 +45,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         None => of_spec(arguments, ui)?,
     };
     let Ready { image, mcu } = ready;
+    let image = shell::no_option(image);
     let part = mcu.part();
     let Some(chip) = part.chip else {
         return Err(not_a_board(part.board));
@@ -51,7 +53,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let probe: Vec<&str> = arguments.probe.iter().flat_map(|probe| ["--probe", probe.as_str()]).collect();
     let download = [&["download", "--chip", chip, "--verify"], &probe[..], &[image.as_str()]].concat();
     let reset = [&["reset", "--chip", chip], &probe[..]].concat();
-    let commands = format!("  {PROBE_RS} {}\n  {PROBE_RS} {}", download.join(" "), reset.join(" "));
+    let shown = |words: &[&str]| words.iter().fold(shell::line(PROBE_RS), |line, word| line.word(word));
+    let commands = format!("  {}\n  {}", shown(&download), shown(&reset));
     let Some(program) = find_program(PROBE_RS) else {
         return Err(Failure::Environment(format!(
             "{PROBE_RS} is not installed (looked for on PATH), so nothing was flashed; {image} is checked. \
@@ -62,7 +65,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         confirm(ui, part.board)?;
     }
     for (what, words) in [("writing", download), ("restarting", reset)] {
-        ui.progress(&format!("{what}: {PROBE_RS} {}", words.join(" ")));
+        ui.progress(&format!("{what}: {}", shown(&words)));
         // Its progress is for the eyes; on standard output stands our result alone.
         let output = Command::new(&program).args(&words).stdin(Stdio::null()).stdout(std::io::stderr()).status();
         match output {

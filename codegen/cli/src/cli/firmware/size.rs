@@ -1,12 +1,11 @@
 //! `specgen size`: who takes the memory of an image, and what its tick reaches.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use object::{Architecture, Object};
 use serde::Serialize;
 
 use super::{Common, Made, make, read_image, refusal, text};
+use crate::cli::named::InputFile;
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_toolchain::TargetError;
 use specgen_toolchain::checks::{self, Checked, Rules};
@@ -18,7 +17,7 @@ use specgen_toolchain::size::{Size, has_tick, size};
 pub struct Arguments {
     /// A spec, which is built first, or an ELF image.
     #[arg(value_name = "SPEC|ELF")]
-    file: PathBuf,
+    file: InputFile,
     #[command(flatten)]
     common: Common,
     /// Function of the image that is one tick; found by itself in images of specgen.

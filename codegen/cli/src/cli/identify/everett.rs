@@ -1,7 +1,7 @@
 //! `specgen identify RECORD`: a reversal-curve record in, an Everett table and its figures out.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 use serde::Serialize;
@@ -11,6 +11,7 @@ use super::predict;
 use super::reading::ReadingArguments;
 use super::refused;
 use crate::cli::file::write_file;
+use crate::cli::named::{InputFile, OutputFile};
 use crate::cli::plot::{Plot, wrote};
 use crate::cli::table::{right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
@@ -23,7 +24,7 @@ use specgen_report::identification as figure;
 pub struct EverettArguments {
     /// Reversal-curve record: CSV with columns time_s, drive_V, displacement_um.
     #[arg(required = true)]
-    record: Option<PathBuf>,
+    record: Option<InputFile>,
     /// Voltage range of the table, V, such as 0:100 or -90:90.
     #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true, required = true)]
     drive: Option<[f64; 2]>,
@@ -32,10 +33,10 @@ pub struct EverettArguments {
     grid: Option<usize>,
     /// A second record of the leg, not used for the fit, to judge the table by.
     #[arg(long, value_name = "RECORD")]
-    validate: Option<PathBuf>,
+    validate: Option<InputFile>,
     /// Write the table (CSV: up_V, down_V, everett_um) here.
     #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    output: Option<OutputFile>,
     #[command(flatten)]
     reading: ReadingArguments,
     #[command(flatten)]

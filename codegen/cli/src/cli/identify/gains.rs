@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::refused;
 use crate::cli::file::write_folder;
+use crate::cli::named::InputFile;
 use crate::cli::table::{right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use crate::cli::{replay, sim, spec};
@@ -30,10 +31,10 @@ const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 #[command(after_help = crate::cli::examples::GAINS)]
 pub struct Arguments {
     /// The recording of a run in which every leg moves slowly by a good part of its stroke: a wave on all axes.
-    recording: PathBuf,
+    recording: InputFile,
     /// The spec that the target was built from.
     #[arg(long, value_name = "SPEC")]
-    spec: PathBuf,
+    spec: InputFile,
     /// Folder for the six tables, leg1.csv to leg6.csv, in that of the spec.
     #[arg(short, long, value_name = "DIR")]
     output: Option<String>,

@@ -1,7 +1,6 @@
 //! `specgen identify gauge`.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
@@ -9,6 +8,7 @@ use serde::Serialize;
 use super::reading::ReadingArguments;
 use super::refused;
 use crate::cli::file::write_file;
+use crate::cli::named::{InputFile, OutputFile};
 use crate::cli::plot::{Plot, wrote};
 use crate::cli::ui::{Failure, Outcome, Ui};
 
@@ -20,13 +20,13 @@ use specgen_report::identification as figure;
 #[command(after_help = crate::cli::examples::GAUGE)]
 pub struct Arguments {
     /// CSV with columns gauge_V and reference_um, and time_s if there is one.
-    record: PathBuf,
+    record: InputFile,
     /// Degree of the polynomial, 1 to 5; chosen by cross-validation if not given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=5))]
     degree: Option<u8>,
     /// Write the calibration as a table (CSV: gauge_V, reference_um, means over even steps) here, for other programs.
     #[arg(long, value_name = "FILE")]
-    table: Option<PathBuf>,
+    table: Option<OutputFile>,
     #[command(flatten)]
     reading: ReadingArguments,
     #[command(flatten)]

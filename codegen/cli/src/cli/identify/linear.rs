@@ -1,13 +1,14 @@
 //! `specgen identify linear`.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 use serde::Serialize;
 
 use super::reading::ReadingArguments;
 use super::refused;
+use crate::cli::named::InputFile;
 use crate::cli::plot::Plot;
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
@@ -30,7 +31,7 @@ pub struct Arguments {
     /// Records at one frequency each: CSV with columns time_s, drive_V, displacement_um. The drive may be that of an
     /// inverse hysteresis model, as in the paper.
     #[arg(required = true)]
-    records: Vec<PathBuf>,
+    records: Vec<InputFile>,
     /// Frequencies of the records, Hz, in their order; found in the records if not given.
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = frequency)]
     frequency: Vec<f64>,
@@ -39,7 +40,7 @@ pub struct Arguments {
     reference: Option<f64>,
     /// Judge the weights of this spec, on its sampled loop, over the λ found.
     #[arg(long, value_name = "SPEC")]
-    spec: Option<PathBuf>,
+    spec: Option<InputFile>,
     #[command(flatten)]
     reading: ReadingArguments,
     #[command(flatten)]

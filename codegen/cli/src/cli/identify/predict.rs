@@ -1,7 +1,7 @@
 //! `specgen identify predict`: a table or a spec and a drive in, the displacement out, beside the measured one where there is one.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 
@@ -9,6 +9,7 @@ use super::cause::account;
 use super::reading::ReadingArguments;
 use super::{Identified, refused};
 use crate::cli::file::write_file;
+use crate::cli::named::{InputFile, OutputFile};
 use crate::cli::plot::{Plot, wrote};
 use crate::cli::spec;
 use crate::cli::ui::{Failure, Outcome, Ui};
@@ -24,9 +25,9 @@ pub struct Arguments {
     /// A table as `specgen identify -o` writes it, or a spec (.toml): the tables of its records, with its creep, second weight and
     /// dead time.
     #[arg(value_name = "TABLE|SPEC")]
-    model: PathBuf,
+    model: InputFile,
     /// Drive: CSV with time_s, drive_V (the command) or monitor_V (the measured voltage); compared if it has displacement_um.
-    drive: PathBuf,
+    drive: InputFile,
     /// Leg of the spec, 0 to 5.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=5), allow_negative_numbers = true)]
     leg: u8,
@@ -39,7 +40,7 @@ pub struct Arguments {
     mode: Option<Given>,
     /// Write time_s, drive_V, displacement_um (predicted) and, where it was measured, measured_um and error_um here.
     #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    output: Option<OutputFile>,
     #[command(flatten)]
     reading: ReadingArguments,
     #[command(flatten)]

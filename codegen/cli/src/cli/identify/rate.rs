@@ -9,6 +9,7 @@ use super::Identified;
 use super::everett::{grid, range};
 use super::reading::ReadingArguments;
 use crate::cli::file::write_file;
+use crate::cli::named::{InputFile, OutputFolder};
 use crate::cli::plot::{Plot, wrote};
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
@@ -23,7 +24,7 @@ use specgen_report::identification as figure;
 pub struct Arguments {
     /// Records of one leg at different rates, at least two: CSV with columns time_s, drive_V, displacement_um.
     #[arg(required = true, value_name = "RECORD")]
-    records: Vec<PathBuf>,
+    records: Vec<InputFile>,
     /// Voltage range of the tables, V, such as 0:100 or -90:90.
     #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true)]
     drive: [f64; 2],
@@ -32,10 +33,10 @@ pub struct Arguments {
     grid: usize,
     /// A further record, in no fit, to judge the options by.
     #[arg(long, value_name = "RECORD")]
-    hold_out: Option<PathBuf>,
+    hold_out: Option<InputFile>,
     /// Write NAME.toml (lines of a spec) and the tables NAME-static.csv, NAME-mu0.csv and so on beside it.
     #[arg(short, long, value_name = "NAME")]
-    output: Option<PathBuf>,
+    output: Option<OutputFolder>,
     #[command(flatten)]
     reading: ReadingArguments,
     #[command(flatten)]
@@ -45,7 +46,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let refused = |findings| Failure::from(Refused { source: None, findings });
     let reading = arguments.reading.reading()?;
-    let read = |path: &PathBuf| read_record(path, &path.display().to_string(), &reading);
+    let read = |path: &InputFile| read_record(path, &path.display().to_string(), &reading);
     let mut records = Vec::new();
     let mut errors = Vec::new();
     for path in &arguments.records {

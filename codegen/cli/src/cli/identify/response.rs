@@ -1,12 +1,12 @@
 //! `specgen identify response`.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use clap::Args;
 
 use super::reading::ReadingArguments;
 use super::{Identified, refused};
+use crate::cli::named::InputFile;
 use crate::cli::plot::Plot;
 use crate::cli::ui::{Failure, Outcome, Ui};
 
@@ -18,7 +18,7 @@ use specgen_report::identification as figure;
 #[command(after_help = crate::cli::examples::RESPONSE)]
 pub struct Arguments {
     /// Swept sine, multisine or noise: CSV with columns time_s, drive_V, displacement_um, evenly sampled.
-    record: PathBuf,
+    record: InputFile,
     /// Samples in a segment; a power of two near an eighth of the record if not given.
     #[arg(long, value_name = "N")]
     segment: Option<usize>,

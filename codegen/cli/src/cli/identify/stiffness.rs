@@ -1,11 +1,10 @@
 //! `specgen identify stiffness`.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use super::reading::ReadingArguments;
 use super::{Identified, refused};
+use crate::cli::named::InputFile;
 use crate::cli::plot::Plot;
 use crate::cli::ui::{Failure, Outcome, Ui};
 
@@ -18,7 +17,7 @@ use specgen_report::identification as figure;
 pub struct Arguments {
     /// CSV with columns time_s, force_N (positive where it pushes the displacement up), displacement_um, and drive_V if
     /// there is one, which must be constant.
-    record: PathBuf,
+    record: InputFile,
     #[command(flatten)]
     reading: ReadingArguments,
     #[command(flatten)]

@@ -19,6 +19,7 @@ use super::pose::{ZERO, in_words};
 use crate::cli::file::{check_place, write_file};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
+use specgen_language::files;
 use specgen_language::model::Model;
 use specgen_operate::frame::Frame;
 use specgen_operate::{Order, Session, Until};
@@ -187,6 +188,7 @@ impl<P: Port> Operator<P> {
 
     pub fn obey(&mut self, order: &Order, ui: &Ui) -> Result<(), Ended> {
         self.look()?;
+        files::begin_again();
         let line = format!("{order:?}");
         match order {
             Order::Status => {

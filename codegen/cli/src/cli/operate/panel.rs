@@ -18,7 +18,6 @@ mod said;
 
 use std::cell::RefCell;
 use std::net::{IpAddr, SocketAddr, TcpListener};
-use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
@@ -36,6 +35,7 @@ use specgen_runtime::supervisor::{Phase, Request};
 use super::operator::Pulse;
 use super::{Ended, Operator, Served, mistake};
 use crate::cli::line::Line;
+use crate::cli::named::InputFile;
 use crate::cli::spec;
 use crate::cli::ui::{Failure, Ui};
 use hall::{Hall, now};
@@ -62,7 +62,7 @@ const RAMPED: f64 = 5.0;
 pub struct Arguments {
     /// The spec that the device was built from: for the figure of the platform, and for the margins of gains.
     #[arg(value_name = "SPEC")]
-    spec: PathBuf,
+    spec: InputFile,
     #[command(flatten)]
     line: Line,
     /// Where browsers connect. Any address but one of this computer itself lets others on the network who know the token move the

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use specgen_language::files;
 use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
 use specgen_operate::{read_wave, refused_wave};
@@ -12,7 +13,7 @@ use super::operator::Operator;
 impl<P: Port> Operator<P> {
     pub(super) fn wave_of(&self, path: &Path) -> Result<(Vec<u64>, [u64; 6]), String> {
         let name = path.display();
-        let text = std::fs::read_to_string(path).map_err(|error| format!("could not read `{name}`: {error}"))?;
+        let text = files::text(path).map_err(|unread| format!("`{name}` cannot be read: {unread}"))?;
         self.wave_of_text(&text).map_err(|error| format!("{name}: {error}"))
     }
 

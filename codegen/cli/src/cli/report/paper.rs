@@ -6,6 +6,7 @@ use host_sim::plant::LegParameters;
 use host_sim::platform::rig::Noise;
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::TaskSpace;
+use specgen_language::shell;
 use specgen_report::hysteresis;
 use specgen_report::paper::{legs, linear, machining, motion, region};
 use specgen_report::section::Section;
@@ -44,10 +45,10 @@ fn of_platform(
         Failure::Environment("the model of the platform was lost; report this as a defect of specgen".to_owned())
     })?;
     let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED);
-    let sim = format!("specgen sim {name} --frequency 0.1,1,10 -o DIR");
+    let sim = shell::on("specgen sim", name, "--frequency 0.1,1,10 -o DIR");
     let mut sections = motion::sections(&scenario, controller, &sim, &|what| ui.progress(what)).map_err(environment)?;
     ui.progress("machining, linear relation");
-    let machined = machining::section(&scenario, controller, &format!("specgen sim {name} -o DIR"));
+    let machined = machining::section(&scenario, controller, &shell::on("specgen sim", name, "-o DIR"));
     sections.push(machined.map_err(environment)?);
     sections.push(hysteresis::of_paper(&specimen.legs[0], model.actuator.voltage[0]));
     sections.push(linear::of_platform(&scenario, controller, &platform, &model.actuator, "").map_err(environment)?);
@@ -60,7 +61,7 @@ fn of_legs(compiled: &Compiled, controller: &mut Controller, name: &str, ui: &Ui
     let leg = LegParameters::reference();
     let all: [LegParameters; LEGS] = std::array::from_fn(|_| leg.clone());
     let scenario = machine::legs(model, &all, &leg.noise, SEED, reproduce::legs::SAMPLES);
-    let sim = format!("specgen sim {name} -o DIR");
+    let sim = shell::on("specgen sim", name, "-o DIR");
     ui.progress("leg tracking, linear relation, stability region");
     let adaptation = &model.adaptation;
     let mode = usize::from(adaptation.level_weight > 0.0) + usize::from(adaptation.drift_weight > 0.0);
@@ -94,7 +95,8 @@ fn converge(
     let leg = LegParameters::reference();
     match convergence::run(compiled, controller, &leg, SEED, generations as usize, &|_| {}) {
         Ok(found) => {
-            let command = format!("specgen tune {name} --optimiser genetic --evaluations {}", 100 * generations);
+            let command =
+                shell::on("specgen tune", name, &format!("--optimiser genetic --evaluations {}", 100 * generations));
             Ok(specgen_report::paper::convergence::section(&found, &command))
         }
         Err(convergence::ConvergenceError::NothingToTune(why)) => Ok(absent(&format!("{why}."))),

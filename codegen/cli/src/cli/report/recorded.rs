@@ -1,17 +1,16 @@
 //! `specgen report --record`: a run of a machine, run again by bits, and with a simulated machine in its place.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 use host_sim::controller::{MachineWord, Supervised};
-use host_sim::record::{self, Block, Reader};
+use host_sim::record::{self, Block};
 use specgen_compiler::compile::Compiled;
 use specgen_report::record::{Run, Sample};
 use specgen_runtime::record::Reason;
 
 use super::beside;
 use super::words::Words;
+use crate::cli::replay;
 use crate::cli::sim::{emitted, environment};
 use crate::cli::ui::{Failure, Ui};
 
@@ -21,8 +20,7 @@ const FAULTED: u8 = 5;
 /// Reads a record and runs its ticks again, with its own readings and with those of a simulated machine.
 pub fn read(path: &Path, compiled: &Compiled, ui: &Ui) -> Result<Run, Failure> {
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{}: {error}", path.display()));
-    let file = File::open(path).map_err(|error| refuse(&format_args!("cannot be read: {error}")))?;
-    let mut reader = Reader::new(BufReader::with_capacity(1 << 20, file)).map_err(|error| refuse(&error))?;
+    let mut reader = replay::open(path)?;
     let recorded = &reader.header().description;
     if recorded.digest != compiled.ir.digest {
         return Err(refuse(&format_args!(

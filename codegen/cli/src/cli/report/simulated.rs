@@ -9,6 +9,7 @@ use specgen_compiler::compile::Compiled;
 use specgen_compiler::stability::platform::Law;
 use specgen_language::diagnostic::codes;
 use specgen_language::model::TaskSpace;
+use specgen_language::shell;
 use specgen_report::budget::{self, Pair};
 use specgen_report::first::Errors;
 use specgen_report::platform::{self, Motion};
@@ -59,7 +60,7 @@ fn of_platform(
     let law = margins::name(Law::ALL.get(mode as usize).copied().unwrap_or(Law::Position));
     let corners = compiled.findings.iter().any(|finding| finding.code == codes::TRAJECTORY_CORNERS.id);
     let mut sections =
-        vec![tracking::section(&all, &law, model.timing.period, corners, &format!("specgen sim {name} -o DIR"))];
+        vec![tracking::section(&all, &law, model.timing.period, corners, &shell::on("specgen sim", name, "-o DIR"))];
     let played = all.iter().find(|one| one.own && one.run.is_some());
     if let Some((one, run)) = played.and_then(|one| Some((one, one.run.as_ref()?))) {
         let motion = Motion::of_platform(&platform, run, model.timing.period);
@@ -77,11 +78,11 @@ fn of_platform(
     ui.progress("error budget");
     let pair = Pair { own: &mut *controller, fine };
     sections.push(budget::of_platform(model, task, &specimen, pair, SEED, &all).map_err(environment)?);
-    sections.push(margins::section(compiled, mode, &format!("specgen check {name}")));
+    sections.push(margins::section(compiled, mode, &shell::on("specgen check", name, "")));
     if task.correction.is_some() {
         ui.progress("learning between passes");
     }
-    let learned = learning::section(compiled, task, &scenario, controller, &format!("specgen learn {name}"));
+    let learned = learning::section(compiled, task, &scenario, controller, &shell::on("specgen learn", name, ""));
     sections.extend(learned.map_err(|error| Failure::Gate(error.to_string()))?);
     ui.progress("hysteresis of each leg");
     let legs = &specimen.legs;
@@ -124,7 +125,7 @@ fn of_legs(
     let mode = usize::from(adaptation.level_weight > 0.0) + usize::from(adaptation.drift_weight > 0.0);
     let (law, word) = MODES[mode];
     let law = margins::adapting_name(law);
-    let mut tracked = Section::new("tracking", "Tracking", &format!("specgen sim {name} -o DIR"));
+    let mut tracked = Section::new("tracking", "Tracking", &shell::on("specgen sim", name, "-o DIR"));
     let (mut values, mut motion) = (Vec::new(), None);
     for frequency in LEG_FREQUENCIES {
         ui.progress(&format!("six legs at {frequency} Hz"));
@@ -157,7 +158,7 @@ fn of_legs(
     }
     ui.progress("error budget");
     sections.push(budget::of_legs(&leg, mode, Pair { own: &mut *controller, fine }, SEED).map_err(environment)?);
-    sections.push(margins::section(compiled, mode as u32, &format!("specgen check {name}")));
+    sections.push(margins::section(compiled, mode as u32, &shell::on("specgen check", name, "")));
     sections.push(hysteresis::of_legs(&leg, model.actuator.voltage[0], &compiled.records));
     let said = values
         .iter()

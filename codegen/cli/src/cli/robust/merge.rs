@@ -1,13 +1,11 @@
 //! `specgen robust merge`: the report of a study whose parts were run apart.
 
-use std::fs;
-use std::path::PathBuf;
-
 use clap::Args;
 
 use super::Results;
 use super::work::Part;
-use crate::cli::file::claim;
+use crate::cli::file::{claim, read_text};
+use crate::cli::named::{InputFile, OutputFolder};
 use crate::cli::plot::Plot;
 use crate::cli::ui::{Failure, Ui};
 use specgen_studies::robust::shard;
@@ -18,10 +16,10 @@ use specgen_studies::robust::shard;
 pub struct Arguments {
     /// Files that --shard wrote, all of one study, in any order.
     #[arg(value_name = "PART", required = true)]
-    parts: Vec<PathBuf>,
+    parts: Vec<InputFile>,
     /// Write runs (CSV) and report (JSON) here.
     #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
+    output: Option<OutputFolder>,
     #[command(flatten)]
     plot: Plot,
 }
@@ -31,9 +29,7 @@ pub(super) fn run(arguments: &Arguments, ui: &Ui) -> Result<(), Failure> {
     let mut read = Vec::new();
     for path in &arguments.parts {
         let name = path.display().to_string();
-        let text = fs::read_to_string(path)
-            .map_err(|error| Failure::Environment(format!("could not read `{name}`: {error}")))?;
-        let part = Part::read(&text).map_err(|why| Failure::Gate(format!("`{name}` {why}")))?;
+        let part = Part::read(&read_text(path)?).map_err(|why| Failure::Gate(format!("`{name}` {why}")))?;
         if let Some((first, other)) = read.first()
             && let Some((what, here, there)) = part.differs(other)
         {

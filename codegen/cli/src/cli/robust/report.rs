@@ -3,9 +3,10 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
+use specgen_language::shell;
 use specgen_report::chart::{Axis, Chart, DOTS};
 
-use super::work::{Lessons, Work, quoted};
+use super::work::{Lessons, Work};
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::Outcome as Shown;
 use specgen_studies::robust::quantiles::quantile;
@@ -213,7 +214,7 @@ impl<'a> Found<'a> {
     /// The command that runs one member alone.
     fn replay(&self, member: &Member) -> String {
         let Work { spec, options, .. } = self.work;
-        format!("specgen robust {} --replay {}{options}", quoted(spec), member.name)
+        shell::line("specgen robust").path(spec).words("--replay").word(&member.name).words(options.trim_start()).into()
     }
 
     fn figures(&self, outcome: &Outcome) -> String {

@@ -1,6 +1,5 @@
 //! What a study was asked to do, and a part of what it did, as a file.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use host_sim::plant::LegParameters;
@@ -12,6 +11,7 @@ use crate::cli::file::write_file;
 use crate::cli::trajectory::Followed;
 use crate::cli::ui::{Failure, Outcome as Shown, Ui};
 use specgen_compiler::compile::Compiled;
+use specgen_language::shell;
 use specgen_studies::robust::{Factors, Gate, Learning, Member, Outcome, Plan, Shard, shard};
 use specgen_toolchain::sha256;
 
@@ -131,43 +131,32 @@ impl Work {
 /// What a replay of a member has to be given as well.
 fn options(arguments: &StudyArguments) -> String {
     let StudyArguments { vary, trajectory, frequency, plant, diverged_above, learn, .. } = arguments;
-    let mut out = String::new();
-    // Writing to a String cannot fail, here and below.
+    let mut out = shell::line("");
     if plant.seed != 1 {
-        let _ = write!(out, " --seed {}", plant.seed);
+        out = out.words(&format!("--seed {}", plant.seed));
     }
     if let Some(name) = trajectory {
-        let _ = write!(out, " --trajectory {}", quoted(name));
+        out = out.words("--trajectory").word(name);
     }
     if let Some(hertz) = frequency {
-        let _ = write!(out, " --frequency {hertz}");
+        out = out.words(&format!("--frequency {hertz}"));
     }
     for given in vary {
-        let _ = write!(out, " --vary {}={}:{}", given.factor, given.range[0], given.range[1]);
+        out = out.words("--vary").word(&format!("{}={}:{}", given.factor, given.range[0], given.range[1]));
     }
     if let Some(bound) = diverged_above {
-        let _ = write!(out, " --diverged-above '{bound:e} m'");
+        out = out.words("--diverged-above").word(&format!("{bound:e} m"));
     }
     if let Some(passes) = learn {
-        let _ = write!(out, " --learn {passes}");
+        out = out.words(&format!("--learn {passes}"));
     }
     if let Some(path) = &plant.plant {
-        let _ = write!(out, " --plant {}", quoted(&path.display().to_string()));
+        out = out.words("--plant").path(path);
     }
     if plant.no_noise {
-        out.push_str(" --no-noise");
+        out = out.words("--no-noise");
     }
-    out
-}
-
-/// As a shell takes it for one word.
-pub(super) fn quoted(text: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./+=:%,".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        text.to_owned()
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
-    }
+    out.into()
 }
 
 /// A member and what became of it.

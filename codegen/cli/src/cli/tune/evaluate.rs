@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
 use host_sim::controller::Controller;
 use serde::Serialize;
 
+use super::super::file::read_text;
 use super::super::sim::environment;
 use super::super::ui::{Failure, Outcome, Ui};
 use super::Job;
@@ -18,8 +18,7 @@ use specgen_studies::tuning::{self, Evaluation, Setting, Space};
 /// The candidates of a file; every name and number is looked at before any is run.
 pub(super) fn read(file: &Path, space: &Space) -> Result<Vec<Setting>, Failure> {
     let shown = file.display();
-    let text =
-        fs::read_to_string(file).map_err(|error| Failure::Environment(format!("could not read `{shown}`: {error}")))?;
+    let text = read_text(file)?;
     let asked: Vec<BTreeMap<String, f64>> = serde_json::from_str(&text).map_err(|error| {
         Failure::Gate(format!("`{shown}`: expected an array of objects such as [{{\"level\": 0.2}}]: {error}"))
     })?;

@@ -20,5 +20,6 @@ pub const PART: Part = Part {
         "src/histogram.rs",
         "src/lib.rs",
         "src/scheduling.rs",
+        "src/signals.rs",
     },
 };

@@ -25,6 +25,7 @@ pub const PART: Part = Part {
         "src/operator.rs",
         "src/options.rs",
         "src/passes.rs",
+        "src/outputs.rs",
         "src/record.rs",
         "src/samples.rs",
         "src/service.rs",

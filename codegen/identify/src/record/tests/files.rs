@@ -179,7 +179,7 @@ fn what_is_refused_says_what_is_then_taken() {
     let found = read(b"time_s,drive_V,displacement_um\n0,0,0\n", &["drive_V=7"], None).unwrap_err();
     assert!(found[0].message.contains("names `7` for `drive_V`"), "{found:?}");
     for (magic, word) in [
-        (&b"MATLAB 5.0 MAT-file, Platform"[..], "loadmat('r.csv')"),
+        (&b"MATLAB 5.0 MAT-file, Platform"[..], "loadmat(sys.argv[1])"),
         (b"MATLAB 7.3 MAT-file, Platform", "h5py"),
         (b"\x89HDF\r\n\x1a\n", "h5py"),
         (b"TDSm\x0e\0\0\0", "nptdms"),

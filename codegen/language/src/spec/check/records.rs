@@ -1,9 +1,9 @@
 //! The measurement files that a spec names: their number, their paths, and that they can be opened.
 
-use std::fs::File;
 use std::path::Path;
 
 use crate::diagnostic::codes;
+use crate::files;
 use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
 use crate::spec::text;
@@ -52,13 +52,5 @@ fn readable_of(f: &Fields, dir: &Path, findings: &mut Findings, key: &str) -> Op
 }
 
 fn cannot_open(path: &Path) -> Option<String> {
-    if path.is_dir() {
-        return Some("it is a folder".to_owned());
-    }
-    if !path.is_file() {
-        // Opening a device or a pipe could wait for ever.
-        let exists = path.try_exists().unwrap_or(false);
-        return Some(if exists { "it is not a regular file" } else { "there is no such file" }.to_owned());
-    }
-    File::open(path).err().map(|error| error.to_string())
+    files::open_file(path).err().map(|unread| unread.to_string())
 }

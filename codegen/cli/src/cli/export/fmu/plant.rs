@@ -1,7 +1,6 @@
 //! The unit of the simulated machine: the plant of `specgen sim` with all that it is made of.
 
 use std::collections::BTreeMap;
-use std::fs;
 
 use host_sim::plant::LegParameters;
 use host_sim::word::{Scalar, WordKind};
@@ -14,6 +13,7 @@ use toml_edit::{Array, DocumentMut};
 
 use super::sources::{SIMULATOR, UNIT};
 use super::{Built, Unit, Variable};
+use crate::cli::file::write_scratch;
 use crate::cli::sim::environment;
 use crate::cli::ui::{Failure, Ui};
 
@@ -33,10 +33,7 @@ pub(super) fn built(compiled: &Compiled, ui: &Ui) -> Result<Built, Failure> {
     let scratch = Scratch::new().map_err(environment)?;
     let sources = scratch.path().join("sources");
     for (name, text) in &rust {
-        let path = sources.join("rust").join(name);
-        fs::create_dir_all(path.parent().unwrap_or(&sources))
-            .and_then(|()| fs::write(&path, text))
-            .map_err(environment)?;
+        write_scratch(&sources.join("rust").join(name), text.as_bytes())?;
     }
     let own =
         [("model.h", MODEL.to_owned()), ("fmu.h", unit.header(&format!("#define FMU_PLANT {}\n", literal(&text))))];

@@ -1,0 +1,140 @@
+//! Files and folders that arguments name. What each is for is its type, so that one look at the arguments serves every command: no
+//! output is an input, and no two outputs are one file.
+
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::ops::Deref;
+use std::path::{Path, PathBuf};
+
+use clap::builder::{MapValueParser, PathBufValueParser, TypedValueParser, ValueParserFactory};
+use clap::{ArgMatches, ValueHint};
+
+use super::file::refused_output;
+use super::ui::Failure;
+use specgen_language::files::{self, Unwritten, Way};
+
+macro_rules! named {
+    ($($(#[$doc:meta])* $name:ident)*) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, PartialEq, Eq)]
+        pub struct $name(PathBuf);
+
+        impl Deref for $name {
+            type Target = Path;
+            fn deref(&self) -> &Path {
+                &self.0
+            }
+        }
+
+        impl AsRef<Path> for $name {
+            fn as_ref(&self) -> &Path {
+                self
+            }
+        }
+
+        impl AsRef<OsStr> for $name {
+            fn as_ref(&self) -> &OsStr {
+                self.0.as_ref()
+            }
+        }
+
+        impl From<PathBuf> for $name {
+            fn from(path: PathBuf) -> Self {
+                Self(path)
+            }
+        }
+
+        impl ValueParserFactory for $name {
+            type Parser = MapValueParser<PathBufValueParser, fn(PathBuf) -> Self>;
+            fn value_parser() -> Self::Parser {
+                PathBufValueParser::new().map(Self)
+            }
+        }
+    )*};
+}
+
+named! {
+    /// A file that the command reads.
+    InputFile
+    /// A file that the command writes, whole.
+    OutputFile
+    /// A folder that the command writes files into, or the beginning of their names.
+    OutputFolder
+    /// What is no file of data: a device, a socket.
+    Endpoint
+}
+
+/// Refuses arguments of which one would replace what another names, and outputs that cannot be written, before anything is read.
+pub fn check(matches: &ArgMatches) -> Result<(), Failure> {
+    let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
+    collect(matches, &mut inputs, &mut outputs);
+    inputs.iter().for_each(|path| files::note_input(path));
+    let mut seen = BTreeSet::new();
+    for path in &outputs {
+        let way = files::guard(path).map_err(|why| refused_output(path, &why))?;
+        let Way::File(target) = way else { continue };
+        if !seen.insert(whole(&target)) {
+            return Err(refused_output(path, &Unwritten::Twice));
+        }
+    }
+    Ok(())
+}
+
+/// The same name for the same file, which need not be there.
+fn whole(target: &Path) -> PathBuf {
+    let absolute = std::path::absolute(target).unwrap_or_else(|_| target.to_owned());
+    let folder = absolute.parent().and_then(|folder| folder.canonicalize().ok());
+    folder.zip(absolute.file_name()).map_or(absolute.clone(), |(folder, name)| folder.join(name))
+}
+
+fn collect(matches: &ArgMatches, inputs: &mut Vec<PathBuf>, outputs: &mut Vec<PathBuf>) {
+    for id in matches.ids().map(clap::Id::as_str) {
+        if let Ok(Some(found)) = matches.try_get_many::<InputFile>(id) {
+            inputs.extend(found.map(|one| one.0.clone()));
+        }
+        if let Ok(Some(found)) = matches.try_get_many::<OutputFile>(id) {
+            outputs.extend(found.map(|one| one.0.clone()));
+        }
+    }
+    if let Some((_, below)) = matches.subcommand() {
+        collect(below, inputs, outputs);
+    }
+}
+
+/// What an argument names; none for one that names no file.
+pub fn role(argument: &clap::Arg) -> Option<Role> {
+    use clap::builder::ValueParser;
+    let is = |parser: ValueParser| argument.get_value_parser().type_id() == parser.type_id();
+    let roles = [
+        (ValueParser::from(InputFile::value_parser()), Role::Input),
+        (ValueParser::from(OutputFile::value_parser()), Role::Output),
+        (ValueParser::from(OutputFolder::value_parser()), Role::Folder),
+        (ValueParser::from(Endpoint::value_parser()), Role::Endpoint),
+        (ValueParser::path_buf(), Role::Unknown),
+    ];
+    roles.into_iter().find(|(parser, _)| is(parser.clone())).map(|(_, role)| role)
+}
+
+/// What an argument that names a path is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// It is read.
+    Input,
+    /// It is written.
+    Output,
+    /// Files are written into it.
+    Folder,
+    /// A device or a socket.
+    Endpoint,
+    /// Its type does not say: no argument may be so.
+    Unknown,
+}
+
+/// Shells complete the names of files.
+pub fn with_hints(command: clap::Command) -> clap::Command {
+    let command = command.mut_args(|argument| match role(&argument) {
+        Some(_) => argument.value_hint(ValueHint::AnyPath),
+        None => argument,
+    });
+    command.mut_subcommands(with_hints)
+}

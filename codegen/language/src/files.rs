@@ -1,0 +1,366 @@
+//! Files that a user names: one way in, and one guard of every way out.
+//!
+//! [`open`] looks at the kind of a file before it opens it, and keeps in mind which file a command has read. [`guard`] refuses an
+//! output that would replace one of those, whatever its name. Both are of one command at a time: [`begin`] forgets. A command opens
+//! its files in the thread that performs it.
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::fs::{self, File, Metadata, OpenOptions};
+use std::io::{self, Read};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use rustix::fs::{Access, OFlags, access, fcntl_setfl};
+
+/// Larger files whose content is kept in memory are refused, bytes.
+pub const MAX_BYTES: u64 = 256 << 20;
+/// A reader of a pipe that is written to has so long to open it.
+const READER: Duration = Duration::from_secs(2);
+/// As many links lead from one to the next, as Linux has it.
+const LINKS: usize = 40;
+
+/// Which file it is, whatever its name: device and inode.
+type Identity = (u64, u64);
+
+thread_local! {
+    /// What the command of this thread has read, by the first name of each.
+    static INPUTS: RefCell<BTreeMap<Identity, PathBuf>> = const { RefCell::new(BTreeMap::new()) };
+    /// What it has written.
+    static WRITTEN: RefCell<BTreeSet<Identity>> = const { RefCell::new(BTreeSet::new()) };
+}
+
+/// A command begins: nothing is read or written yet.
+pub fn begin() {
+    INPUTS.take();
+    WRITTEN.take();
+}
+
+/// What was written may be written again, as an order of a session does; what was read is kept in mind.
+pub fn begin_again() {
+    WRITTEN.take();
+}
+
+fn identity(found: &Metadata) -> Identity {
+    (found.dev(), found.ino())
+}
+
+fn remember(found: &Metadata, path: &Path) {
+    INPUTS.with_borrow_mut(|inputs| {
+        inputs.entry(identity(found)).or_insert_with(|| path.to_owned());
+    });
+}
+
+/// What kind of file it is, in words.
+fn kind(found: &Metadata) -> &'static str {
+    let kind = found.file_type();
+    if kind.is_dir() {
+        "a folder"
+    } else if kind.is_fifo() {
+        "a named pipe (FIFO)"
+    } else if kind.is_socket() {
+        "a socket"
+    } else if kind.is_file() {
+        "a regular file"
+    } else {
+        "a device"
+    }
+}
+
+/// Why a file cannot be read.
+#[derive(Debug)]
+pub enum Unread {
+    /// It is no regular file, but this.
+    Kind(&'static str),
+    /// It has more bytes than this.
+    Large(u64),
+    /// It is no text in UTF-8 from this byte on, which is in this line (from 1).
+    Text {
+        /// From 0.
+        byte: usize,
+        /// From 1.
+        line: usize,
+    },
+    /// What the system says.
+    System(io::Error),
+}
+
+impl Unread {
+    /// What to do about it.
+    #[must_use]
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::Kind("a folder") => "name a file in it",
+            Self::Kind(_) => "store what it gives in a file, and name that",
+            Self::Large(_) => "name a smaller file",
+            Self::Text { .. } => "save it as text in UTF-8",
+            Self::System(_) => "check the path and its permissions",
+        }
+    }
+}
+
+impl fmt::Display for Unread {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Kind(kind) => write!(f, "it is {kind}, expected a regular file"),
+            Self::Large(limit) if *limit < 1 << 20 => write!(f, "it is larger than {limit} bytes"),
+            Self::Large(limit) => write!(f, "it is larger than {} MiB", limit >> 20),
+            Self::Text { byte, line } => write!(f, "it is no text in UTF-8: byte {byte}, in line {line}"),
+            Self::System(error) => match error.kind() {
+                io::ErrorKind::NotFound => f.write_str("there is no such file"),
+                io::ErrorKind::PermissionDenied => f.write_str("reading it is not permitted"),
+                _ => error.fmt(f),
+            },
+        }
+    }
+}
+
+impl std::error::Error for Unread {}
+
+impl From<io::Error> for Unread {
+    fn from(error: io::Error) -> Self {
+        Self::System(error)
+    }
+}
+
+/// Opens a regular file to read, or a pipe that this process was given, such as `/dev/stdin` or `<(…)` of a shell. A named pipe is
+/// refused: without a writer it would wait for ever.
+///
+/// # Errors
+/// If it is of another kind, or the system refuses it.
+pub fn open(path: &Path) -> Result<File, Unread> {
+    let found = fs::metadata(path)?;
+    // What has no name is in the hands of this process already.
+    let given = found.file_type().is_fifo() && fs::canonicalize(path).is_err();
+    if given { opened(path, &found, true) } else { open_file(path) }
+}
+
+/// Opens a regular file to read.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_file(path: &Path) -> Result<File, Unread> {
+    opened(path, &fs::metadata(path)?, false)
+}
+
+fn opened(path: &Path, found: &Metadata, pipe: bool) -> Result<File, Unread> {
+    let fits = |found: &Metadata| found.is_file() || (pipe && found.file_type().is_fifo());
+    if !fits(found) {
+        return Err(Unread::Kind(kind(found)));
+    }
+    // It may be another file by now: opening this one waits for nobody, and it is looked at again.
+    let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
+    let file = OpenOptions::new().read(true).custom_flags(flags.bits().cast_signed()).open(path)?;
+    let found = file.metadata()?;
+    if !fits(&found) {
+        return Err(Unread::Kind(kind(&found)));
+    }
+    if pipe {
+        fcntl_setfl(&file, OFlags::empty()).map_err(io::Error::from)?;
+    } else {
+        remember(&found, path);
+    }
+    Ok(file)
+}
+
+/// Looks whether [`read`] would read a file of at most [`MAX_BYTES`].
+///
+/// # Errors
+/// As [`read`].
+pub fn look(path: &Path) -> Result<(), Unread> {
+    let found = open(path)?.metadata()?;
+    if found.is_file() && found.len() > MAX_BYTES { Err(Unread::Large(MAX_BYTES)) } else { Ok(()) }
+}
+
+/// The content of a file.
+///
+/// # Errors
+/// As [`open`], and if it has more bytes than `limit`.
+pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, Unread> {
+    content(open(path)?, limit)
+}
+
+/// What is left of an open file.
+///
+/// # Errors
+/// If it has more bytes than `limit`, or the system refuses it.
+pub fn content(file: File, limit: u64) -> Result<Vec<u8>, Unread> {
+    let mut bytes = Vec::new();
+    // One more tells that it is too large.
+    file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit { Err(Unread::Large(limit)) } else { Ok(bytes) }
+}
+
+/// The content of a text file of at most [`MAX_BYTES`].
+///
+/// # Errors
+/// As [`read`], and if it is not in UTF-8.
+pub fn text(path: &Path) -> Result<String, Unread> {
+    text_of(path, MAX_BYTES)
+}
+
+/// The same with another limit, bytes.
+///
+/// # Errors
+/// As [`text`].
+pub fn text_of(path: &Path, limit: u64) -> Result<String, Unread> {
+    String::from_utf8(read(path, limit)?).map_err(|error| {
+        let byte = error.utf8_error().valid_up_to();
+        let line = 1 + error.as_bytes()[..byte].iter().filter(|byte| **byte == b'\n').count();
+        Unread::Text { byte, line }
+    })
+}
+
+/// Keeps in mind that a command reads this file, before it does.
+pub fn note_input(path: &Path) {
+    if let Ok(found) = fs::metadata(path)
+        && found.is_file()
+    {
+        remember(&found, path);
+    }
+}
+
+/// The input that this file is, by the name it was read by; none if the command has not read it.
+fn input(path: &Path) -> Option<PathBuf> {
+    let found = fs::metadata(path).ok()?;
+    INPUTS.with_borrow(|inputs| inputs.get(&identity(&found)).cloned())
+}
+
+/// Why a file cannot be written.
+#[derive(Debug)]
+pub enum Unwritten {
+    /// It is this input of the same command.
+    Input(PathBuf),
+    /// The same command has written it already.
+    Twice,
+    /// Nobody may write to it.
+    Protected,
+    /// It is of a kind that no output can be.
+    Kind(&'static str),
+    /// It is a pipe that nobody reads.
+    Unheard,
+    /// What the system says.
+    System(io::Error),
+}
+
+impl fmt::Display for Unwritten {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Input(name) => {
+                write!(f, "it is an input of this command, `{}`; name another file", name.display())
+            }
+            Self::Twice => f.write_str("another output of this command has the same name; name two files"),
+            Self::Protected => f.write_str("it is write-protected; name another file, or permit writing to this one"),
+            Self::Kind("a folder") => f.write_str("it is a folder, name a file in it"),
+            Self::Kind(kind) => write!(f, "it is {kind}; name a regular file"),
+            Self::Unheard => f.write_str("no program reads this pipe; start its reader first"),
+            Self::System(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for Unwritten {}
+
+impl From<io::Error> for Unwritten {
+    fn from(error: io::Error) -> Self {
+        Self::System(error)
+    }
+}
+
+/// Where an output that may be written goes.
+#[derive(Debug)]
+pub enum Way {
+    /// A regular file of this name, which is there or not: no link.
+    File(PathBuf),
+    /// A device or a pipe.
+    Device,
+}
+
+/// Looks whether a command may write this file: it is none of its inputs and none of its other outputs, by device and inode, and
+/// whoever owns it permits it.
+///
+/// # Errors
+/// Why not.
+pub fn guard(path: &Path) -> Result<Way, Unwritten> {
+    if let Some(name) = input(path) { Err(Unwritten::Input(name)) } else { guard_edit(path) }
+}
+
+/// The same for a command whose purpose is to edit an input.
+///
+/// # Errors
+/// As [`guard`].
+pub fn guard_edit(path: &Path) -> Result<Way, Unwritten> {
+    let target = behind_links(path)?;
+    let found = match fs::metadata(path) {
+        Ok(found) => found,
+        // What is missing above it is made, or stands in the way then.
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+            return Ok(Way::File(target));
+        }
+        Err(error) => return Err(error.into()),
+    };
+    let of = found.file_type();
+    if of.is_dir() || of.is_socket() || of.is_block_device() {
+        return Err(Unwritten::Kind(if of.is_block_device() { "a disk" } else { kind(&found) }));
+    }
+    if !found.is_file() {
+        return Ok(Way::Device);
+    }
+    if WRITTEN.with_borrow(|written| written.contains(&identity(&found))) {
+        return Err(Unwritten::Twice);
+    }
+    // Whoever may write everything, as root, still means what the permissions say.
+    if found.mode() & 0o222 == 0 || access(path, Access::WRITE_OK).is_err() {
+        return Err(Unwritten::Protected);
+    }
+    Ok(Way::File(target))
+}
+
+/// Keeps in mind that the command has written this file.
+pub fn note_output(path: &Path) {
+    if let Ok(found) = fs::metadata(path) {
+        WRITTEN.with_borrow_mut(|written| written.insert(identity(&found)));
+    }
+}
+
+/// The name that links lead to, which need not be there.
+fn behind_links(path: &Path) -> io::Result<PathBuf> {
+    if let Ok(whole) = fs::canonicalize(path) {
+        return Ok(whole);
+    }
+    let mut target = path.to_owned();
+    for _ in 0..LINKS {
+        match fs::read_link(&target) {
+            Ok(next) => target = target.parent().unwrap_or(Path::new("")).join(next),
+            Err(_) => return Ok(target),
+        }
+    }
+    Err(io::Error::other("links lead in a circle"))
+}
+
+/// Opens a device or a pipe to write to. A pipe that nobody reads is refused after a moment.
+///
+/// # Errors
+/// If nobody reads the pipe, or the system refuses it.
+pub fn open_device(path: &Path) -> Result<File, Unwritten> {
+    let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
+    let until = Instant::now() + READER;
+    loop {
+        match OpenOptions::new().write(true).custom_flags(flags.bits().cast_signed()).open(path) {
+            Ok(file) => {
+                fcntl_setfl(&file, OFlags::empty()).map_err(io::Error::from)?;
+                return Ok(file);
+            }
+            Err(error) if error.raw_os_error() != Some(rustix::io::Errno::NXIO.raw_os_error()) => {
+                return Err(error.into());
+            }
+            Err(_) if Instant::now() >= until => return Err(Unwritten::Unheard),
+            Err(_) => std::thread::sleep(Duration::from_millis(20)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

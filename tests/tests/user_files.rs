@@ -1,0 +1,127 @@
+//! Every file of a user is opened by `specgen_language::files` and written by `codegen/cli/src/cli/file.rs`, which look at its kind and at
+//! what it is to the command. Whatever else opens, writes or moves a file is listed here, with its number of places and whose file it is.
+
+use std::path::{Path, PathBuf};
+
+use specgen_tests::repository;
+
+/// What opens, writes or replaces a file without a look at it.
+const DOORS: [&str; 9] = [
+    "File::open(",
+    "File::create(",
+    "fs::read(",
+    "fs::read_to_string(",
+    "fs::write(",
+    "fs::rename(",
+    "fs::copy(",
+    "OpenOptions::new()",
+    "File::options()",
+];
+
+const OWN: &str = "in a folder of the program's own";
+const SYSTEM: &str = "a file of the system";
+const OUTPUT: &str = "the output folder, which is specgen's as its manifest says";
+const DEVICE: &str = "a device or shared memory, opened without waiting";
+
+/// Places by file.
+const LISTED: &[(&str, usize, &str)] = &[
+    ("codegen/cli/src/cli/export.rs", 1, OWN),
+    ("codegen/cli/src/cli/export/fmu.rs", 1, OWN),
+    ("codegen/cli/src/cli/file.rs", 1, OWN),
+    ("codegen/cli/src/cli/operate/panel/http.rs", 1, SYSTEM),
+    ("codegen/compiler/src/golden.rs", 3, "of the tests"),
+    ("codegen/compiler/src/workspace/found.rs", 2, OUTPUT),
+    ("codegen/compiler/src/workspace/hold.rs", 1, OUTPUT),
+    ("codegen/compiler/src/workspace/output.rs", 6, OUTPUT),
+    ("codegen/compiler/src/workspace/output/replace.rs", 3, OUTPUT),
+    ("codegen/identify/src/container.rs", 2, "opened before by `files`, whose readers want a path"),
+    ("codegen/language/src/files.rs", 2, "the door"),
+    ("codegen/language/src/interrupt.rs", 1, OWN),
+    ("codegen/language/src/lock.rs", 2, OWN),
+    ("codegen/operate/src/doctor.rs", 1, SYSTEM),
+    ("codegen/operate/src/doctor/equipment.rs", 1, SYSTEM),
+    ("codegen/operate/src/doctor/latency.rs", 1, SYSTEM),
+    ("codegen/operate/src/pil/pipes.rs", 3, OWN),
+    ("codegen/operate/src/pil/serial.rs", 1, DEVICE),
+    ("codegen/studies/src/reproduce/embedded.rs", 1, OWN),
+    ("codegen/toolchain/src/apt.rs", 1, OWN),
+    ("codegen/toolchain/src/build.rs", 2, OWN),
+    ("codegen/toolchain/src/cache.rs", 5, OWN),
+    ("codegen/toolchain/src/cache/key.rs", 3, "of cargo's workspace and settings"),
+    ("codegen/toolchain/src/emulator.rs", 1, OWN),
+    ("codegen/toolchain/src/process.rs", 3, OWN),
+    ("codegen/toolchain/src/replay.rs", 2, OWN),
+    ("codegen/toolchain/src/trace.rs", 1, OWN),
+    ("codegen/toolchain/src/unpacked.rs", 3, OWN),
+    ("firmware/rt-pc/src/capture.rs", 2, "looked at by `outputs::check`"),
+    ("firmware/rt-pc/src/outputs.rs", 1, "the door of `rt-pc`"),
+    ("firmware/rt/src/exchange.rs", 1, DEVICE),
+    ("firmware/rt/src/exchange/mapping.rs", 2, DEVICE),
+    ("firmware/rt/src/scheduling.rs", 1, SYSTEM),
+];
+
+/// Sources of what is shipped, without their tests.
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let is_test = path.file_stem().is_some_and(|stem| stem == "tests");
+        if path.is_dir() && !is_test {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|end| end == "rs") && !is_test {
+            found.push(path);
+        }
+    }
+}
+
+/// How often a source opens a file by itself.
+fn doors(text: &str) -> usize {
+    let code = text.lines().take_while(|line| !line.contains("#[cfg(test)]"));
+    let code: Vec<&str> = code.filter_map(|line| line.split("//").next()).collect();
+    let count = |line: &str| -> usize {
+        let of = |door: &&str| {
+            let places = line.match_indices(door.trim_end_matches("()"));
+            // `PendingFile::create` is another one's.
+            places.filter(|(at, _)| !line[..*at].ends_with(|c: char| c.is_alphanumeric() && !line[..*at].ends_with("Tdms"))).count()
+        };
+        DOORS.iter().map(of).sum()
+    };
+    code.into_iter().filter(|line| !line.trim_start().starts_with("use ")).map(count).sum()
+}
+
+#[test]
+fn no_file_of_a_user_is_opened_by_another_door() {
+    let root = repository();
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(root.join("codegen")).unwrap() {
+        sources(&entry.unwrap().path().join("src"), &mut files);
+    }
+    ["host-sim/src", "firmware/rt/src", "firmware/rt-pc/src"].iter().for_each(|folder| sources(&root.join(folder), &mut files));
+    let mut found: Vec<(String, usize)> = Vec::new();
+    for file in files {
+        let count = doors(&std::fs::read_to_string(&file).unwrap());
+        let name = file.strip_prefix(&root).unwrap().to_str().unwrap().to_owned();
+        found.extend((count > 0).then_some((name, count)));
+    }
+    found.sort();
+    let listed: Vec<(String, usize)> = LISTED.iter().map(|(name, count, _)| ((*name).to_owned(), *count)).collect();
+    let new: Vec<_> = found.iter().filter(|one| !listed.contains(one)).collect();
+    assert!(new.is_empty(), "open these by specgen_language::files, write them by cli::file: {new:#?}");
+    let gone: Vec<_> = listed.iter().filter(|one| !found.contains(one)).collect();
+    assert!(gone.is_empty(), "no longer so, take them from the list: {gone:#?}");
+}
+
+#[test]
+fn a_door_is_seen() {
+    let cases = [
+        ("let text = std::fs::read_to_string(path)?;", 1),
+        ("fs::write(a, b).and_then(|()| fs::rename(a, c))", 2),
+        ("OpenOptions::new().write(true).open(path)", 1),
+        ("TdmsFile::open(path); hdf5_pure::File::open(path)", 2),
+        ("use std::fs::File::open(", 0),
+        ("// fs::read(path)\nPendingFile::create(path)", 0),
+        ("#[cfg(test)]\nfs::read(path)", 0),
+    ];
+    for (text, count) in cases {
+        assert_eq!(doors(text), count, "{text}");
+    }
+}
