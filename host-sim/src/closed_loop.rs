@@ -8,6 +8,7 @@ use std::fmt::{self, Write as _};
 use std::ops::ControlFlow;
 
 use crate::controller::{ControllerError, TickController};
+use crate::coverage::Coverage;
 use crate::description::DescriptionError;
 use crate::noise::{Gauge, Gaussian, amplifier};
 use crate::plant::{LegParameters, NoiseParameters, Plant};
@@ -69,6 +70,16 @@ pub struct Tracking {
     pub interval: f64,
     /// One sample per tick, at its end.
     pub samples: Vec<TrackingSample>,
+    /// Ticks of the path.
+    pub path: usize,
+}
+
+impl Tracking {
+    /// How much of the path the samples are.
+    #[must_use]
+    pub fn coverage(&self) -> Coverage {
+        Coverage::new(self.samples.len(), self.path, self.interval)
+    }
 }
 
 /// The end of one tick.
@@ -136,6 +147,13 @@ pub enum RunError {
         /// Its status word then.
         status: u32,
     },
+    /// A platform controller did not follow its path to the last set-point.
+    EndedEarly {
+        /// How far it followed.
+        coverage: Coverage,
+        /// Status bits: of a set-point that was refused or stale, or those of the last tick.
+        status: u32,
+    },
 }
 
 impl fmt::Display for RunError {
@@ -157,7 +175,16 @@ impl fmt::Display for RunError {
             Self::NotReady { limit, status } => {
                 write!(
                     f,
-                    "the controller is still on its way to the bias pose after {limit} s (status {status:#x}); lower the bias or raise its speed in the spec"
+                    "the controller is still on its way to the start of the path or the bias pose after {limit} s (status {status:#x}); lower the bias or raise control.setpoint.speed in the spec"
+                )
+            }
+            Self::EndedEarly { coverage, status } => {
+                let Coverage { seconds, path_seconds } = coverage;
+                write!(
+                    f,
+                    "the run ended early, after {seconds:.3} s of a path of {path_seconds:.3} s (status {status:#x}{}{}): there is no figure, for the error of a part is not that of the path",
+                    if *status == 0 { "" } else { ": " },
+                    status_words(*status)
                 )
             }
         }
@@ -267,7 +294,7 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
         trajectory: &dyn LegTrajectory,
         interval: f64,
     ) -> Result<Run, RunError> {
-        let ticks = ticks_within(trajectory.duration(), interval)?;
+        let (ticks, path) = ticks_of(trajectory, interval)?;
         let mut trace = Trace::new(controller.description().clone());
         let mut samples = Vec::with_capacity(ticks);
         self.follow(controller, trajectory, interval, |sample, words| {
@@ -275,7 +302,7 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
             samples.push(*sample);
             ControlFlow::Continue(())
         })?;
-        Ok(Run { trace, tracking: Tracking { interval, samples } })
+        Ok(Run { trace, tracking: Tracking { interval, samples, path } })
     }
 
     /// Makes voltages come `ticks` control intervals late, in every run from here on; that of rest before the first.
@@ -292,7 +319,8 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
         }
     }
 
-    /// As [`Rig::run`], but keeps nothing: `watch` sees the end of every tick with its words and may end the run.
+    /// As [`Rig::run`], but keeps nothing: `watch` sees the end of every tick with its words and may end the run. Returns how much
+    /// of the path was seen.
     ///
     /// # Errors
     /// As [`Rig::run`].
@@ -302,8 +330,8 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
         trajectory: &dyn LegTrajectory,
         interval: f64,
         mut watch: impl FnMut(&TrackingSample, &Words) -> ControlFlow<()>,
-    ) -> Result<(), RunError> {
-        let ticks = ticks_within(trajectory.duration(), interval)?;
+    ) -> Result<Coverage, RunError> {
+        let (ticks, path) = ticks_of(trajectory, interval)?;
         let wiring = Wiring::of(controller)?;
         let scalar = controller.description().scalar;
         let mut input = vec![0; controller.description().input_names.len()];
@@ -331,10 +359,10 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
             self.hold(&held, interval);
             measured = self.read();
             if watch(&TrackingSample { time, target, requested, measured }, &words).is_break() {
-                break;
+                return Ok(Coverage::new(tick + 1, path, interval));
             }
         }
-        Ok(())
+        Ok(Coverage::new(ticks, path, interval))
     }
 
     /// Holds six voltages (V) for `interval` (s), each with the noise of its amplifier.
@@ -354,6 +382,11 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
     pub fn read(&mut self) -> [f64; LEGS] {
         self.channels.each_mut().map(|channel| channel.gauge.read(channel.leg.seen()))
     }
+}
+
+/// Ticks of `interval` (s) of a leg trajectory, and of the path that it is the start of.
+fn ticks_of(trajectory: &dyn LegTrajectory, interval: f64) -> Result<(usize, usize), RunError> {
+    Ok((ticks_within(trajectory.duration(), interval)?, ticks_within(trajectory.whole(), interval)?))
 }
 
 /// Number of ticks of `interval` (s) in `duration` (s).

@@ -12,6 +12,7 @@
 
 pub mod closed_loop;
 pub mod controller;
+pub mod coverage;
 pub mod description;
 pub mod forc;
 pub mod noise;

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use crate::closed_loop::{LEGS, Tracking};
+use crate::coverage::Coverage;
 
 /// Tracking error of one run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -19,6 +20,9 @@ pub struct TrackingRow {
     pub leg_rmse_nm: [f64; LEGS],
     /// Largest |T − Y| of any leg, nm.
     pub peak_nm: f64,
+    /// What was measured.
+    #[serde(flatten)]
+    pub coverage: Coverage,
 }
 
 impl TrackingRow {
@@ -44,6 +48,7 @@ impl TrackingRow {
             rmse_nm: libm::sqrt(mean_square) * 1e9,
             leg_rmse_nm: squares.map(|square| libm::sqrt(square / count) * 1e9),
             peak_nm: peak * 1e9,
+            coverage: tracking.coverage(),
         }
     }
 }
@@ -56,10 +61,16 @@ pub struct TrackingTable {
 }
 
 impl TrackingTable {
-    /// Error of one run in nm, if it was made.
+    /// A run, if it was made.
+    #[must_use]
+    pub fn row(&self, mode: &str, frequency: f64) -> Option<&TrackingRow> {
+        self.rows.iter().find(|row| row.mode == mode && row.frequency_hz == frequency)
+    }
+
+    /// Its error, nm.
     #[must_use]
     pub fn rmse_nm(&self, mode: &str, frequency: f64) -> Option<f64> {
-        self.rows.iter().find(|row| row.mode == mode && row.frequency_hz == frequency).map(|row| row.rmse_nm)
+        self.row(mode, frequency).map(|row| row.rmse_nm)
     }
 
     /// CSV, one line per run.
@@ -70,18 +81,19 @@ impl TrackingTable {
             // Writing to a String cannot fail, here and below.
             let _ = write!(out, ",rmse_nm[{leg}]");
         }
-        out.push('\n');
+        out.push_str(",seconds,path_seconds\n");
         for row in &self.rows {
             let _ = write!(out, "{},{},{:.4},{:.4}", row.mode, row.frequency_hz, row.rmse_nm, row.peak_nm);
             for value in row.leg_rmse_nm {
                 let _ = write!(out, ",{value:.4}");
             }
-            out.push('\n');
+            let Coverage { seconds, path_seconds } = row.coverage;
+            let _ = writeln!(out, ",{seconds:.6},{path_seconds:.6}");
         }
         out
     }
 
-    /// Text: a line per mode, a column per frequency, nm rms.
+    /// Text: a line per mode, a column per frequency, nm rms; below them what was measured.
     #[must_use]
     pub fn to_text(&self) -> String {
         let mut modes: Vec<&str> = Vec::new();
@@ -105,6 +117,16 @@ impl TrackingTable {
                 let _ = write!(out, "{cell:>12}");
             }
         }
+        let of = |name: &str, time: fn(&Coverage) -> f64, out: &mut String| {
+            let _ = write!(out, "\n{name:<8}");
+            for frequency in &frequencies {
+                let row = self.rows.iter().find(|row| row.frequency_hz == *frequency);
+                let cell = row.map_or_else(String::new, |row| format!("{:.3}", time(&row.coverage)));
+                let _ = write!(out, "{cell:>12}");
+            }
+        };
+        of("over s", |coverage| coverage.seconds, &mut out);
+        of("path s", |coverage| coverage.path_seconds, &mut out);
         out.push('\n');
         out
     }
@@ -210,7 +232,7 @@ mod tests {
                 TrackingSample { time: n as f64, target, requested: target, measured }
             })
             .collect();
-        Tracking { interval: 1.0, samples }
+        Tracking { interval: 1.0, path: samples.len(), samples }
     }
 
     #[test]
@@ -246,11 +268,12 @@ mod tests {
         }
         assert_eq!(
             table.to_text(),
-            "nm rms        0.1 Hz       10 Hz\ninvhys         129.1       129.1\npcc              0.0         0.0\n"
+            "nm rms        0.1 Hz       10 Hz\ninvhys         129.1       129.1\npcc              0.0         0.0\n\
+             over s         3.000       3.000\npath s         3.000       3.000\n"
         );
         assert_eq!(
             table.to_csv().lines().nth(1),
-            Some(&*format!("invhys,0.1,129.0994,200.0000{}", ",129.0994".repeat(6)))
+            Some(&*format!("invhys,0.1,129.0994,200.0000{},3.000000,3.000000", ",129.0994".repeat(6)))
         );
         assert_eq!(table.rmse_nm("ewma", 0.1), None);
     }

@@ -14,6 +14,11 @@ pub trait LegTrajectory {
     /// Length in s.
     fn duration(&self) -> f64;
 
+    /// Length of the path that this is the start of, s.
+    fn whole(&self) -> f64 {
+        self.duration()
+    }
+
     /// Leg displacements in m at `time` (s, 0 to the duration).
     fn displacements(&self, time: f64) -> [f64; 6];
 }
@@ -22,6 +27,11 @@ pub trait LegTrajectory {
 pub trait PoseTrajectory {
     /// Length in s.
     fn duration(&self) -> f64;
+
+    /// Length of the path that this is the start of, s.
+    fn whole(&self) -> f64 {
+        self.duration()
+    }
 
     /// Pose with its derivatives at `time` (s, 0 to the duration).
     ///

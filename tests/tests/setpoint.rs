@@ -4,10 +4,14 @@
 use std::fs;
 
 use host_sim::controller::{Controller, TickController};
+use host_sim::coverage::Coverage;
+use host_sim::plant::LegParameters;
+use host_sim::platform::rig::Noise;
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTrajectory, Reading, Step};
 use specgen::diagnostic::Diagnostic;
 use specgen::ir::{self, Scalar};
 use specgen::lower::setpoint;
+use specgen::machine;
 use specgen::model::{self, Model, Trajectory, TrajectoryKind};
 use specgen::spec::{self, SpecSource};
 use specgen::waveform::{self, Waveform};
@@ -378,11 +382,21 @@ fn tables_with_jumps_wrong_units_or_places_out_of_reach_are_refused_by_line() {
     assert_eq!((codes(&found), line(&found[0]).1), (vec!["E0457"], Some(66)));
 }
 
-/// What a user does: a table beside the spec, played by the emitted controller.
+/// What a user does: tables beside the spec, played by the emitted controller.
 const WITH_TABLE: (&str, &str) = (
     "[timing]",
     "[[trajectory]]\nname = \"eight\"\nkind = \"waveform\"\nfile = \"records/eight.csv\"\nperiod = \"1 ms\"\n\n[timing]",
 );
+const WITH_TABLES: (&str, &str) = (
+    "[timing]",
+    "[[trajectory]]\nname = \"eight\"\nkind = \"waveform\"\nfile = \"records/eight.csv\"\nperiod = \"1 ms\"\n\n\
+     [[trajectory]]\nname = \"line\"\nkind = \"waveform\"\nfile = \"records/line.csv\"\nperiod = \"10 ms\"\n\n[timing]",
+);
+
+/// From x = −3 µm, where the bias is not, to 3 µm in a second.
+fn line() -> String {
+    (0..=100).fold("x_um\n".to_owned(), |text, k| text + &format!("{}\n", -3.0 + 0.06 * f64::from(k)))
+}
 
 /// `target` of an emitted controller that stands at its bias and then plays a trajectory, and the bias.
 fn emitted_targets(controller: &mut Controller, selector: u64) -> (Vec<[f64; 6]>, [f64; 6]) {
@@ -423,9 +437,10 @@ fn the_emitted_controller_plays_the_papers_paths_and_a_table() {
     let text = eight();
     let rows = waveform::parse(&text, "eight.csv", 1e-3).unwrap().rows;
     for (name, edits, tolerance) in
-        [("setpoint-f64", &[WITH_TABLE][..], 1e-12), ("setpoint-f32", &[WITH_TABLE, F32][..], 0.1e-9)]
+        [("setpoint-f64", &[WITH_TABLES][..], 1e-12), ("setpoint-f32", &[WITH_TABLES, F32][..], 0.1e-9)]
     {
-        let emitted = Emitted::with_records(name, "reference.toml", edits, &[("eight.csv", text.clone())]);
+        let records = [("eight.csv", text.clone()), ("line.csv", line())];
+        let emitted = Emitted::with_records(name, "reference.toml", edits, &records);
         let mut controller = emitted.controller();
         for (selector, (_, path)) in (0..).zip(PATHS) {
             controller.reset();
@@ -445,7 +460,36 @@ fn the_emitted_controller_plays_the_papers_paths_and_a_table() {
         for (row, pose) in rows[1..].iter().zip(poses.iter().skip(9).step_by(10)) {
             assert!((0..3).all(|axis| (pose[axis] - row[axis]).abs() <= tolerance), "{row:?} {pose:?}");
         }
+        // A path that does not start at the bias: busy from the first tick of the way there to the end.
+        controller.reset();
+        let (poses, _) = emitted_targets(&mut controller, 4);
+        let approach = poses.len().checked_sub(10_000).expect("the path is played");
+        assert!(approach > 100 && (poses[approach - 1][0] + 3e-6).abs() <= tolerance, "{approach} ticks");
+        assert!(
+            (poses[approach + 4999][0]).abs() <= tolerance && (poses[approach + 9999][0] - 3e-6).abs() <= tolerance
+        );
+        if name == "setpoint-f64" {
+            scored_whole(&emitted, &mut controller);
+        }
     }
+}
+
+/// The simulation scores that path, and nothing else.
+fn scored_whole(emitted: &Emitted, controller: &mut Controller) {
+    let model = &emitted.compiled.model;
+    let task = model.task_space.as_ref().unwrap();
+    let specimen = machine::specimen(model, task, &LegParameters::reference(), Some(1));
+    let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), 1);
+    let path = machine::on_board(&emitted.compiled, 4).unwrap();
+    assert_eq!((path.ticks, path.repeats, path.approach.unwrap()[0]), (10_000, false, -3e-6));
+    let run = scenario.play(controller, &path, None).unwrap();
+    let errors = run.scored().unwrap();
+    println!("line: {}, {:.2} nm rms", errors.coverage(), errors.rms_translation_nm());
+    assert_eq!(errors.coverage(), Coverage::new(10_000, 10_000, model.timing.period));
+    assert!((0.5..5.0).contains(&errors.rms_translation_nm()));
+    // Case 1 begins at the bias.
+    assert_eq!(machine::on_board(&emitted.compiled, 0).unwrap().approach, None);
+    assert_eq!(machine::on_board(&emitted.compiled, 5), None);
 }
 
 #[test]

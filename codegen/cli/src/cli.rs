@@ -1,7 +1,7 @@
 //! The command line: arguments in, text or JSON out, exit code.
 //!
 //! Exit codes: 0 good, 1 the spec, a record or a budget fails, 2 usage, 3 environment (a missing tool, a full disk),
-//! 130 ended by Ctrl-C, with the best so far where a part of the work is a result.
+//! 4 a simulated run did not come to the end of its path, 130 ended by Ctrl-C, with the best so far where a part of the work is a result.
 
 mod build;
 mod cache;
@@ -184,7 +184,7 @@ pub fn run() -> ExitCode {
         Err(error) => return refuse_arguments(error),
     };
     let mut ui = Ui::new(cli.common.json);
-    interrupt::catch(move || Ui::new(cli.common.json).failed(&Failure::ended_early()));
+    interrupt::catch(move || Ui::new(cli.common.json).failed(&Failure::interrupted()));
     if cli.common.no_cache {
         target::cache::switch_off();
     }
@@ -221,7 +221,7 @@ pub fn call(
         // What it has not shown when it unwinds is not looked at.
         Ok((cli, matches)) => {
             catch_unwind(AssertUnwindSafe(|| perform(&cli, &matches, &mut ui))).unwrap_or_else(|cause| {
-                if cause.is::<interrupt::Ended>() { Err(Failure::ended_early()) } else { resume_unwind(cause) }
+                if cause.is::<interrupt::Ended>() { Err(Failure::interrupted()) } else { resume_unwind(cause) }
             })
         }
         Err(error) => {

@@ -8,19 +8,19 @@
 
 use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, TickController};
+use host_sim::coverage::Coverage;
 use host_sim::plant::{LegParameters, NoiseParameters};
 use host_sim::platform::Specimen;
 use host_sim::platform::rig::{Noise, PlatformRun, Record, RunOptions};
 use host_sim::scenario::{LegScenario, MODES, select};
-use host_sim::trajectory::{PaperPose, Reading};
 use serde_json::{Value, json};
 
 use super::chart::{Axis, Chart, DASHED, INK, LINE, pairs};
 use super::margins::adapting_name;
 use super::section::{Grid, Part, Rows, Section};
 use super::spectrum::cumulative;
-use super::tracking::{AXES, Followed, LEGS, PLAYED, mode_of, path};
-use specgen_language::model::{Model, TaskSpace, TrajectoryKind};
+use super::tracking::{AXES, Followed, LEGS, mode_of};
+use specgen_language::model::{Model, TaskSpace};
 use specgen_studies::machine;
 use specgen_studies::reproduce;
 use specgen_studies::reproduce::write::digits;
@@ -79,7 +79,6 @@ pub fn of_platform(
         return Ok(empty().lead("Not made: no trajectory of the spec was followed."));
     };
     let speeds: Vec<&Followed> = all.iter().filter(|one| one.name == first.name && one.run.is_some()).collect();
-    let number = task.trajectories.iter().position(|one| one.name == first.name).unwrap_or_default();
     let errors = |run: &PlatformRun| -> Errors {
         (0..6).map(|axis| run.samples.iter().map(|s| s.target[axis] - s.tick.pose[axis]).collect()).collect()
     };
@@ -87,14 +86,12 @@ pub fn of_platform(
     let run = |controller: &mut dyn TickController, noise: &Noise| -> Result<Vec<Errors>, RunError> {
         let mut scenario = machine::scenario(model, task, specimen, noise, seed);
         scenario.options = RunOptions { record: Record::Samples, ..scenario.options };
-        let of = |speed: &&Followed| match (&task.trajectories[number].kind, speed.frequency) {
-            (TrajectoryKind::Paper { path: which, as_printed, .. }, Some(frequency)) => {
-                let reading = if *as_printed { Reading::AsPrinted } else { Reading::Corrected };
-                scenario.run(controller, &PaperPose { path: path(*which), reading, frequency })
-            }
-            _ => scenario.play(controller, number as u32, PLAYED),
+        let of = |speed: &&Followed| {
+            let run = speed.course.run(&scenario, controller)?;
+            run.scored()?;
+            Ok(errors(&run))
         };
-        speeds.iter().map(of).map(|run| run.map(|run| errors(&run))).collect()
+        speeds.iter().map(of).collect()
     };
     let all_noise = Noise::of(specimen);
     let alone = |channels| Noise { channels, ..Noise::NONE };
@@ -110,7 +107,8 @@ pub fn of_platform(
         let found = each(&quiet[k], sources, silent[k].clone());
         let together = speed.run.as_ref().map(&errors).unwrap_or_default();
         let what = format!("{} at {}", speed.name, speed.speed());
-        let parts = parts(&what, k, &AXES, &found, &together, model.timing.period);
+        let coverage = speed.coverage().unwrap_or_default();
+        let parts = parts((&what, coverage), k, &AXES, &found, &together, model.timing.period);
         section = section.pane(&[&what], parts);
     }
     Ok(section)
@@ -126,11 +124,12 @@ pub fn of_legs(leg: &LegParameters, mode: usize, controllers: Pair, seed: u64) -
     select(own, word)?;
     select(fine, word)?;
     let legs = std::array::from_fn(|_| leg.clone());
-    let mut interval = 0.0;
+    let (mut interval, mut coverage) = (0.0, Coverage::default());
     let mut run = |controller: &mut dyn TickController, noise: &NoiseParameters| -> Result<Errors, RunError> {
         let scenario = LegScenario::new(&legs, noise, seed, reproduce::legs::SAMPLES);
         let tracking = scenario.run(controller, FREQUENCY)?.tracking;
         interval = tracking.interval;
+        coverage = tracking.coverage();
         let of = |leg: usize| tracking.samples.iter().map(|s| s.target[leg] - s.measured[leg]).collect();
         Ok((0..6).map(of).collect())
     };
@@ -144,7 +143,7 @@ pub fn of_legs(leg: &LegParameters, mode: usize, controllers: Pair, seed: u64) -
     let together = run(own, &leg.noise)?;
     let what = format!("the leg trajectory at 1 Hz with {}", adapting_name(name));
     let mut section = empty();
-    section.parts = parts(&what, 0, &LEGS, &found, &together, interval);
+    section.parts = parts((&what, coverage), 0, &LEGS, &found, &together, interval);
     Ok(section.text("Errors are as the gauges read them, their own noise included."))
 }
 
@@ -180,8 +179,9 @@ fn advice(source: &str) -> &'static str {
     }
 }
 
-/// Bars of both units, and the cumulative spectrum of the first coordinates together.
-fn parts(what: &str, number: usize, names: &[&str; 6], added: &[Added], together: &Errors, interval: f64) -> Vec<Part> {
+/// Bars of both units, and the cumulative spectrum of the first coordinates together, of `what` was followed and over what it
+/// was measured.
+fn parts((what, coverage): (&str, Coverage), number: usize, names: &[&str; 6], added: &[Added], together: &Errors, interval: f64) -> Vec<Part> {
     let legs = names[0] == LEGS[0];
     let mut values: Vec<(&str, [f64; 6])> =
         added.iter().map(|one| (one.name, core::array::from_fn(|axis| rms(&one.errors[axis])))).collect();
@@ -196,7 +196,7 @@ fn parts(what: &str, number: usize, names: &[&str; 6], added: &[Added], together
         .map(|(axis, name)| format!("{name}, {}", if legs || axis < 3 { "nm" } else { "nrad" }))
         .collect();
     let head: Vec<&str> = core::iter::once("source, rms").chain(head.iter().map(String::as_str)).collect();
-    let mut table = Grid::new(&format!("Error budget: {what}"), &head);
+    let mut table = Grid::new(&format!("Error budget: {what}, over {coverage}"), &head);
     let row = |name: &str, values: &[f64; 6]| [vec![name.to_owned()], values.map(digits).to_vec()].concat();
     for (name, values) in &values {
         table.push(row(name, values));

@@ -9,17 +9,15 @@ use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::{PlatformRun, Record, RunOptions};
 use host_sim::platform::scenario::{PLATFORM_MODES, select};
 use host_sim::table::Line;
-use host_sim::trajectory::{PaperPose, Reading};
 use serde_json::{Value, json};
 use specgen_identify::Report;
-use specgen_language::model::{Actuator, TaskSpace, TrajectoryKind};
+use specgen_language::model::Actuator;
 use specgen_runtime::Platform;
-use specgen_runtime::setpoint::{REFUSED, STALE};
 use specgen_studies::reproduce::write::digits;
 
 use super::chart::{Axis, BLUE, Chart, LINE, Note, pairs};
 use super::section::{Grid, Part, Rows, Section};
-use super::tracking::{AXES, Followed, PLAYED, path, short};
+use super::tracking::{AXES, Followed, short};
 
 /// Rates of the loops, Hz, the least important first.
 const FREQUENCIES: [f64; 3] = [0.1, 10.0, 50.0];
@@ -47,7 +45,6 @@ pub fn of_platform(
     machine: &PlatformScenario,
     controller: &mut Controller,
     platform: &Platform<f64>,
-    task: &TaskSpace,
     actuator: &Actuator,
     legs: &[LegParameters; 6],
     records: &[Option<Report>],
@@ -55,7 +52,7 @@ pub fn of_platform(
 ) -> Result<Section, RunError> {
     let own = all.iter().find(|one| one.own && one.run.is_some());
     let behind = match own {
-        Some(own) => behind(machine, controller, platform, task, actuator, own)?,
+        Some(own) => behind(machine, controller, platform, actuator, own)?,
         None => Vec::new(),
     };
     let mut section = Section::new("hysteresis", "Hysteresis", "");
@@ -140,21 +137,13 @@ fn behind(
     machine: &PlatformScenario,
     controller: &mut Controller,
     platform: &Platform<f64>,
-    task: &TaskSpace,
     actuator: &Actuator,
     own: &Followed,
 ) -> Result<Vec<Behind>, RunError> {
     let mut traced = machine.clone();
     traced.options = RunOptions { record: Record::Trace, ..machine.options.clone() };
     select(controller, PLATFORM_MODES[1].1)?;
-    let number = task.trajectories.iter().position(|one| one.name == own.name).unwrap_or_default();
-    let run = match (&task.trajectories[number].kind, own.frequency) {
-        (TrajectoryKind::Paper { path: which, as_printed, .. }, Some(frequency)) => {
-            let reading = if *as_printed { Reading::AsPrinted } else { Reading::Corrected };
-            traced.run(controller, &PaperPose { path: path(*which), reading, frequency })?
-        }
-        _ => traced.play(controller, number as u32, PLAYED)?,
-    };
+    let run = own.course.run(&traced, controller)?;
     let of = |points: Vec<(f64, f64)>| {
         let line = Line::fit(&points)?;
         let left: Vec<[f64; 2]> =
@@ -173,7 +162,7 @@ pub(crate) fn moved_over_requested(
     platform: &Platform<f64>,
     run: &PlatformRun,
 ) -> Result<Vec<Vec<(f64, f64)>>, RunError> {
-    let Some(trace) = run.trace.as_ref().filter(|_| run.status & (REFUSED | STALE) == 0) else { return Ok(Vec::new()) };
+    let Some(trace) = run.trace.as_ref().filter(|_| run.is_followed()) else { return Ok(Vec::new()) };
     let description = controller.description();
     let (requested, words) = (description.outputs("requested")?, description.input_names.len());
     let before = trace.len().saturating_sub(run.samples.len());

@@ -5,6 +5,7 @@ use core::ops::ControlFlow;
 
 use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, TickController};
+use host_sim::coverage::Coverage;
 use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::Bench;
 use host_sim::trajectory::{PaperPath, PaperPose};
@@ -56,9 +57,10 @@ pub fn section(
         Err(error) => return Err(error),
     };
     let lead = lead(&learned, &convergence);
-    let mut table = Grid::new("Passes of case 1 at 10 Hz", &["pass", "nm rms", "nrad rms", "by the gauges, nm"]);
+    let mut table = Grid::new("Passes of case 1 at 10 Hz", &["pass", "nm rms", "nrad rms", "by the gauges, nm", "over s", "path s"]);
     for (number, pass) in learned.passes.iter().enumerate() {
-        let values = [pass.translation_nm, pass.orientation_nrad, pass.measured_nm].map(digits);
+        let Coverage { seconds, path_seconds } = pass.coverage;
+        let values = [pass.translation_nm, pass.orientation_nrad, pass.measured_nm, seconds, path_seconds].map(digits);
         table.push([vec![number.to_string()], values.to_vec()].concat());
     }
     let columns = vec![vec![Part::Chart(bound(&learnable, &convergence))], vec![Part::Chart(by_pass(&learned))]];
@@ -78,7 +80,8 @@ fn lead(learned: &Learned, convergence: &Convergence) -> String {
         many => format!("{many} passes take {case} from {first} to {best}\u{2009}nm"),
     };
     format!(
-        "{gained}; from {low} to {high}\u{2009}Hz each leaves {} or less of the error on every machine within the declared intervals.",
+        "{gained}, measured over {}; from {low} to {high}\u{2009}Hz each leaves {} or less of the error on every machine within the declared intervals.",
+        learned.passes[learned.best].coverage,
         short(convergence.radius)
     )
 }

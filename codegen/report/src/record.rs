@@ -1,5 +1,6 @@
 //! A run of a real machine beside the simulation of the same commands.
 
+use host_sim::coverage::Coverage;
 use serde_json::{Value, json};
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::Model;
@@ -97,6 +98,16 @@ fn rms(samples: &[Sample], of: impl Fn(&Sample) -> f64) -> f64 {
     libm::sqrt(sum / count.max(1) as f64)
 }
 
+/// An error (nm rms) in words, with the time that it was measured over: the ticks that count, of all that were recorded.
+fn error_text(run: &Run, nano: f64, period: f64) -> String {
+    let scored = run.recorded.iter().filter(|sample| sample.scored).count();
+    if scored == 0 {
+        return "unknown: no tick counts".to_owned();
+    }
+    let coverage = Coverage::new(scored, run.recorded.len(), period);
+    format!("{}\u{2009}nm rms by the gauges over {}", short(nano), coverage.brief())
+}
+
 /// rms of the error of each coordinate over the ticks that count, nm and nrad.
 fn error_rms(samples: &[Sample]) -> [f64; 6] {
     core::array::from_fn(|k| rms(samples, |sample| (sample.target[k] - sample.measured[k]) * 1e9))
@@ -148,9 +159,9 @@ fn first(compiled: &Compiled, run: &Run) -> Vec<Part> {
     let sentence = Sentence {
         verdict: verdict.to_owned(),
         why: format!(
-            "{}\u{2009}s recorded. Error {}\u{2009}nm rms by the gauges{against}.",
+            "{}\u{2009}s recorded. Error {}{against}.",
             short(seconds),
-            short(lengths)
+            error_text(run, lengths, model.timing.period)
         ),
         mark,
     };
@@ -273,9 +284,9 @@ fn errors(model: &Model, run: &Run) -> Section {
     };
     let left_out = run.recorded.iter().filter(|sample| sample.running && !sample.scored).count();
     let section = Section::new("errors", "Errors", "").lead(&format!(
-        "{} has {}\u{2009}nm rms{against}.",
+        "{} has {}{against}.",
         names[worst],
-        short(found[worst])
+        error_text(run, found[worst], period)
     ));
     let section = if left_out == 0 {
         section

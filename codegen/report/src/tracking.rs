@@ -4,13 +4,15 @@ mod pane;
 
 use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, TickController};
+use host_sim::coverage::Coverage;
 use host_sim::platform::PlatformScenario;
-use host_sim::platform::rig::{PlatformRun, Record, RunOptions};
+use host_sim::platform::rig::{OnBoard, PlatformRun, Record, RunOptions};
 use host_sim::platform::scenario::select;
 use host_sim::trajectory::{self, PaperPose, Reading};
 use serde_json::{Value, json};
+use specgen_compiler::compile::Compiled;
 use specgen_language::model::{Model, PaperPath, TaskSpace, TrajectoryKind};
-use specgen_runtime::setpoint::{REFUSED, STALE};
+use specgen_studies::machine::on_board;
 use specgen_studies::reproduce::write::digits;
 use specgen_studies::verdict::{Figure, Subject};
 
@@ -25,10 +27,34 @@ pub const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
 pub const LEGS: [&str; 6] = ["leg 0", "leg 1", "leg 2", "leg 3", "leg 4", "leg 5"];
 /// A trajectory is run at its own frequency and at this many times it.
 const FAST: f64 = 10.0;
-/// A trajectory on board that does not end is followed for this long, s.
-pub(crate) const PLAYED: f64 = 60.0;
 /// The key of limits.
 const LIMITS: &str = "requirements.tracking";
+
+/// How a trajectory of the spec is followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Course {
+    /// As a stream of set-points.
+    Streamed(PaperPose),
+    /// By the controller, which has it.
+    Played(OnBoard),
+}
+
+impl Course {
+    /// Follows it with the controller as configured.
+    ///
+    /// # Errors
+    /// As [`PlatformScenario::run`] and [`PlatformScenario::play`].
+    pub fn run(
+        &self,
+        machine: &PlatformScenario,
+        controller: &mut dyn TickController,
+    ) -> Result<PlatformRun, RunError> {
+        match self {
+            Self::Streamed(path) => machine.run(controller, path),
+            Self::Played(path) => machine.play(controller, path, None),
+        }
+    }
+}
 
 /// A trajectory of the spec at a frequency, followed by the simulated machine.
 #[derive(Debug, Clone)]
@@ -39,6 +65,8 @@ pub struct Followed {
     pub frequency: Option<f64>,
     /// Whether it is the speed that the spec gives.
     pub own: bool,
+    /// How it was followed.
+    pub course: Course,
     /// The run; none if the controller refused set-points.
     pub run: Option<PlatformRun>,
 }
@@ -59,6 +87,12 @@ impl Followed {
     #[must_use]
     pub fn rms(&self) -> Option<[f64; 6]> {
         self.run.as_ref().map(|run| run.errors.rms_nano())
+    }
+
+    /// What was measured.
+    #[must_use]
+    pub fn coverage(&self) -> Option<Coverage> {
+        self.run.as_ref().map(|run| run.errors.coverage())
     }
 }
 
@@ -90,9 +124,9 @@ pub fn mode_of(controller: &Controller) -> u32 {
 /// Every trajectory of the spec at its own frequency, at ten times it, and where a limit asks for another one, at that.
 ///
 /// # Errors
-/// As [`PlatformScenario::run`].
+/// As [`Course::run`].
 pub fn follow(
-    model: &Model,
+    compiled: &Compiled,
     task: &TaskSpace,
     machine: &PlatformScenario,
     controller: &mut Controller,
@@ -104,15 +138,20 @@ pub fn follow(
     select(controller, mode)?;
     let mut all = Vec::new();
     for (number, one) in task.trajectories.iter().enumerate() {
-        let kept = |run: PlatformRun| (run.status & (REFUSED | STALE) == 0).then_some(run);
-        let name = one.name.clone();
+        let name = &one.name;
+        let mut follow = |frequency: Option<f64>, own: bool, course: Course| -> Result<(), RunError> {
+            let run = Some(course.run(&sampled, controller)?).filter(PlatformRun::is_followed);
+            all.push(Followed { name: name.clone(), frequency, own, course, run });
+            Ok(())
+        };
         match &one.kind {
             TrajectoryKind::Paper { path: which, as_printed, frequency } => {
-                let asked = model
+                let asked = compiled
+                    .model
                     .requirements
                     .tracking
                     .iter()
-                    .filter(|limit| limit.trajectory.as_ref().is_none_or(|for_| *for_ == name));
+                    .filter(|limit| limit.trajectory.as_ref().is_none_or(|for_| for_ == name));
                 let mut frequencies = vec![*frequency, FAST * frequency];
                 frequencies.extend(asked.filter_map(|limit| limit.frequency));
                 frequencies.sort_by(f64::total_cmp);
@@ -120,15 +159,14 @@ pub fn follow(
                 for hertz in frequencies {
                     progress(&format!("{name} at {hertz} Hz"));
                     let reading = if *as_printed { Reading::AsPrinted } else { Reading::Corrected };
-                    let run = sampled.run(controller, &PaperPose { path: path(*which), reading, frequency: hertz })?;
-                    let own = hertz == *frequency;
-                    all.push(Followed { name: name.clone(), frequency: Some(hertz), own, run: kept(run) });
+                    let streamed = Course::Streamed(PaperPose { path: path(*which), reading, frequency: hertz });
+                    follow(Some(hertz), hertz == *frequency, streamed)?;
                 }
             }
             TrajectoryKind::Step { .. } | TrajectoryKind::Waveform { .. } => {
+                let Some(path) = on_board(compiled, number as u32) else { continue };
                 progress(&format!("{name} on board"));
-                let run = sampled.play(controller, number as u32, PLAYED)?;
-                all.push(Followed { name, frequency: None, own: true, run: kept(run) });
+                follow(None, true, Course::Played(path))?;
             }
         }
     }
@@ -140,7 +178,7 @@ pub fn follow(
 pub fn judged(model: &Model, all: &[Followed]) -> Vec<Figure> {
     let mut figures = Vec::new();
     for one in all {
-        let Some(rms) = one.rms() else { continue };
+        let Some((rms, coverage)) = one.rms().zip(one.coverage()) else { continue };
         let limits = model.requirements.tracking.iter().filter(|limit| {
             limit.trajectory.as_ref().is_none_or(|name| *name == one.name)
                 && limit.frequency.map_or(one.own, |hertz| one.frequency == Some(hertz))
@@ -150,7 +188,8 @@ pub fn judged(model: &Model, all: &[Followed]) -> Vec<Figure> {
             let mut judge = |what: &str, value: f64, most: Option<f64>, unit: &'static str| {
                 if let Some(most) = most {
                     let name = format!("{} {what}", one.named());
-                    figures.push(Figure::new(Subject::Tracking, &name, value, unit).at_most(1e9 * most, LIMITS));
+                    let figure = Figure::new(Subject::Tracking, &name, value, unit).over(coverage);
+                    figures.push(figure.at_most(1e9 * most, LIMITS));
                 }
             };
             judge("xyz", norm(&rms, false), limit.translation, "nm");
@@ -161,7 +200,7 @@ pub fn judged(model: &Model, all: &[Followed]) -> Vec<Figure> {
             }
         }
         if figures.len() == before && one.own {
-            figures.push(Figure::new(Subject::Tracking, &one.named(), norm(&rms, false), "nm"));
+            figures.push(Figure::new(Subject::Tracking, &one.named(), norm(&rms, false), "nm").over(coverage));
         }
     }
     figures
@@ -172,8 +211,8 @@ pub fn judged(model: &Model, all: &[Followed]) -> Vec<Figure> {
 pub struct Line {
     /// What was followed.
     pub name: String,
-    /// Errors: whether it is at the speed that the spec gives, and how much.
-    pub values: Vec<(bool, f64)>,
+    /// Errors: whether it is at the speed that the spec gives, how much, and over what it was measured, if it is of a path.
+    pub values: Vec<(bool, f64, Option<Coverage>)>,
     /// Beside it.
     pub note: String,
     /// Limit of the spec.
@@ -188,7 +227,7 @@ pub fn lines(model: &Model, noise: Option<&[f64; 6]>, all: &[Followed], turning:
         let nano = noise.map(|v| v * 1e9);
         let axes = if turning { 3..6 } else { 0..3 };
         let each: Vec<String> = axes.map(|axis| format!("{} {}", AXES[axis], few(nano[axis]))).collect();
-        let values = vec![(true, norm(&nano, turning))];
+        let values = vec![(true, norm(&nano, turning), None)];
         let unit = if turning { "nrad" } else { "nm" };
         let note = format!("{} {unit}", each.join(", "));
         lines.push(Line { name: "gauge noise".to_owned(), values, note, limit: None });
@@ -205,7 +244,7 @@ pub fn lines(model: &Model, noise: Option<&[f64; 6]>, all: &[Followed], turning:
         });
         lines.push(Line {
             name: name.to_owned(),
-            values: of().filter_map(|one| one.rms().map(|rms| (one.own, norm(&rms, turning)))).collect(),
+            values: of().filter_map(|one| Some((one.own, norm(&one.rms()?, turning), one.coverage()))).collect(),
             note: refused.join(", "),
             limit: limit.map(|limit| 1e9 * limit),
         });
@@ -229,13 +268,14 @@ pub fn dumbbell(lines: &[Line], speeds: [Option<String>; 2], unit: &str) -> Rows
         let wider = |(low, high): (f64, f64), value: f64| {
             (if value < low { value } else { low }, if value > high { value } else { high })
         };
-        for (_, value) in &line.values {
+        for (_, value, _) in &line.values {
             ends = wider(ends, *value);
         }
         (low, high) = line.values.iter().map(|one| one.1).chain(line.limit).fold((low, high), wider);
         let text = |own: bool| {
-            let found: Vec<String> = line.values.iter().filter(|one| one.0 == own).map(|one| digits(one.1)).collect();
-            found.join(", ")
+            let over = |coverage: Option<Coverage>| coverage.map_or_else(String::new, |c| format!(" over {}", c.brief()));
+            let found = line.values.iter().filter(|one| one.0 == own);
+            found.map(|one| digits(one.1) + &over(one.2)).collect::<Vec<_>>().join(", ")
         };
         numbers.push(vec![line.name.clone(), text(true), text(false)]);
         let several = line.values.len() > 1;
@@ -243,7 +283,7 @@ pub fn dumbbell(lines: &[Line], speeds: [Option<String>; 2], unit: &str) -> Rows
             .values
             .iter()
             .enumerate()
-            .map(|(k, (own, value))| {
+            .map(|(k, (own, value, _))| {
                 let before = several && k == 0 || !several && !line.note.is_empty();
                 let outer = k == 0 || k + 1 == line.values.len();
                 json!({ "m": if *own { "hollow" } else { "dot" }, "x": value, "text": if outer { few(*value) } else { String::new() }, "before": before })
@@ -301,6 +341,7 @@ pub fn section(all: &[Followed], law: &str, interval: f64, corners: bool, comman
             names: AXES,
             lengths: 3,
             interval,
+            coverage: run.errors.coverage(),
             samples: run.samples.iter().map(|sample| [sample.target, sample.tick.pose]).collect(),
             corner: if corners { "corner, W0458" } else { "corner" },
         };

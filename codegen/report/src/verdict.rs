@@ -53,6 +53,7 @@ pub fn share(figure: &Figure) -> Option<f64> {
 /// A row of a card: label, value against limit, bar, share, mark.
 #[must_use]
 pub fn limit_row(label: &str, figure: &Figure) -> String {
+    let label = &figure.coverage.map_or_else(|| label.to_owned(), |coverage| format!("{label}, {}", coverage.brief()));
     let Some((limit, share)) = figure.limit.as_ref().zip(share(figure)) else {
         let text = figure.words.clone().unwrap_or_else(|| format!("{} {}", thin(&figure.value_text()), unit(figure)));
         return text_row(label, &text, mark_of(figure));

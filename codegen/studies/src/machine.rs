@@ -7,10 +7,11 @@ use core::array::from_fn;
 
 use host_sim::closed_loop::LEGS;
 use host_sim::plant::{LegParameters, NoiseParameters};
-use host_sim::platform::rig::{Noise, PlatformRig, RunOptions};
+use host_sim::platform::rig::{Noise, OnBoard, PlatformRig, RunOptions};
 use host_sim::platform::{GaugeSignal, Joints, PlatformParameters, PlatformScenario, Probe, Specimen, UserFrames};
 use host_sim::scenario::LegScenario;
 
+use specgen_compiler::compile::Compiled;
 use specgen_language::model::{Model, TaskSpace};
 
 /// Gain of the reference leg's controller, 5 × 0.1262 µm/V: what its measured gain is relative to, m/V.
@@ -72,6 +73,15 @@ pub fn scenario(model: &Model, task: &TaskSpace, specimen: &Specimen, noise: &No
     }
     scenario.rig_mut().plant_mut().step_whole_ticks(model.timing.period);
     scenario
+}
+
+/// The trajectory of the spec with this number, as its controller plays it; none if it has no such one.
+#[must_use]
+pub fn on_board(compiled: &Compiled, selector: u32) -> Option<OnBoard> {
+    let setpoints = &compiled.ir.task_space.as_ref()?.setpoints;
+    let path = &setpoints.trajectories.get(selector as usize)?.path;
+    let approach = Some(path.start()).filter(|start| *start != setpoints.home);
+    Some(OnBoard { selector, approach, ticks: path.ticks() as usize, repeats: path.repeats() })
 }
 
 /// Pose of the user's zero: the bias, and the offset of the work frame.

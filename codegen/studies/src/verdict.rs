@@ -177,13 +177,15 @@ impl Verdict {
             is_axis(a) && is_axis(b) && a.unit == b.unit && a.relation() == b.relation() && a.words == b.words
         };
         let groups: Vec<&[&Figure]> = figures.chunk_by(together).collect();
-        // Neighbours of one unit say it once.
-        let runs = groups.chunk_by(|a, b| a[0].unit == b[0].unit && a[0].words.is_none() && b[0].words.is_none());
+        // Neighbours of one unit say it once, and so over what they were measured.
+        let alike = |a: &Figure, b: &Figure| a.unit == b.unit && a.coverage == b.coverage;
+        let runs = groups.chunk_by(|a, b| alike(a[0], b[0]) && a[0].words.is_none() && b[0].words.is_none());
         let said: Vec<String> = runs
             .map(|run| {
                 let text = run.iter().map(|group| said(group)).collect::<Vec<_>>().join(", ");
                 let unit = if run[0][0].unit == "bytes" { "KiB" } else { run[0][0].unit };
-                if unit.is_empty() || text.contains(unit) { text } else { format!("{text} {unit}") }
+                let text = if unit.is_empty() || text.contains(unit) { text } else { format!("{text} {unit}") };
+                run[0][0].coverage.map_or(text.clone(), |coverage| format!("{text} over {}", coverage.brief()))
             })
             .collect();
         (!said.is_empty()).then(|| said.join(", "))
@@ -238,6 +240,7 @@ fn said(group: &[&Figure]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use host_sim::coverage::Coverage;
 
     fn empty() -> Verdict {
         Verdict {
@@ -260,11 +263,16 @@ mod tests {
         }
         verdict.push(Figure::new(Subject::Reach, "θx", 421.1, "µrad").at_least(400.0, "spec"));
         verdict.push(Figure::more_than(Subject::Margins, "delay", 5.0, "ticks"));
+        for (name, value, ticks) in [("case-1 xyz", 20.7, 25_000), ("case-1 z", 3.0, 25_000), ("line", 78.6, 10_000)] {
+            let figure = Figure::new(Subject::Tracking, name, value, "nm").over(Coverage::new(ticks, ticks, 1e-4));
+            verdict.push(figure);
+        }
         assert_eq!(
             verdict.text(),
             "bench is ready: 5 figures within their limits, 1 warning\n\
              \x20 reach    54.9/52.4/174 ≥ 50/50/50 µm, 421 ≥ 400 µrad\n\
              \x20 margins  delay > 5 ticks\n\
+             \x20 tracking case-1 xyz 20.7, case-1 z 3.00 nm over 2.500/2.500 s, line 78.6 nm over …\n\
              \x20 time     instructions 4,043 ≤ 4,500\n\
              \x20 next     specgen sim bench.toml\n"
         );

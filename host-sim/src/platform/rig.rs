@@ -20,8 +20,8 @@ use crate::noise::{Gauge, Gaussian, amplifier};
 use crate::plant::NoiseParameters;
 
 pub(super) use bench::Paused;
-pub use bench::{BUSY, Bench, Command, Request, Tick};
-pub use run::{PlatformRun, PoseSample, Record, RunOptions};
+pub use bench::{BUSY, Bench, Command, NOT_FOLLOWED, Request, Tick};
+pub use run::{OnBoard, PlatformRun, PoseSample, Record, RunOptions};
 
 /// Noise around a plant.
 #[derive(Debug, Clone, Copy, PartialEq)]

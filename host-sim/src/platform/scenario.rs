@@ -1,7 +1,7 @@
 //! The paper's experiments on a simulated platform: Tables 5 to 8 (free motion) and 9 (machining).
 
 use super::contact::WorkPart;
-use super::rig::{Noise, PlatformRig, PlatformRun, RunOptions};
+use super::rig::{Noise, OnBoard, PlatformRig, PlatformRun, RunOptions};
 use super::specimen::Specimen;
 use super::table::{MachiningTable, PoseRow, PoseTable};
 use crate::closed_loop::{Preparation, RunError};
@@ -75,14 +75,14 @@ impl PlatformScenario {
     /// Lets the controller play one of its own trajectories, see [`PlatformRig::play`].
     ///
     /// # Errors
-    /// As [`PlatformRig::run`].
+    /// As [`PlatformRig::play`].
     pub fn play(
         &self,
         controller: &mut dyn TickController,
-        selector: u32,
-        limit: f64,
+        path: &OnBoard,
+        limit: Option<f64>,
     ) -> Result<PlatformRun, RunError> {
-        self.prepared.clone().play(controller, selector, &self.options, limit)
+        self.prepared.clone().play(controller, path, &self.options, limit)
     }
 
     /// Runs a trajectory against a work part.
@@ -115,7 +115,7 @@ impl PlatformScenario {
             for &(mode, word) in modes {
                 select(controller, word)?;
                 let run = self.run(controller, *trajectory)?;
-                table.rows.push(PoseRow::of(name, mode, *frequency, &run.errors));
+                table.rows.push(PoseRow::of(name, mode, *frequency, run.scored()?));
             }
         }
         Ok(table)
@@ -137,7 +137,7 @@ impl PlatformScenario {
             for &(mode, word) in modes {
                 select(controller, word)?;
                 let run = self.against(controller, trajectory, part)?;
-                table.push(name, mode, &run.errors);
+                table.push(name, mode, run.scored()?);
             }
         }
         Ok(table)

@@ -10,6 +10,7 @@ use super::rig::{Bench, Paused, PlatformRig, Request, Tick};
 use super::scenario::PlatformScenario;
 use crate::closed_loop::{RunError, ticks_within};
 use crate::controller::{Controller, TickController};
+use crate::coverage::Coverage;
 use crate::trajectory::{PoseTarget, PoseTrajectory};
 
 /// A platform at its bias pose with a trajectory before it.
@@ -20,6 +21,8 @@ pub struct PlatformStudy {
     interval: f64,
     /// Set-points of each tick with the true pose that they ask for.
     targets: Vec<(PoseTarget, Six)>,
+    /// Ticks of the path that they are the start of.
+    path: usize,
 }
 
 /// The end of one tick of a run.
@@ -48,6 +51,7 @@ impl PlatformStudy {
         let options = &scenario.options;
         let interval = options.interval;
         let ticks = ticks_within(trajectory.duration(), interval)?;
+        let path = ticks_within(trajectory.whole(), interval)?;
         let targets = (1..=ticks).map(|tick| {
             let wanted = trajectory.target(tick as f64 * interval);
             (wanted, options.pose_of(&wanted))
@@ -62,7 +66,7 @@ impl PlatformStudy {
         let (bench, _) = rig.ready(&mut controller, options)?;
         let paused = bench.pause();
         rig.draw_ahead(ticks);
-        Ok(Self { rig, controller, paused, interval, targets: targets.collect() })
+        Ok(Self { rig, controller, paused, interval, targets: targets.collect(), path })
     }
 
     /// Ticks of a run.
@@ -83,7 +87,8 @@ impl PlatformStudy {
         self.controller.fork()
     }
 
-    /// Runs the trajectory with the settings `words`. `watch` sees the end of every tick and may end the run.
+    /// Runs the trajectory with the settings `words`. `watch` sees the end of every tick and may end the run. Returns how much of
+    /// the path was seen.
     ///
     /// # Errors
     /// If the controller refuses the settings or gives a voltage that is not finite.
@@ -95,7 +100,7 @@ impl PlatformStudy {
         controller: &mut Controller,
         words: &[u64],
         mut watch: impl FnMut(&Moment) -> ControlFlow<()>,
-    ) -> Result<(), RunError> {
+    ) -> Result<Coverage, RunError> {
         controller.take_over(&self.controller);
         controller.configure(words)?;
         let mut rig = self.rig.clone();
@@ -104,9 +109,9 @@ impl PlatformStudy {
             let tick = bench.tick(&Request::stream(*wanted))?;
             let time = (index + 1) as f64 * self.interval;
             if watch(&Moment { time, target, tick: &tick }).is_break() {
-                break;
+                return Ok(Coverage::new(index + 1, self.path, self.interval));
             }
         }
-        Ok(())
+        Ok(Coverage::new(self.targets.len(), self.path, self.interval))
     }
 }

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::linear::Six;
+use crate::coverage::Coverage;
 
 /// Names of the pose coordinates.
 pub const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
@@ -23,9 +24,17 @@ pub struct PoseErrors {
     translation_norms: f64,
     orientation_norms: f64,
     largest_translation: f64,
+    interval: f64,
+    path: usize,
 }
 
 impl PoseErrors {
+    /// None yet, of a path of so many ticks of an interval (s).
+    #[must_use]
+    pub fn over(path: usize, interval: f64) -> Self {
+        Self { interval, path, ..Self::default() }
+    }
+
     /// Adds one error: target less true pose, m and rad.
     pub fn add(&mut self, error: &Six) {
         self.count += 1;
@@ -47,6 +56,12 @@ impl PoseErrors {
     #[must_use]
     pub fn count(&self) -> usize {
         self.count
+    }
+
+    /// How much of the path they are of.
+    #[must_use]
+    pub fn coverage(&self) -> Coverage {
+        Coverage::new(self.count, self.path, self.interval)
     }
 
     fn divisor(&self) -> f64 {
@@ -105,6 +120,9 @@ pub struct PoseRow {
     pub mode: String,
     /// Operating frequency, Hz.
     pub frequency_hz: f64,
+    /// What was measured.
+    #[serde(flatten)]
+    pub coverage: Coverage,
     /// Root mean square error of each coordinate, nm and nrad.
     pub rms_nano: Six,
     /// Largest error of P_C, nm.
@@ -119,6 +137,7 @@ impl PoseRow {
             trajectory: trajectory.to_owned(),
             mode: mode.to_owned(),
             frequency_hz: frequency,
+            coverage: errors.coverage(),
             rms_nano: errors.rms_nano(),
             peak_nm: errors.peak_translation_nm(),
         }
@@ -154,14 +173,17 @@ impl PoseTable {
     /// CSV, one line per run.
     #[must_use]
     pub fn to_csv(&self) -> String {
-        let mut out = String::from("trajectory,mode,frequency_Hz,x_nm,y_nm,z_nm,rx_nrad,ry_nrad,rz_nrad,peak_nm\n");
+        let mut out = String::from(
+            "trajectory,mode,frequency_Hz,x_nm,y_nm,z_nm,rx_nrad,ry_nrad,rz_nrad,peak_nm,seconds,path_seconds\n",
+        );
         for row in &self.rows {
             // Writing to a String cannot fail, here and below.
             let _ = write!(out, "{},{},{}", row.trajectory, row.mode, row.frequency_hz);
             for value in row.rms_nano {
                 let _ = write!(out, ",{value:.4}");
             }
-            let _ = writeln!(out, ",{:.4}", row.peak_nm);
+            let Coverage { seconds, path_seconds } = row.coverage;
+            let _ = writeln!(out, ",{:.4},{seconds:.6},{path_seconds:.6}", row.peak_nm);
         }
         out
     }
@@ -179,13 +201,16 @@ impl PoseTable {
     }
 
     fn text(&self, beside_paper: bool) -> String {
-        let mut out = String::from("rms error  Hz mode        x nm    y nm    z nm norm nm rx nrad ry nrad rz nrad\n");
+        let mut out = String::from(
+            "rms error  Hz mode        x nm    y nm    z nm norm nm rx nrad ry nrad rz nrad  over s  path s\n",
+        );
         for row in &self.rows {
             let _ = write!(out, "{:<8}{:>5} {:<10}", row.trajectory, row.frequency_hz, row.mode);
             for value in with_norm(row.rms_nano) {
                 let _ = write!(out, "{value:>8.1}");
             }
-            out.push('\n');
+            let Coverage { seconds, path_seconds } = row.coverage;
+            let _ = writeln!(out, "{seconds:>8.3}{path_seconds:>8.3}");
             let paper = beside_paper.then(|| paper_rms(&row.trajectory, &row.mode, row.frequency_hz)).flatten();
             if let Some(paper) = paper {
                 let _ = write!(out, "{:<24}", "         paper");
@@ -280,6 +305,9 @@ pub struct MachiningRow {
     pub orientation_nrad: f64,
     /// Largest error of P_C, nm.
     pub peak_nm: f64,
+    /// What was measured.
+    #[serde(flatten)]
+    pub coverage: Coverage,
 }
 
 /// Table 9: machining.
@@ -313,6 +341,7 @@ impl MachiningTable {
             translation_nm: errors.mean_translation_nm(),
             orientation_nrad: errors.mean_orientation_nrad(),
             peak_nm: errors.peak_translation_nm(),
+            coverage: errors.coverage(),
         });
     }
 
@@ -332,10 +361,12 @@ impl MachiningTable {
     /// CSV, one line per run.
     #[must_use]
     pub fn to_csv(&self) -> String {
-        let mut out = String::from("part,mode,translation_nm,orientation_nrad,peak_nm\n");
+        let mut out = String::from("part,mode,translation_nm,orientation_nrad,peak_nm,seconds,path_seconds\n");
         for row in &self.rows {
-            let MachiningRow { part, mode, translation_nm, orientation_nrad, peak_nm } = row;
-            let _ = writeln!(out, "{part},{mode},{translation_nm:.4},{orientation_nrad:.4},{peak_nm:.4}");
+            let MachiningRow { part, mode, translation_nm, orientation_nrad, peak_nm, coverage } = row;
+            let Coverage { seconds, path_seconds } = coverage;
+            let _ = write!(out, "{part},{mode},{translation_nm:.4},{orientation_nrad:.4},{peak_nm:.4}");
+            let _ = writeln!(out, ",{seconds:.6},{path_seconds:.6}");
         }
         out
     }
@@ -354,13 +385,18 @@ impl MachiningTable {
     }
 
     fn text(&self, beside_paper: bool) -> String {
-        let mut out = String::from("mean error norm            nm      nrad");
+        let mut out = String::from("mean error norm            nm      nrad  over s  path s");
         out.push_str(if beside_paper { "   paper nm      nrad\n" } else { "\n" });
         for row in &self.rows {
             let _ = write!(
                 out,
-                "{:<11}{:<10}{:>8.2}{:>10.1}",
-                row.part, row.mode, row.translation_nm, row.orientation_nrad
+                "{:<11}{:<10}{:>8.2}{:>10.1}{:>8.3}{:>8.3}",
+                row.part,
+                row.mode,
+                row.translation_nm,
+                row.orientation_nrad,
+                row.coverage.seconds,
+                row.coverage.path_seconds
             );
             let paper = beside_paper.then(|| paper_machining(&row.part, &row.mode)).flatten();
             if let Some([nm, nrad]) = paper {
@@ -377,7 +413,7 @@ mod tests {
     use super::*;
 
     fn errors() -> PoseErrors {
-        let mut errors = PoseErrors::default();
+        let mut errors = PoseErrors::over(3, 0.5);
         errors.add(&[3e-9, 0.0, 4e-9, 1e-9, 2e-9, 2e-9]);
         errors.add(&[-3e-9, 0.0, 4e-9, -10e-9, 0.0, 0.0]);
         errors.add(&[0.0; 6]);
@@ -395,7 +431,7 @@ mod tests {
         assert!((errors.mean_orientation_nrad() - 13.0 / 3.0).abs() < 1e-12);
         assert!((errors.peak_translation_nm() - 5.0).abs() < 1e-12);
         assert!((errors.peak_nano()[3] - 10.0).abs() < 1e-12);
-        assert_eq!(errors.count(), 3);
+        assert_eq!((errors.count(), errors.coverage()), (3, Coverage { seconds: 1.5, path_seconds: 1.5 }));
     }
 
     #[test]
@@ -408,7 +444,11 @@ mod tests {
         assert_eq!(lines.len(), 4, "{text}");
         assert!(!table.ours_to_text().contains("paper"));
         assert!(lines[2].contains("paper") && lines[2].contains("631") && lines[2].ends_with("325"), "{text}");
-        assert!(table.to_csv().lines().nth(1).unwrap().starts_with("case-1,pf-pcc,10,2.4495,0.0000,3.2660,"));
+        assert!(lines[1].ends_with("   1.500   1.500"), "{text}");
+        let csv = table.to_csv();
+        let row = csv.lines().nth(1).unwrap();
+        assert!(row.starts_with("case-1,pf-pcc,10,2.4495,0.0000,3.2660,"), "{row}");
+        assert!(row.ends_with(",1.500000,1.500000"), "{row}");
         assert!(table.row("case-1", "pf-pcc", 1.0).is_none());
     }
 

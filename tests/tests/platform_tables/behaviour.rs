@@ -5,7 +5,7 @@ use host_sim::platform::rig::{Bench as Rig, Command, Record, Request};
 use host_sim::platform::scenario::{PLATFORM_MODES, select};
 use host_sim::platform::{PlatformScenario, Specimen, UserFrames};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
-use specgen::machine;
+use specgen::machine::{self, on_board};
 use specgen_tests::length;
 
 use super::bench::{BIAS, Bench, PERIOD, in_parallel, reference_machine};
@@ -161,25 +161,23 @@ fn trajectories_on_board_are_those_streamed() {
     let mut controller = bench.controller();
     for (selector, path) in [(0, PaperPath::Case1), (1, PaperPath::Case2), (2, PaperPath::Machining)] {
         let path = PaperPose::corrected(path, 1.0);
-        let played = scenario.play(&mut controller, selector, 60.0).expect("a run");
+        let course = on_board(&bench.emitted.compiled, selector).expect("a trajectory of the spec");
+        let played = scenario.play(&mut controller, &course, None).expect("a run");
         let streamed = scenario.run(&mut controller, &path).expect("a run");
         assert_eq!((played.status, streamed.status), (0, 0));
-        let off = |lead: usize| {
-            let pairs = played.samples.iter().skip(lead).zip(&streamed.samples);
-            pairs
-                .map(|(a, b)| (0..6).map(|k| (a.target[k] - b.target[k]).abs()).fold(0.0, f64::max))
-                .fold(0.0, f64::max)
-        };
-        // The move to the start takes a tick or none.
-        let lead = (0..4).min_by(|a, b| off(*a).total_cmp(&off(*b))).expect("a lead");
+        let off = played
+            .samples
+            .iter()
+            .zip(&streamed.samples)
+            .flat_map(|(a, b)| (0..6).map(|k| (a.target[k] - b.target[k]).abs()))
+            .fold(0.0, f64::max);
         let (a, b) = (played.errors.rms_translation_nm(), streamed.errors.rms_translation_nm());
-        println!(
-            "{:?}: on board off by {:.1e} after {lead} ticks; {a:.2} nm on board, {b:.2} nm streamed",
-            path.path,
-            off(lead)
-        );
-        assert!(off(lead) <= 1e-12, "{:?}: {:e}", path.path, off(lead));
-        assert!(played.samples.len().abs_diff(streamed.samples.len()) <= 4);
+        println!("{:?}: on board off by {off:.1e}; {a:.2} nm on board, {b:.2} nm streamed", path.path);
+        assert!(off <= 1e-12, "{:?}: {off:e}", path.path);
+        // From the first set-point to the last.
+        let whole = (path.duration() / scenario.options.interval).round() as usize;
+        assert_eq!([played.samples.len(), streamed.samples.len()], [whole; 2]);
+        assert!(played.errors.coverage() == streamed.errors.coverage() && played.errors.coverage().is_whole());
         assert!((a / b - 1.0).abs() < 0.05, "{a} {b}");
     }
 }

@@ -22,7 +22,7 @@ examples of its own: `specgen check --help`. (minutes) takes some; (board) wants
 a board, a second program, or a computer at rest.
 
 Exit codes: 0 good; 1 spec, record or budget refused; 2 usage; 3 environment;
-130 interrupted.";
+4 a run ended before the end of its path; 130 interrupted.";
 
 pub const NEW: &str = "\
 Examples:

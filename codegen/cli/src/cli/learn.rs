@@ -8,15 +8,17 @@ use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
+use host_sim::closed_loop::RunError;
 use host_sim::platform::rig::{Bench, Noise};
 use host_sim::word::status_words;
 use serde::Serialize;
+use serde_json::Value;
 
 use super::file::{check_input, check_place, write_file};
 use super::line::Line;
 use super::named::{InputFile, OutputFile};
 use super::operate::{Ended, Operator, motion_name};
-use super::sim::{PlantArguments, emitted, environment, frequency};
+use super::sim::{PlantArguments, emitted, frequency};
 use super::spec;
 use super::table::{left, right, row};
 use super::trajectory;
@@ -275,7 +277,7 @@ fn simulated<T, F>(
     let noise = if arguments.plant.no_noise { Noise::NONE } else { Noise::of(&specimen) };
     let scenario = plant::scenario(model, task, &specimen, &noise, seed);
     let mut rig = scenario.rig().clone();
-    let mut bench = Bench::new(&mut rig, &mut controller, model.timing.period, 0).map_err(environment)?;
+    let mut bench = Bench::new(&mut rig, &mut controller, model.timing.period, 0)?;
     bench.arm(ARMING).map_err(gate)?;
     let found = match work(&mut bench, ui) {
         Ok(done) => Some(keep(done, ui)?),
@@ -327,7 +329,7 @@ fn on_machine<T, F>(
     let found = match done {
         Ok(done) => Some(keep(done, ui)?),
         Err(LearnError::Ended) => None,
-        Err(error) => return Err(down.err().unwrap_or_else(|| Failure::Gate(format!("{name}: {error}")))),
+        Err(error) => return Err(down.err().unwrap_or_else(|| failure(&error, format!("{name}: {error}")))),
     };
     let down = format!("; {}", down?);
     let why = match ended {
@@ -378,7 +380,18 @@ fn help(arguments: &Arguments, study: &Study) -> Option<String> {
 }
 
 fn gate(error: impl Into<LearnError>) -> Failure {
-    Failure::Gate(error.into().to_string())
+    let error = error.into();
+    failure(&error, error.to_string())
+}
+
+/// A motion that was not made to its end has no figure.
+fn failure(error: &LearnError, message: String) -> Failure {
+    match error {
+        LearnError::Run(RunError::EndedEarly { .. }) | LearnError::Status(_) => {
+            Failure::EndedEarly { message, result: Value::Null }
+        }
+        _ => Failure::Gate(message),
+    }
 }
 
 /// The `[control]` of a spec whose controller takes a correction.
@@ -463,6 +476,7 @@ impl Outcome for Found {
             many => format!("{:.1} -> {:.1} nm rms in {many} passes", first.translation_nm, best.translation_nm),
         };
         let mut text = format!("{name}: {motion}, {gained} ({machine})\n");
+        text.push_str(&format!("  each pass measured over {}\n", best.coverage));
         // Writing to a String cannot fail, here and below.
         let _ = writeln!(
             text,
@@ -478,7 +492,7 @@ impl Outcome for Found {
         let columns = [right(6), right(10), right(10), right(12), left(0).behind("  ")];
         row(&mut text, &columns, &[&"pass", &"nm rms", &"nrad rms", &"gauges, nm", &""]);
         for (number, pass) in learned.passes.iter().enumerate() {
-            let Pass { translation_nm, orientation_nrad, measured_nm, status } = pass;
+            let Pass { translation_nm, orientation_nrad, measured_nm, status, .. } = pass;
             let said = [if number == learned.best { "kept" } else { "" }.to_owned(), status_words(*status)];
             let said: Vec<String> = said.into_iter().filter(|text| !text.is_empty()).collect();
             row(

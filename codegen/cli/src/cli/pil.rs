@@ -173,12 +173,11 @@ fn in_the_loop<P: Port>(
         (Ok(()), None) => {
             let below = if compiled.model.task_space.is_some() { "target less true pose" } else { "target less gauge" };
             report.plot = arguments.plot.charts(&report.name, below, &report.charts)?;
-            ui.result(&report);
-            Ok(())
+            ui.scored(&report, &report.ended_early)
         }
         (_, Some(stop)) => Err(stopped(stop, report, ui)),
         (Err(Broken::Command(failure)), None) => Err(failure),
-        (Err(Broken::Run(error)), None) => Err(environment(error)),
+        (Err(Broken::Run(error)), None) => Err(error.into()),
     }
 }
 

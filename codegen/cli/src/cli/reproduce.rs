@@ -131,7 +131,7 @@ fn section_3(compiled: &Compiled, steps: &mut Steps) -> Result<Vec<Table>, Failu
     let table_2 = legs::table_2(&scenario, &mut controller);
     steps.next("Fig. 29: the stability region", REGION);
     let figure_29 = legs::figure_29(&mut controller, compiled.model.adaptation.run_interval);
-    [table_1, table_2, figure_29].into_iter().map(|table| table.map_err(environment)).collect()
+    [table_1, table_2, figure_29].into_iter().map(|table| table.map_err(Failure::from)).collect()
 }
 
 /// Tables 5 to 9.
@@ -143,13 +143,13 @@ fn section_4(compiled: &Compiled, steps: &mut Steps) -> Result<(Vec<Table>, Cont
     for case in platform::CASES {
         for frequency in platform::FREQUENCIES {
             steps.next(&format!("Tables 5 to 8: {} at {frequency} Hz", case.0), CASE);
-            platform::free_motion(&scenario, &mut controller, case, frequency, &mut free).map_err(environment)?;
+            platform::free_motion(&scenario, &mut controller, case, frequency, &mut free)?;
         }
     }
     let mut machining = MachiningTable::default();
     for part in platform::parts() {
         steps.next(&format!("Table 9: machining {}", part.0), MACHINING);
-        platform::machining(&scenario, &mut controller, part, &mut machining).map_err(environment)?;
+        platform::machining(&scenario, &mut controller, part, &mut machining)?;
     }
     let mut tables: Vec<Table> = Vec::new();
     for (case, _) in platform::CASES {
@@ -200,6 +200,7 @@ fn table_3() -> Table {
         ours: Cell::Text((*ours).to_owned()),
         ratio: None,
         remark: None,
+        coverage: None,
     });
     Table {
         id: "table-3",

@@ -15,7 +15,7 @@ use super::file::{check_place, claim, write_folder};
 use super::learn::{NOWHERE, takes_correction};
 use super::named::{InputFile, OutputFolder};
 use super::plot::Plot;
-use super::sim::{PlantArguments, emitted, environment, frequency};
+use super::sim::{PlantArguments, emitted, frequency};
 use super::spec;
 use super::trajectory;
 use super::ui::{Failure, Ui};
@@ -149,7 +149,7 @@ fn study(arguments: &StudyArguments, ui: &mut Ui) -> Result<(), Failure> {
         Some(passes) => {
             takes_correction(&compiled)?;
             let learning =
-                Learning::of(&compiled, &followed.choice, &factors, BANDWIDTH, passes).map_err(environment)?;
+                Learning::of(&compiled, &followed.choice, &factors, BANDWIDTH, passes)?;
             Some(learning.ok_or_else(|| Failure::Gate(NOWHERE.to_owned()))?)
         }
         None => None,
@@ -195,11 +195,11 @@ fn study(arguments: &StudyArguments, ui: &mut Ui) -> Result<(), Failure> {
         }
     });
     ui.rate_done();
-    let runs = runs.map_err(environment)?;
+    let runs = runs?;
     if let (Some(shard), Some(file)) = (arguments.shard, &arguments.output) {
         if runs.len() < all {
             // A part is whole or not there.
-            return Err(Failure::ended_early());
+            return Err(Failure::interrupted());
         }
         Part { shard, planned: whole.members.len(), work, runs: runs.into_iter().map(Ran::from).collect() }
             .write(file, ui)?;

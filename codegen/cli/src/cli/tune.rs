@@ -15,7 +15,7 @@ use serde_json::json;
 use super::file::{check_edit, claim, edit_file, write_folder};
 use super::named::{InputFile, OutputFolder};
 use super::plot::Plot;
-use super::sim::{PlantArguments, emitted, environment, frequency};
+use super::sim::{PlantArguments, emitted, frequency};
 use super::spec;
 use super::ui::{Failure, Ui};
 use specgen_compiler::compile::{self, Compiled, Refused};
@@ -277,7 +277,7 @@ impl Job<'_> {
     }
 
     fn case(&self, start: &Setting, conditions: &Conditions) -> Result<Case, Failure> {
-        Case::new(&self.compiled, &self.controller, &self.leg, start, conditions).map_err(environment)
+        Case::new(&self.compiled, &self.controller, &self.leg, start, conditions).map_err(Failure::from)
     }
 
     fn conditions(&self, trajectory: TrajectoryChoice, seed: u64, whole_ticks: bool) -> Conditions {
@@ -354,7 +354,7 @@ impl Job<'_> {
             };
             let search = Search::run(optimiser.as_mut(), &self.space, &self.feasibility, case, &options);
             ui.rate_done();
-            searches.push((name, search.map_err(environment)?));
+            searches.push((name, search?));
         }
         Ok(searches)
     }

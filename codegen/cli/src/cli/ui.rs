@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
+use host_sim::closed_loop::RunError;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -20,6 +21,8 @@ use specgen_toolchain::TargetError;
 const GLANCE: Duration = Duration::from_millis(800);
 /// Exit code where the machine is to blame: a tool, a disk.
 const ENVIRONMENT: u8 = 3;
+/// Exit code of a simulated run that did not come to the end of its path.
+const ENDED_EARLY: u8 = 4;
 /// Exit code of a command that was ended by Ctrl-C, as shells have it.
 const INTERRUPTED: u8 = 130;
 
@@ -50,6 +53,12 @@ pub enum Failure {
         /// For programs; the text is out already.
         result: Value,
     },
+    /// A run did not come to the end of its path, so that it has no figure: exit code 4, with the figures of the others.
+    EndedEarly {
+        message: String,
+        /// For programs; the text is out already.
+        result: Value,
+    },
     /// Ended from outside with a result: what was found so far.
     Interrupted {
         message: String,
@@ -60,7 +69,7 @@ pub enum Failure {
 
 impl Failure {
     /// Ended by Ctrl-C before there was a result.
-    pub fn ended_early() -> Self {
+    pub fn interrupted() -> Self {
         let message = "interrupted: there is no result; every file that is there is whole".to_owned();
         Self::Interrupted { message, result: Value::Null }
     }
@@ -69,6 +78,16 @@ impl Failure {
 impl From<Refused> for Failure {
     fn from(refused: Refused) -> Self {
         Self::Refused(Box::new(refused))
+    }
+}
+
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Self {
+        let message = error.to_string();
+        match error {
+            RunError::EndedEarly { .. } => Self::EndedEarly { message, result: Value::Null },
+            _ => Self::Environment(message),
+        }
     }
 }
 
@@ -237,6 +256,16 @@ impl Ui {
         }
     }
 
+    /// The result of simulated runs, and the failure to return if some, by their names, did not come to the end of their path.
+    pub fn scored(&self, outcome: &impl Outcome, ended: &[String]) -> Result<(), Failure> {
+        if ended.is_empty() {
+            self.result(outcome);
+            return Ok(());
+        }
+        let message = format!("ended before the end of the path, so that there is no figure: {}", ended.join(", "));
+        Err(Failure::EndedEarly { message, result: self.shown(outcome) })
+    }
+
     /// The result of a command that fails: its text goes out now, and the value is for the failure.
     pub fn shown(&self, outcome: &impl Outcome) -> Value {
         if !self.json {
@@ -319,12 +348,14 @@ impl Ui {
             Failure::Environment(text) => (ENVIRONMENT, text.clone()),
             Failure::Judged { message, .. } => (1, message.clone()),
             Failure::Incomplete { message, .. } => (ENVIRONMENT, message.clone()),
+            Failure::EndedEarly { message, .. } => (ENDED_EARLY, message.clone()),
             Failure::Interrupted { message, .. } => (INTERRUPTED, message.clone()),
         };
         if self.json {
             let result = match failure {
                 Failure::Interrupted { result, .. }
                 | Failure::Judged { result, .. }
+                | Failure::EndedEarly { result, .. }
                 | Failure::Incomplete { result, .. } => result.clone(),
                 _ => Value::Null,
             };

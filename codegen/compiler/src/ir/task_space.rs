@@ -447,6 +447,30 @@ impl Frames {
 }
 
 impl Path {
+    /// Where it begins, as the controller has it, in the user's coordinates, m and rad.
+    #[must_use]
+    pub fn start(&self) -> [f64; 6] {
+        match self {
+            Self::Segments { start, .. } => *start,
+            Self::Table { rows, .. } => rows.first().map_or([0.0; 6], |row| row.pose),
+        }
+    }
+
+    /// Ticks from its start to its end; of one that repeats, of one repetition.
+    #[must_use]
+    pub fn ticks(&self) -> u32 {
+        match self {
+            Self::Segments { ticks, .. } => *ticks,
+            Self::Table { rows, row_ticks, .. } => rows.len().saturating_sub(1) as u32 * row_ticks,
+        }
+    }
+
+    /// Whether it begins again at its end.
+    #[must_use]
+    pub fn repeats(&self) -> bool {
+        matches!(self, Self::Table { repeat: true, .. })
+    }
+
     /// With every constant rounded to `scalar`.
     #[must_use]
     pub fn rounded(mut self, scalar: Scalar) -> Self {

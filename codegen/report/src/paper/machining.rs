@@ -7,7 +7,6 @@ use host_sim::platform::rig::{Record, RunOptions};
 use host_sim::platform::scenario::{MACHINING_MODES, select};
 use host_sim::platform::table::MachiningTable;
 use host_sim::trajectory::{PaperPath, PaperPose, Reading};
-use specgen_runtime::setpoint::{REFUSED, STALE};
 
 use super::motion::{REFUSED_PATH, TARGETS, change, error};
 use crate::chart::{Axis, Chart, DASHED, EDGE, LINE};
@@ -53,11 +52,11 @@ pub fn section(
         for (mode, word) in MACHINING_MODES {
             select(controller, word)?;
             let run = sampled.against(controller, &trajectory, part)?;
-            if run.status & (REFUSED | STALE) != 0 {
+            let Ok(found) = run.scored() else {
                 refused.push(format!("{name} with {mode}"));
                 continue;
-            }
-            table.push(name, mode, &run.errors);
+            };
+            table.push(name, mode, found);
             for axis in 0..6 {
                 let (turning, label) = (axis / 3, AXES[axis]);
                 let combined = mode != "p";

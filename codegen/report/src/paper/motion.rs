@@ -7,7 +7,6 @@ use host_sim::platform::rig::{PoseSample, Record, RunOptions};
 use host_sim::platform::scenario::{FREE_MODES, select};
 use host_sim::platform::table::{PoseRow, PoseTable};
 use host_sim::trajectory::{PaperPose, Reading};
-use specgen_runtime::setpoint::{REFUSED, STALE};
 
 use crate::chart::{Axis, Chart, DASHED, INK, LINE};
 use crate::section::Section;
@@ -52,11 +51,11 @@ pub fn sections(
             for (mode, word) in FREE_MODES {
                 select(controller, word)?;
                 let run = sampled.run(controller, &trajectory)?;
-                if run.status & (REFUSED | STALE) != 0 {
+                let Ok(errors) = run.scored() else {
                     refused.push(format!("{mode} at {frequency} Hz"));
                     continue;
-                }
-                table.rows.push(PoseRow::of(name, mode, frequency, &run.errors));
+                };
+                table.rows.push(PoseRow::of(name, mode, frequency, errors));
                 figures.add(mode, &run.samples);
             }
             if let Some(charts) = figures.finish() {

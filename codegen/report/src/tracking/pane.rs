@@ -1,5 +1,7 @@
 //! A run as it is drawn: path and error of each coordinate, and where its corners are.
 
+use host_sim::coverage::Coverage;
+
 use crate::chart::{Axis, BLUE, Chart, DASHED, INK, LINE, Note, WIDE};
 use crate::section::{Group, Multiples, Part};
 
@@ -18,6 +20,8 @@ pub struct Shown<'a> {
     pub lengths: usize,
     /// Control interval, s.
     pub interval: f64,
+    /// How much of the path the samples are.
+    pub coverage: Coverage,
     /// Target and what was reached, m and rad, tick by tick.
     pub samples: Vec<[[f64; 6]; 2]>,
     /// What a corner of the path is called.
@@ -116,11 +120,12 @@ pub fn pane(run: &Shown) -> Vec<Part> {
     let follows = if at_corner { "; the peak follows a corner of the path" } else { "" };
     vec![
         Part::Lead(format!(
-            "With {} {} stays within {}\u{2009}nm of {what}, {}\u{2009}nm rms{follows}.",
+            "With {} {} stays within {}\u{2009}nm of {what}, {}\u{2009}nm rms over {}{follows}.",
             run.law,
             run.names[worst],
             short(peak[worst]),
-            short(rms[worst])
+            short(rms[worst]),
+            run.coverage
         )),
         Part::Multiples(Multiples { id: format!("axes-{id}"), items, groups, selected: worst }),
     ]

@@ -24,6 +24,8 @@ pub struct Motion {
     pub corrected: usize,
     /// Of the platform's joints, m: what angles count with.
     pub radius: f64,
+    /// Of a tick, s.
+    pub interval: f64,
 }
 
 impl Motion {
@@ -61,6 +63,6 @@ impl Motion {
             }
         }));
         targets.extend(std::iter::repeat_n(start, after));
-        Ok(Self { targets, scored, corrected, radius })
+        Ok(Self { targets, scored, corrected, radius, interval })
     }
 }

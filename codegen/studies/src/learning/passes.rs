@@ -5,6 +5,7 @@ use std::fmt;
 use std::ops::ControlFlow;
 
 use host_sim::closed_loop::RunError;
+use host_sim::coverage::Coverage;
 use host_sim::platform::rig::{Bench, Request};
 use host_sim::word::status_words;
 use serde::Serialize;
@@ -194,11 +195,19 @@ pub struct Pass {
     pub measured_nm: f64,
     /// Status bits seen.
     pub status: u32,
+    /// What was measured of the motion.
+    #[serde(flatten)]
+    pub coverage: Coverage,
 }
 
 impl Pass {
-    fn of(seen: &Seen, motion: &Motion) -> Self {
-        let Motion { scored, radius, .. } = motion;
+    fn of(seen: &Seen, motion: &Motion) -> Result<Self, LearnError> {
+        let Motion { scored, radius, interval, .. } = motion;
+        let shown = seen.real.len().min(seen.measured.len()).min(scored.end);
+        let coverage = Coverage::new(shown.saturating_sub(scored.start), scored.len(), *interval);
+        if !coverage.is_whole() {
+            return Err(RunError::EndedEarly { coverage, status: seen.status }.into());
+        }
         let rms = |errors: &[[f64; 6]], weights: [f64; 2]| {
             let sum: f64 = errors[scored.clone()]
                 .iter()
@@ -206,12 +215,13 @@ impl Pass {
                 .sum();
             libm::sqrt(sum / scored.len() as f64) * 1e9
         };
-        Self {
+        Ok(Self {
             translation_nm: rms(&seen.real, [1.0, 0.0]),
             orientation_nrad: rms(&seen.real, [0.0, 1.0]),
             measured_nm: rms(&seen.measured, [1.0, radius * radius]),
             status: seen.status,
-        }
+            coverage,
+        })
     }
 
     /// Whether the limits held the correction back.
@@ -285,7 +295,7 @@ pub fn learn(
     let mut seen = equal()?;
     let mut judge = repeated.map(|before| Judge::new(Score::of(&seen, motion), &before));
     let mut learned = Learned {
-        passes: vec![Pass::of(&seen, motion)],
+        passes: vec![Pass::of(&seen, motion)?],
         best: 0,
         knots: played.clone(),
         noise_nm: judge.as_ref().map(Judge::noise_nm),
@@ -312,7 +322,7 @@ pub fn learn(
             }
             passed => passed?,
         };
-        let pass = Pass::of(&seen, motion);
+        let pass = Pass::of(&seen, motion)?;
         let least = learned.passes[learned.best].measured_nm;
         learned.passes.push(pass);
         go_on = watch(number, &pass);

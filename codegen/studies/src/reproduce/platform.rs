@@ -37,7 +37,7 @@ pub fn free_motion(
     for (mode, word) in FREE_MODES {
         select(controller, word)?;
         let run = scenario.run(controller, &trajectory)?;
-        table.rows.push(PoseRow::of(name, mode, frequency, &run.errors));
+        table.rows.push(PoseRow::of(name, mode, frequency, run.scored()?));
     }
     Ok(())
 }
@@ -65,7 +65,8 @@ pub fn tables(runs: &PoseTable, case: &str) -> [Table; 2] {
                 for frequency in FREQUENCIES {
                     let place = if turning { 3 + axis } else { axis };
                     let paper = paper_rms(case, mode, frequency).map_or(f64::NAN, |values| values[place]);
-                    let ours = runs.row(case, mode, frequency).map_or(f64::NAN, |row| row.rms_nano[place]);
+                    let run = runs.row(case, mode, frequency);
+                    let ours = run.map_or(f64::NAN, |row| row.rms_nano[place]);
                     let suspect = first && mode == "pf-pcc" && place == 2 && frequency == FREQUENCIES[0];
                     let reason = match (turning, suspect) {
                         (true, _) => Remark::Angles,
@@ -76,7 +77,8 @@ pub fn tables(runs: &PoseTable, case: &str) -> [Table; 2] {
                         [["x", "y", "z"], ["θx", "θy", "θz"]][usize::from(turning)][axis],
                         if turning { "nrad" } else { "nm" },
                     );
-                    rows.push(Row::numbers([mode, quantity], Some(frequency), unit, [paper, ours], reason));
+                    let row = Row::numbers([mode, quantity], Some(frequency), unit, [paper, ours], reason);
+                    rows.push(row.over(run.map(|row| row.coverage)));
                 }
             }
         }
@@ -85,7 +87,7 @@ pub fn tables(runs: &PoseTable, case: &str) -> [Table; 2] {
     [false, true].map(|turning| Table {
         id: ids[usize::from(turning)],
         title: titles[usize::from(turning)],
-        how: "P/F, true pose against bias and corrected path, root mean square; one machine within tolerances (seed 1), one nominal record for six legs".to_owned(),
+        how: "P/F, true pose against bias and corrected path, root mean square over the whole path; one machine within tolerances (seed 1), one nominal record for six legs".to_owned(),
         command: "specgen sim specs/reference.toml --frequency 0.1,1,10",
         rows: rows(turning),
     })
@@ -106,7 +108,7 @@ pub fn machining(
     for (mode, word) in MACHINING_MODES {
         select(controller, word)?;
         let run = scenario.against(controller, &trajectory, part)?;
-        table.push(name, mode, &run.errors);
+        table.push(name, mode, run.scored()?);
     }
     Ok(())
 }
@@ -118,10 +120,14 @@ pub fn table_9(runs: &MachiningTable) -> Table {
     for (part, _) in parts() {
         for (mode, _) in MACHINING_MODES {
             let paper = paper_machining(part, mode).unwrap_or([f64::NAN; 2]);
-            let ours = runs.row(part, mode).map_or([f64::NAN; 2], |row| [row.translation_nm, row.orientation_nrad]);
+            let run = runs.row(part, mode);
+            let ours = run.map_or([f64::NAN; 2], |row| [row.translation_nm, row.orientation_nrad]);
+            let coverage = run.map(|row| row.coverage);
             let case = format!("{part}, {mode}");
             let at = Some(MACHINING_FREQUENCY);
-            let row = |what, unit, k: usize, reason| Row::numbers([&case, what], at, unit, [paper[k], ours[k]], reason);
+            let row = |what, unit, k: usize, reason| {
+                Row::numbers([&case, what], at, unit, [paper[k], ours[k]], reason).over(coverage)
+            };
             rows.push(row("translation error norm", "nm", 0, Remark::WorkParts));
             rows.push(row("orientation error norm", "nrad", 1, Remark::BelowResolution));
         }
@@ -136,7 +142,7 @@ pub fn table_9(runs: &MachiningTable) -> Table {
     Table {
         id: "table-9",
         title: "Table 9, Figs 23 to 28: machining, P against P/F",
-        how: "mean of the norm of the true error; in touch with a linear work part from the start of the path"
+        how: "mean of the norm of the true error over the whole path; in touch with a linear work part from the start of the path"
             .to_owned(),
         command: "specgen sim specs/reference.toml",
         rows,

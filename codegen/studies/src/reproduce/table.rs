@@ -1,5 +1,6 @@
 //! A table of the paper beside ours.
 
+use host_sim::coverage::Coverage;
 use serde::Serialize;
 
 use crate::paper::remark::Remark;
@@ -33,6 +34,9 @@ pub struct Row {
     pub ratio: Option<f64>,
     /// Why they differ; none where there is nothing to compare.
     pub remark: Option<Remark>,
+    /// Over what ours was measured, of the error on a path.
+    #[serde(flatten)]
+    pub coverage: Option<Coverage>,
 }
 
 impl Row {
@@ -54,7 +58,14 @@ impl Row {
             ours: Cell::Number(ours),
             ratio: Some(ours / paper),
             remark: Some(Remark::of(paper, ours, reason)),
+            coverage: None,
         }
+    }
+
+    /// The same, ours measured over this part of a path; none where it was not made.
+    #[must_use]
+    pub fn over(self, coverage: Option<Coverage>) -> Self {
+        Self { coverage, ..self }
     }
 }
 

@@ -127,7 +127,7 @@ impl Results {
     /// One line for each comparison.
     #[must_use]
     pub fn csv(&self) -> String {
-        let mut out = String::from("table,case,quantity,frequency_Hz,unit,paper,ours,ratio,remark\n");
+        let mut out = String::from("table,case,quantity,frequency_Hz,unit,paper,ours,ratio,remark,seconds,path_seconds\n");
         let quoted = |text: &str| {
             if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
         };
@@ -139,7 +139,7 @@ impl Results {
             for row in &table.rows {
                 let _ = writeln!(
                     out,
-                    "{},{},{},{},{},{},{},{},{}",
+                    "{},{},{},{},{},{},{},{},{},{}",
                     table.id,
                     quoted(&row.case),
                     quoted(&row.quantity),
@@ -148,7 +148,11 @@ impl Results {
                     plain(&row.paper),
                     plain(&row.ours),
                     row.ratio.map_or_else(String::new, |ratio| format!("{ratio:.6}")),
-                    row.remark.map_or("", |remark| remark.id())
+                    row.remark.map_or("", |remark| remark.id()),
+                    row.coverage.map_or_else(
+                        || ",".to_owned(),
+                        |coverage| format!("{:.6},{:.6}", coverage.seconds, coverage.path_seconds)
+                    )
                 );
             }
         }

@@ -1,6 +1,7 @@
 //! Learning of a motion that repeats, on machines that are not their data sheet.
 
 use host_sim::closed_loop::RunError;
+use host_sim::coverage::Coverage;
 use serde::{Deserialize, Serialize};
 
 use super::Factors;
@@ -27,6 +28,9 @@ pub struct Learnt {
     pub passes: u32,
     /// Whether learning ended because the error grew.
     pub grew: bool,
+    /// What was measured of the motion in that pass.
+    #[serde(flatten)]
+    pub coverage: Coverage,
 }
 
 impl Learning {

@@ -7,6 +7,7 @@ use std::sync::mpsc;
 
 use host_sim::closed_loop::RunError;
 use host_sim::controller::Controller;
+use host_sim::coverage::Coverage;
 use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{Bench, Noise};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -44,6 +45,9 @@ pub struct Figures {
     pub fault_ticks: u64,
     /// Their status bits.
     pub fault_bits: u32,
+    /// What was measured.
+    #[serde(flatten)]
+    pub coverage: Coverage,
     /// What the machine learned, where it was asked to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub learned: Option<Learnt>,
@@ -149,7 +153,7 @@ impl Study<'_> {
         let learned =
             learn(&mut bench, motion, Learner::Host(update), &[], *spacing, *passes, |_, _| ControlFlow::Continue(()))?;
         let best = &learned.passes[learned.best];
-        Ok(Some(Learnt { error_nm: best.translation_nm, passes: learned.best as u32, grew: learned.grew() }))
+        Ok(Some(Learnt { error_nm: best.translation_nm, passes: learned.best as u32, grew: learned.grew(), coverage: best.coverage }))
     }
 
     fn simulate(&self, member: &Member) -> Result<Outcome, RunError> {
@@ -175,7 +179,7 @@ impl Study<'_> {
         let (mut square, mut turned) = (0.0, 0.0);
         let mut figures = Figures::default();
         let mut lost = None;
-        case.observe(&mut case.worker(), &setting, |seen| {
+        figures.coverage = case.observe(&mut case.worker(), &setting, |seen| {
             // A NaN keeps no bound.
             let kept = seen.largest <= self.bound && seen.orientation * radius <= self.bound;
             ticks += 1;

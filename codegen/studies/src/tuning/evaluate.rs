@@ -12,6 +12,7 @@ use std::ops::ControlFlow;
 
 use host_sim::closed_loop::{LEGS, RunError, ticks_within};
 use host_sim::controller::{Controller, TickController};
+use host_sim::coverage::Coverage;
 use host_sim::plant::{LegParameters, NoiseParameters};
 use host_sim::platform::rig::Noise;
 use host_sim::platform::study::PlatformStudy;
@@ -110,6 +111,9 @@ pub struct Score {
     pub effort_nm: f64,
     /// (9), µm s².
     pub cost: f64,
+    /// What was measured.
+    #[serde(flatten)]
+    pub coverage: Coverage,
 }
 
 /// What came of one setting.
@@ -293,7 +297,7 @@ impl Case {
         let factor = |gains: &[f64; 6]| -> [f64; 6] { std::array::from_fn(|k| gains[k] / stiffness[k] * scale[k]) };
         let (kp, ki, kv) = (factor(&tuning.proportional), factor(&tuning.integral), factor(&tuning.derivative));
         let (mut integral, mut last, mut target) = ([0.0; 6], [0.0; 6], None::<[f64; 6]>);
-        study.run(worker, words, |moment| {
+        let coverage = study.run(worker, words, |moment| {
             if moment.tick.status & NOT_SCORED != 0 {
                 limited = Some(Evaluation::Limited { time: moment.time, status: moment.tick.status });
                 return ControlFlow::Break(());
@@ -318,7 +322,7 @@ impl Case {
             sums.add(moment.time, parts[0], parts[1], radius, effort, self.period);
             ControlFlow::Continue(())
         })?;
-        Ok(limited.unwrap_or_else(|| Evaluation::Scored(sums.score())))
+        Ok(limited.unwrap_or_else(|| Evaluation::Scored(sums.score(coverage))))
     }
 
     fn legs(
@@ -338,7 +342,7 @@ impl Case {
         let mut limited = None;
         let mut last = [0.0; LEGS];
         let at_rest = AT_REST * self.stroke;
-        scenario.rig().clone().follow(worker, trajectory, self.period, |sample, words| {
+        let coverage = scenario.rig().clone().follow(worker, trajectory, self.period, |sample, words| {
             let mut status = words.output[status_place] as u32;
             for (leg, target) in sample.target.iter().enumerate() {
                 if target.abs() < at_rest {
@@ -361,7 +365,7 @@ impl Case {
             sums.add(sample.time, square, 0.0, 0.0, effort, self.period);
             ControlFlow::Continue(())
         })?;
-        Ok(limited.unwrap_or_else(|| Evaluation::Scored(sums.score())))
+        Ok(limited.unwrap_or_else(|| Evaluation::Scored(sums.score(coverage))))
     }
 }
 
@@ -414,7 +418,8 @@ impl Sums {
         self.cost += (a1 * time * norm * 1e6 + a2 * effort * 1e12) * period;
     }
 
-    fn score(&self) -> Score {
+    /// Of a run that was made to its end.
+    fn score(&self, coverage: Coverage) -> Score {
         let rms = |sum: f64| libm::sqrt(sum / self.count.max(1) as f64) * 1e9;
         Score {
             error_nm: rms(self.square),
@@ -423,6 +428,7 @@ impl Sums {
             peak_nm: self.peak * 1e9,
             effort_nm: rms(self.effort),
             cost: self.cost,
+            coverage,
         }
     }
 }
@@ -437,9 +443,10 @@ mod tests {
         let mut sums = Sums::default();
         sums.add(0.5, 9e-12, 1.6e-9, 0.1, 4e-12, 1e-4);
         let expected = (0.998 * 0.5 * 5.0 + 0.002 * 4.0) * 1e-4;
-        assert!((sums.score().cost - expected).abs() < 1e-15, "{} {expected}", sums.score().cost);
+        let score = |sums: &Sums| sums.score(Coverage::new(1, 1, 1e-4));
+        assert!((score(&sums).cost - expected).abs() < 1e-15, "{} {expected}", score(&sums).cost);
         sums.add(1.0, 9e-12, 1.6e-9, 0.1, 0.0, 1e-4);
-        assert!((sums.score().cost - expected - 0.998 * 5.0 * 1e-4).abs() < 1e-15);
-        assert!((sums.score().error_nm - 5000.0).abs() < 1e-9);
+        assert!((score(&sums).cost - expected - 0.998 * 5.0 * 1e-4).abs() < 1e-15);
+        assert!((score(&sums).error_nm - 5000.0).abs() < 1e-9);
     }
 }

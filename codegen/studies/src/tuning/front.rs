@@ -28,7 +28,9 @@ pub fn front(candidates: &[Candidate]) -> Vec<Candidate> {
 /// The front as CSV: figures, then the numbers of the space.
 #[must_use]
 pub fn to_csv(front: &[Candidate], space: &Space) -> String {
-    let mut out = String::from("candidate,error_nm,effort_nm,peak_nm,translation_nm,orientation_nrad,cost_um_s2");
+    let mut out = String::from(
+        "candidate,error_nm,effort_nm,peak_nm,translation_nm,orientation_nrad,cost_um_s2,seconds,path_seconds",
+    );
     for parameter in &space.parameters {
         let _ = write!(out, ",{}", parameter.role);
     }
@@ -41,6 +43,7 @@ pub fn to_csv(front: &[Candidate], space: &Space) -> String {
         for figure in figures {
             let _ = write!(out, ",{figure:.6e}");
         }
+        let _ = write!(out, ",{:.6},{:.6}", score.coverage.seconds, score.coverage.path_seconds);
         for parameter in &space.parameters {
             let _ = write!(out, ",{:.3e}", space.value(setting, parameter.role));
         }
@@ -65,10 +68,18 @@ pub fn history_csv(history: &[Generation]) -> String {
 mod tests {
     use super::*;
     use crate::tuning::{Score, Setting};
+    use host_sim::coverage::Coverage;
 
     fn candidate(number: usize, error_nm: f64, effort_nm: f64) -> Candidate {
-        let score =
-            Score { error_nm, translation_nm: error_nm, orientation_nrad: 0.0, peak_nm: 0.0, effort_nm, cost: 0.0 };
+        let score = Score {
+            error_nm,
+            translation_nm: error_nm,
+            orientation_nrad: 0.0,
+            peak_nm: 0.0,
+            effort_nm,
+            cost: 0.0,
+            coverage: Coverage::default(),
+        };
         Candidate { number, setting: Setting::Legs { level: 0.1, drift: 0.1 }, score }
     }
 

@@ -1,5 +1,6 @@
 //! A number about a platform, how it stands to its limit, and how it is written.
 
+use host_sim::coverage::Coverage;
 use serde::Serialize;
 use specgen_toolchain::budget::group;
 
@@ -89,6 +90,9 @@ pub struct Figure {
     pub mark: Mark,
     /// Said in place of the number, where it is no measure.
     pub words: Option<String>,
+    /// What was measured; none where nothing follows a path.
+    #[serde(flatten)]
+    pub coverage: Option<Coverage>,
 }
 
 impl Figure {
@@ -96,7 +100,7 @@ impl Figure {
     #[must_use]
     pub fn new(subject: Subject, name: &str, value: f64, unit: &'static str) -> Self {
         let name = name.to_owned();
-        Self { subject, name, value, more: false, unit, limit: None, mark: Mark::NoLimit, words: None }
+        Self { subject, name, value, more: false, unit, limit: None, mark: Mark::NoLimit, words: None, coverage: None }
     }
 
     /// A fact in words that is as it must be, or not.
@@ -110,6 +114,12 @@ impl Figure {
     #[must_use]
     pub fn more_than(subject: Subject, name: &str, value: f64, unit: &'static str) -> Self {
         Self { more: true, ..Self::new(subject, name, value, unit) }
+    }
+
+    /// The same, measured over this part of a path.
+    #[must_use]
+    pub fn over(self, coverage: Coverage) -> Self {
+        Self { coverage: Some(coverage), ..self }
     }
 
     /// The same, which must be at most `value` by what `from` says.

@@ -18,6 +18,9 @@
 //! * **Stop**: any other command during a motion; obeyed when standing. A motion that would leave the workspace after
 //!   all (the frames bend the way) is frozen at its last pose.
 //!
+//! [`BUSY`] stays set from the first of several motions to the last: in the tick in which one arrives, too, if the command
+//! begins the next with the following tick.
+//!
 //! Nothing non-finite and no pose outside the workspace is ever given out or kept, whatever the command. From tick to tick
 //! no axis moves further than speed · T_s in a move, or the stream's speed · T_s in a stream.
 
@@ -34,7 +37,7 @@ mod snapshot;
 pub const REFUSED: u32 = 1 << 16;
 /// Status: the stream is stale and the platform held.
 pub const STALE: u32 = 1 << 17;
-/// Status: bias, move, trajectory or stop under way.
+/// Status: bias, move, trajectory or stop under way, or begun by the command with the next tick.
 pub const BUSY: u32 = 1 << 18;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -157,8 +160,31 @@ impl<T: Real> Generator<T> {
             return self.stream(setpoints, command, fresh);
         }
         self.age = 0;
-        let status = self.obey(setpoints, kind, command);
-        self.advance(setpoints, status)
+        let refused = self.obey(setpoints, kind, command);
+        let moved = !matches!(self.phase, Phase::Hold);
+        let status = self.advance(setpoints, refused);
+        if moved && matches!(self.phase, Phase::Hold) && status == 0 && self.begins_next(setpoints, kind, command) {
+            return BUSY;
+        }
+        status
+    }
+
+    /// Whether the command begins a motion with the next tick, now that it stands still.
+    #[cold]
+    #[inline(never)]
+    fn begins_next<F: Frames<T>>(&self, setpoints: &Setpoints<T, F>, kind: CommandKind, command: &Command<T>) -> bool {
+        let goal = match kind {
+            CommandKind::Move => command.target.pose,
+            CommandKind::Trajectory if self.finished != Some(command.selector) => {
+                match setpoints.trajectories.get(command.selector as usize) {
+                    Some(trajectory) if trajectory.start() == self.place => return true,
+                    Some(trajectory) => trajectory.start(),
+                    None => return false,
+                }
+            }
+            _ => return false,
+        };
+        goal != self.place && setpoints.admitted(&goal).is_some()
     }
 
     /// One tick under the command to stream.

@@ -1,8 +1,9 @@
 use host_sim::closed_loop::{Preparation, RunError};
-use host_sim::controller::StandIn;
+use host_sim::controller::{StandIn, TickController};
+use host_sim::coverage::Coverage;
 use host_sim::plant::LegParameters;
 use host_sim::platform::Specimen;
-use host_sim::platform::rig::{BUSY, GaugeFault, Noise, PlatformRig, Record, RunOptions};
+use host_sim::platform::rig::{BUSY, Command, GaugeFault, Noise, OnBoard, PlatformRig, PlatformRun, Record, RunOptions};
 use host_sim::platform::{PlatformParameters, WorkPart};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 
@@ -168,4 +169,110 @@ fn a_gauge_ends_at_its_range() {
         rig.hold(&[20.0; 6], INTERVAL);
     }
     assert_eq!(rig.read_gauges()[0], 2e-6);
+}
+
+/// Status of a set-point that was refused.
+const REFUSED: u32 = 1 << 16;
+/// A micrometre off while it moves to the start; ticks of that.
+const OFF: f64 = 1e-6;
+const APPROACH: u64 = 30;
+
+/// Moves for [`APPROACH`] ticks under the command to move, then plays for `busy` ticks with the tick behind them as the last; `bad` is
+/// the tick of the play in which it refuses its set-point, if it does. Its target is off only while it moves.
+fn player(busy: u64, bad: Option<u64>) -> StandIn<impl FnMut(&mut u64, &[u64], &mut [u64])> {
+    let target = oracle::platform::description().output("target[0]").unwrap();
+    let mut moved = 0;
+    let tick = move |played: &mut u64, row: &[u64], output: &mut [u64]| {
+        output.fill(0);
+        let command = row[input("command")];
+        let mut status = 0;
+        if command == Command::Move.word() {
+            moved += 1;
+            output[target] = OFF.to_bits();
+            status = if moved < APPROACH { BUSY } else { 0 };
+        } else if command == Command::Trajectory.word() {
+            *played += 1;
+            status = if *played <= busy { BUSY } else { 0 };
+            if Some(*played) == bad {
+                status = REFUSED;
+            }
+        }
+        output[54] = u64::from(status);
+    };
+    StandIn { description: oracle::platform::description(), state: 0, tick }
+}
+
+fn played(
+    controller: &mut dyn TickController,
+    path: &OnBoard,
+    interval: f64,
+    limit: Option<f64>,
+) -> Result<PlatformRun, RunError> {
+    let options = RunOptions { settle: 0.0, record: Record::Samples, ..RunOptions::new(interval, [0.0; 6]) };
+    let mut rig = rig(&Noise::NONE, 1);
+    rig.plant_mut().step_whole_ticks(interval);
+    rig.play(controller, path, &options, limit)
+}
+
+/// A path of 200 ticks that does not begin at the bias.
+const PATH: OnBoard = OnBoard { selector: 1, approach: Some([OFF, 0.0, 0.0, 0.0, 0.0, 0.0]), ticks: 200, repeats: false };
+
+#[test]
+fn a_path_is_scored_from_its_first_set_point_to_its_last_and_no_further() {
+    let once = OnBoard { approach: None, ..PATH };
+    let repeated = OnBoard { repeats: true, ..PATH };
+    // A repetition longer than what is usually followed is followed once.
+    let long = OnBoard { ticks: 7000, ..repeated };
+    let for_ever = u64::MAX - 1;
+    for (path, busy, interval, limit, ticks) in [
+        (PATH, 199, INTERVAL, None, 200),
+        (once, 199, INTERVAL, None, 200),
+        (PATH, 199, INTERVAL, Some(1.0), 200),
+        (PATH, 199, INTERVAL, Some(0.0123), 123),
+        (repeated, for_ever, 1e-2, None, 6000),
+        (repeated, for_ever, 1e-2, Some(2.5), 250),
+        (long, for_ever, 1e-2, None, 7000),
+    ] {
+        let run = played(&mut player(busy, None), &path, interval, limit).unwrap();
+        assert_eq!(run.samples.len(), ticks, "{path:?} {limit:?}");
+        let errors = run.scored().unwrap();
+        assert_eq!(errors.coverage(), Coverage::new(ticks, path.ticks, interval), "{path:?} {limit:?}");
+        // The way to the start is no part of the path.
+        assert!(errors.peak_nano()[0] < 1.0, "{path:?}: {} nm", errors.peak_nano()[0]);
+        assert!((run.samples[ticks - 1].time - ticks as f64 * interval).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_run_that_ends_early_is_an_error_and_no_figure() {
+    let repeated = OnBoard { repeats: true, ..PATH };
+    for (path, busy, seconds) in [(PATH, 0, 1e-4), (PATH, 50, 5.1e-3), (PATH, 198, 19.9e-3), (repeated, 199, 20e-3)] {
+        let error = played(&mut player(busy, None), &path, INTERVAL, Some(1.0)).unwrap_err();
+        let RunError::EndedEarly { coverage, status } = error else { panic!("{error}") };
+        assert!((coverage.seconds - seconds).abs() < 1e-12 && status == 0, "{coverage}");
+        assert_eq!(coverage.path_seconds, 200.0 * INTERVAL);
+        let text = RunError::EndedEarly { coverage, status }.to_string();
+        assert!(text.contains(&format!("after {seconds:.3} s of a path of 0.020 s (status 0x0)")), "{text}");
+    }
+    // A set-point that is refused ends the run; what it had of errors is not the path's.
+    let run = played(&mut player(199, Some(80)), &PATH, INTERVAL, None).unwrap();
+    assert!(!run.is_followed() && run.samples.len() == 80);
+    let error = run.scored().unwrap_err();
+    let RunError::EndedEarly { coverage, status } = error else { panic!("{error}") };
+    assert_eq!((coverage, status), (Coverage::new(79, 200, INTERVAL), REFUSED));
+    // Of a stream, too, which goes on all the same.
+    let StandIn { description, state, mut tick } = follower(0, 0.0);
+    let mut refuses = StandIn {
+        description,
+        state,
+        tick: move |ticks: &mut u64, row: &[u64], output: &mut [u64]| {
+            tick(ticks, row, output);
+            if row[input("sequence")] == 42 {
+                output[54] = u64::from(REFUSED);
+            }
+        },
+    };
+    let run = rig(&Noise::NONE, 1).run(&mut refuses, &Rise, &options()).unwrap();
+    assert_eq!((run.samples.len(), run.errors.coverage()), (200, Coverage::new(41, 200, INTERVAL)));
+    assert!(matches!(run.scored(), Err(RunError::EndedEarly { status: REFUSED, .. })));
 }

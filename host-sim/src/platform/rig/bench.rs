@@ -18,6 +18,8 @@ use crate::word::Scalar;
 
 /// Status bit of a generator that is busy with bias, move or trajectory.
 pub const BUSY: u32 = 1 << 18;
+/// Status bits of set-points that were refused or stale: the controller held instead of following.
+pub const NOT_FOLLOWED: u32 = 3 << 16;
 
 /// What the controller is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -237,12 +239,27 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// If it takes longer, or as [`Bench::tick`].
     pub fn arm(&mut self, limit: f64) -> Result<f64, RunError> {
-        let ticks = ticks_within(limit, self.interval)?;
-        let mut status = 0;
-        for tick in 1..=ticks {
-            status = self.tick(&Request::default())?.status;
+        self.until_arrived(&Request::default(), limit).map(|(ticks, _)| ticks as f64 * self.interval)
+    }
+
+    /// Moves to a pose of the user's frames (m and rad), at most for `limit` (s); returns the status bits that were seen.
+    ///
+    /// # Errors
+    /// As [`Bench::arm`].
+    pub fn move_to(&mut self, pose: &Six, limit: f64) -> Result<u32, RunError> {
+        let target = PoseTarget { pose: *pose, ..PoseTarget::default() };
+        let request = Request { command: Command::Move, target, ..Request::default() };
+        self.until_arrived(&request, limit).map(|(_, seen)| seen)
+    }
+
+    /// Asks until nothing moves: how many ticks that took, and the status bits that were seen.
+    fn until_arrived(&mut self, request: &Request, limit: f64) -> Result<(usize, u32), RunError> {
+        let (mut status, mut seen) = (0, 0);
+        for tick in 1..=ticks_within(limit, self.interval)? {
+            status = self.tick(request)?.status;
+            seen |= status & !BUSY;
             if status & BUSY == 0 {
-                return Ok(tick as f64 * self.interval);
+                return Ok((tick, seen));
             }
         }
         Err(RunError::NotReady { limit, status })

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{BUSY, Bench, Command, GaugeFault, PlatformRig, Request, Tick};
+use super::{BUSY, Bench, Command, GaugeFault, NOT_FOLLOWED, PlatformRig, Request, Tick};
 use crate::closed_loop::{RunError, ticks_within};
 use crate::controller::TickController;
 use crate::platform::contact::WorkPart;
@@ -12,6 +12,9 @@ use crate::platform::table::PoseErrors;
 use crate::trace::Trace;
 use crate::trajectory::{PoseTarget, PoseTrajectory};
 use crate::word::status_words;
+
+/// A path that repeats is followed for as many whole repetitions as fit into this time, once at least, s.
+const REPEATED: f64 = 60.0;
 
 /// What a run keeps besides its errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -72,6 +75,31 @@ impl RunOptions {
     }
 }
 
+/// A trajectory of the controller's own, as the controller has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OnBoard {
+    /// Its number.
+    pub selector: u32,
+    /// Where it begins, in the user's frames, m and rad; none where that is the bias pose.
+    pub approach: Option<Six>,
+    /// Ticks of the path; of one that repeats, of one repetition.
+    pub ticks: usize,
+    /// Whether it begins again at its end.
+    pub repeats: bool,
+}
+
+impl OnBoard {
+    /// Ticks that are followed: the whole path, or at most `limit` (s) of it.
+    fn followed(&self, interval: f64, limit: Option<f64>) -> Result<usize, RunError> {
+        let limit = limit.map(|limit| ticks_within(limit, interval)).transpose()?;
+        let times = if self.repeats { (ticks_within(REPEATED, interval)? / self.ticks.max(1)).max(1) } else { 1 };
+        Ok(match limit {
+            Some(limit) if self.repeats || limit < self.ticks => limit,
+            _ => times * self.ticks,
+        })
+    }
+}
+
 /// The end of one tick of a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseSample {
@@ -86,7 +114,7 @@ pub struct PoseSample {
 /// A run of a platform.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlatformRun {
-    /// True pose against bias and trajectory.
+    /// True pose against bias and trajectory, up to where the controller no longer followed; see [`PlatformRun::scored`].
     pub errors: PoseErrors,
     /// One per tick of the trajectory, if they are kept.
     pub samples: Vec<PoseSample>,
@@ -112,8 +140,8 @@ impl PlatformRig {
     ) -> Result<PlatformRun, RunError> {
         let interval = options.interval;
         let ticks = ticks_within(trajectory.duration(), interval)?;
+        let mut errors = PoseErrors::over(ticks_within(trajectory.whole(), interval)?, interval);
         let (mut bench, arming) = self.ready(controller, options)?;
-        let mut errors = PoseErrors::default();
         let mut samples = Vec::new();
         let mut seen = 0;
         for tick in 0..ticks {
@@ -125,8 +153,10 @@ impl PlatformRig {
             let wanted = trajectory.target(time);
             let tick = bench.tick(&Request::stream(wanted))?;
             let target = options.pose_of(&wanted);
-            errors.add(&std::array::from_fn(|k| target[k] - tick.pose[k]));
             seen |= tick.status;
+            if seen & NOT_FOLLOWED == 0 {
+                errors.add(&std::array::from_fn(|k| target[k] - tick.pose[k]));
+            }
             if options.record != Record::Errors {
                 samples.push(PoseSample { time, target, tick });
             }
@@ -134,35 +164,38 @@ impl PlatformRig {
         Ok(PlatformRun { errors, samples, trace: bench.into_trace(), status: seen, arming })
     }
 
-    /// Runs `controller` likewise, but lets it play its own trajectory `selector`, move to the start included, until it
-    /// stands or for `limit` (s). True poses are scored against its own targets.
+    /// Runs `controller` likewise, but lets it play a trajectory of its own: moves to its start, then plays it from its first
+    /// set-point to its last, or at most `limit` (s) of it. True poses are scored against its own targets; the way to the start
+    /// is not. A run whose set-points the controller refused ends there, see [`PlatformRun::is_followed`].
     ///
     /// # Errors
-    /// As [`PlatformRig::run`].
+    /// As [`PlatformRig::run`], and if the trajectory ends before its last set-point.
     pub fn play(
         &mut self,
         controller: &mut dyn TickController,
-        selector: u32,
+        path: &OnBoard,
         options: &RunOptions,
-        limit: f64,
+        limit: Option<f64>,
     ) -> Result<PlatformRun, RunError> {
         let interval = options.interval;
-        let ticks = ticks_within(limit, interval)?;
+        let ticks = path.followed(interval, limit)?;
         let (mut bench, arming) = self.ready(controller, options)?;
-        let request = Request { command: Command::Trajectory, selector, ..Request::default() };
-        let mut errors = PoseErrors::default();
+        let mut seen = path.approach.map_or(Ok(0), |start| bench.move_to(&start, options.arming))?;
+        let request = Request { command: Command::Trajectory, selector: path.selector, ..Request::default() };
+        let mut errors = PoseErrors::over(path.ticks, interval);
         let mut samples = Vec::new();
-        let mut seen = 0;
-        for tick in 0..ticks {
-            let time = (tick + 1) as f64 * interval;
+        for number in 1..=ticks {
             let tick = bench.tick(&request)?;
             seen |= tick.status & !BUSY;
-            if tick.status & BUSY == 0 {
+            if options.record != Record::Errors {
+                samples.push(PoseSample { time: number as f64 * interval, target: tick.target, tick });
+            }
+            if seen & NOT_FOLLOWED != 0 {
                 break;
             }
             errors.add(&std::array::from_fn(|k| tick.target[k] - tick.pose[k]));
-            if options.record != Record::Errors {
-                samples.push(PoseSample { time, target: tick.target, tick });
+            if tick.status & BUSY == 0 && (number < path.ticks || path.repeats) {
+                return Err(RunError::EndedEarly { coverage: errors.coverage(), status: tick.status });
             }
         }
         Ok(PlatformRun { errors, samples, trace: bench.into_trace(), status: seen, arming })
@@ -192,6 +225,23 @@ impl PlatformRig {
 }
 
 impl PlatformRun {
+    /// Whether the controller followed every set-point: refused none, and found none stale.
+    #[must_use]
+    pub fn is_followed(&self) -> bool {
+        self.status & NOT_FOLLOWED == 0
+    }
+
+    /// The errors, if they are those of the path.
+    ///
+    /// # Errors
+    /// If the controller held instead of following.
+    pub fn scored(&self) -> Result<&PoseErrors, RunError> {
+        if self.is_followed() {
+            return Ok(&self.errors);
+        }
+        Err(RunError::EndedEarly { coverage: self.errors.coverage(), status: self.status })
+    }
+
     /// CSV, one line per tick that was kept: what was wanted, where it was and by how much that is off, what the controller saw,
     /// did and said. SI units.
     #[must_use]

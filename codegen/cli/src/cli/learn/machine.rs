@@ -34,7 +34,7 @@ impl Own {
         let names: Vec<&str> = known.clone().map(|one| one.name.as_str()).collect();
         let found = known.enumerate().find(|(_, one)| Some(one.name.as_str()) == name);
         match found.map(|(number, one)| (number as u32, &one.path)) {
-            Some((number, Poses::Segments { start, .. })) => Ok(Self { number, start: *start }),
+            Some((number, path @ Poses::Segments { .. })) => Ok(Self { number, start: path.start() }),
             Some(_) => Err(Failure::Usage("a machine learns trajectories of the paper's kinds, not waveforms".to_owned())),
             None if names.is_empty() => Err(Failure::Usage(
                 "a machine learns the trajectories that it has, and this spec has none: add a [[trajectory]], and build anew"

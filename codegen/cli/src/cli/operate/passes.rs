@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use host_sim::coverage::Coverage;
 use host_sim::word::status_words;
 use serde::Serialize;
 use specgen_link::client::{ClientError, Port};
@@ -40,12 +41,16 @@ pub struct Played {
     correction: String,
     /// Root mean square of the translation's error as the gauges show it, over the motion and the rest after it, nm.
     error_nm: f64,
+    /// Over both.
+    #[serde(flatten)]
+    coverage: Coverage,
     status: u32,
 }
 
 impl Outcome for Played {
     fn text(&self) -> String {
-        let mut text = format!("played under {}: {:.1} nm rms by its gauges", self.correction, self.error_nm);
+        let Self { correction, error_nm, coverage, .. } = self;
+        let mut text = format!("played under {correction}: {error_nm:.1} nm rms by its gauges over {coverage}");
         let words = status_words(self.status & !BUSY);
         if !words.is_empty() {
             // Writing to a String cannot fail.
@@ -92,9 +97,16 @@ impl<P: Port> Operator<P> {
         let ticks = u32::try_from(table.knots.len()).unwrap_or(u32::MAX).saturating_mul(spacing);
         let course = Course { spacing, before, ticks, trajectory: number as u32 };
         let passed = self.pass(&table.start, course, Some(&table.knots), ui)?;
-        let motion = passed.errors.get((before / spacing) as usize..).unwrap_or_default();
+        let rest = (before / spacing) as usize;
+        let motion = passed.errors.get(rest..).unwrap_or_default();
+        let [seen, whole] = [motion.len(), (course.knots() as usize).saturating_sub(rest)];
+        let ticks = spacing as usize;
+        let coverage = Coverage::new(seen * ticks, whole * ticks, self.session.period());
+        if !coverage.is_whole() {
+            return Err(Ended::Fault(format!("the pass ended early, after {coverage}: there is no figure")));
+        }
         let error_nm = translation_nm(motion);
-        self.note(line, &Played { correction: shown(path), error_nm, status: passed.status }, ui);
+        self.note(line, &Played { correction: shown(path), error_nm, coverage, status: passed.status }, ui);
         Ok(())
     }
 

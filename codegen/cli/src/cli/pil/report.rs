@@ -3,11 +3,13 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
+use host_sim::closed_loop::RunError;
 use host_sim::platform::table::{MachiningTable, PoseTable};
 use host_sim::table::TrackingTable;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::cli::sim::platform::Played;
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::Outcome;
 use specgen_compiler::compile::Compiled;
@@ -44,6 +46,10 @@ pub struct Report {
     pub free_motion: PoseTable,
     /// Platform, against a work part.
     pub machining: Value,
+    /// Platform, a trajectory on board.
+    pub on_board: Option<Played>,
+    /// Runs that did not come to the end of their path.
+    pub ended_early: Vec<String>,
     /// Errors in words.
     #[serde(skip)]
     pub errors: String,
@@ -81,10 +87,19 @@ impl Report {
             tracking: TrackingTable::default(),
             free_motion: PoseTable::default(),
             machining: Value::Null,
+            on_board: None,
+            ended_early: Vec::new(),
             errors: String::new(),
             charts: Vec::new(),
             plot: None,
         }
+    }
+
+    /// A run that did not come to the end of its path: no figure.
+    pub fn ended(&mut self, name: &str, error: &RunError) {
+        // Writing to a String cannot fail.
+        let _ = writeln!(self.errors, "{name}: not scored: {error}, as on the host");
+        self.ended_early.push(name.to_owned());
     }
 
     /// Puts the table of free motion before what else is said of errors.

@@ -1,18 +1,15 @@
 //! What is run in the loop: the scenarios of `sim`, with a lock-step for a controller.
 
-use std::fmt::Write as _;
-
 use host_sim::closed_loop::Rig;
 use host_sim::plant::{LegPlant, NoiseParameters};
-use host_sim::platform::rig::{Noise, PlatformRun};
+use host_sim::platform::rig::{Noise, OnBoard};
 use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select as select_platform};
-use host_sim::platform::table::{AXES, MachiningTable, PoseRow};
+use host_sim::platform::table::{MachiningTable, PoseRow};
 use host_sim::platform::{PlatformScenario, WorkPart};
 use host_sim::scenario::{MODES, select as select_legs};
 use host_sim::table::TrackingRow;
 use host_sim::trajectory::{LegTrajectory, PaperLeg, PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
 use specgen_link::client::Port;
-use specgen_runtime::setpoint::{REFUSED, STALE};
 
 use super::report::Report;
 use super::{Arguments, Broken, timed};
@@ -46,7 +43,7 @@ pub enum Plan {
         frequency: f64,
     },
     /// A trajectory on board.
-    Board { name: String, selector: u32, mode: Option<(&'static str, u32)> },
+    Board { name: String, path: OnBoard, mode: Option<(&'static str, u32)> },
 }
 
 impl Plan {
@@ -56,7 +53,7 @@ impl Plan {
     /// Arguments that make no sense for the spec.
     pub fn of(arguments: &Arguments, compiled: &Compiled) -> Result<Self, Failure> {
         match &compiled.model.task_space {
-            Some(task) => Self::platform(arguments, task),
+            Some(task) => Self::platform(arguments, compiled, task),
             None => Self::legs(arguments, compiled),
         }
     }
@@ -78,7 +75,7 @@ impl Plan {
         Ok(Self::Legs { modes, frequency, samples })
     }
 
-    fn platform(arguments: &Arguments, task: &TaskSpace) -> Result<Self, Failure> {
+    fn platform(arguments: &Arguments, compiled: &Compiled, task: &TaskSpace) -> Result<Self, Failure> {
         if arguments.samples.is_some() {
             return Err(Failure::Usage(
                 "--samples is for legs with their own gauges; a spec with [control] runs at its timing.period"
@@ -93,8 +90,9 @@ impl Plan {
                         .to_owned(),
                 ));
             }
-            let selector = sim::platform::selector(task, name)?;
-            return Ok(Self::Board { name: name.clone(), selector, mode: wanted });
+            let path = machine::on_board(compiled, sim::platform::selector(task, name)?);
+            let path = path.ok_or_else(|| Failure::Usage(format!("the controller has no trajectory `{name}`")))?;
+            return Ok(Self::Board { name: name.clone(), path, mode: wanted });
         }
         let (name, path, part) = match arguments.scenario.as_deref().unwrap_or("case-1") {
             "case-1" => ("case-1", PaperPath::Case1, None),
@@ -155,10 +153,10 @@ impl Plan {
                     })?;
                     let title = format!("{name} at {frequency} Hz, {mode}");
                     report.charts.push(sim::platform::chart(&title, scenario.options.interval, &run));
-                    refused(name, &run, report);
-                    match part {
-                        None => report.free_motion.rows.push(PoseRow::of(name, mode, *frequency, &run.errors)),
-                        Some(_) => machining.push(name, mode, &run.errors),
+                    match (run.scored(), part) {
+                        (Err(error), _) => report.ended(&title, &error),
+                        (Ok(found), None) => report.free_motion.rows.push(PoseRow::of(name, mode, *frequency, found)),
+                        (Ok(found), Some(_)) => machining.push(name, mode, found),
                     }
                 }
                 if part.is_none() {
@@ -168,17 +166,22 @@ impl Plan {
                 }
                 Ok(())
             }
-            Self::Board { name, selector, mode } => {
+            Self::Board { name, path, mode } => {
                 let scenario = platform(compiled, arguments, ui)?;
                 if let Some((_, word)) = mode {
                     select_platform(lockstep, *word).map_err(host_sim::closed_loop::RunError::from)?;
                 }
                 ui.progress(&format!("playing {name} on board"));
-                let limit = arguments.seconds.unwrap_or(sim::platform::PLAYED);
-                let run = timed(&mut report.seconds, || scenario.play(lockstep, *selector, limit))?;
-                report.errors = on_board(name, &run);
+                let run = timed(&mut report.seconds, || scenario.play(lockstep, path, arguments.seconds))?;
                 report.charts.push(sim::platform::chart(name, scenario.options.interval, &run));
-                refused(name, &run, report);
+                match run.scored() {
+                    Ok(errors) => {
+                        let played = sim::platform::Played::of(name, errors);
+                        report.errors = played.text();
+                        report.on_board = Some(played);
+                    }
+                    Err(error) => report.ended(name, &error),
+                }
                 Ok(())
             }
         }
@@ -215,28 +218,6 @@ fn platform(compiled: &Compiled, arguments: &Arguments, ui: &Ui) -> Result<Platf
     Ok(machine::scenario(model, task, &specimen, &noise, seed))
 }
 
-/// Says if the controller held instead of following.
-fn refused(name: &str, run: &PlatformRun, report: &mut Report) {
-    if run.status & (REFUSED | STALE) != 0 {
-        let _ = writeln!(
-            report.errors,
-            "{name}: the controller refused set-points (status {:#x}), as it did on the host",
-            run.status
-        );
-    }
-}
-
-fn on_board(name: &str, run: &PlatformRun) -> String {
-    let (rms, peak) = (run.errors.rms_nano(), run.errors.peak_nano());
-    let mut text = format!("{name}, on board: true pose against the controller's target\n");
-    for (axis, name) in AXES.iter().enumerate() {
-        let unit = if axis < 3 { "nm" } else { "nrad" };
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "  {name:<3}{:>10.2} {unit} rms{:>10.2} {unit} peak", rms[axis], peak[axis]);
-    }
-    text
-}
-
 /// The start of a trajectory, or all of it.
 struct Start<T> {
     whole: T,
@@ -258,6 +239,10 @@ impl<T: LegTrajectory> LegTrajectory for Start<T> {
         self.cut(self.whole.duration())
     }
 
+    fn whole(&self) -> f64 {
+        self.whole.duration()
+    }
+
     fn displacements(&self, time: f64) -> [f64; 6] {
         self.whole.displacements(time)
     }
@@ -266,6 +251,10 @@ impl<T: LegTrajectory> LegTrajectory for Start<T> {
 impl<T: PoseTrajectory> PoseTrajectory for Start<T> {
     fn duration(&self) -> f64 {
         self.cut(self.whole.duration())
+    }
+
+    fn whole(&self) -> f64 {
+        self.whole.duration()
     }
 
     fn target(&self, time: f64) -> PoseTarget {

@@ -46,12 +46,12 @@ fn of_platform(
     })?;
     let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED);
     let sim = shell::on("specgen sim", name, "--frequency 0.1,1,10 -o DIR");
-    let mut sections = motion::sections(&scenario, controller, &sim, &|what| ui.progress(what)).map_err(environment)?;
+    let mut sections = motion::sections(&scenario, controller, &sim, &|what| ui.progress(what))?;
     ui.progress("machining, linear relation");
     let machined = machining::section(&scenario, controller, &shell::on("specgen sim", name, "-o DIR"));
-    sections.push(machined.map_err(environment)?);
+    sections.push(machined?);
     sections.push(hysteresis::of_paper(&specimen.legs[0], model.actuator.voltage[0]));
-    sections.push(linear::of_platform(&scenario, controller, &platform, &model.actuator, "").map_err(environment)?);
+    sections.push(linear::of_platform(&scenario, controller, &platform, &model.actuator, "")?);
     sections.push(region::section(compiled, None).map_err(environment)?);
     Ok(sections)
 }
@@ -65,7 +65,7 @@ fn of_legs(compiled: &Compiled, controller: &mut Controller, name: &str, ui: &Ui
     ui.progress("leg tracking, linear relation, stability region");
     let adaptation = &model.adaptation;
     let mode = usize::from(adaptation.level_weight > 0.0) + usize::from(adaptation.drift_weight > 0.0);
-    let mut tracking = legs::section(&scenario, controller, &sim).map_err(environment)?;
+    let mut tracking = legs::section(&scenario, controller, &sim)?;
     // A law without its weight is the one before it.
     let same = [
         "The spec gives no weights: EWMA and PCC are here the inverse model alone, and no reproduction of the paper's.",
@@ -74,7 +74,7 @@ fn of_legs(compiled: &Compiled, controller: &mut Controller, name: &str, ui: &Ui
     if let Some(text) = same.get(mode) {
         tracking = tracking.text(text);
     }
-    let lines = linear::of_legs(&scenario, controller, &model.actuator, &sim).map_err(environment)?;
+    let lines = linear::of_legs(&scenario, controller, &model.actuator, &sim)?;
     let region = region::section(compiled, Some(controller)).map_err(environment)?;
     Ok(vec![tracking, hysteresis::of_paper(&leg, model.actuator.voltage[0]), lines, region])
 }

@@ -55,7 +55,7 @@ fn of_platform(
     })?;
     ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
     let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED);
-    let all = tracking::follow(model, task, &scenario, controller, &|what| ui.progress(what)).map_err(environment)?;
+    let all = tracking::follow(compiled, task, &scenario, controller, &|what| ui.progress(what))?;
     let mode = tracking::mode_of(controller);
     let law = margins::name(Law::ALL.get(mode as usize).copied().unwrap_or(Law::Position));
     let corners = compiled.findings.iter().any(|finding| finding.code == codes::TRAJECTORY_CORNERS.id);
@@ -77,7 +77,7 @@ fn of_platform(
     }
     ui.progress("error budget");
     let pair = Pair { own: &mut *controller, fine };
-    sections.push(budget::of_platform(model, task, &specimen, pair, SEED, &all).map_err(environment)?);
+    sections.push(budget::of_platform(model, task, &specimen, pair, SEED, &all)?);
     sections.push(margins::section(compiled, mode, &shell::on("specgen check", name, "")));
     if task.correction.is_some() {
         ui.progress("learning between passes");
@@ -87,8 +87,8 @@ fn of_platform(
     ui.progress("hysteresis of each leg");
     let legs = &specimen.legs;
     let behind =
-        hysteresis::of_platform(&scenario, controller, &platform, task, &model.actuator, legs, &compiled.records, &all);
-    sections.push(behind.map_err(environment)?);
+        hysteresis::of_platform(&scenario, controller, &platform, &model.actuator, legs, &compiled.records, &all);
+    sections.push(behind?);
     let noise = compiled.pose_noise.as_ref().map(|noise| noise.pose);
     let speed = |own: bool| all.iter().find(|one| one.own == own && one.frequency.is_some()).map(Followed::speed);
     let picture = |turning: bool, unit: &'static str| {
@@ -99,7 +99,10 @@ fn of_platform(
     let said = first.map(|first| {
         let of = all.iter().filter(|one| one.name == first.name);
         let each =
-            of.filter_map(|one| Some(format!("{}\u{2009}nm at {}", short(norm(&one.rms()?, false)), one.speed())));
+            of.filter_map(|one| {
+                let (rms, coverage) = (one.rms()?, one.coverage()?);
+                Some(format!("{}\u{2009}nm at {} over {coverage}", short(norm(&rms, false)), one.speed()))
+            });
         each.collect::<Vec<_>>().join(", ")
     });
     let errors = Errors {
@@ -130,7 +133,7 @@ fn of_legs(
     for frequency in LEG_FREQUENCIES {
         ui.progress(&format!("six legs at {frequency} Hz"));
         select(controller, word).map_err(environment)?;
-        let run = scenario.run(controller, frequency).map_err(environment)?.tracking;
+        let run = scenario.run(controller, frequency)?.tracking;
         let speed = format!("{frequency}\u{2009}Hz");
         let shown = Shown {
             id: format!("legs-{frequency}hz"),
@@ -139,10 +142,11 @@ fn of_legs(
             names: tracking::LEGS,
             lengths: 6,
             interval: run.interval,
+            coverage: run.coverage(),
             samples: run.samples.iter().map(|sample| [sample.target, sample.measured]).collect(),
             corner: "corner",
         };
-        values.push((frequency == LEG_FREQUENCIES[0], shown.rms_nano()));
+        values.push((frequency == LEG_FREQUENCIES[0], shown.rms_nano(), Some(shown.coverage)));
         tracked = tracked.pane(&[&speed], tracking::pane(&shown));
         if motion.is_none() {
             motion = Motion::of_legs(model, &run);
@@ -157,13 +161,16 @@ fn of_legs(
         );
     }
     ui.progress("error budget");
-    sections.push(budget::of_legs(&leg, mode, Pair { own: &mut *controller, fine }, SEED).map_err(environment)?);
+    sections.push(budget::of_legs(&leg, mode, Pair { own: &mut *controller, fine }, SEED)?);
     sections.push(margins::section(compiled, mode as u32, &shell::on("specgen check", name, "")));
     sections.push(hysteresis::of_legs(&leg, model.actuator.voltage[0], &compiled.records));
     let said = values
         .iter()
         .zip(LEG_FREQUENCIES)
-        .map(|((_, nm), hertz)| format!("{}\u{2009}nm at {hertz}\u{2009}Hz", short(*nm)));
+        .map(|((_, nm, coverage), hertz)| {
+            let over = coverage.map_or_else(String::new, |coverage| format!(" over {coverage}"));
+            format!("{}\u{2009}nm at {hertz}\u{2009}Hz{over}", short(*nm))
+        });
     let said = said.collect::<Vec<_>>().join(", ");
     let line = Line { name: "leg trajectory".to_owned(), values, note: String::new(), limit: None };
     let speeds = LEG_FREQUENCIES.map(|hertz| Some(format!("{hertz}\u{2009}Hz")));

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use host_sim::coverage::Coverage;
 use serde::Serialize;
 use specgen_language::shell;
 use specgen_report::chart::{Axis, Chart, DOTS};
@@ -80,6 +81,9 @@ pub(super) struct Report<'a> {
     factors: &'a Factors,
     planned: usize,
     diverged: usize,
+    /// Of the machines that kept the bound, all of which follow the same path.
+    #[serde(flatten)]
+    coverage: Option<Coverage>,
     table: Vec<Line<'a>>,
     gate: Judgement<'a>,
     runs: Vec<Run<'a>>,
@@ -143,6 +147,7 @@ impl<'a> Found<'a> {
             factors: &self.work.factors,
             planned: self.planned,
             diverged: self.runs.iter().filter(|(_, outcome)| outcome.figures().is_none()).count(),
+            coverage: self.runs.iter().find_map(|(_, outcome)| Some(outcome.figures()?.coverage)),
             table: self.rows().map(|row| self.line(row)).collect(),
             gate: Judgement { asked: self.gate, reasons: self.reasons, complete: self.runs.len() == self.planned },
             runs: self.runs.iter().map(|(member, outcome)| Run { member, outcome }).collect(),
@@ -225,7 +230,8 @@ impl<'a> Found<'a> {
                     let (rms, peak) = (f.orientation_nrad, f.orientation_peak_nrad);
                     let _ = write!(out, ", {rms:.1} nrad rms, {peak:.1} nrad peak");
                 }
-                if let Some(Learnt { error_nm, passes, grew }) = f.learned {
+                let _ = write!(out, ", over {}", f.coverage.brief());
+                if let Some(Learnt { error_nm, passes, grew, .. }) = f.learned {
                     let _ = write!(out, ", {error_nm:.2} nm learned in {passes} passes");
                     out.push_str(if grew { ", then it grew" } else { "" });
                 }
@@ -278,7 +284,7 @@ impl<'a> Found<'a> {
                 let _ = write!(out, ",{factor}[{leg}]");
             }
         }
-        out.push('\n');
+        out.push_str(",seconds,path_seconds\n");
         for (member, outcome) in self.runs {
             let diverged = outcome.figures().is_none();
             let _ = write!(out, "{},{},{},{diverged},", member.name, member.seed, member.drawn);
@@ -296,7 +302,10 @@ impl<'a> Found<'a> {
             for value in EACH.into_iter().flat_map(|factor| each(d, factor)) {
                 let _ = write!(out, ",{value}");
             }
-            out.push('\n');
+            let _ = match outcome.figures().map(|figures| figures.coverage) {
+                Some(Coverage { seconds, path_seconds }) => writeln!(out, ",{seconds},{path_seconds}"),
+                None => writeln!(out, ",,"),
+            };
         }
         out
     }
@@ -317,6 +326,9 @@ impl Shown for Report<'_> {
             self.seed,
             if self.noise { "" } else { ", without noise" },
         );
+        if let Some(coverage) = &self.coverage {
+            let _ = writeln!(out, "each measured over {coverage}");
+        }
         if let Some(Lessons { passes, band: [low, high] }) = found.work.learning {
             let _ = writeln!(out, "learned from {passes} passes on each, {low:.1} to {high:.0} Hz");
         }

@@ -101,7 +101,7 @@ fn own(
             let interval =
                 arguments.samples.map_or(model.timing.period, |samples| 1.0 / frequency / f64::from(samples));
             let sweep = LegSweep { range: range(model), frequency, periods: PERIODS };
-            let mut run = scenario.rig().clone().run(controller, &sweep, interval).map_err(environment)?;
+            let mut run = scenario.rig().clone().run(controller, &sweep, interval)?;
             let first = run.tracking.samples.iter().take_while(|sample| sample.time < 1.0 / frequency).count();
             if own_law == u64::from(word) {
                 charts.push(chart(&run.tracking, &format!("{mode} at {frequency} Hz")));
@@ -184,16 +184,16 @@ pub(super) fn run(
     let scenario = machine::legs(&compiled.model, &legs, &noise, arguments.plant.seed, samples);
     let modes = modes(&compiled.model.adaptation);
     ui.progress("Table 2: every law that the spec gives weights for, at three frequencies");
-    let tracking = scenario.tracking(controller, &modes, &TRACKING_FREQUENCIES).map_err(environment)?;
+    let tracking = scenario.tracking(controller, &modes, &TRACKING_FREQUENCIES)?;
     ui.progress("Table 1: inverse model alone at six frequencies");
-    let linearity = scenario.linearity(controller, &LINEARITY_FREQUENCIES).map_err(environment)?;
+    let linearity = scenario.linearity(controller, &LINEARITY_FREQUENCIES)?;
 
     let mut traces = Vec::new();
     if arguments.traces {
         for &(mode, word) in &modes {
             select(controller, word).map_err(environment)?;
             for frequency in TRACKING_FREQUENCIES {
-                let run = scenario.run(controller, frequency).map_err(environment)?;
+                let run = scenario.run(controller, frequency)?;
                 let stem = format!("trace-{mode}-{frequency}hz");
                 traces.push((format!("{stem}.csv"), run.trace.to_csv().into_bytes()));
                 traces.push((format!("{stem}.trace"), run.trace.to_bytes()));

@@ -9,9 +9,10 @@ use std::fmt::Write as _;
 
 use host_sim::closed_loop::RunError;
 use host_sim::controller::TickController;
+use host_sim::coverage::Coverage;
 use host_sim::platform::rig::{Noise, PlatformRun, Record};
 use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select};
-use host_sim::platform::table::{AXES, MachiningRow, MachiningTable, PoseRow, PoseTable};
+use host_sim::platform::table::{AXES, MachiningRow, MachiningTable, PoseErrors, PoseRow, PoseTable};
 use host_sim::platform::{PlatformScenario, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
 use host_sim::word::status_words;
@@ -25,7 +26,6 @@ use specgen_compiler::compile::Compiled;
 use specgen_language::model::{AdaptationMode, ControlMode, TaskSpace};
 use specgen_language::spec::nearest;
 use specgen_report::chart::{Axis, Chart, LINE};
-use specgen_runtime::setpoint::{REFUSED, STALE};
 use specgen_runtime::wave::Wave;
 use specgen_studies::machine;
 
@@ -44,8 +44,6 @@ const MACHINING: [(&str, u32); 3] = [PLATFORM_MODES[0], PLATFORM_MODES[3], PLATF
 const MACHINING_FREQUENCY: f64 = 1.0;
 /// Bits of the status that say that a leg was limited.
 pub(in crate::cli) const LEG_LIMITED: u32 = 0x3f;
-/// A trajectory on board that does not end is followed for this long, s.
-pub(in crate::cli) const PLAYED: f64 = 60.0;
 
 /// Refuses arguments that are for legs alone, and a trajectory that the spec does not have.
 pub(super) fn check(arguments: &Arguments, task: &TaskSpace) -> Result<(), Failure> {
@@ -109,14 +107,15 @@ pub(super) fn run(
         traces: Vec::new(),
         charts: Vec::new(),
         refused: Vec::new(),
+        ended: Vec::new(),
         limited: Vec::new(),
     };
     let found = match &arguments.trajectory {
-        Some(name) => experiment.own(name, selector(task, name)?)?,
+        Some(name) => experiment.own(name, compiled, selector(task, name)?)?,
         None if arguments.paper => experiment.tables(arguments.frequencies())?,
         None => experiment.motions(compiled, task, arguments.frequencies())?,
     };
-    let Experiment { mut tables, traces, charts, refused, limited, .. } = experiment;
+    let Experiment { mut tables, traces, charts, refused, ended, limited, .. } = experiment;
     let plot = arguments.plot.charts(&compiled.ir.name, "target less true pose", &charts)?;
     let report = Report {
         name: &compiled.ir.name,
@@ -135,8 +134,7 @@ pub(super) fn run(
     };
     tables.push(("tables.json".to_owned(), format!("{:#}\n", json!(report)).into_bytes()));
     write_files(arguments, tables, traces, ui)?;
-    ui.result(&report);
-    Ok(())
+    ui.scored(&report, &ended)
 }
 
 /// The machine, and what was found on it.
@@ -179,17 +177,59 @@ enum Found {
     },
     /// The true pose against the target, a row a motion.
     Motions { motions: Vec<Motion> },
-    /// The true pose against the controller's target, axis by axis.
-    Trajectory { trajectory: String, seconds: f64, rms_nano: [f64; 6], peak_nano: [f64; 6], translation_nm: f64 },
-    /// The only run was refused.
+    Trajectory(Played),
+    /// The only run ended early.
     Nothing {},
+}
+
+/// A trajectory on board: the true pose against the controller's target, axis by axis.
+#[derive(Debug, Serialize)]
+pub(in crate::cli) struct Played {
+    trajectory: String,
+    #[serde(flatten)]
+    coverage: Coverage,
+    /// Root mean square error of x, y, z (nm) and of the angles (nrad).
+    rms_nano: [f64; 6],
+    peak_nano: [f64; 6],
+    /// Norm of the root mean squares of x, y and z, nm.
+    translation_nm: f64,
+}
+
+impl Played {
+    pub(in crate::cli) fn of(trajectory: &str, errors: &PoseErrors) -> Self {
+        Self {
+            trajectory: trajectory.to_owned(),
+            coverage: errors.coverage(),
+            rms_nano: errors.rms_nano(),
+            peak_nano: errors.peak_nano(),
+            translation_nm: errors.rms_translation_nm(),
+        }
+    }
+
+    /// Whole lines.
+    pub(in crate::cli) fn text(&self) -> String {
+        let Self { trajectory, coverage, rms_nano, peak_nano, translation_nm } = self;
+        let mut out = format!("{trajectory}, on board, {coverage}: true pose against the controller's target\n");
+        for (axis, name) in AXES.iter().enumerate() {
+            let unit = if axis < 3 { "nm" } else { "nrad" };
+            // Writing to a String cannot fail, here and below.
+            let _ = writeln!(
+                out,
+                "  {name:<5}{:>10.2} {unit} rms{:>10.2} {unit} peak",
+                rms_nano[axis], peak_nano[axis]
+            );
+        }
+        let _ = writeln!(out, "  x,y,z{translation_nm:>10.2} nm rms, norm of the three");
+        out
+    }
 }
 
 /// A run of the platform's own motions.
 #[derive(Serialize)]
 struct Motion {
     name: String,
-    seconds: f64,
+    #[serde(flatten)]
+    coverage: Coverage,
     /// Root mean square error of x, y, z (nm) and of the angles (nrad).
     rms_nano: [f64; 6],
     /// Norm of those of x, y and z, nm.
@@ -212,18 +252,7 @@ impl Outcome for Report<'_> {
         match &self.found {
             Found::Tables { text, .. } => out += text,
             Found::Motions { motions } => out += &table(motions),
-            Found::Trajectory { trajectory, seconds, rms_nano, peak_nano, translation_nm } => {
-                out += &format!("{trajectory}, on board, {seconds:.3} s: true pose against the controller's target\n");
-                for (axis, name) in AXES.iter().enumerate() {
-                    let unit = if axis < 3 { "nm" } else { "nrad" };
-                    let _ = writeln!(
-                        out,
-                        "  {name:<5}{:>10.2} {unit} rms{:>10.2} {unit} peak",
-                        rms_nano[axis], peak_nano[axis]
-                    );
-                }
-                let _ = writeln!(out, "  x,y,z{translation_nm:>10.2} nm rms, norm of the three");
-            }
+            Found::Trajectory(played) => out += &played.text(),
             Found::Nothing {} => {}
         }
         for line in self.refused.iter().chain(&self.limited) {
@@ -237,11 +266,13 @@ impl Outcome for Report<'_> {
 fn table(motions: &[Motion]) -> String {
     let mut out = "rms of target less true pose, nm and nrad; norm and peak of x, y, z\n".to_owned();
     let mut columns = vec![left(16)];
-    columns.resize(9, right(8));
-    row(&mut out, &columns, &[&"", &"x", &"y", &"z", &"norm", &"peak", &"θx", &"θy", &"θz"]);
-    for Motion { name, rms_nano, translation_nm, peak_nm, .. } in motions {
+    columns.resize(11, right(8));
+    row(&mut out, &columns, &[&"", &"x", &"y", &"z", &"norm", &"peak", &"θx", &"θy", &"θz", &"over s", &"path s"]);
+    for Motion { name, coverage, rms_nano, translation_nm, peak_nm, .. } in motions {
         let [x, y, z, a, b, c] = rms_nano.map(short);
-        row(&mut out, &columns, &[name, &x, &y, &z, &short(*translation_nm), &short(*peak_nm), &a, &b, &c]);
+        let [over, path] = [coverage.seconds, coverage.path_seconds].map(|seconds| format!("{seconds:.3}"));
+        let (norm, peak) = (short(*translation_nm), short(*peak_nm));
+        row(&mut out, &columns, &[name, &x, &y, &z, &norm, &peak, &a, &b, &c, &over, &path]);
     }
     let waves: Vec<String> = motions
         .iter()
@@ -315,6 +346,8 @@ struct Experiment<'a> {
     traces: Vec<File>,
     charts: Vec<Chart>,
     refused: Vec<String>,
+    /// Names of runs that did not come to the end of their path.
+    ended: Vec<String>,
     limited: Vec<String>,
 }
 
@@ -362,7 +395,7 @@ impl Experiment<'_> {
         let mut motions = Vec::new();
         self.ui.progress("at rest");
         let run = self.scenario.run(self.controller, &Rest);
-        motions.extend(self.keep("at rest", run)?.map(|run| self.motion("at rest", &run, None)));
+        motions.extend(self.keep("at rest", run)?.map(|run| motion("at rest", &run, None)));
         let period = compiled.model.timing.period;
         // All axes at once, and every leg within its stroke.
         let share = WAVE * compiled.reach.as_ref().map_or(0.0, |reach| reach.share);
@@ -381,46 +414,38 @@ impl Experiment<'_> {
                 Err(failure) => return Err(failure),
             };
             let run = self.scenario.run(self.controller, &PoseWave { wave: RefCell::new(wave), seconds });
-            motions.extend(self.keep(&name, run)?.map(|run| self.motion(&name, &run, Some(amplitude))));
+            motions.extend(self.keep(&name, run)?.map(|run| motion(&name, &run, Some(amplitude))));
         }
         for (place, trajectory) in task.trajectories.iter().enumerate() {
             let name = &trajectory.name;
             self.ui.progress(&format!("playing {name} on board"));
-            let run = self.scenario.play(self.controller, place as u32, PLAYED);
-            motions.extend(self.keep(name, run)?.map(|run| self.motion(name, &run, None)));
+            let Some(path) = machine::on_board(compiled, place as u32) else { continue };
+            let run = self.scenario.play(self.controller, &path, None);
+            motions.extend(self.keep(name, run)?.map(|run| motion(name, &run, None)));
         }
         self.tables.push(("motions.csv".to_owned(), csv(&motions).into_bytes()));
         Ok(Found::Motions { motions })
     }
 
-    fn motion(&self, name: &str, run: &PlatformRun, amplitude: Option<f64>) -> Motion {
-        Motion {
-            name: name.to_owned(),
-            seconds: run.errors.count() as f64 * self.scenario.options.interval,
-            rms_nano: run.errors.rms_nano(),
-            translation_nm: run.errors.rms_translation_nm(),
-            peak_nm: run.errors.peak_translation_nm(),
-            amplitude,
-        }
-    }
-
     /// A trajectory of the spec, in the mode of the spec.
-    fn own(&mut self, name: &str, selector: u32) -> Result<Found, Failure> {
+    fn own(&mut self, name: &str, compiled: &Compiled, selector: u32) -> Result<Found, Failure> {
         self.ui.progress(&format!("playing {name} on board"));
-        let run = self.scenario.play(self.controller, selector, PLAYED);
-        let Some(run) = self.keep(&format!("trajectory-{name}"), run)? else { return Ok(Found::Nothing {}) };
-        Ok(Found::Trajectory {
-            trajectory: name.to_owned(),
-            seconds: run.errors.count() as f64 * self.scenario.options.interval,
-            rms_nano: run.errors.rms_nano(),
-            peak_nano: run.errors.peak_nano(),
-            translation_nm: run.errors.rms_translation_nm(),
-        })
+        let Some(path) = machine::on_board(compiled, selector) else { return Ok(Found::Nothing {}) };
+        let run = self.scenario.play(self.controller, &path, None);
+        let run = self.keep(&format!("trajectory-{name}"), run)?;
+        Ok(run.map_or(Found::Nothing {}, |run| Found::Trajectory(Played::of(name, &run.errors))))
     }
 
-    /// Samples of a run for its file; none, and a line about it, if the controller held instead of following.
+    /// Samples of a run for its file; none, and a line about it, if it did not come to the end of its path.
     fn keep(&mut self, name: &str, run: Result<PlatformRun, RunError>) -> Result<Option<PlatformRun>, Failure> {
-        let run = run.map_err(environment)?;
+        let run = match run {
+            Err(error @ RunError::EndedEarly { .. }) => {
+                self.refused.push(format!("{name}: not scored: {error}"));
+                self.ended.push(name.to_owned());
+                return Ok(None);
+            }
+            run => run?,
+        };
         if self.traced {
             self.traces.push((format!("{}.csv", name.replace(' ', "-")), run.to_csv().into_bytes()));
         }
@@ -428,16 +453,28 @@ impl Experiment<'_> {
             self.charts.push(chart(name, self.scenario.options.interval, &run));
         }
         let seen = status_words(run.status);
-        if run.status & (REFUSED | STALE) == 0 {
+        if run.is_followed() {
             if run.status & LEG_LIMITED != 0 {
                 self.limited.push(format!("{name}: {seen}: at an end of stroke, voltage or slew rate"));
             }
             return Ok(Some(run));
         }
+        self.ended.push(name.to_owned());
         self.refused.push(format!(
             "{name}: not scored: {seen}; the path leaves the workspace,\n  or moves faster than control.setpoint.stream_speed"
         ));
         Ok(None)
+    }
+}
+
+fn motion(name: &str, run: &PlatformRun, amplitude: Option<f64>) -> Motion {
+    Motion {
+        name: name.to_owned(),
+        coverage: run.errors.coverage(),
+        rms_nano: run.errors.rms_nano(),
+        translation_nm: run.errors.rms_translation_nm(),
+        peak_nm: run.errors.peak_translation_nm(),
+        amplitude,
     }
 }
 
@@ -454,10 +491,11 @@ pub(in crate::cli) fn chart(name: &str, interval: f64, run: &PlatformRun) -> Cha
 
 /// A line a motion.
 fn csv(motions: &[Motion]) -> String {
-    let mut out = String::from("motion,seconds,x_nm,y_nm,z_nm,rx_nrad,ry_nrad,rz_nrad,norm_nm,peak_nm\n");
-    for Motion { name, seconds, rms_nano, translation_nm, peak_nm, .. } in motions {
+    let mut out =
+        String::from("motion,seconds,path_seconds,x_nm,y_nm,z_nm,rx_nrad,ry_nrad,rz_nrad,norm_nm,peak_nm\n");
+    for Motion { name, coverage, rms_nano, translation_nm, peak_nm, .. } in motions {
         // Writing to a String cannot fail, here and below.
-        let _ = write!(out, "{name},{seconds:.6}");
+        let _ = write!(out, "{name},{:.6},{:.6}", coverage.seconds, coverage.path_seconds);
         for value in rms_nano {
             let _ = write!(out, ",{value:.4}");
         }

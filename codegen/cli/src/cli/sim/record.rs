@@ -228,6 +228,7 @@ fn legs(
         .rig()
         .clone()
         .follow(controller, &wave, compiled.model.timing.period, |_, _| std::ops::ControlFlow::Continue(()))
+        .map(|_| ())
 }
 
 /// A wave as a trajectory that is asked once a tick.

@@ -8,7 +8,6 @@ use host_sim::controller::Controller;
 use serde::Serialize;
 
 use super::super::file::read_text;
-use super::super::sim::environment;
 use super::super::ui::{Failure, Outcome, Ui};
 use super::Job;
 use specgen_language::interrupt;
@@ -72,8 +71,8 @@ pub(super) fn run(job: &Job, asked: &[Setting], ui: &Ui) -> Result<(), Failure> 
         let verdicts = evaluate(&settings, &job.feasibility, &case, &mut workers, interrupt::heed());
         for (setting, verdict) in asked.iter().zip(verdicts) {
             // A list that lacks some is not what was asked for.
-            let Some(verdict) = verdict else { return Err(Failure::ended_early()) };
-            let verdict = verdict.map_err(environment)?;
+            let Some(verdict) = verdict else { return Err(Failure::interrupted()) };
+            let verdict = verdict?;
             let cost = match verdict {
                 Verdict::Run(Evaluation::Scored(score)) => Some(score.cost),
                 _ => None,
@@ -109,8 +108,12 @@ impl Outcome for Evaluated<'_> {
                 Verdict::Unstable => "unstable, or without the margins".to_owned(),
                 Verdict::Run(Evaluation::Limited { time, .. }) => format!("at a limit after {time:.4} s"),
                 Verdict::Run(Evaluation::Scored(score)) => format!(
-                    "cost {:.5} µm s², {:.2} nm rms, {:.2} nrad rms, effort {:.2} nm",
-                    score.cost, score.translation_nm, score.orientation_nrad, score.effort_nm
+                    "cost {:.5} µm s², {:.2} nm rms, {:.2} nrad rms, effort {:.2} nm over {}",
+                    score.cost,
+                    score.translation_nm,
+                    score.orientation_nrad,
+                    score.effort_nm,
+                    score.coverage.brief()
                 ),
             };
             let _ = writeln!(text, "candidate {index}: {said}");

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::super::sim::environment;
 use super::super::table::{left, right, row};
 use super::super::ui::{Failure, Outcome};
 use super::Job;
@@ -100,8 +99,8 @@ impl<'a> Report<'a> {
                 name,
                 setting,
                 holds_margins: job.feasibility.holds(&setting),
-                tuned_on: case.run(&mut here, &setting).map_err(environment)?,
-                scored_on: other.run(&mut there, &setting).map_err(environment)?,
+                tuned_on: case.run(&mut here, &setting)?,
+                scored_on: other.run(&mut there, &setting)?,
             });
         }
         let result = rows.last().map(|row| row.setting);
@@ -170,7 +169,12 @@ impl<'a> Report<'a> {
 
     fn scores(&self, text: &mut String) {
         let two = [left(18), right(44), right(34).behind("   ")];
-        row(text, &two, &[&"rms", &"tuned on", &"not tuned on"]);
+        let over = |of: fn(&Row) -> &Evaluation| {
+            let score = self.settings.iter().find_map(|row| of(row).score());
+            score.map_or_else(String::new, |score| format!(" over {}", score.coverage.brief()))
+        };
+        let (tuned, other) = (over(|row| &row.tuned_on), over(|row| &row.scored_on));
+        row(text, &two, &[&"rms", &format_args!("tuned on{tuned}"), &format_args!("not tuned on{other}")]);
         // The columns of a score, and the first three of them again.
         let tuned = format!("{:>9}{:>9}{:>9}{:>9}{:>8}", "nm", "nrad", "peak nm", "effort", "cost");
         let other = format!("{:>9}{:>9}{:>9}{:>7}", "nm", "nrad", "peak nm", "");

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use host_sim::closed_loop::{LEGS, RunError};
 use host_sim::controller::{Controller, TickController};
+use host_sim::coverage::Coverage;
 
 use super::{AT_REST, Case, Kind, Setting};
 
@@ -24,6 +25,7 @@ pub struct Observed {
 
 impl Case {
     /// Runs `setting` as [`Case::run`] does, but shows `watch` the end of every tick instead of scoring; it may end the run.
+    /// Returns how much of the trajectory it saw.
     ///
     /// # Errors
     /// As [`Case::run`].
@@ -32,7 +34,7 @@ impl Case {
         worker: &mut Controller,
         setting: &Setting,
         mut watch: impl FnMut(&Observed) -> ControlFlow<()>,
-    ) -> Result<(), RunError> {
+    ) -> Result<Coverage, RunError> {
         match &self.kind {
             Kind::Platform { study, .. } => study.run(worker, &setting.words(worker), |moment| {
                 let mut parts = [0.0; 2];
