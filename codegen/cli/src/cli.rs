@@ -1,7 +1,8 @@
 //! The command line: arguments in, text or JSON out, exit code.
 //!
-//! Exit codes: 0 good, 1 the spec, a record or a budget fails, 2 usage, 3 environment (a missing tool, a full disk),
-//! 4 a simulated run did not come to the end of its path, 130 ended by Ctrl-C, with the best so far where a part of the work is a result.
+//! Exit codes: 0 good; 1 the spec, a record or a budget fails, or an input cannot be read; 2 usage, or an output is an input;
+//! 3 environment (a missing tool, a full disk, a file that cannot be written); 4 a simulated run ended before the end of its
+//! path; 130 ended by Ctrl-C, with the best so far where a part of the work is a result.
 
 mod build;
 mod cache;

@@ -93,7 +93,6 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["operate", "--socket", "y", "--baud", "9600"], "cannot be used with"),
         (&["operate", "--socket", "y", "legs.toml", "go"], "`go` is none of: status, arm"),
         (&["operate", "--socket", "y", "stop", "arm"], "`stop` ends the session: nothing comes after it"),
-        (&["operate", "--socket", "y", "--script", "none.txt"], "could not read `none.txt`"),
         (&["operate", "--socket", "y", "--script", "none.txt", "arm"], "exclude each other"),
         (&["forc"], "--output"),
         (&["forc", "-o", "x.csv", "--grid", "1"], "--grid"),

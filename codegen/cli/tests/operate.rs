@@ -144,7 +144,8 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
             2,
             "`command`: expected hold, stream, move, trajectory, found `x`; nothing was asked of the machine",
         ),
-        ("wave none.toml", 2, "could not read `none.toml`"),
+        ("wave none.toml", 1, "`none.toml` cannot be read: there is no such file"),
+        ("play case-1 none.json m", 1, "`none.json` cannot be read: there is no such file"),
         ("config write none.toml", 1, "none.toml is refused"),
         ("record download legs.toml/x.rec", 3, "could not create the folder `legs.toml`"),
     ] {

@@ -71,7 +71,7 @@ fn every_line_with_a_name_in_it_is_built_in_one_place_and_run_by_a_test() {
         found.extend((count > 0).then(|| (name.clone(), count)));
         for line in literals(&code).iter().flat_map(|text| lines(text)) {
             let is_known = |known: &&str| known.replace("\\n", "\n").trim() == line;
-            let is_listed = NO_LINES.iter().chain(&CONSTANT).any(|known| is_known(known));
+            let is_listed = NO_LINES.iter().chain(&CONSTANT).any(is_known);
             if line.contains('{') && !is_listed && !is_sentence(&line) {
                 loose.push(format!("{name}: `{line}`"));
             }

@@ -5,7 +5,7 @@
 //! its files in the thread that performs it.
 
 use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, Read};
@@ -28,19 +28,11 @@ type Identity = (u64, u64);
 thread_local! {
     /// What the command of this thread has read, by the first name of each.
     static INPUTS: RefCell<BTreeMap<Identity, PathBuf>> = const { RefCell::new(BTreeMap::new()) };
-    /// What it has written.
-    static WRITTEN: RefCell<BTreeSet<Identity>> = const { RefCell::new(BTreeSet::new()) };
 }
 
-/// A command begins: nothing is read or written yet.
+/// A command begins: nothing is read yet.
 pub fn begin() {
     INPUTS.take();
-    WRITTEN.take();
-}
-
-/// What was written may be written again, as an order of a session does; what was read is kept in mind.
-pub fn begin_again() {
-    WRITTEN.take();
 }
 
 fn identity(found: &Metadata) -> Identity {
@@ -233,7 +225,7 @@ fn input(path: &Path) -> Option<PathBuf> {
 pub enum Unwritten {
     /// It is this input of the same command.
     Input(PathBuf),
-    /// The same command has written it already.
+    /// Another output of the same command has this name.
     Twice,
     /// Nobody may write to it.
     Protected,
@@ -278,8 +270,7 @@ pub enum Way {
     Device,
 }
 
-/// Looks whether a command may write this file: it is none of its inputs and none of its other outputs, by device and inode, and
-/// whoever owns it permits it.
+/// Looks whether a command may write this file: it is none of its inputs, by device and inode, and whoever owns it permits it.
 ///
 /// # Errors
 /// Why not.
@@ -308,21 +299,11 @@ pub fn guard_edit(path: &Path) -> Result<Way, Unwritten> {
     if !found.is_file() {
         return Ok(Way::Device);
     }
-    if WRITTEN.with_borrow(|written| written.contains(&identity(&found))) {
-        return Err(Unwritten::Twice);
-    }
     // Whoever may write everything, as root, still means what the permissions say.
     if found.mode() & 0o222 == 0 || access(path, Access::WRITE_OK).is_err() {
         return Err(Unwritten::Protected);
     }
     Ok(Way::File(target))
-}
-
-/// Keeps in mind that the command has written this file.
-pub fn note_output(path: &Path) {
-    if let Ok(found) = fs::metadata(path) {
-        WRITTEN.with_borrow_mut(|written| written.insert(identity(&found)));
-    }
 }
 
 /// The name that links lead to, which need not be there.

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,9 @@ class Table(Mapping[str, NDArray[Any]]):
 
 def read_table(path: str | PathLike[str]) -> Table:
     """Reads a CSV file with one line of names; columns with anything but numbers are text."""
+    # A pipe without a writer, or a device, would be waited for.
+    if Path(path).exists() and not Path(path).is_file():
+        raise OSError(f"{path}: it is no regular file")
     with open(path, encoding="utf-8") as file:
         names = file.readline().rstrip("\n").split(",")
         first = file.readline().rstrip("\n").split(",")

@@ -8,6 +8,7 @@ use host_sim::word::{Scalar, WordKind};
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
 use pyo3::{PyErr, PyResult, Python, pyclass, pymethods};
+use specgen::files;
 
 use crate::Error;
 
@@ -73,6 +74,8 @@ impl Library {
     /// Loads a host library; with its supervisor if `supervised`.
     #[new]
     fn new(path: PathBuf, supervised: bool) -> PyResult<Self> {
+        // A pipe in its place would be waited for.
+        drop(files::open_file(&path).map_err(|unread| refused(format!("{}: {unread}", path.display())))?);
         let controller = Controller::load(&path).map_err(refused)?;
         let tick = if supervised {
             Tick::Supervised(Box::new(Supervised::new(controller).map_err(refused)?))

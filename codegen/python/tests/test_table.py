@@ -1,5 +1,6 @@
 """CSV of the commands as arrays."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,16 @@ def test_a_file_of_names_alone_has_no_rows(tmp_path: Path) -> None:
     file.write_text("time_s,pose[0],pose[1]\n")
     table = specgen.read_table(file)
     assert table["time_s"].shape == (0,) and table["pose"].shape == (0, 2)
+
+
+def test_what_is_no_plain_file_is_not_waited_for(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for path in [pipe, Path("/dev/zero")]:
+        with pytest.raises(OSError, match="no regular file"):
+            specgen.read_table(path)
+        with pytest.raises(specgen.Error, match="expected a regular file"):
+            specgen.Controller(path)
 
 
 def test_a_line_that_is_cut_off_is_refused(tmp_path: Path) -> None:

@@ -21,8 +21,9 @@ docs/guide.md leads from the bench to running firmware. Every command has
 examples of its own: `specgen check --help`. (minutes) takes some; (board) wants
 a board, a second program, or a computer at rest.
 
-Exit codes: 0 good; 1 spec, record or budget refused; 2 usage; 3 environment;
-4 a run ended before the end of its path; 130 interrupted.";
+Exit codes: 0 good; 1 spec, record or budget refused, or an input that cannot be
+read; 2 usage, or an output that is an input; 3 environment; 4 a simulated run
+ended before the end of its path; 130 interrupted.";
 
 pub const NEW: &str = "\
 Examples:

@@ -173,7 +173,6 @@ impl PendingFile {
                 // On the disk before it takes the place of what was there.
                 workspace::sync(file.path()).map_err(|error| unwritten(&target, &error))?;
                 file.persist(&target).map_err(|error| unwritten(&target, &error.error))?;
-                files::note_output(&target);
                 let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
                 let _ = workspace::sync(folder.unwrap_or(Path::new(".")));
                 Ok(())
@@ -223,5 +222,29 @@ fn temporary_beside(target: &Path, folder: &Path) -> io::Result<NamedTempFile> {
             Err(error) => return Err(error),
             Ok(_) => return Ok(file),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a folder of results would replace is as safe as a file that is named.
+    #[test]
+    fn a_folder_of_results_replaces_no_input() {
+        files::begin();
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("runs.csv"), "mine").unwrap();
+        let results = [("report.json", "new"), ("runs.csv", "new")];
+        let results = results.map(|(name, text)| (name.to_owned(), text.as_bytes().to_vec()));
+        assert_eq!(read_text(&at("runs.csv")).unwrap(), "mine");
+        let refused = write_folder(folder.path(), &results).unwrap_err();
+        assert!(matches!(refused, Failure::Usage(text) if text.contains("runs.csv` is not written")));
+        assert!(fs::read_to_string(at("runs.csv")).unwrap() == "mine" && !at("report.json").exists());
+        edit_file(&at("runs.csv"), b"edited").unwrap();
+        files::begin();
+        write_folder(folder.path(), &results).unwrap();
+        assert_eq!(fs::read_to_string(at("runs.csv")).unwrap(), "new");
     }
 }

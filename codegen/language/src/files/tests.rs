@@ -41,15 +41,6 @@ fn an_input_is_no_output_whatever_its_name() {
 }
 
 #[test]
-fn an_output_is_written_once() {
-    let (_folder, at) = folder();
-    note_output(&at("free.csv"));
-    assert_eq!(refusal(&at("free.csv")), Unwritten::Twice.to_string());
-    begin_again();
-    assert!(guard(&at("free.csv")).is_ok() && guard(&at("read.csv")).is_err());
-}
-
-#[test]
 fn links_to_nothing_lead_to_what_is_to_be() {
     let (_folder, at) = folder();
     symlink("b", at("a")).unwrap();

@@ -16,10 +16,9 @@ use super::answer::{Answer, Downloaded, MachineStatus, Moves, Plain, RecorderSta
 use super::ended::{Ended, unsupported, waving};
 use super::health::Standing;
 use super::pose::{ZERO, in_words};
-use crate::cli::file::{check_place, write_file};
+use crate::cli::file::{check_input, check_place, write_file};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
-use specgen_language::files;
 use specgen_language::model::Model;
 use specgen_operate::frame::Frame;
 use specgen_operate::{Order, Session, Until};
@@ -165,7 +164,10 @@ impl<P: Port> Operator<P> {
             }
             Order::OnEdge(order) => self.check(std::slice::from_ref(order)),
             Order::Goto(name) if name != ZERO && !marks.contains(&name.as_str()) => Err(nonsense(self.no_mark(name))),
-            Order::Play { name, correction } => self.playable(name, correction.as_ref()).map(|_| ()).map_err(nonsense),
+            Order::Play { name, correction } => {
+                correction.as_ref().map_or(Ok(()), |(path, _)| check_input(path))?;
+                self.playable(name, correction.as_ref()).map(|_| ()).map_err(nonsense)
+            }
             Order::Gains(gains) => self.gains_of(gains).map(|_| ()).map_err(nonsense),
             Order::Trigger { line, settings } => self.places_of(*line, settings).map(|_| ()).map_err(nonsense),
             Order::Move { .. }
@@ -176,7 +178,10 @@ impl<P: Port> Operator<P> {
             | Order::Goto(_)
             | Order::Watch { file: None, .. }
             | Order::Mode(_) => self.motion().map(|_| ()).map_err(nonsense),
-            Order::Wave(path) => self.wave_of(path).map(|_| ()).map_err(nonsense),
+            Order::Wave(path) => {
+                check_input(path)?;
+                self.wave_of(path).map(|_| ()).map_err(nonsense)
+            }
             Order::Watch { file: Some(path), .. } => {
                 self.motion().map_err(nonsense)?;
                 check_place(path)
@@ -188,7 +193,6 @@ impl<P: Port> Operator<P> {
 
     pub fn obey(&mut self, order: &Order, ui: &Ui) -> Result<(), Ended> {
         self.look()?;
-        files::begin_again();
         let line = format!("{order:?}");
         match order {
             Order::Status => {
