@@ -61,6 +61,12 @@ pub fn length<T>(short: T, long: T) -> T {
     if std::env::var_os("SPECGEN_SOAK").is_some() { long } else { short }
 }
 
+/// The larger of two errors. Unlike `f64::max` it keeps a NaN, which no bound admits.
+#[must_use]
+pub fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a >= b { a } else { b }
+}
+
 fn builds() -> PathBuf {
     repository().join("target/tests")
 }
@@ -314,10 +320,12 @@ pub fn integers(trace: &Trace, name: &str) -> Vec<u64> {
 /// Text files below `dir`, by path relative to it.
 ///
 /// # Panics
-/// If one is no text.
+/// If there are none, or one is no text.
 #[must_use]
 pub fn sources(dir: &Path) -> BTreeMap<String, String> {
+    let files = files(dir);
+    assert!(!files.is_empty(), "no file in {}", dir.display());
     let text =
         |(path, content): (PathBuf, Vec<u8>)| (path.display().to_string(), String::from_utf8(content).expect("text"));
-    files(dir).into_iter().map(text).collect()
+    files.into_iter().map(text).collect()
 }

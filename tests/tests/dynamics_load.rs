@@ -8,7 +8,7 @@ use specgen::ir::{Load, LoadBound};
 use specgen::lower;
 use specgen_runtime::dynamics::Affine;
 use specgen_runtime::{Motion, Platform};
-use specgen_tests::compile_edited;
+use specgen_tests::{compile_edited, worse};
 
 const MOTIONS: u32 = 500;
 /// A motion as one list: pose, rate, acceleration.
@@ -56,7 +56,7 @@ impl Case {
     /// variable after the other to where the error grows.
     fn worst(&self, affine: &Affine<f64>, bound: &LoadBound) -> f64 {
         let widths = self.widths(bound);
-        let largest = |state: &State| self.left(affine, state).into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        let largest = |state: &State| self.left(affine, state).into_iter().fold(0.0, |a, b| worse(a, b.abs()));
         let mut random = ChaCha8Rng::seed_from_u64(17);
         let mut worst = 0.0_f64;
         for round in 0..MOTIONS {
@@ -75,7 +75,7 @@ impl Case {
                     }
                 }
             }
-            worst = worst.max(largest(&state));
+            worst = worse(worst, largest(&state));
         }
         worst
     }

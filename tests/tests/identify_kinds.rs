@@ -47,6 +47,7 @@ fn the_slopes_of_table_1_are_found_with_their_frequencies() {
     let records: Vec<Record> = table.iter().map(|(f, rho)| cycles(*f, *rho, 0.0, 1)).collect();
     let relations: Vec<_> = records.iter().rev().map(|r| linear::relation(r, None).unwrap()).collect();
     let report = linear::together(relations, None).unwrap();
+    assert_eq!(report.relations.len(), table.len());
     for (relation, (f, rho)) in report.relations.iter().zip(table) {
         assert!((relation.frequency / f - 1.0).abs() < 1e-3, "{relation:?}");
         assert!((relation.gain * 1e6 - rho).abs() < 1e-5, "{relation:?}");
@@ -306,6 +307,7 @@ const TRUE: [f64; 4] = [-2.0, 5.0, 0.02, -0.0015];
 fn a_cubic_gauge_is_found_to_be_cubic_and_its_coefficients_are_right() {
     let report = gauge::calibrate_text(&csv(GAUGE, &gauge_rows(2e-4, 0.0, &TRUE)), "g.csv", None).unwrap();
     assert_eq!(report.degree, 3, "{:?}", report.held_out_rms);
+    assert_eq!((report.coefficients.len(), report.errors.len()), (TRUE.len(), TRUE.len()));
     for ((found, error), wanted) in report.coefficients.iter().zip(&report.errors).zip(TRUE) {
         assert!((found * 1e6 - wanted).abs() < 5.0 * error * 1e6 + 1e-9, "{found} ± {error} for {wanted}");
     }

@@ -6,7 +6,7 @@ use specgen::compile::{Refused, compile};
 use specgen::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen::lower::leg_jacobian;
 use specgen::requirements::{Steps, steps};
-use specgen_tests::repository;
+use specgen_tests::{repository, worse};
 
 /// The spec with edits, and what the compiler says.
 fn verdict(spec: &str, edits: &[(&str, &str)]) -> (String, Result<Steps, Vec<Diagnostic>>) {
@@ -85,7 +85,7 @@ fn the_step_of_the_platform_is_the_worst_of_all_roundings() {
             nalgebra::Vector6::from_fn(|leg, _| if signs >> leg & 1 == 1 { found.leg } else { -found.leg } / 2.0);
         let pose = solved.solve(&legs).unwrap();
         for (most, step) in worst.iter_mut().zip(pose.iter()) {
-            *most = most.max(step.abs());
+            *most = worse(*most, step.abs());
         }
     }
     for (found, worst) in found.platform.iter().zip(worst) {

@@ -11,6 +11,7 @@ use specgen::lower::pose_noise;
 use specgen::model::{Model, Probe, Scalar};
 use specgen_numerics::Double;
 use specgen_runtime::{Calibration, Gauges, Real};
+use specgen_tests::worse;
 
 const POSES: usize = 2000;
 
@@ -45,7 +46,7 @@ fn pose_error<T: Real>(model: &Model, ir: &Ir, seed: u64, poses: usize) -> [f64;
         let pose = random.pose(model);
         let readings = exact_readings(model, &pose).map(|reading| real::<T>(reading));
         for (k, (found, pose)) in gauges.pose(&readings).into_iter().zip(pose).enumerate() {
-            worst[k / 3] = worst[k / 3].max((double(found) - pose).abs());
+            worst[k / 3] = worse(worst[k / 3], (double(found) - pose).abs());
         }
     }
     worst
@@ -100,7 +101,7 @@ fn random_layouts_that_are_accepted_are_exact_too() {
         };
         accepted += 1;
         let error = pose_error::<f64>(&model, &ir, accepted, 50);
-        worst = [worst[0].max(error[0]), worst[1].max(error[1])];
+        worst = [worse(worst[0], error[0]), worse(worst[1], error[1])];
     }
     println!("{accepted} layouts, {refused} refused: {:.1e} m, {:.1e} rad", worst[0], worst[1]);
     assert!(worst[0] <= 1e-12 && worst[1] <= 1e-12, "{worst:?}");
@@ -133,7 +134,7 @@ fn readings_of_a_pose_are_those_of_the_rotated_planes() {
             let pose = random.pose(&model);
             let found = gauges.readings(&series, &pose);
             for (found, exact) in found.iter().zip(exact_readings(&model, &pose)) {
-                worst = worst.max((found - exact).abs());
+                worst = worse(worst, (found - exact).abs());
             }
         }
         assert!(worst <= 1e-18, "{worst:e} m");
@@ -193,8 +194,8 @@ fn forward_kinematics_undoes_the_inverse_over_the_workspace() {
         let rounded = lengths.map(|length| length as f32);
         let found32 = legs32.pose(&inverse32, single.kinematics.corrections as usize, &rounded);
         for k in 0..6 {
-            worst[k / 3] = worst[k / 3].max((found[k] - pose[k]).abs());
-            worst32[k / 3] = worst32[k / 3].max((f64::from(found32[k]) - pose[k]).abs());
+            worst[k / 3] = worse(worst[k / 3], (found[k] - pose[k]).abs());
+            worst32[k / 3] = worse(worst32[k / 3], (f64::from(found32[k]) - pose[k]).abs());
         }
     }
     println!("{} corrections: f64 {:.1e} m, {:.1e} rad", ir.kinematics.corrections, worst[0], worst[1]);

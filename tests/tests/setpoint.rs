@@ -20,7 +20,7 @@ use specgen_runtime::setpoint as runtime;
 use specgen_runtime::setpoint::{
     BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Setpoints, StopLimits, Target,
 };
-use specgen_tests::{Emitted, compile_edited, repository};
+use specgen_tests::{Emitted, compile_edited, repository, worse};
 
 const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
 const PATHS: [(model::PaperPath, PaperPath); 3] = [
@@ -143,8 +143,15 @@ fn play<T: Real + Into<f64>>(model: &Model, plan: &Setpoints<T, Parallel>, selec
     }
 }
 
+/// What is compared is the whole path, and nothing behind it.
+fn assert_whole(ticks: usize, host: &dyn PoseTrajectory, period: f64) {
+    let seconds = ticks as f64 * period;
+    assert!((seconds - host.duration()).abs() < period, "{seconds} s of {} s", host.duration());
+}
+
 /// Largest deviation of pose, rate and acceleration from the host's formulas, of lengths (index 0) and angles (1).
 fn deviation(targets: &[Target<f64>], host: &dyn PoseTrajectory, period: f64) -> [[f64; 2]; 3] {
+    assert_whole(targets.len(), host, period);
     let mut worst = [[0.0_f64; 2]; 3];
     for (tick, target) in (1..).zip(targets) {
         let expected = host.target(f64::from(tick) * period);
@@ -153,7 +160,7 @@ fn deviation(targets: &[Target<f64>], host: &dyn PoseTrajectory, period: f64) ->
         for (worst, (found, expected)) in worst.iter_mut().zip(pairs) {
             for axis in 0..6 {
                 let difference = (found[axis] - expected[axis]).abs();
-                worst[axis / 3] = worst[axis / 3].max(difference);
+                worst[axis / 3] = worse(worst[axis / 3], difference);
             }
         }
     }
@@ -447,16 +454,18 @@ fn the_emitted_controller_plays_the_papers_paths_and_a_table() {
             let host = PaperPose::corrected(path, 1.0);
             let (poses, bias) = emitted_targets(&mut controller, selector);
             assert!((bias[2] - 10e-6).abs() < 1e-12 && bias[0] == 0.0);
+            assert_whole(poses.len(), &host, 100e-6);
             let mut worst = 0.0_f64;
             for (tick, pose) in (1..).zip(&poses) {
                 let expected = host.target(f64::from(tick) * 100e-6).pose;
-                worst = (0..3).fold(worst, |worst, axis| worst.max((pose[axis] - expected[axis]).abs()));
+                worst = (0..3).fold(worst, |worst, axis| worse(worst, (pose[axis] - expected[axis]).abs()));
             }
             println!("{name} {path:?}: {worst:.1e} m");
             assert!(worst <= tolerance, "{name} {path:?}: {worst:e}");
         }
         controller.reset();
         let (poses, _) = emitted_targets(&mut controller, 3);
+        assert_eq!(poses.len(), 10 * (rows.len() - 1));
         for (row, pose) in rows[1..].iter().zip(poses.iter().skip(9).step_by(10)) {
             assert!((0..3).all(|axis| (pose[axis] - row[axis]).abs() <= tolerance), "{row:?} {pose:?}");
         }

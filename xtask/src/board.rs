@@ -97,6 +97,13 @@ fn tested(root: &Path, with_faults: bool) -> ExitCode {
     report.finish()
 }
 
+/// The tests of the models that stand for a board's parts.
+fn models(root: &Path) -> Outcome {
+    let mut test = cargo(root, &[&["test", "--release", "--quiet", "--locked"], &TOOL[..]].concat());
+    test.arg("--target-dir").arg(built_in(root));
+    expect_success(test, "see the test above")
+}
+
 /// For the test run: from boot to a record that replays, of the images that its tests build, with the specgen that they made.
 pub fn short(root: &Path) -> Outcome {
     each(root, &[TOOL], |trial| run(trial, true))
@@ -112,7 +119,10 @@ pub fn long(root: &Path) -> Outcome {
 }
 
 fn each(root: &Path, packages: &[Package], work: impl Fn(&Trial) -> Result<(), String>) -> Outcome {
-    let prepared = built(root, packages);
+    let prepared = match models(root) {
+        Outcome::Passed => built(root, packages),
+        failed => failed,
+    };
     if !matches!(prepared, Outcome::Passed) {
         return prepared;
     }

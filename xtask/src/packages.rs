@@ -53,7 +53,10 @@ pub fn check(root: &Path, manifest: &str) -> Outcome {
 }
 
 fn judge(output: &Output) -> Outcome {
-    let refused = match serde_json::from_slice(&output.stdout) {
+    let refused = match serde_json::from_slice::<Value>(&output.stdout) {
+        Ok(metadata) if metadata["packages"].as_array().is_none_or(Vec::is_empty) => {
+            return Outcome::Failed("cargo metadata: it names no package".to_owned());
+        }
         Ok(metadata) => refused(&metadata),
         Err(error) => return Outcome::Failed(format!("cargo metadata: {error}")),
     };

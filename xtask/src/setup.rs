@@ -2,6 +2,7 @@
 
 use crate::run::Outcome;
 use specgen_toolchain as target;
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// The cross compiler and QEMU, installed if need be.
@@ -30,6 +31,12 @@ pub fn component(name: &str, subcommand: &str) -> Result<(), Outcome> {
         return Ok(());
     }
     Err(missing(format!("{name} is not installed; install it with: rustup component add {name}")))
+}
+
+/// Whether the compiler that cargo takes here has the library of microcontrollers: another one may be the cross compiler.
+pub fn has_target() -> bool {
+    let printed = Command::new("rustc").args(["--print", "target-libdir", "--target", target::TRIPLE]).output();
+    printed.is_ok_and(|output| Path::new(String::from_utf8_lossy(&output.stdout).trim()).is_dir())
 }
 
 /// A failure, unless the user allows that something is missing.

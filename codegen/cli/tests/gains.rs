@@ -64,6 +64,7 @@ fn a_run_of_the_machine_gives_the_gain_of_each_leg_and_tables_that_take_its_erro
         let of = |name: &str| legs.iter().map(|leg| leg[name].as_f64().unwrap()).collect::<Vec<_>>();
         let gains = of("gain");
         println!("{plant}, table x {factor:.3}: lambda {gains:.3?} ± {:.4?}", of("error"));
+        assert_eq!(gains.len(), 6);
         // The legs of the machine are within ±10 % of the spec's.
         assert!(gains.iter().all(|gain| (0.89..=1.11).contains(&(gain * factor))), "{gains:?}");
         let (left, before) = (of("residual_rms"), of("residual_before"));

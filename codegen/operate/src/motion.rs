@@ -309,9 +309,7 @@ mod tests {
             let user = [3e-6, -2e-6, 1e-6, 1e-4, -2e-4, 3e-4];
             let pose = motion.platform(&user).unwrap();
             let back = motion.user(&pose).unwrap();
-            let worst =
-                back.iter().zip(user).map(|(a, b)| (a - b).abs()).fold(0.0, |a: f64, b| if b > a { b } else { a });
-            assert!(worst < 1e-15, "{more}: {back:?}");
+            assert!(back.iter().zip(user).all(|(a, b)| (a - b).abs() < 1e-15), "{more}: {back:?}");
         }
     }
 }

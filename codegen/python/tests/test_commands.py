@@ -99,6 +99,7 @@ def test_identified_and_predicted_as_by_the_command(tmp_path: Path) -> None:
     predicted = specgen.predict(table, record)
     assert predicted.data == command("identify", "predict", table, record)["result"]
     samples = predicted.samples
+    assert len(samples["error_um"]) > 1000
     assert np.array_equal(samples["error_um"], samples["measured_um"] - samples["displacement_um"]) or np.allclose(
         samples["error_um"], samples["measured_um"] - samples["displacement_um"], atol=1e-9
     )

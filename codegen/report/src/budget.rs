@@ -314,10 +314,12 @@ mod tests {
     #[test]
     fn every_source_is_alone() {
         let all = NoiseParameters { sensor_nm_rms: 1.0, adc_lsb_nm: 2.0, dac_lsb_mv: 0.0, amplifier_mv_rms: 3.0 };
+        let mut sum = [0.0; 3];
         for (name, noise) in sources(&all) {
-            let on =
-                [noise.sensor_nm_rms, noise.adc_lsb_nm, noise.amplifier_mv_rms].iter().filter(|v| **v > 0.0).count();
-            assert_eq!(on, 1, "{name}");
+            let each = [noise.sensor_nm_rms, noise.adc_lsb_nm, noise.amplifier_mv_rms];
+            assert_eq!(each.iter().filter(|v| **v > 0.0).count(), 1, "{name}");
+            sum = std::array::from_fn(|k| sum[k] + each[k]);
         }
+        assert_eq!(sum, [1.0, 2.0, 3.0], "each once");
     }
 }

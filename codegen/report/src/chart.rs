@@ -358,6 +358,7 @@ mod tests {
         assert_eq!(thinned(&values), (1.0, values.clone()));
         let axis = Axis::linear("", "");
         let packed = axis.packed(&values);
+        assert_eq!(packed["v"].as_array().unwrap().len(), values.len());
         for (back, value) in packed["v"].as_array().unwrap().iter().zip(&values) {
             assert!((back.as_f64().unwrap() * packed["k"].as_f64().unwrap() - value).abs() <= 3e-7 / STEPS);
         }

@@ -201,7 +201,7 @@ extern "C" fn specgen_timed_end() {
 }
 
 /// The recorder's memories, for the one call that there is.
-#[allow(unsafe_code)] // Statics that are written.
+#[allow(unsafe_code, clippy::deref_addrof)] // Statics that are written, to which no plain reference may be taken.
 fn memories() -> (&'static mut [u64], [&'static mut Kept; 2], &'static mut [Knot], &'static mut SampleMemory) {
     static mut MEMORY: [u64; RECORD] = [0; RECORD];
     static mut KEPT: Kept = Kept::new();

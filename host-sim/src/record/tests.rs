@@ -177,11 +177,13 @@ fn a_changed_byte_is_always_said() {
     let good = bytes(&recorder);
     let expected = pieces(&good);
     assert!(expected.len() >= 2);
+    let mut read = 0;
     for place in 0..good.len() {
         for change in [0x01, 0x80, 0xff] {
             let mut bytes = good.clone();
             bytes[place] ^= change;
             let Ok(mut reader) = Reader::new(&bytes[..]) else { continue };
+            read += 1;
             let found: Vec<Piece> = std::iter::from_fn(|| reader.next_piece().unwrap()).collect();
             assert!(found.iter().any(|piece| !matches!(piece, Piece::Block(_))), "byte {place}");
             for piece in &found {
@@ -189,11 +191,16 @@ fn a_changed_byte_is_always_said() {
             }
         }
     }
+    // What spoils the head is refused as a whole.
+    assert!(read > good.len(), "{read} of {} were read", 3 * good.len());
+    let mut cut = 0;
     for length in 0..good.len() {
         if let Ok(mut reader) = Reader::new(&good[..length]) {
             while let Some(piece) = reader.next_piece().unwrap() {
                 assert!(expected.contains(&piece) || matches!(piece, Piece::Cut { .. }), "{length} bytes");
+                cut += usize::from(matches!(piece, Piece::Cut { .. }));
             }
         }
     }
+    assert!(cut > good.len() / 4, "{cut}");
 }

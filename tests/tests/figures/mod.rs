@@ -33,7 +33,7 @@ fn minor_version(compiler: &str) -> String {
     version.unwrap_or(compiler).split('.').take(2).collect::<Vec<_>>().join(".")
 }
 
-/// Every figure that has grown beyond what is allowed or has no committed one, in words.
+/// Every figure that has grown beyond what is allowed, has no committed one, or is committed and was not measured, in words.
 fn grown(committed: &Figures, found: &Figures) -> Vec<String> {
     let mut grown = Vec::new();
     for (name, value) in found {
@@ -45,6 +45,8 @@ fn grown(committed: &Figures, found: &Figures) -> Vec<String> {
             Some(_) => {}
         }
     }
+    let lost = committed.keys().filter(|name| !found.contains_key(*name));
+    grown.extend(lost.map(|name| format!("{name}: committed, and not measured")));
     grown
 }
 
@@ -59,8 +61,11 @@ pub fn held(file: &str, name: &str, compiler: &str, found: Figures) -> Vec<Strin
         fs::write(path(file), text).expect("the repository is writable");
         return Vec::new();
     }
-    let Some(old) = committed.get(name).and_then(|versions| versions.get(&version)) else {
-        println!("  {name}: no committed figures for rustc {version}: SPECGEN_BLESS=1 adds them");
+    let Some(old) = committed.get(name) else {
+        return vec![format!("{name}: no committed figures: SPECGEN_BLESS=1 adds them")];
+    };
+    let Some(old) = old.get(&version) else {
+        println!("skipped: no committed figures of {name} for rustc {version}: SPECGEN_BLESS=1 adds them");
         return Vec::new();
     };
     let said = |grown: String| format!("{name}: {grown}; if that must be: SPECGEN_BLESS=1 renews the figures");
@@ -82,6 +87,9 @@ fn growth_by_four_percent_and_a_new_figure_are_seen() {
     let all = committed.iter().map(|(name, value)| (name.clone(), 1.1 * value)).collect();
     assert_eq!(grown(&committed, &all).len(), 3);
     let found = Figures::from([("another".to_owned(), 1.0)]);
-    assert_eq!(grown(&committed, &found), ["another: no committed figure"]);
+    assert_eq!(grown(&committed, &found).len(), 4);
+    assert!(grown(&committed, &found).contains(&"another: no committed figure".to_owned()));
+    assert_eq!(grown(&committed, &Figures::new()).len(), 3, "nothing measured");
+    assert!(held("platform.json", "no such controller", "rustc 1.95.0 (x)", found)[0].contains("no committed figures"));
     assert_eq!(minor_version("rustc 1.96.0 (ac68faa20 2026-05-25)"), "1.96");
 }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::modules::{Modules, Name, Read};
 
@@ -122,7 +122,8 @@ impl Graph {
 
     /// Files of the crate.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
-        self.modules.all.iter().map(|module| module.file.as_path())
+        let own = self.modules.all.iter().map(|module| module.file.as_path());
+        own.chain(self.modules.included.iter().map(PathBuf::as_path))
     }
 
     /// Cycles of modules that are beside each other, each as its arrows, a line each.

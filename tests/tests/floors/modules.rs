@@ -37,6 +37,8 @@ pub struct Module {
 /// The modules of a crate by number, the root first.
 pub struct Modules {
     pub all: Vec<Module>,
+    /// Files whose text is put into that of a module.
+    pub included: BTreeSet<PathBuf>,
 }
 
 impl Modules {
@@ -45,7 +47,8 @@ impl Modules {
     /// # Panics
     /// If a file of a module is missing.
     pub fn of(root: &Path, read: Read) -> Self {
-        let mut modules = Self { all: vec![Module { file: root.to_owned(), ..Module::default() }] };
+        let root_module = Module { file: root.to_owned(), ..Module::default() };
+        let mut modules = Self { all: vec![root_module], included: BTreeSet::new() };
         modules.add_file(0, root.parent().unwrap(), read);
         modules
     }
@@ -177,6 +180,7 @@ impl Scan<'_> {
         // What a build script makes is no file of the repository.
         if let Some(text) = (self.read)(&path) {
             self.run(&tokens(&text), outside);
+            self.modules.included.insert(path);
         }
         5
     }

@@ -12,7 +12,7 @@ use host_sim::platform::rig::{Bench, GaugeFault, Noise, Request, RunOptions, Tic
 use host_sim::platform::{PlatformRig, PlatformScenario, Specimen};
 use host_sim::trajectory::PoseTarget;
 use specgen::compile::Compiled;
-use specgen_tests::Emitted;
+use specgen_tests::{Emitted, worse};
 
 pub const PERIOD: f64 = 1e-4;
 /// Ticks of a period of the path that streams follow.
@@ -219,7 +219,7 @@ impl Run<'_> {
 
 /// Largest distance of the true pose from the target, turns counted by the way at a gauge, m.
 pub fn worst(ticks: &[Tick]) -> f64 {
-    ticks.iter().map(distance).fold(0.0, f64::max)
+    ticks.iter().map(distance).fold(0.0, worse)
 }
 
 pub fn distance(tick: &Tick) -> f64 {
@@ -232,7 +232,7 @@ pub fn largest_step(before: &Tick, ticks: &[Tick]) -> f64 {
     let mut largest = 0.0_f64;
     for (a, b) in std::iter::once(before).chain(ticks).zip(ticks) {
         for leg in 0..6 {
-            largest = largest.max((b.voltage[leg] - a.voltage[leg]).abs());
+            largest = worse(largest, (b.voltage[leg] - a.voltage[leg]).abs());
         }
     }
     largest

@@ -7,6 +7,7 @@ use guarded::*;
 use host_sim::platform::WorkPart;
 use host_sim::platform::rig::{Command, GaugeFault, Request};
 use host_sim::trajectory::PoseTarget;
+use specgen_tests::worse;
 
 #[test]
 fn a_gauge_that_fails_holds_the_pose_and_its_return_makes_no_jump() {
@@ -160,7 +161,7 @@ fn a_set_point_that_jumps_is_no_number_or_lies_outside_is_held() {
             assert_eq!(here.pose, there);
             let again = run.stream(LAP);
             assert_eq!(all_status(&again), [0]);
-            let peak = worst(&held).max(worst(&stopping));
+            let peak = worse(worst(&held), worst(&stopping));
             let steps = largest_step(&before, &[&held[..], &stopping[..]].concat());
             println!(
                 "{name} = {bad:e}: {:.0} nm ({:.1}), steps {:.1} mV ({:.1}), at rest: {}",
@@ -272,18 +273,18 @@ fn a_wrench_that_cannot_be_is_not_believed() {
             run.release();
             assert_eq!(all_status(&faulty), [WRENCH], "wrench[{axis}] = {bad}");
             let during = load(run);
-            let apart = before.iter().zip(&during).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let apart = before.iter().zip(&during).map(|(a, b)| (a - b).abs()).fold(0.0, worse);
             let after = run.ticks(200, &Request { fresh: true, ..Request::stream(path(run.now)) });
             assert_eq!(all_status(&after), [0]);
             println!(
                 "wrench[{axis}] = {bad:e}: load apart by {:.2} nm, {:.1} nm ({:.1}), steps {:.1} mV ({:.1})",
                 apart * 1e9,
-                worst(&faulty).max(worst(&after)) * 1e9,
+                worse(worst(&faulty), worst(&after)) * 1e9,
                 error * 1e9,
                 largest_step(&last, &[&faulty[..], &after[..]].concat()) * 1e3,
                 step * 1e3
             );
-            assert!(worst(&faulty).max(worst(&after)) < 2.0 * error && apart < 20e-9);
+            assert!(worse(worst(&faulty), worst(&after)) < 2.0 * error && apart < 20e-9);
             assert!(largest_step(&last, &[&faulty[..], &after[..]].concat()) < 0.2);
         }
     });

@@ -5,6 +5,7 @@ use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{Bench as Rig, Command, Request, Tick};
 use host_sim::platform::{PlatformParameters, Specimen};
 use host_sim::trajectory::PoseTarget;
+use specgen_tests::worse;
 
 use crate::platform_tables::bench::{BIAS, Bench, PERIOD};
 
@@ -78,7 +79,7 @@ impl Machine {
     pub fn stated(&self) -> Stated {
         let stream = &self.bench.emitted.compiled.stops[0];
         assert_eq!(stream.what, "stream");
-        let most = |of: &[f64; 6]| (0..6).map(|axis| of[axis] * lever(axis)).fold(0.0, f64::max);
+        let most = |of: &[f64; 6]| (0..6).map(|axis| of[axis] * lever(axis)).fold(0.0, worse);
         Stated { way: most(&stream.way), overshoot: most(&stream.overshoot) }
     }
 
@@ -155,13 +156,13 @@ impl Run<'_> {
             if tick.status & STALE == 0 {
                 stale = Some(tick.target[axis]);
             } else if let Some(from) = stale {
-                ran.target = ran.target.max(along(&tick.target, from));
-                ran.pose = ran.pose.max(along(&tick.pose, from));
+                ran.target = worse(ran.target, along(&tick.target, from));
+                ran.pose = worse(ran.pose, along(&tick.pose, from));
             }
             if tick.status & STALE == 0 || tick.status & BUSY != 0 {
                 ran.time = (after + 1) as f64 * PERIOD;
             }
-            ran.worst = ran.worst.max(off);
+            ran.worst = worse(ran.worst, off);
             match after {
                 150 => ran.at_15ms = off,
                 500 => ran.at_50ms = off,

@@ -4,7 +4,7 @@
 mod bench;
 
 use bench::{Machine, Ran, machines};
-use specgen_tests::length;
+use specgen_tests::{length, worse};
 
 use crate::platform_tables::bench::in_parallel;
 
@@ -37,7 +37,7 @@ fn a_dry_stream_stands_soon_near_and_with_no_leg_limited() {
         let stated = machine.stated();
         for share in SPEEDS {
             let of: Vec<&Ran> = ran.iter().filter(|one| one.share.abs() == share).collect();
-            let most = |figure: &dyn Fn(&Ran) -> f64| of.iter().map(|one| figure(one)).fold(0.0, f64::max);
+            let most = |figure: &dyn Fn(&Ran) -> f64| of.iter().map(|one| figure(one)).fold(0.0, worse);
             println!(
                 "{:<14} {:>4.1} mm/s: stands after {:>4.1} ms; from where it counts as stale target {:.3} um, platform {:.3} um; off by {:.3} um at most, {:.3} um 15 ms, {:.3} um 50 ms after the last set-point; limited {:x}",
                 machine.name,

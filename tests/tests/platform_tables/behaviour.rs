@@ -6,7 +6,7 @@ use host_sim::platform::scenario::{PLATFORM_MODES, select};
 use host_sim::platform::{PlatformScenario, Specimen, UserFrames};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use specgen::machine::{self, on_board};
-use specgen_tests::length;
+use specgen_tests::{length, worse};
 
 use super::bench::{BIAS, Bench, PERIOD, in_parallel, reference_machine};
 
@@ -75,11 +75,11 @@ fn an_over_range_demand_leaves_nothing_behind() {
         assert!(run.status & !LEG_LIMITED == 0, "{name}: status {:#x}", run.status);
         assert_eq!(run.status & LEG_LIMITED, LEG_LIMITED, "{name}: every leg at its limit");
         let error = |sample: &host_sim::platform::rig::PoseSample| {
-            (0..3).map(|k| (sample.tick.pose[k] - sample.target[k]).abs()).fold(0.0, f64::max)
+            (0..3).map(|k| (sample.tick.pose[k] - sample.target[k]).abs()).fold(0.0, worse)
         };
         let late = run.samples.iter().filter(|s| s.time > OverRange::END && error(s) > 0.1e-6);
-        let settled = late.map(|s| s.time - OverRange::END).fold(0.0, f64::max);
-        let worst = run.samples.iter().filter(|s| s.time > OverRange::THERE).map(error).fold(0.0, f64::max);
+        let settled = late.map(|s| s.time - OverRange::END).fold(0.0, worse);
+        let worst = run.samples.iter().filter(|s| s.time > OverRange::THERE).map(error).fold(0.0, worse);
         println!("over-range z, {name}: off by {:.1} µm, below 0.1 µm {:.1} ms after", worst * 1e6, settled * 1e3);
         assert!(worst > 5e-6, "{name}: the demand was within range");
         assert!(settled < 0.2, "{name}: {settled} s");
@@ -105,12 +105,12 @@ fn change(scenario: &PlatformScenario, bench: &Bench, from: u32, to: u32, motion
     };
     let mut last: Option<[f64; 6]> = None;
     let mut usual: f64 = 0.0;
-    let moved = |last: &[f64; 6], now: &[f64; 6]| (0..6).map(|k| (now[k] - last[k]).abs()).fold(0.0, f64::max);
+    let moved = |last: &[f64; 6], now: &[f64; 6]| (0..6).map(|k| (now[k] - last[k]).abs()).fold(0.0, worse);
     const BEFORE: usize = 8000;
     for tick in 0..BEFORE {
         let now = rig.tick(&request(tick)).expect("a tick").voltage;
         if let Some(last) = last.filter(|_| tick >= BEFORE - 500) {
-            usual = usual.max(moved(&last, &now));
+            usual = worse(usual, moved(&last, &now));
         }
         last = Some(now);
     }
@@ -123,7 +123,7 @@ fn change(scenario: &PlatformScenario, bench: &Bench, from: u32, to: u32, motion
         step
     });
     let at = steps.next().expect("the change");
-    [at, usual, steps.fold(0.0, f64::max)]
+    [at, usual, steps.fold(0.0, worse)]
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn a_change_of_mode_moves_no_leg() {
             let (from, to) = pairs[pair as usize];
             change(&scenario, bench, from, to, motion)
         });
-        let largest = |column: usize| steps.iter().map(|step| step[column]).fold(0.0, f64::max);
+        let largest = |column: usize| steps.iter().map(|step| step[column]).fold(0.0, worse);
         println!(
             "{what}: largest step at a change of mode {:.1} mV, of a tick before {:.1} mV, after {:.1} mV",
             largest(0) * 1e3,
@@ -170,7 +170,7 @@ fn trajectories_on_board_are_those_streamed() {
             .iter()
             .zip(&streamed.samples)
             .flat_map(|(a, b)| (0..6).map(|k| (a.target[k] - b.target[k]).abs()))
-            .fold(0.0, f64::max);
+            .fold(0.0, worse);
         let (a, b) = (played.errors.rms_translation_nm(), streamed.errors.rms_translation_nm());
         println!("{:?}: on board off by {off:.1e}; {a:.2} nm on board, {b:.2} nm streamed", path.path);
         assert!(off <= 1e-12, "{:?}: {off:e}", path.path);
@@ -201,9 +201,9 @@ fn a_turned_work_frame_and_a_tool_point_are_followed() {
     let run = scenario.run(&mut bench.controller(), &PaperPose::corrected(PaperPath::Case2, 1.0)).expect("a run");
     assert_eq!(run.status & !(1 << 18), 0, "{:#x}", run.status);
     let off = |s: &host_sim::platform::rig::PoseSample| {
-        (0..6).map(|k| (s.target[k] - s.tick.target[k]).abs()).fold(0.0, f64::max)
+        (0..6).map(|k| (s.target[k] - s.tick.target[k]).abs()).fold(0.0, worse)
     };
-    let worst = run.samples.iter().map(off).fold(0.0, f64::max);
+    let worst = run.samples.iter().map(off).fold(0.0, worse);
     println!(
         "frames: targets off by {worst:.1e}; {:.2} nm, {:.1} nrad",
         run.errors.rms_translation_nm(),
@@ -252,7 +252,7 @@ fn a_stream_that_ends_and_a_command_to_hold_stand_still() {
     let before = last.target;
     let tick = rig.tick(&Request::default()).expect("a tick");
     assert_eq!(tick.target, before);
-    let error = (0..3).map(|k| (tick.pose[k] - tick.target[k]).abs()).fold(0.0, f64::max);
+    let error = (0..3).map(|k| (tick.pose[k] - tick.target[k]).abs()).fold(0.0, worse);
     assert!(error < 30e-9, "{error:e}");
     assert!(before[2] > BIAS[2]);
 }
@@ -266,6 +266,7 @@ fn the_machine_of_the_reference_spec_is_the_reference_machine() {
     let close = |a: f64, b: f64| (a - b).abs() <= 1e-12 * b.abs();
     for (a, b) in found.legs.iter().zip(&expected.legs) {
         assert!(close(a.gain_um_per_v, b.gain_um_per_v) && close(a.s2, b.s2));
+        assert_eq!(a.play_thresholds_v.len(), b.play_thresholds_v.len());
         assert!(a.play_thresholds_v.iter().zip(&b.play_thresholds_v).all(|(a, b)| close(*a, *b)));
         assert_eq!((&a.creep_weights, a.u_max), (&b.creep_weights, b.u_max));
         assert!((a.noise.adc_lsb_nm - b.noise.adc_lsb_nm).abs() < 0.1 && close(a.noise.sensor_nm_rms, 2.2));
@@ -308,7 +309,7 @@ fn excursion(
         if k + WINDOW >= tick {
             let off: f64 = (0..3).map(|axis| (now.pose[axis] - now.target[axis]).powi(2)).sum();
             let window = &mut largest[usize::from(k >= tick)];
-            *window = window.max(off.sqrt());
+            *window = worse(*window, off.sqrt());
         }
     }
     largest
@@ -332,12 +333,12 @@ fn a_change_of_mode_in_motion_disturbs_no_more_than_the_modes_themselves() {
     // What each mode is off by where nothing changes.
     let mut usual = [0.0_f64; 7];
     for ((from, _), found) in pairs.iter().zip(&found) {
-        usual[*from as usize] = found.iter().fold(usual[*from as usize], |most, [before, _]| most.max(*before));
+        usual[*from as usize] = found.iter().fold(usual[*from as usize], |most, [before, _]| worse(most, *before));
     }
     println!("off the path in modes 0 to 6: {:.0?} nm", usual.map(|m| m * 1e9));
     let mut worst = [0.0_f64; 2];
     for ((from, to), found) in pairs.iter().zip(&found) {
-        let after = found.iter().fold(0.0_f64, |most, [_, after]| most.max(*after));
+        let after = found.iter().fold(0.0, |most, [_, after]| worse(most, *after));
         let share = after / usual[*from as usize].max(usual[*to as usize]);
         if share > worst[0] {
             worst = [share, after];

@@ -74,28 +74,34 @@ fn both_classes_of_legs_follow_a_path_with_corners_and_a_fast_circle() {
         [case, circle]
     };
     // The lead as the compiler proposes it; without one the circle is 400 nm off.
-    let [case, circle] = show("plays", errors(reference_machine()));
-    assert!(case < 30.0 && circle < 110.0);
-    let [case, circle] = show("Bouc-Wen", errors(&bouc_wen("classes-bouc-wen", &[])));
-    assert!(case < 120.0 && circle < 300.0);
-    // In the soak beside 0.1 ms, which was chosen on paths with corners.
-    for (name, machine) in length(&[][..], &[("plays", true), ("Bouc-Wen", false)]) {
-        let edits = [("transfer_time   =", "lead = \"0.1 ms\"\ntransfer_time   =")];
-        let bench = if *machine {
-            Bench::new("classes-lead-plays", Specimen::reference(), &edits)
-        } else {
-            bouc_wen("classes-lead-bouc-wen", &edits)
-        };
-        show(&format!("{name}, lead 0.1 ms"), errors(&bench));
+    let plays = show("plays", errors(reference_machine()));
+    assert!(plays[0] < 30.0 && plays[1] < 110.0);
+    let bouc = show("Bouc-Wen", errors(&bouc_wen("classes-bouc-wen", &[])));
+    assert!(bouc[0] < 120.0 && bouc[1] < 300.0);
+    if length(true, false) {
+        return println!(
+            "skipped: only in the soak: both classes with a lead of 0.1 ms, which was chosen on paths with corners"
+        );
+    }
+    let edits = [("transfer_time   =", "lead = \"0.1 ms\"\ntransfer_time   =")];
+    let late = Bench::new("classes-lead-plays", Specimen::reference(), &edits);
+    for (name, proposed, late) in
+        [("plays", plays, late), ("Bouc-Wen", bouc, bouc_wen("classes-lead-bouc-wen", &edits))]
+    {
+        let [case, circle] = show(&format!("{name}, lead 0.1 ms"), errors(&late));
+        // It is a little better on corners, and worse on what is smooth and fast.
+        assert!(proposed[0] < 1.1 * case && proposed[1] < circle, "{name}: {proposed:?} against {case} {circle}");
     }
 }
 
 /// What a grid of 64 takes off that of 32: a record of each leg on either grid, both classes, damped.
 #[test]
 fn a_finer_grid_is_no_worse() {
-    // Two more records of twelve legs: in the soak.
-    for class in length(&[][..], &["plays", "Bouc-Wen"]) {
-        let specimen = match *class {
+    if length(true, false) {
+        return println!("skipped: only in the soak: two more records of twelve legs");
+    }
+    for class in ["plays", "Bouc-Wen"] {
+        let specimen = match class {
             "plays" => Specimen::reference(),
             _ => Specimen::within_tolerances(&PlatformParameters::reference(), &LegParameters::bouc_wen(), 1),
         };
@@ -116,7 +122,7 @@ fn a_finer_grid_is_no_worse() {
             println!("{class}, grid {grid}: case 1 at 10 Hz {:.1} nm, circle {:.1} nm", found[0], found[1]);
             found
         });
-        let bound = if *class == "plays" { 16.0 } else { 1.02 * coarse[0] };
+        let bound = if class == "plays" { 16.0 } else { 1.02 * coarse[0] };
         assert!(fine[0] <= bound, "{class}: {} nm", fine[0]);
     }
 }

@@ -8,7 +8,7 @@ use host_sim::platform::{Specimen, WorkPart};
 use host_sim::trajectory::PoseTarget;
 use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, Tuning};
 use specgen::tuning::relay;
-use specgen_tests::length;
+use specgen_tests::{length, worse};
 
 use super::bench::{Bench, DAMPED, PERIOD, in_parallel, reference_machine};
 use super::classes::{bouc_wen, errors};
@@ -82,7 +82,7 @@ fn disturbed(bench: &Bench) -> [f64; 3] {
         let square = |error: &[f64; 6]| -> f64 { axes.clone().zip(&mean).map(|(k, m)| (error[k] - m).powi(2)).sum() };
         (rest.iter().map(square).sum::<f64>() / REST as f64).sqrt() * 1e9
     };
-    [after[100..].iter().map(far).fold(0.0, f64::max), rms(0..3), rms(3..6)]
+    [after[100..].iter().map(far).fold(0.0, worse), rms(0..3), rms(3..6)]
 }
 
 #[test]

@@ -7,7 +7,7 @@ use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 use specgen::lower::platform;
 use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDynamics, Tuning};
 
-use specgen_tests::length;
+use specgen_tests::{length, worse};
 
 use super::bench::{BIAS, Bench, PERIOD, SEED, in_parallel, median, plants, random_machines};
 
@@ -153,7 +153,7 @@ fn predicted_limits_are_those_of_the_machine() {
             deviations.push(deviation.abs());
         }
     }
-    let worst = deviations.iter().copied().fold(0.0, f64::max);
+    let worst = deviations.iter().copied().fold(0.0, worse);
     let typical = median(deviations);
     println!("predicted limits are off by {:.1} % typically, {:.1} % at worst", typical * 100.0, worst * 100.0);
     assert!(worst <= 0.10 && typical <= 0.05, "{worst} {typical}");

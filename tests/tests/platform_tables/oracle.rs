@@ -10,7 +10,7 @@ use host_sim::platform::rig::{Noise, Record, RunOptions};
 use host_sim::platform::scenario::{PLATFORM_MODES, select};
 use host_sim::platform::{PlatformParameters, PlatformScenario};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
-use specgen_tests::Emitted;
+use specgen_tests::{Emitted, worse};
 
 use super::bench::PERIOD;
 
@@ -134,7 +134,7 @@ impl Comparison {
                 for (stem, largest) in &mut worst {
                     let at = place(&format!("{stem}[{leg}]"));
                     let difference = f64::from_bits(row[at]) - f64::from_bits(output[at - inputs]);
-                    *largest = largest.max(difference.abs());
+                    *largest = worse(*largest, difference.abs());
                 }
             }
         }

@@ -12,7 +12,7 @@ use specgen::machine;
 use specgen::robust::factors::Given;
 use specgen::robust::{Deviation, Factor, Factors};
 use specgen_runtime::playback::Knot;
-use specgen_tests::length;
+use specgen_tests::{length, worse};
 
 use super::bench::{Bench, PERIOD, in_parallel};
 use super::learning::{RADIUS, SPEED, WISH, other, plays};
@@ -167,7 +167,7 @@ fn a_known_response_is_found_within_its_errors() {
                     let expected = if i == j { [0.7 * angle.cos(), -0.7 * angle.sin()] } else { [0.0; 2] };
                     let [re, im] = bin.response[i][j];
                     let off = (re - expected[0]).hypot(im - expected[1]);
-                    largest = largest.max(if i == j { off } else { 0.0 });
+                    largest = worse(largest, if i == j { off } else { 0.0 });
                     squares += (off / bin.error[i][j]).powi(2);
                     count += 1.0;
                 }

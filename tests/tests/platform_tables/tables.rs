@@ -4,7 +4,7 @@ use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory,
 use host_sim::platform::table::{MachiningTable, PoseRow, PoseTable, paper_rms};
 use host_sim::platform::{Specimen, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose};
-use specgen_tests::{length, repository};
+use specgen_tests::{length, repository, worse};
 
 use super::bench::{Bench, in_parallel, median, plants, random_machines, reference_machine};
 
@@ -38,12 +38,15 @@ fn machining(bench: &Bench) -> MachiningTable {
 /// Every value of Tables 5 to 8 at most the paper's.
 #[track_caller]
 fn below_the_paper(table: &PoseTable) -> f64 {
-    let mut closest: f64 = 0.0;
-    for PoseRow { trajectory, mode, frequency_hz, rms_nano, .. } in &table.rows {
-        let Some(paper) = paper_rms(trajectory, mode, *frequency_hz) else { continue };
+    let mut closest = 0.0;
+    // The paper has no F alone.
+    let of_the_paper: Vec<&PoseRow> = table.rows.iter().filter(|row| row.mode.starts_with("pf-")).collect();
+    assert!(of_the_paper.len() >= CASES.len() * FREE_MODES.len(), "{} rows", of_the_paper.len());
+    for PoseRow { trajectory, mode, frequency_hz, rms_nano, .. } in of_the_paper {
+        let paper = paper_rms(trajectory, mode, *frequency_hz).expect("the paper made this run");
         for (axis, (ours, paper)) in rms_nano.iter().zip(paper).enumerate() {
             assert!(*ours <= paper, "{trajectory} {frequency_hz} Hz {mode}, axis {axis}: {ours} above {paper}");
-            closest = closest.max(ours / paper);
+            closest = worse(closest, ours / paper);
         }
     }
     closest
@@ -108,7 +111,7 @@ fn tables_5_to_8_on_random_machines() {
             print!(" {case} {frequency} Hz {a:.1} {b:.1} {c:.1} |");
         }
         println!(" nm Invhys, EWMA, PCC");
-        closest = closest.max(below_the_paper(table));
+        closest = worse(closest, below_the_paper(table));
     }
     println!("closest to the paper: {closest:.3} of it");
 
@@ -123,7 +126,9 @@ fn tables_5_to_8_on_random_machines() {
         let gained = ratios("case-1", frequency, "pf-invhys", "pf-ewma");
         assert!(extremes(&gained).0 >= 1.3);
         // A few machines have no median.
-        assert!(length(true, median(gained) >= 2.0));
+        if length(false, true) {
+            assert!(median(gained) >= 2.0);
+        }
         for case in ["case-1", "case-2"] {
             assert!(extremes(&ratios(case, frequency, "pf-pcc", "pf-ewma")).1 <= 1.05);
         }

@@ -160,7 +160,8 @@ mod tests {
             if let Some(weight) = drift_weight {
                 drift = weight * (model_error - old) + (1.0 - weight) * drift;
             }
-            if y.abs() > 1.0 {
+            // A NaN does not settle, either.
+            if y.is_nan() || y.abs() > 1.0 {
                 return false;
             }
             if run > runs - 1000 {

@@ -208,7 +208,10 @@ mod tests {
     #[test]
     fn a_container_without_sys_and_proc_is_unknown_in_everything() {
         let found = of(&[]);
-        assert!(found.iter().all(|finding| finding.grade == Unknown && finding.fix.is_some()), "{found:?}");
+        assert!(
+            found.len() > 4 && found.iter().all(|finding| finding.grade == Unknown && finding.fix.is_some()),
+            "{found:?}"
+        );
     }
 
     #[test]

@@ -8,7 +8,7 @@ use specgen_compiler::lower;
 use specgen_compiler::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDynamics, Tuning};
 use specgen_language::model::{AdaptationMode, ControlMode};
 
-use super::matrix::{Matrix6c, inverse, left, multiply, norm, spectral_radius};
+use super::matrix::{Matrix6c, inverse, larger, left, multiply, norm, spectral_radius};
 use super::response::{Bin, Response};
 use crate::factors::{Factor, Factors};
 
@@ -277,9 +277,8 @@ impl Learnable {
             for ((radii, real), inverse) in radii.iter_mut().zip(&real).zip(&inverses) {
                 let product = multiply(real, inverse);
                 for (radius, share) in radii.iter_mut().zip(SHARES) {
-                    let found = spectral_radius(&left(&product, share));
                     // A NaN is no convergence.
-                    *radius = if found <= *radius { *radius } else { found };
+                    *radius = larger(*radius, spectral_radius(&left(&product, share)));
                 }
             }
         }

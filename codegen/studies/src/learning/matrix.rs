@@ -39,7 +39,12 @@ pub(super) fn spectral_radius(matrix: &Matrix6c) -> f64 {
 /// Largest sum of magnitudes of a row.
 pub(super) fn norm(matrix: &Matrix6c) -> f64 {
     let sums = matrix.iter().map(|row| row.iter().map(|value| libm::sqrt(square(*value))).sum::<f64>());
-    sums.fold(0.0, |most, sum| if sum <= most { most } else { sum })
+    sums.fold(0.0, larger)
+}
+
+/// The larger of two; a NaN where one is none.
+pub(super) fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b <= a { a } else { b }
 }
 
 /// By elimination with row pivots; not finite where there is none.
@@ -92,5 +97,11 @@ mod tests {
         let radius = spectral_radius(&similar);
         let expected = libm::hypot(0.5, 0.3);
         assert!(radius >= expected * (1.0 - 1e-9) && radius < 1.15 * expected, "{radius} {expected}");
+        // What is no number in one entry has no bound.
+        for (row, column) in [(0, 0), (3, 1), (5, 5)] {
+            let mut spoilt = similar;
+            spoilt[row][column][1] = f64::NAN;
+            assert!(spectral_radius(&spoilt).is_nan(), "{row} {column}");
+        }
     }
 }

@@ -4,7 +4,7 @@
 use specgen_runtime::dynamics::Leg;
 use specgen_runtime::{Motion, Platform};
 
-use crate::common::{Matrix, Random, cross, dot, product, rotation, times, transpose};
+use crate::common::{Matrix, Random, cross, dot, product, rotation, times, transpose, worse};
 
 type Six = [f64; 6];
 type Vector = [f64; 3];
@@ -322,7 +322,7 @@ fn everywhere(mut look: impl FnMut(&Machine, [usize; 6], &Platform<f64>, &Motion
 
 /// Largest difference as a share of `scale`.
 fn apart(found: &Six, expected: &Six, scale: f64) -> f64 {
-    found.iter().zip(expected).map(|(a, b)| (a - b).abs() / scale).fold(0.0, f64::max)
+    found.iter().zip(expected).map(|(a, b)| (a - b).abs() / scale).fold(0.0, worse)
 }
 
 #[test]

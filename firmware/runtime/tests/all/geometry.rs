@@ -4,7 +4,7 @@ use specgen_runtime::linear::{difference, transform};
 use specgen_runtime::sensing::faults;
 use specgen_runtime::{Calibration, Gauges, Legs, Series};
 
-use crate::common::{Random, cross, dot, inverse, rotation, times};
+use crate::common::{Random, cross, dot, inverse, rotation, times, worse};
 
 type Six = [f64; 6];
 type Vector = [f64; 3];
@@ -37,7 +37,7 @@ fn poses(seed: u64, reach: f64, tilt: f64) -> impl Iterator<Item = Six> {
 }
 
 fn apart(a: &Six, b: &Six) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, worse)
 }
 
 /// Platform joint and leg at rest, nothing symmetric.

@@ -41,7 +41,7 @@ fn the_dynamic_model_is_relays_of_both_weights_with_the_second_times_the_rate() 
             };
             let drive = step as f64 / refine as f64;
             let exact = relays.apply(step) + (drive - last) * rate_relays.apply(step);
-            worst = worst.max((memory.apply(&table, drive) - exact).abs());
+            worst = worse(worst, (memory.apply(&table, drive) - exact).abs());
             last = drive;
         }
         assert!(worst < 100.0 * EXACT, "{worst:e}");
@@ -87,7 +87,7 @@ fn inverse_then_forward_is_the_identity_wherever_the_inverse_says_so() {
                 fell_back += 1;
             } else {
                 found += 1;
-                worst = worst.max(error);
+                worst = worse(worst, error);
             }
         }
         println!("size {size}: {found} found, {fell_back} fell back, worst {worst:e} m");
@@ -120,7 +120,7 @@ fn as_the_rate_goes_to_zero_the_model_goes_to_the_static_one() {
         let (mut memory, mut still) = (Dynamic::new(), ReversalMemory::<f64, 64>::new());
         (0..=ticks).fold(0.0_f64, |worst, k| {
             let drive = 32.0 * (9.0 * k as f64 / ticks as f64).sin().abs() * (k as f64 / ticks as f64);
-            worst.max((memory.apply(&table, drive) - still.apply(&table.still, drive)).abs())
+            worse(worst, (memory.apply(&table, drive) - still.apply(&table.still, drive)).abs())
         })
     };
     let (coarse, fine) = (worst(1000), worst(100_000));
@@ -218,7 +218,7 @@ fn creep_inverse_then_a_fine_step_integration_gives_the_demand() {
             }
         }
         let exact = f + states.iter().zip(WEIGHTS).map(|(x, w)| x * w).sum::<f64>();
-        worst = worst.max((exact - demand).abs()).max((claimed - demand).abs());
+        worst = worse(worse(worst, (exact - demand).abs()), (claimed - demand).abs());
     }
     println!("worst {worst:e} m");
     assert!(worst < 1e-13, "{worst:e}");

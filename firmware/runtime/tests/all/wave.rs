@@ -1,5 +1,6 @@
 //! Waves: their shapes against textbook formulas, their derivatives against differences, their limits, and their ends.
 
+use crate::common::worse;
 use specgen_runtime::Motion;
 use specgen_runtime::setpoint::{MoveLimits, Parallel, Setpoints, StopLimits};
 use specgen_runtime::wave::{AxisWave, Limits, Refused, Settings, Shape, Stage, TONES, Tone, WORDS, Wave, step_of};
@@ -114,7 +115,7 @@ fn limits_hold_and_are_not_wasted() {
     let settings = every_shape();
     let all = run(&settings, wide());
     for axis in 0..6 {
-        let most = |of: &dyn Fn(&Motion<f64>) -> f64| all.iter().map(of).fold(f64::MIN, f64::max);
+        let most = |of: &dyn Fn(&Motion<f64>) -> f64| all.iter().map(of).fold(f64::MIN, worse);
         let high = most(&|motion| motion.pose[axis]);
         let rate = most(&|motion| motion.rate[axis].abs());
         let acceleration = most(&|motion| motion.acceleration[axis].abs());

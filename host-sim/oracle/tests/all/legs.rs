@@ -48,6 +48,7 @@ fn noise_free_n16_figures_are_within_5_percent_of_the_study() {
         scenario(&parameters, &NoiseParameters::NONE).tracking(&mut controller, &MODES, &TRACKING_FREQUENCIES).unwrap();
     let found = figures(&table);
     report("N = 16, no noise", &found, &study);
+    assert_eq!(found.len(), study.len());
     for (found, study) in found.iter().zip(study) {
         assert!((found / study - 1.0).abs() < 0.05, "{found} nm, study {study} nm");
     }

@@ -6,6 +6,11 @@ mod space;
 pub use space::*;
 use specgen_runtime::Everett;
 
+/// The larger of two errors. Unlike `f64::max` it keeps a NaN, which no bound admits.
+pub fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a >= b { a } else { b }
+}
+
 /// 64-bit linear congruential generator (Knuth's constants): a fixed sequence, whatever the platform.
 pub struct Random(pub u64);
 

@@ -2,7 +2,7 @@
 
 use specgen_runtime::setpoint::{Frames, Target, Tool, Work};
 
-use crate::common::{Random, product, rotation, transpose};
+use crate::common::{Random, product, rotation, transpose, worse};
 
 const POINT: [f64; 3] = [7e-3, -5e-3, 40e-3];
 const AXES: [f64; 3] = [0.4, -0.3, 1.1];
@@ -32,7 +32,7 @@ fn work_frames_place_the_tool_point_and_turn_about_it() {
         let pose = work().to_platform(&Target::at(user)).unwrap().pose;
         let expected = by_definition(user);
         for axis in 0..6 {
-            worst = worst.max((pose[axis] - expected[axis]).abs());
+            worst = worse(worst, (pose[axis] - expected[axis]).abs());
         }
     }
     println!("f64 against the definition: {worst:.1e} m, rad");
@@ -99,7 +99,7 @@ fn frames_in_single_precision_keep_a_tenth_of_a_nanometre() {
         let b = exact.to_platform(&Target::at(user.map(f64::from))).unwrap().pose;
         for axis in 0..6 {
             let worst = &mut worst[axis / 3];
-            *worst = worst.max((f64::from(a[axis]) - b[axis]).abs());
+            *worst = worse(*worst, (f64::from(a[axis]) - b[axis]).abs());
         }
     }
     println!("f32 frames against f64: {:.1e} m, {:.1e} rad", worst[0], worst[1]);

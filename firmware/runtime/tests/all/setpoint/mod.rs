@@ -8,7 +8,7 @@ mod standing;
 mod stops;
 mod support;
 
-use crate::common::Random;
+use crate::common::{Random, worse};
 use specgen_runtime::Snapshot;
 use specgen_runtime::setpoint::{
     BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Profile, REFUSED, STALE, Setpoints, StopLimits, Target,
@@ -49,8 +49,8 @@ fn inconsistency(targets: &[Target<f64>], third: [f64; 6]) -> f64 {
             let by_pose = (w[2].pose[axis] - w[0].pose[axis]) / (2.0 * PERIOD) - w[1].rate[axis];
             let by_rate = (w[2].rate[axis] - w[0].rate[axis]) / (2.0 * PERIOD) - w[1].acceleration[axis];
             let rounding = f64::EPSILON * BOUND[axis] / PERIOD;
-            worst = worst.max((by_pose.abs() - rounding) / (third * PERIOD * PERIOD / 2.0));
-            worst = worst.max((by_rate.abs() - rounding) / (third * PERIOD / 2.0));
+            worst = worse(worst, (by_pose.abs() - rounding) / (third * PERIOD * PERIOD / 2.0));
+            worst = worse(worst, (by_rate.abs() - rounding) / (third * PERIOD / 2.0));
         }
     }
     worst
@@ -121,7 +121,7 @@ fn moves_keep_speed_acceleration_and_jerk_and_take_hardly_longer_than_the_optimu
         assert!(f64::from(ticks) <= 1.02 * optimum + 8.0, "{ticks} for {optimum}: {way:e} {v:e} {a:e} {j:e}");
         assert!(f64::from(ticks) >= optimum - 1e-6, "{ticks} beats {optimum}");
         if optimum > 200.0 {
-            worst = worst.max(f64::from(ticks) / optimum);
+            worst = worse(worst, f64::from(ticks) / optimum);
         }
 
         let mut plan = plan(Parallel, vec![]);
@@ -294,7 +294,7 @@ fn segments_follow_their_formula_and_its_derivatives() {
             let (w, (s, c)) = ((t - 0.5) / 2.0, (core::f64::consts::TAU * (t - 0.5)).sin_cos());
             (5.5e-6 + 2e-6 * w - (3e-6 + 2e-6 * w) * c, (3e-6 + 2e-6 * w) * s)
         };
-        worst = worst.max((target.pose[0] - x).abs()).max((target.pose[1] - y).abs());
+        worst = worse(worse(worst, (target.pose[0] - x).abs()), (target.pose[1] - y).abs());
     }
     println!("f64 segments against the formula: {worst:.1e} m");
     assert!(worst < 1e-18, "{worst:e}");
@@ -322,7 +322,7 @@ fn a_table_is_a_spline_and_repeats_without_a_seam() {
     let mut worst = 0.0_f64;
     for (k, target) in (1..).zip(&targets) {
         let angle = core::f64::consts::TAU * f64::from(k) / 3200.0;
-        worst = worst.max((target.pose[0] - 5e-6 * angle.cos()).abs());
+        worst = worse(worst, (target.pose[0] - 5e-6 * angle.cos()).abs());
         assert!((target.pose[1] - 5e-6 * angle.sin()).abs() <= 1.05 * expected);
     }
     assert!(worst <= 1.05 * expected && worst > 0.5 * expected, "{worst:e} {expected:e}");
