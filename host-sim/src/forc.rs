@@ -8,6 +8,9 @@ use std::fmt::Write;
 use crate::noise::Gauge;
 use crate::plant::{Plant, steps_within};
 
+/// The comment that marks a record as simulated; `specgen_identify::SIMULATED` is the same, and a test holds the two together.
+pub const SIMULATED: &str = "# simulated by specgen: no leg was measured";
+
 /// How the curves are driven and sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReversalExperiment {
@@ -118,11 +121,11 @@ pub struct ReversalRecord {
 }
 
 impl ReversalRecord {
-    /// CSV with the columns `time_s,drive_V,displacement_um`: 1e-8 s, 1e-5 V and 1e-5 µm, which is a tenth of the
+    /// CSV with the columns `time_s,drive_V,displacement_um`, and a comment below their names that says that no leg was measured. 1e-8 s, 1e-5 V and 1e-5 µm, which is a tenth of the
     /// smallest noise here; grid nodes of N = 32 over 100 V are exact.
     #[must_use]
     pub fn to_csv(&self) -> String {
-        let mut out = String::from("time_s,drive_V,displacement_um\n");
+        let mut out = format!("time_s,drive_V,displacement_um\n{SIMULATED}\n");
         for row in &self.rows {
             let (time, drive) = (trimmed(row.time, 8), trimmed(row.drive, 6));
             // Writing to a String cannot fail.
@@ -199,6 +202,7 @@ mod tests {
         assert!(csv.len() < 300_000, "{}", csv.len());
         let mut lines = csv.lines();
         assert_eq!(lines.next(), Some("time_s,drive_V,displacement_um"));
+        assert_eq!(lines.next(), Some(SIMULATED));
         for (line, row) in lines.zip(&record.rows) {
             let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
             assert!((cells[0] - row.time).abs() < 1e-8);

@@ -111,7 +111,7 @@ fn items(key: &Key) -> Vec<Item> {
         Shape::List(items) | Shape::Leading(_, items) => items.to_vec(),
         // Of the first row; the rows are alike.
         Shape::Rows(_, items) => items.to_vec(),
-        Shape::Records | Shape::Reasons => Vec::new(),
+        Shape::Records | Shape::Reasons | Shape::Paths => Vec::new(),
     }
 }
 
@@ -120,7 +120,9 @@ fn item_path(key: &Key, path: &str, index: usize) -> String {
     match key.shape {
         Shape::One(_) => path.to_owned(),
         Shape::Rows(..) => format!("{path}[0][{index}]"),
-        Shape::List(_) | Shape::Leading(..) | Shape::Records | Shape::Reasons => format!("{path}[{index}]"),
+        Shape::List(_) | Shape::Leading(..) | Shape::Records | Shape::Reasons | Shape::Paths => {
+            format!("{path}[{index}]")
+        }
     }
 }
 
@@ -128,7 +130,7 @@ fn item_path(key: &Key, path: &str, index: usize) -> String {
 fn line_with(key: &Key, index: usize, literal: &str) -> String {
     match key.shape {
         Shape::One(_) => format!("{} = {literal}\n", key.name),
-        Shape::List(_) | Shape::Records | Shape::Reasons => {
+        Shape::List(_) | Shape::Records | Shape::Reasons | Shape::Paths => {
             let inner = key.example.trim_matches(['[', ']']);
             let mut values: Vec<&str> = inner.split(", ").collect();
             values[index] = literal;

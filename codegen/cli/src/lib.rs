@@ -8,7 +8,7 @@
 pub mod cli;
 
 pub use specgen_compiler::{
-    compile, emit, ir, lint, lower, precision, reach, requirements, settings, stability, workspace,
+    assumed, compile, emit, ir, lint, lower, precision, reach, requirements, rest, settings, stability, workspace,
 };
 pub use specgen_identify::{self as identify, everett, waveform};
 pub use specgen_language::{diagnostic, files, interrupt, lock, model, shell, spec};

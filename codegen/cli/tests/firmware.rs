@@ -74,6 +74,7 @@ fn an_image_is_built_checked_weighed_and_only_flashed_if_it_passes() {
     let digest = made["digest"].as_str().unwrap();
     let identity = format!("made by specgen {}, platform legs, f64, spec {digest}", env!("CARGO_PKG_VERSION"));
     assert!(size.stdout.contains(&identity), "{}", size.stdout);
+    assert!(size.stdout.contains("  assumed: geometry.base_radius, "), "{}", size.stdout);
     let (_, weighed) = json(&folder, &["size", image]);
     assert_eq!(weighed["result"]["size"], made["size"]);
     assert_eq!(weighed["result"]["checks"], made["checks"]);
@@ -93,7 +94,8 @@ fn flashing(folder: &Folder, image: &str) {
     let flash = |path: &OsString, arguments: &[&str]| {
         Run::of(folder.command().env("PATH", path).args(["flash", image]).args(arguments))
     };
-    let board = ["--target", "stm32h743", "--yes"];
+    let unasked = ["--target", "stm32h743", "--yes"];
+    let board = ["--target", "stm32h743", "--yes", "--assumed-ok"];
     let commands = [format!("download --chip STM32H743ZITx --verify {image}"), "reset --chip STM32H743ZITx".to_owned()];
     // Nothing to flash with: what is missing, and the exact commands.
     let bare = without_probe_rs();
@@ -103,7 +105,10 @@ fn flashing(folder: &Folder, image: &str) {
     let path = fake_probe_rs(folder, 0);
     let asked = || fs::read_to_string(folder.path("asked.txt")).unwrap_or_default();
     // Nobody says that the amplifiers are off; no board is named; the emulated machine is none.
-    flash(&path, &["--target", "stm32h743"]).says(2, &["switch the amplifiers off", "--yes"]);
+    flash(&path, &["--target", "stm32h743", "--assumed-ok"]).says(2, &["switch the amplifiers off", "--yes"]);
+    // The image knows what its spec assumed, and that its record was simulated.
+    let known = ["E0348", "geometry.base_radius, ", "records/reference-forc.csv (simulated)", "nothing was flashed"];
+    flash(&path, &unasked).says(1, &known);
     flash(&path, &["--yes"]).says(2, &["name it by --target"]);
     flash(&path, &["--yes", "--target", "qemu"]).says(2, &["name it by --target"]);
     // A core without double precision: the image computes in f64 with an FPU that the board does not have, which the

@@ -1,6 +1,7 @@
 //! The command and the compiler as a user meets them, in one binary: a module for each subject.
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
+mod assumed;
 #[path = "../../../tests/tests/board_support/mod.rs"]
 mod board_support;
 mod build_cache;

@@ -172,6 +172,7 @@ fn a_record_of_a_leg_of_a_spec_has_its_stroke_its_voltages_and_its_noise() {
     let rows: Vec<[f64; 3]> = record
         .lines()
         .skip(1)
+        .filter(|line| !line.starts_with('#'))
         .map(|line| {
             let mut cells = line.split(',').map(|cell| cell.parse().unwrap());
             std::array::from_fn(|_| cells.next().unwrap())

@@ -97,13 +97,17 @@ fn the_report_of_six_legs_is_one_small_page_that_begins_with_the_verdict() {
     assert_eq!(document.code, 0, "{:#}", document.value);
     let result = &document.value["result"];
     let page = folder.read("page.html");
-    assert_eq!((&result["bytes"], &result["verdict"]), (&page.len().into(), &"Ready, not measured".into()));
+    assert_eq!(
+        (&result["bytes"], &result["verdict"]),
+        (&page.len().into(), &"Ready, not measured, on assumptions".into())
+    );
     assert!(page.len() < LARGEST, "{} bytes", page.len());
     in_order(
         &page,
         &[
             "id=\"verdict\"",
-            "Ready, not measured",
+            "Ready, not measured, on assumptions",
+            "10 assumed values, simulated leg record",
             "Reach per axis",
             "data-view=\"platform\"",
             "Findings",
@@ -126,17 +130,27 @@ fn the_report_of_six_legs_is_one_small_page_that_begins_with_the_verdict() {
 #[test]
 fn the_report_of_a_platform_judges_errors_by_their_limits() {
     let folder = Folder::new();
-    let limits = "[[requirements.tracking]]\ntrajectory = \"case-1\"\ntranslation = \"50 nm\"\n\n[[requirements.tracking]]\ntrajectory = \"case-2\"\nfrequency = \"10 Hz\"\naxes = [\"1 nm\", \"1 um\", \"1 um\", \"1 mrad\", \"1 mrad\", \"1 mrad\"]\n\n[target]\n";
+    let limits = "[requirements]\nrotation_noise = \"20 nrad\"\n\n[[requirements.tracking]]\ntrajectory = \"case-1\"\ntranslation = \"50 nm\"\n\n[[requirements.tracking]]\ntrajectory = \"case-2\"\nfrequency = \"10 Hz\"\naxes = [\"1 nm\", \"1 um\", \"1 um\", \"1 mrad\", \"1 mrad\", \"1 mrad\"]\n\n[target]\n";
     let spec = folder.read("reference.toml");
     folder.write("limited.toml", spec.replace("[target]\n", limits));
     let checked = folder.run(&["check", "limited.toml"]);
-    assert_eq!(checked.code, 0, "{}", checked.stderr);
-    in_order(&checked.stdout, &["reference is good so far", "2 limits, not simulated here: specgen report"]);
+    assert_eq!(checked.code, 1, "{}", checked.stderr);
+    in_order(
+        &checked.stdout,
+        &["reference is NOT ready: noise θx/θy/θz 26.9/", "2 limits, not simulated here: specgen report"],
+    );
     let run = folder.run(&["report", "limited.toml", "--no-target", "-o", "limited.html"]);
-    run.says(1, &["reference is NOT ready: case-2 10 Hz x"]);
-    assert!(run.stdout.starts_with("Not safe to build: error above its limit\n"), "{}", run.stdout);
+    run.says(1, &["E0347", "reference is NOT ready: noise θx/θy/θz 26.9/26.9/22.4 > 20/20/20 nrad, case-2 10 Hz x"]);
+    assert!(run.stdout.starts_with("Not safe to build: noise of θx\n"), "{}", run.stdout);
     let page = folder.read("limited.html");
-    in_order(&page, &["Not safe to build", "Error of case-2 10 Hz x", "requirements.tracking", "<table>"]);
+    in_order(
+        &page,
+        &["Not safe to build", "requirements.rotation_noise", "Error of case-2 10 Hz x", "requirements.tracking"],
+    );
+    in_order(
+        &page,
+        &["13 assumed values, simulated leg record", "noise at rest in θx", "<table>", "nobody measured 13"],
+    );
     let table = page.split("<caption>Errors on trajectories, rms</caption>").nth(1).unwrap();
     for (name, word) in [
         ("case-1 1 Hz xyz", "holds"),

@@ -3,13 +3,15 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use crate::assumed::Assumptions;
 use crate::demand;
 use crate::emit;
 use crate::ir::Ir;
 use crate::lint::{self, paths::PathDemand};
 use crate::lower::setpoint::{self, Stopping};
-use crate::lower::{self, PoseNoise};
+use crate::lower::{self, Origin, PoseNoise};
 use crate::reach::{self, Reach};
+use crate::rest::{self, RestNoise};
 use crate::stability::platform::{Design, RestDynamics};
 use crate::stability::{self, Margins};
 use crate::{requirements, workspace};
@@ -40,6 +42,10 @@ pub struct Compiled {
     pub stops: Vec<Stopping>,
     /// Noise of the measured pose, with gauges that see the platform.
     pub pose_noise: Option<PoseNoise>,
+    /// Noise of the pose at rest, as the gauges show it.
+    pub rest_noise: RestNoise,
+    /// What all of it rests on that nobody measured.
+    pub assumptions: Assumptions,
     /// Every constant of the controller.
     pub ir: Ir,
     /// Files of the workspace: path, text.
@@ -55,6 +61,15 @@ pub struct Refused {
     pub source: Option<SpecSource>,
     /// All findings of the run.
     pub findings: Vec<Diagnostic>,
+}
+
+impl Compiled {
+    /// What of the requirements the spec misses although it compiles: errors that whoever judges the spec shows. A simulation runs all the
+    /// same.
+    #[must_use]
+    pub fn missed(&self) -> Vec<Diagnostic> {
+        rest::check(&self.model, &self.rest_noise)
+    }
 }
 
 /// Everything short of writing: reads, checks, identifies, lowers, emits.
@@ -98,8 +113,11 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compile
 
     let digest = lower::digest(&source.text, records.texts.iter().chain(&setpoints.texts));
     let task = design.as_ref().zip(setpoints.setpoints);
-    let ir = accepted(lower::lower(&model, task, &records.tables, &records.rate_tables, &digest), findings)?;
+    let assumptions = Assumptions::of(&model, records.simulated);
+    let origin = Origin { digest: &digest, assumed: assumptions.list() };
+    let ir = accepted(lower::lower(&model, task, &records.tables, &records.rate_tables, origin), findings)?;
     let pose_noise = accepted(lower::pose_noise(&model), findings)?;
+    let rest_noise = accepted(rest::noise(&model, design.as_ref()), findings)?;
     // With the program of the spec's board, if it has one.
     let target = Target::of(model.target.mcu);
     let files = workspace::files_with(&ir, &emit::emit(&ir), &[target.folder]);
@@ -116,6 +134,8 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compile
         demands: demand.paths,
         stops: demand.stops,
         pose_noise,
+        rest_noise,
+        assumptions,
         ir,
         files,
         findings: Vec::new(),

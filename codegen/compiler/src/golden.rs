@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
+use crate::assumed::Assumptions;
 use crate::compile::check_stability;
 use crate::ir::Ir;
-use crate::lower::setpoint;
-use crate::{demand, lint, lower, reach, requirements};
+use crate::lower::{Origin, setpoint};
+use crate::{demand, lint, lower, reach, requirements, rest};
 use specgen_identify::everett::EverettTable;
 use specgen_identify::waveform::{self, Waveform};
 use specgen_language::diagnostic::{Diagnostic, Place, Severity};
@@ -212,10 +213,16 @@ fn build(source: &SpecSource, table_of_poses: Option<&str>) -> Result<Built, Vec
         }
         _ => Vec::new(),
     };
+    let rest = rest::noise(&model, design.as_ref());
     let task = design.as_ref().zip(setpoints);
-    let lowered = lower::lower(&model, task, &tables, &rate_tables, "digest").map_err(|found| findings.extend(found));
+    let origin = Origin { digest: "digest", assumed: Assumptions::of(&model, Vec::new()).list() };
+    let lowered = lower::lower(&model, task, &tables, &rate_tables, origin).map_err(|found| findings.extend(found));
     let Ok(ir) = lowered else { return Err(findings) };
     figures["noise"] = json!(format!("{:?}", lower::pose_noise(&model)));
+    if let Ok(rest) = &rest {
+        findings.extend(rest::check(&model, rest));
+    }
+    figures["rest"] = json!(format!("{rest:?}"));
     Ok(Built { ir, figures, findings })
 }
 

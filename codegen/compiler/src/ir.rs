@@ -63,6 +63,8 @@ pub struct Ir {
     pub name: String,
     /// SHA-256 of spec and records, hex.
     pub digest: String,
+    /// What nobody measured: paths of the spec, and simulated files.
+    pub assumed: Vec<String>,
     /// Version of the compiler.
     pub specgen_version: String,
     /// Arithmetic.

@@ -4,6 +4,7 @@
 //! model → lint, stability, requirements, demand (findings) → lower → ir (every constant) → emit (text) → workspace (folder)
 //! ```
 
+pub mod assumed;
 pub mod compile;
 pub mod demand;
 pub mod emit;
@@ -16,6 +17,7 @@ pub mod lower;
 pub mod precision;
 pub mod reach;
 pub mod requirements;
+pub mod rest;
 pub mod settings;
 pub mod stability;
 pub mod workspace;

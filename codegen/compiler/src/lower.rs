@@ -22,7 +22,7 @@ pub(crate) use integrity::digest;
 pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
 pub use load::describe as describe_load;
 pub(crate) use sensing::seen;
-pub use sensing::{PoseNoise, pose_noise};
+pub use sensing::{PoseNoise, pose_noise, poses_per_reading, reading_noise};
 
 use crate::ir::{
     Bounds, Defaults, Hysteresis, Ir, Law, Load, PlatformDefaults, Scalar, Sensing, Setpoint, Setpoints, TaskSpace,
@@ -36,11 +36,20 @@ use specgen_runtime::Motion;
 /// Beyond this many strokes a leg set-point is a mistake, not a demand to saturate on.
 const LEG_SETPOINT_STROKES: f64 = 2.0;
 
+/// Where a controller comes from.
+#[derive(Debug, Clone)]
+pub struct Origin<'a> {
+    /// Hex digest of spec and records.
+    pub digest: &'a str,
+    /// What nobody measured, see [`Assumptions::list`](crate::assumed::Assumptions::list).
+    pub assumed: Vec<String>,
+}
+
 /// Computes every constant of the controller.
 ///
 /// `task` is the tuning of a controller in task space and its set-points ([`setpoint::lower`]), none for six legs with their own
 /// gauges; `tables` holds one Everett table for all legs or one for each, `rate_tables` those of the second weight of (6), if the
-/// spec names any; `digest` is the hex digest of spec and records.
+/// spec names any. Nothing of `origin` changes the law.
 ///
 /// # Errors
 /// Findings about values that cannot be turned into a controller (a converter too coarse
@@ -50,7 +59,7 @@ pub fn lower(
     task: Option<(&Design, Setpoints)>,
     tables: &[EverettTable],
     rate_tables: &[EverettTable],
-    digest: &str,
+    origin: Origin<'_>,
 ) -> Result<Ir, Vec<Diagnostic>> {
     let scalar = scalar(model);
     let hysteresis = hysteresis(model, tables, rate_tables, scalar);
@@ -83,7 +92,7 @@ pub fn lower(
         _ => None,
     };
     let integrity = integrity::lower(
-        integrity::identity(&model.name, digest, scalar),
+        integrity::identity(&model.name, &origin, scalar),
         scalar,
         &hysteresis,
         &actuation,
@@ -97,7 +106,8 @@ pub fn lower(
     let gauge_converter = gauge_converter::lower(model, task_space.as_ref().map(|task| &task.sensing), scalar);
     Ok(Ir {
         name: model.name.clone(),
-        digest: digest.to_owned(),
+        digest: origin.digest.to_owned(),
+        assumed: origin.assumed,
         specgen_version: env!("CARGO_PKG_VERSION").to_owned(),
         scalar,
         kinematics: kinematics::lower(model, scalar)?,

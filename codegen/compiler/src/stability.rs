@@ -16,7 +16,7 @@ use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::{Adaptation, AdaptationMode, Model};
 
 pub use phase::phase_margin;
-pub use sampled::{LegDynamics, spectral_radius, transition};
+pub use sampled::{LegDynamics, shown_at_rest, spectral_radius, transition};
 pub use specgen_numerics::{ewma_limit, pcc_limit};
 
 /// A radius above this is refused. The limit is 1; a small weight rightly has a radius just below it, so what is kept

@@ -13,7 +13,7 @@ pub(crate) mod names;
 use std::io::Read;
 
 use super::findings::Findings;
-use dialect::{decoded, is_blank, is_comment, split};
+use dialect::{decoded, is_blank, is_comment, is_mark, split};
 use input::Input;
 use specgen_language::diagnostic::{Code, codes};
 use specgen_language::interrupt;
@@ -79,7 +79,36 @@ pub(crate) struct Lines<'a> {
     separator: u8,
     /// Decimal sign of the file, once a number has one.
     decimal: Option<char>,
+    /// Whether a line above said that the file is simulated.
+    simulated: bool,
     input: Input<'a>,
+}
+
+/// The samples of a file.
+pub(crate) struct Samples {
+    /// Line of each.
+    pub(crate) lines: LineNumbers,
+    /// The columns that were wanted; NaN after the problem with a value was reported.
+    pub(crate) columns: Vec<Vec<f64>>,
+    /// Whether a comment marks the file as simulated.
+    pub(crate) simulated: bool,
+}
+
+/// What a simulation writes below the names of the columns of its record: the names stay in the first line, where programs look for
+/// them, and the mark stays with the file wherever it is copied. A measured record that takes its place has none.
+pub const SIMULATED: &str = "# simulated by specgen: no leg was measured";
+
+/// Whether the text of a data file is marked as simulated: by a comment whose first word is `simulated`.
+#[must_use]
+pub fn is_simulated(text: &str) -> bool {
+    text.lines().any(|line| is_mark(line.as_bytes()))
+}
+
+/// The text of a table or record with the mark below its first line.
+#[must_use]
+pub fn marked_as_simulated(text: &str) -> String {
+    let (names, rest) = text.split_once('\n').unwrap_or((text, ""));
+    format!("{names}\n{SIMULATED}\n{rest}")
 }
 
 /// Reads the header; `None` after the problem was reported.
@@ -112,14 +141,15 @@ pub(crate) fn open<'a>(
             return None;
         }
         let header = Header { names: Vec::new(), line: 1, interval: None };
-        return Some((header, Lines { format, names: 0, separator: b',', decimal: None, input }));
+        let nothing = Lines { format, names: 0, separator: b',', decimal: None, simulated: false, input };
+        return Some((header, nothing));
     };
-    lines.drain(..found.next);
+    let simulated = lines.drain(..found.next).any(|(_, line)| is_mark(&line));
     if format.preamble && check_decimal_commas(&found, &lines, format, findings) {
         return None;
     }
     input.put_back(lines);
-    let lines = Lines { format, names: found.names.len(), separator: found.separator, decimal: None, input };
+    let lines = Lines { format, names: found.names.len(), separator: found.separator, decimal: None, simulated, input };
     Some((Header { names: found.names, line: found.line, interval: found.interval }, lines))
 }
 
@@ -166,8 +196,8 @@ fn check_decimal_commas(
 }
 
 impl Lines<'_> {
-    /// Line numbers, and the values of the columns `wanted`; NaN after the problem with a value was reported.
-    pub(crate) fn read(mut self, wanted: &[Column], findings: &mut Findings) -> (LineNumbers, Vec<Vec<f64>>) {
+    /// The columns `wanted`.
+    pub(crate) fn read(mut self, wanted: &[Column], findings: &mut Findings) -> Samples {
         let mut lines = LineNumbers::default();
         let mut columns = vec![Vec::new(); wanted.len()];
         let mut text = Vec::new();
@@ -182,6 +212,7 @@ impl Lines<'_> {
                 }
             };
             if is_blank(&text) || is_comment(&text) {
+                self.simulated |= is_mark(&text);
                 continue;
             }
             if lines.len() == MAX_SAMPLES {
@@ -210,7 +241,7 @@ impl Lines<'_> {
                 findings.add(self.format.value, Some(line), message, help);
             }
         }
-        (lines, columns)
+        Samples { lines, columns, simulated: self.simulated }
     }
 
     fn finite(&self, field: &[u8]) -> Option<f64> {

@@ -6,7 +6,7 @@ use crate::everett::EverettTable;
 use crate::mode::Mode;
 use crate::rate::period::{INVERTED, Invertible};
 use crate::rate::{CreepTerm, Inertia, RateModel};
-use crate::{Options, Report, identify, is_table_csv, parse_record, rate, read_file, read_table_csv};
+use crate::{Options, Report, identify, is_simulated, is_table_csv, parse_record, rate, read_file, read_table_csv};
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen_language::model::{Model, RateDependence};
 
@@ -23,6 +23,8 @@ pub struct Declared {
     pub rate_tables: Vec<EverettTable>,
     /// How each record was identified; none for one that is a table already.
     pub reports: Vec<Option<Report>>,
+    /// Files among records and rate tables that are marked as simulated, in their order.
+    pub simulated: Vec<String>,
     /// Warnings, none of which refuses anything.
     pub warnings: Vec<Diagnostic>,
     /// Name and text of each file that was read.
@@ -103,7 +105,7 @@ impl Declared {
         };
         let scale = of_right_scale(model, name, &table);
         self.tables.push(table);
-        self.texts.push((name.to_owned(), text));
+        self.keep(name, text);
         scale
     }
 
@@ -111,8 +113,15 @@ impl Declared {
         let table = rate::read_rate_csv(&text, name)?;
         fits_spec(model, name, &table, codes::RATE_TABLE_MISMATCH, "hysteresis.rate_tables")?;
         self.rate_tables.push(table);
-        self.texts.push((name.to_owned(), text));
+        self.keep(name, text);
         Ok(())
+    }
+
+    fn keep(&mut self, name: &str, text: String) {
+        if is_simulated(&text) {
+            self.simulated.push(name.to_owned());
+        }
+        self.texts.push((name.to_owned(), text));
     }
 }
 

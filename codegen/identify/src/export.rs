@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::columns::{self, Column, Format, LineNumbers};
+use super::columns::{self, Column, Format, LineNumbers, Samples};
 use super::findings::Findings;
 use crate::everett::EverettTable;
 use specgen_language::diagnostic::{Code, Diagnostic, codes};
@@ -72,7 +72,7 @@ pub(crate) fn read_nodes(
         preamble: false,
     };
     let (_, lines) = columns::open(text.as_bytes(), &format, findings)?;
-    let (lines, values) = lines.read(&[0, 1, 2].map(|at| Column::plain(at, "")), findings);
+    let Samples { lines, columns: values, .. } = lines.read(&[0, 1, 2].map(|at| Column::plain(at, "")), findings);
     let [ups, downs, values] = <[Vec<f64>; 3]>::try_from(values).ok()?;
     let nodes: Vec<f64> = values.iter().map(|value| value * 1e-6).collect();
     for (line, _) in lines.iter().zip(&nodes).filter(|(_, node)| node.abs() > largest) {

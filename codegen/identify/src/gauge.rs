@@ -15,6 +15,8 @@ use specgen_language::diagnostic::{Diagnostic, codes};
 pub struct GaugeReport {
     /// Name of the record.
     pub record: String,
+    /// Whether a comment in it marks it as simulated.
+    pub simulated: bool,
     /// Samples of the record.
     pub samples: usize,
     /// Degree of the polynomial, 1 to 5.
@@ -186,6 +188,7 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
     glitches(signals, &found.residual, findings);
     Some(GaugeReport {
         record: signals.shown_as.clone(),
+        simulated: signals.simulated,
         samples: volts.len(),
         degree,
         held_out_rms: held_out.iter().map(|folds| root_mean(folds)).collect(),

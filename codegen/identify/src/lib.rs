@@ -59,6 +59,7 @@ use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_numerics::nnls;
 
 pub use cause::{Cause, Source};
+pub use columns::{SIMULATED, is_simulated, marked_as_simulated};
 pub use coverage::Region;
 pub use export::{is_table_csv, read_table_csv, write_table_csv};
 pub use file::{MAX_FILE_BYTES, read_file};
@@ -183,6 +184,7 @@ fn identify_checked(
     let cause = residual.cause(record, used.first, noise_floor, gain);
     let report = Report {
         record: record.shown_as.clone(),
+        simulated: record.simulated,
         grid: plane.grid,
         samples: record.time.len(),
         samples_skipped: used.first,

@@ -15,6 +15,8 @@ use specgen_numerics::{ewma_limit, pcc_limit};
 pub struct Relation {
     /// Name of the record.
     pub record: String,
+    /// Whether a comment in it marks it as simulated.
+    pub simulated: bool,
     /// Frequency of the cycles, Hz.
     pub frequency: f64,
     /// Whether the frequency was found in the record (or given).
@@ -194,6 +196,7 @@ fn line(
     let loop_width = widest(record, first, end, found.coefficients[1]);
     Some(Relation {
         record: record.shown_as.clone(),
+        simulated: record.simulated,
         frequency,
         frequency_detected: detected,
         cycles: starts.len() - 1,

@@ -43,6 +43,8 @@ pub struct Record {
     pub displacement: Vec<f64>,
     /// Samples that no fit believes: glitches, and what follows a jump of the drive.
     pub weightless: Vec<bool>,
+    /// Whether a comment in the file marks it as simulated.
+    pub simulated: bool,
     /// Findings that refuse nothing.
     pub warnings: Vec<Diagnostic>,
 }
@@ -124,14 +126,14 @@ fn of_source(source: impl Read, reading: &Reading, mut findings: Findings) -> Re
         return Err(findings.into_diagnostics());
     };
     let shown_as = signals.shown_as.clone();
-    let monitored = signals.columns[DRIVE].is_none();
+    let (monitored, simulated) = (signals.columns[DRIVE].is_none(), signals.simulated);
     let mut take = |k: usize| signals.columns[k].take();
     let (time, drive, monitor, micrometres) = (take(0), take(1), take(2), take(3));
     let (time, drive) = (time.unwrap_or_default(), drive.or(monitor).unwrap_or_default());
     let mut displacement = micrometres.unwrap_or_default();
     displacement.iter_mut().for_each(|y| *y *= 1e-6);
     let record = finish(findings, &shown_as, &signals.lines, [time, drive, displacement])?;
-    Ok(Record { monitored, ..record })
+    Ok(Record { monitored, simulated, ..record })
 }
 
 /// Longest interval for which a converter is believed to hold a command, s: a record sampled more slowly leaves commands out.
@@ -160,7 +162,8 @@ fn finish(
     let [time, drive, displacement] = columns;
     let weightless = distrust::weightless(lines, &time, &drive, &displacement, &mut findings);
     let warnings = findings.into_diagnostics();
-    Ok(Record { shown_as: shown_as.to_owned(), time, drive, monitored: false, displacement, weightless, warnings })
+    let shown_as = shown_as.to_owned();
+    Ok(Record { shown_as, time, drive, monitored: false, displacement, weightless, simulated: false, warnings })
 }
 
 #[cfg(test)]

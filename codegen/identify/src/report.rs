@@ -21,6 +21,8 @@ pub enum Branches {
 pub struct Report {
     /// Name of the record.
     pub record: String,
+    /// Whether a comment in it marks it as simulated.
+    pub simulated: bool,
     /// Intervals per axis of the table.
     pub grid: usize,
     /// Samples in the record.

@@ -28,6 +28,8 @@ pub use welch::Bin;
 pub struct ResponseReport {
     /// Name of the record.
     pub record: String,
+    /// Whether a comment in it marks it as simulated.
+    pub simulated: bool,
     /// Samples per second.
     pub rate: f64,
     /// Samples in a segment.
@@ -189,6 +191,7 @@ fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings)
     let mut coherence: Vec<f64> = used.iter().map(|b| b.coherence).collect();
     Some(ResponseReport {
         record: signals.shown_as.clone(),
+        simulated: signals.simulated,
         rate,
         segment,
         segments: averages,

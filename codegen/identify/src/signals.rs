@@ -5,7 +5,7 @@ mod places;
 use std::io::Read;
 use std::path::Path;
 
-use super::columns::{self, Column, LineNumbers, RECORD};
+use super::columns::{self, Column, LineNumbers, RECORD, Samples};
 use super::file::open_file;
 use super::findings::Findings;
 use super::reading::Reading;
@@ -30,6 +30,8 @@ pub(crate) struct Signals {
     pub(crate) lines: LineNumbers,
     /// Values; none for a column that the file does not have.
     pub(crate) columns: Vec<Option<Vec<f64>>>,
+    /// Whether a comment marks the file as simulated.
+    pub(crate) simulated: bool,
 }
 
 pub(crate) use places::MONITOR;
@@ -86,7 +88,7 @@ pub(crate) fn columns_of(
     let (header, lines) = columns::open(source, &RECORD, findings)?;
     let places = places::find(&header, wanted, reading, findings)?;
     let there: Vec<Column> = places.columns.iter().flatten().copied().collect();
-    let (lines, values) = lines.read(&there, findings);
+    let Samples { lines, columns: values, simulated } = lines.read(&there, findings);
     let mut values = values.into_iter();
     let mut columns: Vec<Option<Vec<f64>>> =
         places.columns.iter().map(|place| place.and_then(|_| values.next())).collect();
@@ -98,7 +100,7 @@ pub(crate) fn columns_of(
             None => *time = Some((0..lines.len()).map(|k| k as f64 * interval).collect()),
         }
     }
-    Some(Signals { shown_as: findings.path().to_owned(), lines, columns })
+    Some(Signals { shown_as: findings.path().to_owned(), lines, columns, simulated })
 }
 
 impl Signals {

@@ -26,7 +26,7 @@ pub fn parse(text: &str, shown_as: &str) -> Result<Vec<State>, Vec<Diagnostic>> 
         } else if names.len() != COLUMNS {
             format!("there are {} columns, expected {COLUMNS}", names.len())
         } else {
-            let (_, columns) = lines.read(&names, &mut findings);
+            let columns = lines.read(&names, &mut findings).columns;
             let count = columns.first().map_or(0, Vec::len);
             let state = |row: usize| -> State {
                 core::array::from_fn(|part| core::array::from_fn(|axis| columns[6 * part + axis][row]))

@@ -20,6 +20,8 @@ use specgen_language::diagnostic::{Diagnostic, codes};
 pub struct StiffnessReport {
     /// Name of the record.
     pub record: String,
+    /// Whether a comment in it marks it as simulated.
+    pub simulated: bool,
     /// Samples of the record.
     pub samples: usize,
     /// Stiffness k, N/m: force over displacement without creep.
@@ -215,6 +217,7 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
     let (low, high) = extent(force);
     Some(StiffnessReport {
         record: signals.shown_as.clone(),
+        simulated: signals.simulated,
         samples: y.len(),
         stiffness,
         error,

@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use crate::columns::{self, Format, Header};
+use crate::columns::{self, Format, Header, Samples};
 use crate::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
@@ -69,7 +69,7 @@ fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) 
     let columns = meanings(&header, findings)?;
     let all: Vec<columns::Column> =
         header.names.iter().enumerate().map(|(at, name)| columns::Column::plain(at, name)).collect();
-    let (lines, values) = lines.read(&all, findings);
+    let Samples { lines, columns: values, .. } = lines.read(&all, findings);
     let lines: Vec<usize> = lines.iter().collect();
     let mut rows = vec![[0.0; 6]; lines.len()];
     for (column, values) in columns.iter().zip(&values) {

@@ -73,6 +73,8 @@ pub enum Shape {
     Records,
     /// An array of texts `KEY: REASON`, each about a key of the spec.
     Reasons,
+    /// An array of texts, each the path of a key of the spec.
+    Paths,
 }
 
 /// A single value.

@@ -89,6 +89,15 @@ const START: Section = Section {
             aliases: &[],
             example: r#""reference""#,
         },
+        Key {
+            name: "assumed",
+            shape: Shape::Paths,
+            presence: Presence::Default("[]"),
+            doc: "Values of this spec that nobody gave or measured, each by the path of its key; a repeated section such as `gauge` stands for all of its tables. The verdict counts them, and a real board or card takes the controller with `--assumed-ok` only. Take an entry out once its value is measured or known. Nothing of it changes the law.",
+            symbol: "",
+            aliases: &["assumptions", "guessed", "estimated", "unmeasured"],
+            example: r#"["sensor.noise"]"#,
+        },
     ],
 };
 
@@ -97,6 +106,9 @@ const START: Section = Section {
 pub struct Model {
     /// Name of the platform: ASCII letters, digits, `-` and `_`.
     pub name: String,
+    /// Paths of keys and repeated sections whose values nobody gave or measured, in the order of the spec; each names a value that
+    /// the spec has, and no two name the same.
+    pub assumed: Vec<String>,
     /// (1), (2), (AI.2)–(AI.4).
     pub geometry: Geometry,
     /// The moving platform, Table 4.
@@ -144,6 +156,7 @@ impl Model {
         let task_space = if controlled { Some(TaskSpace::read(fields, "control")?) } else { None };
         Some(Self {
             name: Value::read(fields, "name")?,
+            assumed: Value::read(fields, "assumed")?,
             geometry: Geometry::read(fields, "geometry")?,
             platform: RigidBody::read(fields, "platform")?,
             leg: LegBody::read(fields, "leg")?,

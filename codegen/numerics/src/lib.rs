@@ -14,12 +14,14 @@
 //! | [`nnls`] | non-negative least squares: the weights of a hysteresis table |
 //! | [`largest`], [`simplex`] | where a condition ceases to hold, by bisection; where a cost is least |
 //! | [`Resolvent`] | what a sampled system answers at each frequency |
+//! | [`steady_covariances`] | what white noise makes of the states of a sampled system |
 //! | [`nyquist`] | sensitivity and stability of a loop of one signal |
 //! | [`Kernels`], [`displacements`], [`jacobian`], [`leg_forces`], [`pivot_ratio`] | the controller's kernels on these numbers, compiled here |
 //!
 //! A crate of its own because it is optimised for speed, which the rest of the compiler is not.
 
 mod cholesky;
+mod covariance;
 mod double;
 mod eigenvalues;
 mod exponential;
@@ -37,6 +39,7 @@ mod taylor;
 mod traced;
 
 pub use cholesky::Factor;
+pub use covariance::steady_covariances;
 pub use double::Double;
 pub use eigenvalues::{eigenvalues, spectral_radius};
 pub use exponential::exponential;

@@ -108,6 +108,17 @@ class Compiled:
         return dict(self.checked["verdict"])
 
     @property
+    def passed(self) -> bool:
+        """Whether no figure is beyond its limit, such as the noise of the pose at rest."""
+        return self.checked.passed
+
+    @property
+    def assumed(self) -> list[str]:
+        """What nobody measured: paths of the spec's values, and files of simulated records."""
+        assumed = self.verdict["assumed"]
+        return [*assumed["values"], *assumed["simulated"]]
+
+    @property
     def margins(self) -> list[dict[str, Any]]:
         """Stability: of the closed loops over the platform's modes, law by law; of six legs with their own gauges, the one of the spec."""
         design = self.design

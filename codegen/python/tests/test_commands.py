@@ -18,6 +18,7 @@ def test_a_spec_that_compiles_says_all_that_the_command_says() -> None:
     assert [finding.code for finding in compiled.findings] == [one["code"] for one in document["findings"]]
     assert compiled.margins == document["result"]["design"]["margins"]
     assert compiled.constants == command("dump-ir", REFERENCE)["result"]
+    assert len(compiled.assumed) == 14 and compiled.assumed[-1] == "records/reference-forc.csv" and compiled.passed
     assert specgen.compile(LEGS).margins == [command("check", LEGS)["result"]["margins"]]
 
 

@@ -85,6 +85,15 @@ fn reach_card(compiled: &Compiled, verdict: &Verdict) -> String {
     }
     let noise = verdict.figures.iter().filter(|figure| figure.subject == Subject::Noise && figure.name == "step");
     content += &noise.map(|figure| limit_row("resolution", figure)).collect::<String>();
+    // Of the axes that have a limit, the one that takes most of it; without limits, x.
+    let at_rest = verdict
+        .figures
+        .iter()
+        .filter(|figure| figure.subject == Subject::Noise && AXES.contains(&figure.name.as_str()));
+    let used = |figure: &Figure| share(figure).unwrap_or_default();
+    let worst = at_rest.reduce(|a, b| if used(b) > used(a) { b } else { a });
+    content +=
+        &worst.map_or_else(String::new, |figure| limit_row(&format!("noise at rest in {}", figure.name), figure));
     let note =
         if compiled.design.is_some() { "asked of available, line: limit" } else { "from the middle of the strokes" };
     card("Reach per axis", note, "", &content)

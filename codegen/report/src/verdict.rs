@@ -154,7 +154,7 @@ pub struct Sentence {
     pub verdict: String,
     /// Number, limit, consequence.
     pub why: String,
-    /// `ok`, `none` or `error`.
+    /// `ok`, `warning`, `none` or `error`.
     pub mark: &'static str,
 }
 
@@ -171,16 +171,26 @@ impl Sentence {
         });
         let errors = verdict.figures.iter().any(|figure| figure.subject == Subject::Tracking && figure.limit.is_some());
         let open = if errors { "" } else { " The errors on trajectories have no limit in the spec." };
+        let assumed = &verdict.assumed;
+        let resting = if assumed.is_empty() {
+            String::new()
+        } else {
+            format!(
+                " It rests on what nobody measured: {}; a real machine takes it with --assumed-ok only.",
+                assumed.summary()
+            )
+        };
+        let on = if assumed.is_empty() { "" } else { ", on assumptions" };
         match verdict.answer {
             Answer::Ready => Self {
-                verdict: "Ready to build".to_owned(),
-                why: format!("All {within} limits hold.{tight}{open}"),
-                mark: "ok",
+                verdict: format!("Ready to build{on}"),
+                why: format!("All {within} limits hold.{tight}{open}{resting}"),
+                mark: if assumed.is_empty() { "ok" } else { "warning" },
             },
             Answer::NotMeasured => Self {
-                verdict: "Ready, not measured".to_owned(),
+                verdict: format!("Ready, not measured{on}"),
                 why: format!(
-                    "All {within} limits looked at hold.{tight} Time, memory and bits: {}.",
+                    "All {within} limits looked at hold.{tight} Time, memory and bits: {}.{resting}",
                     verdict.unmeasured.as_deref().unwrap_or("not measured")
                 ),
                 mark: "none",
@@ -206,7 +216,7 @@ impl Sentence {
                 });
                 Self {
                     verdict: format!("Not safe to build: {first}"),
-                    why: why.map(|text| capital(&text)).collect::<Vec<_>>().join(" "),
+                    why: why.map(|text| capital(&text)).collect::<Vec<_>>().join(" ") + &resting,
                     mark: "error",
                 }
             }
@@ -239,6 +249,7 @@ impl Sentence {
 fn said(figure: &Figure) -> String {
     match figure.subject {
         Subject::Reach => format!("reach in {}", figure.name),
+        Subject::Noise if figure.name != "step" => format!("noise of {}", figure.name),
         Subject::Margins => format!("margin of {}", figure.name),
         Subject::Tracking => format!("error of {}", figure.name),
         Subject::Bits => "bits differ".to_owned(),

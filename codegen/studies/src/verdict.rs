@@ -5,6 +5,7 @@ mod known;
 
 use serde::Serialize;
 
+use specgen_compiler::assumed::Assumptions;
 use specgen_compiler::compile::Compiled;
 use specgen_language::diagnostic::Severity;
 use specgen_toolchain::budget::{self, Used, group};
@@ -45,6 +46,9 @@ pub struct Verdict {
     pub answer: Answer,
     /// Warnings about the spec.
     pub warnings: usize,
+    /// What the figures rest on that nobody measured. It changes no answer, but a real machine takes the controller only if its user accepts
+    /// it.
+    pub assumed: Assumptions,
     /// By subject, in the order of [`Subject::ALL`].
     pub figures: Vec<Figure>,
     /// Why time, memory or bits are not measured, if they are not.
@@ -63,6 +67,7 @@ impl Verdict {
             digest: compiled.ir.digest.clone(),
             answer: Answer::NotMeasured,
             warnings,
+            assumed: compiled.assumptions.clone(),
             figures: Vec::new(),
             unmeasured: Some(unmeasured.to_owned()),
             next: Vec::new(),
@@ -146,23 +151,25 @@ impl Verdict {
         let name = &self.name;
         let kept = match self.figures.iter().filter(|figure| figure.mark == Mark::Within).count() {
             0 => "no figure has a limit".to_owned(),
-            1 => "1 figure within its limit".to_owned(),
-            many => format!("{many} figures within their limits"),
+            1 => "1 limit kept".to_owned(),
+            many => format!("{many} limits kept"),
         };
+        let record = self
+            .assumed
+            .records()
+            .map(|records| if self.assumed.simulated.len() == 1 { format!("a {records}") } else { records });
+        let on = self.assumed.count().or(record).map_or_else(String::new, |assumed| format!(" on {assumed}"));
         let warnings = match self.warnings {
             0 => String::new(),
             1 => ", 1 warning".to_owned(),
             many => format!(", {many} warnings"),
         };
         match self.answer {
-            Answer::Ready => format!("{name} is ready: {kept}{warnings}"),
-            Answer::NotMeasured => format!("{name} is good so far: {kept}{warnings}"),
+            Answer::Ready => format!("{name} is ready{on}: {kept}{warnings}"),
+            Answer::NotMeasured => format!("{name} is good so far{on}: {kept}{warnings}"),
             Answer::NotReady => {
-                let why = |one: &Figure| match one.words {
-                    Some(_) => one.subject.name().to_owned(),
-                    None => said(&[one]),
-                };
-                let why: Vec<String> = self.beyond().map(why).collect();
+                let beyond: Vec<&Figure> = self.beyond().collect();
+                let why: Vec<String> = beyond.chunk_by(together).map(why).collect();
                 format!("{name} is NOT ready: {}{warnings}", why.join(", "))
             }
         }
@@ -172,10 +179,6 @@ impl Verdict {
     #[must_use]
     pub fn line(&self, subject: Subject) -> Option<String> {
         let figures: Vec<&Figure> = self.figures.iter().filter(|figure| figure.subject == subject).collect();
-        let is_axis = |figure: &Figure| AXES.contains(&figure.name.as_str());
-        let together = |a: &&Figure, b: &&Figure| {
-            is_axis(a) && is_axis(b) && a.unit == b.unit && a.relation() == b.relation() && a.words == b.words
-        };
         let groups: Vec<&[&Figure]> = figures.chunk_by(together).collect();
         // Neighbours of one unit say it once, and so over what they were measured.
         let alike = |a: &Figure, b: &Figure| a.unit == b.unit && a.coverage == b.coverage;
@@ -191,12 +194,16 @@ impl Verdict {
         (!said.is_empty()).then(|| said.join(", "))
     }
 
-    /// At most ten lines of at most [`WIDTH`] letters: the answer, a line a subject, what comes next.
+    /// At most ten lines of at most [`WIDTH`] letters, eleven with limits on errors: the answer, a line a subject, what is assumed, what
+    /// comes next.
     #[must_use]
     pub fn text(&self) -> String {
         let mut lines = vec![self.headline()];
         let known = |subject: &Subject| self.line(*subject).map(|line| format!("  {:<9}{line}", subject.name()));
         lines.extend(Subject::ALL.iter().filter_map(known));
+        if !self.assumed.is_empty() {
+            lines.push(format!("  {:<9}{}", "assumed", self.assumed.summary().replace(" assumed value", " value")));
+        }
         if let Some(why) = &self.unmeasured {
             lines.push(format!("  {:<9}{why}", "left out"));
         }
@@ -214,6 +221,29 @@ impl Verdict {
     }
 }
 
+fn is_axis(figure: &Figure) -> bool {
+    AXES.contains(&figure.name.as_str())
+}
+
+/// Whether neighbours are coordinates that are written as one group.
+fn together(a: &&Figure, b: &&Figure) -> bool {
+    let both = is_axis(a) && is_axis(b) && a.subject == b.subject;
+    both && a.unit == b.unit && a.relation() == b.relation() && a.words == b.words
+}
+
+/// A figure beyond its limit, or coordinates that are, as the reason of an answer: `flash 68.4 > 64`, `noise x/y 6.1/5.4 > 5/5 nm`.
+fn why(group: &[&Figure]) -> String {
+    let first = group[0];
+    if first.words.is_some() {
+        return first.subject.name().to_owned();
+    }
+    if !is_axis(first) {
+        return said(group);
+    }
+    let names: Vec<&str> = group.iter().map(|figure| figure.name.as_str()).collect();
+    format!("{} {} {} {}", first.subject.name(), names.join("/"), said(group), first.unit)
+}
+
 /// A line that is too long, with dots where it is cut: all of it is in the details.
 fn cut(line: &str) -> String {
     if line.chars().count() <= WIDTH {
@@ -229,7 +259,7 @@ fn said(group: &[&Figure]) -> String {
         return words.clone();
     }
     let list = |of: &dyn Fn(&Figure) -> String| group.iter().map(|figure| of(figure)).collect::<Vec<_>>().join("/");
-    let mut text = if AXES.contains(&first.name.as_str()) { String::new() } else { format!("{} ", first.name) };
+    let mut text = if is_axis(first) { String::new() } else { format!("{} ", first.name) };
     text += &list(&Figure::value_text);
     if let Some(relation) = first.relation() {
         text += &format!(" {relation} {}", list(&Figure::limit_text));
@@ -248,6 +278,7 @@ mod tests {
             digest: String::new(),
             answer: Answer::NotMeasured,
             warnings: 1,
+            assumed: Assumptions::default(),
             figures: Vec::new(),
             unmeasured: None,
             next: vec!["specgen sim bench.toml".to_owned(), format!("specgen report {}", "x".repeat(80))],
@@ -269,7 +300,7 @@ mod tests {
         }
         assert_eq!(
             verdict.text(),
-            "bench is ready: 5 figures within their limits, 1 warning\n\
+            "bench is ready: 5 limits kept, 1 warning\n\
              \x20 reach    54.9/52.4/174 ≥ 50/50/50 µm, 421 ≥ 400 µrad\n\
              \x20 margins  delay > 5 ticks\n\
              \x20 tracking case-1 xyz 20.7, case-1 z 3.00 nm over 2.500/2.500 s, line 78.6 nm over …\n\
@@ -286,9 +317,40 @@ mod tests {
         assert_eq!(verdict.answer, Answer::NotReady);
         assert_eq!(verdict.headline(), "bench is NOT ready: flash 68.4 > 64, 1 warning");
         assert_eq!(verdict.line(Subject::Memory).unwrap(), "flash 68.4 > 64, RAM 0.07 ≤ 0.07 KiB");
+        for (axis, value) in [("x", 6.1), ("y", 5.4), ("z", 4.0)] {
+            verdict.push(Figure::new(Subject::Noise, axis, value, "nm").at_most(5.0, "spec"));
+        }
+        assert_eq!(verdict.headline(), "bench is NOT ready: noise x/y 6.10/5.40 > 5/5 nm, flash 68.4 > 64, 1 warning");
         let more = Figure::more_than(Subject::Margins, "λ", 10.0, "");
         assert_eq!(more.clone().at_least(1.1, "spec").mark, Mark::Within);
         assert_eq!(more.at_most(20.0, "spec").mark, Mark::Beyond);
+    }
+
+    #[test]
+    fn what_nobody_measured_is_counted_in_the_headline_and_a_line() {
+        let mut verdict = empty();
+        verdict.next.clear();
+        verdict.unmeasured = None;
+        verdict.push(Figure::new(Subject::Noise, "x", 2.7, "nm").at_most(5.0, "spec"));
+        let of = |values: usize, simulated: usize| Assumptions {
+            values: vec![String::new(); values],
+            simulated: vec![String::new(); simulated],
+        };
+        for (assumed, headline, line) in [
+            (
+                of(13, 1),
+                "bench is ready on 13 assumed values: 1 limit kept, 1 warning",
+                "13 values, simulated leg record",
+            ),
+            (of(1, 0), "bench is ready on 1 assumed value: 1 limit kept, 1 warning", "1 value"),
+            (of(0, 1), "bench is ready on a simulated leg record: 1 limit kept, 1 warning", "simulated leg record"),
+            (of(0, 6), "bench is ready on 6 simulated leg records: 1 limit kept, 1 warning", "6 simulated leg records"),
+        ] {
+            verdict.assumed = assumed;
+            assert_eq!(verdict.text(), format!("{headline}\n  noise    2.70 ≤ 5 nm\n  assumed  {line}\n"));
+        }
+        verdict.assumed = Assumptions::default();
+        assert_eq!(verdict.text(), "bench is ready: 1 limit kept, 1 warning\n  noise    2.70 ≤ 5 nm\n");
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub use build::{Image, build_image, build_pil};
 pub use error::TargetError;
 pub use process::find_in_path as find_program;
 pub use replay::{ReplayResult, replay, replay_machine};
-pub use size::IDENTITY_MARK;
+pub use size::{ASSUMED_MARK, ASSUMED_SEPARATOR, IDENTITY_MARK};
 
 /// Rust's name of the compilation target of every [`Mcu`](specgen_language::model::Mcu) here.
 pub const TRIPLE: &str = "thumbv7em-none-eabihf";

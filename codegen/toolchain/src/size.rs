@@ -13,6 +13,12 @@ use std::collections::BTreeMap;
 
 /// What the line in every image begins with that says where its controller comes from.
 pub const IDENTITY_MARK: &str = "specgen-identity: ";
+/// What the line behind it begins with, which names what nobody measured; there is none where all is.
+pub const ASSUMED_MARK: &str = "assumed: ";
+/// What stands between the names.
+pub const ASSUMED_SEPARATOR: &str = ", ";
+/// Longest such line that is believed, bytes.
+const LONGEST_ASSUMED: usize = 1 << 16;
 /// Longest identity that is believed, bytes.
 const LONGEST_IDENTITY: usize = 512;
 /// Code without line information: assembly, and libraries that came compiled.
@@ -25,6 +31,8 @@ const UNNAMED: &str = "unnamed constants";
 pub struct Size {
     /// Compiler, platform and spec, as the image says; none if it was made by something else.
     pub identity: Option<String>,
+    /// What its controller rests on that nobody measured, as the image says.
+    pub assumed: Vec<String>,
     /// In the order of the image.
     pub sections: Vec<Section>,
     /// By bytes of flash, the most first.
@@ -102,7 +110,7 @@ pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
     let mut sections = Vec::new();
     let mut owners: BTreeMap<String, Owner> = BTreeMap::new();
     let mut variables: BTreeMap<String, u64> = BTreeMap::new();
-    let mut identity = None;
+    let mut found = None;
     for section in file.sections() {
         let SectionFlags::Elf { sh_flags, .. } = section.flags() else { continue };
         if sh_flags.0 & object::elf::SHF_ALLOC.0 == 0 || section.size() == 0 {
@@ -120,7 +128,7 @@ pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
             code(&debug, section.address(), end, &mut owners)?;
             continue;
         }
-        identity = identity.or(find_identity(section.data().map_err(malformed)?));
+        found = found.or(find_identity(section.data().map_err(malformed)?));
         constants(&file, section.address(), end, &mut owners);
     }
     for symbol in file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Data && symbol.size() > 0) {
@@ -134,7 +142,8 @@ pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
     owners.sort_by(|a, b| (b.flash(), &a.name).cmp(&(a.flash(), &b.name)));
     let mut variables: Vec<(String, u64)> = variables.into_iter().collect();
     variables.sort_by(|a, b| (b.1, &a.0).cmp(&(a.1, &b.0)));
-    Ok(Size { identity, sections, owners, variables })
+    let (identity, assumed) = found.map_or((None, Vec::new()), |(identity, assumed)| (Some(identity), assumed));
+    Ok(Size { identity, assumed, sections, owners, variables })
 }
 
 /// The tick of an image, if it has one that is known: see [`checks::check`].
@@ -251,13 +260,21 @@ fn without_version(package: &str) -> &str {
     &package[..end]
 }
 
-/// The identity line in the bytes of a section.
-fn find_identity(bytes: &[u8]) -> Option<String> {
+/// The identity line in the bytes of a section, and what the line behind it names as assumed.
+fn find_identity(bytes: &[u8]) -> Option<(String, Vec<String>)> {
     let mark = IDENTITY_MARK.as_bytes();
     let start = bytes.windows(mark.len()).position(|window| window == mark)? + mark.len();
-    let line = bytes.get(start..)?.iter().take(LONGEST_IDENTITY).take_while(|byte| **byte != b'\n');
-    let line: Vec<u8> = line.copied().collect();
-    String::from_utf8(line).ok().filter(|text| text.starts_with("specgen "))
+    let identity = line(bytes.get(start..)?, LONGEST_IDENTITY)?;
+    let behind = bytes.get(start + identity.len() + 1..).and_then(|bytes| line(bytes, LONGEST_ASSUMED));
+    let list = behind.as_deref().and_then(|line| line.strip_prefix(ASSUMED_MARK)).map(str::to_owned);
+    let assumed = list.map_or_else(Vec::new, |list| list.split(ASSUMED_SEPARATOR).map(str::to_owned).collect());
+    identity.starts_with("specgen ").then_some((identity, assumed))
+}
+
+/// The line that `bytes` begin with, if it is text.
+fn line(bytes: &[u8], longest: usize) -> Option<String> {
+    let line: Vec<u8> = bytes.iter().take(longest).take_while(|byte| **byte != b'\n').copied().collect();
+    String::from_utf8(line).ok()
 }
 
 #[cfg(test)]
@@ -295,7 +312,11 @@ mod tests {
     #[test]
     fn an_identity_is_found_where_it_lies_and_nowhere_else() {
         let line = format!("\0\0{IDENTITY_MARK}specgen 0.1.0, platform x, f64, spec 00\nrest");
-        assert_eq!(find_identity(line.as_bytes()).as_deref(), Some("specgen 0.1.0, platform x, f64, spec 00"));
+        let identity = "specgen 0.1.0, platform x, f64, spec 00".to_owned();
+        assert_eq!(find_identity(line.as_bytes()), Some((identity.clone(), Vec::new())));
+        let line = line.replace("rest", &format!("{ASSUMED_MARK}sensor.noise, gauge\nrest"));
+        let assumed = ["sensor.noise", "gauge"].map(str::to_owned).to_vec();
+        assert_eq!(find_identity(line.as_bytes()), Some((identity, assumed)));
         assert_eq!(find_identity(b"specgen-identity"), None);
         assert_eq!(find_identity(IDENTITY_MARK.as_bytes()), None);
     }

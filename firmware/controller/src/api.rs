@@ -5,7 +5,7 @@
 pub use crate::config::{CONFIG_NAMES, CONFIG_WORDS, Config, ConfigError, Environment};
 pub use crate::defaults::LEG_GAIN;
 pub use crate::description::DESCRIPTION;
-pub use crate::identity::{LEGS, PERIOD_SECONDS, Real, SCALAR_BITS, SPEC_DIGEST, SPEC_NAME, SPECGEN_VERSION};
+pub use crate::identity::{ASSUMED, LEGS, PERIOD_SECONDS, Real, SCALAR_BITS, SPEC_DIGEST, SPEC_NAME, SPECGEN_VERSION};
 pub use crate::state::{LegState, State};
 pub use crate::step::{actuate, step};
 pub use crate::tick::{

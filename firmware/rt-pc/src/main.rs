@@ -91,6 +91,7 @@ fn open(options: &Options) -> Result<(), Failure> {
         }
         #[cfg(feature = "comedi")]
         options::Hardware::Comedi(input) => {
+            accept_assumptions(controller::ASSUMED, options.assumed_ok).map_err(Failure::Run)?;
             let library = devices::comedi::library::Comedilib::open(options.comedi_library.as_deref());
             let library = library.map_err(Failure::Environment)?;
             let settings = devices::comedi::Settings {
@@ -107,6 +108,19 @@ fn open(options: &Options) -> Result<(), Failure> {
             Err(Failure::Usage("--comedi needs another build: cargo build --release --features comedi".to_owned()))
         }
     }
+}
+
+/// A card drives a real machine: what the controller rests on is measured, or accepted as it is.
+#[cfg(feature = "comedi")]
+fn accept_assumptions(assumed: &[&str], accepted: bool) -> Result<(), String> {
+    if accepted || assumed.is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "the controller of a real machine would rest on what nobody measured: {}; measure it, take its entries out of `assumed` in the \
+         spec, name records of the machine's own legs and build again, or accept it with --assumed-ok",
+        assumed.join(", ")
+    ))
 }
 
 fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failure> {

@@ -16,6 +16,7 @@ Machine
   --comedi-out DEVICE  a card of the amplifiers, once for each in order (default: that of the gauges)
   --comedi-range LOW:HIGH       voltages that the range of a gauge's input must hold (default -10:10)
   --comedi-out-range LOW:HIGH   voltages that the range of an amplifier's output must hold (default -10:10)
+  --assumed-ok         with --comedi: the machine may rest on what nobody measured: assumed values of the spec, simulated records
   --comedi-library FILE         another libcomedi than the system's
   --sim-timeout MS     how long a reading of the simulated machine may take before it counts as broken (default 20)
   --sim-edge-every S   the input line of the simulated machine rises every S seconds (default: never)
@@ -41,8 +42,8 @@ Operation
   --help, --version
 
 SIGINT or SIGTERM ramps down and ends; a second one ends at once with the amplifiers off.
-Exit codes: 0 good, 1 the machine faulted or held for a cause, a record is not whole or the book does not balance, 2 usage,
-3 environment.
+Exit codes: 0 good, 1 the machine faulted or held for a cause, a record is not whole, the book does not balance or a card would be
+driven on assumptions, 2 usage, 3 environment.
 ";
 
 /// What the controller runs on.
@@ -61,6 +62,8 @@ pub struct Options {
     /// Of inputs and of outputs, V.
     pub comedi_ranges: [[f64; 2]; 2],
     pub comedi_library: Option<PathBuf>,
+    /// A card may be driven by a controller that rests on assumptions.
+    pub assumed_ok: bool,
     /// ns.
     pub sim_timeout: u64,
     /// ns.
@@ -111,6 +114,7 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
         comedi_outputs: Vec::new(),
         comedi_ranges: [[-10.0, 10.0]; 2],
         comedi_library: None,
+        assumed_ok: false,
         sim_timeout: 20_000_000,
         sim_edge_every: None,
         duration: None,
@@ -144,6 +148,7 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
             Long("comedi-range") => options.comedi_ranges[0] = range(&mut parser, "--comedi-range")?,
             Long("comedi-out-range") => options.comedi_ranges[1] = range(&mut parser, "--comedi-out-range")?,
             Long("comedi-library") => options.comedi_library = Some(parser.value()?.into()),
+            Long("assumed-ok") => options.assumed_ok = true,
             Long("sim-timeout") => {
                 options.sim_timeout = (number(&mut parser, "--sim-timeout", 0.1, 10_000.0)? * 1e6) as u64
             }

@@ -11,5 +11,6 @@ mod learning;
 mod limits;
 mod oracle;
 mod response;
+mod rest;
 mod steps;
 mod tables;

@@ -6,7 +6,7 @@ use specgen::compile::compile;
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
 use specgen::ir::{Ir, Sensing};
-use specgen::lower;
+use specgen::lower::{self, Origin};
 use specgen::model::{
     ControlMode, DynamicsChoice, Environment, Frames, Interaction, Model, Probe, Scalar, SetpointRules, TaskSpace,
 };
@@ -77,11 +77,15 @@ fn table(model: &Model) -> EverettTable {
 
 pub fn lowered(model: &Model) -> Result<Ir, Vec<Diagnostic>> {
     let Some(task) = model.task_space.as_ref() else {
-        return lower::lower(model, None, &[table(model)], &[], &"0".repeat(64));
+        return lower::lower(model, None, &[table(model)], &[], origin());
     };
     let design = platform::design(model, task, &RestDynamics::of(&lower::platform(model)?))?;
     let (setpoints, _) = lower::setpoint::lower(model, task, &[], lower::scalar(model))?;
-    lower::lower(model, Some((&design, setpoints)), &[table(model)], &[], &"0".repeat(64))
+    lower::lower(model, Some((&design, setpoints)), &[table(model)], &[], origin())
+}
+
+fn origin() -> Origin<'static> {
+    Origin { digest: "0000", assumed: Vec::new() }
 }
 
 pub fn with_scalar(mut model: Model, scalar: Scalar) -> Model {

@@ -16,7 +16,7 @@ use specgen_compiler::compile::Compiled;
 use specgen_compiler::workspace;
 use specgen_language::model;
 use specgen_language::shell;
-use specgen_studies::verdict::Verdict;
+use specgen_studies::verdict::{Answer, Verdict};
 use specgen_studies::verify::{self, Inspection, Measurement};
 use specgen_toolchain as target;
 use specgen_toolchain::budget::{self, group};
@@ -98,6 +98,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     } else {
         ui.findings_in_brief(&compiled.source, &compiled.findings);
     }
+    ui.findings(Some(&compiled.source), &compiled.missed());
     let output = arguments
         .output
         .as_deref()
@@ -217,7 +218,10 @@ impl Summary {
                 "the emulated machine computes other bits than the host: {difference}; report this as a defect of specgen with the spec"
             ));
         }
-        (!self.over_budget.is_empty()).then(|| format!("over budget: {}", self.over_budget.join("; ")))
+        if !self.over_budget.is_empty() {
+            return Some(format!("over budget: {}", self.over_budget.join("; ")));
+        }
+        (self.verdict.answer == Answer::NotReady).then(|| self.verdict.headline())
     }
 }
 

@@ -15,12 +15,13 @@ use specgen_compiler::lower::setpoint::{self, Stopping};
 use specgen_compiler::lower::{self, PoseNoise};
 use specgen_compiler::precision::Precision;
 use specgen_compiler::reach::Reach;
+use specgen_compiler::rest::RestNoise;
 use specgen_compiler::stability::Margins;
 use specgen_compiler::stability::platform::Design;
 use specgen_identify::Report;
 use specgen_language::shell;
 use specgen_studies::lead::{self, LeadOf};
-use specgen_studies::verdict::Verdict;
+use specgen_studies::verdict::{Answer, Verdict};
 
 /// Arguments of `check`.
 #[derive(Args, Debug)]
@@ -45,6 +46,7 @@ struct Checked<'a> {
     design: &'a Option<Design>,
     reach: &'a Option<Reach>,
     pose_noise: &'a Option<PoseNoise>,
+    rest_noise: &'a RestNoise,
     records: &'a [Option<Report>],
     trajectories: &'a [PathDemand],
     stops: &'a [Stopping],
@@ -74,6 +76,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut findings = compiled.findings.clone();
     findings.extend(precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref()));
     findings.extend(lint::estimated(&compiled.model));
+    findings.extend(compiled.missed());
     findings.extend(compiled.reach.iter().flat_map(|reach| reach::notes(&compiled.model, reach)));
     arguments.strictness.accept(&compiled, &findings)?;
     ui.findings(Some(&compiled.source), &findings);
@@ -85,7 +88,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut verdict = Verdict::of(&compiled, "time, memory, bits: the next command measures them");
     let spec = &arguments.spec;
     verdict.next = vec![shell::on("specgen", spec, "-o DIR"), shell::on("specgen sim", spec, "")];
-    ui.result(&Checked {
+    let failed = (verdict.answer == Answer::NotReady).then(|| verdict.headline());
+    let checked = Checked {
         name: &compiled.ir.name,
         digest: &compiled.ir.digest,
         verdict,
@@ -93,6 +97,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         design: &compiled.design,
         reach: &compiled.reach,
         pose_noise: &compiled.pose_noise,
+        rest_noise: &compiled.rest_noise,
         records: &compiled.records,
         trajectories: &compiled.demands,
         stops: &compiled.stops,
@@ -100,8 +105,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         precision_ratio: ratio,
         compiled: &compiled,
         details: arguments.details,
-    });
-    Ok(())
+    };
+    ui.judged(&checked, failed)
 }
 
 impl Outcome for Checked<'_> {
@@ -118,9 +123,14 @@ impl Outcome for Checked<'_> {
 /// What identification and the stability check found, a line each.
 pub fn describe(compiled: &Compiled) -> String {
     let mut text = String::new();
+    let assumed = compiled.assumptions.list();
+    if !assumed.is_empty() {
+        // Writing to a String cannot fail, here and below.
+        let _ = writeln!(text, "  nobody measured {}:", compiled.assumptions.summary());
+        assumed.iter().for_each(|one| text.push_str(&format!("    {one}\n")));
+    }
     for (name, report) in compiled.model.hysteresis.records.iter().zip(&compiled.records) {
         let what = report.as_ref().map_or_else(|| "a table, taken as it is".to_owned(), super::identify::summary);
-        // Writing to a String cannot fail.
         let _ = writeln!(text, "  record {name}: {what}");
     }
     if let Some(margins) = &compiled.margins
@@ -176,8 +186,16 @@ pub fn describe(compiled: &Compiled) -> String {
     if !compiled.stops.is_empty() {
         text.push_str(&setpoint::describe_stops(&compiled.stops));
     }
+    let list = |values: &[f64]| values.iter().map(|v| format!("{:.1}", v * 1e9)).collect::<Vec<_>>().join("/");
+    let rest = &compiled.rest_noise;
+    let parts = [&rest.pose, &rest.gauges, &rest.amplifiers].map(|part| [list(&part[..3]), list(&part[3..])]);
+    let [[pose, turned], [by_gauges, turned_by_gauges], [by_amplifiers, turned_by_amplifiers]] = parts;
+    let _ = writeln!(
+        text,
+        "  pose at rest: {pose} nm and {turned} nrad rms as the gauges show it; {by_gauges} nm and {turned_by_gauges} nrad by the gauges, \
+         {by_amplifiers} nm and {turned_by_amplifiers} nrad by the amplifiers"
+    );
     if let (Some(noise), Some(task)) = (&compiled.pose_noise, &compiled.ir.task_space) {
-        let list = |values: &[f64]| values.iter().map(|v| format!("{:.1}", v * 1e9)).collect::<Vec<_>>().join("/");
         let _ = writeln!(
             text,
             "  gauges: {:.2} nm rms each with quantisation; pose {} nm and {} nrad rms; legs {} nm rms; found in {} passes to {:.1e} m, {:.1e} rad",

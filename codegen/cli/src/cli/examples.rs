@@ -58,7 +58,7 @@ Examples:
   specgen build legs.toml --target host -o legs-host
       a shared library for this computer
   specgen build platform.toml --target stm32h743 -o controller  # (minutes)
-      an image of the NUCLEO-H743ZI2
+      an image of the NUCLEO-H743ZI2; with --assumed-ok while values of the spec are assumed
   specgen build platform.toml --target rt-pc -o controller  # (minutes)
       the program of a real-time PC
   specgen build platform.toml --target qemu --no-measure  # (minutes)

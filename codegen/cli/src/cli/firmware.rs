@@ -19,6 +19,7 @@ use super::named::{InputFile, OutputFolder};
 use super::spec;
 use super::ui::{Failure, Ui};
 use crate::{emit, workspace};
+use specgen_compiler::assumed::Assumptions;
 use specgen_compiler::compile::{Compiled, Refused};
 use specgen_language::diagnostic::{Diagnostic, Severity, codes};
 use specgen_language::files;
@@ -53,6 +54,9 @@ pub struct Common {
     /// Do not run the emulator: no instruction counts, no comparison of bits.
     #[arg(long)]
     no_measure: bool,
+    /// A real board may rest on what nobody measured: the values that the spec names as `assumed`, and simulated records.
+    #[arg(long)]
+    assumed_ok: bool,
     #[command(flatten)]
     strictness: super::Strictness,
 }
@@ -84,6 +88,8 @@ struct Made {
     used: Option<Used>,
     /// Of a board's whole program.
     stack: Option<Reserve>,
+    /// What the controller rests on that nobody measured.
+    assumed: Assumptions,
     /// What differs from what the spec says, or was left out.
     notes: Vec<String>,
     /// What is over budget or must not be: nothing is flashed then.
@@ -97,7 +103,7 @@ struct Made {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let made = make(&arguments.spec, &arguments.common, any, ui)?;
+    let made = make(&arguments.spec, &arguments.common, Purpose::Machine, ui)?;
     ui.judged(&made, refusal(&made))
 }
 
@@ -122,25 +128,52 @@ fn refusal(made: &Made) -> Option<String> {
     (!list.is_empty()).then(|| format!("{} for {} is refused:{list}", made.target, made.board))
 }
 
-/// Every target will do.
-fn any(_: Target) -> Result<(), Failure> {
-    Ok(())
+/// What an image is built for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Purpose {
+    /// To be weighed: it may rest on whatever the spec assumes.
+    Weighing,
+    /// For a machine: a board's is a real one.
+    Machine,
+    /// For a board, that is written to it.
+    Board,
 }
 
-/// Compiles, writes, builds, checks, measures. A target that the command does not `accept` is refused before anything is written.
-fn make(spec: &Path, common: &Common, accept: fn(Target) -> Result<(), Failure>, ui: &mut Ui) -> Result<Made, Failure> {
+impl Purpose {
+    /// Refuses a target that the command has no use for.
+    fn takes(self, target: Target) -> Result<(), Failure> {
+        if self == Self::Board && !matches!(target.kind, Kind::Board(_)) {
+            return Err(flash::not_a_board(target.name));
+        }
+        Ok(())
+    }
+
+    /// Refuses a board whose controller would rest on what nobody measured, unless that is accepted.
+    fn accepts(self, target: Target, compiled: &Compiled, common: &Common) -> Result<(), Failure> {
+        let is_real = self != Self::Weighing && matches!(target.kind, Kind::Board(_));
+        if !is_real || common.assumed_ok || compiled.assumptions.is_empty() {
+            return Ok(());
+        }
+        let findings = vec![compiled.assumptions.refusal(&compiled.model)];
+        Err(Refused { source: Some(compiled.source.clone()), findings }.into())
+    }
+}
+
+/// Compiles, writes, builds, checks, measures. What does not do for the purpose is refused before anything is written.
+fn make(spec: &Path, common: &Common, purpose: Purpose, ui: &mut Ui) -> Result<Made, Failure> {
     let compiled = spec::quietly(spec, ui)?;
     common.strictness.accept(&compiled, &compiled.findings)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
     let declared = compiled.model.target.mcu;
     // clap lets only known names through.
     let target = common.target.as_deref().and_then(Target::named).unwrap_or_else(|| Target::of(declared));
-    accept(target)?;
+    purpose.takes(target)?;
     if let Kind::Board(mcu) = target.kind
         && let Some(finding) = wrong_part(&compiled, mcu, target)
     {
         return Err(Refused { source: Some(compiled.source), findings: vec![finding] }.into());
     }
+    purpose.accepts(target, &compiled, common)?;
     if common.lockstep && !matches!(target.kind, Kind::Board(_)) {
         let boards = "stm32h743, stm32f4";
         let message = format!("--lockstep is for the targets {boards}; {} has it in any case or never", target.name);
@@ -218,6 +251,7 @@ fn build(
         measurement: None,
         used: None,
         stack: None,
+        assumed: compiled.assumptions.clone(),
         notes: Vec::new(),
         failures: Vec::new(),
         bits: compiled.ir.scalar.bits(),
@@ -271,6 +305,12 @@ fn build(
                 made.notes.push(format!("the time of a tick was not estimated: {why}"));
             }
             made.failures.extend(late(compiled, made.measurement.as_ref(), ui));
+            let missed = compiled.missed();
+            made.failures.extend(missed.iter().map(|one| format!("{}: {}; {}", one.code, one.message, one.help)));
+            ui.findings(Some(&compiled.source), &missed);
+            if !compiled.assumptions.is_empty() {
+                made.notes.push(format!("it rests on {}", compiled.assumptions.summary()));
+            }
         }
     }
     hold_against_budget(&mut made, compiled, target);

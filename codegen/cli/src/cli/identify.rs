@@ -77,9 +77,33 @@ pub(super) struct Identified<R> {
     #[serde(skip)]
     pub record: String,
     pub report: R,
+    /// Keys of a spec whose values are measured now; none where the record is simulated.
+    pub measured: Measured,
     /// A line for each file that was written.
     #[serde(skip)]
     pub files: String,
+}
+
+/// Keys of a spec whose values a record gives.
+#[derive(Debug, Clone, Serialize)]
+#[serde(transparent)]
+pub(super) struct Measured(Vec<String>);
+
+impl Measured {
+    /// These; none if the record is `simulated`, which measures nothing.
+    fn of(keys: &[&str], simulated: bool) -> Self {
+        let keys: &[&str] = if simulated { &[] } else { keys };
+        Self(keys.iter().map(|key| (*key).to_owned()).collect())
+    }
+
+    /// What becomes of the spec's list of assumed values once the lines stand in it: a comment, so that it may be pasted with them.
+    fn text(&self) -> String {
+        if self.0.is_empty() {
+            return "# simulated, not measured: the spec's `assumed` stays as it is\n".to_owned();
+        }
+        let list: Vec<String> = self.0.iter().map(|key| format!("\"{key}\"")).collect();
+        format!("# measured: take out of the spec's `assumed`, where they are in it: {}\n", list.join(", "))
+    }
 }
 
 fn refused(findings: Vec<Diagnostic>) -> Failure {

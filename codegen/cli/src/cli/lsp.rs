@@ -252,7 +252,7 @@ fn findings(open: &Open) -> Vec<Diagnostic> {
     let source =
         SpecSource { display_name: open.uri.as_str().to_owned(), text: open.text.clone(), dir: folder(&open.uri) };
     match compile::compile_source(source) {
-        Ok(compiled) => compiled.findings,
+        Ok(compiled) => [compiled.missed(), compiled.findings].concat(),
         Err(refused) => refused.findings,
     }
 }

@@ -389,8 +389,8 @@ fn fit_workspace(draft: &mut Draft, name: &str, place: &Path) {
 struct Begun {
     folder: String,
     files: [&'static str; 3],
-    /// Values that nobody gave and nothing was computed from.
-    assumed: usize,
+    /// Paths of the values that nobody gave, as the spec names them.
+    assumed: Vec<String>,
     /// What the legs reach; none where they do not hold a platform.
     reach: Option<Reach>,
     /// Commands to go on with.
@@ -407,7 +407,7 @@ impl Outcome for Begun {
             };
             text.push_str(&format!("  workspace {} µm and {} mrad from rest\n", bounds(0..3, 1e6), bounds(3..6, 1e3)));
         }
-        text.push_str(&format!("  {} values are assumed, and marked so in {SPEC}\n", self.assumed));
+        text.push_str(&format!("  {} values are assumed: `assumed` in {SPEC} names them\n", self.assumed.len()));
         text.push_str(&format!("  {RECORD} is simulated: put a record of your legs in its place\nnext\n"));
         self.next.iter().for_each(|command| text.push_str(&format!("  {command}\n")));
         text

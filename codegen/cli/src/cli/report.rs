@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Ok(compiled) => compiled,
         Err(refused) => return self::refused(arguments, refused, ui),
     };
-    ui.findings(Some(&compiled.source), &compiled.findings);
+    ui.findings(Some(&compiled.source), &[compiled.findings.clone(), compiled.missed()].concat());
     let output = place(arguments, &compiled.ir.name);
     check_place(&output)?;
     if let Some(record) = &arguments.record {

@@ -41,8 +41,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
         /// The spec's settings, in the order of [`crate::CONFIG_NAMES`]: what `Config::new().to_words()` gives.
         pub static SETTINGS: [u64; CONFIG_WORDS] = [#(#settings),*];
 
-        /// Where this controller comes from, in one line. It lies in every image whose target asks
-        /// [`intact`](crate::integrity::intact), and `specgen size` prints it.
+        /// Where this controller comes from, in one line, and what of that nobody measured, in a second. It lies in every image
+        /// whose target asks [`intact`](crate::integrity::intact); `specgen size` prints it, and `specgen flash` asks about the second.
         pub static IDENTITY: [u8; #length] = *#identity;
 
         /// Adds tables and trajectories.

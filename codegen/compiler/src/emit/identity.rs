@@ -21,6 +21,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         ir.actuation.voltage[0],
         ir.actuation.voltage[1],
     );
+    let assumed = &ir.assumed;
     let motion = motion(ir);
     quote! {
         #![doc = " What this controller is."]
@@ -39,6 +40,9 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const SPEC_DIGEST: &str = #digest;
         /// Version of the compiler.
         pub const SPECGEN_VERSION: &str = #version;
+        /// What nobody measured: paths of the spec whose values are assumed, and simulated records. A program that drives a real machine
+        /// asks its user first where this is not empty. Nothing of it is in the law.
+        pub const ASSUMED: &[&str] = &[#(#assumed),*];
         /// Of the description what stands before the names of words, and what stands after them.
         pub(crate) const ABOUT: &str = #about;
         pub(crate) const MOTION: &str = #motion;

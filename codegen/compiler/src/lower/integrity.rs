@@ -1,7 +1,8 @@
 //! Checksum of tables and settings, as the controller computes it again when it starts.
 
+use super::Origin;
 use specgen_runtime::Crc32;
-use specgen_toolchain::{IDENTITY_MARK, sha256};
+use specgen_toolchain::{ASSUMED_MARK, ASSUMED_SEPARATOR, IDENTITY_MARK, sha256};
 
 use crate::ir::{
     Actuation, Defaults, Gains, Hysteresis, Integrity, Interaction, Law, Mode, Path, PlatformDefaults, RateModel,
@@ -21,12 +22,18 @@ pub(crate) fn digest<'a>(spec: &str, files: impl Iterator<Item = &'a (String, St
     sha256(&all)
 }
 
-/// One line about where a controller comes from.
-pub(super) fn identity(name: &str, digest: &str, scalar: Scalar) -> String {
+/// A line about where a controller comes from, and one about what of that nobody measured, if there is such.
+pub(super) fn identity(name: &str, origin: &Origin<'_>, scalar: Scalar) -> String {
+    let assumed = if origin.assumed.is_empty() {
+        String::new()
+    } else {
+        format!("{ASSUMED_MARK}{}\n", origin.assumed.join(ASSUMED_SEPARATOR))
+    };
     format!(
-        "{IDENTITY_MARK}specgen {}, platform {name}, f{}, spec {digest}\n",
+        "{IDENTITY_MARK}specgen {}, platform {name}, f{}, spec {}\n{assumed}",
         env!("CARGO_PKG_VERSION"),
-        scalar.bits()
+        scalar.bits(),
+        origin.digest
     )
 }
 

@@ -4,7 +4,7 @@ mod calibration;
 mod layout;
 mod noise;
 
-pub use noise::{PoseNoise, pose_noise, readings_per_pose};
+pub use noise::{PoseNoise, pose_noise, poses_per_reading, reading_noise, readings_per_pose};
 
 use specgen_runtime::{Gauges, Series};
 

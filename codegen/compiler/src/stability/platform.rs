@@ -17,6 +17,7 @@ mod notch;
 mod open_loop;
 mod refusal;
 mod report;
+mod rest;
 mod rule;
 mod sampled;
 mod search;
@@ -25,7 +26,7 @@ use serde::Serialize;
 use specgen_runtime::Platform;
 
 use specgen_language::diagnostic::Diagnostic;
-use specgen_language::model::{AdaptationMode, Gains, Interaction, Model, TaskSpace};
+use specgen_language::model::{AdaptationMode, ControlMode, Gains, Interaction, Model, TaskSpace};
 use specgen_numerics::Matrix6;
 
 pub use super::LARGEST_RADIUS;
@@ -165,6 +166,16 @@ pub fn lead(model: &Model, task: &TaskSpace, basis: &ModalBasis) -> f64 {
 }
 
 impl Design {
+    /// The law that the spec starts with, and its numbers.
+    #[must_use]
+    pub fn law(&self, model: &Model, task: &TaskSpace) -> (Law, &Tuning) {
+        match task.mode {
+            ControlMode::P => (Law::Position, &self.position),
+            ControlMode::F => (Law::Feedforward(adapting(model)), &self.combined),
+            ControlMode::PF => (Law::Combined(adapting(model)), &self.combined),
+        }
+    }
+
     /// The loop of the spec that this was designed for, up to its tuning; `task` is its `[control]`.
     #[must_use]
     pub fn closed_loop(&self, model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Option<ClosedLoop> {

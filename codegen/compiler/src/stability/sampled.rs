@@ -13,7 +13,7 @@
 use core::f64::consts::TAU;
 
 use specgen_language::model::Model;
-use specgen_numerics::{Matrix, exponential, spectral_radius as largest_magnitude};
+use specgen_numerics::{Matrix, exponential, spectral_radius as largest_magnitude, steady_covariances};
 
 /// Linear dynamics of a leg as the adaptation sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,11 +111,45 @@ pub fn transition(dynamics: &LegDynamics, level_weight: f64, drift_weight: Optio
     one_run
 }
 
+/// Variance of what the gauge of a leg shows at rest (m²), by unit variance of its noise and of the amplifier's (of the displacement
+/// asked for): the first over runs, with the weights of level and drift that are in use, none without adaptation; the second over ticks of
+/// `period` (s), on the leg alone.
+#[must_use]
+pub fn shown_at_rest(dynamics: &LegDynamics, weights: Option<(f64, Option<f64>)>, period: f64) -> [f64; 2] {
+    let alone = LegDynamics { run: period, ..*dynamics };
+    let discrete = alone.discretise();
+    let leg = alone.states();
+    let mut transition = Matrix::zeros(leg);
+    let mut driven = Vec::with_capacity(leg);
+    for row in 0..leg {
+        transition.set_row(row, &discrete.row(row)[..leg]);
+        driven.push(vec![discrete[(row, leg)]]);
+    }
+    let of = |transition: &Matrix, input: &[Vec<f64>], shown: usize| {
+        let [covariance] = steady_covariances(transition, [input]);
+        covariance[(shown, shown)]
+    };
+    let by_amplifier = of(&transition, &driven, shown(leg));
+    let Some((level, drift)) = weights else { return [1.0, by_amplifier] };
+    let (leg, closed) = (dynamics.states(), self::transition(dynamics, level, drift, 1.0));
+    let discrete = dynamics.discretise();
+    // An error of the reading does what the state that is shown does by way of the estimates.
+    let column = shown(leg);
+    let own = |row: usize| if row < leg { discrete[(row, column)] } else { 0.0 };
+    let input: Vec<Vec<f64>> = (0..closed.size()).map(|row| vec![closed[(row, column)] - own(row)]).collect();
+    [1.0 + of(&closed, &input, column), by_amplifier]
+}
+
+/// The state that the gauge shows, of a leg of so many.
+fn shown(leg: usize) -> usize {
+    if leg > 3 { 3 } else { 1 }
+}
+
 /// Row of an estimate over the states, of which the first `leg` are the leg's: its factors of the reading, δ̂ and φ̂.
 fn estimate_row(leg: usize, states: usize, [measured, level, drift]: [f64; 3]) -> Vec<f64> {
     let mut row = vec![0.0; leg];
     // What the gauge shows is its own state, or the displacement.
-    row[if leg > 3 { 3 } else { 1 }] = measured;
+    row[shown(leg)] = measured;
     row.extend([level, drift]);
     row.truncate(states);
     row

@@ -68,6 +68,13 @@ pub(super) fn is_comment(line: &[u8]) -> bool {
     matches!(line.first(), Some(b'#' | b'%'))
 }
 
+/// Whether a line marks its file as simulated: a comment whose first word is `simulated`.
+pub(super) fn is_mark(line: &[u8]) -> bool {
+    let words = line.trim_ascii_start().iter().skip_while(|byte| matches!(byte, b'#' | b'%' | b' ' | b'\t'));
+    let first: Vec<u8> = words.take_while(|byte| byte.is_ascii_alphabetic()).copied().collect();
+    is_comment(line) && first.eq_ignore_ascii_case(b"simulated")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -81,6 +88,16 @@ mod tests {
             assert_eq!(number(bad, b';'), None, "{bad}");
         }
         assert_eq!(number("1,5", b','), None);
+    }
+
+    #[test]
+    fn a_comment_that_begins_so_marks_a_file_as_simulated() {
+        for mark in ["# simulated by specgen", "%Simulated", "#  simulated: by hand"] {
+            assert!(is_mark(mark.as_bytes()), "{mark}");
+        }
+        for other in ["simulated", "# not simulated", "# simulatedly", "0,1,2", "# drive simulated by a source", ""] {
+            assert!(!is_mark(other.as_bytes()), "{other}");
+        }
     }
 
     #[test]

@@ -21,6 +21,8 @@ const BEATS: f64 = 0.02;
 pub struct Measured {
     /// Name of the record.
     pub record: String,
+    /// Whether a comment in it marks it as simulated.
+    pub simulated: bool,
     /// Curves per second, Hz.
     pub frequency: f64,
     /// Median |u̇|, V/s.
@@ -139,6 +141,7 @@ fn measured(p: &Prepared) -> Measured {
     let (low, high) = statistics::extent(y);
     Measured {
         record: p.record.shown_as.clone(),
+        simulated: p.record.simulated,
         frequency: p.frequency,
         speed: p.speed,
         samples: p.samples(),

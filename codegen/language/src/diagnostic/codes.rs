@@ -135,6 +135,10 @@ codes! {
     TRIGGER_KEY = "E0337";
     TRIGGER_OUTSIDE = "E0338";
     TOO_MANY_TRIGGERS = "E0339";
+    ASSUMED_UNKNOWN = "E0345";
+    ASSUMED_TWICE = "E0346";
+    NOISE_AT_REST = "E0347";
+    ASSUMED_ON_BOARD = "E0348";
 
     // Stability, reach, set-points, gauges, supervisor.
     UNSTABLE_STATIC = "E0401";

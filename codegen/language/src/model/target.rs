@@ -58,12 +58,28 @@ section! {
     "requirements" ["goals", "specification"], Optional => Requirements {
         /// Finest displacement that matters. No converter code may move a leg by more, nor half a code on every leg the platform along an axis.
         precision: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "" ["resolution", "accuracy"], "50 nm";
+        /// Largest noise of the pose at rest: rms of x, y and z, each, as the gauges show it, with what the amplifiers' noise moves. `specgen check`, the main job and the report judge the spec by it.
+        noise: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Rule("that of `precision`"), "" ["jitter", "stability", "noise_floor"], "5 nm";
+        /// Largest noise at rest of θx, θy and θz, rms, each.
+        rotation_noise: Option<f64> = one(Dimension::ANGLE, Range::closed(1e-12, 1e-1), "nrad"), Optional, "", "50 nrad";
     }
     and |fields, _table| {
         /// How well trajectories are to be followed.
         tracking: Vec<TrackingLimit> = (0..fields.count("requirements.tracking"))
             .map(|index| TrackingLimit::read(fields, &format!("requirements.tracking[{index}]")))
             .collect::<Option<_>>()?;
+    }
+}
+
+impl Requirements {
+    /// Largest noise at rest of the axis, 0 to 5, m or rad, and the key that sets it; none where the spec sets none.
+    #[must_use]
+    pub fn noise_of(&self, axis: usize) -> Option<(f64, &'static str)> {
+        if axis > 2 {
+            return self.rotation_noise.map(|limit| (limit, "requirements.rotation_noise"));
+        }
+        let of_precision = self.precision.map(|limit| (limit, "requirements.precision"));
+        self.noise.map(|limit| (limit, "requirements.noise")).or(of_precision)
     }
 }
 

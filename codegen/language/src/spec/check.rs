@@ -4,6 +4,7 @@
 //! (the `?` on `Option`). So one run finds everything.
 
 mod adaptation;
+mod assumed;
 mod control;
 mod electrical;
 mod gauges;
@@ -62,6 +63,7 @@ const CHECKS: &[Check] = &[
     gauges::input_of_calibrated,
     robust::ranges_in_order,
     lint::reasons,
+    assumed::values,
     trajectories::keys_of_kind,
     trajectories::names_differ,
     trajectories::limits,

@@ -36,7 +36,7 @@ fn item_of(key: &Key, path: &str) -> Option<Item> {
             let index = path.rsplit_once('[').and_then(|(_, rest)| rest.trim_end_matches(']').parse::<usize>().ok());
             items.get(index.unwrap_or(0)).copied()
         }
-        Shape::Records | Shape::Reasons => None,
+        Shape::Records | Shape::Reasons | Shape::Paths => None,
     }
 }
 

@@ -72,7 +72,7 @@ pub fn key_markdown(path: &str, key: &Key) -> String {
 
 fn form(key: &Key) -> String {
     match key.shape {
-        Shape::One(_) | Shape::Records | Shape::Reasons => format!("`{}`", key.example),
+        Shape::One(_) | Shape::Records | Shape::Reasons | Shape::Paths => format!("`{}`", key.example),
         Shape::List(items) if items.len() > 3 => {
             format!("{} values, `{}`", items.len(), key.example)
         }
@@ -97,6 +97,7 @@ fn range(key: &Key) -> String {
         }
         Shape::Records => "1 or 6 files".to_owned(),
         Shape::Reasons => "texts `KEY: REASON`".to_owned(),
+        Shape::Paths => "paths of keys".to_owned(),
     }
 }
 

@@ -133,6 +133,13 @@ fn key_schema(key: &Key) -> Value {
             array.insert("items".into(), json!({"type": "string", "pattern": r"^[a-z_0-9.\[\]]+:.*\S"}));
             array
         }
+        Shape::Paths => {
+            let mut array = Map::new();
+            array.insert("type".into(), json!("array"));
+            array.insert("items".into(), json!({"type": "string", "pattern": r"^[a-z_0-9.\[\]]+$"}));
+            array.insert("uniqueItems".into(), json!(true));
+            array
+        }
         Shape::Records => {
             let file = Value::Object(item_schema(Item::File));
             let lists = json!([{"minItems": 1, "maxItems": 1}, {"minItems": 6, "maxItems": 6}]);

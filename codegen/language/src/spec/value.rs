@@ -56,6 +56,7 @@ impl ValueReader<'_> {
             Shape::Rows(count, items) => self.rows(count, items, value)?,
             Shape::Records => self.texts("a file name", value)?,
             Shape::Reasons => self.texts("a text", value)?,
+            Shape::Paths => self.texts("the path of a key in quotes", value)?,
         };
         Some(Field { parsed, span, items, given: true })
     }

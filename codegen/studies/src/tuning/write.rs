@@ -15,7 +15,8 @@ const UNITS: [(&str, [&str; 2]); 3] = [
     ("derivative", ["N s/m", "N m s/rad"]),
 ];
 
-/// The text of the spec with `setting`; only what `space` tunes is changed. `note` becomes a comment above a new table.
+/// The text of the spec with `setting`; only what `space` tunes is changed, and is no longer named as assumed. `note` becomes a comment above
+/// a new table.
 ///
 /// # Errors
 /// What the editor says of a text that the compiler read, or of a section that is no table.
@@ -23,6 +24,7 @@ pub fn edited(compiled: &Compiled, space: &Space, setting: &Setting, note: &str)
     // The editor would end every line with `\n`.
     let windows = compiled.source.text.contains("\r\n");
     let mut document: DocumentMut = compiled.source.text.parse().map_err(|error| format!("{error}"))?;
+    let mut written: Vec<String> = Vec::new();
     let tunes = |wanted: fn(Role) -> bool| space.parameters.iter().any(|parameter| wanted(parameter.role));
     match setting {
         Setting::Legs { level, drift } => {
@@ -36,12 +38,14 @@ pub fn edited(compiled: &Compiled, space: &Space, setting: &Setting, note: &str)
                 if !tuned {
                     continue;
                 }
-                if table.contains_key(&bandwidth) {
-                    // Rounded down: at a weight of 1 a bandwidth rounded up would be refused.
-                    set(table, &bandwidth, format!("{:.3e} rad/s", floor4(value / run)).into());
+                // Rounded down: at a weight of 1 a bandwidth rounded up would be refused.
+                let (key, value) = if table.contains_key(&bandwidth) {
+                    (bandwidth, format!("{:.3e} rad/s", floor4(value / run)).into())
                 } else {
-                    set(table, &format!("{stem}_weight"), value.into());
-                }
+                    (format!("{stem}_weight"), value.into())
+                };
+                set(table, &key, value);
+                written.push(format!("adaptation.{key}"));
             }
         }
         Setting::Platform { combined, position, .. } => {
@@ -63,17 +67,27 @@ pub fn edited(compiled: &Compiled, space: &Space, setting: &Setting, note: &str)
                         list.push(format!("{} {}", plain(*value), units[axis / 3]));
                     }
                     set(table, key, Value::Array(list));
+                    written.push(format!("{name}.{key}"));
                 }
             }
             if !bandwidths_given || tunes(|role| matches!(role, Role::Level | Role::Drift)) {
                 let table = section(&mut document, "adaptation", note)?;
                 set(table, "level_bandwidth", format!("{} rad/s", plain(combined.level_bandwidth)).into());
                 set(table, "drift_bandwidth", format!("{} rad/s", plain(combined.drift_bandwidth)).into());
+                written.extend(["level", "drift"].map(|stem| format!("adaptation.{stem}_bandwidth")));
             }
         }
     }
+    forget(&mut document, &written);
     let text = document.to_string();
     Ok(if windows { text.replace("\r\n", "\n").replace('\n', "\r\n") } else { text })
+}
+
+/// Takes keys out of the list of assumed values: they are decided now.
+fn forget(document: &mut DocumentMut, keys: &[String]) {
+    if let Some(assumed) = document.get_mut("assumed").and_then(Item::as_array_mut) {
+        assumed.retain(|entry| entry.as_str().is_none_or(|path| !keys.iter().any(|key| key == path)));
+    }
 }
 
 /// The shortest text that reads back to the value, in the way of specs.
@@ -131,6 +145,18 @@ mod tests {
         let mut document: DocumentMut = "a = 1 # one\n\n[[b]]\nc = 2\n".parse().unwrap();
         set(section(&mut document, "gains", "tuned").unwrap(), "k", 1.5.into());
         assert_eq!(document.to_string(), "a = 1 # one\n\n[[b]]\nc = 2\n\n# tuned\n[gains]\nk = 1.5\n");
+    }
+
+    #[test]
+    fn what_is_tuned_is_no_longer_assumed() {
+        let text = "assumed = [ # why\n    \"gains.integral\", \"sensor.noise\",\n]\n";
+        let mut document: DocumentMut = text.parse().unwrap();
+        forget(&mut document, &["gains.integral".to_owned(), "gains.derivative".to_owned()]);
+        let assumed: Vec<_> = document["assumed"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+        assert_eq!(assumed, ["sensor.noise"]);
+        let mut without: DocumentMut = "a = 1\n".parse().unwrap();
+        forget(&mut without, &["a".to_owned()]);
+        assert_eq!(without.to_string(), "a = 1\n");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use specgen_toolchain::budget::group;
 pub enum Subject {
     /// How far each axis goes alone, from the middle of the strokes, µm and µrad; the limit is the declared workspace.
     Reach,
-    /// Noise of the measured pose and of a gauge, rms; `step`: the finest of the converters, at a leg or the platform.
+    /// Noise of the pose at rest, as the gauges show it, and of a reading, rms; `step`: the finest of the converters, at a leg or the platform.
     Noise,
     /// How well the hysteresis tables fit their records.
     Record,

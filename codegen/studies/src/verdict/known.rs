@@ -27,16 +27,16 @@ fn reach(compiled: &Compiled) -> Vec<Figure> {
 }
 
 fn noise(compiled: &Compiled) -> Vec<Figure> {
-    let mut figures = Vec::new();
-    if let Some(noise) = &compiled.pose_noise {
-        for (axis, value) in noise.pose.iter().enumerate() {
-            let unit = if axis < 3 { "nm" } else { "nrad" };
-            figures.push(Figure::new(Subject::Noise, AXES[axis], 1e9 * value, unit));
+    let noise = &compiled.rest_noise;
+    let axes = noise.pose.iter().enumerate().map(|(axis, value)| {
+        let figure = Figure::new(Subject::Noise, AXES[axis], 1e9 * value, if axis < 3 { "nm" } else { "nrad" });
+        match compiled.model.requirements.noise_of(axis) {
+            Some((limit, key)) => figure.at_most(1e9 * limit, key),
+            None => figure,
         }
-        figures.push(Figure::new(Subject::Noise, "gauge", 1e9 * noise.reading, "nm"));
-    } else if compiled.model.sensor.noise > 0.0 {
-        figures.push(Figure::new(Subject::Noise, "gauge", 1e9 * compiled.model.sensor.noise, "nm"));
-    }
+    });
+    let mut figures: Vec<Figure> = axes.collect();
+    figures.push(Figure::new(Subject::Noise, "gauge", 1e9 * noise.reading, "nm"));
     let steps = requirements::steps(&compiled.model);
     let largest = steps.platform.iter().fold(steps.leg, |largest, step| if *step > largest { *step } else { largest });
     let step = Figure::new(Subject::Noise, "step", 1e9 * largest, "nm");

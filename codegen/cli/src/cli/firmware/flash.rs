@@ -6,9 +6,10 @@ use std::process::{Command, Stdio};
 use clap::Args;
 use serde::Serialize;
 
-use super::{Common, make, read_image, refusal, text};
+use super::{Common, Purpose, make, read_image, refusal, text};
 use crate::cli::named::InputFile;
 use crate::cli::ui::{Failure, Outcome, Ui};
+use specgen_language::diagnostic::codes;
 use specgen_language::model::{self, Mcu};
 use specgen_language::shell;
 use specgen_toolchain::budget;
@@ -122,7 +123,7 @@ struct Ready {
 }
 
 fn of_spec(arguments: &Arguments, ui: &mut Ui) -> Result<Ready, Failure> {
-    let made = make(&arguments.file, &arguments.common, a_board, ui)?;
+    let made = make(&arguments.file, &arguments.common, Purpose::Board, ui)?;
     let result = ui.shown(&made);
     if let Some(message) = refusal(&made) {
         return Err(Failure::Judged { message: format!("{message}\nnothing was flashed"), result });
@@ -156,6 +157,14 @@ fn of_image(arguments: &Arguments, elf: &[u8], ui: &mut Ui) -> Result<Ready, Fai
         failures
             .push("it holds no identity of a controller: was it made by specgen, and does it check itself?".to_owned());
     }
+    if !size.assumed.is_empty() && !arguments.common.assumed_ok {
+        failures.push(format!(
+            "{}: it rests on what nobody measured ({}): measure it, take its entries out of `assumed` in the spec and build again; or \
+             accept it with --assumed-ok",
+            codes::ASSUMED_ON_BOARD.id,
+            size.assumed.join(", ")
+        ));
+    }
     let image = arguments.file.display().to_string();
     let examined = Examined { image, failures, size, checks: checked };
     let result = ui.shown(&examined);
@@ -168,11 +177,7 @@ fn of_image(arguments: &Arguments, elf: &[u8], ui: &mut Ui) -> Result<Ready, Fai
     Err(Failure::Judged { message, result })
 }
 
-fn a_board(target: Target) -> Result<(), Failure> {
-    if matches!(target.kind, Kind::Board(_)) { Ok(()) } else { Err(not_a_board(target.name)) }
-}
-
-fn not_a_board(name: &str) -> Failure {
+pub(super) fn not_a_board(name: &str) -> Failure {
     Failure::Usage(format!(
         "nothing was flashed: {name} is no board with a debug probe; name one by --target stm32h743 or --target stm32f4"
     ))

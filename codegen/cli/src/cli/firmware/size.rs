@@ -4,7 +4,7 @@ use clap::Args;
 use object::{Architecture, Object};
 use serde::Serialize;
 
-use super::{Common, Made, make, read_image, refusal, text};
+use super::{Common, Made, Purpose, make, read_image, refusal, text};
 use crate::cli::named::InputFile;
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_toolchain::TargetError;
@@ -67,7 +67,7 @@ impl Outcome for Examined {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let path = &arguments.file;
     let Some(bytes) = read_image(path)? else {
-        let built = Built(make(path, &arguments.common, super::any, ui)?);
+        let built = Built(make(path, &arguments.common, Purpose::Weighing, ui)?);
         return ui.judged(&built, refusal(&built.0));
     };
     let malformed = |error: object::Error| TargetError::MalformedImage { text: format!("{}: {error}", path.display()) };

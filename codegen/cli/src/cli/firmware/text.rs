@@ -112,6 +112,9 @@ pub fn sections(size: &Size) -> String {
     if let Some(identity) = &size.identity {
         let _ = writeln!(out, "  made by {identity}");
     }
+    if !size.assumed.is_empty() {
+        let _ = writeln!(out, "  assumed: {}", size.assumed.join(", "));
+    }
     let recorder = match size.recorder() {
         0 => String::new(),
         bytes => format!(", and {} bytes for the recorder", group(bytes)),

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::cause::account;
 use super::predict;
 use super::reading::ReadingArguments;
-use super::refused;
+use super::{Measured, refused};
 use crate::cli::file::write_file;
 use crate::cli::named::{InputFile, OutputFile};
 use crate::cli::plot::{Plot, wrote};
@@ -87,7 +87,9 @@ pub fn run(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
         None => None,
     };
     if let Some(output) = &arguments.output {
-        write_file(output, identify::write_table_csv(&identified.table).as_bytes())?;
+        let text = identify::write_table_csv(&identified.table);
+        let text = if record.simulated { identify::marked_as_simulated(&text) } else { text };
+        write_file(output, text.as_bytes())?;
     }
     let draw = || figure::everett(&identified, choice.as_ref(), validation.as_ref());
     let plot = arguments.plot.write("Everett table", draw)?;
@@ -98,6 +100,7 @@ pub fn run(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
         report: &identified.report,
         validation: validation.as_ref(),
         grid_choice: choice.as_ref(),
+        measured: Measured::of(&["hysteresis.grid", "hysteresis.records"], record.simulated),
         files: table.into_iter().chain(plot).collect(),
     });
     Ok(())
@@ -113,6 +116,7 @@ struct Table<'a> {
     report: &'a Report,
     validation: Option<&'a Prediction>,
     grid_choice: Option<&'a GridChoice>,
+    measured: Measured,
     /// A line for each file that was written.
     #[serde(skip)]
     files: String,
@@ -128,7 +132,7 @@ impl Outcome for Table<'_> {
             let _ = writeln!(text, "{}: {}", validation.record, predict::summary(validation));
         }
         let _ = writeln!(text, "lines for the spec:\n[hysteresis]\ngrid = {}", self.grid);
-        text + &self.files
+        text + &self.measured.text() + &self.files
     }
 }
 
@@ -199,8 +203,9 @@ fn details(report: &Report, text: &mut String) {
 
 /// A report in one line.
 pub fn summary(report: &Report) -> String {
+    let simulated = if report.simulated { "simulated: " } else { "" };
     format!(
-        "{} reversal curves, fit {:.2} nm rms ({:.3} % of {:.2} µm; {:.2} nm within branches), noise {:.2} nm, drift {:.3} nm/s, dead time {:.3} ms, \
+        "{simulated}{} reversal curves, fit {:.2} nm rms ({:.3} % of {:.2} µm; {:.2} nm within branches), noise {:.2} nm, drift {:.3} nm/s, dead time {:.3} ms, \
          {} of {} weights zero, {:.1} % of the plane excited",
         report.reversal_curves,
         report.fit_rms * 1e9,

@@ -7,7 +7,7 @@ use host_sim::controller::{MachineWord, Supervised};
 use host_sim::record::{self, Block, Header, ReplayError};
 use serde::Serialize;
 
-use super::refused;
+use super::{Measured, refused};
 use crate::cli::file::write_folder;
 use crate::cli::named::InputFile;
 use crate::cli::table::{right, row};
@@ -16,7 +16,7 @@ use crate::cli::{replay, sim, spec};
 use specgen_compiler::compile::{Compiled, Refused};
 use specgen_compiler::lower;
 use specgen_identify::gains::{self, LegGain};
-use specgen_identify::{declared, write_table_csv};
+use specgen_identify::{declared, marked_as_simulated, write_table_csv};
 use specgen_language::model::RateDependence;
 
 /// Phases of the supervisor in which the law moves the legs: running, holding.
@@ -56,6 +56,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         ));
     }
     replay::same_build(&arguments.recording, &arguments.spec, &reader.header().description, &compiled)?;
+    let simulated = !compiled.assumptions.simulated.is_empty();
     let dir = arguments.spec.parent().unwrap_or(Path::new(""));
     let tables = declared::records(model, dir).map_err(refused)?;
 
@@ -85,14 +86,18 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut files = String::new();
     if let Some(folder) = &folder {
         let tables = legs.iter().enumerate().map(|(leg, (table, found))| {
-            (format!("leg{}.csv", leg + 1), write_table_csv(&gains::scaled(table, found.gain)).into_bytes())
+            let text = write_table_csv(&gains::scaled(table, found.gain));
+            // The shape is that of the spec's record.
+            let text = if simulated { marked_as_simulated(&text) } else { text };
+            (format!("leg{}.csv", leg + 1), text.into_bytes())
         });
         write_folder(folder, &tables.collect::<Vec<_>>())?;
         files = format!("wrote 6 tables to {}\n", folder.display());
     }
     let legs = legs.into_iter().map(|(_, found)| found).collect();
     let records = arguments.output.as_deref().map(line).unwrap_or_default();
-    ui.result(&Gains { recording: shown, seconds: moves.seconds(), legs, records, files });
+    let measured = Measured::of(&["hysteresis.records"], simulated);
+    ui.result(&Gains { recording: shown, seconds: moves.seconds(), legs, measured, records, files });
     Ok(())
 }
 
@@ -193,6 +198,7 @@ struct Gains {
     seconds: f64,
     /// In the order of the legs.
     legs: Vec<LegGain>,
+    measured: Measured,
     #[serde(skip)]
     records: String,
     #[serde(skip)]
@@ -219,7 +225,7 @@ impl Outcome for Gains {
             );
         }
         if !self.records.is_empty() {
-            text += &format!("lines for the spec:\n[hysteresis]\n{}\n", self.records);
+            text += &format!("lines for the spec:\n[hysteresis]\n{}\n{}", self.records, self.measured.text());
         }
         text + &self.files
     }

@@ -6,7 +6,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::reading::ReadingArguments;
-use super::refused;
+use super::{Measured, refused};
 use crate::cli::file::write_file;
 use crate::cli::named::{InputFile, OutputFile};
 use crate::cli::plot::{Plot, wrote};
@@ -51,7 +51,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     }
     files.extend(arguments.plot.write("Gauge calibration", || figure::gauge(&report))?);
     let (calibration, is_given) = (gauge::spec_line(&report), arguments.degree.is_some());
-    ui.result(&Calibration { record: shown, is_given, report, calibration, files });
+    let measured = Measured::of(&["sensor.calibration"], report.simulated);
+    ui.result(&Calibration { record: shown, is_given, report, calibration, measured, files });
     Ok(())
 }
 
@@ -65,6 +66,7 @@ struct Calibration {
     is_given: bool,
     report: GaugeReport,
     calibration: String,
+    measured: Measured,
     /// A line for each file that was written.
     #[serde(skip)]
     files: String,
@@ -83,7 +85,7 @@ impl Outcome for Calibration {
         format!(
             "{}: {} samples, {:.4} V to {:.4} V, {:.4} µm to {:.4} µm\n  held-out error by degree: {}\n  degree {} ({chosen})\n  \
              residual {:.3} nm rms, {:.3} nm at most (at {})\n  hysteresis {hysteresis}\n  monotonic over these voltages: least slope {:.1} % \
-             of the mean slope\nlines for the spec, in [sensor] for all gauges or in [[gauge]] for this one:\n{}\n{}",
+             of the mean slope\nlines for the spec, in [sensor] for all gauges or in [[gauge]] for this one:\n{}\n{}{}",
             self.record,
             report.samples,
             report.volts[0],
@@ -97,6 +99,7 @@ impl Outcome for Calibration {
             report.residual_max_at,
             report.least_slope_percent,
             self.calibration,
+            self.measured.text(),
             self.files
         )
     }

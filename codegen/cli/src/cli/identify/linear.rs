@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::reading::ReadingArguments;
-use super::refused;
+use super::{Measured, refused};
 use crate::cli::named::InputFile;
 use crate::cli::plot::Plot;
 use crate::cli::table::{left, right, row};
@@ -88,7 +88,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let report = linear::together(relations, arguments.reference).map_err(refused)?;
     let spec = arguments.spec.as_deref().map(|path| judge(path, &report)).transpose()?;
     let plot = arguments.plot.write("Linear relation", || figure::linear(&report, &read))?.unwrap_or_default();
-    ui.result(&Related { gain_ratio: report.gain_ratio_for_spec(), report, spec, plot });
+    let simulated = report.relations.iter().any(|relation| relation.simulated);
+    let measured = Measured::of(&["actuator.stack_gain", "adaptation.gain_ratio"], simulated);
+    ui.result(&Related { gain_ratio: report.gain_ratio_for_spec(), report, measured, spec, plot });
     Ok(())
 }
 
@@ -97,6 +99,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 struct Related {
     report: LinearReport,
     gain_ratio: [f64; 2],
+    measured: Measured,
     spec: Option<Judged>,
     #[serde(skip)]
     plot: String,
@@ -135,7 +138,7 @@ impl Outcome for Related {
             Some(judged) => judged.write(&mut text),
         }
         lines(&self.report, self.spec.as_ref().map(|judged| judged.stacks), &mut text);
-        text + &self.plot
+        text + &self.measured.text() + &self.plot
     }
 }
 

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::cause::account;
 use super::reading::ReadingArguments;
-use super::{Identified, refused};
+use super::{Identified, Measured, refused};
 use crate::cli::file::write_file;
 use crate::cli::named::{InputFile, OutputFile};
 use crate::cli::plot::{Plot, wrote};
@@ -96,7 +96,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     }
     let plot = arguments.plot.write("Prediction", || figure::prediction(&prediction))?;
     let files = arguments.output.as_ref().map(|path| wrote(path)).into_iter().chain(plot).collect();
-    ui.result(&Identified { record: shown, report: prediction, files });
+    ui.result(&Identified { record: shown, report: prediction, measured: Measured::of(&[], false), files });
     Ok(())
 }
 

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::Identified;
 use super::everett::{grid, range};
 use super::reading::ReadingArguments;
+use super::{Identified, Measured};
 use crate::cli::file::write_file;
 use crate::cli::named::{InputFile, OutputFolder};
 use crate::cli::plot::{Plot, wrote};
@@ -15,7 +15,7 @@ use crate::cli::table::{left, right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Refused;
 use specgen_identify::rate::{RateIdentified, RateOption, RateReport, identify_rate, spec_lines, write_rate_csv};
-use specgen_identify::{Options, read_record, write_table_csv};
+use specgen_identify::{Options, marked_as_simulated, read_record, write_table_csv};
 use specgen_report::identification as figure;
 
 /// Arguments of `identify rate`.
@@ -72,7 +72,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let files = arguments.output.as_ref().map(|output| write(output, &identified)).transpose()?.unwrap_or_default();
     let plot = arguments.plot.write("Rate dependence", || figure::rate(&identified.report))?;
     let files = files.iter().map(|path| wrote(path)).chain(plot).collect();
-    ui.result(&Identified { record: String::new(), report: identified.report, files });
+    let keys = keys(&identified.report);
+    let measured = Measured::of(&keys, is_simulated(&identified.report));
+    ui.result(&Identified { record: String::new(), report: identified.report, measured, files });
     Ok(())
 }
 
@@ -82,6 +84,18 @@ impl Outcome for Identified<RateReport> {
     }
 }
 
+/// Whether any of the records is simulated: what is fitted to all of them is then no measurement.
+fn is_simulated(report: &RateReport) -> bool {
+    report.records.iter().any(|record| record.simulated)
+}
+
+/// What the lines of the best option give.
+fn keys(report: &RateReport) -> Vec<&'static str> {
+    let of_mode = ["actuator.resonance", "actuator.damping_ratio"];
+    let own = ["hysteresis.grid", "hysteresis.records", "hysteresis.rate", "hysteresis.dead_time"];
+    own.into_iter().chain(report.mode.iter().flat_map(|_| of_mode)).collect()
+}
+
 /// Tables first, then the lines that name them.
 fn write(output: &Path, identified: &RateIdentified) -> Result<Vec<PathBuf>, Failure> {
     let name = output.file_name().map(|name| name.to_string_lossy().into_owned()).ok_or_else(|| {
@@ -89,6 +103,7 @@ fn write(output: &Path, identified: &RateIdentified) -> Result<Vec<PathBuf>, Fai
     })?;
     let beside = |file: &str| output.with_file_name(file);
     let best = identified.report.verdict.best;
+    let simulated = is_simulated(&identified.report);
     let mut files: Vec<(PathBuf, String)> = Vec::new();
     let mut lines = format!(
         "# Rate dependence of the leg, from `specgen identify rate`. The option in force has the lowest error on rates that it was\n\
@@ -105,9 +120,10 @@ fn write(output: &Path, identified: &RateIdentified) -> Result<Vec<PathBuf>, Fai
             RateOption::CreepMode => format!("{name}-creep-mode.csv"),
         };
         let rate_table = format!("{name}-mu1.csv");
-        files.push((beside(&table), write_table_csv(&model.still)));
+        let mark = |text: String| if simulated { marked_as_simulated(&text) } else { text };
+        files.push((beside(&table), mark(write_table_csv(&model.still))));
         if let Some(rate) = &model.rate {
-            files.push((beside(&rate_table), write_rate_csv(rate)));
+            files.push((beside(&rate_table), mark(write_rate_csv(rate))));
         }
         let block = spec_lines(*option, model, identified.report.held, &table, &rate_table);
         let prefix = if *option == best { "" } else { "# " };
@@ -121,6 +137,7 @@ fn write(output: &Path, identified: &RateIdentified) -> Result<Vec<PathBuf>, Fai
             let _ = writeln!(lines, "{prefix}{line}");
         }
     }
+    lines += &format!("\n{}", Measured::of(&keys(&identified.report), simulated).text());
     files.push((beside(&format!("{name}.toml")), lines));
     for (path, text) in &files {
         write_file(path, text.as_bytes())?;

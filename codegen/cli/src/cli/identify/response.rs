@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use clap::Args;
 
 use super::reading::ReadingArguments;
-use super::{Identified, refused};
+use super::{Identified, Measured, refused};
 use crate::cli::named::InputFile;
 use crate::cli::plot::Plot;
 use crate::cli::ui::{Failure, Outcome, Ui};
@@ -34,13 +34,15 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         .map_err(refused)?;
     ui.findings(None, &report.warnings);
     let files = arguments.plot.write("Frequency response", || figure::response(&report))?.unwrap_or_default();
-    ui.result(&Identified { record: shown, report, files });
+    let keys = ["actuator.resonance", "actuator.damping_ratio", "amplifier.lag"];
+    let measured = Measured::of(&keys, report.simulated);
+    ui.result(&Identified { record: shown, report, measured, files });
     Ok(())
 }
 
 impl Outcome for Identified<ResponseReport> {
     fn text(&self) -> String {
-        let Self { record, report, files } = self;
+        let Self { record, report, measured, files } = self;
         let f = &report.fitted;
         let shown_in = |e: Estimate, scale: f64| format!("{:.4} ± {:.1e}", e.value * scale, e.error * scale);
         let mut text = format!(
@@ -69,11 +71,12 @@ impl Outcome for Identified<ResponseReport> {
         );
         let _ = write!(
             text,
-            "lines for the spec:\n[actuator]\nresonance = \"{:.1} Hz\"  # static gain here: {:.5} um/V for small amplitude, below that of a large loop\ndamping_ratio = {:.4}\n[amplifier]\nlag = \"{:.4} ms\"\n{files}",
+            "lines for the spec:\n[actuator]\nresonance = \"{:.1} Hz\"  # static gain here: {:.5} um/V for small amplitude, below that of a large loop\ndamping_ratio = {:.4}\n[amplifier]\nlag = \"{:.4} ms\"\n{}{files}",
             f.resonance.value,
             f.gain.value * 1e6,
             f.damping_ratio.value,
-            f.lag.value * 1e3
+            f.lag.value * 1e3,
+            measured.text()
         );
         text
     }

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::reading::ReadingArguments;
-use super::{Identified, refused};
+use super::{Identified, Measured, refused};
 use crate::cli::named::InputFile;
 use crate::cli::plot::Plot;
 use crate::cli::ui::{Failure, Outcome, Ui};
@@ -29,7 +29,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let report = stiffness::measure(&arguments.record, &shown, &arguments.reading.reading()?).map_err(refused)?;
     ui.findings(None, &report.warnings);
     let files = arguments.plot.write("Stiffness", || figure::stiffness(&report))?.unwrap_or_default();
-    ui.result(&Identified { record: shown, report, files });
+    let measured = Measured::of(&["actuator.axial_stiffness"], report.simulated);
+    ui.result(&Identified { record: shown, report, measured, files });
     Ok(())
 }
 
@@ -43,7 +44,7 @@ impl Outcome for Identified<StiffnessReport> {
         format!(
             "{}: k = {:.4} ± {:.4} N/µm (standard error); {creep}, drift {:.3} nm/s; without these corrections {:.4} N/µm\n  \
              {} samples ({:.0} independent), force {:.3} N to {:.3} N, residual {:.3} nm rms\nlines for the spec:\n[actuator]\n\
-             axial_stiffness = \"{:.4e} N/m\"\n{}",
+             axial_stiffness = \"{:.4e} N/m\"\n{}{}",
             self.record,
             report.stiffness * 1e-6,
             report.error * 1e-6,
@@ -55,6 +56,7 @@ impl Outcome for Identified<StiffnessReport> {
             report.force[1],
             report.residual_rms * 1e9,
             report.stiffness,
+            self.measured.text(),
             self.files
         )
     }

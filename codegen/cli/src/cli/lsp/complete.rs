@@ -65,6 +65,7 @@ fn values(shape: Shape, example: &str, before: &str, folder: &Path) -> Vec<Compl
         },
         Shape::Records => Item::File,
         Shape::Reasons => return Vec::new(),
+        Shape::Paths => return paths(text),
     };
     match first {
         Item::Quantity { dimension, .. } if quoted => {
@@ -78,6 +79,13 @@ fn values(shape: Shape, example: &str, before: &str, folder: &Path) -> Vec<Compl
         _ if quoted => Vec::new(),
         _ => vec![item(example, CompletionItemKind::VALUE, example, "the form of a value")],
     }
+}
+
+/// Every key by its path, as `write` puts it.
+fn paths(write: impl Fn(&str) -> String) -> Vec<CompletionItem> {
+    let sections = SECTIONS.iter().filter(|section| !section.name.is_empty());
+    let keys = sections.flat_map(|section| section.keys.iter().map(move |key| (section.path(key.name), key.doc)));
+    keys.map(|(path, doc)| item(&path, CompletionItemKind::PROPERTY, write(&path), doc)).collect()
 }
 
 /// CSV files beside the spec and one folder below.

@@ -5,9 +5,14 @@ use std::collections::BTreeMap;
 const TEMPLATE: &str = include_str!("template.toml");
 const HEAD: &str = "\
 #:schema ./platform.schema.json
-# Values that were not given are marked: (assumed) is as in the paper's platform, (computed) follows from the others. Replace
-# them as you measure. `specgen check` says what does not fit together; docs/spec-reference.md has every key.
+# Values that were not given are marked: (assumed) is as in the paper's platform, (computed) follows from the others.
+# `assumed` names them. Take an entry out once its value is measured or decided: `specgen check` counts the rest, and a real
+# board takes the controller with --assumed-ok only while any remain. docs/spec-reference.md has every key.
 ";
+/// Widest line of the list of assumed values, letters.
+const WIDTH: usize = 110;
+/// Its file says of itself that it is simulated.
+const RECORDS: &str = "hysteresis.records";
 
 /// Where a value comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,14 +63,18 @@ impl Draft {
             .unwrap_or_default()
     }
 
-    /// Values that nobody gave and nothing was computed from.
-    pub fn assumed(&self) -> usize {
-        self.entries().filter(|(key, _, _, comment)| !comment.is_empty() && !self.values.contains_key(key)).count()
+    /// Paths of the values that nobody gave: taken from the template, or computed. The gauges' places are one.
+    pub fn assumed(&self) -> Vec<String> {
+        let open = self.entries().map(|(key, ..)| key).filter(|key| key != RECORDS && !self.is_given(key));
+        let mut paths: Vec<String> =
+            open.map(|key| key.split_once('[').map_or(key.clone(), |(section, _)| section.to_owned())).collect();
+        paths.dedup();
+        paths
     }
 
     /// The whole file.
     pub fn text(&self, name: &str) -> String {
-        let mut text = format!("{HEAD}schema = 1\nname = \"{name}\"\n");
+        let mut text = format!("{HEAD}schema = 1\nname = \"{name}\"\n{}", list(&self.assumed()));
         let mut header = "";
         let mut section: Vec<[String; 3]> = Vec::new();
         let mut last = String::new();
@@ -77,7 +86,7 @@ impl Draft {
                 (header, last) = (name, at.to_owned());
             }
             let origin = match self.values.get(&key) {
-                _ if comment.is_empty() => "",
+                _ if comment.is_empty() || key == RECORDS => "",
                 None => " (assumed)",
                 Some((_, Origin::Computed)) => " (computed)",
                 Some((_, Origin::Given)) => "",
@@ -109,6 +118,23 @@ fn lines() -> impl Iterator<Item = (String, &'static str, &'static str, &'static
         let section = if header.starts_with("[[") { format!("{section}[{}]", gauges - 1) } else { section.to_owned() };
         Some((format!("{section}.{key}"), header, value, comment))
     })
+}
+
+/// The key that names assumed values; nothing where there are none.
+fn list(paths: &[String]) -> String {
+    if paths.is_empty() {
+        return String::new();
+    }
+    let mut lines = vec![String::new()];
+    for path in paths {
+        let item = format!("\"{path}\",");
+        match lines.last_mut() {
+            Some(line) if line.is_empty() => *line = item,
+            Some(line) if line.len() + item.len() < WIDTH => *line = format!("{line} {item}"),
+            _ => lines.push(item),
+        }
+    }
+    format!("assumed = [\n    {}\n]\n", lines.join("\n    "))
 }
 
 /// A section with its values and comments in columns.

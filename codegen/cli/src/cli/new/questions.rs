@@ -79,7 +79,7 @@ pub fn literal(question: &Question, answer: &str) -> String {
     let (item, list) = match key.shape {
         Shape::One(item) => (item, false),
         Shape::List(items) | Shape::Leading(_, items) | Shape::Rows(_, items) => (items[0], true),
-        Shape::Records | Shape::Reasons => (Item::File, true),
+        Shape::Records | Shape::Reasons | Shape::Paths => (Item::File, true),
     };
     let one = |text: &str| {
         let text = text.trim();

@@ -4,7 +4,7 @@ use super::layout;
 use crate::lower::kinematics::leg_jacobian;
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::Model;
-use specgen_numerics::multiply6;
+use specgen_numerics::{Matrix6, multiply6};
 
 /// Noise of one gauge reading and what it becomes, rms. Gauges are independent of each other, and the converter's error is spread
 /// evenly over its step.
@@ -31,6 +31,26 @@ pub fn readings_per_pose(model: &Model) -> Result<Option<[[f64; 6]; 6]>, Vec<Dia
     }
 }
 
+/// Pose coordinates (rows) per reading of each gauge (columns) at rest, m/m and rad/m; none without gauges that see the platform.
+///
+/// # Errors
+/// Gauges that do not fix the pose.
+pub fn poses_per_reading(model: &Model) -> Result<Option<Matrix6>, Vec<Diagnostic>> {
+    match &model.task_space {
+        Some(task) => Ok(Some(layout::check(model, &task.probes)?.inverse)),
+        None => Ok(None),
+    }
+}
+
+/// Noise of a reading, quantisation included, and that of the quantisation alone: a step over √12. Rms, m.
+#[must_use]
+pub fn reading_noise(model: &Model) -> [f64; 2] {
+    let [low, high] = model.sensor.range;
+    let step = (high - low) / libm::exp2(f64::from(model.sensor.bits));
+    let quantisation = step / libm::sqrt(12.0);
+    [libm::sqrt(model.sensor.noise * model.sensor.noise + quantisation * quantisation), quantisation]
+}
+
 /// Pose noise of a platform with gauges; none for one without.
 ///
 /// # Errors
@@ -40,10 +60,7 @@ pub fn pose_noise(model: &Model) -> Result<Option<PoseNoise>, Vec<Diagnostic>> {
         return Ok(None);
     };
     let layout = layout::check(model, &task.probes)?;
-    let [low, high] = model.sensor.range;
-    let step = (high - low) / libm::exp2(f64::from(model.sensor.bits));
-    let quantisation = step / libm::sqrt(12.0);
-    let reading = libm::sqrt(model.sensor.noise * model.sensor.noise + quantisation * quantisation);
+    let [reading, quantisation] = reading_noise(model);
     let norm = |row: [f64; 6]| libm::sqrt(row.iter().fold(0.0, |sum, part| sum + part * part));
     let of_legs = leg_jacobian(&model.geometry).map(|legs| multiply6(&legs, &layout.inverse));
     Ok(Some(PoseNoise {

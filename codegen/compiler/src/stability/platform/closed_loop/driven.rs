@@ -5,6 +5,20 @@ use specgen_numerics::nyquist::{Complex, times};
 use specgen_numerics::{Matrix, Resolvent};
 
 impl ClosedLoop {
+    /// The matrix of a tick, and what six inputs in modal coordinates do to the states: a correction of the request, or an error of what
+    /// the gauges show.
+    pub(in super::super) fn driven(
+        &self,
+        law: Law,
+        tuning: &Tuning,
+        conditions: &Conditions,
+        on_gauges: bool,
+    ) -> (Matrix, Vec<[f64; 6]>) {
+        let mut assembly = Assembly::new(self, law, tuning, conditions);
+        assembly.on_gauges = on_gauges;
+        assembly.driven()
+    }
+
     /// What the gauges show at the end of an interval by the correction that is given for it, both in modal coordinates, at each of the angles
     /// ωT_s: T(z) = z C (z − A)⁻¹ B of the transition A, row by row, as (real, imaginary).
     #[must_use]
@@ -16,7 +30,7 @@ impl ClosedLoop {
         angles: &[f64],
     ) -> Vec<[[Complex; 6]; 6]> {
         let shown = shown(self.lags_used()[1]);
-        let (transition, input) = Assembly::new(self, law, tuning, conditions).driven();
+        let (transition, input) = self.driven(law, tuning, conditions, false);
         let mut resolvent = Resolvent::new(&transition, &input);
         let mut found = Vec::with_capacity(angles.len());
         for angle in angles {
@@ -31,7 +45,7 @@ impl ClosedLoop {
     #[must_use]
     pub fn without_feedback(&self, requests: &[[f64; 6]]) -> Vec<[f64; 6]> {
         let law = Law::Feedforward(Adapting::Invhys);
-        let (transition, input) = Assembly::new(self, law, &Tuning::NONE, &Conditions::NOMINAL).driven();
+        let (transition, input) = self.driven(law, &Tuning::NONE, &Conditions::NOMINAL, false);
         let shown = shown(self.lags_used()[1]);
         let mut found = Vec::with_capacity(requests.len());
         over_time(&transition, &input, requests, |states| {
@@ -44,9 +58,7 @@ impl ClosedLoop {
     /// coordinates.
     #[must_use]
     pub fn left(&self, law: Law, tuning: &Tuning, errors: &[[f64; 6]]) -> Vec<[f64; 6]> {
-        let mut assembly = Assembly::new(self, law, tuning, &Conditions::NOMINAL);
-        assembly.on_gauges = true;
-        let (transition, input) = assembly.driven();
+        let (transition, input) = self.driven(law, tuning, &Conditions::NOMINAL, true);
         let shown = shown(self.lags_used()[1]);
         let mut given = errors.iter();
         let mut last = [0.0; 6];

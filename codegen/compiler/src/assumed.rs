@@ -1,0 +1,102 @@
+//! What a controller rests on that nobody measured: what the spec names as assumed, and records that a simulation made.
+
+use serde::Serialize;
+
+use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::model::Model;
+
+/// Values and records that nobody measured.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct Assumptions {
+    /// Paths of keys and repeated sections, as the spec's `assumed` names them.
+    pub values: Vec<String>,
+    /// Files of the spec's `[hysteresis]` that are marked as simulated.
+    pub simulated: Vec<String>,
+}
+
+impl Assumptions {
+    /// Those of `model`, whose files `simulated` are marked so.
+    #[must_use]
+    pub fn of(model: &Model, simulated: Vec<String>) -> Self {
+        Self { values: model.assumed.clone(), simulated }
+    }
+
+    /// Whether everything is measured or known.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty() && self.simulated.is_empty()
+    }
+
+    /// How many values, such as `13 assumed values`; none if there is none.
+    #[must_use]
+    pub fn count(&self) -> Option<String> {
+        match self.values.len() {
+            0 => None,
+            1 => Some("1 assumed value".to_owned()),
+            many => Some(format!("{many} assumed values")),
+        }
+    }
+
+    /// The records, such as `simulated leg record`; none if there is none.
+    #[must_use]
+    pub fn records(&self) -> Option<String> {
+        match self.simulated.len() {
+            0 => None,
+            1 => Some("simulated leg record".to_owned()),
+            many => Some(format!("{many} simulated leg records")),
+        }
+    }
+
+    /// All of them in a few words: `13 assumed values, simulated leg record`; empty if there is none.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        self.count().into_iter().chain(self.records()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Each by what a user finds it under: a path of the spec, or a file.
+    #[must_use]
+    pub fn list(&self) -> Vec<String> {
+        let files = self.simulated.iter().map(|file| format!("hysteresis: {file} (simulated)"));
+        self.values.iter().cloned().chain(files).collect()
+    }
+
+    /// Why no real machine takes the controller of `model` without being asked to, at the list in the spec.
+    #[must_use]
+    pub fn refusal(&self, model: &Model) -> Diagnostic {
+        let clear = [
+            (!self.values.is_empty())
+                .then_some("measure or look up these values and take their entries out of `assumed`"),
+            (!self.simulated.is_empty()).then_some("name a record of the machine's own legs in `hysteresis.records`"),
+        ];
+        let clear: Vec<&str> = clear.into_iter().flatten().collect();
+        Diagnostic::at(
+            &model.spans,
+            &[if self.values.is_empty() { "hysteresis.records" } else { "assumed" }],
+            codes::ASSUMED_ON_BOARD,
+            format!("the controller of a real machine would rest on {}: {}", self.summary(), self.list().join(", ")),
+            format!("{}; or accept them with --assumed-ok", clear.join(", and ")),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn they_are_counted_in_words() {
+        let of = |values: usize, records: usize| Assumptions {
+            values: vec!["sensor.noise".to_owned(); values],
+            simulated: vec!["leg.csv".to_owned(); records],
+        };
+        for (values, records, expected) in [
+            (13, 1, "13 assumed values, simulated leg record"),
+            (1, 0, "1 assumed value"),
+            (0, 6, "6 simulated leg records"),
+            (0, 0, ""),
+        ] {
+            assert_eq!(of(values, records).summary(), expected);
+            assert_eq!(of(values, records).is_empty(), expected.is_empty());
+        }
+    }
+}
