@@ -42,6 +42,7 @@ mod requirements;
 mod sensing;
 mod sensing_emitted;
 mod setpoint;
+mod setpoint_emitted;
 mod settings;
 mod spec_corpus;
 mod spec_errors;

@@ -1,17 +1,10 @@
-//! Set-points of the compiled controller: trajectories against the host's own formulas, tables against their rows, and what is
-//! refused when compiling.
+//! Set-points as they are compiled: trajectories against the host's own formulas, tables against their rows, and what is refused or
+//! warned of.
 
-use std::fs;
-
-use host_sim::controller::{Controller, TickController};
-use host_sim::coverage::Coverage;
-use host_sim::plant::LegParameters;
-use host_sim::platform::rig::Noise;
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTrajectory, Reading, Step};
 use specgen::diagnostic::Diagnostic;
 use specgen::ir::{self, Scalar};
 use specgen::lower::setpoint;
-use specgen::machine;
 use specgen::model::{self, Model, Trajectory, TrajectoryKind};
 use specgen::spec::{self, SpecSource};
 use specgen::waveform::{self, Waveform};
@@ -20,10 +13,10 @@ use specgen_runtime::setpoint as runtime;
 use specgen_runtime::setpoint::{
     BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Setpoints, StopLimits, Target,
 };
-use specgen_tests::{Emitted, compile_edited, repository, worse};
+use specgen_tests::{repository, worse};
 
-const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
-const PATHS: [(model::PaperPath, PaperPath); 3] = [
+pub const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
+pub const PATHS: [(model::PaperPath, PaperPath); 3] = [
     (model::PaperPath::Case1, PaperPath::Case1),
     (model::PaperPath::Case2, PaperPath::Case2),
     (model::PaperPath::Machining, PaperPath::Machining),
@@ -144,7 +137,7 @@ fn play<T: Real + Into<f64>>(model: &Model, plan: &Setpoints<T, Parallel>, selec
 }
 
 /// What is compared is the whole path, and nothing behind it.
-fn assert_whole(ticks: usize, host: &dyn PoseTrajectory, period: f64) {
+pub fn assert_whole(ticks: usize, host: &dyn PoseTrajectory, period: f64) {
     let seconds = ticks as f64 * period;
     assert!((seconds - host.duration()).abs() < period, "{seconds} s of {} s", host.duration());
 }
@@ -307,7 +300,7 @@ fn paths_out_of_reach_too_fast_or_too_slow_for_the_ticks_are_refused() {
 }
 
 /// A figure of eight that starts and ends at rest, sampled every ms.
-fn eight() -> String {
+pub fn eight() -> String {
     let mut text = "# made by a test\ntime_ms,x_um,y_um,theta_z_urad\n".to_owned();
     for k in 0..=400 {
         let w = 0.5 - 0.5 * (std::f64::consts::PI * f64::from(k) / 400.0).cos();
@@ -389,171 +382,56 @@ fn tables_with_jumps_wrong_units_or_places_out_of_reach_are_refused_by_line() {
     assert_eq!((codes(&found), line(&found[0]).1), (vec!["E0457"], Some(66)));
 }
 
-/// What a user does: tables beside the spec, played by the emitted controller.
-const WITH_TABLE: (&str, &str) = (
-    "[timing]",
-    "[[trajectory]]\nname = \"eight\"\nkind = \"waveform\"\nfile = \"records/eight.csv\"\nperiod = \"1 ms\"\n\n[timing]",
-);
-const WITH_TABLES: (&str, &str) = (
-    "[timing]",
-    "[[trajectory]]\nname = \"eight\"\nkind = \"waveform\"\nfile = \"records/eight.csv\"\nperiod = \"1 ms\"\n\n\
-     [[trajectory]]\nname = \"line\"\nkind = \"waveform\"\nfile = \"records/line.csv\"\nperiod = \"10 ms\"\n\n[timing]",
-);
-
-/// From x = −3 µm, where the bias is not, to 3 µm in a second.
-fn line() -> String {
-    (0..=100).fold("x_um\n".to_owned(), |text, k| text + &format!("{}\n", -3.0 + 0.06 * f64::from(k)))
-}
-
-/// `target` of an emitted controller that stands at its bias and then plays a trajectory, and the bias.
-fn emitted_targets(controller: &mut Controller, selector: u64) -> (Vec<[f64; 6]>, [f64; 6]) {
-    let description = controller.description().clone();
-    let at = |name: &str| description.input(name).unwrap();
-    let (command, select) = (at("command"), at("selector"));
-    let (target, status) = (description.output("target[0]").unwrap(), description.output("status").unwrap());
-    let mut input = vec![description.scalar.encode(0.0); description.input_names.len()];
-    input[command] = 0;
-    input[select] = selector;
-    input[at("sequence")] = 0;
-    let mut output = vec![0; description.output_names.len()];
-    let mut tick = |input: &[u64]| {
-        controller.step(input, &mut output);
-        let pose: [f64; 6] = std::array::from_fn(|axis| description.scalar.decode(output[target + axis]));
-        (pose, output[status] & 0x7_0000)
-    };
-    let bias = loop {
-        let (pose, status) = tick(&input);
-        if status == 0 {
-            break pose;
-        }
-    };
-    input[command] = 3;
-    let mut poses = Vec::new();
-    loop {
-        let (pose, status) = tick(&input);
-        poses.push(std::array::from_fn(|axis| pose[axis] - bias[axis]));
-        if status == 0 {
-            return (poses, bias);
-        }
-        assert_eq!(status, u64::from(BUSY));
-    }
-}
-
-#[test]
-fn the_emitted_controller_plays_the_papers_paths_and_a_table() {
-    let text = eight();
-    let rows = waveform::parse(&text, "eight.csv", 1e-3).unwrap().rows;
-    for (name, edits, tolerance) in
-        [("setpoint-f64", &[WITH_TABLES][..], 1e-12), ("setpoint-f32", &[WITH_TABLES, F32][..], 0.1e-9)]
-    {
-        let records = [("eight.csv", text.clone()), ("line.csv", line())];
-        let emitted = Emitted::with_records(name, "reference.toml", edits, &records);
-        let mut controller = emitted.controller();
-        for (selector, (_, path)) in (0..).zip(PATHS) {
-            controller.reset();
-            let host = PaperPose::corrected(path, 1.0);
-            let (poses, bias) = emitted_targets(&mut controller, selector);
-            assert!((bias[2] - 10e-6).abs() < 1e-12 && bias[0] == 0.0);
-            assert_whole(poses.len(), &host, 100e-6);
-            let mut worst = 0.0_f64;
-            for (tick, pose) in (1..).zip(&poses) {
-                let expected = host.target(f64::from(tick) * 100e-6).pose;
-                worst = (0..3).fold(worst, |worst, axis| worse(worst, (pose[axis] - expected[axis]).abs()));
-            }
-            println!("{name} {path:?}: {worst:.1e} m");
-            assert!(worst <= tolerance, "{name} {path:?}: {worst:e}");
-        }
-        controller.reset();
-        let (poses, _) = emitted_targets(&mut controller, 3);
-        assert_eq!(poses.len(), 10 * (rows.len() - 1));
-        for (row, pose) in rows[1..].iter().zip(poses.iter().skip(9).step_by(10)) {
-            assert!((0..3).all(|axis| (pose[axis] - row[axis]).abs() <= tolerance), "{row:?} {pose:?}");
-        }
-        // A path that does not start at the bias: busy from the first tick of the way there to the end.
-        controller.reset();
-        let (poses, _) = emitted_targets(&mut controller, 4);
-        let approach = poses.len().checked_sub(10_000).expect("the path is played");
-        assert!(approach > 100 && (poses[approach - 1][0] + 3e-6).abs() <= tolerance, "{approach} ticks");
-        assert!(
-            (poses[approach + 4999][0]).abs() <= tolerance && (poses[approach + 9999][0] - 3e-6).abs() <= tolerance
-        );
-        if name == "setpoint-f64" {
-            scored_whole(&emitted, &mut controller);
-        }
-    }
-}
-
-/// The simulation scores that path, and nothing else.
-fn scored_whole(emitted: &Emitted, controller: &mut Controller) {
-    let model = &emitted.compiled.model;
+/// A table of x (µm) in rows 1 ms apart that repeats: the warnings, or what refuses it.
+fn repeated(rows: impl Iterator<Item = f64>) -> Vec<Diagnostic> {
+    let text = rows.fold("x_um\n".to_owned(), |text, um| text + &format!("{um:e}\n"));
+    let waveform = waveform::parse(&text, "wave.csv", 1e-3).unwrap();
+    let kind = TrajectoryKind::Waveform { file: "wave.csv".to_owned(), period: 1e-3, repeat: true };
+    let model = with_trajectories(vec![kind]);
     let task = model.task_space.as_ref().unwrap();
-    let specimen = machine::specimen(model, task, &LegParameters::reference(), Some(1));
-    let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), 1);
-    let path = machine::on_board(&emitted.compiled, 4).unwrap();
-    assert_eq!((path.ticks, path.repeats, path.approach.unwrap()[0]), (10_000, false, -3e-6));
-    let run = scenario.play(controller, &path, None).unwrap();
-    let errors = run.scored().unwrap();
-    println!("line: {}, {:.2} nm rms", errors.coverage(), errors.rms_translation_nm());
-    assert_eq!(errors.coverage(), Coverage::new(10_000, 10_000, model.timing.period));
-    assert!((0.5..5.0).contains(&errors.rms_translation_nm()));
-    // Case 1 begins at the bias.
-    assert_eq!(machine::on_board(&emitted.compiled, 0).unwrap().approach, None);
-    assert_eq!(machine::on_board(&emitted.compiled, 5), None);
-}
-
-#[test]
-fn a_table_is_part_of_the_digest_and_its_absence_is_reported() {
-    let digest = |text: String| {
-        compile_edited("setpoint-digest", "reference.toml", &[WITH_TABLE], &[("eight.csv", text)]).ir.digest
-    };
-    assert_ne!(digest(eight()), digest(eight().replacen("# made", "# Made", 1)));
-    let folder = tempfile::tempdir().unwrap();
-    let specs = repository().join("specs");
-    let text = fs::read_to_string(specs.join("reference.toml")).unwrap().replace(WITH_TABLE.0, WITH_TABLE.1);
-    fs::create_dir(folder.path().join("records")).unwrap();
-    fs::copy(specs.join("records/reference-forc.csv"), folder.path().join("records/reference-forc.csv")).unwrap();
-    let path = folder.path().join("platform.toml");
-    fs::write(&path, text).unwrap();
-    let refused = specgen::compile::compile(&path).unwrap_err();
-    assert!(refused.findings.iter().any(|d| d.code == "E0501" || d.code == "E0306"), "{:#?}", refused.findings);
-}
-
-/// Mean instructions of the stage on the M7 in f64: standing, streaming, moving, playing.
-const BUDGETS: [(&str, f64); 4] = [("hold", 150.0), ("stream", 300.0), ("move", 300.0), ("trajectory", 450.0)];
-
-/// `cargo test -p specgen-tests setpoint instructions -- --nocapture` prints the figures.
-#[test]
-fn set_points_stay_within_their_instructions() {
-    let emitted = Emitted::new("setpoint-budget", "reference.toml", &[]);
-    let Some(image) = emitted.image(model::Mcu::Mps2An500) else { return };
-    let mut controller = emitted.controller();
-    let description = controller.description().clone();
-    let at = |name: &str| description.input(name).unwrap();
-    let (command, selector, sequence, x, rate) =
-        (at("command"), at("selector"), at("sequence"), at("setpoint[0]"), at("setpoint_rate[0]"));
-    for (kind, (name, budget)) in [0, 1, 2, 3].into_iter().zip(BUDGETS) {
-        // The bias for a tenth of the ticks, then one thing only. The stage runs after the tick's own generator, with the same
-        // command: of a stream it sees the ticks between fresh set-points.
-        let mut words = Vec::new();
-        for tick in 0..12_000_u64 {
-            let mut row = vec![0; description.input_names.len()];
-            row[command] = kind;
-            // Machining, whose sinusoids turn on five axes.
-            row[selector] = 2;
-            row[sequence] = tick;
-            let time = 1e-4 * tick as f64;
-            let place =
-                if kind == 2 { 30e-6 } else { 5e-6 * (6.0 * (time - 0.13)).sin() * f64::from(u8::from(time > 0.13)) };
-            row[x] = description.scalar.encode(place);
-            row[rate] = description.scalar.encode(if kind == 1 { 30e-6 } else { 0.0 });
-            words.extend(row);
-        }
-        let inputs = host_sim::stimulus::InputRecording { width: description.input_names.len(), words };
-        let (host, config) = specgen_tests::host_trace(&mut controller, &[], &inputs);
-        let m = specgen::verify::measure(&image, &config, &host).unwrap();
-        assert_eq!(m.first_difference, None, "{name}");
-        let stage = m.stage("setpoint").unwrap();
-        println!("{name}: {:.0} mean, {} to {} of {} calls", stage.mean, stage.min, stage.max, stage.calls);
-        assert!(stage.mean <= budget, "{name}: {} instructions", stage.mean);
+    match setpoint::lower(&model, task, &[Some(waveform)], Scalar::F64) {
+        Ok((_, warnings)) => warnings,
+        Err(found) => found,
     }
+}
+
+/// 3 µm, so many cycles in a second.
+fn sine(cycles: f64) -> impl Iterator<Item = f64> {
+    (0..1000).map(move |k| 3.0 * (std::f64::consts::TAU * cycles * f64::from(k) / 1000.0).sin())
+}
+
+#[test]
+fn the_wrap_of_a_table_is_judged_as_any_corner() {
+    for (cycles, expected) in [
+        (1.3, "where it begins again: to the first row x goes by -2.8"),
+        (1.5, "its speed changes by 56.5"),
+        (2.5, "its speed changes by 94.2"),
+    ] {
+        let found = repeated(sine(cycles));
+        assert_eq!(codes(&found), ["W0458"], "{cycles}: {found:#?}");
+        assert!(found[0].message.contains(expected), "{cycles}: {}", found[0].message);
+        assert!(found[0].message.contains("where it begins again") && found[0].help.contains("whole cycles"));
+    }
+    // Half a cycle turns by 18.8 um/s, at which the lowest mode rings by less than a gauge sees.
+    for cycles in [0.5, 1.0, 2.0, 7.0] {
+        assert_eq!(codes(&repeated(sine(cycles))), [""; 0], "{cycles}");
+    }
+    // An ordinary corner, within the table.
+    let triangle = (50..450).map(|k: i32| 0.05 * f64::from(100 - (k % 200 - 100).abs()));
+    let found = repeated(triangle);
+    assert!(codes(&found) == ["W0458"] && found[0].message.contains("here, where the speed of x changes by"), "{found:#?}");
+}
+
+#[test]
+fn a_closing_row_is_the_first_again_within_what_a_table_resolves() {
+    for closing in [0.0, -1.2e-15, 3.0 * std::f64::consts::TAU.sin(), 1e-9] {
+        let found = repeated(sine(1.0).chain([closing]));
+        assert_eq!(codes(&found), ["E0457"], "{closing:e}: {found:#?}");
+    }
+    // A row of its own, as far from the first as its neighbour is; and one that only comes near it.
+    assert_eq!(codes(&repeated(sine(1.0))), [""; 0]);
+    assert_eq!(codes(&repeated(sine(3.0).chain([1e-3]))), ["W0458"]);
+    // About a turning point rows lie close together.
+    let cosine = (0..1000).map(|k| 3.0 * (std::f64::consts::TAU * f64::from(k) / 1000.0).cos());
+    assert_eq!(codes(&repeated(cosine)), [""; 0]);
 }

@@ -126,6 +126,11 @@ fn six_legs_and_a_platform_are_bit_equal_in_closed_loop_and_legs_outrun_real_tim
     assert!(number(&result["ticks"]) > 2000.0);
     let row = &result["free_motion"][0];
     assert_eq!((&row["trajectory"], &row["mode"]), (&"case-1".into(), &"pf-pcc".into()), "{row:#}");
+    // A part was asked for, and the figure says so.
+    assert!(
+        (number(&row["seconds"]) - 0.1).abs() < 1e-9 && (number(&row["path_seconds"]) - 0.25).abs() < 1e-9,
+        "{row:#}"
+    );
     let names: Vec<&str> =
         result["costs"].as_array().unwrap().iter().map(|cost| cost["name"].as_str().unwrap()).collect();
     assert!(names.starts_with(&["supervise", "sense"]), "{names:?}");

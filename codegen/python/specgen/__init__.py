@@ -33,13 +33,14 @@ from ._commands import (
     tune,
 )
 from ._controller import Controller
-from ._findings import Error, Finding, Interrupted, Refused, Result, Unavailable, UsageError
+from ._findings import EndedEarly, Error, Finding, Interrupted, Refused, Result, Unavailable, UsageError
 from ._machine import Machine
 from ._table import Table, read_table
 
 __all__ = [
     "Compiled",
     "Controller",
+    "EndedEarly",
     "Error",
     "Finding",
     "Identification",

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 from . import _native
 from ._controller import Controller
-from ._findings import Error, Interrupted, Refused, Result, Unavailable, UsageError, findings_of
+from ._findings import EndedEarly, Error, Interrupted, Refused, Result, Unavailable, UsageError, findings_of
 from ._table import Table, read_table
 
 StrPath: TypeAlias = str | PathLike[str]
@@ -25,7 +25,7 @@ def command(*arguments: str | PathLike[str], progress: Progress = False) -> Resu
 
     The interpreter is free meanwhile. ``progress`` is called with each line of progress; True prints them to standard error.
 
-    Raises `Refused`, `UsageError`, `Unavailable`, `Interrupted` (with what was found so far) or KeyboardInterrupt. A figure beyond
+    Raises `Refused`, `UsageError`, `Unavailable`, `EndedEarly`, `Interrupted` (with what was found so far) or KeyboardInterrupt. A figure beyond
     its limit raises nothing: `Result.passed` is then False.
     """
     return result_of(json.loads(_native.call([fspath(argument) for argument in arguments], listener(progress))))
@@ -54,6 +54,8 @@ def result_of(document: dict[str, Any]) -> Result:
             return Result(data, findings, error)
         case 2, _:
             raise UsageError(error)
+        case 4, _:
+            raise EndedEarly(error, Result(data, findings, error) if data else None)
         case _:
             raise Unavailable(error)
 

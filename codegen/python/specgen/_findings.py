@@ -85,6 +85,14 @@ class Unavailable(Error):
     and ``Controller`` of a library that was built elsewhere need none."""
 
 
+class EndedEarly(Error):
+    """A simulated run did not come to the end of its path, so that it has no figure. ``result`` has the other runs, if there are any."""
+
+    def __init__(self, message: str, result: Result | None) -> None:
+        super().__init__(message)
+        self.result = result
+
+
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C, with what was found until then."""
 

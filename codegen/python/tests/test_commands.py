@@ -70,7 +70,9 @@ def test_traces_are_the_run() -> None:
     rms = 1e9 * np.sqrt(np.mean(np.square(trace["error"]), axis=0))
     # The file has five digits.
     assert np.allclose(rms, found["rms_nano"], rtol=1e-5)
-    assert set(trace["status_text"]) == {"moving"}
+    # The last tick is where it comes to rest.
+    assert set(trace["status_text"][:-1]) == {"moving"} and trace["status_text"][-1] != "moving"
+    assert len(trace["time_s"]) * 1e-4 == pytest.approx(found["seconds"]) and found["seconds"] == found["path_seconds"]
 
 
 def test_legs_are_simulated_too() -> None:

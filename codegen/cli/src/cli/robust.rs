@@ -148,8 +148,7 @@ fn study(arguments: &StudyArguments, ui: &mut Ui) -> Result<(), Failure> {
     let learning = match arguments.learn {
         Some(passes) => {
             takes_correction(&compiled)?;
-            let learning =
-                Learning::of(&compiled, &followed.choice, &factors, BANDWIDTH, passes)?;
+            let learning = Learning::of(&compiled, &followed.choice, &factors, BANDWIDTH, passes)?;
             Some(learning.ok_or_else(|| Failure::Gate(NOWHERE.to_owned()))?)
         }
         None => None,

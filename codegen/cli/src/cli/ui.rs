@@ -392,3 +392,40 @@ fn refused_file(refused: &Refused) -> &str {
         _ => "the input",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use host_sim::coverage::Coverage;
+
+    use super::*;
+
+    #[derive(Serialize)]
+    struct Found(u32);
+
+    impl Outcome for Found {
+        fn text(&self) -> String {
+            String::new()
+        }
+    }
+
+    #[test]
+    fn a_run_that_ended_early_has_a_message_and_an_exit_code_of_its_own() {
+        let early = RunError::EndedEarly { coverage: Coverage::new(500, 10_000, 1e-4), status: 0 };
+        let other = RunError::NotReady { limit: 1.0, status: 0 };
+        for (error, expected) in [(early, ENDED_EARLY), (other, ENVIRONMENT)] {
+            let message = error.to_string();
+            let mut ui = Ui::called(|_| (), None);
+            assert_eq!(ui.failed(&error.into()), expected, "{message}");
+            let document = ui.taken();
+            assert_eq!((&document["error"], &document["result"]), (&json!(message), &Value::Null));
+        }
+        // Of several, with the figures of the others.
+        let mut ui = Ui::called(|_| (), None);
+        assert!(ui.scored(&Found(3), &[]).is_ok());
+        let failure = ui.scored(&Found(3), &["line".to_owned()]).unwrap_err();
+        assert_eq!(ui.failed(&failure), ENDED_EARLY);
+        let document = ui.taken();
+        assert_eq!(document["result"], json!(3));
+        assert!(document["error"].as_str().is_some_and(|text| text.ends_with("no figure: line")), "{document:#}");
+    }
+}

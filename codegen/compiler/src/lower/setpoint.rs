@@ -2,6 +2,7 @@
 //! workspace and the limits that the spec declares.
 
 mod check;
+mod corners;
 mod declared;
 pub(super) mod motions;
 mod paper;
@@ -13,7 +14,7 @@ mod stopping;
 mod table;
 
 #[cfg(test)]
-pub(crate) use declared::step;
+pub(crate) use corners::step;
 pub use declared::{Declared, declared};
 pub use poses::{Stretch, stretches};
 pub use stopping::{Stopping, check as check_stops, describe as describe_stops};

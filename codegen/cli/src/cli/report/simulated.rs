@@ -98,11 +98,10 @@ fn of_platform(
     let first = all.iter().find(|one| one.run.is_some());
     let said = first.map(|first| {
         let of = all.iter().filter(|one| one.name == first.name);
-        let each =
-            of.filter_map(|one| {
-                let (rms, coverage) = (one.rms()?, one.coverage()?);
-                Some(format!("{}\u{2009}nm at {} over {coverage}", short(norm(&rms, false)), one.speed()))
-            });
+        let each = of.filter_map(|one| {
+            let (rms, coverage) = (one.rms()?, one.coverage()?);
+            Some(format!("{}\u{2009}nm at {} over {coverage}", short(norm(&rms, false)), one.speed()))
+        });
         each.collect::<Vec<_>>().join(", ")
     });
     let errors = Errors {
@@ -164,13 +163,10 @@ fn of_legs(
     sections.push(budget::of_legs(&leg, mode, Pair { own: &mut *controller, fine }, SEED)?);
     sections.push(margins::section(compiled, mode as u32, &shell::on("specgen check", name, "")));
     sections.push(hysteresis::of_legs(&leg, model.actuator.voltage[0], &compiled.records));
-    let said = values
-        .iter()
-        .zip(LEG_FREQUENCIES)
-        .map(|((_, nm, coverage), hertz)| {
-            let over = coverage.map_or_else(String::new, |coverage| format!(" over {coverage}"));
-            format!("{}\u{2009}nm at {hertz}\u{2009}Hz{over}", short(*nm))
-        });
+    let said = values.iter().zip(LEG_FREQUENCIES).map(|((_, nm, coverage), hertz)| {
+        let over = coverage.map_or_else(String::new, |coverage| format!(" over {coverage}"));
+        format!("{}\u{2009}nm at {hertz}\u{2009}Hz{over}", short(*nm))
+    });
     let said = said.collect::<Vec<_>>().join(", ");
     let line = Line { name: "leg trajectory".to_owned(), values, note: String::new(), limit: None };
     let speeds = LEG_FREQUENCIES.map(|hertz| Some(format!("{hertz}\u{2009}Hz")));

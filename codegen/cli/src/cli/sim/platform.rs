@@ -176,7 +176,9 @@ enum Found {
         text: String,
     },
     /// The true pose against the target, a row a motion.
-    Motions { motions: Vec<Motion> },
+    Motions {
+        motions: Vec<Motion>,
+    },
     Trajectory(Played),
     /// The only run ended early.
     Nothing {},
@@ -213,11 +215,8 @@ impl Played {
         for (axis, name) in AXES.iter().enumerate() {
             let unit = if axis < 3 { "nm" } else { "nrad" };
             // Writing to a String cannot fail, here and below.
-            let _ = writeln!(
-                out,
-                "  {name:<5}{:>10.2} {unit} rms{:>10.2} {unit} peak",
-                rms_nano[axis], peak_nano[axis]
-            );
+            let _ =
+                writeln!(out, "  {name:<5}{:>10.2} {unit} rms{:>10.2} {unit} peak", rms_nano[axis], peak_nano[axis]);
         }
         let _ = writeln!(out, "  x,y,z{translation_nm:>10.2} nm rms, norm of the three");
         out
@@ -491,8 +490,7 @@ pub(in crate::cli) fn chart(name: &str, interval: f64, run: &PlatformRun) -> Cha
 
 /// A line a motion.
 fn csv(motions: &[Motion]) -> String {
-    let mut out =
-        String::from("motion,seconds,path_seconds,x_nm,y_nm,z_nm,rx_nrad,ry_nrad,rz_nrad,norm_nm,peak_nm\n");
+    let mut out = String::from("motion,seconds,path_seconds,x_nm,y_nm,z_nm,rx_nrad,ry_nrad,rz_nrad,norm_nm,peak_nm\n");
     for Motion { name, coverage, rms_nano, translation_nm, peak_nm, .. } in motions {
         // Writing to a String cannot fail, here and below.
         let _ = write!(out, "{name},{:.6},{:.6}", coverage.seconds, coverage.path_seconds);

@@ -1,7 +1,7 @@
 //! A table of poses to a spline in ticks.
 
 use super::check::Excesses;
-use super::{AXES, LONGEST, User, amount, spline};
+use super::{AXES, LONGEST, User, amount, corners, spline};
 use crate::ir::{Path, Row};
 use specgen_identify::waveform::Waveform;
 use specgen_language::diagnostic::{Code, Diagnostic, codes};
@@ -9,6 +9,11 @@ use specgen_language::model::{Model, TaskSpace};
 
 /// Share of a tick that the period may be off a whole number of ticks, for it is a rounded quotient.
 const WHOLE: f64 = 1e-6;
+
+/// Rows are the same within this part of the largest step from row to row, and of the largest value: what is left of a rounded
+/// sine, and far less than a row that is meant is from the first one.
+const SAME_STEP: f64 = 1e-6;
+const SAME_VALUE: f64 = 1e-9;
 
 /// The spline of trajectory `index` through the rows of `waveform`, `period` (s) apart.
 pub(super) fn lower(
@@ -38,8 +43,7 @@ pub(super) fn lower(
     }
     let mut rows = waveform.rows.clone();
     let mut findings = Vec::new();
-    let closes = rows.len() > 2 && rows.first() == rows.last();
-    if repeat && closes {
+    if repeat && closes(&rows) {
         findings.push(in_file(
             waveform,
             waveform.rows.len() - 1,
@@ -80,7 +84,21 @@ pub(super) fn lower(
         bend_rate: 6.0 / (period * period),
         repeat,
     };
-    Ok((path, Vec::new()))
+    let name = &task.trajectories[index].name;
+    Ok((path, corners::warning(model, name, waveform, period, repeat).into_iter().collect()))
+}
+
+/// Whether the last row is the first again, within what the numbers of a table resolve.
+fn closes(rows: &[[f64; 6]]) -> bool {
+    let [first, .., last] = rows else { return false };
+    let largest =
+        |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |a: f64, b| if b.abs() > a { b.abs() } else { a });
+    rows.len() > 2
+        && (0..6).all(|axis| {
+            let step = largest(&mut rows.windows(2).map(|pair| pair[1][axis] - pair[0][axis]));
+            let size = largest(&mut rows.iter().map(|row| row[axis]));
+            (last[axis] - first[axis]).abs() <= SAME_STEP * step + SAME_VALUE * size
+        })
 }
 
 /// Steps from row to row that no motion at the permitted speed makes.
