@@ -69,6 +69,7 @@ fn every_byte_lost_doubled_or_replaced_and_every_truncation() {
     let whole = session(&requests());
     let bytes = whole.concat();
     let (expected, _) = feed(&bytes);
+    assert_eq!(expected.len() + 1, whole.len(), "all but the greeting are carried out");
     for place in 1..bytes.len() {
         let (before, after) = bytes.split_at(place);
         check(&[before, &after[1..]].concat(), &whole, &expected, &format!("byte {place} lost"));

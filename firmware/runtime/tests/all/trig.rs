@@ -11,6 +11,18 @@ fn ulps(value: f64, exact: f64, epsilon: f64) -> f64 {
 }
 
 #[test]
+fn one_unit_in_the_last_place_is_seen_and_so_is_what_is_no_number() {
+    for exact in [0.3, -0.6, 1e-5] {
+        for units in [1_u64, 2] {
+            let next = f64::from_bits(f64::to_bits(exact) + units);
+            assert_eq!(ulps(next, exact, f64::EPSILON), units as f64, "{exact}");
+        }
+    }
+    let off = [0.5, ulps(f64::NAN, 0.3, f64::EPSILON), 0.7].into_iter().fold(0.0, worse);
+    assert!(off.is_nan() && worse(0.5, 0.7) == 0.7 && worse(0.7, 0.5) == 0.7);
+}
+
+#[test]
 fn the_kernels_stay_within_one_ulp_of_an_eighth_of_a_turn() {
     let (mut double, mut single) = (0.0_f64, 0.0_f64);
     for k in 1..=400_000 {

@@ -12,6 +12,8 @@ use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use oracle::design::{Deviation, Gains, Rule};
 use oracle::{PlatformOracle, Settings};
 
+use crate::worse;
+
 /// Base N of the study at 10 kHz.
 fn base_n() -> (Specimen, Settings) {
     let specimen = Specimen::ideal(&PlatformParameters::reference(), &LegParameters::reference());
@@ -81,7 +83,7 @@ fn an_over_range_demand_leaves_nothing_behind() {
         assert_eq!(run.status & 0x3f, 0x3f);
         let error = |from: f64, to: f64| {
             let part = run.samples.iter().filter(|s| s.time > from && s.time <= to);
-            part.map(|s| (s.tick.pose[2] - s.target[2]).abs()).fold(0.0, f64::max)
+            part.map(|s| (s.tick.pose[2] - s.target[2]).abs()).reduce(worse).unwrap()
         };
         assert!(error(0.1, 0.3) > 10e-6);
         assert!(error(0.5, 0.7) < 0.1e-6, "{}", error(0.5, 0.7));
@@ -147,7 +149,7 @@ fn the_linear_limit_divides_settling_from_ringing() {
             let mut controller = PlatformOracle::new(&settings).unwrap();
             select(&mut controller, PLATFORM_MODES[2].1).unwrap();
             let samples = scenario.run(&mut controller, &Nudge).unwrap().samples;
-            samples[5000..].iter().map(|s| (s.tick.pose[0] - s.target[0]).abs()).fold(0.0, f64::max)
+            samples[5000..].iter().map(|s| (s.tick.pose[0] - s.target[0]).abs()).reduce(worse).unwrap()
         };
         let (below, above) = (ringing(0.92), ringing(1.08));
         println!("notch {notch:?}: {:.1} nm at 0.92 of the limit, {:.1} nm at 1.08", below * 1e9, above * 1e9);

@@ -1,6 +1,6 @@
 use super::*;
 use crate::plant::LegParameters;
-use crate::platform::PlatformParameters;
+use crate::platform::{PlatformParameters, worse};
 
 fn preparation(specimen: &Specimen) -> Preparation {
     Preparation { peak: specimen.legs[0].u_max, rate: 200.0, settle: 0.2, update: 5e-5, rest: 0.0 }
@@ -27,8 +27,9 @@ fn driven(plant: &mut PlatformPlant, ticks: u32) -> Vec<Six> {
 }
 
 fn worst(run: &[Six], other: &[Six]) -> f64 {
-    let one = |a: &Six, b: &Six| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max);
-    run.iter().zip(other).map(|(a, b)| one(a, b)).fold(0.0, f64::max)
+    assert!(!run.is_empty() && run.len() == other.len(), "{} and {} poses", run.len(), other.len());
+    let one = |a: &Six, b: &Six| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, worse);
+    run.iter().zip(other).map(|(a, b)| one(a, b)).fold(0.0, worse)
 }
 
 /// Holds equal voltages and lets the platform settle; the pose.
