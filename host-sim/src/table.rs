@@ -225,7 +225,7 @@ mod tests {
     use crate::closed_loop::TrackingSample;
 
     fn tracking(samples: usize, gain: f64, offset: f64) -> Tracking {
-        let samples = (0..samples)
+        let samples: Vec<TrackingSample> = (0..samples)
             .map(|n| {
                 let target = [n as f64 * 1e-6; LEGS];
                 let measured = target.map(|t| gain * t + offset);

@@ -1,6 +1,9 @@
 //! Bad input to the spec reader: every key wrong in every way, and the corpus with the text that a user sees.
 
 // Clippy sees the helpers of an integration test as production code.
+use std::collections::BTreeSet;
+
+use crate::support::help;
 use crate::support::specs::{
     Choice, LEGS, PLATFORM, errors, every_key, folder_with_records, line_of, sections, source, spec_files,
 };
@@ -30,12 +33,26 @@ struct Case<'a> {
     /// Key path of the finding.
     about: String,
     what: &'a str,
+    /// The literal in it that is wrong, where one is.
+    bad: &'a str,
 }
 
 /// A spec with every key, and where each key's line is.
 struct Bench {
     folder: tempfile::TempDir,
     cases: usize,
+    /// Lines with placeholders that were tried.
+    offered: usize,
+    /// Helps with a value that is not the user's own.
+    foreign: Vec<String>,
+    /// Helps that were looked at.
+    known: BTreeSet<(String, String)>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self { folder: folder_with_records(), cases: 0, offered: 0, foreign: Vec::new(), known: BTreeSet::new() }
+    }
 }
 
 impl Bench {
@@ -101,7 +118,53 @@ impl Bench {
             assert_eq!(line_of(d, &text), line + line_offset, "a follow-up: {hint}");
             assert!(!d.help.is_empty() && !d.message.is_empty(), "{hint}");
         }
+        let help = found.help.clone();
+        self.offered_by(section, &case, &help);
         self.cases += 1;
+    }
+
+    /// No value of the key's example is in the help, and a line or literal that it shows is refused until its placeholders are
+    /// replaced; without any, it has the numbers of the line that was wrong, and no other. Adds what is not so to `foreign`.
+    fn offered_by(&mut self, section: &Section, case: &Case<'_>, help: &str) {
+        // One help comes of many slips.
+        if !self.known.insert((case.path.to_owned(), help.to_owned())) {
+            return;
+        }
+        let (mut foreign, mut refused_once) = (Vec::new(), 0);
+        for value in help::values(case.key).iter().filter(|value| help.contains(*value) && !case.lines.contains(*value))
+        {
+            foreign.push(format!("{value} of the example"));
+        }
+        let name = case.key.name;
+        let line = help::literal(help, &format!("{name} = ")).map(|new| format!("{name} = {new}\n"));
+        let one = help::literal(help, "in the form ").map(|new| case.lines.replacen(case.bad, new, 1));
+        for offered in line.into_iter().chain(one.filter(|_| !case.bad.is_empty())) {
+            let about = |text: &str| {
+                let found = self.findings(&Self::with(section, case.key, text).0);
+                let mut found: Vec<_> = found.into_iter().filter(|d| d.key.starts_with(case.path)).collect();
+                found.retain(|d| d.code.starts_with("E02") || d.code == codes::OUT_OF_RANGE.id);
+                found
+            };
+            if offered.contains('<') {
+                let found = about(&offered);
+                let refused = |d: &Diagnostic| d.code == codes::PLACEHOLDER.id && d.help.contains("replace <");
+                if found.is_empty() || !found.iter().all(refused) {
+                    foreign.push(format!("not refused as a placeholder: {found:?}"));
+                }
+                refused_once += 1;
+            } else if case.key.template() != case.key.example
+                && !help::numbers(&offered).iter().all(|number| help::numbers(&case.lines).contains(number))
+            {
+                foreign.push(format!("{offered:?} has another number"));
+            }
+            let found = about(&help::filled(&offered, &items(case.key)));
+            if !found.is_empty() {
+                foreign.push(format!("refused when filled in: {found:?}"));
+            }
+        }
+        let hint = |what| format!("{} {}, {:?}: {help:?}: {what}", case.path, case.what, case.lines);
+        self.offered += refused_once;
+        self.foreign.extend(foreign.into_iter().map(hint));
     }
 }
 
@@ -229,7 +292,7 @@ fn bad_literals(item: Item) -> Vec<(&'static str, String, Code)> {
 
 #[test]
 fn every_key_is_checked_in_every_way() {
-    let mut bench = Bench { folder: folder_with_records(), cases: 0 };
+    let mut bench = Bench::new();
     assert!(errors(&bench.findings(&every_key())).is_empty());
     for section in sections() {
         for key in section.keys {
@@ -241,11 +304,13 @@ fn every_key_is_checked_in_every_way() {
                 code,
                 about: about.to_owned(),
                 what,
+                bad: "",
             };
             for (i, item) in items(key).into_iter().enumerate() {
                 let about = item_path(key, &path, i);
                 for (what, literal, code) in bad_literals(item) {
-                    bench.check(section, case(line_with(key, i, &literal), code, &about, what), 0);
+                    let case = case(line_with(key, i, &literal), code, &about, what);
+                    bench.check(section, Case { bad: &literal, ..case }, 0);
                 }
             }
             if !matches!(key.shape, Shape::One(_)) {
@@ -285,18 +350,25 @@ fn every_key_is_checked_in_every_way() {
     }
     // Fewer would mean that the loops above have come to skip something.
     assert!(bench.cases > 1000, "{} cases", bench.cases);
-    println!("{} cases", bench.cases);
+    assert!(bench.foreign.is_empty(), "{}:\n{}", bench.foreign.len(), bench.foreign.join("\n"));
+    assert!(bench.offered > 400, "{} lines offered", bench.offered);
+    println!("{} cases, {} lines offered", bench.cases, bench.offered);
 }
 
 #[test]
 fn every_key_may_be_missing_only_if_it_has_a_default() {
-    let bench = Bench { folder: folder_with_records(), cases: 0 };
+    let mut bench = Bench::new();
     for section in sections() {
         for key in section.keys {
             let path = Bench::path(section, key.name);
             let (text, _) = Bench::with(section, key, "");
             let findings = bench.findings(&text);
             let errors = errors(&findings);
+            for found in &errors {
+                let (code, about, lines) = (codes::MISSING_KEY, found.key.clone(), String::new());
+                let case = Case { key, path: &path, lines, code, about, what: "missing", bad: "" };
+                bench.offered_by(section, &case, &found.help);
+            }
             if path == "hysteresis.rate" {
                 // What belongs to another value than the default is then refused.
                 assert!(errors.len() == 2 && errors.iter().all(|d| d.code == codes::RATE_KEYS), "{findings:#?}");
@@ -328,11 +400,12 @@ fn every_key_may_be_missing_only_if_it_has_a_default() {
             }
         }
     }
+    assert!(bench.foreign.is_empty(), "{}:\n{}", bench.foreign.len(), bench.foreign.join("\n"));
 }
 
 #[test]
 fn every_section_may_be_missing_only_if_nothing_in_it_is_required() {
-    let bench = Bench { folder: folder_with_records(), cases: 0 };
+    let bench = Bench::new();
     let whole = every_key();
     // Without [control] its parts are refused; repeated sections are counted: both have tests of their own.
     let apart = |section: &Section| matches!(section.kind, Kind::Repeated(..)) || section.name == "control";
@@ -347,6 +420,10 @@ fn every_section_may_be_missing_only_if_nothing_in_it_is_required() {
             assert_eq!(errors.len(), 1, "{}: {findings:#?}", section.name);
             assert_eq!((errors[0].code, errors[0].key.as_str()), (codes::MISSING_SECTION.id, section.name));
             assert!(errors[0].help.contains(required.expect("one").name));
+            let (_, lines) = errors[0].help.split_once("Write:\n").expect("lines");
+            let again = bench.findings(&format!("{text}\n{lines}\n"));
+            let refused = |d: &Diagnostic| d.code == codes::PLACEHOLDER.id && d.key.starts_with(section.name);
+            assert!(again.iter().any(refused) && again.iter().all(refused), "{again:#?}");
         } else {
             assert!(errors.is_empty(), "{}: {findings:#?}", section.name);
         }
@@ -368,7 +445,7 @@ fn all_findings_of_a_file_come_in_one_run() {
         assert!(text.contains(good), "{good}");
         text = text.replacen(good, bad, 1);
     }
-    let bench = Bench { folder: folder_with_records(), cases: 0 };
+    let bench = Bench::new();
     let findings = bench.findings(&text);
     let found: Vec<&str> = errors(&findings).iter().map(|d| d.code).collect();
     for code in [
@@ -393,7 +470,7 @@ fn a_spec_has_at_most_four_output_lines_and_an_input() {
         let lines = kinds.iter().enumerate();
         let lines = lines.map(|(line, kind)| format!("\n[[trigger]]\nname = \"line{line}\"\nkind = \"{kind}\"\n"));
         let text = PLATFORM.text() + &lines.collect::<String>();
-        Bench { folder: folder_with_records(), cases: 0 }.findings(&text)
+        Bench::new().findings(&text)
     };
     let accepted = of(&["motion", "input", "ticks", "motion", "points"]);
     assert!(errors(&accepted).is_empty(), "{accepted:?}");

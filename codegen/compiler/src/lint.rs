@@ -20,13 +20,17 @@ mod budget;
 mod contact;
 mod culprit;
 mod electronics;
+mod factors;
+mod frames;
 mod gauge_layout;
 mod gauge_pattern;
 mod gauges;
 mod layout;
 mod motion;
+mod order;
 pub mod paths;
 mod requirements;
+mod tick;
 mod timing;
 mod triggers;
 mod weights;
@@ -50,7 +54,9 @@ const RULES: &[Rule] = &[
     layout::joints_turn,
     layout::base_is_wider,
     layout::proportions,
-    layout::legs_cross,
+    order::joints_run_round,
+    order::legs_cross,
+    frames::other_frame,
     layout::angles_of_pairs,
     bodies::leg_parts_have_size,
     bodies::mass_centres_off_the_joints,
@@ -80,6 +86,10 @@ const RULES: &[Rule] = &[
     gauges::step_against_stroke,
     gauges::odd_coordinates,
     gauges::opposite_directions,
+    gauges::noise_of_many_steps,
+    frames::turned_layout,
+    frames::size_of_pattern,
+    order::gauges_run_round,
     gauges::size_of_layout,
     gauge_pattern::out_of_pattern,
     gauge_layout::slip_of_one,
@@ -88,6 +98,7 @@ const RULES: &[Rule] = &[
     alike::calibrations_straight,
     alike::gains_by_stiffness,
     alike::gains_in_order,
+    alike::integral_in_time,
     contact::work_piece,
     contact::lever_of_contact,
     contact::contact_near_bias,
@@ -101,6 +112,10 @@ const RULES: &[Rule] = &[
     timing::ticks_against_modes,
     timing::gauges_in_time,
     timing::modes_seen_as_others,
+    tick::fits_period,
+    motion::rotations_beside_translations,
+    motion::stops_take_ticks,
+    motion::correction_moves_codes,
     motion::moves_within_slew,
     motion::moves_end,
     motion::limits_bind,
@@ -108,10 +123,14 @@ const RULES: &[Rule] = &[
     motion::streams_keep_up,
     motion::streams_within_slew,
     motion::workspace_is_used,
+    triggers::more_than_one,
     triggers::steps_apart,
     triggers::above_noise,
     triggers::pulses_apart,
     requirements::ask_something,
+    requirements::frequencies,
+    factors::near_defaults,
+    factors::near_one,
     budget::tables_fit,
 ];
 
@@ -205,7 +224,7 @@ impl<'a> Found<'a> {
             true => format!("{message}: {} times beyond what passes", figure(times)),
             false => format!("{message}: further beyond what passes than any factor says"),
         };
-        let help = format!("{help}; if it is meant, say why in [lint]: allow = [\"{key}: REASON\"]");
+        let help = format!("{help}; if it is meant, say why in [lint]: allow = [\"{key}: <reason>\"]");
         self.add(codes::FAR_OFF, key, message, &help);
     }
 

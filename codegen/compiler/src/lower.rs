@@ -13,7 +13,7 @@ mod permitted;
 mod rate;
 mod sensing;
 pub mod setpoint;
-mod supervision;
+pub(crate) mod supervision;
 mod task_space;
 pub mod triggers;
 

@@ -54,7 +54,8 @@ pub struct Key {
     pub symbol: &'static str,
     /// What else people call it. Nothing is read under such a name, or under the symbol; messages lead from it to the key.
     pub aliases: &'static [&'static str],
-    /// A TOML literal that is right.
+    /// A TOML literal that is right for some platform: for the reference, the schema and tests. It is no fix; messages show
+    /// [`Key::template`].
     pub example: &'static str,
 }
 
@@ -164,7 +165,59 @@ pub enum Presence {
     Rule(&'static str),
 }
 
+impl Item {
+    /// A TOML literal of its form, with a placeholder for the value and with its unit: `"<number> kg"`. Only a value that the
+    /// language leaves no choice of is written out.
+    #[must_use]
+    pub fn template(self) -> String {
+        match self {
+            Self::Quantity { unit, .. } => format!("\"<number> {unit}\""),
+            Self::Integer(only, last) if only == last => only.to_string(),
+            Self::Number(_) | Self::Integer(..) => "<number>".to_owned(),
+            Self::Choice(_) => "\"<word>\"".to_owned(),
+            Self::Flag => "<true or false>".to_owned(),
+            Self::File => "\"<file>\"".to_owned(),
+            Self::Name => "\"<name>\"".to_owned(),
+        }
+    }
+}
+
+/// The placeholder in a text, with its angle brackets: letters and blanks between `<` and `>`.
+#[must_use]
+pub fn placeholder(text: &str) -> Option<&str> {
+    let start = text.find('<')?;
+    let end = start + text[start..].find('>')?;
+    let inner = &text[start + 1..end];
+    let words = !inner.is_empty() && inner.chars().all(|c| c.is_ascii_alphabetic() || c == ' ');
+    words.then(|| &text[start..=end])
+}
+
 impl Key {
+    /// A TOML literal of its form, with a placeholder for each value: `["<number> V", "<number> V"]`. Of a list, as many
+    /// values as it must have.
+    #[must_use]
+    pub fn template(&self) -> String {
+        let list = |items: &[Item]| {
+            let items: Vec<String> = items.iter().map(|item| item.template()).collect();
+            format!("[{}]", items.join(", "))
+        };
+        match self.shape {
+            Shape::One(item) => item.template(),
+            Shape::List(items) => list(items),
+            Shape::Leading(least, items) => list(&items[..least]),
+            Shape::Rows(count, items) => format!("[{}]", vec![list(items); count].join(", ")),
+            Shape::Records => list(&[Item::File]),
+            Shape::Reasons => "[\"<key>: <reason>\"]".to_owned(),
+            Shape::Paths => "[\"<key>\"]".to_owned(),
+        }
+    }
+
+    /// A line of a spec with it: name and [`Key::template`].
+    #[must_use]
+    pub fn line(&self) -> String {
+        format!("{} = {}", self.name, self.template())
+    }
+
     /// Whether people call it `name`: its symbol or an alias, upper or lower case, with or without what joins words.
     #[must_use]
     pub fn is_called(&self, name: &str) -> bool {
@@ -216,18 +269,17 @@ impl Section {
         forms
     }
 
-    /// The section as it may be written, from the examples of its keys.
+    /// Its header, and a line of each key that must be given, with a placeholder for each value.
     #[must_use]
-    pub fn example(&self, required_only: bool) -> String {
+    pub fn template(&self) -> String {
         let mut text = self.header();
         if !text.is_empty() {
             text.push('\n');
         }
         let first_form = self.forms().first().map(|form| Presence::Form(form));
-        let needed =
-            |key: &&Key| key.presence == Presence::Required || Some(key.presence) == first_form || !required_only;
+        let needed = |key: &&Key| key.presence == Presence::Required || Some(key.presence) == first_form;
         for key in self.keys.iter().filter(needed) {
-            text.push_str(&format!("{} = {}\n", key.name, key.example));
+            text.push_str(&format!("{}\n", key.line()));
         }
         text
     }

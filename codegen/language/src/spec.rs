@@ -79,7 +79,7 @@ pub fn load_as_far(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
             "",
             0..0,
             "the spec is empty".to_owned(),
-            "start from a copy of specs/minimal.toml, or of specs/legs.toml for every key".to_owned(),
+            "`specgen new NAME` asks for the values of your platform and writes a spec; docs/spec-reference.md lists every key".to_owned(),
         );
         return (None, findings.finish());
     }
@@ -96,9 +96,9 @@ pub fn load_as_far(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     (model, findings.finish())
 }
 
-/// "Put it in quotes" is no help where the key takes no text at all.
+/// "Put it in quotes" is no help where the key takes no text at all, and of a placeholder.
 fn drop_wrong_advice(findings: &mut Findings) {
-    let not_text: Vec<_> =
-        findings.all().iter().filter(|d| d.code == codes::WRONG_TYPE).map(|d| d.place.clone()).collect();
+    let known = |d: &&Diagnostic| d.code == codes::WRONG_TYPE || d.code == codes::PLACEHOLDER;
+    let not_text: Vec<_> = findings.all().iter().filter(known).map(|d| d.place.clone()).collect();
     findings.retain(|d| d.code != codes::UNQUOTED || !not_text.contains(&d.place));
 }

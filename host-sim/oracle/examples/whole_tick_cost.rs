@@ -97,7 +97,7 @@ fn main() {
     let (input, mut output) = (vec![0; inputs], vec![0; outputs]);
     println!("controller on zeros: {:.0} ns", least(|_| controller.step(&input, &mut output)));
     let leg = std::env::args_os().nth(2).unwrap_or_else(|| "plays".into());
-    let leg = match LegParameters::named(leg.as_ref(), std::fs::read_to_string) {
+    let leg = match LegParameters::named(leg.as_ref(), |path| std::fs::read_to_string(path)) {
         Ok(leg) => leg,
         Err(error) => return eprintln!("{error}"),
     };

@@ -282,7 +282,7 @@ mod tests {
         let shipped = SHIPPED[1].1;
         assert!(LegParameters::bouc_wen().bouc_wen.is_some());
         assert_eq!(
-            LegParameters::named(Path::new("bouc-wen"), std::fs::read_to_string).unwrap(),
+            LegParameters::named(Path::new("bouc-wen"), |path| std::fs::read_to_string(path)).unwrap(),
             LegParameters::bouc_wen()
         );
         let refused = |from: &str, to: &str| {
@@ -304,7 +304,7 @@ mod tests {
             eprintln!("skipped: ../shared is not beside the repository");
             return;
         }
-        let mut study = LegParameters::named(&path, std::fs::read_to_string).unwrap();
+        let mut study = LegParameters::named(&path, |path| std::fs::read_to_string(path)).unwrap();
         study.name = "reference-leg".to_owned();
         assert_eq!(study, LegParameters::reference());
     }
@@ -335,7 +335,7 @@ mod tests {
         assert!(unknown.contains("unknown field `capa`") && unknown.contains("line 7"), "{unknown}");
         assert!(refused("\"zeta\": 0.1", "\"zeta\": \"0.1\"").contains("invalid type: string"));
         assert!(refused("\"zeta\": 0.1", "\"zeta\": NaN").contains("line 12"));
-        let absent = LegParameters::named(Path::new("no/such.json"), std::fs::read_to_string).unwrap_err().to_string();
+        let absent = LegParameters::named(Path::new("no/such.json"), |path| std::fs::read_to_string(path)).unwrap_err().to_string();
         assert!(absent.starts_with("no/such.json: not a usable plant\n  cannot be read"), "{absent}");
     }
 }

@@ -6,6 +6,7 @@ mod support;
 
 use std::fs;
 
+use crate::support::help;
 use specgen::diagnostic::Severity;
 use support::{BIAS_Z, CASE_1, after, case, edited, folder, hold, put, reference, value, verdict, with_table};
 
@@ -139,6 +140,11 @@ fn a_geometry_that_does_not_hold_and_gauges_that_do_not_see() {
     ]);
 }
 
+/// The form that a help shows for a value.
+fn form(help: &str) -> &str {
+    help::literal(help, "in the form ").unwrap_or_else(|| panic!("{help}"))
+}
+
 /// 3 µm in x and 40 µrad about y, up and back in 0.1 s.
 fn table() -> String {
     let row = |k: u32| {
@@ -246,7 +252,7 @@ fn tables_of_poses() {
     between.edits[0].1 = between.edits[0].1.replace("1 ms", "0.25 ms");
     between.at = Some("\"0.25 ms\"");
     let mut unit = with_table("a period in volts", table(), "E0211", "expected a time", |help, bad, table| {
-        (bad.replacen("\"1 V\"", &format!("\"{} ms\"", after(help, "such as \"")), 1), table.to_owned())
+        (bad.replacen("\"1 V\"", &form(help).replace("<number>", "1"), 1), table.to_owned())
     });
     unit.edits[0].1 = unit.edits[0].1.replace("1 ms", "1 V");
     unit.at = Some("\"1 V\"");
@@ -284,13 +290,13 @@ fn paths_too_fast_and_paths_that_jump() {
             "a stream that is stale at once",
             &[("stale_ticks  = 10", "stale_ticks  = 0")],
             ("E0301", "0\n\n# [gains]", "expected 1 to 1000000"),
-            |help, bad, _| put(bad, "stale_ticks  = 0", &format!("stale_ticks  = {}", after(help, "such as "))),
+            |help, bad, _| put(bad, "stale_ticks  = 0", &format!("stale_ticks  = {}", after(help, "range: "))),
         ),
         case(
             "a stream without speed",
             &[("stream_speed = [\"5 mm/s\"", "stream_speed = [\"nan mm/s\"")],
             ("E0212", "nan mm/s", "which is not a finite number"),
-            |help, bad, _| put(bad, "nan mm/s", &format!("{} mm/s", after(help, "such as \""))),
+            |help, bad, _| put(bad, "\"nan mm/s\"", &form(help).replace("<number>", "5000")),
         ),
     ]);
 }
@@ -373,7 +379,10 @@ name      = \"case-1\"";
             "a filter in hertz",
             &[("\"1.9e4 rad/s\"", "\"3000 Hz\"")],
             ("E0211", "\"3000 Hz\"", "expected an angular rate"),
-            |help, bad, _| put(bad, "\"3000 Hz\"", &format!("\"{} rad/s\"", after(help, "such as \""))),
+            |help, bad, _| {
+                assert!(help.ends_with("as \"6000 pi rad/s\""), "{help}");
+                put(bad, "\"3000 Hz\"", "\"6000 pi rad/s\"")
+            },
         ),
     ]);
 }

@@ -17,6 +17,8 @@ pub enum Edit {
     Swap(&'static str, &'static str),
     /// One text for another, wherever it stands.
     Text(&'static str, &'static str),
+    /// The text, changed as a whole.
+    With(fn(&str) -> String),
     /// The record of the legs, changed.
     Record(fn(&str) -> String),
 }
@@ -42,6 +44,7 @@ impl Edit {
                 assert!(text.contains(from), "{from}");
                 text.replace(from, to)
             }
+            Self::With(change) => change(text),
             Self::Record(_) => text.to_owned(),
         }
     }

@@ -1,5 +1,6 @@
 //! The first hour of an engineer: slips in a spec are found, at the right key first, with a help that leads out.
 
+mod classes;
 mod edit;
 mod set;
 
@@ -14,10 +15,12 @@ use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
 use specgen::diagnostic::{Diagnostic, Place, Severity};
+use specgen::spec::keys::SECTIONS;
 use specgen::spec::{SpecSource, load_as_far};
 
 use crate::physical_lint::list;
-use crate::physical_lint::support::{plausible, spec, verdict};
+use crate::physical_lint::support::{plausible, verdict};
+use crate::support::help;
 use edit::Edit;
 use set::{Of, SET, Slip};
 
@@ -35,14 +38,7 @@ struct Base {
 impl Base {
     fn of(which: Of) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let text = match which {
-            Of::Own => include_str!("own.toml").to_owned(),
-            Of::Small => include_str!("small.toml").to_owned(),
-            Of::Reference => spec("reference.toml"),
-            Of::Gains => spec("features/platform-gains.toml"),
-            Of::WorkPiece => spec("features/platform-environment.toml"),
-            Of::Calibrated => spec("features/platform-calibration.toml"),
-        };
+        let text = which.text();
         if matches!(which, Of::Own | Of::Small) {
             fs::write(folder.path().join(RECORD), record(&text, folder.path())).unwrap();
         } else {
@@ -110,10 +106,22 @@ fn is_at(found: &Diagnostic, slip: &Slip) -> bool {
 fn slips_of_the_first_hour_are_found_at_the_right_key_with_a_help_that_leads_out() {
     assert!(SET.len() >= 120);
     let bases = bases();
+    let keys = SECTIONS.iter().flat_map(|section| section.keys);
+    let examples: Vec<String> = keys.flat_map(help::values).filter(|value| value.starts_with('"')).collect();
     let mut counts: BTreeMap<&str, [usize; 4]> = BTreeMap::new();
     let mut missed = String::new();
     for slip in SET {
-        let (_, found) = bases[&slip.of].with(slip);
+        let (text, found) = bases[&slip.of].with(slip);
+        for one in found.iter().filter(|_| matches!(slip.of, Of::Own | Of::Small)) {
+            // Some follow from what is written; the reference is the other machine.
+            let known = |value: &str| {
+                let (value, number) =
+                    (value.trim_matches('"'), value.trim_matches('"').split(' ').next().unwrap_or(value));
+                text.contains(number) || slip.fix.iter().any(|fix| fix.contains(value))
+            };
+            let foreign = examples.iter().find(|value| one.help.contains(*value) && !known(value));
+            assert!(foreign.is_none(), "{slip:?}: {}: {foreign:?} is of another machine", one.help);
+        }
         let first = found.first().is_some_and(|one| is_at(one, slip));
         let helps = |one: &Diagnostic| slip.fix.iter().any(|fix| one.help.contains(fix));
         let fixed = found.iter().find(|one| is_at(one, slip)).is_some_and(helps);
@@ -139,6 +147,28 @@ fn slips_of_the_first_hour_are_found_at_the_right_key_with_a_help_that_leads_out
     println!("{:<24}{:>5}{:>8}{:>16}{:>12}\nnot right:\n{missed}", "all", sum[0], sum[1], sum[2], sum[3]);
     for (good, bar) in sum[1..].iter().zip(BARS) {
         assert!(*good as f64 >= bar * sum[0] as f64, "{sum:?} against {BARS:?}");
+    }
+}
+
+/// The voltage of the amplifier's input for that of the stacks: the converter and the stroke say 150 V, a power of ten 100 V.
+#[test]
+fn two_readings_of_a_value_are_both_offered() {
+    let base = Base::of(Of::Small);
+    for (edits, reading) in [
+        (
+            &[Edit::Value("actuator.voltage", "[\"0 V\", \"10 V\"]")][..],
+            ["\"150 V\" (`dac.range` and what", "\"100 V\""],
+        ),
+        (
+            &[Edit::Value("actuator.voltage", "[\"0 V\", \"10 V\"]"), Edit::Value("dac.range", "[\"0 V\", \"10 V\"]")],
+            ["with `dac.range`, both 15 times as large", "ten times larger"],
+        ),
+    ] {
+        let text = edits.iter().fold(base.text.clone(), |text, edit| edit.of(&text));
+        let (_, found) = verdict(&text, base.folder.path());
+        let first = found.first().unwrap();
+        assert!(list(&first.key) == "actuator.voltage" && first.help.contains("at its input"), "{first:?}");
+        assert!(reading.iter().all(|reading| first.help.contains(reading)), "{first:?}");
     }
 }
 

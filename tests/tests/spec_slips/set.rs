@@ -1,6 +1,8 @@
 //! Slips of engineers in their first hour, each with the key that the first finding should be about, and with what its help
 //! should say. Written down before the messages were looked at; no message is a reason to change a line here.
 
+use crate::physical_lint::support::spec;
+
 use super::edit::Edit::{self, Add, Line, Record, Remove, Rename, Swap, Text, Value};
 
 /// The spec that a slip is made in.
@@ -18,6 +20,29 @@ pub enum Of {
     WorkPiece,
     /// `specs/features/platform-calibration.toml`.
     Calibrated,
+    /// `specs/features/platform-joints.toml`.
+    Joints,
+    /// `specs/features/triggers.toml`.
+    Triggers,
+    /// `specs/legs.toml`.
+    Legs,
+}
+
+impl Of {
+    /// The spec as it is.
+    pub fn text(self) -> String {
+        match self {
+            Self::Own => include_str!("own.toml").to_owned(),
+            Self::Small => include_str!("small.toml").to_owned(),
+            Self::Reference => spec("reference.toml"),
+            Self::Gains => spec("features/platform-gains.toml"),
+            Self::WorkPiece => spec("features/platform-environment.toml"),
+            Self::Calibrated => spec("features/platform-calibration.toml"),
+            Self::Joints => spec("features/platform-joints.toml"),
+            Self::Triggers => spec("features/triggers.toml"),
+            Self::Legs => spec("legs.toml"),
+        }
+    }
 }
 
 /// One slip.
@@ -271,6 +296,7 @@ pub const SET: &[Slip] = &[
     s(Own, FIGURE, Value("actuator.stroke", "\"1000 um\""), &["actuator.stroke"], &["stroke"]),
     s(Own, FIGURE, Value("actuator.stacks", "10"), &["actuator.stacks", "actuator.stroke"], &["stacks"]),
     s(Own, FIGURE, Value("actuator.voltage", "[\"-20 V\", \"1200 V\"]"), &["actuator.voltage"], &["voltage", "dac.range"]),
+    s(Small, FIGURE, Value("actuator.voltage", "[\"0 V\", \"10 V\"]"), &["actuator.voltage"], &["\"150 V\""]),
     s(Own, FIGURE, Value("dac.range", "[\"0 V\", \"10 V\"]"), &["dac.range", "actuator.voltage"], &["at the stack"]),
     s(Own, FIGURE, Value("dac.bits", "8"), &["dac.bits", "requirements.precision"], &["bits"]),
     s(Own, FIGURE, Value("workspace.translation", "[\"76 um\", \"67 um\", \"220 um\"]"), &["workspace.translation"], &["at most"]),

@@ -2,4 +2,5 @@
 
 pub mod exact;
 pub mod gauges;
+pub mod help;
 pub mod specs;

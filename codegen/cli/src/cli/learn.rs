@@ -403,9 +403,10 @@ pub(super) fn takes_correction(compiled: &Compiled) -> Result<&TaskSpace, Failur
         )
     })?;
     if task.correction.is_none() {
-        return Err(Failure::Gate(
-            "the controller of this spec takes no correction; write correction = \"2 um\" in [control]".to_owned(),
-        ));
+        return Err(Failure::Gate(format!(
+            "the controller of this spec takes no correction; write correction = \"<number> um\" in [control], at most {} um",
+            1e5 * compiled.model.actuator.stroke
+        )));
     }
     Ok(task)
 }

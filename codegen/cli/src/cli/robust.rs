@@ -108,19 +108,19 @@ struct StudyArguments {
     plant: PlantArguments,
 }
 
-fn measure(text: &str, dimension: Dimension, example: &str) -> Result<f64, String> {
+fn measure(text: &str, dimension: Dimension, unit: &str) -> Result<f64, String> {
     let found = quantity::parse(text).ok().filter(|found| found.dimension == dimension && found.value > 0.0);
     found
         .map(|found| found.value)
-        .ok_or_else(|| format!("expected a quantity above zero such as {example}, found `{text}`"))
+        .ok_or_else(|| format!("expected a quantity above zero in the form \"<number> {unit}\", found `{text}`"))
 }
 
 fn length(text: &str) -> Result<f64, String> {
-    measure(text, Dimension::LENGTH, "\"30 nm\"")
+    measure(text, Dimension::LENGTH, "nm")
 }
 
 fn angle(text: &str) -> Result<f64, String> {
-    measure(text, Dimension::ANGLE, "\"100 nrad\"")
+    measure(text, Dimension::ANGLE, "nrad")
 }
 
 fn percent(text: &str) -> Result<f64, String> {

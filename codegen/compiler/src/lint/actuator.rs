@@ -23,6 +23,11 @@ const SLOWEST: f64 = 1.0;
 
 /// Damping ratio of a bare ceramic of a mechanical quality of 2,500. Whatever it is mounted in has more.
 const LEAST_DAMPED: f64 = 2e-4;
+/// More than this a leg does not ring at all.
+const MOST_DAMPED: f64 = 0.6;
+/// The same of the platform on its legs, whose joints and flexures damp little; and the least that they have.
+const MOST_DAMPED_MODE: f64 = 0.3;
+const LEAST_DAMPED_MODE: f64 = 5e-4;
 /// Fewer cells to an axis do not show the bend of a branch.
 const COARSEST_GRID: usize = 8;
 
@@ -129,6 +134,20 @@ pub(super) fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
 /// Everything that is built is damped.
 pub(super) fn resonance_is_damped(facts: &Facts, found: &mut Found) {
     let actuator = &facts.model.actuator;
+    let structure = facts.model.task_space.as_ref().map_or(0.02, |task| task.modal_damping);
+    for (key, damping) in [("actuator.damping_ratio", actuator.damping_ratio), ("control.modal_damping", structure)] {
+        let of_structure = key.starts_with("control");
+        let most = if of_structure { MOST_DAMPED_MODE } else { MOST_DAMPED };
+        if damping <= most && (damping >= LEAST_DAMPED_MODE || !of_structure) {
+            continue;
+        }
+        found.add(
+            codes::DAMPING_ODD,
+            key,
+            format!("a damping ratio of {} is one of {}", figure(damping), if damping > most { "no resonance: it hardly rings" } else { "a tuning fork: flexures and joints have more" }),
+            "0.005 to 0.05 is usual of a platform on its legs, 0.01 to 0.2 of a leg: check that it is a ratio, with critical damping as 1, and neither percent nor a quality factor (1/(2 Q))",
+        );
+    }
     if actuator.damping_ratio >= LEAST_DAMPED {
         return;
     }

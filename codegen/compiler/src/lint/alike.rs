@@ -8,6 +8,8 @@ use specgen_language::model::{Gains, TaskSpace};
 const CALIBRATION_SPREAD: f64 = 3.0;
 /// What a power above the first adds at an end of the range, in spans. Gauges on the market are straight within 0.02.
 const MOST_BENT: f64 = 0.1;
+/// Slowest integral, its gain over the stiffness of its axis, 1/s.
+const SLOWEST: f64 = 2.0;
 /// A gain over the stiffness of its axis, against the middle one of the six.
 const GAIN_SPREAD: f64 = 10.0;
 /// Two gains over their stiffness are so many times apart as they stand, and less than that in each other's place.
@@ -160,6 +162,28 @@ pub(super) fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
                 &format!("about {:.3e} goes with the others: check the unit", usual * stiffness[axis]),
             );
         }
+    }
+}
+
+/// An integral that takes seconds takes out nothing that lasts less.
+pub(super) fn integral_in_time(facts: &Facts, found: &mut Found) {
+    let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
+    let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
+    for (key, values) in gains_of(task).into_iter().filter(|(key, _)| key.ends_with("integral")) {
+        let rate = middle(core::array::from_fn(|axis| values[axis] / stiffness[axis]));
+        if rate == 0.0 || rate >= SLOWEST {
+            continue;
+        }
+        found.add(
+            codes::INTEGRAL_SLOW,
+            &key,
+            format!(
+                "gains over the stiffness of their axes are about {} 1/s: the integral takes {} s",
+                figure(rate),
+                figure(1.0 / rate)
+            ),
+            "tens to hundreds of 1/s are usual: check the unit (N/(m s), N m/(rad s)), or leave the gains out: the compiler derives them",
+        );
     }
 }
 

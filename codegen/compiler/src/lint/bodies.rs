@@ -8,8 +8,8 @@ const THINNEST: f64 = 0.02;
 /// Nearest that a mass centre lies to its own joint, in radii of gyration of the part.
 const NEAREST_CENTRE: f64 = 0.02;
 /// Radius of gyration of a part over the way from its joint to its mass centre. A rod from the joint on has 0.58, half its
-/// mass at either end 1, a lump half as long as that 0.29.
-const SOUND_PART: core::ops::RangeInclusive<f64> = 0.25..=1.25;
+/// mass at either end 1, a lump half as long as that 0.29. About its joint instead of its mass centre a rod has 1.15.
+const SOUND_PART: core::ops::RangeInclusive<f64> = 0.25..=1.05;
 /// Radius of gyration about one axis, in radii of the joint circle.
 const SOUND_AXIS: core::ops::RangeInclusive<f64> = 0.1..=3.0;
 /// The same about z: a platform reaches out to its joints. An even disc of their radius has 0.71, one of less than half of it

@@ -8,6 +8,8 @@ use specgen_language::model::{Model, Scalar};
 const LEAST_STACK: u64 = 256;
 /// Least instructions of a tick: two sums and a product for every leg and axis of the kinematics and the law.
 const LEAST_INSTRUCTIONS: u64 = 300;
+/// Least time of a tick, s: converters are asked, and wait.
+const LEAST_TIME: f64 = 5e-6;
 /// Declared more than this many times over what is needed, a budget checks nothing.
 const LOOSE: u64 = 512;
 
@@ -84,6 +86,35 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
             format!("a budget of {ram} B of RAM and {flash} B of flash"),
             "code and tables are in flash, which is the larger on every part: are `target.budget.flash` and `target.budget.ram` in each other's place?",
         );
+    }
+    if let Some(declared) = budget.instructions
+        && declared > LOOSE * LEAST_INSTRUCTIONS
+    {
+        found.add(
+            codes::BUDGET_LOOSE,
+            "target.budget.instructions",
+            format!("`target.budget.instructions` is {declared}, and no tick of six legs comes near that"),
+            "some thousands are usual: a budget that no controller can exceed checks nothing",
+        );
+    }
+    let period = facts.model.timing.period;
+    if let Some(time) = budget.time {
+        let shown = |time: f64| figure(time * 1e6);
+        if time > period {
+            found.add(
+                codes::BUDGET_LOOSE,
+                "target.budget.time",
+                format!("`target.budget.time` is {} us, more than the period of {} us", shown(time), shown(period)),
+                "the period is a limit without it: check the unit (us or ms)",
+            );
+        } else if time < LEAST_TIME {
+            found.add(
+                codes::BUDGET_IMPOSSIBLE,
+                "target.budget.time",
+                format!("`target.budget.time` is {} us, and reading six gauges alone takes longer", shown(time)),
+                "check the unit (us or ms); `specgen build` estimates what a tick takes on a board",
+            );
+        }
     }
     if let Some(declared) = budget.instructions
         && declared < LEAST_INSTRUCTIONS

@@ -3,10 +3,12 @@
 //! A wrong unit shows wherever the value is compared with others, and often first at a key that is right. So each value that a
 //! finding names is tried with other powers of ten and the other sign; the one that takes most findings away is suspected.
 
+mod readings;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use super::{allow, check};
+use super::{allow, check, figure};
 use crate::reach;
 use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
 use specgen_language::spec::{self, SpecSource};
@@ -37,6 +39,15 @@ struct Culprit {
     how: String,
     explained: usize,
     of: usize,
+    /// What the value is often taken for.
+    hint: Option<&'static str>,
+}
+
+/// A slip that would explain findings.
+struct Slip {
+    /// Findings that would be gone, less twice those that would be new.
+    score: usize,
+    culprit: Culprit,
 }
 
 /// How soon a finding is shown. What may be wrong with a value comes before what follows from it.
@@ -60,7 +71,13 @@ pub fn in_order(source: &SpecSource, findings: &mut Vec<Diagnostic>) {
     // That of the same item, if there is one.
     let own =
         findings.iter().position(|one| own(one) && one.key == culprit.key).or_else(|| findings.iter().position(own));
-    let explains = format!("{} {} of {} findings would be gone", culprit.how, culprit.explained, culprit.of);
+    let explains = format!(
+        "{} {} of {} findings would be gone{}",
+        culprit.how,
+        culprit.explained,
+        culprit.of,
+        culprit.hint.map_or_else(String::new, |hint| format!(": {hint}"))
+    );
     let first = match own {
         Some(at) => {
             let mut own = findings.remove(at);
@@ -101,39 +118,61 @@ fn culprit(source: &SpecSource, findings: &[Diagnostic]) -> Option<Culprit> {
     if base.len() < 2 {
         return None;
     }
-    let suspects = suspects(findings, &spans);
+    let mut suspects = suspects(findings, &spans);
     if suspects.len() > MOST_SUSPECTS {
         return None;
     }
-    let mut best: Option<(usize, Culprit)> = None;
-    let consider = |best: &mut Option<(usize, Culprit)>, key: &str, text: String, how: &dyn Fn() -> String| {
-        let Some((now, _)) = found(&SpecSource { text, ..source.clone() }) else { return };
+    let model = spec::load_as_far(source).0?;
+    // Both at the amplifier's input agree with each other, and with nothing else.
+    if model.dac.range == model.actuator.voltage {
+        let items =
+            ["actuator.voltage", "dac.range"].map(|list| [0, 1].map(|item| spans.get(&format!("{list}[{item}]"))));
+        let mut places: Vec<Range<usize>> = items.into_iter().flatten().flatten().cloned().collect();
+        places.sort_by_key(|place| place.start);
+        suspects.push(("actuator.voltage".to_owned(), places));
+    }
+    let explained = |key: &str, text: String, how: String| -> Option<Slip> {
+        let (now, _) = found(&SpecSource { text, ..source.clone() })?;
         let (gone, new) = (base.difference(&now).count(), now.difference(&base).count());
         // Findings about one list name it already.
         let lists: BTreeSet<&str> = base.difference(&now).map(|(_, key)| list_of(key)).collect();
         let score = gone.saturating_sub(2 * new);
-        if lists.len() >= 2
-            && score >= 2
-            && 2 * gone > base.len()
-            && best.as_ref().is_none_or(|(most, _)| score > *most)
-        {
-            *best = Some((score, Culprit { key: key.to_owned(), how: how(), explained: gone, of: base.len() }));
-        }
+        let hint = readings::hint(&model, list_of(key));
+        let culprit = Culprit { key: key.to_owned(), how, explained: gone, of: base.len(), hint };
+        (lists.len() >= 2 && score >= 2 && 2 * gone > base.len()).then_some(Slip { score, culprit })
     };
+    // Of equal ones the first: the likeliest.
+    let better = |best: Option<Slip>, one: Slip| match best {
+        Some(best) if best.score >= one.score => Some(best),
+        _ => Some(one),
+    };
+    let mut best: Option<Slip> = None;
     for (key, places) in &suspects {
         // One that explains everything is enough.
-        if best.as_ref().is_some_and(|(score, _)| *score == base.len()) {
+        if best.as_ref().is_some_and(|best| best.score == base.len()) {
             break;
         }
-        for (index, (factor, how)) in SLIPS.into_iter().enumerate() {
-            let Some(text) = changed(&source.text, places, factor, index < OF_UNITS) else { continue };
+        let tried = |factor: f64, of_unit: bool, how: &str, why: Option<&str>| {
+            let text = changed(&source.text, places, factor, of_unit)?;
             // One value is shown as it would be written.
-            let written = || match places.as_slice() {
+            let written = match places.as_slice() {
                 [place] => format!("as {}", &text[place.start..place.end + text.len() - source.text.len()]),
+                [_, _, _, _] if key == "actuator.voltage" => format!("with `dac.range`, both {how},"),
                 _ => how.to_owned(),
             };
-            consider(&mut best, key, text.clone(), &written);
-        }
+            explained(key, text, why.map_or_else(|| written.clone(), |why| format!("{written} ({why})")))
+        };
+        let slips = SLIPS.into_iter().enumerate();
+        let by_unit =
+            slips.filter_map(|(index, (factor, how))| tried(factor, index < OF_UNITS, how, None)).fold(None, better);
+        let readings = readings::of(&model, list_of(key));
+        let by_rest = readings
+            .iter()
+            .filter_map(|one| {
+                tried(one.factor, false, &format!("{} times as large", figure(one.factor)), Some(&one.why))
+            })
+            .fold(None, better);
+        best = [both(by_rest, by_unit)].into_iter().flatten().fold(best, better);
     }
     for [a, b] in exchanged(findings, &spans) {
         let (first, second) =
@@ -141,9 +180,26 @@ fn culprit(source: &SpecSource, findings: &[Diagnostic]) -> Option<Culprit> {
         let mut text = source.text.clone();
         text.replace_range(second.clone(), &source.text[first.clone()]);
         text.replace_range(first.clone(), &source.text[second.clone()]);
-        consider(&mut best, a, text, &|| format!("with `{b}` in its place and the other way round,"));
+        best = explained(a, text, format!("with `{b}` in its place and the other way round,"))
+            .into_iter()
+            .fold(best, better);
     }
-    best.map(|(_, culprit)| culprit)
+    best.map(|best| best.culprit)
+}
+
+/// Two readings of one value: that which explains more, or both where they explain as much and are not the same.
+fn both(first: Option<Slip>, second: Option<Slip>) -> Option<Slip> {
+    let (mut first, second) = match (first, second) {
+        (Some(first), Some(second)) => (first, second),
+        (one, other) => return one.or(other),
+    };
+    if first.score != second.score {
+        return Some(if first.score > second.score { first } else { second });
+    }
+    if !first.culprit.how.starts_with(&second.culprit.how) {
+        first.culprit.how = format!("{}, or {},", first.culprit.how, second.culprit.how);
+    }
+    Some(first)
 }
 
 /// Pairs of keys of which a finding says that they may be in each other's place.
@@ -203,7 +259,8 @@ fn changed(text: &str, places: &[Range<usize>], factor: f64, of_unit: bool) -> O
         let end = inner.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(inner.len());
         let number: f64 = inner[..end].parse().ok()?;
         // As decimal arithmetic has it.
-        let scaled: f64 = format!("{:.12e}", number * factor).parse().ok()?;
+        let decimals = if SLIPS.iter().any(|(slip, _)| *slip == factor) { 12 } else { 3 };
+        let scaled: f64 = format!("{:.decimals$e}", number * factor).parse().ok()?;
         any |= scaled != number;
         let quote = if literal.starts_with('"') { "\"" } else { "" };
         let whole = quote.is_empty() && number % 1.0 == 0.0 && !inner.contains(['.', 'e', 'E']);

@@ -6,8 +6,10 @@ use specgen_language::model::Model;
 
 /// Largest slew rate of a first-order lag is range over time constant: a limit above that never binds.
 const LAG_SLACK: f64 = 1.0;
-/// Noise of an amplifier, of its range.
-const SOUND_NOISE: core::ops::RangeInclusive<f64> = 2e-7..=2e-3;
+/// Noise of an amplifier, of its range: those for stacks have 0.1 to 10 mV on a hundred volts.
+const SOUND_NOISE: core::ops::RangeInclusive<f64> = 2e-7..=3e-4;
+/// Motion of a leg by that noise, in noises or steps of its gauge: nobody looks so closely at what shakes so much.
+const LOUDEST: f64 = 25.0;
 /// Energy of the blocked leg, k s²/2, over that of its charge, C U²/2: ceramics turn at most half of the one into the other,
 /// and levers leave a hundredth of that. Wide, for both figures come from data sheets.
 const SOUND_COUPLING: core::ops::RangeInclusive<f64> = 1e-3..=5.0;
@@ -70,12 +72,23 @@ pub(super) fn current_fits_slew(facts: &Facts, found: &mut Found) {
 pub(super) fn amplifier_noise(facts: &Facts, found: &mut Found) {
     let (noise, actuator) = (facts.model.amplifier.noise, &facts.model.actuator);
     let [low, high] = actuator.voltage;
-    let share = noise / (high - low);
-    let off = times_beyond(share, &SOUND_NOISE);
+    let sensor = &facts.model.sensor;
+    let step = (sensor.range[1] - sensor.range[0]) / libm::exp2(f64::from(sensor.bits));
+    // Nothing below its step is seen.
+    let seen = if sensor.noise > step { sensor.noise } else { step };
+    let (share, beside) = (noise / (high - low), noise * actuator.leg_gain() / seen);
+    let (of_range, of_gauge) = (times_beyond(share, &SOUND_NOISE), beside / LOUDEST);
+    let off = if of_gauge > of_range { of_gauge } else { of_range };
     if noise == 0.0 || off <= 1.0 {
         return;
     }
-    let how = if share > 1e-3 { "more than a five-hundredth of its range" } else { "quieter than any amplifier" };
+    let how = if share < *SOUND_NOISE.start() {
+        "quieter than any amplifier".to_owned()
+    } else if share > *SOUND_NOISE.end() {
+        format!("{} of its range", figure(share))
+    } else {
+        format!("{} times what the gauges can see", figure(beside))
+    };
     found.add_off(
         off,
         codes::AMPLIFIER_NOISE,
@@ -86,7 +99,7 @@ pub(super) fn amplifier_noise(facts: &Facts, found: &mut Found) {
             figure(high - low),
             figure(noise * actuator.leg_gain() * 1e9)
         ),
-        "check the unit: mV or uV",
+        "amplifiers for stacks have 0.1 to 10 mV rms: check the unit (V, mV or uV), and that it is rms and no peak to peak",
     );
 }
 

@@ -1,10 +1,16 @@
 //! Gauges: resolution, range, layout.
 
 use super::{Facts, Found, amount, figure};
-use specgen_language::diagnostic::codes;
+use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::model::Probe;
 
 /// Noise below this share of a converter step cannot be known.
-const QUIETEST: f64 = 0.02;
+const QUIETEST: f64 = 0.06;
+/// Range of a gauge over what there is to see.
+const WIDEST: f64 = 5.0;
+/// Steps of noise beside which a converter is too fine to be meant, and bits from which on converters are so for any gauge.
+const NOISIEST: f64 = 40.0;
+const FINE_BITS: u32 = 18;
 /// A step coarser than this share of the stroke.
 const COARSEST_STEP: f64 = 1e-3;
 /// How far a gauge may reach to one side, in what there is to see there. Gauges come in steps of 2 to 2.5: that is two steps
@@ -44,6 +50,29 @@ pub(super) fn noise_of_a_step(facts: &Facts, found: &mut Found) {
             figure(step * 1e9)
         ),
         "nobody can measure a noise so far below the step: check the unit (nm or pm), or leave the noise out",
+    );
+}
+
+/// A converter of few bits that shows nothing but noise is a slip of the noise's unit, or of the range.
+pub(super) fn noise_of_many_steps(facts: &Facts, found: &mut Found) {
+    let (noise, step) = (facts.model.sensor.noise, step(facts));
+    // What is beyond all gauges is said with the spec.
+    let said = facts.model.sensor.bits > FINE_BITS || noise <= NOISIEST * step;
+    if said {
+        return;
+    }
+    found.add_off(
+        noise / (NOISIEST * step),
+        codes::GAUGE_NOISY,
+        "sensor.noise",
+        format!(
+            "a noise of {} nm rms is {} steps of the gauge's converter of {} bits, {} nm each",
+            figure(noise * 1e9),
+            figure(noise / step),
+            facts.model.sensor.bits,
+            figure(step * 1e9)
+        ),
+        "a converter is chosen for its gauge: check the unit of `sensor.noise` (nm or um; rms) and of `sensor.range`",
     );
 }
 
@@ -113,8 +142,31 @@ fn farthest_seen(facts: &Facts) -> f64 {
     })
 }
 
+/// A range of many times what there is to see wastes the converter, where its step is coarser than the gauge's noise.
+fn range_too_wide(facts: &Facts, found: &mut Found) {
+    let (model, step) = (facts.model, step(facts));
+    let [low, high] = model.sensor.range;
+    let seen = if model.task_space.is_some() { 2.0 * farthest_seen(facts) } else { model.actuator.stroke };
+    if high - low <= WIDEST * seen || model.sensor.noise >= step {
+        return;
+    }
+    found.add(
+        codes::GAUGE_COARSE,
+        "sensor.range",
+        format!(
+            "the gauge spans {} um, {} times what there is to see, and one code of it is {} nm, {} times its noise",
+            figure((high - low) * 1e6),
+            figure((high - low) / seen),
+            figure(step * 1e9),
+            figure(step / model.sensor.noise)
+        ),
+        "check the unit and the digits of `sensor.range`; a wide range asks for more `sensor.bits`",
+    );
+}
+
 /// One code of the gauge against the stroke.
 pub(super) fn step_against_stroke(facts: &Facts, found: &mut Found) {
+    range_too_wide(facts, found);
     let (step, stroke) = (step(facts), facts.model.actuator.stroke);
     if step <= COARSEST_STEP * stroke {
         return;
@@ -211,16 +263,27 @@ pub(super) fn opposite_directions(facts: &Facts, found: &mut Found) {
     }
 }
 
+/// Where the line of a gauge meets its target at rest, in {P}, m.
+pub(super) fn pierced(probe: &Probe, height: f64) -> [f64; 3] {
+    let start = [probe.point[0], probe.point[1], probe.point[2] - height];
+    let (n, m) = (probe.direction, probe.plane_normal);
+    let across = m[0] * n[0] + m[1] * n[1] + m[2] * n[2];
+    let way: f64 = (0..3).fold(0.0, |sum, k| sum + m[k] * (probe.plane_point[k] - start[k])) / across;
+    core::array::from_fn(|k| start[k] + way * n[k])
+}
+
 /// Targets are on the platform.
 pub(super) fn size_of_layout(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
     let radius = facts.model.geometry.joint_radius();
     for (gauge, probe) in task.probes.iter().enumerate() {
-        let start = [probe.point[0], probe.point[1], probe.point[2] - facts.model.geometry.height];
-        let (n, m) = (probe.direction, probe.plane_normal);
-        let across = m[0] * n[0] + m[1] * n[1] + m[2] * n[2];
-        let way: f64 = (0..3).fold(0.0, |sum, k| sum + m[k] * (probe.plane_point[k] - start[k])) / across;
-        let pierced: [f64; 3] = core::array::from_fn(|k| start[k] + way * n[k]);
+        // A height too many or too few is said already.
+        let known =
+            |one: &Diagnostic| one.code == codes::OTHER_FRAME && one.key.starts_with(&format!("gauge[{gauge}].point"));
+        if found.list.iter().any(known) {
+            continue;
+        }
+        let (n, pierced) = (probe.direction, pierced(probe, facts.model.geometry.height));
         let far = libm::sqrt(pierced.iter().fold(0.0, |sum, part| sum + part * part));
         if far.is_nan() || far <= DETACHED * radius {
             if let Some(axis) = aside(&pierced, &n, radius) {

@@ -11,8 +11,8 @@ use specgen_language::diagnostic::codes;
 const NEAREST: f64 = 1e-2;
 /// Base, platform and height are of one size: none is so many times larger or smaller than what lies between the others.
 const OUT_OF_PROPORTION: f64 = 5.0;
-/// Legs that would be shorter by more than this share with each other's joints cross.
-const CROSSED: f64 = 1e-3;
+/// A base is so many times as wide as the platform, at most.
+const WIDEST_BASE: f64 = 2.5;
 /// Six joints evenly on their circle are so many degrees apart: no pair is wider.
 const WIDEST_PAIR: f64 = 60.0;
 
@@ -122,10 +122,12 @@ pub(super) fn proportions(facts: &Facts, found: &mut Found) {
         libm::fabs(libm::log(sizes[k] / libm::sqrt(a * b)))
     });
     let odd = (1..3).fold(0, |odd, k| if apart[k] > apart[odd] { k } else { odd });
+    let wide = sizes[0] > WIDEST_BASE * sizes[1];
     // A platform in the plane of its base is found where the legs are.
-    if !apart[odd].is_finite() || apart[odd] <= libm::log(OUT_OF_PROPORTION) {
+    if !apart[odd].is_finite() || (apart[odd] <= libm::log(OUT_OF_PROPORTION) && !wide) {
         return;
     }
+    let odd = if apart[odd] > libm::log(OUT_OF_PROPORTION) { odd } else { 0 };
     found.add_off(
         libm::exp(apart[odd]) / OUT_OF_PROPORTION,
         codes::OUT_OF_PROPORTION,
@@ -136,37 +138,11 @@ pub(super) fn proportions(facts: &Facts, found: &mut Found) {
             figure(sizes[1] * 1e3),
             figure(sizes[2] * 1e3)
         ),
-        &format!("check the unit of `{}`: the three are of one size on most hexapods", keys[odd]),
+        &format!(
+            "check the unit of `{}`, and that it is a radius and no diameter: the three are of one size on most hexapods, and a base is at most {WIDEST_BASE} times as wide as its platform",
+            keys[odd]
+        ),
     );
-}
-
-/// Legs do not cross. Joints on circles are paired by rule; those of a list may be in another order on one body.
-pub(super) fn legs_cross(facts: &Facts, found: &mut Found) {
-    let geometry = &facts.model.geometry;
-    if !["base", "platform"].iter().any(|body| found.model.spans.contains_key(&format!("geometry.{body}_joints"))) {
-        return;
-    }
-    let length = |base: usize, platform: usize| {
-        let (b, p) = (&geometry.base_joints[base], &geometry.platform_joints[platform]);
-        libm::hypot(libm::hypot(p[0] - b[0], p[1] - b[1]), geometry.height + p[2] - b[2])
-    };
-    for (i, j) in (0..6).flat_map(|i| (i + 1..6).map(move |j| (i, j))) {
-        let (now, exchanged) = (length(i, i) + length(j, j), length(i, j) + length(j, i));
-        if exchanged >= now * (1.0 - CROSSED) {
-            continue;
-        }
-        found.add(
-            codes::LEGS_CROSS,
-            &format!("geometry.platform_joints[{i}]"),
-            format!(
-                "legs {i} and {j} cross: together they are {} mm long, and {} mm if each went to the other's joint",
-                figure(now * 1e3),
-                figure(exchanged * 1e3)
-            ),
-            "`geometry.base_joints` and `geometry.platform_joints` list the legs in the same order: check it on both bodies",
-        );
-        return;
-    }
 }
 
 /// Joints of a pair are nearer to each other than to the next pair.

@@ -12,8 +12,13 @@ const NEVER: f64 = 4.0;
 const WITHIN_TICK: f64 = 1.0;
 /// A stream that may go slower than this share of the speed of moves.
 const SLOWEST_STREAM: f64 = 0.1;
-/// Largest bound against what its legs reach, and smallest.
+/// Smallest bound against what its legs reach.
 const SMALLEST_USE: f64 = 5e-3;
+/// How many times faster or slower rotations are than translations, at the joints and against the workspace. Degrees for
+/// milliradians are 17 times, for radians 57.
+const APART: f64 = 10.0;
+/// Codes of the converter that a correction is worth, at least.
+const FEWEST_CODES: f64 = 10.0;
 
 fn rules<'a>(facts: &Facts<'a>) -> Option<&'a SetpointRules> {
     facts.model.task_space.as_ref().map(|task| &task.setpoint)
@@ -120,6 +125,101 @@ pub(super) fn limits_bind(facts: &Facts, found: &mut Found) {
             );
         }
     }
+}
+
+/// The middle of three.
+fn middle(mut values: [f64; 3]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[1]
+}
+
+/// Rotations and translations are limited alike: at the joints, or as parts of the workspace.
+pub(super) fn rotations_beside_translations(facts: &Facts, found: &mut Found) {
+    let Some(rules) = rules(facts) else { return };
+    let radius = facts.model.geometry.joint_radius();
+    let bounds = facts.model.workspace.bounds();
+    for (name, limits, unit) in [
+        ("speed", rules.speed, ["mm/s", "rad/s"]),
+        ("acceleration", rules.acceleration, ["mm/s^2", "rad/s^2"]),
+        ("jerk", rules.jerk, ["mm/s^3", "rad/s^3"]),
+        ("stream_speed", rules.stream_speed, ["mm/s", "rad/s"]),
+    ] {
+        let key = format!("control.setpoint.{name}");
+        let of = |first: usize, each: &dyn Fn(usize) -> f64| middle(core::array::from_fn(|k| each(first + k)));
+        let along = of(0, &|axis| limits[axis]);
+        let about = of(3, &|axis| limits[axis]);
+        // A locked axis has no way.
+        let part = |axis: usize| if bounds[axis] > 0.0 { limits[axis] / bounds[axis] } else { f64::INFINITY };
+        let ratios = [radius * about / along, of(3, &part) / of(0, &part)];
+        let faster = ratios.iter().all(|ratio| *ratio > APART);
+        let slower = ratios.iter().all(|ratio| *ratio < 1.0 / APART);
+        if !found.model.spans.contains_key(&key) || !(faster || slower) {
+            continue;
+        }
+        found.add(
+            codes::LIMITS_APART,
+            &format!("{key}[3]"),
+            format!(
+                "rotations are limited to {} {}, which is {} {} at the joints, translations to {} {}: {} times {}",
+                figure(about),
+                unit[1],
+                figure(radius * about * 1e3),
+                unit[0],
+                figure(along * 1e3),
+                unit[0],
+                figure(if faster { ratios[0] } else { 1.0 / ratios[0] }),
+                if faster { "less" } else { "more" }
+            ),
+            &format!("check the units of `{key}`: deg, mrad and rad, um and mm"),
+        );
+    }
+}
+
+/// A stop that is over within a tick is no stop, but a jump.
+pub(super) fn stops_take_ticks(facts: &Facts, found: &mut Found) {
+    let Some(rules) = rules(facts) else { return };
+    let Some(limits) = rules.stop_acceleration else { return };
+    let tick = facts.model.timing.period;
+    for (axis, limit) in limits.into_iter().enumerate() {
+        let [speed, stream] = [rules.speed[axis], rules.stream_speed[axis]];
+        let fastest = if speed > stream { speed } else { stream };
+        if fastest / limit >= WITHIN_TICK * tick {
+            continue;
+        }
+        found.add(
+            codes::LIMIT_WITHOUT_EFFECT,
+            &format!("control.setpoint.stop_acceleration[{axis}]"),
+            format!(
+                "a limit of {}/s^2 on {} does nothing: a speed of {}/s is gone within a tick",
+                amount(axis, limit),
+                AXES[axis],
+                amount(axis, fastest)
+            ),
+            "check the unit of `control.setpoint.stop_acceleration`, or leave it out: the compiler derives it from the modes",
+        );
+        return;
+    }
+}
+
+/// A correction of a few codes corrects nothing.
+pub(super) fn correction_moves_codes(facts: &Facts, found: &mut Found) {
+    let model = facts.model;
+    let Some(correction) = model.task_space.as_ref().and_then(|task| task.correction) else { return };
+    let [low, high] = model.dac.range;
+    let code = (high - low) / (libm::exp2(f64::from(model.dac.bits)) - 1.0) * model.actuator.leg_gain();
+    if correction >= FEWEST_CODES * code {
+        return;
+    }
+    found.add(
+        codes::LIMIT_WITHOUT_EFFECT,
+        "control.correction",
+        format!(
+            "a correction of {} nm at most does nothing: one code of the converter moves a leg by {} nm",
+            figure(correction * 1e9),
+            figure(code * 1e9)
+        ),
+        "check the unit (nm or um)",
+    );
 }
 
 /// A streamed set-point that may jump across the workspace is not checked at all.

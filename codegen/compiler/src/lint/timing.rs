@@ -7,6 +7,8 @@ use specgen_language::diagnostic::codes;
 const NOTHING: f64 = 0.01;
 /// Largest lead, in amplifier lags and ticks together: what there is to take out, and a quarter for the modes.
 const LARGEST_LEAD: f64 = 1.25;
+/// The same of six legs, their resonance included: a record's dead time has it all.
+const LONGEST_DEAD_TIME: f64 = 3.0;
 /// A change of mode that takes longer than this is not meant, s.
 const LONGEST_TRANSFER: f64 = 5.0;
 /// A velocity filter slower than this share of the lowest mode.
@@ -24,18 +26,21 @@ pub(super) fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
     let model = facts.model;
     let tick = model.timing.period;
     let lead = model.task_space.as_ref().and_then(|task| task.lead).unwrap_or(0.0);
-    for (key, time) in [
+    let triggers = model.task_space.iter().flat_map(|task| task.triggers.iter().enumerate());
+    let widths = triggers.filter_map(|(index, trigger)| Some((format!("trigger[{index}].width"), trigger.width?)));
+    let times = [
         ("amplifier.lag", model.amplifier.lag),
         ("sensor.lag", model.sensor.lag),
         ("control.lead", lead),
         ("hysteresis.dead_time", model.hysteresis.dead_time),
-    ] {
+    ];
+    for (key, time) in times.into_iter().map(|(key, time)| (key.to_owned(), time)).chain(widths) {
         if time == 0.0 || time >= NOTHING * tick {
             continue;
         }
         found.add(
             codes::TIME_WITHOUT_EFFECT,
-            key,
+            &key,
             format!(
                 "`{key}` is {} us, {} of a tick of {} us: it has no effect",
                 figure(time * 1e6),
@@ -50,8 +55,22 @@ pub(super) fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
 /// A lead takes out the lag, no more.
 pub(super) fn lead_of_the_lag(facts: &Facts, found: &mut Found) {
     let model = facts.model;
-    let Some(lead) = model.task_space.as_ref().and_then(|task| task.lead) else { return };
     let lag = model.amplifier.lag + model.timing.period;
+    // The legs' own resonance delays them by a part of its period.
+    let (dead_time, most) = (model.hysteresis.dead_time, LONGEST_DEAD_TIME * (lag + 1.0 / model.actuator.resonance));
+    if dead_time > most {
+        found.add(
+            codes::LEAD_TOO_LONG,
+            "hysteresis.dead_time",
+            format!(
+                "legs are asked for {} ms early, but amplifier, tick and a period of their resonance together are {} ms",
+                figure(dead_time * 1e3),
+                figure((lag + 1.0 / model.actuator.resonance) * 1e3)
+            ),
+            "check the unit (ms or us); `specgen identify rate` measures it",
+        );
+    }
+    let Some(lead) = model.task_space.as_ref().and_then(|task| task.lead) else { return };
     if lead <= LARGEST_LEAD * lag {
         return;
     }

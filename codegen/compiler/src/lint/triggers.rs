@@ -23,6 +23,28 @@ fn key(index: usize, trigger: &Trigger, name: &str) -> String {
     format!("trigger[{index}].{name}{}", if trigger.axis < 3 { "" } else { "_angle" })
 }
 
+/// Positions that are passed one after the other are more than one.
+pub(super) fn more_than_one(facts: &Facts, found: &mut Found) {
+    for (index, trigger) in of_kind(facts, &[TriggerKind::Position]) {
+        let (Some(start), Some(step)) = (trigger.start, trigger.step) else { continue };
+        let stop = trigger.stop.unwrap_or(facts.model.workspace.bounds()[trigger.axis]);
+        // One position is meant where start and stop are one.
+        if stop <= start || step <= stop - start {
+            continue;
+        }
+        found.add(
+            codes::TRIGGER_SINGLE,
+            &key(index, trigger, "step"),
+            format!(
+                "`step` of trigger[{index}] is {}, but from start to stop there are {}: only the first position is passed",
+                amount(trigger.axis, step),
+                amount(trigger.axis, stop - start)
+            ),
+            "check the units of start, stop and step; write `stop` equal to `start` if one position is meant",
+        );
+    }
+}
+
 /// Positions are apart by more than the hysteresis, and not so many that a single precision cannot tell them apart.
 pub(super) fn steps_apart(facts: &Facts, found: &mut Found) {
     for (index, trigger) in of_kind(facts, &[TriggerKind::Position]) {

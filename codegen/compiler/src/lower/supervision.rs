@@ -1,5 +1,6 @@
 //! The supervisor: times to ticks and samples, bounds to SI, and what cannot work.
 
+pub(crate) mod defaults;
 mod rest;
 
 use super::kinematics::inverse_jacobian;
@@ -18,16 +19,8 @@ const FEWEST_SAMPLES: f64 = 2.0;
 const NOISE_MARGIN: f64 = 8.0;
 /// Largest `supervisor.tracking_error` that a spec may declare.
 const LARGEST_SHARE: f64 = 10.0;
-/// Of `supervisor.stuck_motion` without the key: times the noise, and steps of the gauge's converter.
-const STUCK_MARGIN: f64 = 10.0;
 /// Fewest steps of the converter by which a sound gauge must have moved.
 const FEWEST_STEPS: f64 = 2.0;
-/// Of the stroke, without `supervisor.disagreement`.
-const DISAGREEMENT_SHARE: f64 = 0.2;
-/// Without `supervisor.arm_time`, s.
-const ARM_TIME: f64 = 0.1;
-/// Without `supervisor.host_lost`: silence of a host after which the machine holds and ramps down, s.
-const HOST_LOST: [f64; 2] = [0.1, 10.0];
 /// Missed ticks are counted over this time, s.
 const MISSED_WINDOW: f64 = 1.0;
 
@@ -47,13 +40,13 @@ pub(super) fn lower(
     let noise = pose_noise(model)?;
     let mut findings = Vec::new();
     let mut times = Times { model, findings: &mut findings };
-    let arm_ticks = times.ticks("arm_time", spec.arm_time, ARM_TIME);
-    let gauge = times.ticks("gauge_time", spec.gauge_time, 0.01);
-    let voltage = times.ticks("voltage_time", spec.voltage_time, 0.5);
-    let slew = times.ticks("slew_time", spec.slew_time, 0.05);
-    let stuck_samples = times.samples("stuck_time", spec.stuck_time, 0.05);
-    let disagreement_samples = times.samples("disagreement_time", spec.disagreement_time, 0.1);
-    let tracking_samples = times.samples("tracking_time", spec.tracking_time, 0.1);
+    let arm_ticks = times.ticks("arm_time", spec.arm_time, defaults::ARM_TIME);
+    let gauge = times.ticks("gauge_time", spec.gauge_time, defaults::GAUGE_TIME);
+    let voltage = times.ticks("voltage_time", spec.voltage_time, defaults::VOLTAGE_TIME);
+    let slew = times.ticks("slew_time", spec.slew_time, defaults::SLEW_TIME);
+    let stuck_samples = times.samples("stuck_time", spec.stuck_time, defaults::STUCK_TIME);
+    let disagreement_samples = times.samples("disagreement_time", spec.disagreement_time, defaults::DISAGREEMENT_TIME);
+    let tracking_samples = times.samples("tracking_time", spec.tracking_time, defaults::TRACKING_TIME);
     let [host_ticks, host_gone] = times.host_lost();
     let window = whole(MISSED_WINDOW / period);
     let missed = window.saturating_mul(spec.missed_ticks - 1).saturating_add(1);
@@ -109,7 +102,7 @@ impl Times<'_> {
     /// Ticks after which a host is lost, and those with the event of it after which it is gone.
     fn host_lost(&mut self) -> [u32; 2] {
         let given = self.model.supervisor.host_lost;
-        let [hold, down] = given.unwrap_or(HOST_LOST);
+        let [hold, down] = given.unwrap_or(defaults::HOST_LOST);
         let hold_ticks = self.ticks("host_lost", None, hold);
         let least = 1 + hold_ticks;
         let mut down_ticks = self.ticks("host_lost", None, down);
@@ -168,8 +161,7 @@ fn gauge_bounds(model: &Model, findings: &mut Vec<Diagnostic>) -> (f64, f64) {
     let [low, high] = model.sensor.range;
     let step = (high - low) / libm::exp2(f64::from(model.sensor.bits));
     let noise = model.sensor.noise;
-    let larger = |a: f64, b: f64| if a > b { a } else { b };
-    let stuck_motion = spec.stuck_motion.unwrap_or_else(|| larger(STUCK_MARGIN * step, STUCK_MARGIN * noise));
+    let stuck_motion = spec.stuck_motion.unwrap_or_else(|| defaults::stuck_motion(model, step));
     let least = FEWEST_STEPS * step;
     if stuck_motion < least * (1.0 - 1e-9) {
         findings.push(finding(
@@ -184,7 +176,7 @@ fn gauge_bounds(model: &Model, findings: &mut Vec<Diagnostic>) -> (f64, f64) {
             format!("write stuck_motion = \"{:.4} nm\" or more", above(least * 1e9)),
         ));
     }
-    let disagreement = spec.disagreement.unwrap_or(DISAGREEMENT_SHARE * model.actuator.stroke);
+    let disagreement = spec.disagreement.unwrap_or_else(|| defaults::disagreement(model));
     let least = NOISE_MARGIN * noise + step;
     if disagreement < least {
         findings.push(finding(
@@ -199,7 +191,7 @@ fn gauge_bounds(model: &Model, findings: &mut Vec<Diagnostic>) -> (f64, f64) {
             format!(
                 "write disagreement = \"{:.4} nm\" or more; a fifth of the stroke is {:.4} um",
                 above(least * 1e9),
-                DISAGREEMENT_SHARE * model.actuator.stroke * 1e6
+                defaults::disagreement(model) * 1e6
             ),
         ));
     }
@@ -268,9 +260,7 @@ fn no_range(model: &Model, axis: usize, full: f64, noise: f64) -> Diagnostic {
 /// Codes of a step, and ticks from one to the next: no faster than asked.
 fn ramp(model: &Model, actuation: &Actuation, max_step: i32, findings: &mut Vec<Diagnostic>) -> (i32, u32) {
     let slew_rate = model.actuator.slew_rate;
-    let [low, high] = model.actuator.voltage;
-    let whole_range = high - low;
-    let rate = model.supervisor.ramp_rate.unwrap_or(if whole_range < slew_rate { whole_range } else { slew_rate });
+    let rate = model.supervisor.ramp_rate.unwrap_or_else(|| defaults::ramp_rate(model));
     if rate > slew_rate {
         findings.push(finding(
             model,

@@ -36,9 +36,22 @@ pub(crate) struct Fields {
     tables: BTreeMap<String, Range<usize>>,
     /// Tables of each repeated section.
     counts: BTreeMap<&'static str, usize>,
+    /// The file, for [`Fields::literal`].
+    source: String,
 }
 
 impl Fields {
+    /// None yet, of the file `source`.
+    pub(crate) fn of(source: &str) -> Self {
+        Self { source: source.to_owned(), ..Self::default() }
+    }
+
+    /// The value `index` of the list at `path` as it is written; `None` if it is a default.
+    pub(crate) fn literal(&self, path: &str, index: usize) -> Option<&str> {
+        let field = self.get(path).filter(|field| field.given)?;
+        self.source.get(field.items.get(index)?.clone())
+    }
+
     pub(crate) fn insert(&mut self, path: String, field: Field) {
         self.map.insert(path, field);
     }

@@ -59,6 +59,7 @@ const CHECKS: &[Check] = &[
     rate::dead_time_of_legs,
     gauges::six,
     gauges::directions,
+    gauges::not_angles,
     gauges::calibrated_alike,
     gauges::input_of_calibrated,
     robust::ranges_in_order,
@@ -90,14 +91,15 @@ fn in_order(fields: &Fields, findings: &mut Findings, path: &str, equal_allowed:
         return Some(());
     }
     let message = format!("`{path}` ends where it starts or before: the first value must be the smaller one");
-    let key = path.rsplit('.').next().unwrap_or(path);
-    let example = super::keys::key(path).map_or("", |key| key.example);
-    findings.add(
-        codes::WRONG_ORDER,
-        path,
-        fields.span(path),
-        message,
-        format!("write the smaller value first, as in {key} = {example}"),
-    );
+    let name = path.rsplit('.').next().unwrap_or(path);
+    let turned = match [0, 1].map(|item| fields.literal(path, item)) {
+        [Some(first), Some(second)] if low > high => Some(format!("[{second}, {first}]")),
+        _ => None,
+    };
+    let template = super::keys::key(path).map_or_else(String::new, super::keys::Key::template);
+    let value = turned.as_ref().unwrap_or(&template);
+    let help = format!("write the smaller value first: {name} = {value}");
+    findings.add(codes::WRONG_ORDER, path, fields.span(path), message, help);
+    findings.replace_by(path, turned);
     Some(())
 }

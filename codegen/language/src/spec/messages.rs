@@ -20,12 +20,34 @@ pub(super) fn kind_of(value: &DeValue<'_>) -> &'static str {
     }
 }
 
-/// The example of the key, or of the one item that `path` names ("gains.integral\[3\]").
-pub(super) fn example_of(key: &Key, path: &str) -> String {
-    let index: Option<usize> = path.rsplit_once('[').and_then(|(_, rest)| rest.trim_end_matches(']').parse().ok());
-    let items = key.example.trim_start_matches('[').trim_end_matches(']');
-    let item = index.and_then(|i| items.split(", ").nth(i)).map(|item| item.trim_matches(['[', ']']));
-    item.unwrap_or(key.example).to_owned()
+/// The form of the key, or of the one item that `path` names ("gains.integral\[3\]"), with a placeholder for the value.
+pub(super) fn template_of(key: &Key, path: &str) -> String {
+    let is_item = path.ends_with(']');
+    item_of(key, path)
+        .filter(|_| is_item || matches!(key.shape, Shape::One(_)))
+        .map_or_else(|| key.template(), Item::template)
+}
+
+/// What takes the place of `placeholder`.
+pub(super) fn wanted(key: &Key, path: &str, placeholder: &str) -> String {
+    if placeholder == "<unit>" {
+        return units_of(key, path).unwrap_or_else(|| "a unit".to_owned());
+    }
+    match item_of(key, path) {
+        Some(item @ (Item::Quantity { .. } | Item::Number(_))) => format!("a number of your own: {}", range_of(item)),
+        Some(item @ Item::Integer(..)) => format!("a whole number: {}", range_of(item)),
+        Some(item @ (Item::Choice(_) | Item::Flag)) => range_of(item),
+        Some(Item::Name) => "a name: a letter, then letters, digits, - and _".to_owned(),
+        Some(Item::File) | None if placeholder == "<file>" => "the name of your file, relative to the spec".to_owned(),
+        Some(Item::File) | None => "your own text".to_owned(),
+    }
+}
+
+/// How a file is named that was not named relative to the spec.
+pub(super) fn beside_the_spec(found: &str) -> String {
+    let name = found.rsplit(['/', '\\', ':']).next().unwrap_or_default().trim();
+    let name = if name.is_empty() { "<file>" } else { name };
+    format!("put the file beside the spec and name it \"{}\"", text::shorten(name))
 }
 
 /// The item that `path` names.
@@ -71,7 +93,7 @@ fn bounds(range: Range, scale: f64, unit: &str) -> String {
 
 pub(super) fn range_help(key: &Key, path: &str) -> String {
     let range = item_of(key, path).map_or_else(String::new, |item| format!(": {}", range_of(item)));
-    format!("give a value in range{range}, such as {}. {}", example_of(key, path), key.doc)
+    format!("give a value in range{range}. {}", key.doc)
 }
 
 /// The usual units of the item that `path` names, for a help: "kg or g".
@@ -99,7 +121,7 @@ pub(super) fn time_of_rate(key: &Key, found: &str) -> Option<String> {
     };
     let time = 1.0 / (turn * rate.value);
     let scale = quantity::unit_value(unit).map_or(1.0, |one| one.value);
-    range.contains(time).then(|| format!("{} {unit}", text::number(time / scale)))
+    range.contains(time).then(|| format!("{} {unit}", text::digits(time / scale)))
 }
 
 /// Message and help for a unit that measures something else.
@@ -115,6 +137,9 @@ pub(super) fn wrong_dimension(
     if let Some(time) = time_of_rate(key, found) {
         return (message, format!("{found} is a {} of \"{time}\"", key.name));
     }
+    let own =
+        if is.without_angle() == wanted.without_angle() { with_angle(key, path, found, is, wanted) } else { None };
+    let written = own.map_or_else(|| format!("in the form {}", template_of(key, path)), |own| format!("as \"{own}\""));
     let hint = if is == Dimension::FREQUENCY && wanted == Dimension::ANGULAR_RATE {
         "1 Hz is 2 pi rad/s; "
     } else if is.without_angle() != wanted.without_angle() {
@@ -124,32 +149,69 @@ pub(super) fn wrong_dimension(
     } else {
         "mind the angle in the unit; "
     };
-    (message, format!("{hint}write {} in a form such as {}", wanted.describe(), example_of(key, path)))
+    (message, format!("{hint}write {} {written}", wanted.describe()))
+}
+
+/// What was found, in the unit of the key, where the two differ by an angle alone: 20 Hz is 40 pi rad/s, 5 N m is 5 N m/rad.
+fn with_angle(key: &Key, path: &str, found: &str, is: Dimension, wanted: Dimension) -> Option<String> {
+    let Some(Item::Quantity { unit, range, .. }) = item_of(key, path) else { return None };
+    let value = quantity::parse(found).ok()?.value;
+    let turns = |a, b| is == a && wanted == b && found.contains("Hz") != (is == Dimension::ANGULAR_RATE);
+    let (value, text) = if turns(Dimension::FREQUENCY, Dimension::ANGULAR_RATE) {
+        (std::f64::consts::TAU * value, format!("{} pi rad/s", text::digits(2.0 * value)))
+    } else if turns(Dimension::ANGULAR_RATE, Dimension::FREQUENCY) {
+        let turns = value / std::f64::consts::TAU;
+        (turns, format!("{} Hz", text::digits(turns)))
+    } else {
+        (value, format!("{} {unit}", text::digits(value / quantity::unit_value(unit)?.value)))
+    };
+    range.contains(value).then_some(text)
+}
+
+/// What a quantity with a comma may mean: decimals behind it, or thousands before it.
+fn without_commas(found: &str) -> String {
+    let parts: Vec<&str> = found.split(',').collect();
+    let is_group = |part: &&str| {
+        let digits = part.trim_end().bytes().take_while(u8::is_ascii_digit).count();
+        digits == 3
+    };
+    let decimals = [found.replace(',', "."), found.replace('.', "").replace(',', ".")];
+    let decimals = decimals.into_iter().filter(|_| parts.len() == 2).find(|text| quantity::parse(text).is_ok());
+    let thousands =
+        Some(found.replace(',', "")).filter(|text| parts.iter().skip(1).all(is_group) && quantity::parse(text).is_ok());
+    let written = |text: &str| format!("\"{}\"", text::shorten(text));
+    match (decimals, thousands) {
+        (Some(one), Some(other)) => {
+            format!(
+                "write {} if decimals stand behind the comma, {} if it separates thousands",
+                written(&one),
+                written(&other)
+            )
+        }
+        (Some(one), None) => format!("write the decimals after a point: {}", written(&one)),
+        (None, Some(one)) => format!("write no commas between thousands: {}", written(&one)),
+        (None, None) => "write the decimals after a point and no commas between thousands".to_owned(),
+    }
 }
 
 /// Code, message and help for a text that is not a quantity.
 pub(super) fn bad_quantity(key: &Key, path: &str, found: &str, problem: &Problem) -> (Code, String, String) {
-    let example = example_of(key, path);
-    let such_as = format!("write a number and a unit, such as {example}");
+    let form = template_of(key, path);
+    let such_as = format!("write a number and a unit, in the form {form}");
     let is = format!("`{path}` is \"{}\"", text::shorten(found));
     match problem {
         Problem::TooLong => {
             (codes::BAD_QUANTITY, format!("{is}: longer than {} characters", quantity::MAX_LENGTH), such_as)
         }
         Problem::NoNumber => (codes::BAD_QUANTITY, format!("{is}: a quantity starts with a number"), such_as),
-        Problem::Comma => (
-            codes::BAD_QUANTITY,
-            format!("{is}: a comma in a number"),
-            "write the decimals after a point and no commas between thousands, such as \"1.5 mm\" or \"1500 mm\""
-                .to_owned(),
-        ),
+        Problem::Comma => (codes::BAD_QUANTITY, format!("{is}: a comma in a number"), without_commas(found)),
         Problem::UnknownUnit(unit, meant) => (
             codes::UNKNOWN_UNIT,
             format!("{is}: unknown unit {}", text::quote(unit)),
             meant.map_or_else(
                 || {
                     let units = units_of(key, path).map_or_else(String::new, |units| format!(", such as {units}"));
-                    format!("write a unit as in {example}{units}; upper and lower case matter")
+                    format!("write a unit as in {form}{units}; upper and lower case matter")
                 },
                 |m| format!("did you mean \"{m}\"? Upper and lower case matter"),
             ),
@@ -162,7 +224,7 @@ pub(super) fn bad_quantity(key: &Key, path: &str, found: &str, problem: &Problem
         Problem::BadPower => (
             codes::BAD_QUANTITY,
             format!("{is}: the power of a unit is a whole number from -9 to 9"),
-            format!("write the power as in \"mm^2\" or \"s^-1\"; expected a form such as {example}"),
+            format!("write the power as in \"mm^2\" or \"s^-1\"; the form here is {form}"),
         ),
         Problem::Unexpected(character) => {
             (codes::BAD_QUANTITY, format!("{is}: {character} does not belong there"), such_as)
@@ -172,7 +234,7 @@ pub(super) fn bad_quantity(key: &Key, path: &str, found: &str, problem: &Problem
         Problem::Underflow => (
             codes::NOT_FINITE,
             format!("{is}: too small for a double, yet not zero"),
-            format!("write 0, or a value that a double can hold, such as {example}"),
+            "write 0, or a value that a double can hold".to_owned(),
         ),
     }
 }

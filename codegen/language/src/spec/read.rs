@@ -16,7 +16,7 @@ use crate::keys::fields::{Field, Fields};
 
 /// Reads every value of `root`; what is wrong goes to `findings`.
 pub(super) fn read(source: &str, root: &DeTable<'_>, findings: &mut Findings) -> Fields {
-    let mut reader = Reader { source, fields: Fields::default(), findings, seen: BTreeSet::new() };
+    let mut reader = Reader { source, fields: Fields::of(source), findings, seen: BTreeSet::new() };
     if let Some(section) = keys::section("") {
         reader.table(section, "", root, None);
     }
@@ -129,7 +129,7 @@ impl Reader<'_> {
             path,
             span,
             format!("`{path}` is {}, expected sections {}", messages::kind_of(value), section.header()),
-            format!("write each as a section of its own, with double brackets:\n{}", section.example(true).trim_end()),
+            format!("write each as a section of its own, with double brackets:\n{}", section.template().trim_end()),
         );
     }
 
@@ -219,7 +219,7 @@ impl Reader<'_> {
             section.name,
             span,
             format!("`{}` is {is}, expected the section [{}]", section.name, section.name),
-            format!("write it as a section of its own:\n{}", section.example(true).trim_end()),
+            format!("write it as a section of its own:\n{}", section.template().trim_end()),
         );
     }
 
@@ -254,7 +254,7 @@ impl Reader<'_> {
                     &path,
                     header.clone(),
                     format!("`{path}` is missing"),
-                    format!("write, {place}: {} = {}. {}", key.name, key.example, key.doc),
+                    format!("write, {place}: {}. {}", key.line(), key.doc),
                 );
             }
             Presence::Default(literal) => self.default(path, key, literal, header),
@@ -286,7 +286,7 @@ impl Reader<'_> {
                     section.name,
                     end..end,
                     format!("section [{}] is missing", section.name),
-                    format!("{} Write:\n{}", section.doc, section.example(true).trim_end()),
+                    format!("{} Write:\n{}", section.doc, section.template().trim_end()),
                 );
             } else if section.kind == Kind::Plain && self.outer_is_there(section) {
                 // The place of its defaults is the start of the file.

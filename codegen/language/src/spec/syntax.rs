@@ -117,7 +117,7 @@ const SCALAR_PHRASES: &[&str] =
 
 fn help_for(message: &str) -> &'static str {
     if message.contains("unclosed array") || message.contains("in array") || message.contains("array elements") {
-        "an array is written [\"0 V\", \"100 V\"]: a comma between values, a bracket at each end"
+        "an array is written [VALUE, VALUE]: a comma between values, a bracket at each end"
     } else if message.contains("unclosed table") {
         "a section starts with its name in brackets on a line of its own: [geometry]"
     } else if message.contains("basic string") || message.contains("literal string") || message.contains("escape") {

@@ -57,6 +57,12 @@ pub(super) fn number(value: f64) -> String {
     format!("{}", rounded(value))
 }
 
+/// A number for a fix: twelve significant digits, so that none of the user's are lost, and no noise of a division.
+pub(super) fn digits(value: f64) -> String {
+    let value = format!("{value:.11e}").parse().unwrap_or(value);
+    if value == 0.0 || (1e-4..1e6).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
+}
+
 /// To four significant digits, by way of the decimal text.
 fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)

@@ -8,7 +8,7 @@ use toml::Spanned;
 use toml::de::DeValue;
 
 use super::findings::Findings;
-use super::keys::{Item, Key, MAX_NAME, Shape};
+use super::keys::{self, Item, Key, MAX_NAME, Shape};
 use super::{messages, text};
 use crate::diagnostic::codes;
 use crate::keys::fields::{Field, Parsed};
@@ -118,7 +118,7 @@ impl ValueReader<'_> {
             path,
             text::clamp(self.source, value.span()),
             format!("`{path}` has {found} {what}{}, expected {wanted}", if found == 1 { "" } else { "s" }),
-            format!("write {wanted} {what}s: {} = {}", self.key.name, self.key.example),
+            format!("write {wanted} {what}s: {}", self.key.line()),
         );
     }
 
@@ -131,6 +131,7 @@ impl ValueReader<'_> {
         for (i, element) in array.iter().enumerate() {
             spans.push(text::clamp(self.source, element.span()));
             let path = format!("{}[{i}]", self.path);
+            self.filled_in(&path, element)?;
             match element.get_ref() {
                 DeValue::String(file) => texts.push(file.to_string()),
                 _ => return self.wrong_type(&path, element, what, None),
@@ -139,7 +140,24 @@ impl ValueReader<'_> {
         Some((Parsed::Texts(texts), spans))
     }
 
+    /// Reports a placeholder that nobody replaced; `None` if `value` is one.
+    fn filled_in(&mut self, path: &str, value: &Spanned<DeValue<'_>>) -> Option<()> {
+        let DeValue::String(found) = value.get_ref() else { return Some(()) };
+        let Some(placeholder) = keys::placeholder(found) else { return Some(()) };
+        let span = text::clamp(self.source, value.span());
+        let start = found.find(placeholder).unwrap_or(0);
+        self.findings.add(
+            codes::PLACEHOLDER,
+            path,
+            self.inside(&span, found, &(start..start + placeholder.len())),
+            format!("`{path}` is a placeholder, {}", text::shorten(found)),
+            format!("replace {placeholder} by {}. {}", messages::wanted(self.key, path, placeholder), self.key.doc),
+        );
+        None
+    }
+
     fn scalar(&mut self, item: Item, path: &str, value: &Spanned<DeValue<'_>>) -> Option<Scalar> {
+        self.filled_in(path, value)?;
         match item {
             Item::Quantity { .. } => self.quantity(item, path, value).map(Scalar::Number),
             Item::Number(range) => {
@@ -191,7 +209,7 @@ impl ValueReader<'_> {
         }
         let fixed: String = found.chars().map(|c| if allowed(c) { c } else { '-' }).take(MAX_NAME).collect();
         let fixed = fixed.trim_start_matches(|c: char| !c.is_ascii_alphabetic());
-        let such_as = if fixed.is_empty() { "my-platform" } else { fixed };
+        let such_as = if fixed.is_empty() { "<name>" } else { fixed };
         self.findings.add(
             codes::BAD_NAME,
             path,
@@ -216,7 +234,7 @@ impl ValueReader<'_> {
             path,
             text::clamp(self.source, value.span()),
             format!("\"{}\" is not a path relative to the spec", text::shorten(found)),
-            format!("put the file beside the spec and name it as in {}", self.key.example),
+            messages::beside_the_spec(found),
         );
         None
     }
@@ -250,11 +268,8 @@ impl ValueReader<'_> {
     ) -> Option<T> {
         let units = messages::units_of(self.key, path);
         let help = fix.unwrap_or_else(|| match units {
-            Some(units) => format!(
-                "write the number with its unit, in quotes: {units}; as in {} = {}",
-                self.key.name, self.key.example
-            ),
-            None => format!("write {} = {}", self.key.name, self.key.example),
+            Some(units) => format!("write the number with its unit, {units}, in quotes: {}", self.key.line()),
+            None => format!("write {}", self.key.line()),
         });
         self.findings.add(
             codes::WRONG_TYPE,

@@ -122,7 +122,7 @@ fn the_same_voltages_give_the_same_bits() {
 /// Legs of both classes.
 fn classes() -> [(&'static str, Specimen); 2] {
     ["plays", "bouc-wen"].map(|name| {
-        let leg = LegParameters::named(std::path::Path::new(name), std::fs::read_to_string).unwrap();
+        let leg = LegParameters::named(std::path::Path::new(name), |path| std::fs::read_to_string(path)).unwrap();
         (name, Specimen::within_tolerances(&PlatformParameters::reference(), &leg, 1))
     })
 }

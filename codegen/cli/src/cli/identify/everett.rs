@@ -47,7 +47,7 @@ pub struct EverettArguments {
 const VOLTS: std::ops::RangeInclusive<f64> = -1e4..=1e4;
 
 pub(in crate::cli) fn range(text: &str) -> Result<[f64; 2], String> {
-    let expected = || format!("expected two voltages such as 0:100, found `{text}`");
+    let expected = || format!("expected two voltages LOW:HIGH in V, found `{text}`");
     let (low, high) = text.split_once(':').ok_or_else(expected)?;
     let number = |part: &str| part.trim().trim_end_matches('V').trim().parse::<f64>().map_err(|_| expected());
     let (low, high) = (number(low)?, number(high)?);
@@ -62,7 +62,7 @@ pub(in crate::cli) fn range(text: &str) -> Result<[f64; 2], String> {
 
 /// Any whole number: which sizes can be identified is for identification to say.
 pub(in crate::cli) fn grid(text: &str) -> Result<usize, String> {
-    text.parse().map_err(|_| format!("expected a whole number such as 32, found `{text}`"))
+    text.parse().map_err(|_| format!("expected a whole number, found `{text}`"))
 }
 
 pub fn run(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {

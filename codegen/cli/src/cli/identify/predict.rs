@@ -67,7 +67,7 @@ fn mode(text: &str) -> Result<Given, String> {
             Ok(Given(Some(Mode { frequency, damping })))
         }
         _ => Err(format!(
-            "expected a frequency in Hz and a damping ratio below 1, such as 735:0.015, or none; found `{text}`"
+            "expected FREQUENCY:DAMPING, a frequency in Hz and a damping ratio below 1, or none; found `{text}`"
         )),
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lsp_types::{CompletionItem, CompletionItemKind};
-use specgen_language::spec::keys::{Item, Presence, SECTIONS, Section, Shape};
+use specgen_language::spec::keys::{Item, Key, Presence, SECTIONS, Section, Shape};
 use specgen_language::spec::quantity;
 
 use super::text::Spot;
@@ -13,7 +13,7 @@ pub fn at(text: &str, spot: &Spot, folder: &Path) -> Vec<CompletionItem> {
         return sections(&spot.before);
     }
     if spot.in_value {
-        return spot.key.map_or_else(Vec::new, |key| values(key.shape, key.example, &spot.before, folder));
+        return spot.key.map_or_else(Vec::new, |key| values(key, &spot.before, folder));
     }
     spot.section.map_or_else(Vec::new, |section| names(text, spot, section))
 }
@@ -39,23 +39,23 @@ fn sections(before: &str) -> Vec<CompletionItem> {
     offered.collect()
 }
 
-/// Keys of the section, each with a value that is right. The ones that must be there come first.
+/// Keys of the section, each with a placeholder for its value. The ones that must be there come first.
 fn names(text: &str, spot: &Spot, section: &'static Section) -> Vec<CompletionItem> {
     let offered = section.keys.iter().enumerate().map(|(place, key)| {
         let optional = key.presence != Presence::Required;
         CompletionItem {
             sort_text: Some(format!("{}{place:03}", u8::from(optional))),
-            ..item(key.name, CompletionItemKind::PROPERTY, format!("{} = {}", key.name, key.example), key.doc)
+            ..item(key.name, CompletionItemKind::PROPERTY, key.line(), key.doc)
         }
     });
     let there = |name: &str| spot.has(text, name);
     offered.filter(|offered| !there(&offered.label)).collect()
 }
 
-fn values(shape: Shape, example: &str, before: &str, folder: &Path) -> Vec<CompletionItem> {
+fn values(key: &Key, before: &str, folder: &Path) -> Vec<CompletionItem> {
     let quoted = before.matches('"').count() % 2 == 1;
     let text = |word: &str| if quoted { word.to_owned() } else { format!("\"{word}\"") };
-    let first = match shape {
+    let first = match key.shape {
         Shape::One(item) => item,
         Shape::List(items) | Shape::Leading(_, items) | Shape::Rows(_, items) => match items {
             // In the last items of a list of six stand angles.
@@ -77,7 +77,7 @@ fn values(shape: Shape, example: &str, before: &str, folder: &Path) -> Vec<Compl
         Item::Flag => ["true", "false"].map(|word| item(word, CompletionItemKind::VALUE, word, "")).to_vec(),
         Item::File => files(folder).iter().map(|name| item(name, CompletionItemKind::FILE, text(name), "")).collect(),
         _ if quoted => Vec::new(),
-        _ => vec![item(example, CompletionItemKind::VALUE, example, "the form of a value")],
+        _ => vec![item(key.template(), CompletionItemKind::VALUE, key.template(), "the form of a value")],
     }
 }
 

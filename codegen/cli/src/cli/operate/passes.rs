@@ -217,7 +217,7 @@ fn shown(path: &Path) -> String {
 fn refused(error: ClientError) -> Ended {
     match error {
         ClientError::Refused(Refusal::Unsupported) => Ended::Refused(
-            "the device takes no correction; write correction = \"2 um\" in [control] of its spec, then build it anew"
+            "the device takes no correction; write correction = \"<number> um\" in [control] of its spec, then build it anew"
                 .to_owned(),
         ),
         ClientError::Refused(Refusal::State) => Ended::Refused(

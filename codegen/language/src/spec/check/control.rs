@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
+use crate::spec::keys;
 use crate::spec::text::number;
 
 /// Largest correction as part of the stroke.
@@ -31,7 +32,7 @@ pub(super) fn parts_need_it(f: &Fields, findings: &mut Findings) -> Option<()> {
             path,
             span,
             format!("`{what}` is for the task-space controller, but there is no section [control]"),
-            "write [control] with modal_damping = 0.02 and six sections [[gauge]], or take this out".to_owned(),
+            "write [control] with modal_damping = <number> and six sections [[gauge]], or take this out".to_owned(),
         );
     }
     for section in ["gains", "position_gains"] {
@@ -103,8 +104,10 @@ pub(super) fn both_bandwidths(f: &Fields, findings: &mut Findings) -> Option<()>
         given,
         f.span(given),
         format!("`{given}` stands without `{missing}`: the adaptation may be changed at run time and needs both"),
-        "give both bandwidths, such as \"450 rad/s\" and \"20 rad/s\", or neither: the compiler then derives them"
-            .to_owned(),
+        format!(
+            "write {} = \"<number> rad/s\", too, or take this out: the compiler then derives both",
+            missing.trim_start_matches("adaptation.")
+        ),
     );
     Some(())
 }
@@ -142,7 +145,7 @@ pub(super) fn notch(f: &Fields, findings: &mut Findings) -> Option<()> {
             path,
             f.span(path),
             format!("`{path}` is {}, not above `control.modal_damping`, {}", number(damping), number(own)),
-            "write notch_damping = 1.0, the usual choice, or take the notch out with notch = false".to_owned(),
+            "take notch_damping out: it is then 1; or take the notch out with notch = false".to_owned(),
         );
     }
     Some(())
@@ -193,8 +196,11 @@ pub(super) fn environment_for_model(f: &Fields, findings: &mut Findings) -> Opti
             "control.environment",
             f.span(path),
             "interaction = \"modelled\" needs the stiffness in section [control.environment]".to_owned(),
-            "write [control.environment] with stiffness = [...], six values in N/m and N m/rad; or interaction = \"none\""
-                .to_owned(),
+            format!(
+                "write interaction = \"none\", or the section:\n{}",
+                keys::section("control.environment")
+                    .map_or_else(String::new, |section| section.template().trim_end().to_owned())
+            ),
         );
     }
     Some(())

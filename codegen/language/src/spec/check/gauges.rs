@@ -5,8 +5,13 @@ use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
 use crate::model;
 use crate::spec::findings::Findings;
+use crate::spec::keys;
 use crate::spec::text::number;
 
+/// How near to 1 the squares of three direction cosines add up, of angles that are written with a digit or two behind the point.
+const COSINES: f64 = 2e-3;
+/// Whole angles of directions in a drawing, deg. A vector of these alone, one of which is at least the first, is none.
+const DRAWN: [f64; 10] = [30.0, 45.0, 60.0, 90.0, 120.0, 135.0, 150.0, 180.0, 270.0, 360.0];
 /// Least |cos| between the measuring line and the normal of its target.
 const STEEPEST: f64 = 0.1;
 
@@ -25,7 +30,10 @@ pub(super) fn six(f: &Fields, findings: &mut Findings) -> Option<()> {
         path,
         place.unwrap_or(0..0),
         format!("there are {count} sections [[gauge]], expected 6"),
-        "write six, one for each gauge, in the order of the gauge words:\n[[gauge]]\npoint = [\"80 mm\", \"0 mm\", \"180 mm\"]\ndirection = [0, 0, 1]".to_owned(),
+        format!(
+            "write six, one for each gauge, in the order of the gauge words:\n{}",
+            keys::section("gauge").map_or_else(String::new, |section| section.template().trim_end().to_owned())
+        ),
     );
     Some(())
 }
@@ -45,7 +53,7 @@ pub(super) fn directions(f: &Fields, findings: &mut Findings) -> Option<()> {
                     path,
                     f.span(path),
                     format!("`{path}` has no length, so that it points nowhere"),
-                    "write a direction such as [0, 0, 1]".to_owned(),
+                    "write the components of a direction, of which one at least is not 0: [<number>, <number>, <number>]".to_owned(),
                 );
             }
         }
@@ -67,6 +75,62 @@ pub(super) fn directions(f: &Fields, findings: &mut Findings) -> Option<()> {
                 ),
             );
         }
+    }
+    Some(())
+}
+
+/// The vector of which `angles` are the angles with x, y and z; none if they are those of no vector, or none at all.
+fn from_angles(angles: [f64; 3], unit: f64, range: std::ops::RangeInclusive<f64>) -> Option<[f64; 3]> {
+    let largest = angles.iter().fold(0.0, |most: f64, angle| if angle.abs() > most { angle.abs() } else { most });
+    let cosines = angles.map(|angle| libm::cos(angle * unit));
+    let sum: f64 = cosines.iter().fold(0.0, |sum, cosine| sum + cosine * cosine);
+    (range.contains(&largest) && (sum - 1.0).abs() <= COSINES).then_some(cosines)
+}
+
+/// Whether a vector of more than unit length is a point, in whatever unit.
+fn is_point(vector: [f64; 3], point: [f64; 3]) -> bool {
+    let length = |v: [f64; 3]| libm::sqrt(v.iter().fold(0.0, |sum, one| sum + one * one));
+    let (long, far) = (length(vector), length(point));
+    let along: f64 = vector.iter().zip(point).fold(0.0, |sum, (a, b)| sum + a * b);
+    let oblique = vector.iter().filter(|one| **one != 0.0).count() > 1;
+    oblique && long > 2.0 && along > (1.0 - 1e-9) * long * far
+}
+
+/// A direction is a vector of any length, and angles are three numbers, too. Those with the axes are known by their cosines;
+/// others by being whole angles of a drawing.
+pub(super) fn not_angles(f: &Fields, findings: &mut Findings) -> Option<()> {
+    for (gauge, key) in (0..f.count("gauge")).flat_map(|gauge| ["direction", "target_normal"].map(|key| (gauge, key))) {
+        let path = format!("gauge[{gauge}].{key}");
+        let Some(vector) = f.list::<3>(&path) else { continue };
+        // Components of a unit vector are no radians, and of one of a few units no degrees.
+        let degrees = from_angles(vector, std::f64::consts::PI / 180.0, 10.0..=360.0);
+        // The numbers of the point, which is a place and no direction; along an axis the two are one.
+        let point = f.list::<3>(&format!("gauge[{gauge}].point")).filter(|_| key == "direction");
+        if point.is_some_and(|point| is_point(vector, point)) {
+            findings.add(
+                codes::DIRECTION_ANGLES,
+                &path,
+                f.span(&path),
+                format!("`{path}` has the numbers of `gauge[{gauge}].point`: the line would go through the origin of the base"),
+                "a direction is where the reading grows to, from wherever the gauge stands: write its components".to_owned(),
+            );
+            continue;
+        }
+        let vector_of = degrees.or_else(|| from_angles(vector, 1.0, 1.1..=std::f64::consts::PI + 1e-3));
+        let drawn = vector.iter().all(|one| *one == 0.0 || DRAWN.contains(&one.abs()));
+        if vector_of.is_none() && !(drawn && vector != [0.0; 3]) {
+            continue;
+        }
+        let shown = vector.map(number).join(", ");
+        let help = match vector_of {
+            Some(cosines) => format!(
+                "if they are the angles with x, y and z, write {key} = [{}]; a vector may have any length: if one is meant, write it with other numbers",
+                cosines.map(|cosine| number(if cosine.abs() < 1e-9 { 0.0 } else { cosine })).join(", ")
+            ),
+            None => "if they are angles, write the components of the vector; it may have any length: if one is meant, write it with other numbers".to_owned(),
+        };
+        let message = format!("`{path}` is a vector, and {shown} look like angles");
+        findings.add(codes::DIRECTION_ANGLES, &path, f.span(&path), message, help);
     }
     Some(())
 }

@@ -13,10 +13,10 @@ pub(super) fn reasons(f: &Fields, findings: &mut Findings) -> Option<()> {
         // `workspace.translation[2]` is an item of a key.
         let list = key.rsplit_once('[').filter(|_| key.ends_with(']')).map_or(key, |(list, _)| list);
         let known = keys::key(list);
-        let (what, help) = match known {
-            None => ("names no key of a spec", "write the path of the key, as in"),
+        let (what, help, shown) = match known {
+            None => ("names no key of a spec", "write the path of the key and why its value is meant:", "<key>"),
             Some(_) if reason.trim().is_empty() => {
-                ("gives no reason", "write why the value is meant, behind a colon, as in")
+                ("gives no reason", "write why the value is meant, behind a colon:", key)
             }
             Some(_) => continue,
         };
@@ -25,7 +25,7 @@ pub(super) fn reasons(f: &Fields, findings: &mut Findings) -> Option<()> {
             &format!("{path}[{index}]"),
             f.item_span(path, index),
             format!("\"{}\" {what}", text::shorten(entry)),
-            format!("{help} \"actuator.axial_stiffness: flexures in series, measured\""),
+            format!("{help} \"{shown}: <reason>\""),
         );
     }
     Some(())

@@ -175,16 +175,26 @@ pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> 
     if condition.is_finite() && condition < 1e4 {
         return Some(());
     }
+    let (path, help) = if f.given("geometry.platform_joints") {
+        (
+            "geometry.platform_joints",
+            "check that `geometry.base_joints` and `geometry.platform_joints` list the legs in the same order, both counter-clockwise from above, and the signs of y",
+        )
+    } else {
+        (
+            "geometry.height",
+            "make the height comparable to the radii and the joint pairs close (small base_angle and platform_angle)",
+        )
+    };
     findings.add(
         codes::DEGENERATE_GEOMETRY,
-        "geometry.height",
-        f.span("geometry.height"),
+        path,
+        f.span(path),
         format!(
             "the six legs hardly hold the platform: the condition number of their Jacobian at rest is {}",
             number(condition)
         ),
-        "make the height comparable to the radii and the joint pairs close (small base_angle and platform_angle)"
-            .to_owned(),
+        help.to_owned(),
     );
     Some(())
 }

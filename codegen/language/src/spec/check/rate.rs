@@ -4,22 +4,19 @@ use super::control;
 use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
+use crate::spec::keys;
 use crate::spec::text::number;
 
-/// Option, its keys, and how they are written.
-const OPTIONS: [(&str, &[&str], &str); 2] = [
-    ("dynamic-preisach", &["rate_tables"], "rate_tables = [\"records/leg-mu1.csv\"]"),
-    (
-        "creep",
-        &["creep_times", "creep_weights"],
-        "creep_times = [\"0.8 s\", \"40 ms\"] and creep_weights = [0.03, 0.09]",
-    ),
-];
+/// Option and its keys.
+const OPTIONS: [(&str, &[&str]); 2] =
+    [("dynamic-preisach", &["rate_tables"]), ("creep", &["creep_times", "creep_weights"])];
 
 pub(super) fn keys_of_option(f: &Fields, findings: &mut Findings) -> Option<()> {
     let chosen = f.choice("hysteresis.rate")?;
-    for (option, keys, example) in OPTIONS {
-        for key in keys {
+    for (option, names) in OPTIONS {
+        let lines: Vec<String> =
+            names.iter().filter_map(|name| Some(keys::key(&format!("hysteresis.{name}"))?.line())).collect();
+        for key in names {
             let path = format!("hysteresis.{key}");
             let given = f.given(&path);
             if given && option != chosen {
@@ -36,7 +33,7 @@ pub(super) fn keys_of_option(f: &Fields, findings: &mut Findings) -> Option<()> 
                     &path,
                     f.span("hysteresis.rate"),
                     format!("rate = \"{chosen}\" needs `{path}`"),
-                    format!("write {example}; `specgen identify rate` prints the lines"),
+                    format!("write {}; `specgen identify rate` prints the lines", lines.join(" and ")),
                 );
             }
         }

@@ -6,7 +6,7 @@ use crate::diagnostic::codes;
 use crate::files;
 use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
-use crate::spec::text;
+use crate::spec::{messages, text};
 
 const KEYS: [&str; 2] = ["hysteresis.records", "hysteresis.rate_tables"];
 
@@ -41,7 +41,7 @@ fn readable_of(f: &Fields, dir: &Path, findings: &mut Findings, key: &str) -> Op
             Some((
                 codes::RECORD_PATH,
                 format!("\"{}\" is not a path relative to the spec", text::shorten(record)),
-                "put the file beside the spec and name it as in \"records/leg1.csv\"".to_owned(),
+                messages::beside_the_spec(record),
             ))
         };
         if let Some((code, message, help)) = finding {

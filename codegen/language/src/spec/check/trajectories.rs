@@ -54,7 +54,7 @@ pub(super) fn missing(f: &Fields, findings: &mut Findings, table: &str, path: &s
         path,
         f.table(table).unwrap_or(0..0),
         format!("`{path}` is missing: kind \"{kind}\" needs it"),
-        format!("write, in [[{section}]]: {} = {}. {}", key.name, key.example, key.doc),
+        format!("write, in [[{section}]]: {}. {}", key.line(), key.doc),
     );
     Some(())
 }
@@ -108,7 +108,7 @@ pub(super) fn limits(f: &Fields, findings: &mut Findings) -> Option<()> {
                 &keys::join(&table, "translation"),
                 f.table(&table).unwrap_or(0..0),
                 format!("`{table}` limits nothing"),
-                "write, in [[requirements.tracking]]: translation = \"50 nm\", rotation or axes".to_owned(),
+                "write, in [[requirements.tracking]]: translation = \"<number> nm\", rotation or axes".to_owned(),
             );
         }
     }

@@ -69,7 +69,7 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
                 refuse(
                     &path,
                     format!("`{path}` is {}, but {axis} is {}", what[0], what[1]),
-                    format!("write {right} = {}", keys::key(&keys::join("trigger", &right))?.example),
+                    format!("write {}", keys::key(&keys::join("trigger", &right))?.line()),
                 );
             }
         }

@@ -20,18 +20,18 @@ impl ValueReader<'_> {
         let found = match value.get_ref() {
             DeValue::String(found) => found,
             DeValue::Integer(_) | DeValue::Float(_) => {
-                let number = self.plain_number(path, value)?;
-                self.unit_missing(path, span, number);
+                self.plain_number(path, value)?;
+                let written = self.source[span.clone()].to_owned();
+                self.unit_missing(path, span, &written);
                 return None;
             }
             _ => {
-                let expected = format!("{} such as {}", dimension.describe(), messages::example_of(self.key, path));
-                return self.wrong_type(path, value, &expected, None);
+                return self.wrong_type(path, value, &format!("{} in quotes", dimension.describe()), None);
             }
         };
         match quantity::parse(found) {
             Ok(quantity) if quantity.dimension == Dimension::NONE => {
-                self.unit_missing(path, span, quantity.value);
+                self.unit_missing(path, span, found.trim());
                 None
             }
             Ok(quantity) if quantity.dimension != dimension => {
@@ -64,7 +64,7 @@ impl ValueReader<'_> {
     }
 
     /// Where `range` of the text `found` stands in the file; the whole value where escapes moved it.
-    fn inside(&self, span: &Range<usize>, found: &str, range: &Range<usize>) -> Range<usize> {
+    pub(super) fn inside(&self, span: &Range<usize>, found: &str, range: &Range<usize>) -> Range<usize> {
         let written = &self.source[span.clone()];
         match written.find(found) {
             Some(offset) if !found.is_empty() => span.start + offset + range.start..span.start + offset + range.end,
@@ -72,10 +72,10 @@ impl ValueReader<'_> {
         }
     }
 
-    fn unit_missing(&mut self, path: &str, span: Range<usize>, number: f64) {
+    fn unit_missing(&mut self, path: &str, span: Range<usize>, written: &str) {
         let units = messages::units_of(self.key, path).unwrap_or_default();
         let message = format!("`{path}` is a number without unit");
-        let help = format!("in which unit? Write \"{} UNIT\", in quotes, UNIT such as {units}", text::number(number));
+        let help = format!("in which unit, {units}? Write \"{} <unit>\", in quotes", text::shorten(written));
         self.findings.add(codes::UNIT_MISSING, path, span, message, help);
     }
 
@@ -106,7 +106,7 @@ impl ValueReader<'_> {
                         "`{path}` is {}, which is not a finite number that a double can hold",
                         text::shorten(written)
                     ),
-                    format!("write a finite value, such as {}", messages::example_of(self.key, path)),
+                    messages::range_help(self.key, path),
                 );
                 None
             }

@@ -1,0 +1,113 @@
+//! Values that are usually left out, against what stands in their place, and factors against 1.
+
+use core::ops::RangeInclusive;
+
+use super::{Facts, Found, figure, times_beyond};
+use crate::lower::supervision::defaults;
+use specgen_language::diagnostic::codes;
+
+/// A value over its default: a slip of a thousand lies far outside, whatever has its reason well inside.
+const NEAR_DEFAULT: RangeInclusive<f64> = 1.0 / 50.0..=50.0;
+/// The same of a bound whose default is a fifth of the whole: beyond the whole it is none.
+const PART_OF_WHOLE: RangeInclusive<f64> = 1.0 / 50.0..=5.0;
+/// A factor that `specgen robust` puts on a figure of the spec.
+const SOUND_FACTOR: RangeInclusive<f64> = 0.25..=4.0;
+
+/// A value that stands in the spec beside what would stand there without it.
+struct Pair {
+    key: String,
+    value: Option<f64>,
+    default: f64,
+    /// How it is shown: unit, and how many of it are one in SI.
+    unit: (&'static str, f64),
+    sound: RangeInclusive<f64>,
+}
+
+fn pairs(facts: &Facts) -> Vec<Pair> {
+    let (model, spec) = (facts.model, &facts.model.supervisor);
+    let of = |name: &str, value, default, unit, sound| Pair {
+        key: format!("supervisor.{name}"),
+        value,
+        default,
+        unit,
+        sound,
+    };
+    let time = |name, value, default| of(name, value, default, ("ms", 1e3), NEAR_DEFAULT);
+    let [low, high] = model.sensor.range;
+    let step = (high - low) / libm::exp2(f64::from(model.sensor.bits));
+    let [hold, down] = defaults::HOST_LOST;
+    let mut pairs = vec![
+        time("arm_time", spec.arm_time, defaults::ARM_TIME),
+        time("gauge_time", spec.gauge_time, defaults::GAUGE_TIME),
+        time("stuck_time", spec.stuck_time, defaults::STUCK_TIME),
+        time("disagreement_time", spec.disagreement_time, defaults::DISAGREEMENT_TIME),
+        time("tracking_time", spec.tracking_time, defaults::TRACKING_TIME),
+        time("voltage_time", spec.voltage_time, defaults::VOLTAGE_TIME),
+        time("slew_time", spec.slew_time, defaults::SLEW_TIME),
+        time("host_lost[0]", spec.host_lost.map(|lost| lost[0]), hold),
+        time("host_lost[1]", spec.host_lost.map(|lost| lost[1]), down),
+        of("ramp_rate", spec.ramp_rate, defaults::ramp_rate(model), ("V/s", 1.0), NEAR_DEFAULT),
+        of("stuck_motion", spec.stuck_motion, defaults::stuck_motion(model, step), ("nm", 1e9), NEAR_DEFAULT),
+        of("disagreement", spec.disagreement, defaults::disagreement(model), ("um", 1e6), PART_OF_WHOLE),
+        of("tracking_error", Some(spec.tracking_error), 0.2, ("", 1.0), PART_OF_WHOLE),
+    ];
+    if let Some(task) = &model.task_space {
+        let [low, high] = model.dac.range;
+        let code = (high - low) / (libm::exp2(f64::from(model.dac.bits)) - 1.0) * model.actuator.leg_gain();
+        pairs.push(Pair {
+            key: "control.dynamics_tolerance".to_owned(),
+            value: task.dynamics_tolerance,
+            default: 0.1 * code,
+            unit: ("nm", 1e9),
+            sound: NEAR_DEFAULT,
+        });
+    }
+    pairs
+}
+
+/// Times and bounds of the supervisor, beside what holds without their keys.
+pub(super) fn near_defaults(facts: &Facts, found: &mut Found) {
+    for Pair { key, value, default, unit: (unit, scale), sound } in pairs(facts) {
+        let Some(value) = value.filter(|value| times_beyond(value / default, &sound) > 1.0) else { continue };
+        let shown = |value: f64| format!("{} {unit}", figure(value * scale)).trim_end().to_owned();
+        found.add(
+            codes::FAR_FROM_DEFAULT,
+            &key,
+            format!(
+                "`{key}` is {}, {} times what holds without the key, {}",
+                shown(value),
+                figure(value / default),
+                shown(default)
+            ),
+            "check its unit and its digits, or leave the key out",
+        );
+    }
+}
+
+/// What `specgen robust` varies are factors about 1, neither percent nor tolerances.
+pub(super) fn near_one(facts: &Facts, found: &mut Found) {
+    let robust = &facts.model.robust;
+    let ranges = [
+        ("mass", robust.mass),
+        ("stiffness", robust.stiffness),
+        ("damping", robust.damping),
+        ("gain", robust.gain),
+        ("hysteresis", robust.hysteresis),
+        ("creep", robust.creep),
+        ("lag", robust.lag),
+        ("gauge_lag", robust.gauge_lag),
+        ("noise", robust.noise),
+    ];
+    for (name, range) in ranges {
+        let far = |factor: &f64| !SOUND_FACTOR.contains(factor);
+        let Some((end, factor)) = range.into_iter().flatten().enumerate().find(|(_, factor)| far(factor)) else {
+            continue;
+        };
+        found.add(
+            codes::FACTOR_ODD,
+            &format!("robust.{name}[{end}]"),
+            format!("`robust.{name}` would be tried at {} times what the spec says", figure(factor)),
+            "smallest and largest factor on the value of the spec, 1 where it is known: a tolerance of 5 % is from 0.95 to 1.05",
+        );
+    }
+}
