@@ -296,7 +296,7 @@ pub const SET: &[Slip] = &[
     s(Own, FIGURE, Value("actuator.stroke", "\"1000 um\""), &["actuator.stroke"], &["stroke"]),
     s(Own, FIGURE, Value("actuator.stacks", "10"), &["actuator.stacks", "actuator.stroke"], &["stacks"]),
     s(Own, FIGURE, Value("actuator.voltage", "[\"-20 V\", \"1200 V\"]"), &["actuator.voltage"], &["voltage", "dac.range"]),
-    s(Small, FIGURE, Value("actuator.voltage", "[\"0 V\", \"10 V\"]"), &["actuator.voltage"], &["\"150 V\""]),
+    s(Small, FIGURE, Value("actuator.voltage", "[\"0 V\", \"10 V\"]"), &["actuator.voltage"], &["\"150 V\"", "\"100 V\""]),
     s(Own, FIGURE, Value("dac.range", "[\"0 V\", \"10 V\"]"), &["dac.range", "actuator.voltage"], &["at the stack"]),
     s(Own, FIGURE, Value("dac.bits", "8"), &["dac.bits", "requirements.precision"], &["bits"]),
     s(Own, FIGURE, Value("workspace.translation", "[\"76 um\", \"67 um\", \"220 um\"]"), &["workspace.translation"], &["at most"]),
