@@ -28,6 +28,7 @@ mod host;
 mod learning;
 mod panel;
 mod samples;
+mod stale;
 use host::{Host, Record};
 
 /// Length of the platform's run, s, where another than that of CI is wanted.

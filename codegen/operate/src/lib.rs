@@ -19,6 +19,6 @@ mod socket;
 mod wave;
 
 pub use order::{Framed, Order, Until, Wanted};
-pub use session::{ALIVE, Place, Session};
+pub use session::{ALIVE, FRESH, GAUGES, Place, Session};
 pub use socket::SocketLine;
 pub use wave::{read_wave, refused_wave};

@@ -13,6 +13,7 @@ use specgen_link::{Reply, Request, samples};
 
 use crate::Session;
 use crate::motion::Motion;
+use crate::session::GAUGES;
 
 pub use specgen_link::samples::Spread;
 
@@ -26,12 +27,12 @@ pub struct Row {
     pub status: u32,
     /// Number of `supervisor::Phase` in the last one.
     pub phase: u8,
-    /// Pose measured in the last one, in the user's coordinates, m and rad.
-    pub pose: [f64; 6],
+    /// Pose measured in the last one, in the user's coordinates, m and rad; none if gauges were not read or not believed in any of them.
+    pub pose: Option<[f64; 6]>,
     /// Set-point of the last one, in the user's coordinates, m and rad.
     pub target: [f64; 6],
-    /// Set-point less pose over all of them, m and rad; along the platform's own axes, which a work frame of the spec turns.
-    pub error: [Spread; 6],
+    /// Set-point less pose over all of them, m and rad, none without a pose; along the platform's own axes, which a work frame of the spec turns.
+    pub error: Option<[Spread; 6]>,
     /// Voltage of each leg over all of them, V.
     pub volts: [Spread; 6],
 }
@@ -100,6 +101,14 @@ impl Row {
             let pose = pose.map(f64::from);
             motion.and_then(|motion| motion.user(&pose)).unwrap_or(pose)
         };
-        Self { status, phase, pose: user(pose), target: user(target), error, volts }
+        let is_measured = status & GAUGES == 0;
+        Self {
+            status,
+            phase,
+            pose: is_measured.then(|| user(pose)),
+            target: user(target),
+            error: is_measured.then_some(error),
+            volts,
+        }
     }
 }

@@ -17,6 +17,12 @@ use crate::pil::{self, OpenError, Opened};
 /// How often a device gets a request, at least: five times before it takes the link for lost.
 pub const ALIVE: Duration = Duration::from_millis(20);
 
+/// What is older than this is not said to be so now.
+pub const FRESH: Duration = Duration::from_millis(300);
+
+/// Status bits of gauges that were not read or not believed.
+pub const GAUGES: u32 = 0x3f00;
+
 /// Names of the word `command` of a platform, by its value.
 const COMMANDS: [&str; 4] = ["hold", "stream", "move", "trajectory"];
 
@@ -32,12 +38,22 @@ pub struct Place {
     pub phase: u8,
     /// The controller's status word.
     pub status: u32,
-    /// Pose measured, in the user's coordinates.
+    /// Pose measured, in the user's coordinates; see [`Place::measured`].
     pub pose: [f64; 6],
+    /// Since that pose was measured; none if none ever was, and the pose says nothing.
+    pub measured: Option<Duration>,
     /// Set-point, in the user's coordinates: where the platform is to be now, not where a motion ends.
     pub target: [f64; 6],
     /// Voltage of each leg, V.
     pub voltage: [f64; 6],
+}
+
+impl Place {
+    /// Whether the pose is that of now: the gauges were read and believed in the last tick, and that was not long ago.
+    #[must_use]
+    pub fn is_measured(&self) -> bool {
+        self.status & GAUGES == 0 && self.measured.is_some_and(|age| age < FRESH)
+    }
 }
 
 /// An open session.
@@ -93,6 +109,7 @@ impl<P: Port> Session<P> {
                 status: 0,
                 events: 0,
                 late: 0,
+                age: None,
                 link: specgen_link::Counters::NONE,
             },
         };
@@ -149,7 +166,7 @@ impl<P: Port> Session<P> {
     /// Where the platform is, and that the host is there; none of six legs.
     pub fn place(&mut self) -> Result<Option<Place>, ClientError> {
         let Some(motion) = &self.motion else { return Ok(None) };
-        let Reply::Place { tick, phase, status, words } = self.client.ask(&Request::Place)? else {
+        let Reply::Place { tick, phase, status, measured, words } = self.client.ask(&Request::Place)? else {
             return Err(ClientError::Unexpected);
         };
         self.asked = Instant::now();
@@ -159,9 +176,10 @@ impl<P: Port> Session<P> {
             *number = self.description.scalar.decode(word);
         }
         let six = |first: usize| -> [f64; POSE] { core::array::from_fn(|axis| numbers[first + axis]) };
-        let (measured, target) = (six(0), six(2 * POSE));
-        let pose = motion.user(&measured).unwrap_or(measured);
-        Ok(Some(Place { tick, phase, status, pose, target, voltage: six(3 * POSE) }))
+        let (shown, target) = (six(0), six(2 * POSE));
+        let pose = motion.user(&shown).unwrap_or(shown);
+        let measured = measured.map(Duration::from_micros);
+        Ok(Some(Place { tick, phase, status, pose, measured, target, voltage: six(3 * POSE) }))
     }
 
     /// What the device noticed of itself; its events are forgotten with that.

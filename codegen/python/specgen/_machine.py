@@ -127,7 +127,8 @@ class Machine:
         return frame
 
     def where(self) -> dict[str, Any]:
-        """Pose by the gauges, set-point and error, um and urad; voltage of each leg, V."""
+        """Pose by the gauges, set-point and error, um and urad; voltage commanded for each leg, V. What is not measured now is None; ``last`` then has
+        the pose of then and its age, s, and ``why`` the reason."""
         where: dict[str, Any] = self.order("where")
         return where
 

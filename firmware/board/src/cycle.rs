@@ -2,7 +2,7 @@
 
 use controller::snapshot::record_after;
 use controller::supervised::{CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, Request, STOP};
-use controller::{Real, passes, sensing, triggers};
+use controller::{GAUGE_FAULT, Real, passes, sensing, triggers};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges, Lines};
 use specgen_link::Silence;
 use specgen_runtime::pending::EDGE;
@@ -194,6 +194,9 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         report.cause = output.cause;
         report.amplifier_on = output.amplifier_on;
         report.status = output.tick.status;
+        if output.tick.status & GAUGE_FAULT == 0 {
+            report.measured = Some(report.tick);
+        }
         report.health.events |= events;
         report.conditions(self.machine.supervisor.conditions);
         report.missed = report.missed.saturating_add(noticed.missed);

@@ -6,8 +6,8 @@ use controller::{COMMAND_WORDS, CONFIG_WORDS, DESCRIPTION, PLACE_WORDS, Real, pa
 use specgen_link::lockstep::{Session, piece};
 use specgen_link::samples::Block;
 use specgen_link::{
-    Bytes, Counted, Counters, Device, EdgeStatus, Health, Identity, KNOT, KNOTS, PassAction, PassStatus,
-    RecorderAction, Refusal, Reply, Request, Status, WaveAction, put_knots,
+    Bytes, Counted, Counters, Device, EdgeStatus, Identity, KNOT, KNOTS, PassAction, PassStatus, RecorderAction,
+    Refusal, Reply, Request, Status, WaveAction, put_knots,
 };
 use specgen_runtime::learning::Settings as Plan;
 use specgen_runtime::pass::{Course, Player};
@@ -19,9 +19,10 @@ use crate::download::{self, Download};
 use crate::exchange::{Access, Awaited, Exchange};
 use crate::gather::with_rows;
 use crate::recording;
-use crate::report::Probes;
+use crate::report::{Probes, Report};
 use crate::samples;
 use crate::stepper::{Costs, Stepper, Stopwatch};
+use crate::words::PERIOD_NANOSECONDS;
 
 /// Words of the longest answer: settings, what a step gives, a piece of a record or of errors.
 const WORDS: usize = {
@@ -99,6 +100,8 @@ impl Visit<'_, '_> {
                 status: report.status,
                 events: report.health.events,
                 late: report.missed,
+                // A board whose ticks stop is reset by its watchdog.
+                age: if report.tick > 0 { Some(0) } else { None },
                 // The endpoint fills it in.
                 link: Counters::NONE,
             });
@@ -107,25 +110,29 @@ impl Visit<'_, '_> {
     }
 
     fn health(&mut self) -> Reply<'static> {
-        let (mut health, mut probes) = (Health::default(), Probes::NONE);
+        let (mut counts, mut probes) = (Report::NONE.health, Probes::NONE);
         (self.with)(&mut |exchange, _| {
-            (health, probes) = (exchange.report.health, exchange.probes);
+            (counts, probes) = (exchange.report.health, exchange.probes);
             // An answer that is lost is given again as it is.
             exchange.report.health.events = 0;
         });
-        Reply::Health(Health { clock: probes.hertz, stack: (probes.stack)(), ..health })
+        Reply::Health(counts.told(&probes))
     }
 
     #[inline(never)]
     fn place(&mut self) -> Reply<'_> {
         let mut words = [0; PLACE_WORDS];
-        let (mut tick, mut phase, mut status) = (0, Phase::Disarmed, 0);
+        let (mut tick, mut phase, mut status, mut measured) = (0, Phase::Disarmed, 0, None);
         (self.with)(&mut |exchange, machine| {
-            (tick, phase, status) = (exchange.report.tick, exchange.report.phase, exchange.report.status);
+            let report = &exchange.report;
+            (tick, phase, status, measured) = (report.tick, report.phase, report.status, report.measured);
             words = place_words(&machine.state);
         });
+        let since = |measured: u64| tick.saturating_sub(measured).saturating_mul(u64::from(PERIOD_NANOSECONDS)) / 1000;
         match self.desk.session.answer(&words) {
-            Some(words) if PLACE_WORDS > 0 => Reply::Place { tick, phase: phase.word() as u8, status, words },
+            Some(words) if PLACE_WORDS > 0 => {
+                Reply::Place { tick, phase: phase.word() as u8, status, measured: measured.map(since), words }
+            }
             _ => Reply::Refused(Refusal::Unsupported),
         }
     }

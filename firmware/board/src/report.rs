@@ -34,8 +34,57 @@ pub struct Report {
     pub status: u32,
     /// Ticks that never came.
     pub missed: u32,
-    /// All else. Its stack stands at zero until it is asked for.
-    pub health: Health,
+    /// The last tick, by [`Self::tick`], in which the gauges were read and believed; none if there was none.
+    pub measured: Option<u64>,
+    /// All else.
+    pub health: Counts,
+}
+
+/// What is counted since power-up, and times in counts of [`Probes::hertz`].
+#[derive(Debug, Clone, Copy)]
+pub struct Counts {
+    /// Events since the host asked last.
+    pub events: u32,
+    /// Faults of converters, and a bit for each kind.
+    pub converter_faults: u32,
+    /// See [`Self::converter_faults`].
+    pub faults: u32,
+    /// Ticks with a gauge that was not believed.
+    pub gauge_faults: u32,
+    /// Ticks that ended after the next one was due.
+    pub overruns: u32,
+    /// A tick, the last and the longest; zeros until one was timed.
+    pub tick: [u32; 2],
+    /// From gauges to outputs, the same.
+    pub output: [u32; 2],
+    /// Largest delay of a tick's beginning.
+    pub latest: u32,
+}
+
+impl Counts {
+    /// As the link says it. What nothing counts, and what was not timed yet, is none.
+    pub(crate) fn told(&self, probes: &Probes) -> Health {
+        let Self { events, converter_faults, faults, gauge_faults, overruns, tick, output, latest } = *self;
+        let timed = |times: [u32; 2]| {
+            let [_, longest] = times;
+            if probes.hertz > 0 && longest > 0 { Some(times.map(u64::from)) } else { None }
+        };
+        let tick = timed(tick);
+        let stack = (probes.stack)();
+        let [_, reserved] = stack;
+        Health {
+            events,
+            converter_faults,
+            faults,
+            gauge_faults,
+            overruns: tick.map(|_| overruns),
+            clock: probes.hertz,
+            tick,
+            output: timed(output),
+            latest: tick.map(|_| u64::from(latest)),
+            stack: if reserved > 0 { Some(stack) } else { None },
+        }
+    }
 }
 
 impl Report {
@@ -47,17 +96,16 @@ impl Report {
         amplifier_on: false,
         status: 0,
         missed: 0,
-        health: Health {
+        measured: None,
+        health: Counts {
             events: 0,
             converter_faults: 0,
             faults: 0,
             gauge_faults: 0,
             overruns: 0,
-            clock: 0,
             tick: [0; 2],
             output: [0; 2],
             latest: 0,
-            stack: [0; 2],
         },
     };
 

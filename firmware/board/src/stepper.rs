@@ -51,7 +51,7 @@ impl Costs {
     pub(crate) fn stage(&self) -> Stage<'static> {
         let Self { calls, smallest, sum, largest } = *self;
         // Seen from outside only: on a board the stack is not painted.
-        Stage { name: WHOLE, calls, smallest: if calls > 0 { smallest } else { 0 }, sum, largest, stack: 0 }
+        Stage { name: WHOLE, calls, smallest: if calls > 0 { smallest } else { 0 }, sum, largest, stack: None }
     }
 }
 

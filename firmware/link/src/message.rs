@@ -232,6 +232,8 @@ pub enum Reply<'a> {
         phase: u8,
         /// The controller's status word.
         status: u32,
+        /// Since the gauges were last read and believed, which is when the pose was measured, µs; none if they never were.
+        measured: Option<u64>,
         /// The controller's `place_words`: pose measured, set-point, set-point in the user's coordinates, voltages of the legs.
         #[serde(borrow)]
         words: Bytes<'a>,
@@ -337,11 +339,14 @@ pub struct Status {
     pub events: u32,
     /// Ticks that came late since power-up.
     pub late: u32,
+    /// Since the tick that all of this is of, µs; none before the first.
+    pub age: Option<u64>,
     /// What the link has counted; filled in by the endpoint.
     pub link: Counters,
 }
 
-/// What a device noticed of itself since power-up. Times are in counts of [`Health::clock`], the last one and the longest.
+/// What a device noticed of itself since power-up. Times are in counts of [`Health::clock`], the last one and the longest; what is not measured is
+/// none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Health {
     /// Events seen since the host asked last.
@@ -352,18 +357,18 @@ pub struct Health {
     pub faults: u32,
     /// Ticks in which a gauge was not finite, out of range, stuck, or in disagreement.
     pub gauge_faults: u32,
-    /// Ticks that ended after the next one was due.
-    pub overruns: u32,
-    /// Counts in a second; 0 where nothing is measured.
+    /// Ticks that ended after the next one was due; none where time waits for them.
+    pub overruns: Option<u32>,
+    /// Counts in a second.
     pub clock: u32,
     /// A tick, from its beginning to its end.
-    pub tick: [u32; 2],
+    pub tick: Option<[u64; 2]>,
     /// From the sampling of the gauges until the outputs changed.
-    pub output: [u32; 2],
+    pub output: Option<[u64; 2]>,
     /// Largest delay of a tick's beginning.
-    pub latest: u32,
-    /// Most bytes of the stack seen in use, and bytes there are; zeros where that is not measured.
-    pub stack: [u32; 2],
+    pub latest: Option<u64>,
+    /// Most bytes of the stack seen in use, and bytes there are.
+    pub stack: Option<[u32; 2]>,
 }
 
 /// What a stage has cost.
@@ -379,8 +384,8 @@ pub struct Stage<'a> {
     pub sum: u64,
     /// Most of a call.
     pub largest: u64,
-    /// For the whole tick: most stack seen in use, bytes; 0 if it is not measured.
-    pub stack: u32,
+    /// For the whole tick: most stack seen in use, bytes; none where that is not measured.
+    pub stack: Option<u32>,
 }
 
 /// How a recorder stands.

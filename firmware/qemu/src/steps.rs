@@ -95,7 +95,7 @@ impl lockstep::Machine for Steps {
         let stage = self.stages.all().get(index)?;
         let (name, stack) = if index == 0 { (WHOLE, self.deepest as u32) } else { (stage.name(), 0) };
         let [calls, smallest, sum, largest] = stage.counts();
-        Some(Stage { name, calls, smallest, sum, largest, stack })
+        Some(Stage { name, calls, smallest, sum, largest, stack: if stack > 0 { Some(stack) } else { None } })
     }
 }
 

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use controller::waves::{self, Wave};
-use controller::{Config, PLACE_WORDS, Real, passes};
+use controller::{Config, GAUGE_FAULT, PLACE_WORDS, Real, passes};
 use specgen_link::{EdgeStatus, Health};
 use specgen_runtime::pass::Course;
 use specgen_runtime::pending::{self, EDGE};
@@ -35,6 +35,9 @@ pub struct Console {
     pub said: Option<Said>,
     /// Where the platform was then.
     pub place: [u64; PLACE_WORDS],
+    /// When that came, and when one last came whose gauges were read and believed, ns.
+    pub ticked: Option<u64>,
+    pub measured: Option<u64>,
     /// What the loop noticed of itself.
     pub health: Health,
     /// Settings that are in force once all orders are taken.
@@ -62,6 +65,8 @@ impl Console {
             passes: Passes::new(),
             said: None,
             place: [0; PLACE_WORDS],
+            ticked: None,
+            measured: None,
             health,
             config,
             events: 0,
@@ -73,10 +78,14 @@ impl Console {
         }
     }
 
-    /// Takes what a tick gave.
-    pub fn update(&mut self, row: &Row, said: Said) {
+    /// Takes what a tick gave, at this time, ns.
+    pub fn update(&mut self, row: &Row, said: Said, now: u64) {
         self.said = Some(said);
         self.place = row.place;
+        self.ticked = Some(now);
+        if said.status & GAUGE_FAULT == 0 {
+            self.measured = Some(now);
+        }
         self.events |= row.input.events & !EDGE;
         self.edge = row.edge;
         self.capture.update(row.recorded, row.triggered);

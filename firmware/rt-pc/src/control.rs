@@ -66,7 +66,6 @@ impl<D: Device> Loop<'_, D> {
         let Inner { outlets, mut orders, mut players } = self.rings;
         let mut keeper = Keeper::new(outlets, self.tape.take(), self.shared, (&machine, &self.config));
         let mut phase = Phase::Disarmed;
-        let mut codes = [0; LEGS];
         let mut enabled = false;
         let mut link = Link { number: 0, asked: 0, silence: self.timing.silence };
         let mut count = 0;
@@ -95,12 +94,8 @@ impl<D: Device> Loop<'_, D> {
             }
 
             self.device.tick(tick);
-            let mut broken = false;
-            match self.device.read() {
-                Ok(fresh) => codes = fresh,
-                // The last codes stay: an event says that they are old.
-                Err(_) => broken = true,
-            }
+            let read = self.device.read();
+            let mut broken = read.is_err();
             let mut rose = false;
             if triggers::INPUT {
                 let line = self.device.input();
@@ -108,14 +103,20 @@ impl<D: Device> Loop<'_, D> {
                 rose = setpoints.sense(line);
             }
             let usage = Usage::of_this_thread();
-            let read = clock::now();
+            let sensed = clock::now();
 
             if broken {
                 events |= CONVERTER;
             }
             let command = setpoints.next(phase, &self.config);
-            let (gauge, wrench) =
-                (codes.map(|code| sensing::CONVERTER.reading(code)), self.device.wrench().map(|value| value as Real));
+            let (gauge, wrench) = match read {
+                Ok(codes) => (
+                    codes.map(|code| sensing::CONVERTER.reading(code)),
+                    self.device.wrench().map(|value| value as Real),
+                ),
+                // What was not read is not believed: no number stands for it.
+                Err(_) => ([Real::NAN; LEGS], [Real::NAN; LEGS]),
+            };
             // None of the supervisor's business, and in every record.
             let seen = if rose { events | EDGE } else { events };
             let input = MachineInput::measured(&command, &gauge, &wrench, setpoints.request(), seen);
@@ -191,8 +192,8 @@ impl<D: Device> Loop<'_, D> {
             }
             let usage = Usage::of_this_thread().since(usage);
             let done = clock::now();
-            self.shared.took([planned, woken, read, written, done], period, elastic);
-            account.tick(&Stamps { planned, woken, read, computed, written, done }, &usage, suspended);
+            self.shared.took([planned, woken, sensed, written, done], period, elastic);
+            account.tick(&Stamps { planned, woken, read: sensed, computed, written, done }, &usage, suspended);
             planned += period;
             if elastic && planned < done {
                 planned = done;

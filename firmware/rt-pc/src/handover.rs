@@ -125,8 +125,8 @@ pub struct Shared {
     pub tick: LastAndLongest,
     /// From the readings to the outputs.
     pub output: LastAndLongest,
-    /// Largest delay of waking up, ns.
-    pub latest: AtomicU32,
+    /// Delay of waking up; of none where time waits for the loop.
+    pub delay: LastAndLongest,
     /// Ticks that ended after the next one was due.
     pub overruns: AtomicU32,
 }
@@ -137,8 +137,7 @@ impl Shared {
         self.tick.add(done.saturating_sub(woken));
         self.output.add(written.saturating_sub(read));
         if !elastic {
-            let late = woken.saturating_sub(planned);
-            self.latest.fetch_max(u32::try_from(late).unwrap_or(u32::MAX), Ordering::Relaxed);
+            self.delay.add(woken.saturating_sub(planned));
             if done > planned + period {
                 self.overruns.fetch_add(1, Ordering::Relaxed);
             }
@@ -154,30 +153,35 @@ impl Shared {
             // A device says that it failed, not how; the stack of a thread has a guard.
             faults: 0,
             gauge_faults: now(&self.gauge_faults),
-            overruns: now(&self.overruns),
+            overruns: self.delay.get().map(|_| now(&self.overruns)),
             clock: 1_000_000_000,
             tick: self.tick.get(),
             output: self.output.get(),
-            latest: now(&self.latest),
-            stack: [0; 2],
+            latest: self.delay.get().map(|[_, longest]| longest),
+            stack: None,
         }
     }
 }
 
 /// A time of ticks, ns; the real-time thread alone writes it.
 #[derive(Debug, Default)]
-pub struct LastAndLongest([AtomicU32; 2]);
+pub struct LastAndLongest {
+    is_known: AtomicBool,
+    times: [AtomicU64; 2],
+}
 
 impl LastAndLongest {
     pub fn add(&self, time: u64) {
-        let time = u32::try_from(time).unwrap_or(u32::MAX);
-        let [last, longest] = &self.0;
+        let [last, longest] = &self.times;
         last.store(time, Ordering::Relaxed);
         longest.fetch_max(time, Ordering::Relaxed);
+        self.is_known.store(true, Ordering::Release);
     }
 
-    pub fn get(&self) -> [u32; 2] {
-        self.0.each_ref().map(|time| time.load(Ordering::Relaxed))
+    /// None before the first.
+    pub fn get(&self) -> Option<[u64; 2]> {
+        let times = || self.times.each_ref().map(|time| time.load(Ordering::Relaxed));
+        self.is_known.load(Ordering::Acquire).then(times)
     }
 }
 

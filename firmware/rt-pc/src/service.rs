@@ -147,7 +147,7 @@ impl Service<'_> {
             if faulted || held {
                 outcome.incidents.push(Incident { tick: said.tick, phase: said.phase, cause: said.cause });
             }
-            self.console.update(&row, said);
+            self.console.update(&row, said, now);
             if let Some(link) = &mut self.link {
                 link.show(&row);
             }

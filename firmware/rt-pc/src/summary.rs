@@ -131,7 +131,7 @@ impl Summary<'_> {
     /// Late and skipped ticks of a cause, if there were any.
     fn cause(&self, cause: Late) -> Option<Json> {
         let (late, skipped) = (self.account.late()[cause as usize], self.account.skipped()[cause as usize]);
-        let longest = self.account.worst(cause).unwrap_or(0);
+        let longest = self.account.worst(cause);
         (late + skipped > 0).then(|| {
             let name = cause.name().into();
             Json::object([
@@ -202,6 +202,13 @@ impl Json {
 impl From<u64> for Json {
     fn from(number: u64) -> Self {
         Self::Number(number)
+    }
+}
+
+/// What was not measured is null.
+impl From<Option<u64>> for Json {
+    fn from(number: Option<u64>) -> Self {
+        number.map_or(Self::Null, Self::Number)
     }
 }
 

@@ -8,7 +8,7 @@
 //! Always: planned = on time + late + skipped. [`Account::balances`] is checked at the end of every run.
 
 use crate::clock::Usage;
-use crate::histogram::{Histogram, time_text};
+use crate::histogram::{Histogram, known_text, time_text};
 
 use std::fmt::Write as _;
 
@@ -302,7 +302,7 @@ impl Account {
         for cause in Cause::ALL {
             let (late, skipped) = (self.late[cause as usize], self.skipped[cause as usize]);
             if late + skipped > 0 {
-                let longest = self.worst(cause).map_or_else(|| "-".to_owned(), time_text);
+                let longest = known_text(self.worst(cause));
                 let _ = writeln!(text, "  {:<18}{late:>9}{skipped:>9}{longest:>12}  {}", cause.name(), cause.advice());
             }
         }
@@ -310,9 +310,9 @@ impl Account {
         for (name, histogram) in self.histograms() {
             let _ = write!(text, "  {name:<18}");
             for share in [0.5, 0.99, 0.999] {
-                let _ = write!(text, "{:>11}", time_text(histogram.quantile(share)));
+                let _ = write!(text, "{:>11}", known_text(histogram.quantile(share)));
             }
-            let _ = writeln!(text, "{:>11}", time_text(histogram.largest()));
+            let _ = writeln!(text, "{:>11}", known_text(histogram.largest()));
         }
         let _ = write!(text, "outputs after the planned time:\n{}", self.response.to_text());
         text

@@ -16,7 +16,6 @@ pub struct Histogram {
     bins: [u64; BINS],
     count: u64,
     largest: u64,
-    sum: u64,
 }
 
 impl Default for Histogram {
@@ -29,7 +28,7 @@ impl Histogram {
     /// An empty one.
     #[must_use]
     pub const fn new() -> Self {
-        Self { bins: [0; BINS], count: 0, largest: 0, sum: 0 }
+        Self { bins: [0; BINS], count: 0, largest: 0 }
     }
 
     /// Counts one time, ns.
@@ -38,7 +37,6 @@ impl Histogram {
             *bin += 1;
         }
         self.count += 1;
-        self.sum = self.sum.saturating_add(nanoseconds);
         if nanoseconds > self.largest {
             self.largest = nanoseconds;
         }
@@ -50,30 +48,22 @@ impl Histogram {
         self.count
     }
 
-    /// The longest, ns.
+    /// The longest, ns; none of none.
     #[must_use]
-    pub fn largest(&self) -> u64 {
-        self.largest
+    pub fn largest(&self) -> Option<u64> {
+        (self.count > 0).then_some(self.largest)
     }
 
-    /// The mean, ns; 0 of none.
+    /// A time that at least the share `share` (0 to 1) of all does not exceed, ns: at most 1/16 too long, never too short; none of none.
     #[must_use]
-    pub fn mean(&self) -> u64 {
-        self.sum.checked_div(self.count).unwrap_or(0)
-    }
-
-    /// A time that at least the share `share` (0 to 1) of all does not exceed, ns: at most 1/16 too long, never too short.
-    #[must_use]
-    pub fn quantile(&self, share: f64) -> u64 {
+    pub fn quantile(&self, share: f64) -> Option<u64> {
         let wanted = (share * self.count as f64).ceil() as u64;
         let mut seen = 0;
-        for (bin, count) in self.bins.iter().enumerate() {
+        let bin = self.bins.iter().position(|count| {
             seen += count;
-            if seen >= wanted && seen > 0 {
-                return upper_end(bin).min(self.largest);
-            }
-        }
-        self.largest
+            seen >= wanted && seen > 0
+        });
+        bin.map(|bin| upper_end(bin).min(self.largest))
     }
 
     /// Counts by doubling: upper end (ns, exclusive) and count, from the first to the last that is not empty.
@@ -115,6 +105,12 @@ pub fn time_text(nanoseconds: u64) -> String {
         10.0..100.0 => format!("{value:.1} {unit}"),
         _ => format!("{value:.0} {unit}"),
     }
+}
+
+/// The same, `-` where nothing was timed.
+#[must_use]
+pub fn known_text(nanoseconds: Option<u64>) -> String {
+    nanoseconds.map_or_else(|| "-".to_owned(), time_text)
 }
 
 /// Number of binary digits: the length of a bar.
@@ -159,18 +155,18 @@ mod tests {
         times.sort_unstable();
         for share in [0.0, 0.25, 0.5, 0.99, 0.999, 1.0] {
             let exact = times[((share * 5000.0) as usize).clamp(1, 5000) - 1];
-            let found = histogram.quantile(share);
+            let found = histogram.quantile(share).unwrap();
             assert!(found >= exact && found - exact <= exact / 16, "{share}: {found} for {exact}");
         }
-        assert_eq!((histogram.count(), histogram.largest()), (5000, times[4999]));
+        assert_eq!((histogram.count(), histogram.largest()), (5000, Some(times[4999])));
         assert_eq!(histogram.octaves().iter().map(|(_, count)| count).sum::<u64>(), 5000);
-        assert_eq!(histogram.mean(), times.iter().sum::<u64>() / 5000);
     }
 
     #[test]
     fn an_empty_one_and_a_single_time_are_shown() {
         let mut histogram = Histogram::new();
-        assert_eq!((histogram.quantile(0.5), histogram.mean(), histogram.to_text()), (0, 0, String::new()));
+        assert_eq!((histogram.quantile(0.5), histogram.largest(), histogram.to_text()), (None, None, String::new()));
+        assert_eq!([None, Some(850)].map(known_text), ["-", "850 ns"]);
         histogram.add(1_500);
         assert_eq!(histogram.to_text(), format!("  <   2.05 µs          1  {}\n", "#".repeat(50)));
         let times = [999, 1_000, 12_340, 999_999, 3_050_000, 2_100_000_000];

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use serde::Serialize;
-use specgen_rt::histogram::{Histogram, time_text};
+use specgen_rt::histogram::{Histogram, known_text, time_text};
 
 use super::named::InputFile;
 use super::plot::Plot;
@@ -113,7 +113,7 @@ impl Outcome for Report {
         }
         let _ = writeln!(text, "wake-ups, from the planned time to running");
         let Figures { p50_ns, p99_ns, p999_ns, max_ns, .. } = self.latency;
-        let [median, p99, p999, longest] = [p50_ns, p99_ns, p999_ns, max_ns].map(time_text);
+        let [median, p99, p999, longest] = [p50_ns, p99_ns, p999_ns, max_ns].map(known_text);
         let _ = writeln!(text, "  median {median}, 99 % {p99}, 99.9 % {p999}, longest {longest}");
         text += &self.delays.to_text();
         let _ = writeln!(text, "{} {}", mark(self.verdict.grade), self.verdict.text);
@@ -151,8 +151,10 @@ fn management(measured: &Measured) -> Finding {
 
 /// What the measurement means for a loop of this period.
 fn judge(measured: &Measured, period: u64) -> (Grade, String) {
-    let longest = measured.delays.largest();
     let hertz = 1e9 / period as f64;
+    let Some(longest) = measured.delays.largest() else {
+        return (Grade::Unknown, format!("{hertz:.0} Hz: no wake-up was measured; measure for longer, --seconds"));
+    };
     let within = format!("{} of {} periods of {}", measured.skipped, measured.planned, time_text(period));
     if measured.skipped > 0 {
         let share = measured.skipped as f64 / measured.planned as f64;

@@ -3,6 +3,7 @@
 mod answer;
 mod ended;
 mod health;
+mod located;
 mod operator;
 pub mod panel;
 mod passes;

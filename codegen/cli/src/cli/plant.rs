@@ -7,7 +7,7 @@ use host_sim::platform::rig::Noise;
 use serde::Serialize;
 use specgen_rt::clock::{self, SECOND};
 use specgen_rt::exchange::{self, OpenError, Server};
-use specgen_rt::histogram::{Histogram, time_text};
+use specgen_rt::histogram::{Histogram, known_text, time_text};
 use specgen_rt::scheduling;
 
 use super::named::InputFile;
@@ -61,22 +61,19 @@ struct Summary {
     digest: String,
     ticks: u64,
     controllers: u64,
-    p50_ns: u64,
-    p99_ns: u64,
-    max_ns: u64,
+    /// None of these where no tick was asked for.
+    p50_ns: Option<u64>,
+    p99_ns: Option<u64>,
+    max_ns: Option<u64>,
 }
 
 impl Outcome for Summary {
     fn text(&self) -> String {
+        let Self { name, ticks, controllers, .. } = self;
+        let [median, most, longest] = [self.p50_ns, self.p99_ns, self.max_ns].map(known_text);
+        let period = time_text(self.period_ns);
         format!(
-            "{}: {} ticks for {} controllers; a tick took {} (median), {} (99 %), {} (longest) of {}\n",
-            self.name,
-            self.ticks,
-            self.controllers,
-            time_text(self.p50_ns),
-            time_text(self.p99_ns),
-            time_text(self.max_ns),
-            time_text(self.period_ns),
+            "{name}: {ticks} ticks for {controllers} controllers; a tick took {median} (median), {most} (99 %), {longest} (longest) of {period}\n"
         )
     }
 }

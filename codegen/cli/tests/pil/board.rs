@@ -95,7 +95,8 @@ impl Machine for Stepped {
     }
 
     fn stage(&self, index: usize) -> Option<Stage<'_>> {
-        let stage = Stage { name: "supervise", calls: self.ticks, smallest: 1, sum: self.ticks, largest: 1, stack: 0 };
+        let stage =
+            Stage { name: "supervise", calls: self.ticks, smallest: 1, sum: self.ticks, largest: 1, stack: None };
         (index == 0).then_some(stage)
     }
 }

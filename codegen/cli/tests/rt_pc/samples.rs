@@ -54,10 +54,13 @@ fn check_row(row: &Row, tick: u64, every: u32, shown: &BTreeMap<u64, Shown>, mot
     let ticks: Vec<&Shown> = (tick..tick + u64::from(every)).map(|tick| &shown[&tick]).collect();
     let (_, phase, [pose, target, _]) = ticks[ticks.len() - 1];
     let user = |pose: &[f64; 6]| motion.user(&pose.map(|value| f64::from(value as f32))).unwrap();
-    assert_eq!((row.phase, row.pose, row.target), (*phase, user(pose), user(target)), "tick {tick}");
+    assert_eq!((row.phase, row.pose, row.target), (*phase, Some(user(pose)), user(target)), "tick {tick}");
     assert_eq!(row.status, ticks.iter().fold(0, |all, (status, ..)| all | status), "tick {tick}");
     for axis in 0..6 {
-        check_spread(&row.error[axis], ticks.iter().map(|(_, _, [pose, target, _])| target[axis] - pose[axis]));
+        check_spread(
+            &row.error.unwrap()[axis],
+            ticks.iter().map(|(_, _, [pose, target, _])| target[axis] - pose[axis]),
+        );
         check_spread(&row.volts[axis], ticks.iter().map(|(_, _, [_, _, volts])| volts[axis]));
     }
 }

@@ -41,14 +41,14 @@ pub struct Figures {
     pub planned: u64,
     /// Whole periods that were slept through.
     pub skipped: u64,
-    /// Half of the delays are no longer.
-    pub p50_ns: u64,
+    /// Half of the delays are no longer; none of these if none was measured.
+    pub p50_ns: Option<u64>,
     /// 99 % are no longer.
-    pub p99_ns: u64,
+    pub p99_ns: Option<u64>,
     /// 99.9 %.
-    pub p999_ns: u64,
+    pub p999_ns: Option<u64>,
     /// The longest.
-    pub max_ns: u64,
+    pub max_ns: Option<u64>,
     /// Upper ends and counts by doubling.
     pub below_ns: Vec<(u64, u64)>,
 }

@@ -24,4 +24,6 @@ pub(super) enum Code {
     NotNow = 89,
     InMotion = 93,
     WaveActive = 73,
+    /// The gauges are not read, or one is not believed: nothing is known of the position.
+    Sensor = 505,
 }

@@ -259,7 +259,10 @@ fn query<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, command: &str, re
         "POS" | "MOV" | "ONT" | "SVO" | "VMO" | "TRA" => {
             stage.refresh()?;
             match command {
-                "POS" => per_axis(axes, rest, |axis| decimal(to_wire(stage.pose()[axis])))?,
+                "POS" => {
+                    let pose = stage.pose()?;
+                    per_axis(axes, rest, |axis| decimal(to_wire(pose[axis])))?
+                }
                 "MOV" => per_axis(axes, rest, |axis| decimal(to_wire(stage.goal()[axis])))?,
                 "ONT" => {
                     let there = stage.servo() && !stage.moves();

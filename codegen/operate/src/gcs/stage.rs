@@ -285,8 +285,11 @@ impl<P: Port> Stage<P> {
     }
 
     /// Where it is, as clients see it, m and rad.
-    pub(super) fn pose(&self) -> [f64; 6] {
-        self.seen_from_pivot(&self.place.pose)
+    ///
+    /// # Errors
+    /// [`Code::Sensor`] if it is not measured now.
+    pub(super) fn pose(&self) -> Result<[f64; 6], Code> {
+        if self.place.is_measured() { Ok(self.seen_from_pivot(&self.place.pose)) } else { Err(Code::Sensor) }
     }
 
     /// The goal that a move changes: only of a machine that runs, and that is going nowhere that is not known.

@@ -72,8 +72,8 @@ pub struct Cost {
     pub mean: f64,
     /// Most.
     pub max: u64,
-    /// For the whole tick: most stack seen in use, bytes; 0 if the device does not measure it.
-    pub stack: u32,
+    /// For the whole tick: most stack seen in use, bytes; none if the device does not measure it.
+    pub stack: Option<u32>,
 }
 
 /// The host's controller with a device beside it. As a [`TickController`] it closes the loop of any scenario; after a reset the

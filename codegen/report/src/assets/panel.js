@@ -2,11 +2,11 @@
 (function () {
   counted();
   const root = document.documentElement, facts = JSON.parse(by("facts").textContent);
-  const NAMES = ["x", "y", "z", "θx", "θy", "θz"], STALE = 300, DIGITS = 200, SPECTRUM = 500;
+  const NAMES = ["x", "y", "z", "θx", "θy", "θz"], GAUGES = 0x3f00, STALE = 300, DIGITS = 200, SPECTRUM = 500;
   const samples = new Samples(facts.period), strips = new Strips(by("strips"), samples), legs = new Legs(by("legs"), samples, facts.volts);
   const spectrum = new Spectrum(by("spectrum"), samples, facts.modes);
   const shownAfter = { count: 0, sum: 0, most: 0 };
-  let socket = null, state = null, left = null, ended = "", you = "", row = null, standing = null, arrived = -Infinity, stated = -Infinity, sent = 0, asked = 0, answers = {};
+  let socket = null, state = null, left = null, ended = "", you = "", row = null, standing = null, arrived = -Infinity, measured = -Infinity, stated = -Infinity, sent = 0, asked = 0, answers = {};
   let wave = null, pending = null, gapped = 0, lastEvent = 0, pose = null, delay = 500;
 
   // Platform: live, its motion drawn larger by a round factor.
@@ -84,10 +84,13 @@
       const tick = at.getFloat64(place, true), every = at.getUint32(place + 12, true), rows = at.getUint32(place + 16, true);
       place += 24;
       for (let r = 0; r < rows; r++) {
-        const values = new Float32Array(buffer, place + 8, 48), phase = at.getUint32(place + 4, true), gap = samples.add(tick + r * every, every, phase === 2, values, 12);
-        spectrum.add(every, gap || phase !== 2, values, 12);
+        const values = new Float32Array(buffer, place + 8, 48), phase = at.getUint32(place + 4, true), status = at.getUint32(place, true);
+        // Where a gauge was not read or not believed the pose is an old one, and there is no error.
+        const read = !(status & GAUGES), law = phase === 2 && read, gap = samples.add(tick + r * every, every, law, values, 12);
+        spectrum.add(every, gap || !law, values, 12);
         if (gap) missing(gap);
-        row = { status: at.getUint32(place, true), phase, values };
+        if (read) measured = performance.now();
+        row = { status, phase, values };
         place += 200;
       }
     }
@@ -130,9 +133,14 @@
   let digits = 0, spectra = 0;
   function draw() {
     const now = performance.now(), live = row && now - arrived < STALE && !left;
-    const error = live ? NAMES.map((_, k) => row.values[13 + 3 * k]) : null, volts = live ? NAMES.map((_, k) => row.values[31 + 3 * k]) : null;
+    const bad = row ? row.status & GAUGES : GAUGES, read = live && !bad;
+    // What no gauge is read of is not known, whether outputs follow included.
+    const error = read ? NAMES.map((_, k) => row.values[13 + 3 * k]) : null, volts = live && bad !== GAUGES ? NAMES.map((_, k) => row.values[31 + 3 * k]) : null;
+    root.dataset.measured = String(Boolean(read));
+    by("view").classList.toggle("old", !read);
+    by("pose-age").textContent = read ? "" : "not measured" + (isFinite(measured) ? " for " + duration((now - measured) / 1000) : "");
     // First, for it asks how wide it is, which is known as long as nothing else has changed.
-    if (standing && live && standing.every(isFinite)) {
+    if (standing && read && standing.every(isFinite)) {
       facts.view.pose = standing.map(v => v * larger);
       view.draw();
     }
@@ -145,13 +153,13 @@
     // Over 30 s a pixel is longer than that.
     if (now - shown5.at >= DIGITS || !live) {
       Object.assign(shown5, { at: now, error, volts });
-      legs.draw(live ? volts : null);
+      legs.draw(volts);
     }
     if (!live) Object.assign(shown5, { error: null, volts: null });
     if (now - spectra >= SPECTRUM) {
       spectra = now;
       const law = row && row.phase === 2;
-      by("spectrum-note").textContent = live && law ? spectrum.draw(NAMES[spectrum.axis], now) : live ? "no live spectrum: the law is suspended" : "no data";
+      by("spectrum-note").textContent = !live ? "no data" : !read ? "no live spectrum: the pose is not measured" : law ? spectrum.draw(NAMES[spectrum.axis], now) : "no live spectrum: the law is suspended";
     }
     if (pending !== null) {
       const after = Date.now() - pending;
@@ -190,8 +198,10 @@
     };
     const events = lastEvent ? "last event " + new Date(lastEvent).toTimeString().slice(0, 8) : "";
     const age = now - arrived, link = socket && now - stated < 1000;
-    chip.className = "chip" + (!state || !link || left ? " none" : state.phase === "faulted" ? " bad" : "");
-    chip.textContent = state && link && !left ? state.phase : "–";
+    const known = state && link && !left && ticks(state.status);
+    chip.className = "chip" + (!known ? " none" : state.phase === "faulted" ? " bad" : "");
+    chip.textContent = known ? state.phase : "–";
+    if (!link) blank();
     if (ended) put("error", "The panel has ended.", ended);
     else if (!link) put("error", "No link to the panel.", "Use the hardware stop if the machine must stop.", state ? "" : "connecting");
     else if (left) put("warning", "The page that had the orders is gone.", "The machine holds" + (left.left > 0 ? ", and ramps down in " + left.left.toFixed(0) + "\u2009s" : " or is at rest") + ". Hold, Ramp down and Ask for orders work from here.");
@@ -203,11 +213,21 @@
       else if (watch && said.kind !== "error") more = state.holder + " has the orders. Hold and Ramp down work from here, too.";
       else if (!state.holder && said.kind !== "error") more = (more ? more + " " : "") + "Ask for orders first.";
       if (state.asked && state.mine) put("warning", state.asked.by + " asks for the orders.", "Hand over or keep: " + state.asked.left.toFixed(0) + "\u2009s left.", said.code || events);
-      else put(said.kind, watch && said.kind === "ok" ? "You watch." : said.what, more, said.code ? said.code + " · " + events : "no condition present" + (events ? " · " + events : ""));
+      else put(said.kind, watch && said.kind === "ok" ? "You watch." : said.what, more, row && row.status & GAUGES ? by("pose-age").textContent : said.code ? said.code + " · " + events : "no condition present" + (events ? " · " + events : ""));
     }
-    const down = by("down").querySelector("span"), volts = row ? Math.max(...[0, 1, 2, 3, 4, 5].map(k => Math.abs(row.values[31 + 3 * k]))) : 0;
-    const time = facts.ramp ? (volts / facts.ramp).toFixed(1) + "\u2009s to 0\u2009V" : "";
-    down.textContent = !link ? "No link: use the hardware stop" : state && !state.status.amplifiers_on && !left ? "at rest already" : (state && state.phase === "ramping down" ? "ramping down, " : "") + time + " · key Esc";
+    const down = by("down").querySelector("span"), volts = shown5.volts ? Math.max(...shown5.volts.map(Math.abs)) : NaN;
+    const time = facts.ramp && isFinite(volts) ? (volts / facts.ramp).toFixed(1) + "\u2009s to 0\u2009V" : "";
+    down.textContent = !link ? "No link: use the hardware stop" : state && !state.status.amplifiers_on && !left ? "at rest already" : (state && state.phase === "ramping down" ? "ramping down, " : "") + (time ? time + " · " : "") + "key Esc";
+  }
+
+  // What the machine said last is of now.
+  const ticks = status => status && status.age !== null && status.age * 1000 < STALE;
+
+  // Without a link nothing is known of the machine: no figure of then stays.
+  function blank() {
+    for (const id of ["amplifiers", "mode", "holder", "pages", "link", "late", "record-note"]) by(id).textContent = "–";
+    for (const id of ["reach", "record-room"]) by(id).textContent = "";
+    by("stop").textContent = "Hardware stop: –.";
   }
 
   // ── Controls ──
@@ -216,7 +236,7 @@
     if (!state || !state.status) return;
     const { status, phase, mine, holder, known } = state, on = status.amplifiers_on, cause = state.said.code;
     const orders = mine ? "" : holder ? "orders: " + holder : "ask for orders";
-    by("amplifiers").textContent = on ? "on" : "off";
+    by("amplifiers").textContent = !ticks(status) ? "–" : on ? "on" : "off";
     const mode = known.gains && known.gains.mode || "–";
     by("mode").textContent = mode.toUpperCase().replace("PF", "P/F").replace("-", " with ").replace("INVHYS", "Invhys");
     by("holder").textContent = mine ? "this page (" + you + ")" : holder || "nobody";

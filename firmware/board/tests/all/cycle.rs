@@ -300,6 +300,9 @@ fn a_converter_that_failed_names_the_cause_and_one_acknowledgement_is_enough_onc
         run(&mut exchange, Request::Acknowledge, 100, false);
         assert_eq!(exchange.report.phase, Phase::Faulted, "it still does not answer");
         run(&mut exchange, Request::None, 1, false);
+        // The pose is that of the last tick in which they were read.
+        let report = &exchange.report;
+        assert!(report.measured.is_some_and(|measured| measured + 100 < report.tick), "{report:?}");
         parts.0.borrow_mut().gauge_fault = None;
         run(&mut exchange, Request::Acknowledge, 2, false);
         assert_eq!(exchange.report.phase, Phase::Disarmed);

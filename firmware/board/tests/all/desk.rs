@@ -139,7 +139,36 @@ fn events_are_kept_until_the_host_has_them() {
         bench.exchange.report.health.events |= events;
         bench.ask(&Request::Health, |reply| {
             let Reply::Health(health) = reply else { unreachable!() };
-            assert_eq!((health.events, health.overruns, health.stack), (expected, 7, [100, 200]));
+            assert_eq!((health.events, health.stack), (expected, Some([100, 200])));
+            // Nothing was timed yet.
+            assert_eq!((health.overruns, health.tick, health.output, health.latest), (None, None, None, None));
+        });
+    }
+    bench.exchange.probes.hertz = 1_000;
+    (bench.exchange.report.health.tick, bench.exchange.report.health.output) = ([10, 20], [0, 0]);
+    bench.ask(&Request::Health, |reply| {
+        let Reply::Health(health) = reply else { unreachable!() };
+        assert_eq!((health.overruns, health.tick, health.output), (Some(7), Some([10, 20]), None));
+        assert_eq!((health.latest, health.clock), (Some(0), 1_000));
+    });
+}
+
+/// A pose is as old as the last tick whose gauges were read and believed.
+#[test]
+fn a_place_says_when_its_pose_was_measured() {
+    let mut bench = Bench::new();
+    let period = u64::from(specgen_board::PERIOD_NANOSECONDS);
+    for (tick, measured) in [(0, None), (9, None), (9, Some(9)), (100_009, Some(9))] {
+        (bench.exchange.report.tick, bench.exchange.report.measured) = (tick, measured);
+        let expected = measured.map(|measured: u64| (tick - measured) * period / 1000);
+        bench.ask(&Request::Place, |reply| match reply {
+            Reply::Place { measured, .. } => assert_eq!(measured, expected),
+            Reply::Refused(Refusal::Unsupported) => {}
+            other => panic!("{other:?}"),
+        });
+        bench.ask(&Request::Status, |reply| {
+            let Reply::Status(status) = reply else { unreachable!() };
+            assert_eq!(status.age, (tick > 0).then_some(0));
         });
     }
 }

@@ -18,6 +18,7 @@ const STATUS: Status = Status {
     status: 1 << 18,
     events: 31,
     late: 7,
+    age: Some(u64::MAX),
     link: Counters::NONE,
 };
 
@@ -26,12 +27,12 @@ const HEALTH: Health = Health {
     converter_faults: u32::MAX,
     faults: 0x1fe,
     gauge_faults: 7,
-    overruns: 1,
+    overruns: Some(1),
     clock: 400_000_000,
-    tick: [22_000, u32::MAX],
-    output: [16_000, 17_000],
-    latest: 80,
-    stack: [7_932, 8_192],
+    tick: Some([22_000, u64::MAX]),
+    output: Some([16_000, 17_000]),
+    latest: None,
+    stack: Some([7_932, 8_192]),
 };
 
 fn requests() -> Vec<Request<'static>> {
@@ -69,13 +70,14 @@ fn replies() -> Vec<Reply<'static>> {
         Refusal::TooLong,
         Refusal::Rate { least: u32::MAX },
     ];
-    let stage = Stage { name: "supervise", calls: 3, smallest: 0, sum: u64::MAX, largest: 1 << 40, stack: 4096 };
+    let stage = Stage { name: "supervise", calls: 3, smallest: 0, sum: u64::MAX, largest: 1 << 40, stack: Some(4096) };
     let recorder = RecorderStatus { running: true, triggered: false, ticks: 100, capacity: 4096 };
     let mut all: Vec<Reply<'static>> = refusals.map(Reply::Refused).to_vec();
     all.extend([
         Reply::Done,
         Reply::Health(HEALTH),
-        Reply::Place { tick: u64::MAX, phase: 2, status: 1 << 18, words: leaked(24, 8) },
+        Reply::Place { tick: u64::MAX, phase: 2, status: 1 << 18, measured: Some(u64::MAX), words: leaked(24, 8) },
+        Reply::Place { tick: 0, phase: 0, status: 0, measured: None, words: leaked(24, 8) },
         Reply::Identity(IDENTITY),
         Reply::Config { words: leaked(WORDS, 6) },
         Reply::Stepped { cost: u32::MAX, digest: u64::MAX, output: leaked(WORDS, 7) },

@@ -53,9 +53,15 @@ impl<'a> Desk<'a> {
             status: said.map_or(0, |said| said.status),
             events: *self.events,
             late: said.map_or(0, |said| u32::try_from(said.late).unwrap_or(u32::MAX)),
+            age: self.since(self.console.ticked),
             // The endpoint fills it in.
             link: Counters::NONE,
         })
+    }
+
+    /// From then to now, µs.
+    fn since(&self, then: Option<u64>) -> Option<u64> {
+        then.map(|then| self.now.saturating_sub(then) / 1000)
     }
 
     fn health(&mut self) -> Reply<'static> {
@@ -66,8 +72,9 @@ impl<'a> Desk<'a> {
         let Reply::Status(Status { tick, phase, status, .. }) = self.status() else {
             return Reply::Refused(Refusal::State);
         };
+        let measured = self.since(self.console.measured);
         match put_words(&self.console.place, &mut self.words) {
-            Some(words) if PLACE_WORDS > 0 => Reply::Place { tick, phase, status, words },
+            Some(words) if PLACE_WORDS > 0 => Reply::Place { tick, phase, status, measured, words },
             _ => Reply::Refused(Refusal::Unsupported),
         }
     }

@@ -1,11 +1,14 @@
 //! Answers of a machine, as text and as JSON.
 
 use std::fmt::Write as _;
+use std::time::Duration;
 
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
+use specgen_operate::FRESH;
 
+use super::located::ago;
 use crate::cli::ui::Outcome;
 
 /// A session: every order with its answer, and how the machine stood at the end. Answers were shown as they came.
@@ -61,6 +64,8 @@ pub struct MachineStatus {
     pub status_in_words: String,
     pub events: u32,
     pub late: u32,
+    /// Since the tick that all of this is of, s; none before the first.
+    pub age: Option<f64>,
     pub link_errors: u32,
     pub damaged_frames: u32,
     /// s.
@@ -71,8 +76,13 @@ pub struct MachineStatus {
 impl Outcome for MachineStatus {
     fn text(&self) -> String {
         let on = if self.amplifiers_on { "on" } else { "off" };
+        let age = match self.age.map(Duration::from_secs_f64) {
+            None => "  there was no tick yet: all of this is as at the start\n".to_owned(),
+            Some(age) if age >= FRESH => format!("  the machine makes no ticks: all of this was so {} ago\n", ago(age)),
+            Some(_) => String::new(),
+        };
         format!(
-            "tick {}, {:.4} s: {}, amplifiers {on}; status {:#x}: {}\n  {} late ticks, {} damaged frames\n",
+            "tick {}, {:.4} s: {}, amplifiers {on}; status {:#x}: {}\n{age}  {} late ticks, {} damaged frames\n",
             self.tick,
             self.tick as f64 * self.period,
             self.stands,

@@ -8,7 +8,7 @@ use specgen_link::Health;
 use specgen_runtime::supervisor::Cause;
 
 use super::answer::MachineStatus;
-use super::pose::Located;
+use super::located::Located;
 use crate::cli::ui::Outcome;
 
 /// Answer to `status`: how the machine stands, and what it noticed.
@@ -44,7 +44,7 @@ pub struct Noticed {
     converter_faults: u32,
     converter_faults_in_words: Vec<String>,
     gauge_faults: u32,
-    overruns: u32,
+    overruns: Option<u32>,
     tick_us: Option<[f64; 2]>,
     gauges_to_outputs_us: Option<[f64; 2]>,
     latest_us: Option<f64>,
@@ -54,8 +54,8 @@ pub struct Noticed {
 
 impl From<Health> for Noticed {
     fn from(health: Health) -> Self {
-        let microseconds = |counts: u32| f64::from(counts) * 1e6 / f64::from(health.clock);
-        let timed = health.clock > 0;
+        let microseconds = |counts: u64| counts as f64 * 1e6 / f64::from(health.clock);
+        let timed = |times: Option<[u64; 2]>| times.filter(|_| health.clock > 0).map(|times| times.map(microseconds));
         // Event bits are in the order of the causes from `missed tick` on.
         let events = (0..5).filter(|bit| health.events >> bit & 1 == 1);
         let causes = events.filter_map(|bit| Cause::from_word(Cause::MissedTick.word() + bit));
@@ -67,10 +67,10 @@ impl From<Health> for Noticed {
             converter_faults_in_words: kinds.map(|fault| fault.to_string()).collect(),
             gauge_faults: health.gauge_faults,
             overruns: health.overruns,
-            tick_us: timed.then(|| health.tick.map(microseconds)),
-            gauges_to_outputs_us: timed.then(|| health.output.map(microseconds)),
-            latest_us: timed.then(|| microseconds(health.latest)),
-            stack_bytes: (health.stack[1] > 0).then_some(health.stack),
+            tick_us: timed(health.tick),
+            gauges_to_outputs_us: timed(health.output),
+            latest_us: health.latest.filter(|_| health.clock > 0).map(microseconds),
+            stack_bytes: health.stack,
         }
     }
 }
@@ -79,21 +79,26 @@ impl Noticed {
     fn text(&self, period: f64) -> String {
         let events = if self.events == 0 { "none".to_owned() } else { self.events_in_words.join(", ") };
         let mut text = format!("  events since asked last: {events}\n");
-        // Writing to a String cannot fail.
-        if let (Some([tick, longest]), Some([output, most]), Some(late)) =
-            (self.tick_us, self.gauges_to_outputs_us, self.latest_us)
-        {
-            let period = period * 1e6;
-            let _ = writeln!(
-                text,
-                "  a tick {tick:.1} us, longest {longest:.1} us of {period} us, begun at most {late:.1} us late"
-            );
+        let late = self.latest_us.map_or_else(
+            || "when it begins is not measured: time waits for it".to_owned(),
+            |late| format!("begun at most {late:.1} us late"),
+        );
+        // Writing to a String cannot fail, here and below.
+        let _ = match self.tick_us {
+            Some([tick, longest]) => {
+                writeln!(text, "  a tick {tick:.1} us, longest {longest:.1} us of {} us, {late}", period * 1e6)
+            }
+            None => writeln!(text, "  times of a tick: not measured"),
+        };
+        if let Some([output, most]) = self.gauges_to_outputs_us {
             let _ = writeln!(text, "  from gauges to outputs {output:.1} us, longest {most:.1} us");
         }
+        let overruns =
+            self.overruns.map_or_else(|| "overruns not measured".to_owned(), |count| format!("{count} overruns"));
         let _ = writeln!(
             text,
-            "  since power-up: {} overruns, {} converter faults, {} ticks with a gauge not believed",
-            self.overruns, self.converter_faults, self.gauge_faults
+            "  since power-up: {overruns}, {} converter faults, {} ticks with a gauge not believed",
+            self.converter_faults, self.gauge_faults
         );
         for kind in &self.converter_faults_in_words {
             let _ = writeln!(text, "    converter: {kind}");
@@ -116,10 +121,11 @@ mod tests {
             converter_faults: 3,
             faults: Fault::NotEnded.bit(),
             clock: 200_000_000,
-            tick: [10_000, 20_000],
-            output: [5_000, 6_000],
-            latest: 300,
-            stack: [100, 8192],
+            tick: Some([10_000, 20_000]),
+            output: Some([5_000, 6_000]),
+            latest: Some(300),
+            overruns: Some(2),
+            stack: Some([100, 8192]),
             ..Health::default()
         };
         let text = Noticed::from(health).text(1e-4);
@@ -130,10 +136,16 @@ mod tests {
             "25.0 us",
             "BUSY stayed high",
             "100 of 8192",
+            "2 overruns",
         ] {
             assert!(text.contains(part), "{part}: {text}");
         }
         let bare = Noticed::from(Health::default()).text(1e-4);
         assert!(!bare.contains("stack") && bare.contains("none"), "{bare}");
+        // A zero that nothing counted is no figure, and neither is the end of a word.
+        assert!(bare.contains("times of a tick: not measured") && bare.contains("overruns not measured"), "{bare}");
+        let waits = Health { clock: 1_000_000_000, tick: Some([12_300, 6_000_000_000]), ..Health::default() };
+        let text = Noticed::from(waits).text(1e-4);
+        assert!(text.contains("longest 6000000.0 us of 100 us, when it begins is not measured"), "{text}");
     }
 }

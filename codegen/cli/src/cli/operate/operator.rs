@@ -104,6 +104,7 @@ impl<P: Port> Operator<P> {
             status_in_words: host_sim::word::status_words(status.status).replace('+', ", "),
             events: status.events,
             late: status.late,
+            age: status.age.map(|age| Duration::from_micros(age).as_secs_f64()),
             link_errors: status.link.errors(),
             damaged_frames: self.session.damaged(),
             period: self.session.period(),

@@ -17,8 +17,9 @@ use specgen_runtime::supervisor::{Cause, Phase};
 
 use super::answer::{Moves, Plain};
 use super::ended::Ended;
+use super::located::Located;
 use super::operator::Operator;
-use super::pose::{Located, ZERO, in_words, unit};
+use super::pose::{ZERO, in_words, unit};
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::Outcome;
 
@@ -157,16 +158,7 @@ impl<P: Port> Operator<P> {
 
     /// Where it is, in the session's frame.
     pub(super) fn located(&self, place: &Place) -> Located {
-        let millionths = |values: [f64; 6]| values.map(|value| value * 1e6);
-        let (pose, target) = (self.seen(&place.pose), self.seen(&place.target));
-        Located {
-            tick: place.tick,
-            pose: millionths(pose),
-            target: millionths(target),
-            error: core::array::from_fn(|axis| (target[axis] - pose[axis]) * 1e6),
-            voltage: place.voltage,
-            moves: u64::from(place.phase) == Phase::Running.word() && place.status & BUSY != 0,
-        }
+        Located::of(place, self.session.status(), |user| self.seen(user))
     }
 
     pub(super) fn no_mark(&self, name: &str) -> String {

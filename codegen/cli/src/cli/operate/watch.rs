@@ -8,7 +8,7 @@ use serde::Serialize;
 use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
 use specgen_operate::place::AXES;
-use specgen_operate::samples::{Block, Row};
+use specgen_operate::samples::{Block, Row, Spread};
 
 use super::ended::Ended;
 use super::operator::Operator;
@@ -141,13 +141,15 @@ const COLUMNS: [Column; 9] =
     [right(10), right(9), right(9), right(9), right(9), right(9), right(9), right(8), right(8)];
 
 fn line(Sample { tick, row: given, .. }: &Sample) -> String {
-    let pose = given.pose.map(|value| format!("{:.3}", value * 1e6));
+    let nothing = || "-".to_owned();
+    let pose: [String; 6] =
+        std::array::from_fn(|axis| given.pose.map_or_else(nothing, |pose| format!("{:.3}", pose[axis] * 1e6)));
     let largest = |axes: std::ops::Range<usize>| {
-        let ends = given.error[axes].iter().flat_map(|error| [error.least, error.most]);
-        format!(
-            "{:.1}",
-            1e9 * ends.fold(0.0, |largest: f32, end| if end.abs() > largest { end.abs() } else { largest })
-        )
+        let ends: Option<Vec<f32>> =
+            given.error.map(|error| error[axes].iter().flat_map(|error| [error.least, error.most]).collect());
+        let most =
+            |ends: Vec<f32>| ends.iter().fold(0.0, |most: f32, end| if end.abs() > most { end.abs() } else { most });
+        ends.map_or_else(nothing, |ends| format!("{:.1}", 1e9 * most(ends)))
     };
     let [x, y, z, rx, ry, rz] = &pose;
     let mut text = String::new();
@@ -171,15 +173,17 @@ fn titles() -> String {
     titles
 }
 
-/// Numbers as the shortest decimals that give the same bits.
+/// Numbers as the shortest decimals that give the same bits; `nan` where nothing was measured.
 fn values(Sample { tick, time, ticks, row }: &Sample) -> String {
     let mut values = format!("{tick},{time:.9},{ticks},{},{}", row.status, row.phase);
-    for value in row.pose.iter().chain(&row.target) {
-        values += &format!(",{value:e}");
-    }
-    for spread in row.error.iter().chain(&row.volts) {
-        values += &format!(",{:e},{:e},{:e}", spread.least, spread.mean, spread.most);
-    }
+    let place = |place: Option<f64>| place.map_or_else(|| ",nan".to_owned(), |value| format!(",{value:e}"));
+    let spread = |spread: Option<Spread>| {
+        spread.map_or_else(|| ",nan".repeat(3), |Spread { least, mean, most }| format!(",{least:e},{mean:e},{most:e}"))
+    };
+    (0..6).for_each(|axis| values += &place(row.pose.map(|pose| pose[axis])));
+    row.target.iter().for_each(|value| values += &place(Some(*value)));
+    (0..6).for_each(|axis| values += &spread(row.error.map(|error| error[axis])));
+    row.volts.iter().for_each(|volts| values += &spread(Some(*volts)));
     values
 }
 
@@ -258,7 +262,7 @@ impl<P: Port> Operator<P> {
         let (frame, period) = (self.frame, self.session.period());
         let Block { tick, every, rows, .. } = block;
         rows.into_iter().enumerate().map(move |(index, mut row)| {
-            row.pose = frame.pose(&row.pose).unwrap_or(row.pose);
+            row.pose = row.pose.map(|pose| frame.pose(&pose).unwrap_or(pose));
             row.target = frame.pose(&row.target).unwrap_or(row.target);
             let tick = tick.saturating_add(u64::from(every) * index as u64);
             Sample { tick, time: tick as f64 * period, ticks: every, row }

@@ -136,9 +136,9 @@ impl Outcome for Report {
                 row(&mut out, &columns, &[&name, &cost.calls, &cost.min, &mean, &cost.max]);
             }
         }
-        if let Some(whole) = self.costs.first().filter(|whole| whole.stack > 0) {
+        if let Some(stack) = self.costs.first().and_then(|whole| whole.stack) {
             let bound = self.stack_bound.map_or_else(String::new, |bound| format!(", static bound {bound} bytes"));
-            let _ = writeln!(out, "stack of a tick: {} bytes seen{bound}", whole.stack);
+            let _ = writeln!(out, "stack of a tick: {} bytes seen{bound}", stack);
         }
         if self.damaged_frames > 0 {
             let _ = writeln!(out, "{} frames came damaged and were asked for again", self.damaged_frames);

@@ -3,7 +3,7 @@
 //! A message: number 1 and the count of blocks (u32 each), its own number (u32), nothing (u32), when it was sent (f64, ms since 1970),
 //! where the platform of the last row is from rest (6 f64, m and rad); then each block: first tick (f64), number, ticks a row, rows,
 //! nothing (u32 each); then its rows: status, phase (u32 each), pose, set-point, error, voltages (f32 each; error and voltages least,
-//! mean, most of each axis and leg). Little-endian.
+//! mean, most of each axis and leg); pose and error that are not measured are NaN. Little-endian.
 
 use specgen_operate::motion::Motion;
 use specgen_operate::samples::{Block, Spread};
@@ -19,7 +19,7 @@ pub fn message(number: u32, blocks: &[Block], motion: Option<&Motion>, sent: f64
     }
     bytes.extend(sent.to_le_bytes());
     let last = blocks.last().and_then(|block| block.rows.last());
-    let standing = last.and_then(|row| motion?.platform(&row.pose)).unwrap_or([f64::NAN; 6]);
+    let standing = last.and_then(|row| motion?.platform(&row.pose?)).unwrap_or([f64::NAN; 6]);
     standing.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
     for block in blocks {
         bytes.extend((block.tick as f64).to_le_bytes());
@@ -29,10 +29,13 @@ pub fn message(number: u32, blocks: &[Block], motion: Option<&Motion>, sent: f64
         for row in &block.rows {
             bytes.extend(row.status.to_le_bytes());
             bytes.extend(u32::from(row.phase).to_le_bytes());
-            for value in row.pose.iter().chain(&row.target) {
+            // Of what is not measured a page shows nothing, by the status.
+            let nothing = Spread { least: f32::NAN, mean: f32::NAN, most: f32::NAN };
+            let (pose, error) = (row.pose.unwrap_or([f64::NAN; 6]), row.error.unwrap_or([nothing; 6]));
+            for value in pose.iter().chain(&row.target) {
                 bytes.extend((*value as f32).to_le_bytes());
             }
-            for Spread { least, mean, most } in row.error.iter().chain(&row.volts) {
+            for Spread { least, mean, most } in error.iter().chain(&row.volts) {
                 for value in [least, mean, most] {
                     bytes.extend(value.to_le_bytes());
                 }

@@ -3,6 +3,7 @@
 use specgen_compiler::ir::Supervision;
 use specgen_language::model::Model;
 use specgen_link::Status;
+use specgen_operate::GAUGES;
 use specgen_runtime::setpoint::{BUSY, REFUSED, STALE};
 use specgen_runtime::supervisor::{Cause, Phase};
 
@@ -74,6 +75,8 @@ pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
                 ("warning", "Running. The last command is refused.", "Hold, run, and move to where there is reach.")
             } else if bits & STALE != 0 {
                 ("warning", "Running. The stream of set-points has stopped.", "Move, or send set-points.")
+            } else if bits & GAUGES != 0 {
+                ("warning", "Running. A gauge is not read, or not believed.", "Check its converter and cable.")
             } else if bits != 0 {
                 ("warning", "Running, with a limit reached.", "Look at the status below the events.")
             } else if status.status & BUSY != 0 {
