@@ -145,11 +145,16 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
             "`command`: expected hold, stream, move, trajectory, found `x`; nothing was asked of the machine",
         ),
         ("wave none.toml", 1, "`none.toml` cannot be read: there is no such file"),
-        ("play case-1 none.json m", 1, "`none.json` cannot be read: there is no such file"),
+        ("play case-1 correction=none.json machine=m", 1, "`none.json` cannot be read: there is no such file"),
         ("config write none.toml", 1, "none.toml is refused"),
+        // Whichever comes first: what the session reads is not written.
+        ("wave wave.toml; record download wave.toml", 2, "it is an input of this command, `wave.toml`"),
+        ("record download wave.toml; on-edge wave wave.toml", 2, "it is an input of this command, `wave.toml`"),
+        ("record download reference.toml", 2, "it is an input of this command, `reference.toml`"),
         ("record download legs.toml/x.rec", 3, "could not create the folder `legs.toml`"),
     ] {
-        let run = Run::of(&mut board.operate(&folder, &["reference.toml", "arm", "wait arming 20", last]));
+        let lines = ["reference.toml", "arm", "wait arming 20"].into_iter().chain(last.split("; "));
+        let run = Run::of(&mut board.operate(&folder, &lines.collect::<Vec<_>>()));
         run.says(code, &[text]);
         assert!(board.is(Phase::Disarmed), "{last}");
     }

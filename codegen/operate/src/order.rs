@@ -1,6 +1,6 @@
 //! What an operator types, as orders.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use specgen_link::RecorderAction;
@@ -183,6 +183,16 @@ pub enum Until {
 }
 
 impl Order {
+    /// The file that it reads, if any.
+    #[must_use]
+    pub fn input(&self) -> Option<&Path> {
+        match self {
+            Self::WriteConfig(path) | Self::Wave(path) | Self::Play { correction: Some((path, _)), .. } => Some(path),
+            Self::OnEdge(order) => order.input(),
+            _ => None,
+        }
+    }
+
     /// Of a line; none if there is nothing in it but blanks and a comment (`# …`).
     ///
     /// # Errors

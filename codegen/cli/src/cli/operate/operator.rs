@@ -19,6 +19,7 @@ use super::pose::{ZERO, in_words};
 use crate::cli::file::{check_input, check_place, write_file};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
+use specgen_language::files;
 use specgen_language::model::Model;
 use specgen_operate::frame::Frame;
 use specgen_operate::{Order, Session, Until};
@@ -157,6 +158,8 @@ impl<P: Port> Operator<P> {
     pub fn check(&self, orders: &[Order]) -> Result<(), Failure> {
         let nonsense = |text: String| Failure::Usage(format!("{text}; nothing was asked of the machine"));
         let mut marks: Vec<&str> = self.marks.keys().map(String::as_str).collect();
+        // A download may stand above the order that reads its file.
+        orders.iter().filter_map(Order::input).for_each(files::note_input);
         orders.iter().try_for_each(|order| match order {
             Order::Set(assignments) => self.session.assign(assignments).map(|_| ()).map_err(nonsense),
             Order::Mark(name) => {
