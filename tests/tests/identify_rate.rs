@@ -163,12 +163,14 @@ fn on_a_static_leg_no_option_beats_the_static_table() {
 #[test]
 fn two_runs_give_the_same_bits() {
     let truth = Truth { creep: vec![(0.06, 0.132)], dead_time: 3, ..PLAIN };
-    let text = || {
-        let found = found(&truth);
+    let text = |truth: &Truth| {
+        let found = found(truth);
         let lines = found.models.iter().map(|(o, m)| spec_lines(*o, m, 0.0, "t.csv", "r.csv")).collect::<String>();
         lines + &write_rate_csv(found.models[2].1.rate.as_ref().unwrap())
     };
-    assert_eq!(text(), text());
+    let first = text(&truth);
+    assert_eq!(text(&truth), first);
+    assert_ne!(text(&Truth { dead_time: 4, ..truth }), first);
 }
 
 fn mean(values: &[f64]) -> f64 {

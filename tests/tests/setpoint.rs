@@ -419,7 +419,10 @@ fn the_wrap_of_a_table_is_judged_as_any_corner() {
     // An ordinary corner, within the table.
     let triangle = (50..450).map(|k: i32| 0.05 * f64::from(100 - (k % 200 - 100).abs()));
     let found = repeated(triangle);
-    assert!(codes(&found) == ["W0458"] && found[0].message.contains("here, where the speed of x changes by"), "{found:#?}");
+    assert!(
+        codes(&found) == ["W0458"] && found[0].message.contains("here, where the speed of x changes by"),
+        "{found:#?}"
+    );
 }
 
 #[test]

@@ -54,6 +54,21 @@ const PUBLISHED_SCHEMA: Trial =
 const LOOM: &str = "firmware/rt/tests/loom/Cargo.toml";
 /// What orders memory that two processes share, under a model checker.
 const SHARED_MEMORY: Trial = Trial { manifest: LOOM, judges: &[("firmware/rt/src/exchange", ".rs")] };
+/// Packages that are no members of the workspace, and formatted one by one.
+const FORMATTED_ALONE: [&str; 12] = [
+    FIRMWARE,
+    TICK,
+    HOST_LIBRARY,
+    REAL_TIME,
+    wheel::MANIFEST,
+    BOARDS_COMMON,
+    SCHEMA,
+    fuzz::MANIFEST,
+    board::MANIFEST,
+    LOOM,
+    BOARDS[0],
+    BOARDS[1],
+];
 /// Time that the soak gives each target of the fuzzer, s.
 const FUZZING: u32 = 300;
 /// Members of the workspace that people write.
@@ -198,21 +213,7 @@ fn formatting(root: &Path) -> Outcome {
     }
     // Not `--all`: the emitted controller is formatted by specgen itself.
     let members = HAND_WRITTEN.iter().flat_map(|name| ["--package", name]);
-    let excluded = [
-        FIRMWARE,
-        TICK,
-        HOST_LIBRARY,
-        REAL_TIME,
-        wheel::MANIFEST,
-        BOARDS_COMMON,
-        SCHEMA,
-        fuzz::MANIFEST,
-        board::MANIFEST,
-        LOOM,
-    ]
-    .into_iter()
-    .chain(BOARDS);
-    let excluded = excluded.map(|manifest| vec!["--manifest-path", manifest]);
+    let excluded = FORMATTED_ALONE.into_iter().map(|manifest| vec!["--manifest-path", manifest]);
     for scope in std::iter::once(members.collect()).chain(excluded) {
         let fix = format!("run: cargo fmt {}", scope.join(" "));
         let outcome = expect_success(cargo(root, &[&["fmt", "--check"], &scope[..]].concat()), &fix);
@@ -272,4 +273,49 @@ fn lints(root: &Path) -> Outcome {
         }
     }
     Outcome::Passed
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::fs;
+
+    use super::*;
+
+    /// Files of this name that are committed, by path from the repository.
+    fn named(name: &str) -> BTreeSet<String> {
+        let listed = Command::new("git").current_dir(crate::root()).args(["ls-files", "-z"]).output().unwrap();
+        assert!(listed.status.success(), "{listed:?}");
+        let paths = String::from_utf8(listed.stdout).unwrap();
+        paths
+            .split('\0')
+            .filter(|path| Path::new(path).file_name().is_some_and(|last| last == name))
+            .map(str::to_owned)
+            .collect()
+    }
+
+    /// A list that a new package is not added to would leave it out, and say nothing.
+    #[test]
+    fn no_package_is_left_out_of_a_list() {
+        // By a step of its own; its lock file is looked at where it was generated.
+        let own_board = "examples/own-board/Cargo.toml";
+        let locked: BTreeSet<String> = named("Cargo.lock").iter().map(|path| path.replace(".lock", ".toml")).collect();
+        assert_eq!(locked, LOCKED.into_iter().chain([own_board]).map(str::to_owned).collect());
+
+        let workspace = fs::read_to_string(crate::root().join("Cargo.toml")).unwrap();
+        let members = workspace.split_once("members = [").unwrap().1.split_once(']').unwrap().0;
+        let members: BTreeSet<String> =
+            members.split('"').skip(1).step_by(2).map(|folder| format!("{folder}/Cargo.toml")).collect();
+        // Emitted, so that specgen itself formats it; and a crate of the link's tests.
+        let others = ["Cargo.toml", "firmware/controller/Cargo.toml", LINK_PROOF, own_board];
+        let alone =
+            named("Cargo.toml").into_iter().filter(|path| !members.contains(path) && !others.contains(&path.as_str()));
+        assert_eq!(alone.collect::<BTreeSet<_>>(), FORMATTED_ALONE.into_iter().map(str::to_owned).collect());
+        let name = |path: &String| {
+            let text = fs::read_to_string(crate::root().join(path)).unwrap();
+            text.lines().find_map(|line| line.strip_prefix("name = ")).unwrap().trim_matches('"').to_owned()
+        };
+        let names: BTreeSet<String> = members.iter().map(name).filter(|name| name != "controller").collect();
+        assert_eq!(names, HAND_WRITTEN.into_iter().map(str::to_owned).collect());
+    }
 }

@@ -181,7 +181,7 @@ fn a_good_spec_gives_one_document_and_its_text_the_same_facts() {
     let digest = made["digest"].as_str().unwrap();
     assert!(folder.read("out/README.md").contains(digest));
     let text = folder.run(&["legs.toml", "-o", "out", "--no-build"]);
-    is_a_verdict(&text.stdout, "legs is good so far: ");
+    is_a_verdict(&text.stdout, "legs is good so far on 10 assumed values: ");
     let all = folder.run(&["legs.toml", "-o", "out", "--no-build", "--details"]).stdout;
     let (verdict, details) = all.split_once("\n\n").unwrap();
     assert_eq!(format!("{verdict}\n"), text.stdout);
@@ -191,7 +191,7 @@ fn a_good_spec_gives_one_document_and_its_text_the_same_facts() {
     assert_eq!((check.code, &check.value["result"]["digest"]), (0, &digest.into()));
     assert_eq!(check.value["result"]["records"][0]["grid"], 32);
     let text = folder.run(&["check", "legs.toml"]);
-    is_a_verdict(&text.stdout, "legs is good so far: ");
+    is_a_verdict(&text.stdout, "legs is good so far on 10 assumed values: ");
     assert_eq!((text.code, &check.value["result"]["verdict"]["answer"]), (0, &"not-measured".into()));
     let details = folder.run(&["check", "legs.toml", "--details"]).stdout;
     assert!(details.starts_with(&text.stdout) && details.contains("\n  record records/"), "{details}");

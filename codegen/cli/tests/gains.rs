@@ -27,7 +27,7 @@ fn spec(folder: &Folder, name: &str, records: &str, less: bool) {
 fn scaled(table: &str, factor: f64) -> String {
     let (header, rows) = table.split_once('\n').unwrap();
     let mut text = format!("{header}\n");
-    for row in rows.lines() {
+    for row in rows.lines().filter(|row| !row.starts_with('#')) {
         let (thresholds, node) = row.rsplit_once(',').unwrap();
         text += &format!("{thresholds},{:?}\n", node.parse::<f64>().unwrap() * factor);
     }

@@ -16,8 +16,9 @@ fn good(folder: &Folder) -> Vec<[f64; 3]> {
     let (header, rows) = text.split_once('\n').unwrap();
     assert_eq!(header, HEADER);
     let number = |field: &str| field.parse::<f64>().unwrap();
+    let rows = rows.lines().filter(|line| !line.starts_with('#'));
     let rows: Vec<[f64; 3]> =
-        rows.lines().map(|line| line.split(',').map(number).collect::<Vec<_>>().try_into().unwrap()).collect();
+        rows.map(|line| line.split(',').map(number).collect::<Vec<_>>().try_into().unwrap()).collect();
     assert!(rows.len() > 500);
     rows
 }

@@ -15,6 +15,8 @@ fn row<'a>(report: &'a Value, name: &str) -> &'a Value {
 }
 
 fn error_nm(row: &Value, on: &str) -> f64 {
+    let seconds = row[on]["Scored"]["seconds"].as_f64().unwrap();
+    assert!(seconds > 0.0 && row[on]["Scored"]["path_seconds"].as_f64() == Some(seconds), "of the whole path: {row:#}");
     row[on]["Scored"]["error_nm"].as_f64().unwrap_or_else(|| panic!("not scored: {row:#}"))
 }
 

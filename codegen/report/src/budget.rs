@@ -181,7 +181,14 @@ fn advice(source: &str) -> &'static str {
 
 /// Bars of both units, and the cumulative spectrum of the first coordinates together, of `what` was followed and over what it
 /// was measured.
-fn parts((what, coverage): (&str, Coverage), number: usize, names: &[&str; 6], added: &[Added], together: &Errors, interval: f64) -> Vec<Part> {
+fn parts(
+    (what, coverage): (&str, Coverage),
+    number: usize,
+    names: &[&str; 6],
+    added: &[Added],
+    together: &Errors,
+    interval: f64,
+) -> Vec<Part> {
     let legs = names[0] == LEGS[0];
     let mut values: Vec<(&str, [f64; 6])> =
         added.iter().map(|one| (one.name, core::array::from_fn(|axis| rms(&one.errors[axis])))).collect();

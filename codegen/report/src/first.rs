@@ -61,11 +61,15 @@ pub fn of(
         platform::standing(&compiled.model, &compiled.findings),
         "drag to turn · to scale",
     ));
+    let is_error = |finding: &Diagnostic| finding.severity == Severity::Error;
+    let missed = compiled.findings.iter().any(is_error);
+    let note =
+        if missed { "a requirement is missed · one row per code" } else { "nothing refused · one row per code" };
     parts.push(Part::Html(format!(
         "{}{}{}</div>\n",
         controller_card(compiled, verdict, measured),
         margin_card(compiled, verdict, mode),
-        findings("Findings", "nothing refused · one row per code", &compiled.findings, &compiled.source)
+        findings("Findings", note, &compiled.findings, &compiled.source)
     )));
     parts
 }

@@ -273,7 +273,8 @@ pub fn dumbbell(lines: &[Line], speeds: [Option<String>; 2], unit: &str) -> Rows
         }
         (low, high) = line.values.iter().map(|one| one.1).chain(line.limit).fold((low, high), wider);
         let text = |own: bool| {
-            let over = |coverage: Option<Coverage>| coverage.map_or_else(String::new, |c| format!(" over {}", c.brief()));
+            let over =
+                |coverage: Option<Coverage>| coverage.map_or_else(String::new, |c| format!(" over {}", c.brief()));
             let found = line.values.iter().filter(|one| one.0 == own);
             found.map(|one| digits(one.1) + &over(one.2)).collect::<Vec<_>>().join(", ")
         };

@@ -66,12 +66,11 @@ fn legs_rest_where_amplifiers_that_are_off_leave_them() {
     let record = fs::read_to_string(repository().join("specs/records/reference-forc.csv")).expect("a record");
     let shifted = |by: f64| {
         let mut column = None;
-        let lines = record.lines().map(|line| {
+        let lines = record.lines().filter(|line| !line.starts_with('#')).map(|line| {
             let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
             match column {
-                None if !line.starts_with('#') => column = cells.iter().position(|name| name.starts_with("drive")),
+                None => column = cells.iter().position(|name| name.starts_with("drive")),
                 Some(at) => cells[at] = format!("{:?}", cells[at].trim().parse::<f64>().expect("a number") + by),
-                None => {}
             }
             cells.join(",") + "\n"
         });

@@ -93,11 +93,13 @@ struct Built {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let compiled = match compile::compile(&arguments.spec) {
+    let mut compiled = match compile::compile(&arguments.spec) {
         Ok(compiled) => compiled,
         Err(refused) => return self::refused(arguments, refused, ui),
     };
-    ui.findings(Some(&compiled.source), &[compiled.findings.clone(), compiled.missed()].concat());
+    // The page judges: what is missed stands first among its findings.
+    compiled.findings.splice(0..0, compiled.missed());
+    ui.findings(Some(&compiled.source), &compiled.findings);
     let output = place(arguments, &compiled.ir.name);
     check_place(&output)?;
     if let Some(record) = &arguments.record {

@@ -127,7 +127,8 @@ impl Results {
     /// One line for each comparison.
     #[must_use]
     pub fn csv(&self) -> String {
-        let mut out = String::from("table,case,quantity,frequency_Hz,unit,paper,ours,ratio,remark,seconds,path_seconds\n");
+        let mut out =
+            String::from("table,case,quantity,frequency_Hz,unit,paper,ours,ratio,remark,seconds,path_seconds\n");
         let quoted = |text: &str| {
             if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
         };

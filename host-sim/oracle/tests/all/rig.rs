@@ -3,7 +3,9 @@ use host_sim::controller::{StandIn, TickController};
 use host_sim::coverage::Coverage;
 use host_sim::plant::LegParameters;
 use host_sim::platform::Specimen;
-use host_sim::platform::rig::{BUSY, Command, GaugeFault, Noise, OnBoard, PlatformRig, PlatformRun, Record, RunOptions};
+use host_sim::platform::rig::{
+    BUSY, Command, GaugeFault, Noise, OnBoard, PlatformRig, PlatformRun, Record, RunOptions,
+};
 use host_sim::platform::{PlatformParameters, WorkPart};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 
@@ -215,7 +217,8 @@ fn played(
 }
 
 /// A path of 200 ticks that does not begin at the bias.
-const PATH: OnBoard = OnBoard { selector: 1, approach: Some([OFF, 0.0, 0.0, 0.0, 0.0, 0.0]), ticks: 200, repeats: false };
+const PATH: OnBoard =
+    OnBoard { selector: 1, approach: Some([OFF, 0.0, 0.0, 0.0, 0.0, 0.0]), ticks: 200, repeats: false };
 
 #[test]
 fn a_path_is_scored_from_its_first_set_point_to_its_last_and_no_further() {

@@ -111,12 +111,13 @@ fn halving_the_step_shows_second_order_and_a_nanometre_at_most() {
 
 #[test]
 fn the_same_voltages_give_the_same_bits() {
-    let run = || {
+    let run = |volts: f64| {
         let mut plant = prepared(&Specimen::random(3, 4));
         plant.touch(WorkPart::aluminium());
-        raised(&mut plant, 33.0, 0.05).map(f64::to_bits)
+        raised(&mut plant, volts, 0.05).map(f64::to_bits)
     };
-    assert_eq!(run(), run());
+    assert_eq!(run(33.0), run(33.0));
+    assert_ne!(run(33.0), run(33.000_001));
 }
 
 /// Legs of both classes.
