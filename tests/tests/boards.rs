@@ -54,7 +54,7 @@ const F446: Board = Board {
     name: "board-f446",
     folder: "stm32f4",
     mcu: Mcu::Stm32F446Re,
-    flash: 96 * 1024,
+    flash: 98 * 1024,
     ram: 32 * 1024,
     stack: 12 * 1024,
     tightly: None,

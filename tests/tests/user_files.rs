@@ -81,7 +81,11 @@ fn doors(text: &str) -> usize {
         let of = |door: &&str| {
             let places = line.match_indices(door.trim_end_matches("()"));
             // `PendingFile::create` is another one's.
-            places.filter(|(at, _)| !line[..*at].ends_with(|c: char| c.is_alphanumeric() && !line[..*at].ends_with("Tdms"))).count()
+            places
+                .filter(|(at, _)| {
+                    !line[..*at].ends_with(|c: char| c.is_alphanumeric() && !line[..*at].ends_with("Tdms"))
+                })
+                .count()
         };
         DOORS.iter().map(of).sum()
     };
@@ -95,7 +99,9 @@ fn no_file_of_a_user_is_opened_by_another_door() {
     for entry in std::fs::read_dir(root.join("codegen")).unwrap() {
         sources(&entry.unwrap().path().join("src"), &mut files);
     }
-    ["host-sim/src", "firmware/rt/src", "firmware/rt-pc/src"].iter().for_each(|folder| sources(&root.join(folder), &mut files));
+    ["host-sim/src", "firmware/rt/src", "firmware/rt-pc/src"]
+        .iter()
+        .for_each(|folder| sources(&root.join(folder), &mut files));
     let mut found: Vec<(String, usize)> = Vec::new();
     for file in files {
         let count = doors(&std::fs::read_to_string(&file).unwrap());

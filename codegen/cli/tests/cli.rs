@@ -293,7 +293,7 @@ fn a_spec_that_is_no_spec_is_refused_with_its_name_and_a_fix() {
     for (spec, code, line, fix) in [
         ("nothing.toml", "E0101", None, "path"),
         ("folder.toml", "E0101", None, "name the .toml file in it"),
-        ("empty.toml", "E0105", Some(1), "specs/minimal.toml"),
+        ("empty.toml", "E0105", Some(1), "specgen new"),
         ("huge.toml", "E0102", None, "measurements belong in CSV files"),
         ("latin.toml", "E0103", Some(2), "save the file as UTF-8"),
         ("binary.toml", "E0103", Some(2), "save the file as UTF-8"),

@@ -130,7 +130,7 @@ fn a_declared_trajectory_beyond_the_strokes_is_refused_at_its_place() {
 #[test]
 fn warnings_are_denied_unless_the_spec_says_why() {
     let (folder, text) = folder("legs.toml");
-    let noisy = text.replace("\"2 mV\"", "\"300 mV\"");
+    let noisy = text.replace("\"2 mV\"", "\"100 mV\"");
     folder.write("noisy.toml", &noisy);
     assert_eq!(folder.run(&["check", "noisy.toml"]).code, 0);
     for denied in [&["check", "noisy.toml", "--deny-warnings"][..], &["noisy.toml", "--deny-warnings", "--no-build"]] {
@@ -142,9 +142,9 @@ fn warnings_are_denied_unless_the_spec_says_why() {
     folder.write("allowed.toml", format!("{noisy}\n{reason}"));
     folder.run(&["check", "allowed.toml", "--deny-warnings"]).says(0, &["N0891", "lent until"]);
     // Far off is refused in any case, and let pass in the same way.
-    let far = noisy.replace("\"300 mV\"", "\"2 V\"");
+    let far = noisy.replace("\"100 mV\"", "\"2 V\"");
     folder.write("far.toml", &far);
-    folder.run(&["check", "far.toml"]).says(1, &["E0890", "amplifier.noise", "10 times beyond"]);
+    folder.run(&["check", "far.toml"]).says(1, &["E0890", "amplifier.noise", "66.67 times beyond"]);
     folder.write("far.toml", format!("{far}\n{reason}"));
     assert_eq!(folder.run(&["check", "far.toml", "--deny-warnings"]).code, 0);
     // An exception needs a key and a reason, and something to let pass.

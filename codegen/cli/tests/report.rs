@@ -357,9 +357,9 @@ fn reproduce_gives_the_same_bytes_twice_and_every_table() {
     assert_eq!(rows, 18 + 9 + 8 + 4 * 27 + 10 + 10);
     // What the project promises of Table 2 and of Fig. 29.
     for line in csv.lines().filter(|line| line.starts_with("table-2,invhys")) {
-        assert!(line.ends_with("agrees"), "{line}");
+        assert!(line.contains(",agrees,"), "{line}");
     }
     for line in csv.lines().filter(|line| line.starts_with("figure-29,\"PCC")) {
-        assert!(line.ends_with("agrees"), "{line}");
+        assert!(line.contains(",agrees,"), "{line}");
     }
 }

@@ -24,7 +24,7 @@ const BUILT: &[(&str, usize, &str)] = &[
     ("codegen/cli/src/cli/report/paper.rs", 4, "commands_of_a_page_name_its_spec"),
     ("codegen/cli/src/cli/report/simulated.rs", 5, "commands_of_a_page_name_its_spec"),
     ("codegen/cli/src/cli/robust/report.rs", 1, "a_machine_is_run_again_by_its_line"),
-    ("codegen/cli/src/cli/robust/trajectory.rs", 1, "a_machine_is_run_again_by_its_line"),
+    ("codegen/cli/src/cli/trajectory.rs", 1, "a_machine_is_run_again_by_its_line"),
     ("codegen/cli/src/cli/robust/work.rs", 1, "a_machine_is_run_again_by_its_line"),
     ("codegen/cli/src/cli/ui.rs", 1, "next_commands_name_the_files_that_were_named"),
     ("codegen/identify/src/columns/foreign.rs", 4, "records_in_other_forms_become_text_and_stay"),

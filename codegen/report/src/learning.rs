@@ -57,7 +57,10 @@ pub fn section(
         Err(error) => return Err(error),
     };
     let lead = lead(&learned, &convergence);
-    let mut table = Grid::new("Passes of case 1 at 10 Hz", &["pass", "nm rms", "nrad rms", "by the gauges, nm", "over s", "path s"]);
+    let mut table = Grid::new(
+        "Passes of case 1 at 10 Hz",
+        &["pass", "nm rms", "nrad rms", "by the gauges, nm", "over s", "path s"],
+    );
     for (number, pass) in learned.passes.iter().enumerate() {
         let Coverage { seconds, path_seconds } = pass.coverage;
         let values = [pass.translation_nm, pass.orientation_nrad, pass.measured_nm, seconds, path_seconds].map(digits);

@@ -18,6 +18,7 @@ mod motion;
 mod passes;
 mod plan;
 mod response;
+mod seen;
 mod table;
 mod update;
 
@@ -25,8 +26,9 @@ pub use convergence::{Convergence, LARGEST_RADIUS, Learnable};
 pub use excitation::{Excitation, PASSES};
 pub use heard::Heard;
 pub use motion::Motion;
-pub use passes::{Ending, LearnError, Learned, Learner, Pass, Repeating, Seen, course, held, learn, translation_nm};
+pub use passes::{Ending, LearnError, Learned, Learner, Pass, Repeating, course, held, learn, translation_nm};
 pub use plan::Plan;
 pub use response::{Bin, Response};
+pub use seen::Seen;
 pub use table::{Table, TableError, knots};
 pub use update::Update;

@@ -303,7 +303,7 @@ mod tests {
             "bench is ready: 5 limits kept, 1 warning\n\
              \x20 reach    54.9/52.4/174 ≥ 50/50/50 µm, 421 ≥ 400 µrad\n\
              \x20 margins  delay > 5 ticks\n\
-             \x20 tracking case-1 xyz 20.7, case-1 z 3.00 nm over 2.500/2.500 s, line 78.6 nm over …\n\
+             \x20 tracking case-1 xyz 20.7, case-1 z 3.00 nm over 2.500/2.500 s, line 78.6 nm  …\n\
              \x20 time     instructions 4,043 ≤ 4,500\n\
              \x20 next     specgen sim bench.toml\n"
         );

@@ -22,6 +22,7 @@ pub mod engine;
 pub mod error;
 pub mod host;
 pub mod image;
+mod owner;
 mod panics;
 pub mod places;
 mod process;

@@ -2,7 +2,7 @@
 
 use super::callgraph::{CallGraph, Function};
 use super::error::TargetError;
-use super::size;
+use super::owner;
 use addr2line::Context;
 use addr2line::gimli::{self, Dwarf, EndianSlice, LittleEndian};
 use object::{Object, ObjectSection};
@@ -82,7 +82,7 @@ fn site(debug: &DebugInfo<'_>, function: &Function, place: u64) -> Result<String
     let mut lines = Vec::new();
     while let Some(frame) = frames.next().map_err(malformed)? {
         if let Some((file, line)) = frame.location.and_then(|l| Some((l.file?.to_owned(), l.line?)))
-            && size::crate_of_file(&file) != "core"
+            && owner::crate_of_file(&file) != "core"
         {
             lines.push(format!("{file}:{line}"));
         }

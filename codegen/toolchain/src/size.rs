@@ -6,6 +6,7 @@
 use super::checks;
 use super::error::TargetError;
 use super::image::RECORDER;
+use super::owner::{NO_LINES, crate_of_file};
 use super::panics::{self, DebugInfo};
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind};
 use serde::Serialize;
@@ -21,8 +22,6 @@ pub const ASSUMED_SEPARATOR: &str = ", ";
 const LONGEST_ASSUMED: usize = 1 << 16;
 /// Longest identity that is believed, bytes.
 const LONGEST_IDENTITY: usize = 512;
-/// Code without line information: assembly, and libraries that came compiled.
-const NO_LINES: &str = "without line information";
 /// Constants without a symbol: literals of the compiler, and those that it merged.
 const UNNAMED: &str = "unnamed constants";
 
@@ -210,56 +209,6 @@ fn crate_of_symbol(name: &str) -> &str {
     }
 }
 
-/// Crates of the compiler's library that an image may hold.
-const LIBRARY: [&str; 5] = ["core", "alloc", "compiler-builtins", "stdarch", "portable-simd"];
-
-/// The crate that a source file belongs to: by the registry's `name-version`, the library of the compiler, else the folder that holds `src`. Folders
-/// of the machine above that count for nothing, whatever their names.
-pub(super) fn crate_of_file(path: &str) -> String {
-    source_of(path).0
-}
-
-/// The crate of a source file, and the file within its folder `src`.
-pub(super) fn source_of(path: &str) -> (String, String) {
-    let path = path.replace('\\', "/");
-    let parts: Vec<&str> = path.split('/').collect();
-    let from = |at: usize| parts.get(at..).unwrap_or_default().join("/");
-    let part = |at: usize| parts.get(at).copied().unwrap_or_default();
-    // `…/registry/src/INDEX/NAME-VERSION/…`.
-    let package = parts.windows(2).rposition(|pair| pair == ["registry", "src"]).map(|at| at + 3);
-    if let Some(at) = package.filter(|at| without_version(part(*at)) != part(*at)) {
-        return (without_version(part(at)).to_owned(), from(at + 2));
-    }
-    // `…/rust/library/core/…`, or `rustc-1.96` or a digest in place of `rust`.
-    let of_compiler = |at: usize| {
-        let above = |by: usize| at.checked_sub(by).map_or("", part);
-        above(1) == "rust" || above(1).starts_with("rustc") || above(2) == "rustc"
-    };
-    let library = parts.iter().rposition(|part| *part == "library").filter(|at| of_compiler(*at)).map(|at| at + 1);
-    if let Some(at) = library.filter(|at| LIBRARY.contains(&part(*at))) {
-        return (part(at).to_owned(), from(at + 2));
-    }
-    let source = parts.iter().rposition(|part| *part == "src");
-    match source.map(|at| (at, at.checked_sub(1).map_or("", part))) {
-        Some((at, folder)) if !folder.is_empty() && folder != "." => (folder.to_owned(), from(at + 1)),
-        // Paths of the package that is built itself start with `src`.
-        Some((0, _)) => ("firmware".to_owned(), from(1)),
-        _ => (NO_LINES.to_owned(), String::new()),
-    }
-}
-
-/// `cortex-m-rt` of `cortex-m-rt-0.7.7`.
-fn without_version(package: &str) -> &str {
-    let mut end = package.len();
-    for (at, _) in package.match_indices('-') {
-        if package[at + 1..].starts_with(|c: char| c.is_ascii_digit()) {
-            end = at;
-            break;
-        }
-    }
-    &package[..end]
-}
-
 /// The identity line in the bytes of a section, and what the line behind it names as assumed.
 fn find_identity(bytes: &[u8]) -> Option<(String, Vec<String>)> {
     let mark = IDENTITY_MARK.as_bytes();
@@ -303,7 +252,7 @@ mod tests {
         ] {
             assert_eq!(crate_of_file(path), expected, "{path}");
         }
-        assert_eq!(source_of("/w/src/o/runtime/src/snapshot/walk.rs").1, "snapshot/walk.rs");
+        assert_eq!(crate::owner::source_of("/w/src/o/runtime/src/snapshot/walk.rs").1, "snapshot/walk.rs");
         assert_eq!(crate_of_symbol("controller::hysteresis::EVERETT_0"), "controller");
         assert_eq!(crate_of_symbol("<specgen_runtime::crc::Crc32 as x>::TABLE"), "runtime");
         assert_eq!(crate_of_symbol(".Lanon.1"), UNNAMED);

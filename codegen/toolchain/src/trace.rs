@@ -16,9 +16,9 @@ use specgen_language::interrupt::Scratch;
 use super::build::Image;
 use super::emulator::Emulator;
 use super::error::TargetError;
+use super::owner;
 use super::panics::{self, DebugInfo};
 use super::replay::{read_words, write_words};
-use super::size;
 use super::thumb::{self, Branch, Instruction};
 
 /// Where a tick begins, and where it is over; where what is no part of it begins, and where that is over.
@@ -261,7 +261,7 @@ fn who(debug: &DebugInfo<'_>, address: u64) -> (Who, bool) {
 
 /// For whom a line of a file was written, by its crate and its place there, never by the folders above; none if its callers say.
 fn of_file(path: &str) -> Option<(Who, bool)> {
-    let (owner, file) = size::source_of(path);
+    let (owner, file) = owner::source_of(path);
     let is_law = matches!(owner.as_str(), "controller" | "runtime");
     if !is_law && owner != "board" {
         return None;

@@ -335,7 +335,9 @@ mod tests {
         assert!(unknown.contains("unknown field `capa`") && unknown.contains("line 7"), "{unknown}");
         assert!(refused("\"zeta\": 0.1", "\"zeta\": \"0.1\"").contains("invalid type: string"));
         assert!(refused("\"zeta\": 0.1", "\"zeta\": NaN").contains("line 12"));
-        let absent = LegParameters::named(Path::new("no/such.json"), |path| std::fs::read_to_string(path)).unwrap_err().to_string();
+        let absent = LegParameters::named(Path::new("no/such.json"), |path| std::fs::read_to_string(path))
+            .unwrap_err()
+            .to_string();
         assert!(absent.starts_with("no/such.json: not a usable plant\n  cannot be read"), "{absent}");
     }
 }

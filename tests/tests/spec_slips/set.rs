@@ -317,6 +317,11 @@ fn scaled(record: &str, column: usize, factor: f64) -> String {
     let mut lines = record.lines();
     let mut text = format!("{}\n", lines.next().unwrap());
     for line in lines {
+        if line.starts_with('#') {
+            text.push_str(line);
+            text.push('\n');
+            continue;
+        }
         let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
         cells[column] = format!("{}", cells[column].parse::<f64>().unwrap() * factor);
         text.push_str(&cells.join(","));

@@ -271,7 +271,7 @@ Examples:
 pub const FORC: &str = "\
 Examples:
   specgen forc -o record.csv            # the reference leg, 32 curves at 20 V/s
-  specgen forc platform.toml -o leg.csv                    # a leg of this spec
+  specgen forc platform.toml -o another.csv   # a leg of this spec
   specgen forc -o fast.csv --rate 2000 --grid 16
       a second rate, for `identify rate`
   specgen forc --drive-only --drive -90:90 --sampling 1000 -o drive.csv

@@ -12,7 +12,7 @@
 use std::cmp::Ordering;
 
 use super::motion::Motion;
-use super::passes::Seen;
+use super::seen::Seen;
 
 /// B: parts of a motion.
 const PARTS: usize = 16;

@@ -15,6 +15,7 @@ use specgen_runtime::playback::{self, Knot, UNIT};
 use super::gain::{Judge, Score, Verdict};
 use super::motion::Motion;
 use super::plan::Plan;
+use super::seen::Seen;
 use super::table::knots;
 use super::update::Update;
 
@@ -72,19 +73,6 @@ impl From<RunError> for LearnError {
     fn from(error: RunError) -> Self {
         Self::Run(error)
     }
-}
-
-/// What a machine showed in a pass, tick by tick.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
-    /// Set-point less what the gauges showed, at the end of each tick, m and rad: the mean over the ticks from knot to knot.
-    pub measured: Vec<[f64; 6]>,
-    /// Set-point less true pose; what was measured, where nothing else is known.
-    pub real: Vec<[f64; 6]>,
-    /// What was measured, as it was kept from knot to knot.
-    pub kept: Vec<Knot>,
-    /// Status bits seen.
-    pub status: u32,
 }
 
 /// Who makes the correction of the next pass.

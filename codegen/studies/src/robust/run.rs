@@ -153,7 +153,12 @@ impl Study<'_> {
         let learned =
             learn(&mut bench, motion, Learner::Host(update), &[], *spacing, *passes, |_, _| ControlFlow::Continue(()))?;
         let best = &learned.passes[learned.best];
-        Ok(Some(Learnt { error_nm: best.translation_nm, passes: learned.best as u32, grew: learned.grew(), coverage: best.coverage }))
+        Ok(Some(Learnt {
+            error_nm: best.translation_nm,
+            passes: learned.best as u32,
+            grew: learned.grew(),
+            coverage: best.coverage,
+        }))
     }
 
     fn simulate(&self, member: &Member) -> Result<Outcome, RunError> {

@@ -45,8 +45,10 @@ fn beginnings(plan: &Setpoints64) -> Vec<(&'static str, Generator<f64>)> {
     ]
 }
 
-/// Where a command ends; none for a table that repeats.
-fn commands() -> Vec<(&'static str, Command<f64>, Option<[f64; 6]>)> {
+/// A command with its name, and where it ends; none for a table that repeats.
+type NamedCommand = (&'static str, Command<f64>, Option<[f64; 6]>);
+
+fn commands() -> Vec<NamedCommand> {
     let ends = |selector: u32| {
         let plan = plan64();
         let mut generator = ready(&plan);
