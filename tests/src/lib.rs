@@ -16,6 +16,7 @@ use host_sim::stimulus::{self, InputRecording, Setpoints};
 use host_sim::trace::{Trace, first_difference};
 use specgen::compile::{Compiled, compile};
 use specgen::model::Mcu;
+pub use specgen::target::skipped;
 use specgen::target::{self, Image};
 use specgen::verify;
 use specgen::workspace;
@@ -54,11 +55,11 @@ pub fn image_target() -> PathBuf {
     builds().join(format!("build-{}", worker()))
 }
 
-/// How much of what only gains by length is run: the short length in the test run, the long one where `SPECGEN_SOAK` is set, as
-/// `cargo xtask soak` does.
+/// How much of what only gains by length is run: the short length in the test run, the long one where `SPECGEN_FULL` is set, as
+/// `cargo xtask test --full` does.
 #[must_use]
 pub fn length<T>(short: T, long: T) -> T {
-    if std::env::var_os("SPECGEN_SOAK").is_some() { long } else { short }
+    if std::env::var_os("SPECGEN_FULL").is_some() { long } else { short }
 }
 
 /// The larger of two errors. Unlike `f64::max` it keeps a NaN, which no bound admits.
@@ -185,20 +186,13 @@ impl Emitted {
         Controller::load(&self.library()).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// The emitted crate for a microcontroller; none, with a line that says so, where tools are missing and
-    /// `SPECGEN_ALLOW_MISSING=1` permits it.
+    /// The emitted crate for a microcontroller; none, with a line that says so, where tools are missing and not required.
     ///
     /// # Panics
     /// If it does not build.
     #[must_use]
     pub fn image(&self, mcu: Mcu) -> Option<Image> {
-        if let Err(missing) = target::available() {
-            if std::env::var_os("SPECGEN_ALLOW_MISSING").is_some_and(|value| value == "1") {
-                println!("skipped: {missing}");
-                return None;
-            }
-            panic!("{missing}");
-        }
+        target::found_or_skipped(target::available()).unwrap_or_else(|error| panic!("{error}"))?;
         let stage = Stage::of(&self.dir);
         Some(target::build_image(&stage.folder, mcu, &image_target()).unwrap_or_else(|error| panic!("{error}")))
     }

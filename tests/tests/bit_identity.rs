@@ -77,10 +77,9 @@ fn f64_on_the_host_and_the_m7_is_equal_in_every_bit() {
 }
 
 #[test]
+#[ignore = "long: single precision, on the emulated M4F and M7"]
 fn f32_on_the_host_the_m7_and_the_m4f_is_equal_in_every_bit() {
-    // The core that computes them so; in the soak the M7, too.
-    let mcus = [Mcu::Mps2An386, Mcu::Mps2An500];
-    compare("bits-f32", &[ALIGNED, F32], specgen_tests::length(&mcus[..1], &mcus));
+    compare("bits-f32", &[ALIGNED, F32], &[Mcu::Mps2An386, Mcu::Mps2An500]);
 }
 
 /// With room for eight extrema the memory overflows all the time, and what it drops is the same everywhere.

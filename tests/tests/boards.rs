@@ -13,7 +13,7 @@ use specgen::emit;
 use specgen::model::Mcu;
 use specgen::target::callgraph::CallGraph;
 use specgen::target::checks::{self, Rule, Rules};
-use specgen::target::{build, image, stack, toolchain};
+use specgen::target::{self, build, image, stack, toolchain};
 use specgen::workspace;
 use specgen_tests::{compile_edited, image_target, kept, repository, scratch};
 
@@ -75,14 +75,7 @@ static BUILD: Mutex<()> = Mutex::new(());
 /// The image; none, and a line that says so, without a cross compiler where that is permitted.
 fn image_of(board: &Board) -> Option<Vec<u8>> {
     let _one = BUILD.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    let toolchain = match toolchain::find() {
-        Ok(toolchain) => toolchain,
-        Err(missing) if std::env::var_os("SPECGEN_ALLOW_MISSING").is_some_and(|value| value == "1") => {
-            println!("skipped: {missing}");
-            return None;
-        }
-        Err(missing) => panic!("{missing}"),
-    };
+    let toolchain = target::found_or_skipped(toolchain::find()).unwrap_or_else(|missing| panic!("{missing}"))?;
     let compiled = compile_edited(board.name, "reference.toml", board.edits, &[]);
     let dir = scratch(board.name);
     let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[board.folder]);
@@ -93,7 +86,7 @@ fn image_of(board: &Board) -> Option<Vec<u8>> {
     Some(elf)
 }
 
-/// Image and spec for `cargo xtask test`, which then runs them on an emulated board.
+/// Image and spec for `cargo xtask test --full`, which then runs them on an emulated board.
 fn keep(board: &Board, elf: &[u8]) {
     let specs = repository().join("specs");
     let folder = kept(board.folder);
@@ -197,12 +190,14 @@ fn no_path_of_this_machine_is_in_flash(board: &Board, elf: &[u8]) {
 }
 
 #[test]
+#[ignore = "long: images of real boards"]
 fn the_stm32h743_image_fits_and_its_tick_cannot_fail() {
     check(&H743);
     own_board_builds();
 }
 
 #[test]
+#[ignore = "long: images of real boards"]
 fn the_stm32f446_image_fits_and_its_tick_cannot_fail_nor_compute_doubles() {
     check(&F446);
 }

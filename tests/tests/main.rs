@@ -6,6 +6,7 @@ mod board_samples;
 mod board_support;
 mod boards;
 mod budgets;
+mod dependencies;
 mod dynamics;
 mod dynamics_load;
 mod emitted;

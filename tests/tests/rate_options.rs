@@ -1,5 +1,5 @@
 //! Rate-dependent options of the emitted controller: equal bits on host and microcontroller, and what they are worth on the
-//! reference plant. `SPECGEN_SOAK=1 cargo test --release -p specgen-tests rate_options -- --nocapture` prints the table of
+//! reference plant. `SPECGEN_FULL=1 cargo test --release -p specgen-tests rate_options -- --include-ignored --nocapture` prints the table of
 //! `docs/hysteresis.md`, and what a tick costs with each.
 
 use crate::figures;
@@ -14,7 +14,7 @@ use specgen::identify::{Options, Record, identify, parse_record, write_table_csv
 use specgen::model::Mcu;
 use specgen::target::Image;
 use specgen::verify;
-use specgen_tests::{Emitted, assert_same_bits, column, host_trace, integers, length};
+use specgen_tests::{Emitted, assert_same_bits, column, host_trace, integers, length, skipped};
 
 /// Ticks of each comparison.
 fn ticks() -> usize {
@@ -108,18 +108,16 @@ fn creep_of_legs_is_equal_in_every_bit() {
 }
 
 #[test]
+#[ignore = "long: below in single precision, and of a platform"]
 fn dynamic_preisach_of_legs_is_equal_in_every_bit() {
-    if length(true, false) {
-        return println!("skipped: only in the soak: below in single precision, and of a platform");
-    }
     equal_bits("rate-dynamic", "legs.toml", &[("memory  = 64", DYNAMIC)], &[Mcu::Mps2An500], true);
 }
 
 #[test]
+#[ignore = "long: single precision, on the emulated M4F and M7"]
 fn dynamic_preisach_in_f32_is_equal_in_every_bit() {
     let f32 = ("scalar   = \"f64\"", "scalar   = \"f32\"");
-    let mcus = [Mcu::Mps2An386, Mcu::Mps2An500];
-    let mcus = length(&mcus[..1], &mcus);
+    let mcus = &[Mcu::Mps2An386, Mcu::Mps2An500];
     equal_bits("rate-dynamic-f32", "legs.toml", &[("memory  = 64", DYNAMIC), f32], mcus, true);
 }
 
@@ -127,7 +125,7 @@ fn dynamic_preisach_in_f32_is_equal_in_every_bit() {
 fn both_options_of_a_platform_are_equal_in_every_bit() {
     let creep = CREEP.replace("\ndead_time = \"0.35 ms\"", "");
     if length(true, false) {
-        println!("skipped: only in the soak: creep of a platform, which is that of six legs");
+        skipped("only in the full run: creep of a platform, which is that of six legs");
     } else {
         equal_bits("rate-creep-platform", "reference.toml", &[("memory  = 64", &creep)], &[Mcu::Mps2An500], false);
     }
@@ -212,10 +210,8 @@ fn option(found: &RateIdentified, wanted: RateOption) -> &RateModel {
 /// What the study found holds for the emitted controller: on the reference plant (6) beats the static inverse at 1 Hz, and not at 10 Hz, nor under
 /// PCC; creep with lead does both.
 #[test]
+#[ignore = "long: the study of the options, of five controllers"]
 fn what_the_options_are_worth_on_the_reference_plant() {
-    if length(true, false) {
-        return println!("skipped: only in the soak: the study of the options, of five controllers");
-    }
     let records = records();
     let found = identify_rate(&records, None, &Options::new(32, [0.0, 100.0])).unwrap_or_else(|d| panic!("{d:#?}"));
     println!("{:#?}", found.report.options);

@@ -1,6 +1,6 @@
 //! Mutated specs: whatever comes in, the reader neither panics nor reports a finding that cannot be shown.
 //!
-//! 5,000 inputs, and 200,000 in the soak. The seed is fixed: a failure repeats.
+//! 5,000 inputs, and 200,000 in the full run. The seed is fixed: a failure repeats.
 
 // Clippy sees the helpers of an integration test as production code.
 use std::fs;

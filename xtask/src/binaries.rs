@@ -3,10 +3,9 @@
 //! `cargo test` runs one binary after the other, and at the end of each all processors but one wait for its longest test. Here a
 //! job is a module of a binary (what its tests share is made once), the longest start first, and one line says how each ended.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -17,14 +16,17 @@ use crate::skips;
 /// How tests are run.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Mode {
-    /// Those that only gain by length run at full length: the soak.
-    pub soak: bool,
+    /// Every test at full length, the long ones too.
+    pub full: bool,
     /// The cross compiler or the emulator is missing, which a step before has said: what needs it is skipped.
     pub tools_missing: bool,
 }
 
+/// Modules whose tests mostly wait: for time that passes, or for another process.
+const WAITING: [&str; 1] = ["cli all::rt_pc"];
+
 /// The variable of the environment that asks tests for their long form.
-pub const SOAK: &str = "SPECGEN_SOAK";
+const FULL: &str = "SPECGEN_FULL";
 
 /// What was run.
 #[derive(Debug, Default)]
@@ -177,15 +179,23 @@ struct Ended {
     skipped: Vec<String>,
 }
 
-/// Runs them; a line for each, with all that it printed where it failed.
+/// Runs them; a line for each, with all that it printed where it failed. Those that wait have a worker of their own beside one
+/// for each processor, which help it when they have nothing else to do.
 fn run(jobs: &[Job<'_>], workers: usize, kept: &Path, durations: &Durations, mode: Mode) -> Vec<Ended> {
-    let next = AtomicUsize::new(0);
+    let (waiting, computing): (Vec<usize>, Vec<usize>) =
+        (0..jobs.len()).partition(|index| WAITING.contains(&jobs[*index].name.as_str()));
+    let queues = [computing, waiting].map(|queue| Mutex::new(VecDeque::from(queue)));
+    let take = |queue: &Mutex<VecDeque<usize>>| queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+    let next = &|worker: usize| match worker {
+        _ if worker < workers => take(&queues[0]).or_else(|| take(&queues[1])),
+        _ => take(&queues[1]),
+    };
     let expected: Vec<Duration> = jobs.iter().map(|job| durations.expect(&job.name)).collect();
     let done = Mutex::new((Vec::new(), Progress::new(expected, workers)));
     let work = &|worker: usize| {
         loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(job) = jobs.get(index) else { break };
+            let Some(index) = next(worker) else { break };
+            let job = &jobs[index];
             let start = Instant::now();
             let (good, text) = job.run(kept, mode, worker);
             let ended = job.ended(good, &text, start.elapsed());
@@ -202,7 +212,7 @@ fn run(jobs: &[Job<'_>], workers: usize, kept: &Path, durations: &Durations, mod
         }
     };
     std::thread::scope(|scope| {
-        for worker in 0..workers {
+        for worker in 0..=workers {
             scope.spawn(move || work(worker));
         }
     });
@@ -222,11 +232,11 @@ impl Job<'_> {
             .args(["--show-output", "--test-threads=1", "--exact"])
             .args(&self.tests)
             .stdin(Stdio::null());
-        if mode.soak {
-            command.env(SOAK, "1");
+        if mode.full {
+            command.env(FULL, "1").arg("--include-ignored");
         }
-        if mode.tools_missing {
-            command.env(specgen_toolchain::ALLOW_MISSING, "1");
+        if !mode.tools_missing {
+            command.env(specgen_toolchain::REQUIRE_TOOLS, "1");
         }
         match command.output() {
             Ok(output) => {

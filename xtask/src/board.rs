@@ -104,12 +104,7 @@ fn models(root: &Path) -> Outcome {
     expect_success(test, "see the test above")
 }
 
-/// For the test run: from boot to a record that replays, of the images that its tests build, with the specgen that they made.
-pub fn short(root: &Path) -> Outcome {
-    each(root, &[TOOL], |trial| run(trial, true))
-}
-
-/// For the soak: with the estimate of a tick and faults, one image after the other: a host does not wait long for a board that has half a processor.
+/// For the full run: with the estimate of a tick and faults, one image after the other: a host does not wait long for a board that has half a processor.
 pub fn long(root: &Path) -> Outcome {
     each(root, &[SPECGEN, TOOL], |trial| {
         run(trial, false)?;

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 
 use crate::packages::host;
+use crate::results;
 use crate::run::{Outcome, Report, cargo, expect_success};
 
 /// Its own workspace.
@@ -18,6 +19,8 @@ const TARGETS: [&str; 5] = ["spec", "csv", "record", "link", "operator"];
 const CORPUS: &str = "tests/fuzz/corpus";
 /// Inputs of earlier runs, a folder for each target, and the build.
 const WORK: &str = "target/fuzz";
+/// For each target, unless another time is asked for.
+const SECONDS: u32 = 300;
 /// Longest input, bytes: every spec of the repository fits.
 const LONGEST: usize = 16_384;
 /// Counters of edges, and of what comparisons compare: what libFuzzer is guided by. No sanitizer: the product forbids `unsafe`
@@ -35,11 +38,13 @@ type Work<'a> = Box<dyn Fn(&str) -> Outcome + 'a>;
 
 /// `cargo xtask fuzz [SECONDS [TARGET]]`, `cargo xtask fuzz keep`; none if the arguments are something else.
 pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
+    let mut time = None;
     let (targets, work): (Vec<&str>, Work) = match *arguments {
         ["keep"] => (TARGETS.to_vec(), Box::new(|target| keep(root, target))),
-        [seconds, ref only @ ..] if only.len() < 2 => {
-            let seconds = seconds.parse().ok()?;
-            let targets: Vec<&str> = TARGETS.into_iter().filter(|name| only.is_empty() || only == [*name]).collect();
+        [ref all @ ..] if all.len() <= 2 => {
+            let seconds = all.first().map_or(Some(SECONDS), |seconds| seconds.parse().ok())?;
+            time = Some(seconds);
+            let targets = TARGETS.into_iter().filter(|name| all.get(1).is_none_or(|only| only == name)).collect();
             (targets, Box::new(move |target| run(root, target, seconds)))
         }
         _ => return None,
@@ -47,26 +52,20 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     if targets.is_empty() {
         return None;
     }
-    let mut report = Report::new(1 + targets.len());
+    let all = targets.len() == TARGETS.len();
+    let mut report = Report::new(1 + targets.len() + usize::from(all && time.is_some()));
     report.step("building the targets", || build(root));
     for target in targets {
         if !report.has_failed() {
             report.step(target, || work(target));
         }
     }
-    Some(report.finish())
-}
-
-/// Every target for so many seconds, as one step.
-pub fn all(root: &Path, seconds: u32) -> Outcome {
-    let mut outcome = build(root);
-    for target in TARGETS {
-        if matches!(outcome, Outcome::Passed) {
-            println!("{target}");
-            outcome = run(root, target, seconds);
-        }
+    if let (true, Some(seconds)) = (all, time) {
+        let word = if report.has_failed() { "FAILED" } else { "good" };
+        let result = format!("{word}, {} for {seconds} s each", TARGETS.join(", "));
+        report.step("result of the fuzzing", || results::write(root, "fuzz", &result));
     }
-    outcome
+    Some(report.finish())
 }
 
 fn build(root: &Path) -> Outcome {

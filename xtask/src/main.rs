@@ -11,10 +11,10 @@ mod mutants;
 mod packages;
 mod progress;
 mod release;
+mod results;
 mod run;
 mod setup;
 mod skips;
-mod soak;
 mod steps;
 mod wheel;
 
@@ -24,12 +24,15 @@ use std::process::ExitCode;
 const USAGE: &str = "usage: cargo xtask COMMAND
 
   setup   installs what the tests need: a cross compiler for Cortex-M and QEMU
-  test    setup, then formatting, lints, every test, documentation, freshness of generated files, lock files and licences
-  soak    every test at full length, mutants, and known defects of packages, for releases; writes tests/soak.txt
-  mutants code changed one operator at a time, to see whether a test notices; a sample, `K/N` for another, `all` for all
+  test    setup, then formatting, lints, every test at its short length, freshness of generated files, lock files and licences
+  test --full
+          every test at full length, board images, faults, documentation, known defects of packages; writes tests/results.txt
+  mutants [MINUTES | K/N | all]: code changed one operator at a time, to see whether a test notices: sample after sample for so
+          long, one sample, or all; writes tests/results.txt
   board   SPEC [--target stm32h743|stm32f4] [--cycles | --faults], or --tested [--faults]: a board's image on an emulated board, from boot to a record
           that replays; with times by a model of the core, or with faults
-  fuzz    SECONDS [TARGET]: what comes from outside, under a fuzzer guided by coverage; `fuzz keep` keeps what it found
+  fuzz    [SECONDS [TARGET]]: what comes from outside, under a fuzzer guided by coverage, 300 s each target; writes
+          tests/results.txt; `fuzz keep` keeps what it found
   wheel   the Python package: builds it into target/wheel/dist, and tries it in a fresh environment
   bless   writes the generated files that are committed anew
   changelog VERSION: puts the fragments in changelog/ into CHANGELOG.md, as a release
@@ -44,9 +47,10 @@ fn main() -> ExitCode {
     match words[..] {
         ["setup"] => steps::setup(),
         ["test"] => steps::test(&root()),
-        ["soak"] => steps::soak(&root()),
-        ["mutants"] => steps::mutants(&root(), None),
-        ["mutants", sample] => steps::mutants(&root(), Some(sample)),
+        ["test", "--full"] => steps::full(&root()),
+        ["mutants", ref more @ ..] => {
+            mutants::Sample::of(more).map_or_else(misused, |sample| steps::mutants(&root(), &sample))
+        }
         ["wheel"] => wheel::command(&root()),
         ["bless"] => steps::bless(&root()),
         ["changelog", version] => match changelog::release(&root(), version) {

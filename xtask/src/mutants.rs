@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::{Duration, Instant};
 
 use crate::run::Outcome;
 use crate::setup;
@@ -17,7 +18,7 @@ struct Group {
     package: &'static str,
     /// Arguments of cargo-mutants beside the package, before and behind its `--`.
     arguments: [&'static [&'static str]; 2],
-    /// The sample that is run unless another is asked for: one in so many.
+    /// What one sample is: one in so many.
     one_in: u32,
     /// Least share of the mutants to be noticed, in percent.
     bar: usize,
@@ -29,8 +30,31 @@ const GROUPS: [Group; 2] = [
     Group { package: "specgen-compiler", arguments: [&["--cargo-arg=--lib"], &[]], one_in: 40, bar: 85 },
 ];
 
-/// `cargo xtask mutants [K/N | all]`: the K-th sample of one in N, or all of them.
-pub fn run(root: &Path, sample: Option<&str>) -> Outcome {
+/// Which mutants are made.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Sample {
+    /// One sample after the other of each group, for so long.
+    For(Duration),
+    /// The K-th sample of one in N: `K/N`.
+    One(String),
+    All,
+}
+
+impl Sample {
+    /// By the arguments of the command; none if they are something else.
+    pub fn of(arguments: &[&str]) -> Option<Self> {
+        match *arguments {
+            [] => Some(Self::For(Duration::from_mins(60))),
+            ["all"] => Some(Self::All),
+            [one] if one.contains('/') => Some(Self::One(one.to_owned())),
+            [minutes] => Some(Self::For(Duration::from_mins(minutes.parse().ok()?))),
+            _ => None,
+        }
+    }
+}
+
+/// Makes them and runs the tests; `counts` becomes a line of how many were noticed.
+pub fn run(root: &Path, sample: &Sample, counts: &mut String) -> Outcome {
     let works = cargo_mutants(root, &["--version"]).output().is_ok_and(|output| output.status.success());
     if !works {
         return setup::missing(format!("cargo-mutants is not installed; install it with: {INSTALL}"));
@@ -44,7 +68,10 @@ pub fn run(root: &Path, sample: Option<&str>) -> Outcome {
     let mut known = BTreeSet::new();
     for group in &GROUPS {
         match group.run(root, sample, &listed, &mut known) {
-            Ok(found) => wrong.extend(found),
+            Ok((found, count)) => {
+                wrong.extend(found);
+                *counts += &format!("{}{count}", if counts.is_empty() { "" } else { ", " });
+            }
             Err(why) => return Outcome::Failed(why),
         }
     }
@@ -67,24 +94,52 @@ impl Group {
     fn run(
         &self,
         root: &Path,
-        sample: Option<&str>,
+        sample: &Sample,
         listed: &BTreeSet<String>,
         known: &mut BTreeSet<String>,
-    ) -> Result<Vec<String>, String> {
+    ) -> Result<(Vec<String>, String), String> {
         let package = ["--package", self.package];
         let output = cargo_mutants(root, &[&["--list"], &package[..]].concat()).output().map_err(|e| e.to_string())?;
         let names = names(&String::from_utf8_lossy(&output.stdout));
         known.extend(names.values().cloned());
 
-        let results = PathBuf::from("target/mutants").join(self.package);
-        let default = format!("0/{}", self.one_in);
-        let mut command = cargo_mutants(root, &package);
-        command.args(["--colors", "never", "--no-times", "--output"]).arg(&results).args(self.arguments[0]);
+        let (mut noticed, mut missed) = (Vec::new(), Vec::new());
+        let mut add = |shard: Option<&str>| -> Result<(), String> {
+            let [caught, survive] = self.shard(root, shard, &names)?;
+            noticed.extend(caught);
+            missed.extend(survive);
+            Ok(())
+        };
         match sample {
-            Some("all") => {}
-            sample => {
-                command.args(["--sharding", "round-robin", "--shard", sample.unwrap_or(&default)]);
+            Sample::All => add(None)?,
+            Sample::One(shard) => add(Some(shard))?,
+            Sample::For(time) => {
+                let start = Instant::now();
+                for number in 0..self.one_in {
+                    // Each group has its share of the time, and at least one sample.
+                    if number > 0 && start.elapsed() >= *time / GROUPS.len() as u32 {
+                        break;
+                    }
+                    add(Some(&format!("{number}/{}", self.one_in)))?;
+                }
             }
+        }
+        let count = format!("{} {} of {} noticed", self.package, noticed.len(), noticed.len() + missed.len());
+        Ok((self.judge(&noticed, &missed, listed), count))
+    }
+
+    /// Makes the mutants of a shard, or all: those that were noticed, and those that survive.
+    fn shard(
+        &self,
+        root: &Path,
+        shard: Option<&str>,
+        names: &BTreeMap<String, String>,
+    ) -> Result<[Vec<String>; 2], String> {
+        let results = PathBuf::from("target/mutants").join(self.package);
+        let mut command = cargo_mutants(root, &["--package", self.package]);
+        command.args(["--colors", "never", "--no-times", "--output"]).arg(&results).args(self.arguments[0]);
+        if let Some(shard) = shard {
+            command.args(["--sharding", "round-robin", "--shard", shard]);
         }
         command.arg("--").args(self.arguments[1]);
         std::fs::create_dir_all(root.join(&results)).map_err(|error| format!("{}: {error}", results.display()))?;
@@ -99,8 +154,7 @@ impl Group {
             text.lines().filter_map(|line| names.get(line).cloned()).collect()
         };
         // A mutant that does not end is one that is noticed.
-        let noticed = [of("caught.txt"), of("timeout.txt")].concat();
-        Ok(self.judge(&noticed, &of("missed.txt"), listed))
+        Ok([[of("caught.txt"), of("timeout.txt")].concat(), of("missed.txt")])
     }
 
     fn judge(&self, noticed: &[String], missed: &[String], listed: &BTreeSet<String>) -> Vec<String> {
@@ -180,6 +234,17 @@ mod tests {
         );
         let moved = list.replace(":7:", ":8:");
         assert_eq!(names(&moved).into_values().collect::<Vec<_>>(), found);
+    }
+
+    #[test]
+    fn a_sample_is_a_time_a_share_or_all() {
+        let minutes = |count| Some(Sample::For(Duration::from_mins(count)));
+        assert_eq!(Sample::of(&[]), minutes(60));
+        assert_eq!(Sample::of(&["5"]), minutes(5));
+        assert_eq!(Sample::of(&["3/40"]), Some(Sample::One("3/40".to_owned())));
+        assert_eq!(Sample::of(&["all"]), Some(Sample::All));
+        assert_eq!(Sample::of(&["some"]), None);
+        assert_eq!(Sample::of(&["1", "2"]), None);
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! Packages that others wrote: a step for each lock file looks whether it is fresh and under which licences its packages are;
-//! the soak asks for known defects of them.
+//! the full run asks for known defects of them.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};

@@ -12,7 +12,6 @@ pub struct Durations(BTreeMap<String, f64>);
 /// Seconds on two cores, of jobs above five seconds: for the order on a machine that has not run them yet.
 const TABLE: &[(&str, f64)] = &[
     ("tests all::platform_tables", 220.0),
-    ("tests all::boards", 200.0),
     ("cli all::rt_pc", 200.0),
     ("tests all::physical_lint", 130.4),
     ("tests all::supervisor", 126.2),

@@ -36,6 +36,11 @@ impl Report {
         self.steps.push((name.to_owned(), outcome, start.elapsed()));
     }
 
+    /// Whether every step passed, none was skipped.
+    pub fn is_whole(&self) -> bool {
+        self.steps.iter().all(|(_, outcome, _)| matches!(outcome, Outcome::Passed))
+    }
+
     /// Whether a step failed.
     pub fn has_failed(&self) -> bool {
         self.steps.iter().any(|(_, outcome, _)| matches!(outcome, Outcome::Failed(_)))

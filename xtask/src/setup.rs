@@ -5,6 +5,9 @@ use specgen_toolchain as target;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+/// Set to `1`, what needs a tool that cannot be installed is skipped, and said so.
+const ALLOW_MISSING: &str = "SPECGEN_ALLOW_MISSING";
+
 /// The cross compiler and QEMU, installed if need be.
 pub fn microcontroller() -> Outcome {
     match target::provision::provision(&mut |line| println!("{line}")) {
@@ -41,9 +44,9 @@ pub fn has_target() -> bool {
 
 /// A failure, unless the user allows that something is missing.
 pub fn missing(why: String) -> Outcome {
-    if std::env::var_os(target::ALLOW_MISSING).is_some_and(|value| value == "1") {
+    if std::env::var_os(ALLOW_MISSING).is_some_and(|value| value == "1") {
         Outcome::Skipped(why)
     } else {
-        Outcome::Failed(format!("{why}   ({}=1 skips what needs it)", target::ALLOW_MISSING))
+        Outcome::Failed(format!("{why}   ({ALLOW_MISSING}=1 skips what needs it)"))
     }
 }

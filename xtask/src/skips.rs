@@ -4,15 +4,19 @@ use std::path::Path;
 
 use crate::run::Outcome;
 
-/// What a test prints before the reason.
-const MARK: &str = "skipped: ";
+/// What a test prints before a number, its name and the reason.
+const MARK: &str = "skipped ";
 /// The list: a reason a line, as it begins; `#` begins a remark.
 const LIST: &str = "tests/skips.txt";
 
 /// The reasons in what a job printed.
 pub fn of(text: &str) -> Vec<String> {
-    let reasons = text.lines().filter_map(|line| line.split_once(MARK)).map(|(_, reason)| reason.trim().to_owned());
-    let mut reasons: Vec<String> = reasons.collect();
+    let reason = |line: &str| {
+        let (number, said) = line.split_once(MARK)?.1.split_once(": ")?;
+        number.parse::<u32>().ok()?;
+        Some(said.split_once(": ")?.1.trim().to_owned())
+    };
+    let mut reasons: Vec<String> = text.lines().filter_map(reason).collect();
     reasons.dedup();
     reasons
 }
@@ -43,7 +47,8 @@ mod tests {
 
     #[test]
     fn a_reason_is_found_wherever_it_stands_and_listed_by_its_beginning() {
-        let text = "test a ... ok\nname: skipped: no card here\nskipped: QEMU is missing\nskipped: QEMU is missing\n";
+        let text = "test a ... ok\ntest b ... skipped 1: a::b: no card here\nskipped 2: c: QEMU is missing\nskipped 3: d: QEMU is missing\n\
+                    skipped until: now\n";
         assert_eq!(of(text), ["no card here", "QEMU is missing"]);
         let list = "# devices\nno card\n\n";
         assert!(is_listed(list, "no card here"));

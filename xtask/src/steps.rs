@@ -8,8 +8,9 @@ use specgen_toolchain::TRIPLE;
 
 use crate::binaries::{self, Binary, Mode, Ran};
 use crate::judged::Trial;
+use crate::mutants::Sample;
 use crate::run::{Outcome, Report, cargo, expect_success};
-use crate::{board, fuzz, generated, mutants, packages, setup, soak, wheel};
+use crate::{board, fuzz, generated, mutants, packages, results, setup, wheel};
 
 /// Its own workspace, built for another machine.
 const FIRMWARE: &str = "firmware/qemu/Cargo.toml";
@@ -69,8 +70,6 @@ const FORMATTED_ALONE: [&str; 12] = [
     BOARDS[0],
     BOARDS[1],
 ];
-/// Time that the soak gives each target of the fuzzer, s.
-const FUZZING: u32 = 300;
 /// Members of the workspace that people write.
 const HAND_WRITTEN: [&str; 20] = [
     "specgen",
@@ -104,26 +103,36 @@ pub fn setup() -> ExitCode {
 
 /// `cargo xtask test`
 pub fn test(root: &Path) -> ExitCode {
-    let mut report = Report::new(12 + LOCKED.len());
+    let before = results::changes(root);
+    let mut report = Report::new(10 + LOCKED.len());
     report.step("cross compiler and QEMU", setup::microcontroller);
-    let mode = Mode { tools_missing: report.has_failed(), ..Mode::default() };
+    let mode = Mode { tools_missing: !report.is_whole(), ..Mode::default() };
+    report.step("the last full run", || results::judge(root));
     report.step("formatting", || formatting(root));
     let binaries = compiled(root, &mut report);
     report.step("tests", || binaries::test(root, &binaries, mode, &mut Ran::default()));
-    report.step("images on the emulated board", || board::short(root));
-    report.step("examples in the documentation", || binaries::examples(root));
     report.step("lints", || lints(root));
     report.step("published schema", || PUBLISHED_SCHEMA.unless_unchanged(root));
     report.step("orders of shared memory", || SHARED_MEMORY.unless_unchanged(root));
-    report.step("documentation", || {
-        let mut doc = cargo(root, &["doc", "--release", "--workspace", "--no-deps", "--quiet"]);
-        doc.env("RUSTDOCFLAGS", "-D warnings");
-        expect_success(doc, "see the warnings above")
-    });
     report.step("generated files are fresh", || generated::check(root));
     for manifest in LOCKED {
         report.step(&format!("lock file and licences of {manifest}"), || packages::check(root, manifest));
     }
+    report.step("the clone is as it was", || results::unchanged(before.as_deref(), results::changes(root).as_deref()));
+    report.finish()
+}
+
+/// `cargo xtask test --full`
+pub fn full(root: &Path) -> ExitCode {
+    let start = Instant::now();
+    let mut report = Report::new(12);
+    report.step("cross compiler and QEMU", setup::microcontroller);
+    let mode = Mode { full: true, tools_missing: !report.is_whole() };
+    report.step("known defects of packages", || packages::advisories(root, &LOCKED));
+    let binaries = compiled(root, &mut report);
+    let mut ran = Ran::default();
+    report.step("tests at full length", || binaries::test(root, &binaries, mode, &mut ran));
+    report.step("images on the emulated board, and faults", || board::long(root));
     report.step("lock file and licences of examples/own-board/Cargo.toml", || {
         if root.join(OWN_BOARD).is_file() {
             packages::check(root, OWN_BOARD)
@@ -131,36 +140,27 @@ pub fn test(root: &Path) -> ExitCode {
             setup::missing(format!("{OWN_BOARD} is not there; the test of the boards leaves it"))
         }
     });
-    report.finish()
-}
-
-/// `cargo xtask soak`
-pub fn soak(root: &Path) -> ExitCode {
-    let mut report = Report::new(11);
-    report.step("cross compiler and QEMU", setup::microcontroller);
-    report.step("known defects of packages", || packages::advisories(root, &LOCKED));
-    report.step("published schema", || PUBLISHED_SCHEMA.run(root));
-    report.step("orders of shared memory", || SHARED_MEMORY.run(root));
-    report.step("fuzzing", || fuzz::all(root, FUZZING));
     report.step("tests with every check", || checked(root));
-    let binaries = compiled(root, &mut report);
-    let mut ran = Ran::default();
-    let start = Instant::now();
-    report.step("tests at full length", || {
-        binaries::test(root, &binaries, Mode { soak: true, ..Mode::default() }, &mut ran)
+    report.step("examples in the documentation", || binaries::examples(root));
+    report.step("documentation", || {
+        let mut doc = cargo(root, &["doc", "--release", "--workspace", "--no-deps", "--quiet"]);
+        doc.env("RUSTDOCFLAGS", "-D warnings");
+        expect_success(doc, "see the warnings above")
     });
-    let took = start.elapsed();
-    report.step("images on the emulated board, and faults", || board::long(root));
-    report.step("mutants", || mutants::run(root, None));
-    let good = !report.has_failed();
-    report.step("record of the soak", || soak::write(root, &ran, took, good));
+    report.step("published schema", || PUBLISHED_SCHEMA.run_and_keep(root));
+    report.step("orders of shared memory", || SHARED_MEMORY.run_and_keep(root));
+    let result = results::of_tests(&ran, start.elapsed(), !report.has_failed());
+    report.step("result of the full run", || results::write(root, results::FULL, &result));
     report.finish()
 }
 
 /// `cargo xtask mutants`
-pub fn mutants(root: &Path, sample: Option<&str>) -> ExitCode {
-    let mut report = Report::new(1);
-    report.step("mutants", || mutants::run(root, sample));
+pub fn mutants(root: &Path, sample: &Sample) -> ExitCode {
+    let mut report = Report::new(2);
+    let mut counts = String::new();
+    report.step("mutants", || mutants::run(root, sample, &mut counts));
+    let word = if report.has_failed() { "FAILED" } else { "good" };
+    report.step("result of the mutants", || results::write(root, "mutants", &format!("{word}, {counts}")));
     report.finish()
 }
 

@@ -99,7 +99,7 @@ fn examples_run_as_they_stand() {
     let elsewhere = support::length(&["--plant", "learning.toml --from", "learning.toml --prepare"][..], &[]);
     for line in examples().into_iter().flat_map(|(_, lines)| lines).filter(|line| !line.is_marked()) {
         if elsewhere.iter().any(|part| line.text.contains(part)) {
-            support::skipped(&format!("only in the soak: {}", line.text));
+            support::skipped(&format!("only in the full run: {}", line.text));
             continue;
         }
         if lines.iter().all(|other| other.words != line.words) {

@@ -158,7 +158,7 @@ fn a_controller_on_the_unit_of_its_plant_gets_the_bits_of_specgen_sim() {
         skipped("the importer of this test is written for Linux");
         return;
     }
-    // The periods are 100 and 200 us. Each machine is compiled from its sources: six legs as well for the soak.
+    // The periods are 100 and 200 us. Each machine is compiled from its sources: six legs as well for the full run.
     let all = [("reference.toml", "reference", "1.1"), ("legs.toml", "legs", "2.1")];
     for &(spec, name, seconds) in length(&all[..1], &all) {
         let folder = Folder::new();

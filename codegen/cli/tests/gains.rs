@@ -1,6 +1,6 @@
 //! `specgen identify gains` as a user runs it, on a simulated machine whose legs are of other classes than the controller's model:
 //! the gains of its legs, and what the platform's error is with the tables that come of them.
-//! `SPECGEN_SOAK=1 cargo test --release -p specgen --test all gains -- --nocapture` prints the figures.
+//! `SPECGEN_FULL=1 cargo test --release -p specgen --test all gains -- --include-ignored --nocapture` prints the figures.
 
 use crate::support::{Folder, length};
 

@@ -1,6 +1,6 @@
 //! From a workspace to measured figures, on a stand-in controller: build, replay, footprint, stack bound.
 //!
-//! Needs a cross compiler and QEMU; without them it fails, or skips if `SPECGEN_ALLOW_MISSING=1`.
+//! Needs a cross compiler and QEMU; without them it skips.
 
 mod faults;
 mod fixture;

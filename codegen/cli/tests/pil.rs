@@ -1,6 +1,6 @@
 //! Processor in the loop, as a user runs it: an image in QEMU and a board at a serial port; what ends it, and what it says then.
 //!
-//! Needs a cross compiler and QEMU but for the serial port; without them it fails, or skips if `SPECGEN_ALLOW_MISSING=1`.
+//! Needs a cross compiler and QEMU but for the serial port; without them it skips.
 
 mod board;
 

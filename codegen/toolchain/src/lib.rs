@@ -9,6 +9,9 @@
 //! [`toolchain`] is the one place that looks for a cross compiler, [`places`] says where tools may be, [`provision`] brings them.
 //! Nothing here knows TOML, the IR or the control law; the words it moves are opaque.
 
+use std::io::Write as _;
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use sha2::{Digest as _, Sha256};
 
 mod apt;
@@ -73,20 +76,28 @@ pub fn available() -> Result<Tools, TargetError> {
     Ok(Tools { toolchain: toolchain::find()?, emulator: emulator::Emulator::find()? })
 }
 
-/// Set to `1`, it turns a missing tool from a failure into a skip that is said.
-pub const ALLOW_MISSING: &str = "SPECGEN_ALLOW_MISSING";
+/// Set to `1`, a tool that a test misses is a failure, and not only a skip that is said: `cargo xtask test` brings them first.
+pub const REQUIRE_TOOLS: &str = "SPECGEN_REQUIRE_TOOLS";
 
-/// [`available`] for tests: `None`, said on standard error, if something is missing and [`ALLOW_MISSING`] is `1`.
+/// What a test needs, if it was found. Where it is missing, that is [`skipped`].
 ///
 /// # Errors
-/// As [`available`], without that excuse.
-pub fn available_or_skip(what: &str) -> Result<Option<Tools>, TargetError> {
-    match available() {
-        Ok(tools) => Ok(Some(tools)),
-        Err(error) if std::env::var_os(ALLOW_MISSING).is_some_and(|value| value == "1") => {
-            eprintln!("skipped: {what}: {error}");
+/// What is missing, if [`REQUIRE_TOOLS`] is `1`.
+pub fn found_or_skipped<T>(found: Result<T, TargetError>) -> Result<Option<T>, TargetError> {
+    match found {
+        Err(missing) if std::env::var_os(REQUIRE_TOOLS).is_none_or(|value| value != "1") => {
+            skipped(&missing.to_string());
             Ok(None)
         }
-        Err(error) => Err(error),
+        found => found.map(Some),
     }
+}
+
+/// Says, past what the test runner holds back, that the test of this thread was not run, or not wholly, and how many that is so far.
+pub fn skipped(why: &str) {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let count = COUNT.fetch_add(1, Ordering::Relaxed) + 1;
+    let thread = std::thread::current();
+    // Where nobody can read it, there is nobody to tell.
+    let _ = writeln!(std::io::stderr(), "skipped {count}: {}: {why}", thread.name().unwrap_or("a test"));
 }

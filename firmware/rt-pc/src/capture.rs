@@ -137,19 +137,40 @@ fn put(out: &mut impl Write, tape: &Tape) -> io::Result<()> {
     (0..tape.blocks()).filter_map(|index| tape.block(index)).try_for_each(|block| record::add(out, block))
 }
 
-/// Writes what it holds to a file, whole or not at all; its ticks.
+/// Writes what it holds to a file, whole or not at all; its ticks. The draft beside it replaces no file that was there.
 fn write(path: &Path, tape: &Tape) -> io::Result<u64> {
     let mut draft = path.as_os_str().to_owned();
-    draft.push(".part");
+    draft.push(format!(".{}.part", std::process::id()));
     let draft = PathBuf::from(draft);
-    let written = File::create(&draft).and_then(|file| {
-        let mut out = BufWriter::new(file);
-        put(&mut out, tape)?;
-        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
-        std::fs::rename(&draft, path)
-    });
+    let mut out = BufWriter::new(File::create_new(&draft)?);
+    let written = put(&mut out, tape)
+        .and_then(|()| out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all())
+        .and_then(|()| std::fs::rename(&draft, path));
     if written.is_err() {
         let _ = std::fs::remove_file(&draft);
     }
     written.map(|()| tape.rows())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_draft_of_a_record_replaces_no_file() {
+        let folder = std::env::temp_dir().join(format!("rt-pc-capture-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("run.rec");
+        let drafts = [folder.join("run.rec.part"), folder.join(format!("run.rec.{}.part", std::process::id()))];
+        let (_, tape) = Capture::new(None).unwrap();
+        std::fs::write(&drafts[0], "mine").unwrap();
+        write(&path, &tape).unwrap();
+        assert!(path.is_file());
+        std::fs::write(&drafts[1], "mine").unwrap();
+        assert_eq!(write(&path, &tape).unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+        for draft in &drafts {
+            assert_eq!(std::fs::read_to_string(draft).unwrap(), "mine");
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
 }

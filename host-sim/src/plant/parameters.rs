@@ -301,7 +301,7 @@ mod tests {
     fn the_shipped_file_has_the_values_of_the_feasibility_study() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/reference/leg-plant.json");
         if !path.exists() {
-            eprintln!("skipped: ../shared is not beside the repository");
+            eprintln!("skipped 1: a test: ../shared is not beside the repository");
             return;
         }
         let mut study = LegParameters::named(&path, |path| std::fs::read_to_string(path)).unwrap();

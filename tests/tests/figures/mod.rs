@@ -6,7 +6,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-use specgen_tests::repository;
+use specgen_tests::{repository, skipped};
 
 /// A figure may grow by this share of the committed one, and by as much, before it is a regression.
 const GROWTH: (f64, f64) = (0.03, 2.0);
@@ -65,7 +65,7 @@ pub fn held(file: &str, name: &str, compiler: &str, found: Figures) -> Vec<Strin
         return vec![format!("{name}: no committed figures: SPECGEN_BLESS=1 adds them")];
     };
     let Some(old) = old.get(&version) else {
-        println!("skipped: no committed figures of {name} for rustc {version}: SPECGEN_BLESS=1 adds them");
+        skipped(&format!("no committed figures of {name} for rustc {version}: SPECGEN_BLESS=1 adds them"));
         return Vec::new();
     };
     let said = |grown: String| format!("{name}: {grown}; if that must be: SPECGEN_BLESS=1 renews the figures");

@@ -4,6 +4,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::everett::EverettTable;
 use specgen::identify::{Reading, Record, read_record};
+use specgen_tests::skipped;
 use std::path::Path;
 
 pub fn generator(seed: u64) -> ChaCha8Rng {
@@ -27,7 +28,7 @@ pub fn measured(name: &str) -> Option<Record> {
     if path.exists() {
         return Some(read_record(&path, name, &Reading::default()).unwrap_or_else(|d| panic!("{d:#?}")));
     }
-    println!("skipped: ../shared/data/piezo-forc/{name} is not here");
+    skipped(&format!("../shared/data/piezo-forc/{name} is not here"));
     None
 }
 

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use host_sim::plant::LegParameters;
 use host_sim::platform::{PlatformParameters, Specimen};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
-use specgen_tests::length;
+use specgen_tests::{length, skipped};
 
 use super::bench::{Bench, DAMPED, records, reference_machine};
 
@@ -79,8 +79,8 @@ fn both_classes_of_legs_follow_a_path_with_corners_and_a_fast_circle() {
     let bouc = show("Bouc-Wen", errors(&bouc_wen("classes-bouc-wen", &[])));
     assert!(bouc[0] < 120.0 && bouc[1] < 300.0);
     if length(true, false) {
-        return println!(
-            "skipped: only in the soak: both classes with a lead of 0.1 ms, which was chosen on paths with corners"
+        return skipped(
+            "only in the full run: both classes with a lead of 0.1 ms, which was chosen on paths with corners",
         );
     }
     let edits = [("transfer_time   =", "lead = \"0.1 ms\"\ntransfer_time   =")];
@@ -96,10 +96,8 @@ fn both_classes_of_legs_follow_a_path_with_corners_and_a_fast_circle() {
 
 /// What a grid of 64 takes off that of 32: a record of each leg on either grid, both classes, damped.
 #[test]
+#[ignore = "long: two more records of twelve legs"]
 fn a_finer_grid_is_no_worse() {
-    if length(true, false) {
-        return println!("skipped: only in the soak: two more records of twelve legs");
-    }
     for class in ["plays", "Bouc-Wen"] {
         let specimen = match class {
             "plays" => Specimen::reference(),

@@ -8,7 +8,7 @@ use host_sim::platform::{Specimen, WorkPart};
 use host_sim::trajectory::PoseTarget;
 use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, Tuning};
 use specgen::tuning::relay;
-use specgen_tests::{length, worse};
+use specgen_tests::worse;
 
 use super::bench::{Bench, DAMPED, PERIOD, in_parallel, reference_machine};
 use super::classes::{bouc_wen, errors};
@@ -86,10 +86,8 @@ fn disturbed(bench: &Bench) -> [f64; 3] {
 }
 
 #[test]
+#[ignore = "long: active damping on simulated machines, of three controllers"]
 fn damped_machines_follow_and_hold_better_than_undamped_ones() {
-    if length(true, false) {
-        return println!("skipped: only in the soak: active damping on simulated machines, of three controllers");
-    }
     let other = || {
         static BENCHES: OnceLock<[Bench; 2]> = OnceLock::new();
         let [without, damped] =

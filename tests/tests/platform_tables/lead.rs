@@ -61,10 +61,8 @@ fn played(bench: &Bench) -> (Vec<[f64; 6]>, f64) {
 }
 
 #[test]
+#[ignore = "long: three controllers with other leads"]
 fn a_lead_of_its_own_is_that_of_a_trajectory_alone() {
-    if length(true, false) {
-        return println!("skipped: only in the soak: three controllers with other leads");
-    }
     let of = |own, usual| played(&bench("plays", 30, own, usual));
     let ((own_stream, own), (usual_stream, usual), (_, less)) =
         (of(Some("0.1 ms"), None), of(None, None), of(None, Some("0.1 ms")));

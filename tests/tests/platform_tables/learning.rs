@@ -79,8 +79,9 @@ fn case_1(hertz: f64) -> PaperPose {
 
 /// What the background of a device learns, with room for so many knots: by its own kernel, under its own proof.
 #[test]
+#[ignore = "long: five motions on both classes of legs"]
 fn a_device_learns_in_its_background() {
-    let soak =
+    let full =
         [(10.0, 4096, 5, 6.0), (10.0, 768, 5, 12.0), (1.0, 4096, 5, 3.0), (30.0, 4096, 5, 20.0), (50.0, 4096, 8, 35.0)];
     let machines: Vec<(&str, &Bench)> = match length(1, 2) {
         1 => vec![("plays", plays())],
@@ -89,7 +90,7 @@ fn a_device_learns_in_its_background() {
     for (name, bench) in machines {
         let (learnable, convergence) = design(bench);
         let factors = Factors::of(&bench.emitted.compiled.model, &[]);
-        for (hertz, room, count, bar) in soak.into_iter().take(length(1, soak.len())) {
+        for (hertz, room, count, bar) in full.into_iter().take(length(1, full.len())) {
             let motion = Motion::of(&case_1(hertz), PERIOD, &SPEED, RADIUS).unwrap();
             let plan = Plan::new(&learnable, &motion, &convergence, &factors, room).unwrap();
             let found = &plan.convergence;
@@ -201,6 +202,7 @@ fn settled(bench: &Bench, [size, time]: [f64; 2], prepared: bool) -> [f64; 2] {
 }
 
 #[test]
+#[ignore = "long: steps and a path on four machines"]
 fn what_lag_and_modes_would_leave_is_prepared_by_the_model() {
     type Made = fn() -> &'static Bench;
     let classes: [(&str, Made); 2] = [("plays", plays), ("Bouc-Wen", other)];
@@ -236,10 +238,8 @@ fn what_lag_and_modes_would_leave_is_prepared_by_the_model() {
 }
 
 #[test]
+#[ignore = "long: six motions learned on both classes of legs"]
 fn both_classes_of_legs_are_learned() {
-    if length(true, false) {
-        return println!("skipped: only in the soak: six motions learned on both classes of legs");
-    }
     type Motions = [(&'static str, Box<dyn PoseTrajectory + Sync>, usize, f64); 6];
     let motions: Motions = [
         ("case 1 at 1 Hz", Box::new(case_1(1.0)), 5, f64::INFINITY),
@@ -277,10 +277,8 @@ fn both_classes_of_legs_are_learned() {
 }
 
 #[test]
+#[ignore = "long: learning on 100 machines drawn from the intervals of [robust]"]
 fn every_machine_within_the_intervals_learns() {
-    if length(true, false) {
-        return println!("skipped: only in the soak: learning on 100 machines drawn from the intervals of [robust]");
-    }
     let bench = plays();
     let model = &bench.emitted.compiled.model;
     let task = model.task_space.as_ref().unwrap();

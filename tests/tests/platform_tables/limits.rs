@@ -9,7 +9,7 @@ use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDy
 
 use specgen_tests::{length, worse};
 
-use super::bench::{BIAS, Bench, PERIOD, SEED, in_parallel, median, plants, random_machines};
+use super::bench::{BIAS, Bench, PERIOD, Pair, SEED, in_parallel, median, plants, random_machines};
 
 /// A small step of the demand on every axis, then rest.
 struct Nudge;
@@ -135,8 +135,10 @@ fn predicted_limits_are_those_of_the_machine() {
     let found = in_parallel(count, |number| {
         let pair = &machines[number as usize];
         let mut rows = Vec::new();
-        for (what, law, latency) in cases {
-            for (base, bench) in [("notch", &pair.notched), ("no notch", pair.plain())] {
+        let benches = [("notch", (|pair| &pair.notched) as fn(&Pair) -> &Bench), ("no notch", Pair::plain)];
+        for (base, of) in benches.into_iter().take(length(1, 2)) {
+            let bench = of(pair);
+            for (what, law, latency) in cases {
                 rows.push((what, base, limit(bench, law, &bench.design().combined, latency)));
             }
         }
@@ -169,10 +171,8 @@ fn damping(closed_loop: &ClosedLoop) -> [f64; 6] {
 }
 
 #[test]
+#[ignore = "long: start rules on random machines"]
 fn no_start_rule_is_unstable_on_any_machine() {
-    if length(true, false) {
-        return println!("skipped: only in the soak: start rules on random machines");
-    }
     let machines = random_machines();
     let count = length(1, plants());
     let unstable: Vec<String> = in_parallel(count, |number| {
@@ -205,10 +205,8 @@ fn no_start_rule_is_unstable_on_any_machine() {
 
 /// The criterion can fail: well above the predicted limit a loop does not settle.
 #[test]
+#[ignore = "long: a loop above its limit, simulated"]
 fn a_loop_beyond_its_limit_does_not_settle() {
-    if length(true, false) {
-        return println!("skipped: only in the soak: a loop above its limit, simulated");
-    }
     let bench = &random_machines()[0].notched;
     let design = bench.design();
     let limit = design.bandwidth_limit / design.combined.level_bandwidth;

@@ -1,4 +1,4 @@
-//! Any bits in every input word: 50,000 ticks of each kind, and 50 million in the soak.
+//! Any bits in every input word: 50,000 ticks of each kind, and 50 million in the full run.
 
 use super::bench::*;
 use host_sim::controller::Supervised;

@@ -8,7 +8,6 @@ use serde_json::Value;
 
 use super::host::Host;
 use super::{Bench, DISARMED, Running, wait_for};
-use crate::support::{length, skipped};
 
 fn specgen(bench: &Bench, arguments: &[&str], link: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
@@ -19,10 +18,8 @@ fn specgen(bench: &Bench, arguments: &[&str], link: &Path) -> Output {
 /// With time that waits, so that it runs on any computer. The first pass is without correction: what is learned has to beat it by much on
 /// a machine whose hysteresis and tolerances its controller does not know, and to serve again when it is played from its file.
 #[test]
+#[ignore = "long: learning over the link of the real-time program"]
 fn a_motion_is_learned_over_the_link_and_played_under_what_was_learned() {
-    if length(true, false) {
-        return skipped("only in the soak: learning over the link of the real-time program");
-    }
     let folder = tempfile::tempdir().unwrap();
     let spec = folder.path().join("learning.toml");
     let specs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs");

@@ -13,6 +13,7 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 use specgen::diagnostic::codes;
+pub use specgen::target::skipped;
 use specgen::target::{self, Tools};
 
 pub const BINARY: &str = env!("CARGO_BIN_EXE_specgen");
@@ -218,18 +219,12 @@ pub fn send(signal: Signal, process: u32) {
     kill_process(Pid::from_raw(process.cast_signed()).unwrap(), signal).unwrap();
 }
 
-/// How much of what only gains by length is run: the long length in the soak.
+/// How much of what only gains by length is run: the long length in the full run.
 pub fn length<T>(short: T, long: T) -> T {
-    if std::env::var_os("SPECGEN_SOAK").is_some() { long } else { short }
+    if std::env::var_os("SPECGEN_FULL").is_some() { long } else { short }
 }
 
-/// Cross compiler and emulator; none, with a line that says so, if their absence is excused.
+/// Cross compiler and emulator; none, with a line that says so, if one is missing and none is required.
 pub fn tools() -> Option<Tools> {
-    let test = std::thread::current().name().unwrap_or_default().to_owned();
-    target::available_or_skip(&test).unwrap_or_else(|error| panic!("{error}"))
-}
-
-/// Says why part of a test did not run.
-pub fn skipped(why: &str) {
-    println!("{}: skipped: {why}", std::thread::current().name().unwrap_or("test"));
+    target::found_or_skipped(target::available()).unwrap_or_else(|error| panic!("{error}"))
 }

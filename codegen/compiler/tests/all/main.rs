@@ -17,9 +17,9 @@ use specgen_compiler::stability::platform::{
 };
 use study::{model, rest};
 
-/// How much of what only gains by length is run: the long length in the soak.
+/// How much of what only gains by length is run: the long length in the full run.
 fn length<T>(short: T, long: T) -> T {
-    if std::env::var_os("SPECGEN_SOAK").is_some() { long } else { short }
+    if std::env::var_os("SPECGEN_FULL").is_some() { long } else { short }
 }
 
 const EWMA: Law = Law::Feedforward(Adapting::Ewma);

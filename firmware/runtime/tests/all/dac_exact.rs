@@ -1,4 +1,4 @@
-//! Voltage and slew limits by cases: all there are, or all kinds of them. In the soak every one of the 2³² drives in f32, and every
+//! Voltage and slew limits by cases: all there are, or all kinds of them. In the full run every one of the 2³² drives in f32, and every
 //! pair of 16-bit codes; in the short run a part of those, with whatever is next to a boundary.
 
 use specgen_runtime::{CodeLimits, Dac, Real};
@@ -30,8 +30,8 @@ fn dac<T: Real>(constants: [f64; 5]) -> Dac<T> {
     Dac { volts_at_zero, volts_per_code, cells_at_zero, cells_per_code, codes_per_cell }
 }
 
-fn in_soak() -> bool {
-    std::env::var_os("SPECGEN_SOAK").is_some()
+fn in_full_run() -> bool {
+    std::env::var_os("SPECGEN_FULL").is_some()
 }
 
 /// The permitted code nearest to `wanted`, by another way than the kernel's: where no permitted code is within reach, the one at
@@ -113,7 +113,7 @@ fn numbers_of_the_same_order_have_the_same_code_up_to_both_ends_of_the_integers(
 
 #[test]
 fn from_every_code_to_every_code_limits_and_step_hold() {
-    let stride = if in_soak() { 1 } else { 251 };
+    let stride = if in_full_run() { 1 } else { 251 };
     for limits in LIMITS {
         for previous in (limits.min..=limits.max).step_by(stride) {
             for wanted in -1..=65_536 {
@@ -185,7 +185,7 @@ fn whatever_the_bits_of_a_drive_in_f32_the_code_rises_with_it_and_keeps_limits_a
             let drive = f32::from_bits(in_order(k));
             if drive.is_nan() { walk.any(drive) } else { walk.up(drive) }
         };
-        if in_soak() {
+        if in_full_run() {
             (0..=u32::MAX).for_each(&mut visit);
             assert_eq!(walk.tried, 1 << 32);
         } else {
@@ -211,7 +211,7 @@ fn whatever_the_bits_of_a_drive_in_f32_the_code_rises_with_it_and_keeps_limits_a
 #[test]
 fn next_to_every_boundary_and_at_every_exponent_in_f64_the_code_rises_with_the_drive_and_keeps_limits_and_step() {
     for (constants, last) in
-        [(FROM_ZERO, 65_536), (FROM_BELOW, 65_536), (FINE, if in_soak() { 1 << 24 } else { 1 << 17 })]
+        [(FROM_ZERO, 65_536), (FROM_BELOW, 65_536), (FINE, if in_full_run() { 1 << 24 } else { 1 << 17 })]
     {
         let mut drives = Vec::new();
         let [_, _, at_zero, per_code, _] = constants;
