@@ -18,9 +18,22 @@ pub(crate) fn figure(value: f64) -> String {
     }
 }
 
+/// `value` with so many decimals; nothing has no sign.
+pub(crate) fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.bytes().all(|letter| b"-0.".contains(&letter));
+    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::figure;
+    use super::{figure, fixed};
+
+    #[test]
+    fn nothing_has_no_sign() {
+        let found = [-0.0, -0.004, -0.006, 0.0, 73.7].map(|value| fixed(value, 2));
+        assert_eq!(found, ["0.00", "0.00", "-0.01", "0.00", "73.70"]);
+    }
 
     #[test]
     fn figures_have_four_digits_and_no_more() {

@@ -387,11 +387,29 @@ fn multiplied(value: &str, factor: f64) -> Option<String> {
     any.then_some(changed)
 }
 
-/// A number in a text is a number: neither message nor help of a finding has `NaN` or `inf` in it.
+/// Whether a word is `NaN`, `inf`, or less than nothing, such as `-0.00`.
+fn is_no_number(word: &str) -> bool {
+    let word = word.trim_matches(|letter: char| !letter.is_alphanumeric() && letter != '-').trim_end_matches('-');
+    let number = word.parse::<f64>();
+    number.is_ok_and(|number| !number.is_finite() || (number == 0.0 && number.is_sign_negative()))
+}
+
+/// A number in a text is a number, in message and help of a finding.
 fn assert_numbers(source: &SpecSource, finding: &Diagnostic) {
-    let words = format!("{} {}", finding.message, finding.help);
-    let mut words = words.split(|letter: char| !letter.is_alphanumeric());
-    assert!(!words.any(|word| word == "NaN" || word == "inf"), "{}: {finding:?}", source.display_name);
+    let text = format!("{} {}", finding.message, finding.help);
+    // Words of a message, and its quoted values.
+    let mut words = text.split(|letter: char| letter.is_whitespace() || "\"'`[](),;:=/".contains(letter));
+    assert!(!words.any(is_no_number), "{}: {finding:?}", source.display_name);
+}
+
+#[test]
+fn a_word_that_is_no_number_is_known() {
+    for word in ["NaN", "inf", "-inf", "-0.00", "-0", "(-0.0)", "inf."] {
+        assert!(is_no_number(word), "{word}");
+    }
+    for word in ["0.00", "-0.01", "in", "-", "1e-9", "information", "x-0"] {
+        assert!(!is_no_number(word), "{word}");
+    }
 }
 
 /// All that is found before anything is emitted, of specs with the numbers of one line multiplied, by nothing, too.

@@ -244,12 +244,16 @@ fn why(group: &[&Figure]) -> String {
     format!("{} {} {} {}", first.subject.name(), names.join("/"), said(group), first.unit)
 }
 
-/// A line that is too long, with dots where it is cut: all of it is in the details.
+/// A line that is too long, with dots where it is cut, which is between two figures: all of it is in the details.
 fn cut(line: &str) -> String {
+    const MORE: &str = ", …";
     if line.chars().count() <= WIDTH {
         return line.to_owned();
     }
-    line.chars().take(WIDTH - 2).chain(" …".chars()).collect()
+    let ends = line.match_indices(", ").map(|(at, _)| &line[..at]);
+    let whole = ends.take_while(|part| part.chars().count() + MORE.chars().count() <= WIDTH).last();
+    let letters = || line.chars().take(WIDTH - 2).chain(" …".chars()).collect();
+    whole.map_or_else(letters, |part| format!("{part}{MORE}"))
 }
 
 /// One figure, or neighbours that are coordinates: `54.9/52.4/73.7 ≥ 50/50/52 µm`.
@@ -303,7 +307,7 @@ mod tests {
             "bench is ready: 5 limits kept, 1 warning\n\
              \x20 reach    54.9/52.4/174 ≥ 50/50/50 µm, 421 ≥ 400 µrad\n\
              \x20 margins  delay > 5 ticks\n\
-             \x20 tracking case-1 xyz 20.7, case-1 z 3.00 nm over 2.500/2.500 s, line 78.6 nm  …\n\
+             \x20 tracking case-1 xyz 20.7, case-1 z 3.00 nm over 2.500/2.500 s, …\n\
              \x20 time     instructions 4,043 ≤ 4,500\n\
              \x20 next     specgen sim bench.toml\n"
         );

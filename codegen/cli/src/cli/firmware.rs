@@ -131,8 +131,6 @@ fn refusal(made: &Made) -> Option<String> {
 /// What an image is built for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Purpose {
-    /// To be weighed: it may rest on whatever the spec assumes.
-    Weighing,
     /// For a machine: a board's is a real one.
     Machine,
     /// For a board, that is written to it.
@@ -147,16 +145,16 @@ impl Purpose {
         }
         Ok(())
     }
+}
 
-    /// Refuses a board whose controller would rest on what nobody measured, unless that is accepted.
-    fn accepts(self, target: Target, compiled: &Compiled, common: &Common) -> Result<(), Failure> {
-        let is_real = self != Self::Weighing && matches!(target.kind, Kind::Board(_));
-        if !is_real || common.assumed_ok || compiled.assumptions.is_empty() {
-            return Ok(());
-        }
-        let findings = vec![compiled.assumptions.refusal(&compiled.model)];
-        Err(Refused { source: Some(compiled.source.clone()), findings }.into())
+/// Refuses a board whose controller would rest on what nobody measured, unless that is accepted.
+fn accept_assumptions(target: Target, compiled: &Compiled, common: &Common) -> Result<(), Failure> {
+    let is_real = matches!(target.kind, Kind::Board(_));
+    if !is_real || common.assumed_ok || compiled.assumptions.is_empty() {
+        return Ok(());
     }
+    let findings = vec![compiled.assumptions.refusal(&compiled.model)];
+    Err(Refused { source: Some(compiled.source.clone()), findings }.into())
 }
 
 /// Compiles, writes, builds, checks, measures. What does not do for the purpose is refused before anything is written.
@@ -173,7 +171,7 @@ fn make(spec: &Path, common: &Common, purpose: Purpose, ui: &mut Ui) -> Result<M
     {
         return Err(Refused { source: Some(compiled.source), findings: vec![finding] }.into());
     }
-    purpose.accepts(target, &compiled, common)?;
+    accept_assumptions(target, &compiled, common)?;
     if common.lockstep && !matches!(target.kind, Kind::Board(_)) {
         let boards = "stm32h743, stm32f4";
         let message = format!("--lockstep is for the targets {boards}; {} has it in any case or never", target.name);

@@ -102,6 +102,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     ui.findings(Some(&compiled.source), &compiled.findings);
     let output = place(arguments, &compiled.ir.name);
     check_place(&output)?;
+    let paper = arguments.paper.then(|| beside(&output));
+    paper.as_deref().map_or(Ok(()), check_place)?;
     if let Some(record) = &arguments.record {
         return of_record(arguments, record, &output, &compiled, ui);
     }
@@ -125,7 +127,6 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     for section in sections.iter_mut().filter(|section| section.command.is_empty()) {
         section.command.clone_from(&command);
     }
-    let paper = arguments.paper.then(|| beside(&output));
     let mut head = head(&compiled.source.display_name, &compiled.ir.digest, "report", command);
     head.versions = format!(
         "specgen {} · f{} · {}",

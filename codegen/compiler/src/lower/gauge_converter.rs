@@ -1,5 +1,6 @@
 //! Codes of the gauges' converters.
 
+use crate::figure::fixed;
 use crate::ir::{GaugeConverter, Scalar, Sensing};
 use specgen_language::diagnostic::{Diagnostic, Place, codes};
 use specgen_language::model::Model;
@@ -38,10 +39,21 @@ pub(super) fn unseen(model: &Model, sensing: Option<&Sensing>) -> Vec<Diagnostic
         // Within the limits the polynomial rises, or falls, all the way.
         from >= to || reading(from) * reading(to) > 0.0
     });
+    let place = place.cloned().map_or(Place::Whole, Place::Spec);
     unseen
-        .map(|(gauge, (_, [first, last]))| { let message = format!(
-                "gauge {gauge} gives {first:.4} V to {last:.4} V over `sensor.range`, but its converter takes in {low} V to {high} V: \
-                 it does not see the reading zero"
-            ); let help = format!("write input_range = [\"{:.3} V\", \"{:.3} V\"] or wider, or check the calibration", first - 1e-3, last + 1e-3); Diagnostic::new(codes::GAUGE_INPUT, key, place.cloned().map_or(Place::Whole, Place::Spec), message, help) })
+        .map(|(gauge, (_, [first, last]))| {
+            let message = format!(
+                "gauge {gauge} gives {} V to {} V over `sensor.range`, but its converter takes in {low} V to {high} V: it does not \
+                 see the reading zero",
+                fixed(*first, 4),
+                fixed(*last, 4)
+            );
+            let help = format!(
+                "write input_range = [\"{} V\", \"{} V\"] or wider, or check the calibration",
+                fixed(first - 1e-3, 3),
+                fixed(last + 1e-3, 3)
+            );
+            Diagnostic::new(codes::GAUGE_INPUT, key, place.clone(), message, help)
+        })
         .collect()
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{PathReach, ROOM, Reach};
-use crate::figure::figure;
+use crate::figure::{figure, fixed};
 use crate::lower;
 use specgen_language::diagnostic::{Diagnostic, Severity, codes};
 use specgen_language::model::{Model, SetpointKind};
@@ -160,11 +160,11 @@ fn of_axis(model: &Model, stroke: f64, axis: usize, declared: f64, [low, high]: 
         &[&key, table, "workspace"],
         code,
         format!(
-            "no pose reaches |{}| = {:.2} {unit}: {binds}, and from the middle of it this axis alone goes from {:.2} to {:.2} {unit}",
+            "no pose reaches |{}| = {:.2} {unit}: {binds}, and from the middle of it this axis alone goes from {} to {} {unit}",
             AXES[axis],
             declared * scale,
-            low * scale,
-            high * scale
+            fixed(low * scale, 2),
+            fixed(high * scale, 2)
         ),
         format!("{most}; check the unit, or {way_out}"),
     ))

@@ -23,7 +23,23 @@ impl SpecSource {
         let bytes = read_bytes(path, &display_name)?;
         let text = into_text(bytes, &display_name)?;
         let dir = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        note_files(&text, dir);
         Ok(Self { display_name, text, dir: dir.to_path_buf() })
+    }
+}
+
+/// Whatever the spec names that is a file belongs to it, whether or not the command reads it: no output replaces it.
+fn note_files(text: &str, dir: &Path) {
+    fn note(value: &toml::Value, dir: &Path) {
+        match value {
+            toml::Value::String(name) => files::note_input(&dir.join(name)),
+            toml::Value::Array(values) => values.iter().for_each(|value| note(value, dir)),
+            toml::Value::Table(table) => table.values().for_each(|value| note(value, dir)),
+            _ => {}
+        }
+    }
+    if let Ok(table) = text.parse::<toml::Table>() {
+        note(&toml::Value::Table(table), dir);
     }
 }
 

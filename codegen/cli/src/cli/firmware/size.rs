@@ -67,7 +67,7 @@ impl Outcome for Examined {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let path = &arguments.file;
     let Some(bytes) = read_image(path)? else {
-        let built = Built(make(path, &arguments.common, Purpose::Weighing, ui)?);
+        let built = Built(make(path, &arguments.common, Purpose::Machine, ui)?);
         return ui.judged(&built, refusal(&built.0));
     };
     let malformed = |error: object::Error| TargetError::MalformedImage { text: format!("{}: {error}", path.display()) };

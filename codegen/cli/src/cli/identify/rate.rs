@@ -8,7 +8,7 @@ use clap::Args;
 use super::everett::{grid, range};
 use super::reading::ReadingArguments;
 use super::{Identified, Measured};
-use crate::cli::file::write_file;
+use crate::cli::file::write_folder;
 use crate::cli::named::{InputFile, OutputFolder};
 use crate::cli::plot::{Plot, wrote};
 use crate::cli::table::{left, right, row};
@@ -101,10 +101,9 @@ fn write(output: &Path, identified: &RateIdentified) -> Result<Vec<PathBuf>, Fai
     let name = output.file_name().map(|name| name.to_string_lossy().into_owned()).ok_or_else(|| {
         Failure::Usage(format!("`{}` names no file: give a name such as models/leg1", output.display()))
     })?;
-    let beside = |file: &str| output.with_file_name(file);
     let best = identified.report.verdict.best;
     let simulated = is_simulated(&identified.report);
-    let mut files: Vec<(PathBuf, String)> = Vec::new();
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
     let mut lines = format!(
         "# Rate dependence of the leg, from `specgen identify rate`. The option in force has the lowest error on rates that it was\n\
          # not fitted on. Tables are named relative to the spec.\n[hysteresis]\n# {}\n",
@@ -121,9 +120,9 @@ fn write(output: &Path, identified: &RateIdentified) -> Result<Vec<PathBuf>, Fai
         };
         let rate_table = format!("{name}-mu1.csv");
         let mark = |text: String| if simulated { marked_as_simulated(&text) } else { text };
-        files.push((beside(&table), mark(write_table_csv(&model.still))));
+        files.push((table.clone(), mark(write_table_csv(&model.still)).into_bytes()));
         if let Some(rate) = &model.rate {
-            files.push((beside(&rate_table), mark(write_rate_csv(rate))));
+            files.push((rate_table.clone(), mark(write_rate_csv(rate)).into_bytes()));
         }
         let block = spec_lines(*option, model, identified.report.held, &table, &rate_table);
         let prefix = if *option == best { "" } else { "# " };
@@ -138,11 +137,10 @@ fn write(output: &Path, identified: &RateIdentified) -> Result<Vec<PathBuf>, Fai
         }
     }
     lines += &format!("\n{}", Measured::of(&keys(&identified.report), simulated).text());
-    files.push((beside(&format!("{name}.toml")), lines));
-    for (path, text) in &files {
-        write_file(path, text.as_bytes())?;
-    }
-    Ok(files.into_iter().map(|(path, _)| path).collect())
+    files.push((format!("{name}.toml"), lines.into_bytes()));
+    let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    write_folder(folder, &files)?;
+    Ok(files.into_iter().map(|(file, _)| output.with_file_name(file)).collect())
 }
 
 fn table(report: &RateReport) -> String {

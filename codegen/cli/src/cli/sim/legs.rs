@@ -263,6 +263,12 @@ impl Outcome for Tables<'_> {
             });
             row(&mut out, &columns, &[&mode, &a, &b, &c]);
         }
+        // The same of every law.
+        let [a, b, c] = TRACKING_FREQUENCIES.map(|hertz| {
+            let made = self.tracking.rows.iter().find(|row| row.frequency_hz == hertz);
+            made.map_or("-".to_owned(), |row| row.coverage.brief())
+        });
+        row(&mut out, &columns, &[&"over", &a, &b, &c]);
         // Writing to a String cannot fail, here and below.
         let _ = writeln!(out, "{name}: slope of Y on q̂, as a ratio to that at 0.1 Hz (paper's Table 1)");
         for (index, row) in self.linearity.rows.iter().enumerate() {

@@ -192,7 +192,7 @@ pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> 
         f.span(path),
         format!(
             "the six legs hardly hold the platform: the condition number of their Jacobian at rest is {}",
-            number(condition)
+            if condition.is_finite() { number(condition) } else { "infinite".to_owned() }
         ),
         help.to_owned(),
     );
