@@ -5,10 +5,13 @@ use serde::Serialize;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
 
+/// Left out, these are nothing, which every figure of noise then rests on.
+const NOISE: [&str; 2] = ["sensor.noise", "amplifier.noise"];
+
 /// Values and records that nobody measured.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Assumptions {
-    /// Paths of keys and repeated sections, as the spec's `assumed` names them.
+    /// Paths of keys and repeated sections, as the spec's `assumed` names them, and noise that the spec leaves out.
     pub values: Vec<String>,
     /// Files of the spec's `[hysteresis]` that are marked as simulated.
     pub simulated: Vec<String>,
@@ -18,7 +21,9 @@ impl Assumptions {
     /// Those of `model`, whose files `simulated` are marked so.
     #[must_use]
     pub fn of(model: &Model, simulated: Vec<String>) -> Self {
-        Self { values: model.assumed.clone(), simulated }
+        let left_out = NOISE.into_iter().filter(|key| model.spans.get(*key).is_none());
+        let values = model.assumed.iter().cloned().chain(left_out.map(|key| format!("{key} (left out: none)")));
+        Self { values: values.collect(), simulated }
     }
 
     /// Whether everything is measured or known.
@@ -65,13 +70,13 @@ impl Assumptions {
     pub fn refusal(&self, model: &Model) -> Diagnostic {
         let clear = [
             (!self.values.is_empty())
-                .then_some("measure or look up these values and take their entries out of `assumed`"),
+                .then_some("measure or look up these values, write them, and take their entries out of `assumed`"),
             (!self.simulated.is_empty()).then_some("name a record of the machine's own legs in `hysteresis.records`"),
         ];
         let clear: Vec<&str> = clear.into_iter().flatten().collect();
         Diagnostic::at(
             &model.spans,
-            &[if self.values.is_empty() { "hysteresis.records" } else { "assumed" }],
+            if self.values.is_empty() { &["hysteresis.records"] } else { &["assumed", "sensor"] },
             codes::ASSUMED_ON_BOARD,
             format!("the controller of a real machine would rest on {}: {}", self.summary(), self.list().join(", ")),
             format!("{}; or accept them with --assumed-ok", clear.join(", and ")),

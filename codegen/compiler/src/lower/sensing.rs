@@ -206,6 +206,13 @@ fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
     }
     let Some((_, axis, k, reading)) = worst else { return Vec::new() };
     let (name, unit, scale) = if axis < 3 { ("translation", "µm", 1e6) } else { ("rotation", "mrad", 1e3) };
+    let most = libm::floor(seen_along(model, layout, axis) * scale * 1e4) / 1e4;
+    // An axis that no gauge sees on one side of rest has no bound to propose.
+    let less = if most > 0.0 {
+        format!("at most {most} {unit} on this axis (workspace.{name}[{}]), or ", axis % 3)
+    } else {
+        String::new()
+    };
     vec![finding(
         model,
         codes::GAUGE_RANGE,
@@ -218,12 +225,7 @@ fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
             low * 1e6,
             high * 1e6
         ),
-        format!(
-            "at most {} {unit} on this axis (workspace.{name}[{}]), or gauges whose range takes in {:.3} µm; check the unit of sensor.range",
-            libm::floor(seen_along(model, layout, axis) * scale * 1e4) / 1e4,
-            axis % 3,
-            reading * 1e6
-        ),
+        format!("{less}gauges whose range takes in {:.3} µm; check the unit of sensor.range", reading * 1e6),
     )]
 }
 
