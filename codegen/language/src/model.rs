@@ -33,7 +33,7 @@ pub use task_space::{
 pub use trigger::{MAX_OUTPUTS, Trigger, TriggerDirection, TriggerKind};
 
 /// Every section, in the order of the reference. Sections that hold others come before them.
-pub const SECTIONS: &[Section] = &[
+pub static SECTIONS: &[Section] = &[
     START,
     Geometry::SECTION,
     RigidBody::SECTION,

@@ -44,8 +44,8 @@ macro_rules! files {
 }
 use files;
 
-/// Every folder there is.
-pub const PARTS: &[&Part] = &[
+/// Every folder there is. Not a constant, of which each crate that names it has a copy.
+pub static PARTS: &[&Part] = &[
     &runtime::PART,
     &host::PART,
     &qemu::PART,

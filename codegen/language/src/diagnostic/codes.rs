@@ -6,7 +6,7 @@
 
 use super::Severity;
 
-/// A code and its page. The constants below are all there are: a finding with another code does not compile.
+/// A code and its page. The ones below are all there are: a finding with another code does not compile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Code {
@@ -51,12 +51,13 @@ impl PartialEq<Code> for &str {
     }
 }
 
+// Statics: each crate that names a constant has a copy of its page.
 macro_rules! codes {
     ($($name:ident = $id:literal;)*) => {
         $(#[doc = include_str!(concat!("../../findings/", $id, ".md"))]
-        pub const $name: Code = Code { id: $id, page: include_str!(concat!("../../findings/", $id, ".md")) };)*
+        pub static $name: Code = Code { id: $id, page: include_str!(concat!("../../findings/", $id, ".md")) };)*
         /// Every code, by number.
-        pub const REGISTRY: &[Code] = &[$($name),*];
+        pub static REGISTRY: &[Code] = &[$($name),*];
     };
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Part, files};
 
-pub const PART: Part = Part {
+pub static PART: Part = Part {
     folder: "board",
     member: false,
     what: "what all boards have in common: one tick on real converters, what is said over the link",

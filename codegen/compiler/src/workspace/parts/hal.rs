@@ -2,7 +2,7 @@
 
 use super::{Part, files};
 
-pub const PART: Part = Part {
+pub static PART: Part = Part {
     folder: "hal",
     member: false,
     what: "gauges and amplifiers: traits and drivers",

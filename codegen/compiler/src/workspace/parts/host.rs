@@ -2,7 +2,7 @@
 
 use super::{Part, files};
 
-pub const PART: Part = Part {
+pub static PART: Part = Part {
     folder: "host",
     member: true,
     what: "the same controller as a shared library: `cargo build --release`",

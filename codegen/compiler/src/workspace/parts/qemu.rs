@@ -2,7 +2,7 @@
 
 use super::{Part, files};
 
-pub const PART: Part = Part {
+pub static PART: Part = Part {
     folder: "qemu",
     member: false,
     what: "the same controller on an emulated Cortex-M: see its README",

@@ -2,7 +2,7 @@
 
 use super::{Part, files};
 
-pub const PART: Part = Part {
+pub static PART: Part = Part {
     folder: "rt",
     member: false,
     what: "what a control loop needs of Linux: clock, rights, book of late ticks, shared memory",

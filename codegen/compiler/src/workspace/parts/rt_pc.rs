@@ -2,7 +2,7 @@
 
 use super::{Part, files};
 
-pub const PART: Part = Part {
+pub static PART: Part = Part {
     folder: "rt-pc",
     member: false,
     what: "the controller on a real-time Linux PC",

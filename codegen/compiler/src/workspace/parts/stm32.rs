@@ -2,7 +2,7 @@
 
 use super::{Part, files};
 
-pub const PART: Part = Part {
+pub static PART: Part = Part {
     folder: "stm32",
     member: false,
     what: "what the STM32 boards have in common",

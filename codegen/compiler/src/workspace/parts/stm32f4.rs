@@ -2,7 +2,7 @@
 
 use super::{Part, files};
 
-pub const PART: Part = Part {
+pub static PART: Part = Part {
     folder: "stm32f4",
     member: false,
     what: "firmware of the NUCLEO-F446RE (Cortex-M4F, `f32`)",

@@ -2,7 +2,7 @@
 
 use super::{Part, files};
 
-pub const PART: Part = Part {
+pub static PART: Part = Part {
     folder: "stm32h743",
     member: false,
     what: "firmware of the NUCLEO-H743ZI2 (Cortex-M7)",

@@ -2,7 +2,7 @@
 
 use super::{Part, files};
 
-pub const PART: Part = Part {
+pub static PART: Part = Part {
     folder: "tick",
     member: false,
     what: "a board's tick between stand-ins for its converters, on an emulated Cortex-M: what its time is estimated from",
