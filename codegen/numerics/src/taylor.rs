@@ -7,6 +7,7 @@
 //! micrometre machine the third order is a thousandth of the second, so the bound is hardly larger than what can be found.
 
 use core::cmp::Ordering;
+use core::num::NonZeroU32;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use std::cell::RefCell;
 
@@ -140,10 +141,13 @@ thread_local! {
 }
 
 /// A number of a computation under [`expand`]: a constant, or an expansion of that computation.
+///
+/// Small, and its operations are calls: the kernels are thousands of them.
 #[derive(Debug, Clone, Copy)]
 pub struct Taylor {
     constant: f64,
-    place: Option<usize>,
+    /// Of its expansion, counted from 1.
+    place: Option<NonZeroU32>,
 }
 
 /// Expands what `run` makes of eighteen variables, each within ± its `width` of zero. Also the number of operations on anything
@@ -172,14 +176,14 @@ impl Taylor {
         let place = EXPANSIONS.with(|kept| {
             let mut kept = kept.borrow_mut();
             kept.push(expansion);
-            kept.len() - 1
+            u32::try_from(kept.len()).ok().and_then(NonZeroU32::new)
         });
-        Self { constant, place: Some(place) }
+        Self { constant, place }
     }
 
     fn expansion(self) -> Expansion {
         let constant = Expansion::constant(self.constant);
-        self.place.map_or(constant, |place| EXPANSIONS.with(|kept| kept.borrow()[place].clone()))
+        self.place.map_or(constant, |place| EXPANSIONS.with(|kept| kept.borrow()[place.get() as usize - 1].clone()))
     }
 
     const fn known(self) -> Option<f64> {
@@ -195,6 +199,7 @@ impl Taylor {
 
 impl Add for Taylor {
     type Output = Self;
+    #[inline(never)]
     fn add(self, other: Self) -> Self {
         match (self.known(), other.known()) {
             (Some(a), Some(b)) => Self::constant(a + b),
@@ -207,6 +212,7 @@ impl Add for Taylor {
 
 impl Neg for Taylor {
     type Output = Self;
+    #[inline(never)]
     fn neg(self) -> Self {
         match self.known() {
             Some(value) => Self::constant(-value),
@@ -217,6 +223,7 @@ impl Neg for Taylor {
 
 impl Sub for Taylor {
     type Output = Self;
+    #[inline(never)]
     fn sub(self, other: Self) -> Self {
         match (self.known(), other.known()) {
             (Some(a), Some(b)) => Self::constant(a - b),
@@ -228,6 +235,7 @@ impl Sub for Taylor {
 
 impl Mul for Taylor {
     type Output = Self;
+    #[inline(never)]
     fn mul(self, other: Self) -> Self {
         match (self.known(), other.known()) {
             (Some(a), Some(b)) => Self::constant(a * b),
@@ -241,6 +249,7 @@ impl Mul for Taylor {
 
 impl Div for Taylor {
     type Output = Self;
+    #[inline(never)]
     fn div(self, other: Self) -> Self {
         match (self.known(), other.known()) {
             (Some(a), Some(b)) => Self::constant(a / b),
@@ -252,6 +261,7 @@ impl Div for Taylor {
 
 impl PartialEq for Taylor {
     /// The kernels that are run on this type compare with constants only.
+    #[inline(never)]
     fn eq(&self, other: &Self) -> bool {
         self.known().is_some() && self.known() == other.known()
     }

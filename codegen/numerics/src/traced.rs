@@ -194,6 +194,7 @@ impl<const SINGLE: bool> Traced<SINGLE> {
 
 impl<const SINGLE: bool> Add for Traced<SINGLE> {
     type Output = Self;
+    #[inline(never)]
     fn add(self, other: Self) -> Self {
         if self.nothing() {
             return other;
@@ -210,6 +211,7 @@ impl<const SINGLE: bool> Add for Traced<SINGLE> {
 
 impl<const SINGLE: bool> Neg for Traced<SINGLE> {
     type Output = Self;
+    #[inline(never)]
     fn neg(self) -> Self {
         let by = [self.node.map(|node| (node, [-1.0; 2])), None];
         let node = self.node.and_then(|_| record(Node { by, own: 0.0, known: [0.0; 2] }));
@@ -219,6 +221,7 @@ impl<const SINGLE: bool> Neg for Traced<SINGLE> {
 
 impl<const SINGLE: bool> Sub for Traced<SINGLE> {
     type Output = Self;
+    #[inline(never)]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
@@ -231,6 +234,7 @@ fn is_power_of_two(value: f64) -> bool {
 
 impl<const SINGLE: bool> Mul for Traced<SINGLE> {
     type Output = Self;
+    #[inline(never)]
     fn mul(self, other: Self) -> Self {
         // ã b̃ − a b = ã δb + b̃ δa − δa δb.
         let by = [(self, other.range()), (other, self.range())];
@@ -246,6 +250,7 @@ impl<const SINGLE: bool> Mul for Traced<SINGLE> {
 
 impl<const SINGLE: bool> Div for Traced<SINGLE> {
     type Output = Self;
+    #[inline(never)]
     fn div(self, other: Self) -> Self {
         let nearest = other.form.nearest();
         if nearest <= other.error || nearest == 0.0 {
@@ -268,6 +273,7 @@ impl<const SINGLE: bool> Div for Traced<SINGLE> {
 
 impl<const SINGLE: bool> PartialEq for Traced<SINGLE> {
     /// The kernels that are run on this type compare with zero constants only.
+    #[inline(never)]
     fn eq(&self, other: &Self) -> bool {
         self.error == 0.0
             && other.error == 0.0
