@@ -31,6 +31,7 @@ use crate::stability::platform::{Design, RestDynamics};
 use specgen_identify::everett::EverettTable;
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{self, Model};
+use specgen_numerics::leg_forces;
 use specgen_runtime::Motion;
 
 /// Beyond this many strokes a leg set-point is a mistake, not a demand to saturate on.
@@ -171,7 +172,7 @@ fn task_space(
 ) -> Result<TaskSpace, Vec<Diagnostic>> {
     let platform = platform(model)?;
     let rest = RestDynamics::of(&platform);
-    let rest_force = platform.leg_forces(&Motion::new());
+    let rest_force = leg_forces(&platform, &Motion::new());
     let noise = pose_noise(model)?.map_or([0.0; 6], |noise| noise.pose);
     Ok(TaskSpace {
         sensing: sensing::lower(model, task, scalar)?,

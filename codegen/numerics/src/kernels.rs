@@ -17,6 +17,30 @@ pub fn jacobian(platform: &Platform<f64>, pose: &[f64; 6]) -> [[f64; 6]; 6] {
     platform.jacobian(pose)
 }
 
+/// Six leg forces for a motion, N: [`Platform::leg_forces`].
+#[must_use]
+pub fn leg_forces(platform: &Platform<f64>, motion: &Motion<f64>) -> [f64; 6] {
+    platform.leg_forces(motion)
+}
+
+/// M(h) at `pose` (m and rad), symmetric but for rounding: [`Platform::mass_matrix`].
+#[must_use]
+pub fn mass_matrix(platform: &Platform<f64>, pose: &[f64; 6]) -> [[f64; 6]; 6] {
+    platform.mass_matrix(pose)
+}
+
+/// C(h, ḣ) ḣ at `pose` (m and rad) and `rate` (m/s and rad/s), N and N m: [`Platform::coriolis`].
+#[must_use]
+pub fn coriolis(platform: &Platform<f64>, pose: &[f64; 6], rate: &[f64; 6]) -> [f64; 6] {
+    platform.coriolis(pose, rate)
+}
+
+/// G(h) at `pose` (m and rad), N and N m: [`Platform::gravity`].
+#[must_use]
+pub fn gravity(platform: &Platform<f64>, pose: &[f64; 6]) -> [f64; 6] {
+    platform.gravity(pose)
+}
+
 /// How near elimination comes to a pivot of zero at `pose` (m and rad), moments in units of `reach` (m): [`Platform::pivot_ratio`].
 #[must_use]
 pub fn pivot_ratio(platform: &Platform<f64>, pose: &[f64; 6], reach: f64) -> f64 {
@@ -26,7 +50,7 @@ pub fn pivot_ratio(platform: &Platform<f64>, pose: &[f64; 6], reach: f64) -> f64
 /// [`Platform::leg_forces`] of every motion up to ± `widths` (pose, rate, acceleration; m, rad, s), N: expanded at rest. Also the number
 /// of operations.
 #[must_use]
-pub fn leg_forces(platform: &Platform<Taylor>, widths: &[f64; 18]) -> ([Expansion; 6], usize) {
+pub fn expand_leg_forces(platform: &Platform<Taylor>, widths: &[f64; 18]) -> ([Expansion; 6], usize) {
     expand(widths, |variables| {
         let six = |first: usize| core::array::from_fn(|k| variables[first + k]);
         platform.leg_forces(&Motion { pose: six(0), rate: six(6), acceleration: six(12) })

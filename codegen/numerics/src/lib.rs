@@ -15,8 +15,9 @@
 //! | [`largest`], [`simplex`] | where a condition ceases to hold, by bisection; where a cost is least |
 //! | [`Resolvent`] | what a sampled system answers at each frequency |
 //! | [`steady_covariances`] | what white noise makes of the states of a sampled system |
+//! | [`fft`] | Fourier transforms |
 //! | [`nyquist`] | sensitivity and stability of a loop of one signal |
-//! | [`Kernels`], [`displacements`], [`jacobian`], [`leg_forces`], [`pivot_ratio`] | the controller's kernels on these numbers, compiled here |
+//! | [`Kernels`], [`displacements`], [`leg_forces`], [`mass_matrix`] and others | the controller's kernels on these numbers, compiled here |
 //!
 //! A crate of its own because it is optimised for speed, which the rest of the compiler is not.
 
@@ -25,6 +26,7 @@ mod covariance;
 mod double;
 mod eigenvalues;
 mod exponential;
+pub mod fft;
 mod form;
 mod jury;
 mod kernels;
@@ -45,7 +47,9 @@ pub use eigenvalues::{eigenvalues, spectral_radius};
 pub use exponential::exponential;
 pub use form::magnitude;
 pub use jury::{ewma_limit, pcc_limit};
-pub use kernels::{Kernels, displacements, jacobian, leg_forces, pivot_ratio};
+pub use kernels::{
+    Kernels, coriolis, displacements, expand_leg_forces, gravity, jacobian, leg_forces, mass_matrix, pivot_ratio,
+};
 pub use matrix::{Matrix, Matrix6, multiply6, transpose6};
 pub use resolvent::Resolvent;
 pub use search::{largest, simplex};

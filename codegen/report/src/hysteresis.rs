@@ -12,6 +12,7 @@ use host_sim::table::Line;
 use serde_json::{Value, json};
 use specgen_identify::Report;
 use specgen_language::model::Actuator;
+use specgen_numerics::jacobian;
 use specgen_runtime::Platform;
 use specgen_studies::reproduce::write::digits;
 
@@ -174,7 +175,7 @@ pub(crate) fn moved_over_requested(
         })
         .collect()
     };
-    Ok(platform.jacobian(&[0.0; 6]).into_iter().zip(requested).map(of).collect())
+    Ok(jacobian(platform, &[0.0; 6]).into_iter().zip(requested).map(of).collect())
 }
 
 impl Behind {

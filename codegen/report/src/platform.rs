@@ -3,6 +3,7 @@
 use host_sim::closed_loop::Tracking;
 use host_sim::platform::rig::PlatformRun;
 use serde_json::{Value, json};
+use specgen_numerics::jacobian;
 use specgen_runtime::Platform;
 
 use super::section::Part;
@@ -26,7 +27,7 @@ impl Motion {
     /// The true pose of a run; leg extensions by J at rest.
     #[must_use]
     pub fn of_platform(platform: &Platform<f64>, run: &PlatformRun, interval: f64) -> Self {
-        let jacobian = platform.jacobian(&[0.0; 6]);
+        let jacobian = jacobian(platform, &[0.0; 6]);
         let poses: Vec<[f64; 6]> = run.samples.iter().map(|sample| sample.tick.pose).collect();
         Self::thinned(interval, &poses, |pose| [*pose, product(&jacobian, pose)])
     }

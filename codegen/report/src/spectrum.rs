@@ -2,8 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
+use specgen_numerics::fft::{Complex64, forward};
 
 /// Points of a spectrum as drawn.
 const POINTS: usize = 160;
@@ -19,17 +18,17 @@ pub fn cumulative(signals: &[&[f64]], interval: f64) -> (Vec<f64>, Vec<f64>) {
     }
     let window: Vec<f64> = (0..length).map(|k| 0.5 - 0.5 * libm::cos(TAU * (k as f64 + 0.5) / length as f64)).collect();
     let power: f64 = window.iter().map(|w| w * w).sum();
-    let plan = FftPlanner::new().plan_fft_forward(length);
+    let plan = forward(length);
     let half = length / 2;
     let mut spectrum = vec![0.0; half];
     for signal in signals {
         let (mean, slope) = line(signal);
         let middle = 0.5 * (length - 1) as f64;
-        let mut buffer: Vec<Complex<f64>> = signal
+        let mut buffer: Vec<Complex64> = signal
             .iter()
             .zip(&window)
             .enumerate()
-            .map(|(k, (value, w))| Complex::new((value - mean - slope * (k as f64 - middle)) * w, 0.0))
+            .map(|(k, (value, w))| Complex64::new((value - mean - slope * (k as f64 - middle)) * w, 0.0))
             .collect();
         plan.process(&mut buffer);
         for (sum, bin) in spectrum.iter_mut().zip(&buffer[1..]) {

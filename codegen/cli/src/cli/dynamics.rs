@@ -22,6 +22,7 @@ use specgen_identify::states;
 use specgen_language::files;
 use specgen_language::interrupt::Scratch;
 use specgen_language::model::Model;
+use specgen_numerics::{coriolis, displacements, gravity, jacobian, leg_forces, mass_matrix};
 use specgen_toolchain as target;
 
 /// Leg lengths over those at rest.
@@ -77,12 +78,12 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             None => {
                 let motion = Motion { pose, rate, acceleration };
                 Dynamics {
-                    jacobian: platform.jacobian(&pose),
-                    mass: platform.mass_matrix(&pose),
-                    coriolis: platform.coriolis(&pose, &rate),
-                    gravity: platform.gravity(&pose),
-                    leg_forces: platform.leg_forces(&motion),
-                    displacements: platform.displacements(&pose),
+                    jacobian: jacobian(&platform, &pose),
+                    mass: mass_matrix(&platform, &pose),
+                    coriolis: coriolis(&platform, &pose, &rate),
+                    gravity: gravity(&platform, &pose),
+                    leg_forces: leg_forces(&platform, &motion),
+                    displacements: displacements(&platform, &pose),
                 }
             }
         };

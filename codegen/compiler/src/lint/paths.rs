@@ -3,7 +3,7 @@
 //! Jumps, corners, speed and place of a path are checked where it is lowered, its reach in [`crate::reach`].
 
 use serde::Serialize;
-use specgen_numerics::displacements;
+use specgen_numerics::{displacements, mass_matrix};
 use specgen_runtime::Platform;
 
 use super::{Found, Legs, figure};
@@ -45,7 +45,7 @@ pub fn check(
 ) -> (Vec<PathDemand>, Vec<Diagnostic>) {
     let mut found = Found::new(model);
     let legs = Legs::of(model, platform);
-    let mass = platform.mass_matrix(&[0.0; 6]);
+    let mass = mass_matrix(platform, &[0.0; 6]);
     let inverse = crate::lower::inverse_jacobian(&model.geometry).unwrap_or([[0.0; 6]; 6]);
     let mut demands = Vec::new();
     for (index, (trajectory, path)) in task.trajectories.iter().zip(paths).enumerate() {

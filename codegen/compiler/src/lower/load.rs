@@ -14,7 +14,7 @@ use crate::figure::figure;
 use crate::ir::{Affine, Dynamics, LEGS, Load, LoadBound, Scalar, Setpoints};
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{DynamicsChoice, Model, TaskSpace};
-use specgen_numerics::{Expansion, leg_forces};
+use specgen_numerics::{Expansion, expand_leg_forces};
 
 /// Share of the converter's step that the error may be, if the spec does not say.
 const SHARE_OF_STEP: f64 = 0.1;
@@ -83,7 +83,7 @@ impl Space {
             6..12 => motions.rate[k - 6],
             _ => motions.acceleration[k - 12],
         });
-        let (forces, operations) = leg_forces(&platform.platform(), &widths);
+        let (forces, operations) = expand_leg_forces(&platform.platform(), &widths);
         let compliance = 1.0 / model.actuator.axial_stiffness;
         Self { widths, motions, load: forces.map(|force| force.scaled(compliance)), operations }
     }

@@ -14,6 +14,7 @@ use crate::ir::{Scalar, Sensing};
 use layout::Layout;
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen_language::model::{Model, TaskSpace};
+use specgen_numerics::Kernels as _;
 
 /// More passes than this mean that the pose does not converge.
 const MOST_PASSES: u32 = 12;
@@ -103,7 +104,7 @@ impl Solution {
 fn largest_error(gauges: &Gauges<f64>, series: &Series<f64>, bounds: [f64; 6]) -> [f64; 6] {
     let mut largest = [0.0; 6];
     for pose in grid(bounds) {
-        let found = gauges.pose(&gauges.readings(series, &pose));
+        let found = f64::pose(gauges, &f64::readings(gauges, series, &pose));
         for ((largest, found), exact) in largest.iter_mut().zip(&found).zip(&pose) {
             let error = (found - exact).abs();
             // A NaN is infinitely wrong.
@@ -124,13 +125,13 @@ fn sound_at_range(gauges: &Gauges<f64>, range: [f64; 2]) -> bool {
         for (k, reading) in readings.iter_mut().enumerate() {
             *reading = range[(corner as usize >> k) & 1];
         }
-        let pose = gauges.pose(&readings);
+        let pose = f64::pose(gauges, &readings);
         let angle = norm([pose[3], pose[4], pose[5]]);
         if angle.is_nan() || angle > 1.0 {
             return false;
         }
         let (sine, versine) = series_of(angle, Scalar::F64);
-        let back = gauges.readings(&Series { sine: &sine, versine: &versine }, &pose);
+        let back = f64::readings(gauges, &Series { sine: &sine, versine: &versine }, &pose);
         back.iter().zip(&readings).all(|(back, reading)| (back - reading).abs() <= SOUND_AT_RANGE * span)
     })
 }

@@ -27,7 +27,7 @@ use specgen_runtime::Platform;
 
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{AdaptationMode, ControlMode, Gains, Interaction, Model, TaskSpace};
-use specgen_numerics::Matrix6;
+use specgen_numerics::{Matrix6, jacobian, mass_matrix};
 
 pub use super::LARGEST_RADIUS;
 pub use closed_loop::{ClosedLoop, Conditions};
@@ -55,11 +55,11 @@ impl RestDynamics {
     /// M and J of the controller's own model at rest.
     #[must_use]
     pub fn of(platform: &Platform<f64>) -> Self {
-        let mass = platform.mass_matrix(&[0.0; 6]);
+        let mass = mass_matrix(platform, &[0.0; 6]);
         Self {
             // Symmetric but for rounding, which the modes must not see.
             mass: core::array::from_fn(|i| core::array::from_fn(|j| 0.5 * (mass[i][j] + mass[j][i]))),
-            jacobian: platform.jacobian(&[0.0; 6]),
+            jacobian: jacobian(platform, &[0.0; 6]),
         }
     }
 }

@@ -1,7 +1,6 @@
 //! Welch's averaged cross spectra.
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
+use specgen_numerics::fft::{Complex64, forward};
 
 /// One bin of the response.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,16 +20,15 @@ pub(super) fn h1(x: &[f64], y: &[f64], rate: f64, segment: usize) -> Vec<Bin> {
     let half = segment / 2;
     let window: Vec<f64> =
         (0..segment).map(|k| 0.5 - 0.5 * libm::cos(std::f64::consts::TAU * k as f64 / segment as f64)).collect();
-    // Without the `avx`, `sse` features the planner has one kernel for every machine.
-    let fft = FftPlanner::<f64>::new().plan_fft_forward(segment);
-    let (mut xx, mut yy, mut xy) = (vec![0.0; half], vec![0.0; half], vec![Complex::new(0.0, 0.0); half]);
+    let fft = forward(segment);
+    let (mut xx, mut yy, mut xy) = (vec![0.0; half], vec![0.0; half], vec![Complex64::new(0.0, 0.0); half]);
     let mut start = 0;
     while start + segment <= x.len() {
         let spectrum = |signal: &[f64]| {
             let part = &signal[start..start + segment];
             let mean = part.iter().fold(0.0, |sum, v| sum + v) / segment as f64;
-            let mut values: Vec<Complex<f64>> =
-                part.iter().zip(&window).map(|(v, w)| Complex::new((v - mean) * w, 0.0)).collect();
+            let mut values: Vec<Complex64> =
+                part.iter().zip(&window).map(|(v, w)| Complex64::new((v - mean) * w, 0.0)).collect();
             fft.process(&mut values);
             values
         };
@@ -46,7 +44,7 @@ pub(super) fn h1(x: &[f64], y: &[f64], rate: f64, segment: usize) -> Vec<Bin> {
         .map(|k| {
             let power = xx[k] * yy[k];
             let (h, coherence) =
-                if power > 0.0 { (xy[k] / xx[k], xy[k].norm_sqr() / power) } else { (Complex::new(0.0, 0.0), 0.0) };
+                if power > 0.0 { (xy[k] / xx[k], xy[k].norm_sqr() / power) } else { (Complex64::new(0.0, 0.0), 0.0) };
             Bin {
                 frequency: k as f64 * rate / segment as f64,
                 h: [h.re, h.im],

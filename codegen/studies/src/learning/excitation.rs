@@ -11,8 +11,7 @@
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
-use rustfft::FftPlannerScalar;
-use rustfft::num_complex::Complex64;
+use specgen_numerics::fft::{self, Complex64};
 use specgen_numerics::nyquist::{Complex, plus, times};
 use specgen_runtime::playback::{self, Knot};
 
@@ -117,7 +116,7 @@ impl Excitation {
         let period = learnable.closed_loop.period;
         let to_modal = &learnable.closed_loop.basis.to_modal;
         let length = (2 * motion.corrected).next_power_of_two();
-        let transform = FftPlannerScalar::new().plan_fft_forward(length);
+        let transform = fft::forward(length);
         let spectra = |signal: &mut dyn Iterator<Item = [f64; 6]>| -> [Vec<Complex64>; 6] {
             let modal: Vec<[f64; 6]> = signal.map(|pose| mapped(to_modal, &pose)).collect();
             std::array::from_fn(|mode| {

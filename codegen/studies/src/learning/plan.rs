@@ -2,9 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use rustfft::FftPlannerScalar;
-use rustfft::num_complex::Complex64;
 use specgen_numerics::Matrix6;
+use specgen_numerics::fft::{self, Complex64};
 use specgen_numerics::nyquist::{Complex, times};
 use specgen_runtime::learning::{HEAD, Learning, Settings, plan_rows};
 use specgen_runtime::playback::Knot;
@@ -163,7 +162,7 @@ impl Grid {
             }
             put(6, Complex64::new(passed, 0.0));
         }
-        let inverse = FftPlannerScalar::new().plan_fft_inverse(length);
+        let inverse = fft::inverse(length);
         for spectrum in &mut spectra {
             inverse.process(spectrum);
         }

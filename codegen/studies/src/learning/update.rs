@@ -3,8 +3,7 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use rustfft::num_complex::Complex64;
-use rustfft::{Fft, FftPlannerScalar};
+use specgen_numerics::fft::{self, Complex64, Fft};
 
 use super::convergence::{Convergence, Learnable, cut, highest};
 use super::matrix::{Matrix6c, inverse};
@@ -69,7 +68,6 @@ impl Update {
         let bins = 1 + (highest(bandwidth, period) * length as f64 * period) as usize;
         // What is constant stands at half of the slowest frequency.
         let frequencies: Vec<f64> = (0..bins).map(|bin| if bin == 0 { 0.5 * hertz(1) } else { hertz(bin) }).collect();
-        let mut planner = FftPlannerScalar::new();
         Self {
             bins: design(&frequencies),
             to_modal: learnable.closed_loop.basis.to_modal,
@@ -78,7 +76,7 @@ impl Update {
             fade: FADE.map(|time| libm::round(time / period) as usize),
             rest: motion.scored.start,
             spacing: spacing as usize,
-            transforms: [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)],
+            transforms: [fft::forward(length), fft::inverse(length)],
         }
     }
 

@@ -18,6 +18,7 @@ use specgen_compiler::lower;
 use specgen_identify::gains::{self, LegGain};
 use specgen_identify::{declared, marked_as_simulated, write_table_csv};
 use specgen_language::model::RateDependence;
+use specgen_numerics::displacements;
 
 /// Phases of the supervisor in which the law moves the legs: running, holding.
 const MOVING: [u8; 2] = [2, 3];
@@ -179,7 +180,7 @@ impl Moves {
             let pose: [f64; 6] = six(self.pose);
             let voltages: [f64; 6] = six(self.voltage);
             self.voltages.iter_mut().zip(voltages).for_each(|(all, v)| all.push(v));
-            let moved = self.platform.displacements(&pose);
+            let moved = displacements(&self.platform, &pose);
             self.displacements.iter_mut().zip(moved).for_each(|(all, d)| all.push(d));
         }
     }

@@ -5,6 +5,7 @@ use host_sim::record::{Block, Header};
 use host_sim::word::Scalar;
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::lower;
+use specgen_numerics::jacobian;
 use specgen_report::record::Sample;
 use specgen_runtime::supervisor::MISSED_TICK;
 
@@ -46,7 +47,7 @@ impl Words {
         let setpoint = inputs("setpoint").ok_or_else(lacking)?;
         let either = |output: &str, input: [usize; 6]| description.outputs(output).map_err(|_| input);
         let jacobian = match &compiled.model.task_space {
-            Some(_) => lower::platform(&compiled.model).ok().map(|platform| platform.jacobian(&[0.0; 6])),
+            Some(_) => lower::platform(&compiled.model).ok().map(|platform| jacobian(&platform, &[0.0; 6])),
             None => None,
         };
         Ok(Self {
