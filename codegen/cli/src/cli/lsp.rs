@@ -9,23 +9,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lsp_server::{Connection, ErrorCode, Message, Notification, Request, Response};
-use lsp_types::notification::{self, Notification as _};
-use lsp_types::request::{self, Request as _};
-use lsp_types::{
-    CodeAction, CodeActionKind, CodeActionOrCommand, CodeActionParams, CodeActionProviderCapability, CompletionOptions,
-    CompletionParams, CompletionResponse, Diagnostic as Shown, DiagnosticSeverity, DidChangeTextDocumentParams,
-    DidCloseTextDocumentParams, DidOpenTextDocumentParams, Hover, HoverContents, HoverParams, HoverProviderCapability,
-    MarkupContent, MarkupKind, NumberOrString, PublishDiagnosticsParams, Range, ServerCapabilities,
-    TextDocumentSyncCapability, TextDocumentSyncKind, TextEdit, Uri, WorkspaceEdit,
-};
-use serde::Serialize;
-use serde_json::Value;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
 
 use super::ui::Failure;
 use specgen_compiler::compile;
 use specgen_language::diagnostic::{Diagnostic, Place, Severity};
 use specgen_language::spec::{SpecSource, key_markdown};
-use text::{Lines, Spot};
+use text::{Lines, Part, Spot};
 
 /// Arguments of `lsp`.
 #[derive(Args, Debug)]
@@ -39,27 +30,25 @@ pub struct Arguments {
 pub fn run(_: &Arguments) -> Result<(), Failure> {
     let (connection, threads) = Connection::stdio();
     let failed = |error: &dyn std::fmt::Display| Failure::Environment(format!("the editor's connection: {error}"));
-    let capabilities = serde_json::to_value(capabilities()).map_err(|error| failed(&error))?;
-    connection.initialize(capabilities).map_err(|error| failed(&error))?;
+    connection.initialize(capabilities()).map_err(|error| failed(&error))?;
     Server { connection: &connection, open: BTreeMap::new() }.serve().map_err(|error| failed(&error))?;
     drop(connection);
     threads.join().map_err(|error| failed(&error))
 }
 
-fn capabilities() -> ServerCapabilities {
-    let triggers = ["\"", " ", "=", "["].map(str::to_owned).to_vec();
-    ServerCapabilities {
-        text_document_sync: Some(TextDocumentSyncCapability::Kind(TextDocumentSyncKind::FULL)),
-        hover_provider: Some(HoverProviderCapability::Simple(true)),
-        completion_provider: Some(CompletionOptions { trigger_characters: Some(triggers), ..Default::default() }),
-        code_action_provider: Some(CodeActionProviderCapability::Simple(true)),
-        ..Default::default()
-    }
+fn capabilities() -> Value {
+    json!({
+        // A change comes as the whole text.
+        "textDocumentSync": 1,
+        "hoverProvider": true,
+        "completionProvider": { "triggerCharacters": ["\"", " ", "=", "["] },
+        "codeActionProvider": true,
+    })
 }
 
 /// A document that an editor has open.
 struct Open {
-    uri: Uri,
+    uri: String,
     text: String,
     /// What was found when it was last looked at.
     findings: Vec<Diagnostic>,
@@ -69,11 +58,17 @@ struct Open {
 
 struct Server<'a> {
     connection: &'a Connection,
-    /// By the text of the URI.
+    /// By URI.
     open: BTreeMap<String, Open>,
 }
 
 type Served = Result<(), Box<dyn std::error::Error + Sync + Send>>;
+
+/// What is answered; nothing if there is nothing to say.
+type Answer = serde_json::Result<Option<Value>>;
+
+/// Where a message names its document.
+const URI: &str = "/textDocument/uri";
 
 impl Server<'_> {
     fn serve(&mut self) -> Served {
@@ -112,30 +107,26 @@ impl Server<'_> {
 
     fn note(&mut self, Notification { method, params }: Notification) -> Served {
         match method.as_str() {
-            notification::DidOpenTextDocument::METHOD => {
-                let DidOpenTextDocumentParams { text_document } = serde_json::from_value(params)?;
-                self.put(text_document.uri, text_document.text);
-            }
-            notification::DidChangeTextDocument::METHOD => {
-                let changed: DidChangeTextDocumentParams = serde_json::from_value(params)?;
-                if let Some(last) = changed.content_changes.into_iter().next_back() {
-                    self.put(changed.text_document.uri, last.text);
+            "textDocument/didOpen" => self.put(of(&params, URI)?, of(&params, "/textDocument/text")?),
+            "textDocument/didChange" => {
+                if let Some(last) = of::<Vec<Value>>(&params, "/contentChanges")?.last() {
+                    self.put(of(&params, URI)?, of(last, "/text")?);
                 }
             }
             // The records of a spec may have changed, too.
-            notification::DidSaveTextDocument::METHOD => self.open.values_mut().for_each(|open| open.changed = true),
-            notification::DidCloseTextDocument::METHOD => {
-                let DidCloseTextDocumentParams { text_document } = serde_json::from_value(params)?;
-                self.open.remove(text_document.uri.as_str());
-                self.publish(text_document.uri, Vec::new())?;
+            "textDocument/didSave" => self.open.values_mut().for_each(|open| open.changed = true),
+            "textDocument/didClose" => {
+                let uri: String = of(&params, URI)?;
+                self.open.remove(&uri);
+                self.publish(&uri, &[])?;
             }
             _ => {}
         }
         Ok(())
     }
 
-    fn put(&mut self, uri: Uri, text: String) {
-        self.open.insert(uri.as_str().to_owned(), Open { uri, text, findings: Vec::new(), changed: true });
+    fn put(&mut self, uri: String, text: String) {
+        self.open.insert(uri.clone(), Open { uri, text, findings: Vec::new(), changed: true });
     }
 
     /// Compiles what has changed and shows what was found.
@@ -145,23 +136,23 @@ impl Server<'_> {
             open.changed = false;
             open.findings = findings(open);
             let lines = Lines::new(&open.text);
-            shown.push((open.uri.clone(), open.findings.iter().map(|found| show(found, &lines)).collect()));
+            shown.push((open.uri.clone(), open.findings.iter().map(|found| show(found, &lines)).collect::<Vec<_>>()));
         }
-        shown.into_iter().try_for_each(|(uri, findings)| self.publish(uri, findings))
+        shown.iter().try_for_each(|(uri, findings)| self.publish(uri, findings))
     }
 
-    fn publish(&self, uri: Uri, diagnostics: Vec<Shown>) -> Served {
-        let params = PublishDiagnosticsParams { uri, diagnostics, version: None };
-        let shown = Notification::new(notification::PublishDiagnostics::METHOD.to_owned(), params);
+    fn publish(&self, uri: &str, findings: &[Value]) -> Served {
+        let params = json!({ "uri": uri, "diagnostics": findings });
+        let shown = Notification::new("textDocument/publishDiagnostics".to_owned(), params);
         Ok(self.connection.sender.send(Message::Notification(shown))?)
     }
 
     fn answer(&self, request: Request) -> Response {
         let Request { id, method, params } = request;
         let result = match method.as_str() {
-            request::HoverRequest::METHOD => reply(params, |params| self.hover(&params)),
-            request::Completion::METHOD => reply(params, |params| self.completions(&params)),
-            request::CodeActionRequest::METHOD => reply(params, |params| self.actions(&params)),
+            "textDocument/hover" => self.hover(&params),
+            "textDocument/completion" => self.completions(&params),
+            "textDocument/codeAction" => self.actions(&params),
             _ => {
                 let message = format!("`{method}` is not offered");
                 return Response::new_err(id, ErrorCode::MethodNotFound as i32, message);
@@ -173,63 +164,59 @@ impl Server<'_> {
         }
     }
 
-    /// The open spec called `uri`.
-    fn spec(&self, uri: &Uri) -> Option<&Open> {
-        self.open.get(uri.as_str()).filter(|open| is_spec(&open.text))
+    /// The open spec that is asked about.
+    fn spec(&self, params: &Value) -> serde_json::Result<Option<&Open>> {
+        Ok(self.open.get(&of::<String>(params, URI)?).filter(|open| is_spec(&open.text)))
     }
 
-    fn hover(&self, params: &HoverParams) -> Option<Hover> {
-        let at = &params.text_document_position_params;
-        let open = self.spec(&at.text_document.uri)?;
-        let spot = Spot::at(&open.text, Lines::new(&open.text).offset(at.position));
+    /// The same, and what stands at the place that is asked about.
+    fn spot(&self, params: &Value) -> serde_json::Result<Option<(&Open, Spot)>> {
+        let position = of(params, "/position")?;
+        let at = |open: &Open| Spot::at(&open.text, Lines::new(&open.text).offset(position));
+        Ok(self.spec(params)?.map(|open| (open, at(open))))
+    }
+
+    fn hover(&self, params: &Value) -> Answer {
+        let Some((_, spot)) = self.spot(params)? else { return Ok(None) };
         let value = match (spot.key, spot.section) {
             (Some(key), _) => key_markdown(&spot.path(), key),
             (None, Some(section)) if spot.is_header => format!("`{}`\n\n{}\n", section.header(), section.doc),
-            _ => return None,
+            _ => return Ok(None),
         };
-        let contents = HoverContents::Markup(MarkupContent { kind: MarkupKind::Markdown, value });
-        Some(Hover { contents, range: None })
+        Ok(Some(json!({ "contents": { "kind": "markdown", "value": value } })))
     }
 
-    fn completions(&self, params: &CompletionParams) -> Option<CompletionResponse> {
-        let at = &params.text_document_position;
-        let open = self.spec(&at.text_document.uri)?;
-        let spot = Spot::at(&open.text, Lines::new(&open.text).offset(at.position));
-        Some(CompletionResponse::Array(complete::at(&open.text, &spot, &folder(&open.uri))))
+    fn completions(&self, params: &Value) -> Answer {
+        let offered = |(open, spot): (&Open, Spot)| complete::at(&open.text, &spot, &folder(&open.uri)).into();
+        Ok(self.spot(params)?.map(offered))
     }
 
     /// The fixes that are as simple as another text in the place of a finding.
-    #[expect(clippy::mutable_key_type, reason = "the protocol's types: its URIs keep what they have parsed")]
-    fn actions(&self, params: &CodeActionParams) -> Option<Vec<CodeActionOrCommand>> {
-        let open = self.spec(&params.text_document.uri)?;
+    fn actions(&self, params: &Value) -> Answer {
+        let asked: Part = of(params, "/range")?;
+        let Some(open) = self.spec(params)? else { return Ok(None) };
         let lines = Lines::new(&open.text);
-        let asked = &params.range;
         let fix = |found: &Diagnostic| {
-            let (Place::Spec(span), Some(new_text)) = (&found.place, found.replacement.clone()) else { return None };
-            let range = Range::new(lines.position(span.start), lines.position(span.end));
+            let (Place::Spec(span), Some(text)) = (&found.place, &found.replacement) else { return None };
+            let range = lines.part(span);
             if range.end < asked.start || asked.end < range.start {
                 return None;
             }
-            let title = format!("Replace by {new_text}");
-            let edits = [(open.uri.clone(), vec![TextEdit { range, new_text }])].into_iter().collect();
-            Some(CodeActionOrCommand::CodeAction(CodeAction {
-                title,
-                kind: Some(CodeActionKind::QUICKFIX),
-                diagnostics: Some(vec![show(found, &lines)]),
-                edit: Some(WorkspaceEdit { changes: Some(edits), ..Default::default() }),
-                is_preferred: Some(true),
-                ..Default::default()
+            Some(json!({
+                "title": format!("Replace by {text}"),
+                "kind": "quickfix",
+                "diagnostics": [show(found, &lines)],
+                "edit": { "changes": { &open.uri: [{ "range": range, "newText": text }] } },
+                "isPreferred": true,
             }))
         };
-        Some(open.findings.iter().filter_map(fix).collect())
+        Ok(Some(open.findings.iter().filter_map(fix).collect()))
     }
 }
 
-fn reply<P: serde::de::DeserializeOwned, R: Serialize>(
-    params: Value,
-    answer: impl FnOnce(P) -> R,
-) -> serde_json::Result<Value> {
-    serde_json::to_value(answer(serde_json::from_value(params)?))
+/// Part of a message.
+fn of<T: DeserializeOwned>(params: &Value, pointer: &str) -> serde_json::Result<T> {
+    serde_json::from_value(params.pointer(pointer).cloned().unwrap_or_default())
 }
 
 /// Whether a TOML file is a spec: an editor opens others, too.
@@ -239,8 +226,8 @@ fn is_spec(text: &str) -> bool {
 }
 
 /// Folder of the file that `uri` names.
-fn folder(uri: &Uri) -> PathBuf {
-    let path = text::decoded(uri.as_str().strip_prefix("file://").unwrap_or_default());
+fn folder(uri: &str) -> PathBuf {
+    let path = text::decoded(uri.strip_prefix("file://").unwrap_or_default());
     Path::new(&path).parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf)
 }
 
@@ -249,8 +236,7 @@ fn findings(open: &Open) -> Vec<Diagnostic> {
     if !is_spec(&open.text) {
         return Vec::new();
     }
-    let source =
-        SpecSource { display_name: open.uri.as_str().to_owned(), text: open.text.clone(), dir: folder(&open.uri) };
+    let source = SpecSource { display_name: open.uri.clone(), text: open.text.clone(), dir: folder(&open.uri) };
     match compile::compile_source(source) {
         Ok(compiled) => [compiled.missed(), compiled.findings].concat(),
         Err(refused) => refused.findings,
@@ -258,26 +244,24 @@ fn findings(open: &Open) -> Vec<Diagnostic> {
 }
 
 /// A finding as an editor shows it. One about a record stands at the key that names it.
-fn show(found: &Diagnostic, lines: &Lines<'_>) -> Shown {
+fn show(found: &Diagnostic, lines: &Lines<'_>) -> Value {
     let (range, file) = match &found.place {
-        Place::Spec(span) => (Range::new(lines.position(span.start), lines.position(span.end)), String::new()),
+        Place::Spec(span) => (lines.part(span), String::new()),
         Place::File { path, line } => {
             let at = line.map_or_else(String::new, |line| format!(":{line}"));
-            let span = lines.find(&format!("\"{path}\""));
-            (Range::new(lines.position(span.start), lines.position(span.end)), format!("{path}{at}: "))
+            (lines.part(&lines.find(&format!("\"{path}\""))), format!("{path}{at}: "))
         }
-        Place::Whole => (Range::default(), String::new()),
+        Place::Whole => (Part::default(), String::new()),
     };
-    Shown {
-        range,
-        severity: Some(match found.severity {
-            Severity::Error => DiagnosticSeverity::ERROR,
-            Severity::Warning => DiagnosticSeverity::WARNING,
-            Severity::Note => DiagnosticSeverity::INFORMATION,
-        }),
-        code: Some(NumberOrString::String(found.code.to_owned())),
-        source: Some("specgen".to_owned()),
-        message: format!("{file}{}\nhelp: {}", found.message, found.help),
-        ..Default::default()
-    }
+    json!({
+        "range": range,
+        "severity": match found.severity {
+            Severity::Error => 1,
+            Severity::Warning => 2,
+            Severity::Note => 3,
+        },
+        "code": found.code,
+        "source": "specgen",
+        "message": format!("{file}{}\nhelp: {}", found.message, found.help),
+    })
 }

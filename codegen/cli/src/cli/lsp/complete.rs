@@ -2,13 +2,24 @@
 
 use std::path::Path;
 
-use lsp_types::{CompletionItem, CompletionItemKind};
+use serde_json::{Value, json};
 use specgen_language::spec::keys::{Item, Key, Presence, SECTIONS, Section, Shape};
 use specgen_language::spec::quantity;
 
 use super::text::Spot;
 
-pub fn at(text: &str, spot: &Spot, folder: &Path) -> Vec<CompletionItem> {
+/// What an editor draws beside an offer.
+#[derive(Clone, Copy)]
+enum Kind {
+    Property = 10,
+    Unit = 11,
+    Value = 12,
+    File = 17,
+    Choice = 20,
+    Section = 22,
+}
+
+pub fn at(text: &str, spot: &Spot, folder: &Path) -> Vec<Value> {
     if spot.is_header || spot.before.trim_start().starts_with('[') && !spot.in_value {
         return sections(&spot.before);
     }
@@ -18,41 +29,34 @@ pub fn at(text: &str, spot: &Spot, folder: &Path) -> Vec<CompletionItem> {
     spot.section.map_or_else(Vec::new, |section| names(text, spot, section))
 }
 
-fn item(label: impl Into<String>, kind: CompletionItemKind, insert: impl Into<String>, detail: &str) -> CompletionItem {
-    CompletionItem {
-        label: label.into(),
-        kind: Some(kind),
-        insert_text: Some(insert.into()),
-        detail: Some(detail.to_owned()),
-        ..Default::default()
-    }
+fn item(label: &str, kind: Kind, insert: &str, detail: &str) -> Value {
+    json!({ "label": label, "kind": kind as u8, "insertText": insert, "detail": detail })
 }
 
-fn sections(before: &str) -> Vec<CompletionItem> {
+fn sections(before: &str) -> Vec<Value> {
     let typed = before.chars().filter(|letter| *letter == '[').count();
     let known = SECTIONS.iter().filter(|section| !section.name.is_empty());
     let offered = known.map(|section| {
         let header = section.header();
         // Brackets that are there are not typed again.
-        item(section.name, CompletionItemKind::STRUCT, header.get(typed..).unwrap_or(section.name), section.doc)
+        item(section.name, Kind::Section, header.get(typed..).unwrap_or(section.name), section.doc)
     });
     offered.collect()
 }
 
 /// Keys of the section, each with a placeholder for its value. The ones that must be there come first.
-fn names(text: &str, spot: &Spot, section: &'static Section) -> Vec<CompletionItem> {
-    let offered = section.keys.iter().enumerate().map(|(place, key)| {
+fn names(text: &str, spot: &Spot, section: &'static Section) -> Vec<Value> {
+    let absent = section.keys.iter().enumerate().filter(|(_, key)| !spot.has(text, key.name));
+    let offered = absent.map(|(place, key)| {
         let optional = key.presence != Presence::Required;
-        CompletionItem {
-            sort_text: Some(format!("{}{place:03}", u8::from(optional))),
-            ..item(key.name, CompletionItemKind::PROPERTY, key.line(), key.doc)
-        }
+        let mut offered = item(key.name, Kind::Property, &key.line(), key.doc);
+        offered["sortText"] = format!("{}{place:03}", u8::from(optional)).into();
+        offered
     });
-    let there = |name: &str| spot.has(text, name);
-    offered.filter(|offered| !there(&offered.label)).collect()
+    offered.collect()
 }
 
-fn values(key: &Key, before: &str, folder: &Path) -> Vec<CompletionItem> {
+fn values(key: &Key, before: &str, folder: &Path) -> Vec<Value> {
     let quoted = before.matches('"').count() % 2 == 1;
     let text = |word: &str| if quoted { word.to_owned() } else { format!("\"{word}\"") };
     let first = match key.shape {
@@ -69,23 +73,21 @@ fn values(key: &Key, before: &str, folder: &Path) -> Vec<CompletionItem> {
     };
     match first {
         Item::Quantity { dimension, .. } if quoted => {
-            quantity::common_units(dimension).map(|unit| item(unit, CompletionItemKind::UNIT, unit, "unit")).collect()
+            quantity::common_units(dimension).map(|unit| item(unit, Kind::Unit, unit, "unit")).collect()
         }
-        Item::Choice(words) => {
-            words.iter().map(|word| item(*word, CompletionItemKind::ENUM_MEMBER, text(word), "")).collect()
-        }
-        Item::Flag => ["true", "false"].map(|word| item(word, CompletionItemKind::VALUE, word, "")).to_vec(),
-        Item::File => files(folder).iter().map(|name| item(name, CompletionItemKind::FILE, text(name), "")).collect(),
+        Item::Choice(words) => words.iter().map(|word| item(word, Kind::Choice, &text(word), "")).collect(),
+        Item::Flag => ["true", "false"].map(|word| item(word, Kind::Value, word, "")).to_vec(),
+        Item::File => files(folder).iter().map(|name| item(name, Kind::File, &text(name), "")).collect(),
         _ if quoted => Vec::new(),
-        _ => vec![item(key.template(), CompletionItemKind::VALUE, key.template(), "the form of a value")],
+        _ => vec![item(&key.template(), Kind::Value, &key.template(), "the form of a value")],
     }
 }
 
 /// Every key by its path, as `write` puts it.
-fn paths(write: impl Fn(&str) -> String) -> Vec<CompletionItem> {
+fn paths(write: impl Fn(&str) -> String) -> Vec<Value> {
     let sections = SECTIONS.iter().filter(|section| !section.name.is_empty());
     let keys = sections.flat_map(|section| section.keys.iter().map(move |key| (section.path(key.name), key.doc)));
-    keys.map(|(path, doc)| item(&path, CompletionItemKind::PROPERTY, write(&path), doc)).collect()
+    keys.map(|(path, doc)| item(&path, Kind::Property, &write(&path), doc)).collect()
 }
 
 /// CSV files beside the spec and one folder below.

@@ -2,8 +2,22 @@
 
 use std::ops::Range;
 
-use lsp_types::Position;
+use serde::{Deserialize, Serialize};
 use specgen_language::spec::keys::{self, Key, Section};
+
+/// A place in a text: a line, and a UTF-16 unit in it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Position {
+    line: u32,
+    character: u32,
+}
+
+/// Part of a text.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub struct Part {
+    pub start: Position,
+    pub end: Position,
+}
 
 /// The lines of a text. Editors count lines and UTF-16 units from 0.
 pub struct Lines<'a> {
@@ -18,7 +32,7 @@ impl<'a> Lines<'a> {
     }
 
     /// Where byte `offset` stands; a byte within a character counts as its beginning.
-    pub fn position(&self, offset: usize) -> Position {
+    fn position(&self, offset: usize) -> Position {
         let mut offset = offset.min(self.text.len());
         while !self.text.is_char_boundary(offset) {
             offset -= 1;
@@ -26,7 +40,12 @@ impl<'a> Lines<'a> {
         // The first line starts at 0, so that there is one at or before `offset`.
         let line = self.starts.partition_point(|start| *start <= offset) - 1;
         let column = self.text[self.starts[line]..offset].encode_utf16().count();
-        Position::new(line as u32, column as u32)
+        Position { line: line as u32, character: column as u32 }
+    }
+
+    /// Where bytes stand.
+    pub fn part(&self, span: &Range<usize>) -> Part {
+        Part { start: self.position(span.start), end: self.position(span.end) }
     }
 
     /// The byte at `position`; past the end of a line, the line's end.
@@ -194,9 +213,9 @@ mod tests {
             assert_eq!(lines.offset(lines.position(offset)), offset);
         }
         let behind = text.find("\"\nb").unwrap_or_default();
-        assert_eq!(lines.position(behind), Position::new(0, 8));
-        assert_eq!(lines.offset(Position::new(0, 99)), text.find('\n').unwrap_or_default());
-        assert_eq!(lines.offset(Position::new(99, 0)), text.len());
+        assert_eq!(lines.position(behind), Position { line: 0, character: 8 });
+        assert_eq!(lines.offset(Position { line: 0, character: 99 }), text.find('\n').unwrap_or_default());
+        assert_eq!(lines.offset(Position { line: 99, character: 0 }), text.len());
     }
 
     #[test]
