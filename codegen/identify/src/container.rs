@@ -3,13 +3,14 @@
 //! Columns are the arrays of numbers with the most values, under their names; what is shorter says something about the record and is
 //! left out. Numbers are written so that they read back to the bit.
 
+mod bytes;
+mod mat;
+mod tdms;
+
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
-
-use matfile::{MatFile, NumericData};
-use tdms_rs::{DataType, TdmsFile};
 
 /// Names and values.
 type Columns = Vec<(String, Vec<f64>)>;
@@ -40,15 +41,20 @@ impl Kind {
         kinds.into_iter().find(|(magic, _)| first.starts_with(magic)).map(|(_, kind)| kind)
     }
 
-    /// The columns of `file`, which lies at `path` and is `bytes` long, as lines.
+    /// The columns of `file`, which lies at `path`, as lines.
     ///
     /// # Errors
     /// Why there are none, in words that follow the name of the file.
-    pub(crate) fn open(self, file: File, path: &Path, bytes: u64) -> Result<Lines, String> {
+    pub(crate) fn open(self, mut file: File, path: &Path) -> Result<Lines, String> {
+        let mut whole = || -> Result<Vec<u8>, String> {
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+            Ok(bytes)
+        };
         let columns = match self {
-            Self::Mat => of_mat(file),
+            Self::Mat => whole().and_then(|file| mat::columns(&file)),
             Self::Hdf5 => of_hdf5(path),
-            Self::Tdms => of_tdms(path, bytes),
+            Self::Tdms => whole().and_then(|file| tdms::columns(&file)),
         };
         let mut columns = columns.map_err(|error| format!("cannot be read: {error}"))?;
         let longest = columns.iter().map(|(_, values)| values.len()).max().unwrap_or(0);
@@ -60,35 +66,9 @@ impl Kind {
     }
 }
 
-fn of_mat(file: File) -> Result<Columns, String> {
-    let file = MatFile::parse(io::BufReader::new(file)).map_err(|error| error.to_string())?;
-    Ok(file
-        .arrays()
-        .iter()
-        .filter(|array| is_column(array.size()))
-        .map(|array| (array.name().to_owned(), numbers(array.data())))
-        .collect())
-}
-
 /// Whether an array has one dimension that counts.
 fn is_column<N: Copy + PartialOrd + From<u8>>(size: &[N]) -> bool {
     size.iter().filter(|length| **length > N::from(1)).count() <= 1
-}
-
-fn numbers(data: &NumericData) -> Vec<f64> {
-    match data {
-        NumericData::Double { real, .. } => real.clone(),
-        NumericData::Single { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::Int8 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::UInt8 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::Int16 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::UInt16 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::Int32 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::UInt32 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        // Counters; beyond 2⁵³ none is exact.
-        NumericData::Int64 { real, .. } => real.iter().map(|value| *value as f64).collect(),
-        NumericData::UInt64 { real, .. } => real.iter().map(|value| *value as f64).collect(),
-    }
 }
 
 /// Datasets of the root, and of its groups where the root has no column.
@@ -111,41 +91,6 @@ fn of_hdf5(path: &Path) -> Result<Columns, String> {
             let group = file.group(&name).map_err(said)?;
             columns.extend(read(group.datasets().map_err(said)?, &|name| group.dataset(name)));
         }
-    }
-    Ok(columns)
-}
-
-fn of_tdms(path: &Path, bytes: u64) -> Result<Columns, String> {
-    let said = |error: tdms_rs::TdmsError| error.to_string();
-    let file = TdmsFile::open(path).map_err(said)?;
-    let mut columns = Vec::new();
-    for channel in file.groups().flat_map(|group| group.channels().collect::<Vec<_>>()) {
-        let count = channel.len();
-        // A damaged file may say any number.
-        if count as u64 > bytes {
-            return Err(format!("channel `{}` has more values than the file has bytes", channel.name()));
-        }
-        macro_rules! values {
-            ($type:ty) => {{
-                let mut values = vec![<$type>::default(); count];
-                channel.read(0..count, &mut values).map_err(said)?;
-                values.into_iter().map(|value| value as f64).collect()
-            }};
-        }
-        let values = match channel.dtype() {
-            DataType::Double => values!(f64),
-            DataType::Float => values!(f32),
-            DataType::I8 => values!(i8),
-            DataType::I16 => values!(i16),
-            DataType::I32 => values!(i32),
-            DataType::I64 => values!(i64),
-            DataType::U8 => values!(u8),
-            DataType::U16 => values!(u16),
-            DataType::U32 => values!(u32),
-            DataType::U64 => values!(u64),
-            DataType::String | DataType::Boolean | DataType::TimeStamp => continue,
-        };
-        columns.push((channel.name().to_owned(), values));
     }
     Ok(columns)
 }

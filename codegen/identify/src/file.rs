@@ -64,7 +64,7 @@ pub(crate) fn open_file(path: &Path, findings: &mut Findings) -> Option<Source> 
         foreign::report_as(&first, &format!("and larger than {} MiB", MAX_FILE_BYTES >> 20), findings);
         return None;
     }
-    kind.open(file, path, bytes)
+    kind.open(file, path)
         .map(Source::Container)
         .map_err(|why| foreign::report_as(&first, &format!("and {why}"), findings))
         .ok()

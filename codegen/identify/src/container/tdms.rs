@@ -1,0 +1,202 @@
+//! TDMS files (NI, TDMS File Format Internal Structure): segments, each with what has changed of its objects, and their values.
+
+use super::Columns;
+use super::bytes::{Bytes, DAMAGED};
+
+/// What a segment has.
+const OBJECTS: u32 = 1 << 1;
+const OBJECTS_ALL_NEW: u32 = 1 << 2;
+const VALUES: u32 = 1 << 3;
+/// One value of each object after the other, in place of all of one object and then all of the next.
+const INTERLEAVED: u32 = 1 << 5;
+const BIG_ENDIAN: u32 = 1 << 6;
+/// A type of any length.
+const TEXT: u32 = 0x20;
+
+/// A channel, a group, or the file.
+struct Object {
+    path: String,
+    kind: u32,
+    /// Bytes of all its values in a chunk.
+    size: usize,
+    values: Vec<f64>,
+}
+
+/// Bytes of a value.
+fn width(kind: u32) -> Result<usize, String> {
+    Ok(match kind {
+        TEXT => 0,
+        1 | 5 | 0x21 => 1,
+        2 | 6 => 2,
+        3 | 7 | 9 | 0x19 => 4,
+        4 | 8 | 10 | 0x1a => 8,
+        // A time.
+        0x44 => 16,
+        _ => return Err(format!("it has values of type {kind:#x}")),
+    })
+}
+
+/// As [`Bytes::numbers`] has it; none for texts, flags and times.
+fn form(kind: u32) -> Option<(char, usize)> {
+    Some(match kind {
+        1 => ('i', 1),
+        2 => ('i', 2),
+        3 => ('i', 4),
+        4 => ('i', 8),
+        5 => ('u', 1),
+        6 => ('u', 2),
+        7 => ('u', 4),
+        8 => ('u', 8),
+        9 | 0x19 => ('f', 4),
+        10 | 0x1a => ('f', 8),
+        _ => return None,
+    })
+}
+
+fn text(from: &mut Bytes) -> Result<String, String> {
+    let length = from.word()? as usize;
+    Ok(String::from_utf8_lossy(from.take(length)?).into_owned())
+}
+
+/// Reads what has changed of `objects`. `listed` are the places of those with values, in their order.
+fn read_objects(mut from: Bytes, objects: &mut Vec<Object>, listed: &mut Vec<usize>) -> Result<(), String> {
+    for _ in 0..from.word()? {
+        let path = text(&mut from)?;
+        let place = objects.iter().position(|object| object.path == path).unwrap_or(objects.len());
+        if place == objects.len() {
+            objects.push(Object { path, kind: TEXT, size: 0, values: Vec::new() });
+        }
+        match from.word()? {
+            u32::MAX => listed.retain(|other| *other != place),
+            given => {
+                // Zero: as it was.
+                if given > 0 {
+                    objects[place].kind = from.word()?;
+                    let (_, count) = (from.word()?, from.count()?);
+                    let kind = objects[place].kind;
+                    let size = if kind == TEXT { Some(from.count()?) } else { count.checked_mul(width(kind)?) };
+                    objects[place].size = size.ok_or(DAMAGED)?;
+                }
+                if !listed.contains(&place) {
+                    listed.push(place);
+                }
+            }
+        }
+        // Properties: a name, a type, a value.
+        for _ in 0..from.word()? {
+            text(&mut from)?;
+            match from.word()? {
+                TEXT => {
+                    text(&mut from)?;
+                }
+                kind => {
+                    from.take(width(kind)?)?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The columns of a file: its channels.
+pub(super) fn columns(file: &[u8]) -> Result<Columns, String> {
+    let (mut objects, mut listed) = (Vec::<Object>::new(), Vec::new());
+    let mut file = Bytes { rest: file, is_big_endian: false };
+    while !file.rest.is_empty() {
+        if file.take(4)? != b"TDSm" {
+            return Err(DAMAGED.to_owned());
+        }
+        file.is_big_endian = false;
+        let has = file.word()?;
+        file.is_big_endian = has & BIG_ENDIAN > 0;
+        let (_version, length, before_values) = (file.word()?, file.count()?, file.count()?);
+        // A writer that was stopped leaves all bits set.
+        let segment = file.take(if length == usize::MAX { file.rest.len() } else { length })?;
+        let (rest, values) = segment.split_at_checked(before_values).ok_or(DAMAGED)?;
+        if has & OBJECTS_ALL_NEW > 0 {
+            listed.clear();
+        }
+        if has & OBJECTS > 0 {
+            read_objects(Bytes { rest, ..file }, &mut objects, &mut listed)?;
+        }
+        let size =
+            listed.iter().try_fold(0_usize, |sum, place| sum.checked_add(objects[*place].size)).ok_or(DAMAGED)?;
+        if has & VALUES == 0 || size == 0 {
+            continue;
+        }
+        let mut row = 0;
+        for place in &listed {
+            row += width(objects[*place].kind)?;
+        }
+        for chunk in values.chunks_exact(size) {
+            let mut at = 0;
+            for place in &listed {
+                let object = &mut objects[*place];
+                let own = if has & INTERLEAVED > 0 { width(object.kind)? } else { object.size };
+                let step = if has & INTERLEAVED > 0 { row } else { size };
+                let bytes: Vec<u8> =
+                    chunk.chunks_exact(step.max(1)).flat_map(|row| row.get(at..at + own)).flatten().copied().collect();
+                at += own;
+                if let Some(form) = form(object.kind) {
+                    object.values.extend(Bytes { rest: &bytes, ..file }.numbers(form));
+                }
+            }
+        }
+    }
+    // The path of a channel is `/'group'/'channel'`, with quotes in names doubled.
+    let named = |object: Object| {
+        let (_, name) = object.path.rsplit_once("'/'")?;
+        Some((name.trim_end_matches('\'').replace("''", "'"), object.values))
+    };
+    Ok(objects.into_iter().filter_map(named).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A segment with channels `a` (doubles) and `b` (words), two values of each in a chunk.
+    fn segment(has: u32, values: &[u8]) -> Vec<u8> {
+        let is_big_endian = has & BIG_ENDIAN > 0;
+        let word = |value: u32| if is_big_endian { value.to_be_bytes() } else { value.to_le_bytes() };
+        let long = |value: u64| if is_big_endian { value.to_be_bytes() } else { value.to_le_bytes() };
+        let text = |text: &str| [&word(text.len() as u32)[..], text.as_bytes()].concat();
+        let mut objects = Vec::new();
+        if has & OBJECTS > 0 {
+            objects.extend(word(3));
+            objects.extend([text("/'scan'"), word(u32::MAX).to_vec(), word(1).to_vec()].concat());
+            objects.extend([text("operator"), word(TEXT).to_vec(), text("nobody")].concat());
+            for (path, kind) in [("/'scan'/'a'", 10), ("/'scan'/'it''s b'", 7)] {
+                objects.extend([text(path), word(20).to_vec(), word(kind).to_vec(), word(1).to_vec()].concat());
+                objects.extend([long(2).to_vec(), word(0).to_vec()].concat());
+            }
+        }
+        let lengths = [long((objects.len() + values.len()) as u64), long(objects.len() as u64)].concat();
+        let version = word(4713);
+        [b"TDSm", &has.to_le_bytes()[..], &version, &lengths, &objects, values].concat()
+    }
+
+    #[test]
+    fn chunks_and_interleaved_values_of_both_orders_of_bytes_are_put_together() {
+        let (mut plain, mut mixed) = (Vec::new(), Vec::new());
+        for chunk in [0_u32, 2] {
+            let [a, b] = [chunk, chunk + 1];
+            plain.extend([a, b].map(f64::from).map(f64::to_le_bytes).concat());
+            plain.extend([a, b].map(u32::to_le_bytes).concat());
+            mixed.extend([a, b].map(|k| [&f64::from(k).to_be_bytes()[..], &k.to_be_bytes()].concat()).concat());
+        }
+        let new = OBJECTS | OBJECTS_ALL_NEW | VALUES;
+        let file = [
+            segment(new, &plain),
+            // As before, and a chunk that is cut off.
+            segment(VALUES, &plain[..30]),
+            segment(new | INTERLEAVED | BIG_ENDIAN, &mixed),
+        ];
+        let expected = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 0.0, 1.0, 2.0, 3.0].to_vec();
+        let wanted = Ok(["a", "it's b"].map(|name| (name.to_owned(), expected.clone())).to_vec());
+        assert_eq!(columns(&file.concat()), wanted);
+        let mut other = file.concat();
+        other.pop();
+        assert_ne!(columns(&other), wanted);
+    }
+}
