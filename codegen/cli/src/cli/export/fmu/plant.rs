@@ -100,7 +100,7 @@ fn rust(compiled: &Compiled) -> Result<BTreeMap<String, String>, Failure> {
     if let Some(profiles) = manifest["profile"].as_table_mut() {
         profiles.retain(|name, _| name == "release");
         if let Some(packages) = profiles["release"]["package"].as_table_mut() {
-            packages.retain(|name, _| lock.contains(&format!("\nname = \"{name}\"\n")));
+            packages.retain(|name, _| name == "*" || lock.contains(&format!("\nname = \"{name}\"\n")));
         }
     }
     files.insert("Cargo.toml".to_owned(), manifest.to_string());
