@@ -23,20 +23,21 @@ fn specgen_tick(board: &mut Board, exchange: &mut Exchange, noticed: Noticed) ->
 /// Of the watchdog, µs: some hundred ticks, and starting the converters anew.
 const WATCHDOG: u32 = 20_000;
 
-#[rtic::app(device = embassy_stm32, peripherals = false, dispatchers = [CEC])]
+#[rtic::app(device = stm32_metapac, peripherals = false)]
 mod app {
     use core::mem::MaybeUninit;
+    use core::sync::atomic::AtomicU8;
 
     use controller::supervised::Machine;
-    use embassy_stm32::interrupt::{InterruptExt, Priority};
-    use embassy_stm32::wdg::IndependentWatchdog;
     use specgen_board::{Desk, Exchange, Health, Noticed, Probes, Schedule, Kept, SampleMemory, catch_up, gather, learn};
     use specgen_link::Endpoint;
     use specgen_stm32::cycles::{self, CYCLES};
     use specgen_stm32::enable::Stop;
+    use specgen_stm32::serial::{Answer, Line, Ring};
+    use specgen_stm32::watchdog::Watchdog;
     use specgen_stm32::{converters, serial, stack_used, supply, timer};
 
-    use crate::pins::{self, Link, Watchdog};
+    use crate::pins::{self, Link};
     use crate::{Board, PASSES, RECORD, WATCHDOG, clocks, memory_intact, prepare, safe};
 
     #[shared]
@@ -49,9 +50,9 @@ mod app {
     struct Local {
         schedule: Schedule,
         health: Health,
-        watchdog: IndependentWatchdog<'static, Watchdog>,
+        watchdog: Watchdog,
         stop: Stop,
-        line: Link,
+        line: Line<Link>,
     }
 
     // What is large is made where it stays: a move of some kilobytes would go over the stack.
@@ -65,6 +66,10 @@ mod app {
         kept: MaybeUninit<Kept> = MaybeUninit::uninit(),
         #[unsafe(link_section = ".record.samples")]
         samples: SampleMemory = SampleMemory::new(),
+        #[unsafe(link_section = ".axisram.ring")]
+        ring: Ring = [const { AtomicU8::new(0) }; _],
+        #[unsafe(link_section = ".axisram.answer")]
+        answer: Answer = [const { AtomicU8::new(0) }; _],
     ])]
     fn init(mut context: init::Context) -> (Shared, Local) {
         let core = &mut context.core;
@@ -72,10 +77,10 @@ mod app {
         // Or the linker leaves it out.
         core::hint::black_box(&raw const crate::SPECGEN_TIMES);
         cycles::start(&mut core.DCB, &mut core.DWT);
-        let wiring = pins::take(clocks::start());
-        let mut watchdog = IndependentWatchdog::new(wiring.watchdog, WATCHDOG);
+        let hertz = clocks::start();
+        let wiring = pins::take(hertz);
         // From here on a start that does not come to its end is a reset.
-        watchdog.unleash();
+        let mut watchdog = Watchdog::start(pins::WATCHDOG, WATCHDOG);
         // No handler of its own: what nobody handles stops with the amplifiers off.
         if !supply::watch(pins::SUPPLY) {
             safe::stop();
@@ -83,26 +88,24 @@ mod app {
 
         let intact = memory_intact() && controller::integrity::intact();
         let exchange = context.local.exchange;
-        exchange.probes = Probes { hertz: timer::hertz(), stack: stack_used };
+        exchange.probes = Probes { hertz, stack: stack_used };
         let machine = converters::at_reset(context.local.machine);
         exchange.record(context.local.record, converters::kept(context.local.kept, machine));
         exchange.play(context.local.passes);
         exchange.show(context.local.samples, serial::BAUD);
         let mut board = converters::board(wiring.adc, wiring.dac, wiring.lines, machine, intact);
-        let Some(period) = timer::period(timer::hertz()) else { safe::stop() };
+        let Some(period) = timer::period(hertz) else { safe::stop() };
         board.start(&mut exchange.report);
         exchange.prepare();
 
-        pins::LINK.set_priority(Priority::P8);
         let mut schedule = Schedule::new(period, 0);
-        if link::spawn().is_err() {
-            safe::stop();
-        }
+        // The bus of the USART has half the clock of its timers.
+        let line = Line::open(&mut core.NVIC, hertz / 2, context.local.ring, context.local.answer);
         timer::start(&mut schedule);
-        watchdog.pet();
+        watchdog.feed();
         (
             Shared { exchange, board },
-            Local { schedule, health: Health::new(), watchdog, stop: wiring.stop, line: wiring.link },
+            Local { schedule, health: Health::new(), watchdog, stop: wiring.stop, line },
         )
     }
 
@@ -121,32 +124,24 @@ mod app {
             exchange.report.took(due.late, timer::now().wrapping_sub(begin), local.schedule.period());
             exchange.orphaned = local.health.is_orphaned();
             if local.health.tick(exchange.beat, due.missed, exchange.report.amplifier_on) {
-                local.watchdog.pet();
+                local.watchdog.feed();
             }
         });
     }
 
-    /// Requests of the host.
+    /// Requests of the host. Its interrupt is nobody's but theirs that `serial` has.
     #[task(
+        binds = CEC,
         priority = 1,
         shared = [exchange, board],
-        local = [
-            line,
-            #[unsafe(link_section = ".axisram.ring")]
-            ring: [u8; serial::RING] = [0; serial::RING],
-            endpoint: Endpoint = Endpoint::new(),
-            desk: Desk = Desk::new(CYCLES),
-            #[unsafe(link_section = ".axisram.answer")]
-            answer: [u8; serial::ANSWER] = [0; serial::ANSWER],
-        ]
+        local = [line, endpoint: Endpoint = Endpoint::new(), desk: Desk = Desk::new(CYCLES)]
     )]
-    async fn link(context: link::Context) {
+    fn link(context: link::Context) {
         let local = context.local;
         let mut shared = (context.shared.exchange, context.shared.board);
-        serial::serve(local.line, local.ring, local.endpoint, local.desk, local.answer, |action| {
+        local.line.serve(local.endpoint, local.desk, &mut |action| {
             shared.lock(|exchange, board| action(exchange, board.machine_mut()));
-        })
-        .await;
+        });
     }
 
     #[idle(shared = [exchange, board])]
@@ -182,7 +177,7 @@ mod safe {
         }
     }
 
-    /// Initialisation and the drivers of the HAL have paths that end here; the tick has none, see docs/bring-up.md.
+    /// Initialisation and the link have paths that end here; the tick has none, see docs/bring-up.md.
     #[panic_handler]
     fn panic(_: &PanicInfo<'_>) -> ! {
         stop()

@@ -13,8 +13,8 @@ use specgen_tests::{compile_edited, image_target, kept, repository};
 /// As of the page: the board in `examples/own-board` beside a generated folder, on an ADC of 16 bits.
 const EDITS: &[(&str, &str)] = &[("mcu = \"mps2-an500\"", "mcu = \"stm32h743zi\""), ("bits  = 17", "bits  = 16")];
 
-/// Builds both programs of the example; its tick cannot fail. Called by the test of the generated board of the same part, whose
-/// HAL is then compiled already, and which says so where there is no cross compiler.
+/// Builds both programs of the example; its tick cannot fail. Called by the test of the generated board of the same part, which says so
+/// where there is no cross compiler.
 pub fn own_board_builds() {
     let Ok(toolchain) = toolchain::find() else { return };
     let compiled = compile_edited("own-board", "reference.toml", EDITS, &[]);

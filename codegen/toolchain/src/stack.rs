@@ -109,8 +109,7 @@ pub struct Reserve {
 }
 
 impl Reserve {
-    /// Of an image; none if it has no board's memory map. Wakers, which the link's interrupts call through a register, set bits
-    /// and are not in it.
+    /// Of an image; none if it has no board's memory map.
     ///
     /// # Errors
     /// [`TargetError::MalformedImage`] if the file is damaged.

@@ -219,7 +219,7 @@ impl Toolchain {
         with_libraries(&mut command, &self.libraries)
             .env("RUSTC", &self.rustc)
             .env("RUSTC_BOOTSTRAP", "1")
-            // See `firmware/stm32/src/silent.rs`.
+            // For a HAL that logs by `defmt`: `examples/own-board/src/machine.rs`.
             .env("DEFMT_LOG", "off")
             // Encoded, so that a path with a space stays one flag.
             .env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"))

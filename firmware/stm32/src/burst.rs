@@ -1,13 +1,13 @@
 //! A converter's SPI with its chip select: frames of some bytes at the speed of the wire.
 //!
-//! The HAL waits for each byte before it gives the next one, and for its two flags in between: at 25 MHz that is longer than the
-//! byte. Here a frame goes through the FIFO of the part, by [`Burst`], which each board has for its SPI.
+//! To wait for each byte before the next one is given takes longer than the byte at 25 MHz. Here a frame goes through the FIFO of the
+//! part, by [`Burst`], which each board has for its SPI.
 
-use embassy_stm32::gpio::Output;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
 
 use crate::CycleDelay;
+use crate::pins::Output;
 
 /// After the chip select has been read back, ns: with that, more than 30.
 const SELECT: u32 = 20;
@@ -41,20 +41,20 @@ pub struct Device<BUS, const CYCLES: u32> {
     /// The SPI.
     pub bus: BUS,
     /// Its chip select, high.
-    pub select: Output<'static>,
+    pub select: Output,
 }
 
 impl<BUS: Burst, const CYCLES: u32> Device<BUS, CYCLES> {
     /// Between two edges of the chip select.
     #[inline]
     fn selected<T>(&mut self, action: impl FnOnce(&mut BUS) -> T) -> T {
-        self.select.set_low();
+        self.select.set(false);
         // Pin and SPI are on different buses, and the edge must be out 30 ns before the first one of the clock (AD7606): what is
         // read back has been written.
-        let _ = self.select.is_set_low();
+        let _ = self.select.is_set();
         CycleDelay::<CYCLES>.delay_ns(SELECT);
         let result = action(&mut self.bus);
-        self.select.set_high();
+        self.select.set(true);
         result
     }
 }

@@ -4,16 +4,16 @@ use core::mem::MaybeUninit;
 
 use controller::supervised::Machine;
 use controller::triggers::{INPUT, LINES, MOST};
-use embassy_stm32::gpio::{AnyPin, Input, Level, Output, Pull, Speed};
-use embassy_stm32::time::Hertz;
-use embassy_stm32::{Peri, spi};
+use embedded_hal::spi::{MODE_1, MODE_2, Mode};
 use specgen_board::{Board, GAUGE_BITS, Kept};
 use specgen_hal::ad5686r::Ad5686rPair;
 use specgen_hal::ad7606::{Ad7606, Window};
+use stm32_metapac::gpio::vals::{Ospeedr, Pupdr};
 
 use crate::CycleDelay;
 use crate::burst::{Burst, Device};
 use crate::enable::Enable;
+use crate::pins::{Input, Output, Pin};
 use crate::pulses::{self, Sampling};
 
 /// AD7606 for gauges of up to 16 bits; the pin-compatible AD7608 or AD7606C-18 for up to 18.
@@ -23,31 +23,31 @@ const REFERENCE: Window = Window::around(2500, 50, 5000, ADC_BITS as u32);
 
 /// The ADC.
 pub type Adc<BUS, const CYCLES: u32> =
-    Ad7606<ADC_BITS, Device<BUS, CYCLES>, Sampling, Input<'static>, Output<'static>, CycleDelay<CYCLES>>;
+    Ad7606<ADC_BITS, Device<BUS, CYCLES>, Sampling, Input, Output, CycleDelay<CYCLES>>;
 /// The DACs.
 pub type Dacs<BUS, const OUTPUT: usize, const CYCLES: u32> =
     Ad5686rPair<Device<BUS, CYCLES>, Device<BUS, CYCLES>, pulses::Output<OUTPUT>, Enable, CycleDelay<CYCLES>>;
 /// Pins of triggers, those of the spec alone.
-pub type TriggerPins = ([Option<Output<'static>>; MOST], Option<Input<'static>>);
+pub type TriggerPins = ([Option<Output>; MOST], Option<Input>);
 /// The machine on them. `OUTPUT`: the channel of LDAC, see [`pulses`].
 pub type OnBoard<BUS, const OUTPUT: usize, const CYCLES: u32> =
     Board<'static, Adc<BUS, CYCLES>, Dacs<BUS, OUTPUT, CYCLES>, TriggerPins>;
 
 /// The pins of the ADC.
 pub struct AdcPins<BUS, const CYCLES: u32> {
-    /// SPI in mode 2, see [`adc_spi`], with CS.
+    /// SPI in [`ADC_MODE`], with CS.
     pub spi: Device<BUS, CYCLES>,
     /// CONVST A and B.
     pub start: Sampling,
     /// BUSY with pull-up, so that a part that is not there is seen.
-    pub busy: Input<'static>,
+    pub busy: Input,
     /// RESET, low.
-    pub reset: Output<'static>,
+    pub reset: Output,
 }
 
 /// The pins of the DACs.
 pub struct DacPins<BUS, const OUTPUT: usize, const CYCLES: u32> {
-    /// SPI in mode 1, see [`dac_spi`], with SYNC of each part.
+    /// SPI in [`DAC_MODE`], with SYNC of each part.
     pub spi: [Device<BUS, CYCLES>; 2],
     /// LDAC of both parts.
     pub load: pulses::Output<OUTPUT>,
@@ -56,31 +56,16 @@ pub struct DacPins<BUS, const OUTPUT: usize, const CYCLES: u32> {
 }
 
 /// SPI of the ADC: SCLK idles high, bits are taken on its falling edge.
-#[must_use]
-pub fn adc_spi(frequency: Hertz) -> spi::Config {
-    spi_config(spi::MODE_2, frequency)
-}
-
+pub const ADC_MODE: Mode = MODE_2;
 /// SPI of the DACs: SCLK idles low, bits are taken on its falling edge.
-#[must_use]
-pub fn dac_spi(frequency: Hertz) -> spi::Config {
-    spi_config(spi::MODE_1, frequency)
-}
-
-/// The HAL takes a faster clock where no divider gives this one: it has to be one that a divider gives.
-fn spi_config(mode: spi::Mode, frequency: Hertz) -> spi::Config {
-    let mut config = spi::Config::default();
-    config.mode = mode;
-    config.frequency = frequency;
-    config
-}
+pub const DAC_MODE: Mode = MODE_1;
 
 /// The pins of the spec's triggers: outputs, low, and the input, pulled down; the others stay as they are after reset.
 #[must_use]
-pub fn trigger_pins(outputs: [Peri<'static, AnyPin>; MOST], input: Peri<'static, AnyPin>) -> TriggerPins {
+pub fn trigger_pins(outputs: [Pin; MOST], input: Pin) -> TriggerPins {
     let mut lines = [(); LINES].into_iter();
-    let outputs = outputs.map(|pin| lines.next().map(|()| Output::new(pin, Level::Low, Speed::Medium)));
-    (outputs, INPUT.then(|| Input::new(input, Pull::Down)))
+    let outputs = outputs.map(|pin| lines.next().map(|()| pin.output(false, Ospeedr::MEDIUM_SPEED)));
+    (outputs, INPUT.then(|| input.input(Pupdr::PULL_DOWN)))
 }
 
 /// The machine at reset, made where it stays. A function of its own, so that the compiler fills the memory instead of a copy

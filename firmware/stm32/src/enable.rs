@@ -10,10 +10,11 @@
 
 use core::convert::Infallible;
 
-use embassy_stm32::gpio::{AfType, Flex, OutputType, Pull, Speed};
-use embassy_stm32::pac::TIM1;
-use embassy_stm32::{peripherals, rcc};
 use embedded_hal::digital::{ErrorType, OutputPin};
+use stm32_metapac::TIM1;
+use stm32_metapac::gpio::vals::{Ospeedr, Pupdr};
+
+use crate::pins::Pin;
 
 /// Alternate function of TIM1 on every pin that has it.
 const FUNCTION: u8 = 1;
@@ -34,20 +35,17 @@ pub struct Enable(());
 #[derive(Debug)]
 pub struct Stop(());
 
-/// Takes both pins: channel `CHANNEL` (1 to 4) of TIM1, low, and its break input.
+/// Takes both pins: channel `CHANNEL` (1 to 4) of TIM1, low, and its break input. TIM1 has its clock, and is as after reset.
 #[must_use]
-pub fn guarded<const CHANNEL: usize>(mut line: Flex<'static>, mut contact: Flex<'static>) -> (Enable, Stop) {
+pub fn guarded<const CHANNEL: usize>(line: Pin, contact: Pin) -> (Enable, Stop) {
     const { assert!(CHANNEL >= 1 && CHANNEL <= 4, "TIM1 has channels 1 to 4") };
-    rcc::enable_and_reset::<peripherals::TIM1>();
     let place = CHANNEL - 1;
-    contact.set_as_af_unchecked(FUNCTION, AfType::input(Pull::Up));
+    contact.function(FUNCTION, Ospeedr::LOW_SPEED, Pupdr::PULL_UP);
     // OISx is 0 after reset: low while it is off.
     TIM1.ccmr_output(place / 2).modify(|w| w.0 |= ACTIVE << (8 * (place % 2) + 4));
     TIM1.ccer().modify(|w| w.0 |= 1 << (4 * place));
     TIM1.bdtr().write(|w| w.0 = GUARDED);
-    line.set_as_af_unchecked(FUNCTION, AfType::output(OutputType::PushPull, Speed::Low));
-    // The pins stay as they are.
-    core::mem::forget((line, contact));
+    line.function(FUNCTION, Ospeedr::LOW_SPEED, Pupdr::FLOATING);
     (Enable(()), Stop(()))
 }
 

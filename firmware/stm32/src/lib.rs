@@ -1,5 +1,5 @@
-//! What the STM32 boards have in common, on `embassy-stm32` as HAL. The part is a cargo feature that the board's program
-//! chooses; pins, clocks and interrupts are the program's, too.
+//! What the STM32 boards have in common, on the registers of `stm32-metapac`: a HAL takes longer to compile than all the rest of an
+//! image. The part is a cargo feature that the board's program chooses; pins, clocks and interrupts are the program's, too.
 #![no_std]
 #![deny(missing_docs)]
 #![deny(unsafe_code)]
@@ -10,13 +10,14 @@ pub mod cycles;
 mod delay;
 pub mod enable;
 mod memory;
+pub mod pins;
 pub mod pulses;
 pub mod serial;
-mod silent;
 mod stack;
 pub mod supply;
 pub mod timer;
 pub mod times;
+pub mod watchdog;
 
 pub use delay::CycleDelay;
 pub use stack::used as stack_used;

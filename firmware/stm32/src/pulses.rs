@@ -12,10 +12,10 @@
 //! ```
 
 use cortex_m::asm;
-use embassy_stm32::pac::timer::TimGp16;
-use embassy_stm32::pac::timer::vals::{Mms, Sms, Ts};
 use specgen_board::PERIOD_NANOSECONDS;
 use specgen_hal::{Edge, Fault};
+use stm32_metapac::timer::TimGp16;
+use stm32_metapac::timer::vals::{Mms, Sms, Ts};
 
 /// LDAC low, ns: the AD5686R wants 15.
 const LOW: u32 = 50;
@@ -24,7 +24,7 @@ const MARGIN: u32 = 150;
 /// Looks at the timer until waiting for LDAC is given up: more than the longest way to the output instant.
 const LOOKS: u32 = 10_000;
 
-/// OCxM: the channel is inactive, active, active from its compare value on. By their numbers: the HAL has a type for each family.
+/// OCxM: the channel is inactive, active, active from its compare value on. By their numbers: there is a type for each family.
 const INACTIVE: u32 = 4;
 const ACTIVE: u32 = 5;
 const FROM_COMPARE: u32 = 7;

@@ -1,81 +1,157 @@
 //! The link over a USART.
 //!
-//! Received bytes go by DMA into a ring, as a tick may last longer than a byte and an F4 holds one byte only. Answers go out
-//! by DMA, so that the background sleeps meanwhile.
+//! Received bytes go by DMA into a ring, as a tick may last longer than a byte and an F4 holds one byte only. Answers go out by DMA,
+//! so that the background goes on meanwhile.
 //!
-//! After an error (noise, framing, overrun) the USART and its ring are made anew: the ring of the HAL keeps its place in a buffer
-//! that the DMA begins from the front again, and what it gives out from then on is not what comes in.
+//! What goes wrong on the line (noise, framing, overrun), and what comes in faster than it is answered, damages frames: their CRC
+//! shows that, it is counted, and the host asks again.
 
-use core::future::pending;
+#![allow(unsafe_code)] // Interrupts are enabled.
 
-use controller::supervised::Machine;
-use embassy_stm32::mode::Async;
-use embassy_stm32::usart::{Config, ConfigError, Uart, UartTx};
-use specgen_board::{Desk, Exchange, Visit};
+use core::marker::PhantomData;
+use core::sync::atomic::{AtomicU8, Ordering};
+
+use cortex_m::asm;
+use cortex_m::peripheral::NVIC;
+use specgen_board::{Access, Desk, Visit};
 use specgen_link::{Endpoint, FRAME};
+use stm32_metapac::{DMA1, Interrupt};
 
 /// Of the link, with 8 data bits, no parity, one stop bit.
 pub const BAUD: u32 = 921_600;
-/// Bytes of the ring: half of it holds what comes in 2.7 ms.
-pub const RING: usize = 512;
-/// Bytes of an answer.
-pub const ANSWER: usize = FRAME;
+/// What the DMA fills over and over: half of it holds what comes in 2.7 ms.
+pub type Ring = [AtomicU8; 512];
+/// An answer while it goes out.
+pub type Answer = [AtomicU8; FRAME];
 
-/// Settings of the USART.
-#[must_use]
-pub fn config() -> Config {
-    let mut config = Config::default();
-    config.baudrate = BAUD;
-    config
+/// The interrupt by which the program serves the link. Its own device is not used, so that the others pend it.
+const SERVICE: Interrupt = Interrupt::CEC;
+/// Priority of the interrupts, in the upper half of the byte as all: 8 of 16, below the tick.
+const PRIORITY: u8 = 8 << 4;
+
+/// CR of a stream: enabled, an interrupt at an error, in the middle and at the end; to the peripheral, over and over; memory by bytes
+/// one after the other, highest priority.
+const ENABLED: u32 = 1;
+const ERROR: u32 = 1 << 2;
+const HALF: u32 = 1 << 3;
+const END: u32 = 1 << 4;
+const SENDS: u32 = 1 << 6;
+const CIRCULAR: u32 = 1 << 8;
+const BYTES: u32 = 1 << 10 | 3 << 16;
+
+/// The USART of a board, whose registers differ between the families.
+pub trait Port {
+    /// Streams of DMA1 to and from it.
+    const SEND: usize;
+    /// See above.
+    const RECEIVE: usize;
+    /// Bits of CR that choose its request, or that its DMA needs besides.
+    const STREAM: u32;
+    /// Its interrupt and those of the streams. Each is to call [`interrupt`].
+    const INTERRUPTS: [Interrupt; 3];
+
+    /// Addresses of the data registers: to send, received.
+    fn data() -> [u32; 2];
+
+    /// Hands over its pins, and the requests of the DMA where a multiplexer chooses them.
+    fn prepare();
+
+    /// Sets it up: DMA both ways, interrupts when the line falls idle and at errors, bits of so many clocks.
+    fn start(clocks: u32);
+
+    /// Takes back its interrupts.
+    fn acknowledge();
 }
 
-/// A USART with its pins and DMA, which can be made as often as it takes.
-pub trait Line {
-    /// The USART, as after a reset.
-    ///
-    /// # Errors
-    /// A rate that the clocks do not give.
-    fn open(&mut self) -> Result<Uart<'_, Async>, ConfigError>;
+/// The USART with its DMA.
+pub struct Line<P> {
+    ring: &'static Ring,
+    answer: &'static Answer,
+    /// Place of the next byte in the ring.
+    next: usize,
+    port: PhantomData<P>,
 }
 
-/// Answers requests for ever. `with` gives access to the exchange and the machine, with the tick held off. `ring` and `answer`
-/// are where the DMA can reach them.
-pub async fn serve(
-    line: &mut impl Line,
-    ring: &mut [u8; RING],
-    endpoint: &mut Endpoint,
-    desk: &mut Desk,
-    answer: &mut [u8; ANSWER],
-    mut with: impl FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine)),
-) -> ! {
-    let mut bytes = [0; 64];
-    loop {
-        // On noise without end this loop has the background for itself, which is alive all the same.
-        with(&mut |exchange, _| exchange.beat = exchange.beat.wrapping_add(1));
-        // The rate is one that the clocks give.
-        let Ok(uart) = line.open() else {
-            pending::<()>().await;
-            continue;
-        };
-        let (mut sender, receiver) = uart.split();
-        let mut receiver = receiver.into_ring_buffered(&mut *ring);
-        // Whatever the host has taken for bytes meanwhile ends here.
-        send(&mut sender, answer, &[0]).await;
-        // The frame in which an error came is lost, and counted by its CRC.
-        while let Ok(count) = receiver.read(&mut bytes).await {
-            for &byte in bytes.iter().take(count) {
-                if let Some(reply) = endpoint.push(byte, &mut Visit { desk: &mut *desk, with: &mut with }) {
-                    send(&mut sender, answer, reply).await;
-                }
+impl<P: Port> Line<P> {
+    /// Opens the link. `hertz`: clock of the USART. `ring` and `answer` are where the DMA can reach them.
+    pub fn open(nvic: &mut NVIC, hertz: u32, ring: &'static Ring, answer: &'static Answer) -> Self {
+        let [_, received] = P::data();
+        P::prepare();
+        begin::<P>(P::RECEIVE, received, ring, ring.len(), HALF | CIRCULAR);
+        P::start((hertz + BAUD / 2) / BAUD);
+        for interrupt in P::INTERRUPTS {
+            // SAFETY: they take back what calls them, and pend the service, which the program enables.
+            unsafe {
+                nvic.set_priority(interrupt, PRIORITY);
+                NVIC::unmask(interrupt);
+            }
+        }
+        let line = Self { ring, answer, next: 0, port: PhantomData };
+        // Whatever the host has taken for bytes until now ends here.
+        line.send(&[0]);
+        line
+    }
+
+    /// Takes what has come in, and answers it, for as long as no answer is on its way: the end of one is an interrupt, which comes back
+    /// here.
+    pub fn serve(&mut self, endpoint: &mut Endpoint, desk: &mut Desk, with: &mut Access<'_>) {
+        while !DMA1.st(P::SEND).cr().read().en() {
+            let Some(byte) = self.take() else { return };
+            if let Some(reply) = endpoint.push(byte, &mut Visit { desk: &mut *desk, with: &mut *with }) {
+                self.send(reply);
             }
         }
     }
+
+    /// The next byte that has come in.
+    fn take(&mut self) -> Option<u8> {
+        let left = usize::from(DMA1.st(P::RECEIVE).ndtr().read().ndt());
+        if self.next == (self.ring.len() - left) % self.ring.len() {
+            return None;
+        }
+        let byte = self.ring.get(self.next)?.load(Ordering::Relaxed);
+        self.next = (self.next + 1) % self.ring.len();
+        Some(byte)
+    }
+
+    /// Sends from where the DMA can reach it. What does not go out the host asks for again.
+    fn send(&self, bytes: &[u8]) {
+        for (slot, value) in self.answer.iter().zip(bytes) {
+            slot.store(*value, Ordering::Relaxed);
+        }
+        let [to, _] = P::data();
+        begin::<P>(P::SEND, to, self.answer, bytes.len(), SENDS);
+    }
 }
 
-/// Sends from where the DMA can reach it. What does not go out the host asks for again.
-async fn send(sender: &mut UartTx<'_, Async>, room: &mut [u8; ANSWER], bytes: &[u8]) {
-    for (slot, value) in room.iter_mut().zip(bytes) {
-        *slot = *value;
-    }
-    let _ = sender.write(room.get(..bytes.len()).unwrap_or_default()).await;
+/// Starts a stream that has come to its end, or never ran.
+fn begin<P: Port>(number: usize, register: u32, memory: &'static [AtomicU8], count: usize, more: u32) {
+    acknowledge(number);
+    let stream = DMA1.st(number);
+    stream.par().write_value(register);
+    stream.m0ar().write_value(memory.as_ptr() as u32);
+    stream.ndtr().write(|w| w.set_ndt(count as u16));
+    // Directly, without its FIFO.
+    stream.fcr().write(|w| w.0 = 0);
+    // What was written to memory is there.
+    asm::dmb();
+    stream.cr().write(|w| w.0 = P::STREAM | BYTES | ERROR | END | more | ENABLED);
+}
+
+/// Takes back what a stream has to say. An error is one of the program: no such memory.
+fn acknowledge(number: usize) {
+    let (register, place) = (number / 4, number % 4);
+    assert!(!DMA1.isr(register).read().teif(place));
+    DMA1.ifcr(register).write(|w| {
+        w.set_htif(place, true);
+        w.set_tcif(place, true);
+    });
+}
+
+/// What the interrupts of USART and streams do: the link is served, below the tick and above the background.
+pub fn interrupt<P: Port>() {
+    acknowledge(P::SEND);
+    acknowledge(P::RECEIVE);
+    P::acknowledge();
+    NVIC::pend(SERVICE);
 }

@@ -6,8 +6,8 @@
 
 #![allow(unsafe_code)] // An interrupt is enabled.
 
-use embassy_stm32::interrupt::InterruptExt;
-use embassy_stm32::pac::{EXTI, Interrupt, PWR};
+use cortex_m::peripheral::NVIC;
+use stm32_metapac::{EXTI, Interrupt, PWR};
 
 /// PLS: the last but one threshold.
 const THRESHOLD: u8 = 6;
@@ -25,6 +25,6 @@ pub fn watch(interrupt: Interrupt) -> bool {
     EXTI.rtsr(0).modify(|w| w.set_line(LINE, true));
     EXTI.imr(0).modify(|w| w.set_line(LINE, true));
     // SAFETY: its handler stops the program, whatever it was about to do.
-    unsafe { interrupt.enable() };
+    unsafe { NVIC::unmask(interrupt) };
     !PWR.csr1().read().pvdo()
 }

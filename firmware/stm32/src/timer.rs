@@ -4,10 +4,8 @@
 use core::num::NonZeroU32;
 
 use cortex_m::peripheral::NVIC;
-use embassy_stm32::pac::{Interrupt, TIM2};
-use embassy_stm32::peripherals;
-use embassy_stm32::rcc;
 use specgen_board::{PERIOD_NANOSECONDS, Schedule};
+use stm32_metapac::{Interrupt, TIM2};
 
 use crate::pulses;
 
@@ -18,9 +16,8 @@ pub const fn period(hertz: u32) -> Option<NonZeroU32> {
     if counts < 1 << 31 { NonZeroU32::new(counts as u32) } else { None }
 }
 
-/// Starts the counter; the first interrupt comes one period later.
+/// Starts the counter, which has its clock and is as after reset; the first interrupt comes one period later.
 pub fn start(schedule: &mut Schedule) {
-    rcc::enable_and_reset::<peripherals::TIM2>();
     TIM2.psc().write_value(0);
     TIM2.arr().write_value(u32::MAX);
     TIM2.cr2().modify(|w| w.set_mms(pulses::LEADS));
@@ -28,12 +25,6 @@ pub fn start(schedule: &mut Schedule) {
     acknowledge();
     TIM2.dier().write(|w| w.set_ccie(0, true));
     TIM2.cr1().write(|w| w.set_cen(true));
-}
-
-/// Clock of the counter, Hz.
-#[must_use]
-pub fn hertz() -> u32 {
-    rcc::frequency::<peripherals::TIM2>().0
 }
 
 /// The counter.

@@ -1,7 +1,5 @@
 //! What decides about the time of a tick, for specgen, which reads it from the image.
 
-use embassy_stm32::time::Hertz;
-
 /// Registers that are read and written, and instructions.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -36,12 +34,12 @@ pub struct Times {
 impl Times {
     /// Clock of the core, Hz; FLASH_ACR and CCR; SCLK of ADC and DACs.
     #[must_use]
-    pub const fn new(core: u32, registers: [u32; 2], sclk: [Hertz; 2]) -> Self {
+    pub const fn new(core: u32, registers: [u32; 2], sclk: [u32; 2]) -> Self {
         Self {
             version: 1,
             core,
             registers,
-            sclk: [sclk[0].0, sclk[1].0],
+            sclk,
             byte: Work { reads: 3, writes: 1, instructions: 16 },
             frame: Work { reads: 3, writes: 6, instructions: 60 },
             interrupt: Work { reads: 6, writes: 4, instructions: 150 },

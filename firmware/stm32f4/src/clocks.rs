@@ -1,13 +1,10 @@
 //! Clocks of the NUCLEO-F446RE: 8 MHz of the ST-LINK, 180 MHz core, 90 MHz timers, 45 and 90 MHz SPI.
 
-use embassy_stm32::interrupt::Priority;
-use embassy_stm32::pac::FLASH;
-use embassy_stm32::rcc::{
-    AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllSource, Sysclk,
-};
-use embassy_stm32::time::Hertz;
-use embassy_stm32::{Config, Peripherals};
 use specgen_stm32::times::Times;
+use stm32_metapac::flash::vals::Latency;
+use stm32_metapac::pwr::vals::Vos;
+use stm32_metapac::rcc::vals::{Hpre, Pllm, Plln, Pllp, Pllsrc, Ppre, Sw};
+use stm32_metapac::{DBGMCU, FLASH, PWR, RCC};
 
 /// Clock of TIM2 and TIM3, Hz.
 pub const TIMER: u32 = 90_000_000;
@@ -15,21 +12,89 @@ pub const TIMER: u32 = 90_000_000;
 pub const COPY: u32 = TIMER / 1_000_000 * 40;
 /// What `cortex_m::asm::delay` gets through in a microsecond at most.
 pub const DELAY: u32 = 180;
-/// SCLK of the ADC: 17 MHz at most at 3.3 V, and 90 MHz can only be divided by powers of two.
-pub const ADC: Hertz = Hertz(11_250_000);
-/// SCLK of the DACs: 25 MHz at most where something is read back.
-pub const DAC: Hertz = Hertz(22_500_000);
+/// Divides 90 MHz to SCLK of the ADC: 17 MHz at most at 3.3 V, and a divider is a power of two.
+pub const ADC: u32 = 8;
+/// Divides 45 MHz to SCLK of the DACs: 25 MHz at most where something is read back.
+pub const DAC: u32 = 2;
 /// From sampling to the change of the outputs, ns: codes that are written by then are out at this instant, later ones when they are
 /// written.
 pub const OUTPUT: u32 = 95_000;
 
 /// For the estimate of a tick: 180 MHz; five wait states of the flash, its accelerator on.
-pub const TIMES: Times = Times::new(180_000_000, [0b111 << 8 | 5, 0], [ADC, DAC]);
+pub const TIMES: Times = Times::new(180_000_000, [0b111 << 8 | 5, 0], [90_000_000 / ADC, 45_000_000 / DAC]);
 
-/// Clocks as above, all DMA below the tick, and the accelerator of the flash, which the HAL leaves off: lines of code and constants are
-/// kept, and the next line is fetched ahead of time. What it keeps is emptied first, which is possible only while it is off (RM0390).
-pub fn start() -> Peripherals {
-    let peripherals = embassy_stm32::init(config());
+/// Clocks as above, of every device that is used, too; that of TIM2 and TIM3, Hz, which is twice that of their bus. The core runs from
+/// HSI until then, as after every reset. Names: RM0390, chapters 3 (flash), 5 (PWR) and 6 (RCC).
+pub fn start() -> u32 {
+    // A debugger sees the core while it sleeps.
+    DBGMCU.cr().modify(|w| {
+        w.set_dbg_sleep(true);
+        w.set_dbg_stop(true);
+        w.set_dbg_standby(true);
+    });
+    devices();
+    // Scale 1 and over-drive mode, while HSI is the clock: 180 MHz need both.
+    PWR.cr1().modify(|w| w.set_vos(Vos::SCALE1));
+    PWR.cr1().modify(|w| w.set_oden(true));
+    while !PWR.csr1().read().odrdy() {}
+    PWR.cr1().modify(|w| w.set_odswen(true));
+    while !PWR.csr1().read().odswrdy() {}
+
+    // HSE: a clock from outside.
+    RCC.cr().modify(|w| w.set_hsebyp(true));
+    RCC.cr().modify(|w| w.set_hseon(true));
+    while !RCC.cr().read().hserdy() {}
+    // 8 MHz / 4 * 180 / 2; Q and R are not used.
+    RCC.pllcfgr().write(|w| {
+        w.set_pllsrc(Pllsrc::HSE);
+        w.set_pllm(Pllm::DIV4);
+        w.set_plln(Plln::MUL180);
+        w.set_pllp(Pllp::DIV2);
+    });
+    RCC.cr().modify(|w| w.set_pllon(true));
+    while !RCC.cr().read().pllrdy() {}
+
+    // Wait states of the flash before the clock gets faster.
+    FLASH.acr().write(|w| w.set_latency(Latency::WS5));
+    while FLASH.acr().read().latency() != Latency::WS5 {}
+    RCC.cfgr().modify(|w| {
+        w.set_sw(Sw::PLL1_P);
+        w.set_hpre(Hpre::DIV1);
+        w.set_ppre1(Ppre::DIV4);
+        w.set_ppre2(Ppre::DIV2);
+    });
+    while RCC.cfgr().read().sws() != Sw::PLL1_P {}
+    accelerate();
+    TIMER
+}
+
+/// Clocks of devices. What is read back has been written, and by then they run.
+fn devices() {
+    RCC.ahb1enr().modify(|w| {
+        w.set_gpioaen(true);
+        w.set_gpioben(true);
+        w.set_gpiocen(true);
+        w.set_gpioden(true);
+        w.set_dma1en(true);
+    });
+    RCC.apb1enr().modify(|w| {
+        w.set_tim2en(true);
+        w.set_tim3en(true);
+        w.set_spi3en(true);
+        w.set_usart2en(true);
+        w.set_pwren(true);
+    });
+    RCC.apb2enr().modify(|w| {
+        w.set_tim1en(true);
+        w.set_spi1en(true);
+        w.set_syscfgen(true);
+    });
+    let _ = RCC.apb2enr().read();
+}
+
+/// The accelerator of the flash: lines of code and constants are kept, and the next line is fetched ahead of time. What it keeps is
+/// emptied first, which is possible only while it is off.
+fn accelerate() {
     FLASH.acr().modify(|w| {
         w.set_icrst(true);
         w.set_dcrst(true);
@@ -41,19 +106,4 @@ pub fn start() -> Peripherals {
         w.set_icen(true);
         w.set_dcen(true);
     });
-    peripherals
-}
-
-fn config() -> Config {
-    let mut config = Config::default();
-    config.rcc.hse = Some(Hse { freq: Hertz(8_000_000), mode: HseMode::Bypass });
-    config.rcc.pll_src = PllSource::HSE;
-    config.rcc.pll =
-        Some(Pll { prediv: PllPreDiv::DIV4, mul: PllMul::MUL180, divp: Some(PllPDiv::DIV2), divq: None, divr: None });
-    config.rcc.sys = Sysclk::PLL1_P;
-    config.rcc.ahb_pre = AHBPrescaler::DIV1;
-    config.rcc.apb1_pre = APBPrescaler::DIV4;
-    config.rcc.apb2_pre = APBPrescaler::DIV2;
-    config.dma_interrupt_priority = Priority::P8;
-    config
 }

@@ -1,36 +1,22 @@
 //! The wiring: which pin goes where. The table in docs/bring-up.md is this file in words.
 
-use embassy_stm32::Peripherals;
-use embassy_stm32::gpio::{AnyPin, Flex, Input, Level, Output, OutputType, Pull, Speed};
-pub use embassy_stm32::interrupt::USART2 as LINK;
-use embassy_stm32::mode::Async;
-pub use embassy_stm32::peripherals::IWDG as Watchdog;
-use embassy_stm32::peripherals::{TIM3, USART2};
-use embassy_stm32::spi::Spi;
-use embassy_stm32::timer::simple_pwm::PwmPin;
-use embassy_stm32::timer::{Ch1, Ch2};
-use embassy_stm32::usart::{ConfigError, Uart};
-use embassy_stm32::{Peri, bind_interrupts, dma, pac, peripherals, rcc, usart};
 use specgen_stm32::burst::Device;
-use specgen_stm32::converters::{AdcPins, DacPins, TriggerPins, adc_spi, dac_spi, trigger_pins};
+use specgen_stm32::converters::{ADC_MODE, AdcPins, DAC_MODE, DacPins, TriggerPins, trigger_pins};
 use specgen_stm32::enable::{self, Stop};
+use specgen_stm32::pins::Pin;
 use specgen_stm32::pulses::Pulses;
-use specgen_stm32::serial;
+use specgen_stm32::serial::{self, Port};
+use stm32_metapac::gpio::vals::{Ospeedr, Pupdr};
+use stm32_metapac::iwdg::Iwdg;
+use stm32_metapac::{GPIOA, GPIOB, GPIOC, GPIOD, IWDG, Interrupt, SPI1, SPI3, TIM3, USART2, interrupt};
 
 use crate::clocks::{self, DELAY};
 use crate::spi::Registers;
 
-bind_interrupts!(
-    /// Interrupts of the link.
-    pub struct Irqs {
-        USART2 => usart::InterruptHandler<USART2>;
-        DMA1_STREAM6 => dma::InterruptHandler<peripherals::DMA1_CH6>;
-        DMA1_STREAM5 => dma::InterruptHandler<peripherals::DMA1_CH5>;
-    }
-);
-
 /// Interrupt of the voltage detector.
-pub const SUPPLY: pac::Interrupt = pac::Interrupt::PVD;
+pub const SUPPLY: Interrupt = Interrupt::PVD;
+/// The watchdog.
+pub const WATCHDOG: Iwdg = IWDG;
 /// Channel of TIM3 that drives LDAC, counted from 0: CH1.
 pub const OUTPUT: usize = 0;
 /// That of CONVST: CH2.
@@ -46,58 +32,103 @@ pub struct Wiring {
     pub lines: TriggerPins,
     /// Emergency stop: a closed contact to ground, at the break input of TIM1; open is stop.
     pub stop: Stop,
-    /// Virtual COM port of the ST-LINK.
-    pub link: Link,
-    /// Watchdog.
-    pub watchdog: Peri<'static, Watchdog>,
 }
 
-/// Takes the pins. The enable line comes first and is driven low: channel 1 of TIM1, with its break input.
-pub fn take(p: Peripherals) -> Wiring {
-    let (enable, stop) = enable::guarded::<1>(Flex::new(p.PA8), Flex::new(p.PB12));
-    let high = Level::High;
-    rcc::enable_and_reset::<TIM3>();
-    let clock = rcc::frequency::<TIM3>().0;
+/// Takes the pins; `hertz` is the clock of TIM3. The enable line comes first and is driven low: channel 1 of TIM1, with its break
+/// input.
+pub fn take(hertz: u32) -> Wiring {
+    let (enable, stop) = enable::guarded::<1>(Pin(GPIOA, 8), Pin(GPIOB, 12));
     // At rest before the pins are the timer's.
-    let (start, load) = Pulses::edges::<SAMPLING, OUTPUT>(pac::TIM3, clock, clocks::OUTPUT);
-    core::mem::forget(PwmPin::<TIM3, Ch2>::new(p.PC7, OutputType::PushPull));
-    core::mem::forget(PwmPin::<TIM3, Ch1>::new(p.PC6, OutputType::PushPull));
-    let adc = Registers::new(Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, adc_spi(clocks::ADC)), pac::SPI1);
-    let dac = Registers::new(Spi::new_blocking(p.SPI3, p.PC10, p.PC12, p.PC11, dac_spi(clocks::DAC)), pac::SPI3);
-    let select = |pin: Peri<'static, AnyPin>| Output::new(pin, high, Speed::VeryHigh);
+    let (start, load) = Pulses::edges::<SAMPLING, OUTPUT>(TIM3, hertz, clocks::OUTPUT);
+    for pin in [Pin(GPIOC, 7), Pin(GPIOC, 6)] {
+        pin.function(2, Ospeedr::VERY_HIGH_SPEED, Pupdr::FLOATING);
+    }
+    bus([Pin(GPIOA, 5), Pin(GPIOA, 7), Pin(GPIOA, 6)], 5, Pupdr::PULL_UP);
+    let adc = Registers::new(SPI1, ADC_MODE, clocks::ADC);
+    bus([Pin(GPIOC, 10), Pin(GPIOC, 12), Pin(GPIOC, 11)], 6, Pupdr::PULL_DOWN);
+    let dac = Registers::new(SPI3, DAC_MODE, clocks::DAC);
+    let select = |pin: Pin| pin.output(true, Ospeedr::VERY_HIGH_SPEED);
     Wiring {
         adc: AdcPins {
-            spi: Device { bus: adc, select: select(p.PB6.into()) },
+            spi: Device { bus: adc, select: select(Pin(GPIOB, 6)) },
             start,
-            busy: Input::new(p.PA9, Pull::Up),
-            reset: Output::new(p.PB10, Level::Low, Speed::Low),
+            busy: Pin(GPIOA, 9).input(Pupdr::PULL_UP),
+            reset: Pin(GPIOB, 10).output(false, Ospeedr::LOW_SPEED),
         },
         dac: DacPins {
             spi: [
-                Device { bus: dac.again(), select: select(p.PD2.into()) },
-                Device { bus: dac, select: select(p.PC8.into()) },
+                Device { bus: dac.again(), select: select(Pin(GPIOD, 2)) },
+                Device { bus: dac, select: select(Pin(GPIOC, 8)) },
             ],
             load,
             enable,
         },
-        lines: trigger_pins([p.PC0.into(), p.PC1.into(), p.PC2.into(), p.PC3.into()], p.PC4.into()),
+        lines: trigger_pins([0, 1, 2, 3].map(|number| Pin(GPIOC, number)), Pin(GPIOC, 4)),
         stop,
-        link: Link { usart: p.USART2, pins: (p.PA3, p.PA2), channels: (p.DMA1_CH6, p.DMA1_CH5) },
-        watchdog: p.IWDG,
     }
 }
 
-/// The USART of the link, its pins RX and TX, its DMA for sending and receiving.
-pub struct Link {
-    usart: Peri<'static, USART2>,
-    pins: (Peri<'static, peripherals::PA3>, Peri<'static, peripherals::PA2>),
-    channels: (Peri<'static, peripherals::DMA1_CH6>, Peri<'static, peripherals::DMA1_CH5>),
+/// Hands the pins of an SPI over: SCK, pulled to where it idles, MOSI, MISO.
+fn bus([clock, output, input]: [Pin; 3], function: u8, idle: Pupdr) {
+    clock.function(function, Ospeedr::VERY_HIGH_SPEED, idle);
+    output.function(function, Ospeedr::VERY_HIGH_SPEED, Pupdr::FLOATING);
+    input.function(function, Ospeedr::LOW_SPEED, Pupdr::FLOATING);
 }
 
-impl serial::Line for Link {
-    fn open(&mut self) -> Result<Uart<'_, Async>, ConfigError> {
-        let Self { usart, pins: (rx, tx), channels: (send, receive) } = self;
-        let (rx, tx, send, receive) = (rx.reborrow(), tx.reborrow(), send.reborrow(), receive.reborrow());
-        Uart::new(usart.reborrow(), rx, tx, send, receive, Irqs, serial::config())
+/// The USART of the link: USART2.
+pub struct Link;
+
+impl Port for Link {
+    const SEND: usize = 6;
+    const RECEIVE: usize = 5;
+    /// CHSEL: USART2 is channel 4 of both streams (RM0390, table of DMA1's requests).
+    const STREAM: u32 = 4 << 25;
+    const INTERRUPTS: [Interrupt; 3] = [Interrupt::USART2, Interrupt::DMA1_STREAM5, Interrupt::DMA1_STREAM6];
+
+    fn data() -> [u32; 2] {
+        [USART2.dr().as_ptr() as u32; 2]
     }
+
+    fn prepare() {
+        Pin(GPIOA, 3).function(7, Ospeedr::LOW_SPEED, Pupdr::FLOATING);
+        Pin(GPIOA, 2).function(7, Ospeedr::MEDIUM_SPEED, Pupdr::FLOATING);
+    }
+
+    fn start(clocks: u32) {
+        USART2.brr().write(|w| w.0 = clocks);
+        USART2.cr3().write(|w| {
+            w.set_eie(true);
+            w.set_dmar(true);
+            w.set_dmat(true);
+        });
+        USART2.cr1().write(|w| {
+            w.set_ue(true);
+            w.set_re(true);
+            w.set_te(true);
+            w.set_idleie(true);
+        });
+    }
+
+    fn acknowledge() {
+        let status = USART2.sr().read();
+        // Cleared by reading the data after the status; only then, as that may take a byte that is the DMA's.
+        if status.idle() || status.fe() || status.ne() || status.ore() {
+            let _ = USART2.dr().read();
+        }
+    }
+}
+
+#[interrupt]
+fn USART2() {
+    serial::interrupt::<Link>();
+}
+
+#[interrupt]
+fn DMA1_STREAM5() {
+    serial::interrupt::<Link>();
+}
+
+#[interrupt]
+fn DMA1_STREAM6() {
+    serial::interrupt::<Link>();
 }

@@ -1,25 +1,38 @@
 //! The SPI of the STM32F4: a byte in its shift register, one before it and one behind it.
 
-use embassy_stm32::mode::Blocking;
-use embassy_stm32::pac::spi::Spi as Pac;
-use embassy_stm32::spi::Spi;
-use embassy_stm32::spi::mode::Master;
+use embedded_hal::spi::{Mode, Phase, Polarity};
 use specgen_stm32::burst::{Burst, Stuck};
+use stm32_metapac::spi::Spi;
+use stm32_metapac::spi::vals::{Br, Cpha, Cpol, Mstr};
 
 /// Looks for each byte until it is given up: some ten times what 11 MHz take.
 const LOOKS: usize = 100;
 
 /// Its registers, set up.
 pub struct Registers {
-    spi: Pac,
+    spi: Spi,
 }
 
 impl Registers {
-    /// Takes an SPI that the HAL has set up for bytes, with its registers. Its pins and its clock stay as they are.
+    /// Sets up an SPI that is as after reset, and has its clock and its pins: master, bytes, MSB first, SCLK the clock divided by
+    /// `divider`, a power of two.
     #[must_use]
-    pub fn new(driver: Spi<'static, Blocking, Master>, spi: Pac) -> Self {
-        core::mem::forget(driver);
-        spi.cr1().modify(|w| w.set_spe(true));
+    pub fn new(spi: Spi, mode: Mode, divider: u32) -> Self {
+        spi.cr2().modify(|w| w.set_ssoe(true));
+        spi.cr1().modify(|w| {
+            w.set_mstr(Mstr::MASTER);
+            w.set_cpol(if mode.polarity == Polarity::IdleHigh { Cpol::IDLE_HIGH } else { Cpol::IDLE_LOW });
+            w.set_cpha(if mode.phase == Phase::CaptureOnSecondTransition {
+                Cpha::SECOND_EDGE
+            } else {
+                Cpha::FIRST_EDGE
+            });
+            w.set_br(Br::from_bits(divider.ilog2() as u8 - 1));
+            // Its own select is not looked at: as if it were high.
+            w.set_ssm(true);
+            w.set_ssi(true);
+            w.set_spe(true);
+        });
         Self { spi }
     }
 

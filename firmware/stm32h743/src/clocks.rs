@@ -1,15 +1,10 @@
 //! Clocks of the NUCLEO-H743ZI2 from the 8 MHz of the ST-LINK: core 480 MHz, or 400 where the revision allows no more; buses half
 //! of that, timers as the buses; 33.3 and 50 MHz for the SPI of ADC and DACs.
 
-use embassy_stm32::interrupt::Priority;
-use embassy_stm32::pac::DBGMCU;
-use embassy_stm32::rcc::mux::{Saisel, Spi45sel};
-use embassy_stm32::rcc::{
-    AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk, VoltageScale,
-};
-use embassy_stm32::time::Hertz;
-use embassy_stm32::{Config, Peripherals};
 use specgen_stm32::times::Times;
+use stm32_metapac::pwr::vals::Vos;
+use stm32_metapac::rcc::vals::{Hpre, Plldiv, Pllm, Plln, Pllrge, Pllsrc, Pllvcosel, Ppre, Saisel, Spi45sel, Sw};
+use stm32_metapac::{DBGMCU, FLASH, PWR, RCC, SYSCFG};
 
 /// Clock of TIM2 and TIM4 at most, Hz.
 pub const TIMER: u32 = 240_000_000;
@@ -17,16 +12,16 @@ pub const TIMER: u32 = 240_000_000;
 pub const COPY: u32 = TIMER / 1_000_000 * 12;
 /// What `cortex_m::asm::delay` gets through in a microsecond at most: two a cycle.
 pub const DELAY: u32 = 960;
-/// SCLK of the ADC: 17 MHz at most at 3.3 V.
-pub const ADC: Hertz = Hertz(16_666_666);
-/// SCLK of the DACs: 25 MHz at most where something is read back.
-pub const DAC: Hertz = Hertz(25_000_000);
+/// Divides 33.3 MHz to SCLK of the ADC: 17 MHz at most at 3.3 V.
+pub const ADC: u32 = 2;
+/// Divides 50 MHz to SCLK of the DACs: 25 MHz at most where something is read back.
+pub const DAC: u32 = 2;
 /// From sampling to the change of the outputs, ns: codes that are written by then are out at this instant, later ones when they are
 /// written.
 pub const OUTPUT: u32 = 48_000;
 
 /// For the estimate of a tick: 480 MHz; four wait states of the flash, both caches.
-pub const TIMES: Times = Times::new(480_000_000, [4, 1 << 17 | 1 << 16], [ADC, DAC]);
+pub const TIMES: Times = Times::new(480_000_000, [4, 1 << 17 | 1 << 16], [33_333_333 / ADC, 50_000_000 / DAC]);
 
 /// REV_ID of revision V, the first with voltage scale 0 and so 480 MHz (ES0392).
 const REVISION_V: u16 = 0x2003;
@@ -36,35 +31,127 @@ pub fn is_revision_v() -> bool {
     DBGMCU.idc().read().rev_id() >= REVISION_V
 }
 
-/// Clocks as above, and all DMA below the tick.
-pub fn start() -> Peripherals {
-    embassy_stm32::init(config())
+/// Clocks as above, of every device that is used, too; that of TIM2 and TIM4, Hz, which is twice that of their bus. The core runs from
+/// HSI until then, as after every reset. Names and order: RM0433, chapters 6 (PWR) and 8 (RCC).
+pub fn start() -> u32 {
+    let fast = is_revision_v();
+    // A debugger sees the core while it sleeps.
+    DBGMCU.cr().modify(|w| {
+        w.set_dbgsleep_d1(true);
+        w.set_dbgstop_d1(true);
+        w.set_dbgstby_d1(true);
+        w.set_d1dbgcken(true);
+        w.set_d3dbgcken(true);
+    });
+    devices();
+    voltage(fast);
+
+    // HSE: a clock from outside.
+    RCC.cr().modify(|w| w.set_hsebyp(true));
+    RCC.cr().modify(|w| w.set_hseon(true));
+    while !RCC.cr().read().hserdy() {}
+    plls(fast);
+
+    // Wait states of the flash before the clock gets faster (table: FLASH recommended number of wait states and programming delay).
+    let latency = if fast { 4 } else { 2 };
+    FLASH.acr().write(|w| {
+        w.set_latency(latency);
+        w.set_wrhighfreq(2);
+    });
+    while FLASH.acr().read().latency() != latency {}
+    // Prescalers before the clock, too.
+    RCC.d1cfgr().modify(|w| {
+        w.set_d1cpre(Hpre::DIV1);
+        w.set_d1ppre(Ppre::DIV2);
+        w.set_hpre(Hpre::DIV2);
+    });
+    RCC.d2cfgr().modify(|w| {
+        w.set_d2ppre1(Ppre::DIV2);
+        w.set_d2ppre2(Ppre::DIV2);
+    });
+    RCC.d3cfgr().modify(|w| w.set_d3ppre(Ppre::DIV2));
+    RCC.cfgr().modify(|w| w.set_sw(Sw::PLL1_P));
+    while RCC.cfgr().read().sws() != Sw::PLL1_P {}
+    RCC.d2ccip1r().modify(|w| {
+        w.set_spi123sel(Saisel::PLL2_P);
+        w.set_spi45sel(Spi45sel::PLL2_Q);
+    });
+    if fast { TIMER } else { 200_000_000 }
 }
 
-fn config() -> Config {
-    let fast = is_revision_v();
-    let mut config = Config::default();
-    config.rcc.hse = Some(Hse { freq: Hertz(8_000_000), mode: HseMode::Bypass });
-    let pll = |mul, divp, divq| {
-        Some(Pll { source: PllSource::HSE, prediv: PllPreDiv::DIV1, mul, fracn: None, divp, divq, divr: None })
-    };
-    config.rcc.pll1 = pll(if fast { PllMul::MUL120 } else { PllMul::MUL100 }, Some(PllDiv::DIV2), None);
-    // 400 MHz for the SPIs, whatever the core has.
-    config.rcc.pll2 = pll(PllMul::MUL50, Some(PllDiv::DIV12), Some(PllDiv::DIV8));
-    // Nothing runs on it. A PLL that is not asked for makes the HAL write PLLCKSELR as a whole while PLL1 runs, which RM0433 does
-    // not allow.
-    config.rcc.pll3 = pll(PllMul::MUL50, Some(PllDiv::DIV12), None);
-    config.rcc.mux.spi123sel = Saisel::PLL2_P;
-    config.rcc.mux.spi45sel = Spi45sel::PLL2_Q;
-    config.rcc.sys = Sysclk::PLL1_P;
-    config.rcc.ahb_pre = AHBPrescaler::DIV2;
-    config.rcc.apb1_pre = APBPrescaler::DIV2;
-    config.rcc.apb2_pre = APBPrescaler::DIV2;
-    config.rcc.apb3_pre = APBPrescaler::DIV2;
-    config.rcc.apb4_pre = APBPrescaler::DIV2;
-    config.rcc.voltage_scale = if fast { VoltageScale::Scale0 } else { VoltageScale::Scale1 };
-    config.dma_interrupt_priority = Priority::P8;
-    config.bdma_interrupt_priority = Priority::P8;
-    config.mdma_interrupt_priority = Priority::P8;
-    config
+/// Clocks of devices. What is read back has been written, and by then they run.
+fn devices() {
+    RCC.ahb4enr().modify(|w| {
+        w.set_gpioaen(true);
+        w.set_gpioben(true);
+        w.set_gpioden(true);
+        w.set_gpioeen(true);
+        w.set_gpiofen(true);
+        w.set_gpiogen(true);
+    });
+    RCC.ahb1enr().modify(|w| w.set_dma1en(true));
+    RCC.apb1lenr().modify(|w| {
+        w.set_tim2en(true);
+        w.set_tim4en(true);
+        w.set_usart3en(true);
+    });
+    RCC.apb2enr().modify(|w| {
+        w.set_tim1en(true);
+        w.set_spi1en(true);
+        w.set_spi4en(true);
+    });
+    RCC.apb4enr().modify(|w| w.set_syscfgen(true));
+    let _ = RCC.apb4enr().read();
+}
+
+/// The core's supply by the LDO, which is written once after power-up, and its voltage: scale 1, from which alone scale 0 is reached,
+/// by the overdrive.
+fn voltage(fast: bool) {
+    PWR.cr3().modify(|w| {
+        w.set_scuen(true);
+        w.set_ldoen(true);
+        w.set_bypass(false);
+    });
+    while !PWR.csr1().read().actvosrdy() {}
+    PWR.d3cr().modify(|w| w.set_vos(Vos::SCALE1));
+    while !PWR.d3cr().read().vosrdy() {}
+    if fast {
+        SYSCFG.pwrcr().modify(|w| w.set_oden(1));
+        while !PWR.d3cr().read().vosrdy() {}
+    }
+}
+
+/// PLL1 for the core: 960 MHz / 2, or 800 / 2; PLL2 for the SPIs, whatever the core has: 400 MHz / 12 and / 8. Source and dividers are
+/// written while no PLL runs; afterwards they are locked.
+fn plls(fast: bool) {
+    RCC.pllckselr().modify(|w| {
+        w.set_pllsrc(Pllsrc::HSE);
+        w.set_divm(0, Pllm::DIV1);
+        w.set_divm(1, Pllm::DIV1);
+    });
+    RCC.pllcfgr().modify(|w| {
+        for (pll, oscillator) in [Pllvcosel::WIDE_VCO, Pllvcosel::MEDIUM_VCO].into_iter().enumerate() {
+            w.set_pllvcosel(pll, oscillator);
+            w.set_pllrge(pll, Pllrge::RANGE8);
+            w.set_divpen(pll, true);
+            w.set_divqen(pll, pll == 1);
+            w.set_divren(pll, false);
+        }
+    });
+    RCC.plldivr(0).write(|w| {
+        w.set_plln(if fast { Plln::MUL120 } else { Plln::MUL100 });
+        w.set_pllp(Plldiv::DIV2);
+        w.set_pllq(Plldiv::DIV2);
+        w.set_pllr(Plldiv::DIV2);
+    });
+    RCC.plldivr(1).write(|w| {
+        w.set_plln(Plln::MUL50);
+        w.set_pllp(Plldiv::DIV12);
+        w.set_pllq(Plldiv::DIV8);
+        w.set_pllr(Plldiv::DIV2);
+    });
+    for pll in 0..2 {
+        RCC.cr().modify(|w| w.set_pllon(pll, true));
+        while !RCC.cr().read().pllrdy(pll) {}
+    }
 }

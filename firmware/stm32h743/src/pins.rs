@@ -1,36 +1,24 @@
 //! The wiring: which pin goes where. The table in docs/bring-up.md is this file in words.
 
-use embassy_stm32::Peripherals;
-use embassy_stm32::gpio::{AnyPin, Flex, Input, Level, Output, OutputType, Pull, Speed};
-pub use embassy_stm32::interrupt::USART3 as LINK;
-use embassy_stm32::mode::Async;
-pub use embassy_stm32::peripherals::IWDG1 as Watchdog;
-use embassy_stm32::peripherals::{TIM4, USART3};
-use embassy_stm32::spi::Spi;
-use embassy_stm32::timer::simple_pwm::PwmPin;
-use embassy_stm32::timer::{Ch2, Ch4};
-use embassy_stm32::usart::{ConfigError, Uart};
-use embassy_stm32::{Peri, bind_interrupts, dma, pac, peripherals, rcc, usart};
 use specgen_stm32::burst::Device;
-use specgen_stm32::converters::{AdcPins, DacPins, TriggerPins, adc_spi, dac_spi, trigger_pins};
+use specgen_stm32::converters::{ADC_MODE, AdcPins, DAC_MODE, DacPins, TriggerPins, trigger_pins};
 use specgen_stm32::enable::{self, Stop};
+use specgen_stm32::pins::Pin;
 use specgen_stm32::pulses::Pulses;
-use specgen_stm32::serial;
+use specgen_stm32::serial::{self, Port};
+use stm32_metapac::gpio::vals::{Ospeedr, Pupdr};
+use stm32_metapac::iwdg::Iwdg;
+use stm32_metapac::{
+    DMAMUX1, GPIOA, GPIOB, GPIOD, GPIOE, GPIOF, GPIOG, IWDG1, Interrupt, SPI1, SPI4, TIM4, USART3, interrupt,
+};
 
 use crate::clocks::{self, DELAY};
 use crate::spi::Registers;
 
-bind_interrupts!(
-    /// Interrupts of the link.
-    pub struct Irqs {
-        USART3 => usart::InterruptHandler<USART3>;
-        DMA1_STREAM0 => dma::InterruptHandler<peripherals::DMA1_CH0>;
-        DMA1_STREAM1 => dma::InterruptHandler<peripherals::DMA1_CH1>;
-    }
-);
-
 /// Interrupt of the voltage detector.
-pub const SUPPLY: pac::Interrupt = pac::Interrupt::PVD_AVD;
+pub const SUPPLY: Interrupt = Interrupt::PVD_AVD;
+/// The watchdog.
+pub const WATCHDOG: Iwdg = IWDG1;
 /// Channel of TIM4 that drives LDAC, counted from 0: CH2.
 pub const OUTPUT: usize = 1;
 /// That of CONVST: CH4.
@@ -46,58 +34,104 @@ pub struct Wiring {
     pub lines: TriggerPins,
     /// Emergency stop: a closed contact to ground, at the break input of TIM1; open is stop.
     pub stop: Stop,
-    /// Virtual COM port of the ST-LINK.
-    pub link: Link,
-    /// Watchdog.
-    pub watchdog: Peri<'static, Watchdog>,
 }
 
-/// Takes the pins. The enable line comes first and is driven low: channel 2 of TIM1, with its break input.
-pub fn take(p: Peripherals) -> Wiring {
-    let (enable, stop) = enable::guarded::<2>(Flex::new(p.PE11), Flex::new(p.PE15));
-    let high = Level::High;
-    rcc::enable_and_reset::<TIM4>();
-    let clock = rcc::frequency::<TIM4>().0;
+/// Takes the pins; `hertz` is the clock of TIM4. The enable line comes first and is driven low: channel 2 of TIM1, with its break
+/// input.
+pub fn take(hertz: u32) -> Wiring {
+    let (enable, stop) = enable::guarded::<2>(Pin(GPIOE, 11), Pin(GPIOE, 15));
     // At rest before the pins are the timer's.
-    let (start, load) = Pulses::edges::<SAMPLING, OUTPUT>(pac::TIM4, clock, clocks::OUTPUT);
-    core::mem::forget(PwmPin::<TIM4, Ch4>::new(p.PD15, OutputType::PushPull));
-    core::mem::forget(PwmPin::<TIM4, Ch2>::new(p.PD13, OutputType::PushPull));
-    let adc = Registers::new(Spi::new_blocking(p.SPI1, p.PA5, p.PB5, p.PA6, adc_spi(clocks::ADC)), pac::SPI1);
-    let dac = Registers::new(Spi::new_blocking(p.SPI4, p.PE2, p.PE6, p.PE5, dac_spi(clocks::DAC)), pac::SPI4);
-    let select = |pin: Peri<'static, AnyPin>| Output::new(pin, high, Speed::VeryHigh);
+    let (start, load) = Pulses::edges::<SAMPLING, OUTPUT>(TIM4, hertz, clocks::OUTPUT);
+    for pin in [Pin(GPIOD, 15), Pin(GPIOD, 13)] {
+        pin.function(2, Ospeedr::VERY_HIGH_SPEED, Pupdr::FLOATING);
+    }
+    bus([Pin(GPIOA, 5), Pin(GPIOB, 5), Pin(GPIOA, 6)], 5, Pupdr::PULL_UP);
+    let adc = Registers::new(SPI1, ADC_MODE, clocks::ADC);
+    bus([Pin(GPIOE, 2), Pin(GPIOE, 6), Pin(GPIOE, 5)], 5, Pupdr::PULL_DOWN);
+    let dac = Registers::new(SPI4, DAC_MODE, clocks::DAC);
+    let select = |pin: Pin| pin.output(true, Ospeedr::VERY_HIGH_SPEED);
     Wiring {
         adc: AdcPins {
-            spi: Device { bus: adc, select: select(p.PD14.into()) },
+            spi: Device { bus: adc, select: select(Pin(GPIOD, 14)) },
             start,
-            busy: Input::new(p.PF3, Pull::Up),
-            reset: Output::new(p.PE9, Level::Low, Speed::Low),
+            busy: Pin(GPIOF, 3).input(Pupdr::PULL_UP),
+            reset: Pin(GPIOE, 9).output(false, Ospeedr::LOW_SPEED),
         },
         dac: DacPins {
             spi: [
-                Device { bus: dac.again(), select: select(p.PD2.into()) },
-                Device { bus: dac, select: select(p.PG2.into()) },
+                Device { bus: dac.again(), select: select(Pin(GPIOD, 2)) },
+                Device { bus: dac, select: select(Pin(GPIOG, 2)) },
             ],
             load,
             enable,
         },
-        lines: trigger_pins([p.PE7.into(), p.PE8.into(), p.PE10.into(), p.PE12.into()], p.PE14.into()),
+        lines: trigger_pins([7, 8, 10, 12].map(|number| Pin(GPIOE, number)), Pin(GPIOE, 14)),
         stop,
-        link: Link { usart: p.USART3, pins: (p.PD9, p.PD8), channels: (p.DMA1_CH0, p.DMA1_CH1) },
-        watchdog: p.IWDG1,
     }
 }
 
-/// The USART of the link, its pins RX and TX, its DMA for sending and receiving.
-pub struct Link {
-    usart: Peri<'static, USART3>,
-    pins: (Peri<'static, peripherals::PD9>, Peri<'static, peripherals::PD8>),
-    channels: (Peri<'static, peripherals::DMA1_CH0>, Peri<'static, peripherals::DMA1_CH1>),
+/// Hands the pins of an SPI over: SCK, pulled to where it idles, MOSI, MISO.
+fn bus([clock, output, input]: [Pin; 3], function: u8, idle: Pupdr) {
+    clock.function(function, Ospeedr::VERY_HIGH_SPEED, idle);
+    output.function(function, Ospeedr::VERY_HIGH_SPEED, Pupdr::FLOATING);
+    input.function(function, Ospeedr::LOW_SPEED, Pupdr::FLOATING);
 }
 
-impl serial::Line for Link {
-    fn open(&mut self) -> Result<Uart<'_, Async>, ConfigError> {
-        let Self { usart, pins: (rx, tx), channels: (send, receive) } = self;
-        let (rx, tx, send, receive) = (rx.reborrow(), tx.reborrow(), send.reborrow(), receive.reborrow());
-        Uart::new(usart.reborrow(), rx, tx, send, receive, Irqs, serial::config())
+/// The USART of the link: USART3.
+pub struct Link;
+
+impl Port for Link {
+    const SEND: usize = 0;
+    const RECEIVE: usize = 1;
+    /// TRBUFF, or a stream may lock up with a USART (ES0392). The request is chosen by DMAMUX1.
+    const STREAM: u32 = 1 << 20;
+    const INTERRUPTS: [Interrupt; 3] = [Interrupt::USART3, Interrupt::DMA1_STREAM0, Interrupt::DMA1_STREAM1];
+
+    fn data() -> [u32; 2] {
+        [USART3.tdr().as_ptr() as u32, USART3.rdr().as_ptr() as u32]
     }
+
+    fn prepare() {
+        Pin(GPIOD, 9).function(7, Ospeedr::LOW_SPEED, Pupdr::FLOATING);
+        Pin(GPIOD, 8).function(7, Ospeedr::MEDIUM_SPEED, Pupdr::FLOATING);
+        // Requests of USART3: 45 received, 46 to send (RM0433, table of DMAMUX1).
+        DMAMUX1.ccr(Self::RECEIVE).write(|w| w.set_dmareq_id(45));
+        DMAMUX1.ccr(Self::SEND).write(|w| w.set_dmareq_id(46));
+    }
+
+    fn start(clocks: u32) {
+        USART3.brr().write(|w| w.0 = clocks);
+        USART3.cr3().write(|w| {
+            w.set_eie(true);
+            w.set_dmar(true);
+            w.set_dmat(true);
+        });
+        USART3.cr1().write(|w| {
+            w.set_ue(true);
+            w.set_re(true);
+            w.set_te(true);
+            w.set_idleie(true);
+            w.set_fifoen(true);
+        });
+    }
+
+    fn acknowledge() {
+        // Each flag is cleared by a one at its place.
+        USART3.icr().write(|w| w.0 = USART3.isr().read().0);
+    }
+}
+
+#[interrupt]
+fn USART3() {
+    serial::interrupt::<Link>();
+}
+
+#[interrupt]
+fn DMA1_STREAM1() {
+    serial::interrupt::<Link>();
+}
+
+#[interrupt]
+fn DMA1_STREAM0() {
+    serial::interrupt::<Link>();
 }

@@ -1,11 +1,10 @@
 //! The SPI of the STM32H7: frames through its FIFO.
 
-use embassy_stm32::mode::Blocking;
-use embassy_stm32::pac::spi::Spi as Pac;
-use embassy_stm32::pac::spi::regs::Cr1;
-use embassy_stm32::spi::Spi;
-use embassy_stm32::spi::mode::Master;
+use embedded_hal::spi::{Mode, Phase, Polarity};
 use specgen_stm32::burst::{Burst, Stuck};
+use stm32_metapac::spi::Spi;
+use stm32_metapac::spi::regs::Cr1;
+use stm32_metapac::spi::vals::{Cpha, Cpol, Fthlv, Master, Mbr, Ssiop};
 
 /// Bytes on their way at once: those of the smallest FIFO (SPI4; SPI1 has twice as many).
 const DEPTH: usize = 8;
@@ -14,24 +13,38 @@ const LOOKS: usize = 100;
 
 /// Its registers, set up.
 pub struct Registers {
-    spi: Pac,
+    spi: Spi,
     /// CR1 while it runs.
     running: Cr1,
 }
 
 impl Registers {
-    /// Takes an SPI that the HAL has set up, with its registers. Its pins and its clock stay as they are.
+    /// Sets up an SPI that is as after reset, and has its clock and its pins: master, bytes, MSB first, SCLK the clock divided by
+    /// `divider`, a power of two.
     ///
     /// Transfers have no size (TSIZE 0): what is in the FIFO goes out, without a start for each. ES0392 (SPI: a master's transfer
     /// stalls if it is started within a cycle of SCLK after the end of the last one) names this as the way around it.
     #[must_use]
-    pub fn new(driver: Spi<'static, Blocking, Master>, spi: Pac) -> Self {
-        core::mem::forget(driver);
-        spi.cr1().modify(|w| w.set_spe(false));
+    pub fn new(spi: Spi, mode: Mode, divider: u32) -> Self {
+        spi.cfg2().modify(|w| {
+            w.set_master(Master::MASTER);
+            w.set_cpol(if mode.polarity == Polarity::IdleHigh { Cpol::IDLE_HIGH } else { Cpol::IDLE_LOW });
+            w.set_cpha(if mode.phase == Phase::CaptureOnSecondTransition {
+                Cpha::SECOND_EDGE
+            } else {
+                Cpha::FIRST_EDGE
+            });
+            // Its own select is SSI, which is low, and active when it is high: no mode fault. Its pins are driven while it is off.
+            w.set_ssm(true);
+            w.set_ssoe(true);
+            w.set_ssiop(Ssiop::ACTIVE_HIGH);
+            w.set_afcntr(true);
+        });
         spi.cr2().write(|w| w.set_tsize(0));
         spi.cfg1().modify(|w| {
+            w.set_mbr(Mbr::from_bits(divider.ilog2() as u8 - 1));
             w.set_dsize(7);
-            w.set_fthlv(embassy_stm32::pac::spi::vals::Fthlv::ONE_FRAME);
+            w.set_fthlv(Fthlv::ONE_FRAME);
         });
         let mut running = spi.cr1().read();
         running.set_spe(true);

@@ -1,0 +1,105 @@
+//! Pins: what each is for, and single ones as outputs and inputs.
+
+use core::convert::Infallible;
+
+use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
+use stm32_metapac::gpio::Gpio;
+use stm32_metapac::gpio::vals::{Moder, Ospeedr, Ot, Pupdr};
+
+/// A pin by port and number. The port has its clock, and nobody else sets up a pin of it meanwhile.
+#[derive(Clone, Copy)]
+pub struct Pin(pub Gpio, pub u8);
+
+impl Pin {
+    /// The mode comes last, so that the pin is driven only as it is meant to be.
+    fn mode(self, mode: Moder, speed: Ospeedr, pull: Pupdr) {
+        let Self(port, number) = self;
+        let number = usize::from(number);
+        port.pupdr().modify(|w| w.set_pupdr(number, pull));
+        port.otyper().modify(|w| w.set_ot(number, Ot::PUSH_PULL));
+        port.ospeedr().modify(|w| w.set_ospeedr(number, speed));
+        port.moder().modify(|w| w.set_moder(number, mode));
+    }
+
+    /// Gives it to the peripheral that this alternate function of the data sheet's table names.
+    pub fn function(self, function: u8, speed: Ospeedr, pull: Pupdr) {
+        let number = usize::from(self.1);
+        self.0.afr(number / 8).modify(|w| w.set_afr(number % 8, function));
+        self.mode(Moder::ALTERNATE, speed, pull);
+    }
+
+    /// An output at this level from the beginning.
+    #[must_use]
+    pub fn output(self, high: bool, speed: Ospeedr) -> Output {
+        let mut output = Output(self);
+        output.set(high);
+        self.mode(Moder::OUTPUT, speed, Pupdr::FLOATING);
+        output
+    }
+
+    /// An input.
+    #[must_use]
+    pub fn input(self, pull: Pupdr) -> Input {
+        self.mode(Moder::INPUT, Ospeedr::LOW_SPEED, pull);
+        Input(self)
+    }
+}
+
+/// A pin that is driven, push-pull.
+pub struct Output(Pin);
+
+impl Output {
+    /// Drives it, without reading the port's other pins.
+    #[inline]
+    pub fn set(&mut self, high: bool) {
+        let Pin(port, number) = self.0;
+        // BSRR: the lower half sets, the upper one resets.
+        port.bsrr().write(|w| w.0 = 1 << (number + if high { 0 } else { 16 }));
+    }
+
+    /// Whether it is driven high.
+    #[inline]
+    #[must_use]
+    pub fn is_set(&self) -> bool {
+        let Pin(port, number) = self.0;
+        port.odr().read().0 >> number & 1 == 1
+    }
+}
+
+impl ErrorType for Output {
+    type Error = Infallible;
+}
+
+impl OutputPin for Output {
+    #[inline]
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.set(false);
+        Ok(())
+    }
+
+    #[inline]
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.set(true);
+        Ok(())
+    }
+}
+
+/// A pin that is read.
+pub struct Input(Pin);
+
+impl ErrorType for Input {
+    type Error = Infallible;
+}
+
+impl InputPin for Input {
+    #[inline]
+    fn is_high(&mut self) -> Result<bool, Infallible> {
+        let Pin(port, number) = self.0;
+        Ok(port.idr().read().0 >> number & 1 == 1)
+    }
+
+    #[inline]
+    fn is_low(&mut self) -> Result<bool, Infallible> {
+        self.is_high().map(|high| !high)
+    }
+}
