@@ -574,6 +574,10 @@ impl Guest for Board {
         let part = self.part;
         let within = |base: u32, length: u32| address.wrapping_sub(base) < length;
         let devices = &mut self.devices;
+        let clocked = |offset: u32, bit: u32| devices.store.word(part.rcc + offset) >> bit & 1 == 1;
+        if part.clocks.iter().any(|&[base, offset, bit]| within(base, 0x400) && !clocked(offset, bit)) {
+            self.violations.note("RCC", "a device is written without its clock", self.now);
+        }
         match address {
             _ if Nvic::has(address) => {
                 devices.nvic.write(address, size, value);
