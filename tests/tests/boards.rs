@@ -229,12 +229,14 @@ fn the_wiring_table_is_that_of_the_programs() {
         let source = repository().join("firmware").join(board.folder).join("src/pins.rs");
         let program = fs::read_to_string(source).unwrap();
         let wired: BTreeSet<String> = table.iter().flat_map(|row| pins(row[column])).collect();
-        assert_eq!(wired, pins(&program.replace("p.", " ")), "{}", board.folder);
+        // `Pin(GPIOE, 11)` is PE11.
+        let driven = |code: &str| pins(&code.replace("(GPIO", " P").replace(", ", ""));
+        assert_eq!(wired, driven(&program), "{}", board.folder);
         let guarded = program.lines().find(|line| line.contains("enable::guarded")).unwrap();
-        let (line, contact) = guarded.split_once(", Flex").unwrap();
+        let (line, contact) = guarded.split_once(", Pin").unwrap();
         for (name, code) in [("**ENABLE**", line), ("STOP", contact)] {
             let row = table.iter().find(|row| row[1] == name).unwrap();
-            assert_eq!(pins(row[column]), pins(code), "{}: {name}", board.folder);
+            assert_eq!(pins(row[column]), driven(code), "{}: {name}", board.folder);
         }
     }
     let program = fs::read_to_string(repository().join("firmware/stm32/program.rs")).unwrap();

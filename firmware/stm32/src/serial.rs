@@ -3,13 +3,13 @@
 //! Received bytes go by DMA into a ring, as a tick may last longer than a byte and an F4 holds one byte only. Answers go out by DMA,
 //! so that the background goes on meanwhile.
 //!
-//! What goes wrong on the line (noise, framing, overrun), and what comes in faster than it is answered, damages frames: their CRC
-//! shows that, it is counted, and the host asks again.
+//! What has come in when something goes wrong on the line (noise, framing, overrun) is dropped, and so is a frame by its CRC when more comes in
+//! than the ring holds: that is counted, and the host asks again.
 
 #![allow(unsafe_code)] // Interrupts are enabled.
 
 use core::marker::PhantomData;
-use core::sync::atomic::{AtomicU8, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use cortex_m::asm;
 use cortex_m::peripheral::NVIC;
@@ -59,9 +59,12 @@ pub trait Port {
     /// Sets it up: DMA both ways, interrupts when the line falls idle and at errors, bits of so many clocks.
     fn start(clocks: u32);
 
-    /// Takes back its interrupts.
-    fn acknowledge();
+    /// Takes back its interrupts. True after an error.
+    fn acknowledge() -> bool;
 }
+
+/// There was an error on the line.
+static FAILED: AtomicBool = AtomicBool::new(false);
 
 /// The USART with its DMA.
 pub struct Line<P> {
@@ -95,6 +98,9 @@ impl<P: Port> Line<P> {
     /// Takes what has come in, and answers it, for as long as no answer is on its way: the end of one is an interrupt, which comes back
     /// here.
     pub fn serve(&mut self, endpoint: &mut Endpoint, desk: &mut Desk, with: &mut Access<'_>) {
+        if FAILED.swap(false, Ordering::Relaxed) {
+            self.next = self.end();
+        }
         while !DMA1.st(P::SEND).cr().read().en() {
             let Some(byte) = self.take() else { return };
             if let Some(reply) = endpoint.push(byte, &mut Visit { desk: &mut *desk, with: &mut *with }) {
@@ -105,13 +111,18 @@ impl<P: Port> Line<P> {
 
     /// The next byte that has come in.
     fn take(&mut self) -> Option<u8> {
-        let left = usize::from(DMA1.st(P::RECEIVE).ndtr().read().ndt());
-        if self.next == (self.ring.len() - left) % self.ring.len() {
+        if self.next == self.end() {
             return None;
         }
         let byte = self.ring.get(self.next)?.load(Ordering::Relaxed);
         self.next = (self.next + 1) % self.ring.len();
         Some(byte)
+    }
+
+    /// Place in the ring of the byte that comes in next.
+    fn end(&self) -> usize {
+        let left = usize::from(DMA1.st(P::RECEIVE).ndtr().read().ndt());
+        (self.ring.len() - left) % self.ring.len()
     }
 
     /// Sends from where the DMA can reach it. What does not go out the host asks for again.
@@ -152,6 +163,8 @@ fn acknowledge(number: usize) {
 pub fn interrupt<P: Port>() {
     acknowledge(P::SEND);
     acknowledge(P::RECEIVE);
-    P::acknowledge();
+    if P::acknowledge() {
+        FAILED.store(true, Ordering::Relaxed);
+    }
     NVIC::pend(SERVICE);
 }

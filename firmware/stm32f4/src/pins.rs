@@ -63,7 +63,7 @@ pub fn take(hertz: u32) -> Wiring {
             load,
             enable,
         },
-        lines: trigger_pins([0, 1, 2, 3].map(|number| Pin(GPIOC, number)), Pin(GPIOC, 4)),
+        lines: trigger_pins([Pin(GPIOC, 0), Pin(GPIOC, 1), Pin(GPIOC, 2), Pin(GPIOC, 3)], Pin(GPIOC, 4)),
         stop,
     }
 }
@@ -109,12 +109,14 @@ impl Port for Link {
         });
     }
 
-    fn acknowledge() {
+    fn acknowledge() -> bool {
         let status = USART2.sr().read();
+        let failed = status.fe() || status.ne() || status.ore();
         // Cleared by reading the data after the status; only then, as that may take a byte that is the DMA's.
-        if status.idle() || status.fe() || status.ne() || status.ore() {
+        if failed || status.idle() {
             let _ = USART2.dr().read();
         }
+        failed
     }
 }
 

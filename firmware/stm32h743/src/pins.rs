@@ -65,7 +65,7 @@ pub fn take(hertz: u32) -> Wiring {
             load,
             enable,
         },
-        lines: trigger_pins([7, 8, 10, 12].map(|number| Pin(GPIOE, number)), Pin(GPIOE, 14)),
+        lines: trigger_pins([Pin(GPIOE, 7), Pin(GPIOE, 8), Pin(GPIOE, 10), Pin(GPIOE, 12)], Pin(GPIOE, 14)),
         stop,
     }
 }
@@ -115,9 +115,11 @@ impl Port for Link {
         });
     }
 
-    fn acknowledge() {
+    fn acknowledge() -> bool {
+        let status = USART3.isr().read();
         // Each flag is cleared by a one at its place.
-        USART3.icr().write(|w| w.0 = USART3.isr().read().0);
+        USART3.icr().write(|w| w.0 = status.0);
+        status.fe() || status.ne() || status.ore()
     }
 }
 
