@@ -38,6 +38,7 @@ mod weights;
 pub use allow::{allow, unused};
 pub use budget::{estimated, least};
 pub use culprit::in_order;
+pub(crate) use factors::say_once;
 
 use specgen_runtime::Platform;
 
@@ -89,10 +90,10 @@ const RULES: &[Rule] = &[
     gauges::noise_of_many_steps,
     frames::turned_layout,
     frames::size_of_pattern,
-    order::gauges_run_round,
     gauges::size_of_layout,
     gauge_pattern::out_of_pattern,
     gauge_layout::slip_of_one,
+    order::gauges_run_round,
     alike::calibrations_fit_converter,
     alike::calibrations,
     alike::calibrations_straight,
@@ -213,6 +214,12 @@ impl<'a> Found<'a> {
 
     pub(crate) fn list(self) -> Vec<Diagnostic> {
         self.list
+    }
+
+    /// Whether a point of this gauge is found to be in the other frame: that explains whatever else is odd about it.
+    fn is_in_other_frame(&self, gauge: usize) -> bool {
+        let of_gauge = format!("gauge[{gauge}].");
+        self.list.iter().any(|one| one.code == codes::OTHER_FRAME && one.key.starts_with(&of_gauge))
     }
 
     /// The same of a value that lies so many `times` beyond what the rule lets pass.

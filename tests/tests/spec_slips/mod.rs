@@ -172,6 +172,33 @@ fn two_readings_of_a_value_are_both_offered() {
     }
 }
 
+/// A value of the supervisor that is refused is said once, with a help that does not lead into the next finding.
+#[test]
+fn a_value_that_the_supervisor_refuses_is_found_once() {
+    let base = Base::of(Of::Reference);
+    for (line, code, default) in [
+        ("arm_time = \"10 us\"", "E0470", "\"100 ms\""),
+        ("tracking_time = \"1 ms\"", "E0470", "\"100 ms\""),
+        ("host_lost = [\"50 us\", \"70 us\"]", "E0470", "[\"100 ms\", \"10000 ms\"]"),
+        ("ramp_rate = \"50 V/ms\"", "E0472", "\"100 V/s\""),
+        ("disagreement = \"2 nm\"", "E0471", ""),
+        ("tracking_error = 1e-6", "E0471", ""),
+    ] {
+        let with = |line: &str| base.text.replace("\n[timing]", &format!("\n[supervisor]\n{line}\n\n[timing]"));
+        let (key, _) = line.split_once(" =").unwrap();
+        let (accepted, found) = verdict(&with(line), base.folder.path());
+        let here: Vec<&Diagnostic> = found.iter().filter(|one| one.key.contains(key)).collect();
+        assert!(!accepted && here.len() == 1 && here[0].code == code, "{line}: {found:#?}");
+        if default.is_empty() {
+            continue;
+        }
+        let shown = default.replace('"', if default.starts_with('[') { "\"" } else { "" });
+        assert!(here[0].help.contains(&format!("leave {key} out: it is then {shown}")), "{:?}", here[0]);
+        let (accepted, found) = verdict(&with(&format!("{key} = {default}")), base.folder.path());
+        assert!(accepted && found.iter().all(|one| !one.key.contains(key)), "{line}: {found:#?}");
+    }
+}
+
 /// What stands as a replacement or as a figure in a help is accepted: with it in the text, what was found there is not found
 /// again, and nothing new is refused at that key.
 #[test]

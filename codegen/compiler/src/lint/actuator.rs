@@ -144,7 +144,15 @@ pub(super) fn resonance_is_damped(facts: &Facts, found: &mut Found) {
         found.add(
             codes::DAMPING_ODD,
             key,
-            format!("a damping ratio of {} is one of {}", figure(damping), if damping > most { "no resonance: it hardly rings" } else { "a tuning fork: flexures and joints have more" }),
+            format!(
+                "a damping ratio of {} is {}",
+                figure(damping),
+                if damping > most {
+                    "too large for a resonance, which would hardly ring"
+                } else {
+                    "that of a tuning fork; flexures and joints have more"
+                }
+            ),
             "0.005 to 0.05 is usual of a platform on its legs, 0.01 to 0.2 of a leg: check that it is a ratio, with critical damping as 1, and neither percent nor a quality factor (1/(2 Q))",
         );
     }

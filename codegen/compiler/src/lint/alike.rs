@@ -178,7 +178,7 @@ pub(super) fn integral_in_time(facts: &Facts, found: &mut Found) {
             codes::INTEGRAL_SLOW,
             &key,
             format!(
-                "gains over the stiffness of their axes are about {} 1/s: the integral takes {} s",
+                "gains over the stiffness of their axes are about {} 1/s: the integral has a time constant of {} s",
                 figure(rate),
                 figure(1.0 / rate)
             ),

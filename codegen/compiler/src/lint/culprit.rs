@@ -65,6 +65,7 @@ fn rank(one: &Diagnostic) -> u8 {
 /// Puts first what is found about the one value that would explain most of the findings; then errors and doubts about values,
 /// then what later phases found with them.
 pub fn in_order(source: &SpecSource, findings: &mut Vec<Diagnostic>) {
+    super::say_once(findings);
     findings.sort_by_key(rank);
     let Some(culprit) = culprit(source, findings) else { return };
     let own = |one: &Diagnostic| one.severity > Severity::Note && list_of(&one.key) == list_of(&culprit.key);

@@ -8,7 +8,10 @@ use specgen_language::model::Model;
 const LAG_SLACK: f64 = 1.0;
 /// Noise of an amplifier, of its range: those for stacks have 0.1 to 10 mV on a hundred volts.
 const SOUND_NOISE: core::ops::RangeInclusive<f64> = 2e-7..=3e-4;
-/// Motion of a leg by that noise, in noises or steps of its gauge: nobody looks so closely at what shakes so much.
+/// Above this share, 10 mV on a hundred volts, the motion of a leg counts, too: no amplifier that is bought with care has so
+/// much …
+const LOUD: f64 = 1e-4;
+/// … and this motion of a leg, in noises or steps of its gauge, is then reported.
 const LOUDEST: f64 = 25.0;
 /// Energy of the blocked leg, k s²/2, over that of its charge, C U²/2: ceramics turn at most half of the one into the other,
 /// and levers leave a hundredth of that. Wide, for both figures come from data sheets.
@@ -77,29 +80,24 @@ pub(super) fn amplifier_noise(facts: &Facts, found: &mut Found) {
     // Nothing below its step is seen.
     let seen = if sensor.noise > step { sensor.noise } else { step };
     let (share, beside) = (noise / (high - low), noise * actuator.leg_gain() / seen);
-    let (of_range, of_gauge) = (times_beyond(share, &SOUND_NOISE), beside / LOUDEST);
-    let off = if of_gauge > of_range { of_gauge } else { of_range };
-    if noise == 0.0 || off <= 1.0 {
+    let of_range = times_beyond(share, &SOUND_NOISE);
+    if noise == 0.0 || (of_range <= 1.0 && (share <= LOUD || beside <= LOUDEST)) {
         return;
     }
+    let moves = format!("moves a leg by {} nm rms", figure(noise * actuator.leg_gain() * 1e9));
     let how = if share < *SOUND_NOISE.start() {
-        "quieter than any amplifier".to_owned()
+        format!("is quieter than any amplifier; it {moves}")
     } else if share > *SOUND_NOISE.end() {
-        format!("{} of its range", figure(share))
+        format!("is {} of its range; it {moves}", figure(share))
     } else {
-        format!("{} times what the gauges can see", figure(beside))
+        format!("{moves}, {} times the noise or the step of its gauge", figure(beside))
     };
     found.add_off(
-        off,
+        of_range,
         codes::AMPLIFIER_NOISE,
         "amplifier.noise",
-        format!(
-            "an amplifier noise of {} mV rms on {} V is {how}; it moves a leg by {} nm rms",
-            figure(noise * 1e3),
-            figure(high - low),
-            figure(noise * actuator.leg_gain() * 1e9)
-        ),
-        "amplifiers for stacks have 0.1 to 10 mV rms: check the unit (V, mV or uV), and that it is rms and no peak to peak",
+        format!("an amplifier noise of {} mV rms on {} V {how}", figure(noise * 1e3), figure(high - low)),
+        "amplifiers for stacks have 0.1 to 10 mV rms: check the unit (V, mV or uV), and that it is rms, not peak to peak",
     );
 }
 

@@ -4,7 +4,7 @@ use core::ops::RangeInclusive;
 
 use super::{Facts, Found, figure, times_beyond};
 use crate::lower::supervision::defaults;
-use specgen_language::diagnostic::codes;
+use specgen_language::diagnostic::{Diagnostic, Severity, codes};
 
 /// A value over its default: a slip of a thousand lies far outside, whatever has its reason well inside.
 const NEAR_DEFAULT: RangeInclusive<f64> = 1.0 / 50.0..=50.0;
@@ -73,15 +73,18 @@ pub(super) fn near_defaults(facts: &Facts, found: &mut Found) {
         found.add(
             codes::FAR_FROM_DEFAULT,
             &key,
-            format!(
-                "`{key}` is {}, {} times what holds without the key, {}",
-                shown(value),
-                figure(value / default),
-                shown(default)
-            ),
+            format!("`{key}` is {}, {} times its default of {}", shown(value), figure(value / default), shown(default)),
             "check its unit and its digits, or leave the key out",
         );
     }
+}
+
+/// A value that is refused is not also far from its default.
+pub(crate) fn say_once(findings: &mut Vec<Diagnostic>) {
+    let list = |key: &str| key.split('[').next().unwrap_or_default().to_owned();
+    let errors = findings.iter().filter(|one| one.severity == Severity::Error);
+    let refused: Vec<String> = errors.map(|one| list(&one.key)).collect();
+    findings.retain(|one| one.code != codes::FAR_FROM_DEFAULT || !refused.contains(&list(&one.key)));
 }
 
 /// What `specgen robust` varies are factors about 1, neither percent nor tolerances.
@@ -107,7 +110,7 @@ pub(super) fn near_one(facts: &Facts, found: &mut Found) {
             codes::FACTOR_ODD,
             &format!("robust.{name}[{end}]"),
             format!("`robust.{name}` would be tried at {} times what the spec says", figure(factor)),
-            "smallest and largest factor on the value of the spec, 1 where it is known: a tolerance of 5 % is from 0.95 to 1.05",
+            "give the smallest and the largest factor on the value of the spec: a tolerance of 5 % is [0.95, 1.05]",
         );
     }
 }

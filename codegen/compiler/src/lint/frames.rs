@@ -5,9 +5,7 @@ use super::{Facts, Found, figure};
 use specgen_language::diagnostic::codes;
 use specgen_language::model::Probe;
 
-/// A point lies astray if it is more than so many heights above or below the platform …
-const ASTRAY: f64 = 0.5;
-/// … and is given in another frame if a height more or less leaves no more of that than this share.
+/// A point is given in another frame if a height more or less leaves no more of its distance from the platform than this share.
 const FOUND_AGAIN: f64 = 0.2;
 /// A line within this cosine of the axis: where along the axis it begins does not matter.
 const ALONG_AXIS: f64 = 0.5;
@@ -21,12 +19,10 @@ const OFF_AXIS: f64 = 0.1;
 /// The farthest gauge stands so many joint radii from the axis, at least.
 const NARROWEST: f64 = 0.2;
 
-/// Heights that are to be added to `z`, m above P_C, so that it lies near P_C: 1 or −1. None: it is not astray, or is not
-/// found by that.
+/// Heights that are to be added to `z`, m above P_C, so that it lies near P_C: 1 or −1. None: neither does that.
 fn heights_off(z: f64, height: f64) -> Option<f64> {
     let near = |other: f64| libm::fabs(other) <= FOUND_AGAIN * libm::fabs(z);
-    let astray = libm::fabs(z) > ASTRAY * height;
-    [1.0, -1.0].into_iter().find(|heights| astray && near(z + heights * height))
+    [1.0, -1.0].into_iter().find(|heights| near(z + heights * height))
 }
 
 /// Points that would lie at the platform if they were counted from the other frame.
@@ -122,18 +118,20 @@ pub(super) fn turned_layout(facts: &Facts, found: &mut Found) {
         let apart = angle - first;
         libm::fabs(apart - 90.0 * libm::rint(apart / 90.0))
     };
-    if angles.len() < FEWEST || libm::fabs(first) < TURNED || angles.iter().any(|(_, angle)| apart(*angle) > ALIKE) {
+    // At the corners of a square, along its sides: 45 deg from both.
+    let is_meant = libm::fabs(first) < TURNED || libm::fabs(first) > 45.0 - TURNED;
+    if angles.len() < FEWEST || is_meant || angles.iter().any(|(_, angle)| apart(*angle) > ALIKE) {
         return;
     }
     found.add(
         codes::LAYOUT_TURNED,
         &format!("gauge[{gauge}].direction"),
         format!(
-            "the {} gauges that look across the axis all look {} deg beside their radius or its tangent",
+            "the {} gauges that look across the axis are all turned by {} deg from their radius or its tangent",
             angles.len(),
             figure(libm::fabs(first))
         ),
-        "points and directions are both in {B}: check that neither is turned against it",
+        "points and directions are both in {B}: check that both are given along its axes",
     );
 }
 
@@ -167,12 +165,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_point_is_astray_from_half_a_height_on_and_found_within_a_fifth_of_that() {
+    fn a_point_is_in_the_other_frame_from_five_sixths_to_five_fourths_of_the_height() {
         for (z, expected) in [
             (0.0, None),
-            (-0.09, None),
-            (-0.15, Some(1.0)),
             (-0.149, None),
+            (-0.151, Some(1.0)),
             (-0.18, Some(1.0)),
             (-0.224, Some(1.0)),
             (-0.226, None),

@@ -85,7 +85,7 @@ pub(super) fn slip_of_one(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
     // A slip that puts a gauge out of the pattern of the others is known better from that, and a copy as a copy.
     let known = |finding: &Diagnostic| finding.code == codes::GAUGE_PATTERN || finding.code == codes::GAUGES_ALIKE;
-    if found.list.iter().any(known) {
+    if found.list.iter().any(known) || (0..6).any(|gauge| found.is_in_other_frame(gauge)) {
         return;
     }
     let (height, radius) = (facts.model.geometry.height, facts.model.geometry.joint_radius());
@@ -121,7 +121,12 @@ pub(super) fn slip_of_one(facts: &Facts, found: &mut Found) {
     found.add(
         codes::GAUGE_SLIP,
         &first.key,
-        format!("the gauges {seen}; with {} in `{}` changed it were {} times", first.what, first.key, figure(*best)),
+        format!(
+            "the gauges {seen}; with {} in `{}` changed it would be {} times",
+            first.what,
+            first.key,
+            figure(*best)
+        ),
         &format!(
             "check signs and order of the coordinates in {}",
             keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")

@@ -98,7 +98,7 @@ pub(super) fn out_of_pattern(facts: &Facts, found: &mut Found) {
     let mut restoring: Vec<(usize, &str, Change)> = Vec::new();
     for gauge in 0..6 {
         let now = PATTERNS.map(|(pattern, _)| pattern(&task.probes, gauge));
-        if !now.contains(&Some(false)) {
+        if !now.contains(&Some(false)) || found.is_in_other_frame(gauge) {
             continue;
         }
         let (probe, height) = (&task.probes[gauge], facts.model.geometry.height);

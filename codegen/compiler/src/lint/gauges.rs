@@ -1,7 +1,7 @@
 //! Gauges: resolution, range, layout.
 
-use super::{Facts, Found, amount, figure};
-use specgen_language::diagnostic::{Diagnostic, codes};
+use super::{FAR_OFF, Facts, Found, amount, figure};
+use specgen_language::diagnostic::codes;
 use specgen_language::model::Probe;
 
 /// Noise below this share of a converter step cannot be known.
@@ -10,6 +10,9 @@ const QUIETEST: f64 = 0.06;
 const WIDEST: f64 = 5.0;
 /// Steps of noise beside which a converter is too fine to be meant, and bits from which on converters are so for any gauge.
 const NOISIEST: f64 = 40.0;
+/// Noise of what there is to see that no gauge has, and the narrowest range of the stroke, as the checks of the spec have them.
+const BEYOND_ALL: f64 = 2e-3;
+const NARROWEST: f64 = 0.05;
 const FINE_BITS: u32 = 18;
 /// A step coarser than this share of the stroke.
 const COARSEST_STEP: f64 = 1e-3;
@@ -49,20 +52,24 @@ pub(super) fn noise_of_a_step(facts: &Facts, found: &mut Found) {
             figure(noise / step),
             figure(step * 1e9)
         ),
-        "nobody can measure a noise so far below the step: check the unit (nm or pm), or leave the noise out",
+        "a noise so far below the step cannot be measured: check `sensor.bits`, `sensor.range` and the unit of `sensor.noise` (nm or pm), or leave the noise out",
     );
 }
 
 /// A converter of few bits that shows nothing but noise is a slip of the noise's unit, or of the range.
 pub(super) fn noise_of_many_steps(facts: &Facts, found: &mut Found) {
-    let (noise, step) = (facts.model.sensor.noise, step(facts));
-    // What is beyond all gauges is said with the spec.
-    let said = facts.model.sensor.bits > FINE_BITS || noise <= NOISIEST * step;
-    if said {
+    let (noise, step, stroke) = (facts.model.sensor.noise, step(facts), facts.model.actuator.stroke);
+    let [low, high] = facts.model.sensor.range;
+    let seen = if stroke < high - low { stroke } else { high - low };
+    // What is beyond all gauges is said with the spec (W0303). What is far beyond them is refused, unless it is the range that is
+    // odd (W0304).
+    let beyond = noise / (BEYOND_ALL * seen);
+    let is_said = beyond > 1.0 && (beyond < FAR_OFF || high - low < NARROWEST * stroke);
+    if facts.model.sensor.bits > FINE_BITS || noise <= NOISIEST * step || is_said {
         return;
     }
     found.add_off(
-        noise / (NOISIEST * step),
+        beyond,
         codes::GAUGE_NOISY,
         "sensor.noise",
         format!(
@@ -147,18 +154,19 @@ fn range_too_wide(facts: &Facts, found: &mut Found) {
     let (model, step) = (facts.model, step(facts));
     let [low, high] = model.sensor.range;
     let seen = if model.task_space.is_some() { 2.0 * farthest_seen(facts) } else { model.actuator.stroke };
-    if high - low <= WIDEST * seen || model.sensor.noise >= step {
+    let noise = model.sensor.noise;
+    if high - low <= WIDEST * seen || noise >= step {
         return;
     }
+    let beside = if noise > 0.0 { format!(", {} times its noise", figure(step / noise)) } else { String::new() };
     found.add(
         codes::GAUGE_COARSE,
         "sensor.range",
         format!(
-            "the gauge spans {} um, {} times what there is to see, and one code of it is {} nm, {} times its noise",
+            "the gauge spans {} um, {} times what there is to see; one code of it is {} nm{beside}",
             figure((high - low) * 1e6),
             figure((high - low) / seen),
-            figure(step * 1e9),
-            figure(step / model.sensor.noise)
+            figure(step * 1e9)
         ),
         "check the unit and the digits of `sensor.range`; a wide range asks for more `sensor.bits`",
     );
@@ -277,10 +285,7 @@ pub(super) fn size_of_layout(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
     let radius = facts.model.geometry.joint_radius();
     for (gauge, probe) in task.probes.iter().enumerate() {
-        // A height too many or too few is said already.
-        let known =
-            |one: &Diagnostic| one.code == codes::OTHER_FRAME && one.key.starts_with(&format!("gauge[{gauge}].point"));
-        if found.list.iter().any(known) {
+        if found.is_in_other_frame(gauge) {
             continue;
         }
         let (n, pierced) = (probe.direction, pierced(probe, facts.model.geometry.height));

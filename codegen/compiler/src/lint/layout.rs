@@ -128,6 +128,12 @@ pub(super) fn proportions(facts: &Facts, found: &mut Found) {
         return;
     }
     let odd = if apart[odd] > libm::log(OUT_OF_PROPORTION) { odd } else { 0 };
+    let radius = if keys[odd].ends_with("_radius") { ", and that it is a radius, not a diameter" } else { "" };
+    let width = if odd < 2 {
+        format!(", and a base is at most {WIDEST_BASE} times as wide as its platform")
+    } else {
+        String::new()
+    };
     found.add_off(
         libm::exp(apart[odd]) / OUT_OF_PROPORTION,
         codes::OUT_OF_PROPORTION,
@@ -139,7 +145,7 @@ pub(super) fn proportions(facts: &Facts, found: &mut Found) {
             figure(sizes[2] * 1e3)
         ),
         &format!(
-            "check the unit of `{}`, and that it is a radius and no diameter: the three are of one size on most hexapods, and a base is at most {WIDEST_BASE} times as wide as its platform",
+            "check the unit of `{}`{radius}: base, platform and height are of one size on most hexapods{width}",
             keys[odd]
         ),
     );

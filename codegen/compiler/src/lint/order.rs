@@ -28,7 +28,12 @@ pub(super) fn joints_run_round(facts: &Facts, found: &mut Found) {
     let clockwise: Vec<&str> =
         bodies.iter().filter(|(body, turn)| *turn < 0.0 && is_listed(facts, body)).map(|(body, _)| *body).collect();
     let (key, message) = match clockwise[..] {
-        [one] => (one, format!("the joints of the {one} run clockwise, those of the other body counter-clockwise")),
+        [one] => (
+            one,
+            format!(
+                "the joints of the {one} run clockwise, seen from above, those of the other body counter-clockwise"
+            ),
+        ),
         [_, _] => ("base", "the joints of base and platform run clockwise, seen from above".to_owned()),
         _ => return,
     };
@@ -36,13 +41,20 @@ pub(super) fn joints_run_round(facts: &Facts, found: &mut Found) {
         codes::JOINTS_CLOCKWISE,
         &format!("geometry.{key}_joints"),
         message,
-        "(1) and (2) number them counter-clockwise in right-handed coordinates, z up: check the sign of y, and that x and y are not in each other's place",
+        &format!(
+            "the paper's equations (1) and (2) number legs counter-clockwise, x to the right, y up, seen from above: check the sign of y, that x and y are not exchanged, and the order of the lists; if the legs are numbered clockwise, say so in [lint]: allow = [\"geometry.{key}_joints: <reason>\"]"
+        ),
     );
 }
 
 /// Gauges along the axis that are numbered the other way round than the joints: a mirrored layout looks so.
 pub(super) fn gauges_run_round(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
+    // These findings explain it.
+    let known = [codes::JOINTS_CLOCKWISE, codes::GAUGE_PATTERN, codes::GAUGE_FAR];
+    if found.list.iter().any(|one| known.iter().any(|code| one.code == *code)) {
+        return;
+    }
     let axial = task.probes.iter().enumerate().filter(|(_, probe)| libm::fabs(probe.direction[2]) > AXIAL);
     let (numbers, points): (Vec<usize>, Vec<[f64; 3]>) = axial.map(|(gauge, probe)| (gauge, probe.point)).unzip();
     let of_joints = turn(&facts.model.geometry.base_joints);

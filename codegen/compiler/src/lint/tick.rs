@@ -38,7 +38,7 @@ pub(super) fn fits_period(facts: &Facts, found: &mut Found) {
     let (code, verdict) = if period < CERTAIN * tick {
         (codes::TICK_TOO_LONG, "more than")
     } else {
-        (codes::TICK_TIGHT, "hardly less than")
+        (codes::TICK_TIGHT, "about as long as")
     };
     found.add(
         code,

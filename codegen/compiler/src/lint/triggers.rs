@@ -36,7 +36,7 @@ pub(super) fn more_than_one(facts: &Facts, found: &mut Found) {
             codes::TRIGGER_SINGLE,
             &key(index, trigger, "step"),
             format!(
-                "`step` of trigger[{index}] is {}, but from start to stop there are {}: only the first position is passed",
+                "`step` of trigger[{index}] is {}, but from start to stop there are {}: only the first position gives a pulse",
                 amount(trigger.axis, step),
                 amount(trigger.axis, stop - start)
             ),

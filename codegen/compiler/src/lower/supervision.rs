@@ -5,7 +5,7 @@ mod rest;
 
 use super::kinematics::inverse_jacobian;
 use super::sensing::{PoseNoise, pose_noise, readings_per_pose};
-use crate::figure::AXES;
+use crate::figure::{AXES, figure};
 use crate::ir::{Actuation, Hysteresis, Scalar, Supervision};
 use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::Model;
@@ -120,7 +120,11 @@ impl Times<'_> {
                         "a host is to be lost after {hold:.6} ms, at least a period, and the machine to ramp down after {down:.6} ms; \
                          before that it holds"
                     ),
-                    format!("write host_lost = [\"{least_hold:.6} ms\", \"{least_down:.6} ms\"] or more"),
+                    format!(
+                        "leave host_lost out: it is then [\"{} ms\", \"{} ms\"]; it must be at least [\"{least_hold:.6} ms\", \"{least_down:.6} ms\"]",
+                        figure(defaults::HOST_LOST[0] * 1e3),
+                        figure(defaults::HOST_LOST[1] * 1e3)
+                    ),
                 ));
             }
         }
@@ -145,7 +149,11 @@ impl Times<'_> {
                     least * 1e3,
                     self.model.timing.period * 1e3
                 ),
-                format!("write {key} = \"{:.6} ms\" or more, or shorten timing.period", least * 1e3),
+                format!(
+                    "leave {key} out: it is then {} ms; it must be at least {:.6} ms, or shorten timing.period",
+                    figure(otherwise.max(least) * 1e3),
+                    least * 1e3
+                ),
             ));
         }
         let time = given.unwrap_or(otherwise);
@@ -267,7 +275,10 @@ fn ramp(model: &Model, actuation: &Actuation, max_step: i32, findings: &mut Vec<
             codes::SUPERVISOR_RAMP,
             "ramp_rate",
             format!("voltages would ramp down at {} V/s, faster than actuator.slew_rate, {} V/s", rate, slew_rate),
-            format!("write ramp_rate = \"{} V/s\" or less", slew_rate),
+            format!(
+                "leave ramp_rate out: it is then {} V/s; it must be at most {slew_rate} V/s",
+                figure(defaults::ramp_rate(model))
+            ),
         ));
     }
     let codes = rate * model.timing.period / actuation.volts_per_code;

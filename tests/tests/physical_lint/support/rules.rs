@@ -107,7 +107,7 @@ pub const RULES: &[Rule] = &[
     of("E0311", "platform.mass", ["\"1.195 kg\"", "\"32.5 g\"", "\"32.7 g\""])
         .also(&["W0803", "W0812", "W0814", "W0834", "W0865"]),
     of("E0313", "workspace.translation[0]", ["[\"40 um\"", "[\"54.95 um\"", "[\"54.85 um\""]).on("legs.toml"),
-    of("W0303", "sensor.noise", ["\"2.2 nm\"", "\"121 nm\"", "\"119 nm\""]).also(&["E0471", "W0886"]),
+    of("W0303", "sensor.noise", ["\"2.2 nm\"", "\"121 nm\"", "\"119 nm\""]).also(&["E0471"]),
     // The lint.
     of("E0801", "actuator.stroke", ["\"60 um\"", "\"253 um\"", "\"252 um\""]).also(&["W0822"]),
     of("W0802", "actuator.stroke", ["\"60 um\"", "\"3.33 mm\"", "\"3.31 mm\""]).also(&["E0801", "W0304"]),
@@ -126,6 +126,8 @@ pub const RULES: &[Rule] = &[
     of("W0807", "amplifier.noise", ["\"2 mV\"", "\"30.1 mV\"", "\"29.9 mV\""]),
     of("W0807", "amplifier.noise", ["\"2 mV\"", "\"19.9 mV\"", "\"19.7 mV\""])
         .with(&[("\"2.2 nm\"", "\"0.5 nm\""), ("bits  = 17", "bits  = 20")]),
+    of("W0807", "amplifier.noise", ["\"2 mV\"", "\"10.1 mV\"", "\"9.9 mV\""])
+        .with(&[("\"2.2 nm\"", "\"5 pm\""), ("bits  = 17", "bits  = 24")]),
     of("W0808", "dac.bits", ["bits  = 16", "bits  = 10", "bits  = 11"]),
     of("W0809", "actuator.slew_rate", ["\"40 V/ms\"", "\"0.099 V/ms\"", "\"0.101 V/ms\""]).on("legs.toml"),
     of(
@@ -414,7 +416,7 @@ pub const RULES: &[Rule] = &[
             "[\"0 mm\", \"80 mm\", \"31 mm\"]\ndirection = [1, 0, 0]",
         ],
     )
-    .also(&["W0848", "E0433", "W0826"]),
+    .also(&["E0433"]),
     of("W0882", "geometry.base_joints", [JOINTS, JOINTS_MIRRORED, JOINTS_MOVED])
         .on("features/platform-joints.toml")
         .at("base_joints = [")
