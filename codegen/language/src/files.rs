@@ -103,9 +103,17 @@ impl fmt::Display for Unread {
             Self::System(error) => match error.kind() {
                 io::ErrorKind::NotFound => f.write_str("there is no such file"),
                 io::ErrorKind::PermissionDenied => f.write_str("reading it is not permitted"),
-                _ => error.fmt(f),
+                _ => said(error, f),
             },
         }
+    }
+}
+
+/// What the system says, in words where its own are of no help.
+fn said(error: &io::Error, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    match error.kind() {
+        io::ErrorKind::InvalidFilename => f.write_str("its name is too long"),
+        _ => write!(f, "{error}"),
     }
 }
 
@@ -248,7 +256,7 @@ impl fmt::Display for Unwritten {
             Self::Kind("a folder") => f.write_str("it is a folder, name a file in it"),
             Self::Kind(kind) => write!(f, "it is {kind}; name a regular file"),
             Self::Unheard => f.write_str("no program reads this pipe; start its reader first"),
-            Self::System(error) => error.fmt(f),
+            Self::System(error) => said(error, f),
         }
     }
 }

@@ -215,7 +215,10 @@ impl Key {
     /// A line of a spec with it: name and [`Key::template`].
     #[must_use]
     pub fn line(&self) -> String {
-        format!("{} = {}", self.name, self.template())
+        match self.shape {
+            Shape::One(Item::Flag) => format!("{0} = true or {0} = false", self.name),
+            _ => format!("{} = {}", self.name, self.template()),
+        }
     }
 
     /// Whether people call it `name`: its symbol or an alias, upper or lower case, with or without what joins words.

@@ -139,6 +139,10 @@ pub(super) fn wrong_dimension(
     }
     let own =
         if is.without_angle() == wanted.without_angle() { with_angle(key, path, found, is, wanted) } else { None };
+    if let Some((own, other)) = own.as_ref().zip(hertz_for_rate(key, path, found, is, wanted)) {
+        let help = format!("mind the angle in the unit: write \"{own}\", or \"{other}\" if that is what was meant");
+        return (message, help);
+    }
     let written = own.map_or_else(|| format!("in the form {}", template_of(key, path)), |own| format!("as \"{own}\""));
     let hint = if is == Dimension::FREQUENCY && wanted == Dimension::ANGULAR_RATE {
         "1 Hz is 2 pi rad/s; "
@@ -166,6 +170,14 @@ fn with_angle(key: &Key, path: &str, found: &str, is: Dimension, wanted: Dimensi
         (value, format!("{} {unit}", text::digits(value / quantity::unit_value(unit)?.value)))
     };
     range.contains(value).then_some(text)
+}
+
+/// The same number in Hz, for a frequency that is written in rad/s: the likelier slip.
+fn hertz_for_rate(key: &Key, path: &str, found: &str, is: Dimension, wanted: Dimension) -> Option<String> {
+    let Some(Item::Quantity { range, .. }) = item_of(key, path) else { return None };
+    let value = quantity::parse(found).ok()?.value;
+    let meant = is == Dimension::ANGULAR_RATE && wanted == Dimension::FREQUENCY && range.contains(value);
+    meant.then(|| format!("{} Hz", text::digits(value)))
 }
 
 /// What a quantity with a comma may mean: decimals behind it, or thousands before it.

@@ -51,8 +51,8 @@ pub(super) fn weights_for_mode(f: &Fields, findings: &mut Findings) -> Option<()
                 f.span("adaptation.mode"),
                 format!("mode \"{word}\" needs `{weight}` or `{bandwidth}`"),
                 match which {
-                    "level" => "write level_weight = <number>, the share of a new reading per run, or level_bandwidth = \"<number> rad/s\"",
-                    _ => "write drift_weight = <number>, the share of a new reading per run, or drift_bandwidth = \"<number> rad/s\"; mode \"ewma\" needs neither",
+                    "level" => "write level_weight = <number>, the weight of a new reading in the level estimate, per run, or level_bandwidth = \"<number> rad/s\"",
+                    _ => "write drift_weight = <number>, the weight of a new reading in the drift estimate, per run, or drift_bandwidth = \"<number> rad/s\"; mode \"ewma\" needs neither",
                 }
                 .to_owned(),
             ),

@@ -53,7 +53,8 @@ pub(super) fn directions(f: &Fields, findings: &mut Findings) -> Option<()> {
                     path,
                     f.span(path),
                     format!("`{path}` has no length, so that it points nowhere"),
-                    "write the components of a direction, of which one at least is not 0: [<number>, <number>, <number>]".to_owned(),
+                    "write the components of a direction, at least one of them not 0: [<number>, <number>, <number>]"
+                        .to_owned(),
                 );
             }
         }
