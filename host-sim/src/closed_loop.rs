@@ -154,6 +154,13 @@ pub enum RunError {
         /// Status bits: of a set-point that was refused or stale, or those of the last tick.
         status: u32,
     },
+    /// A platform controller is still busy after the last set-point of its path.
+    NotEnded {
+        /// How much of it was followed: the whole.
+        coverage: Coverage,
+        /// Its status word then.
+        status: u32,
+    },
 }
 
 impl fmt::Display for RunError {
@@ -184,6 +191,13 @@ impl fmt::Display for RunError {
                     f,
                     "the run ended early, after {seconds:.3} s of a path of {path_seconds:.3} s (status {status:#x}{}{}): there is no figure, for the error of a part is not that of the path",
                     if *status == 0 { "" } else { ": " },
+                    status_words(*status)
+                )
+            }
+            Self::NotEnded { coverage, status } => {
+                write!(
+                    f,
+                    "the controller is still busy after {coverage} (status {status:#x}: {}): there is no figure, for the path that it plays is longer",
                     status_words(*status)
                 )
             }

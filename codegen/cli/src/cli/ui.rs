@@ -85,7 +85,9 @@ impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         let message = error.to_string();
         match error {
-            RunError::EndedEarly { .. } => Self::EndedEarly { message, result: Value::Null },
+            RunError::EndedEarly { .. } | RunError::NotEnded { .. } => {
+                Self::EndedEarly { message, result: Value::Null }
+            }
             _ => Self::Environment(message),
         }
     }
@@ -411,8 +413,9 @@ mod tests {
     #[test]
     fn a_run_that_ended_early_has_a_message_and_an_exit_code_of_its_own() {
         let early = RunError::EndedEarly { coverage: Coverage::new(500, 10_000, 1e-4), status: 0 };
+        let late = RunError::NotEnded { coverage: Coverage::new(500, 500, 1e-4), status: 1 << 18 };
         let other = RunError::NotReady { limit: 1.0, status: 0 };
-        for (error, expected) in [(early, ENDED_EARLY), (other, ENVIRONMENT)] {
+        for (error, expected) in [(early, ENDED_EARLY), (late, ENDED_EARLY), (other, ENVIRONMENT)] {
             let message = error.to_string();
             let mut ui = Ui::called(|_| (), None);
             assert_eq!(ui.failed(&error.into()), expected, "{message}");

@@ -257,6 +257,13 @@ fn a_run_that_ends_early_is_an_error_and_no_figure() {
         let text = RunError::EndedEarly { coverage, status }.to_string();
         assert!(text.contains(&format!("after {seconds:.3} s of a path of 0.020 s (status 0x0)")), "{text}");
     }
+    // One that goes on behind its last set-point plays another path.
+    for busy in [200, 250] {
+        let error = played(&mut player(busy, None), &PATH, INTERVAL, None).unwrap_err();
+        let RunError::NotEnded { coverage, status: BUSY } = error else { panic!("{error}") };
+        assert_eq!(coverage, Coverage::new(200, 200, INTERVAL));
+        assert!(error.to_string().contains("busy after 0.020 s, the whole path (status 0x40000: "), "{error}");
+    }
     // A set-point that is refused ends the run; what it had of errors is not the path's.
     let run = played(&mut player(199, Some(80)), &PATH, INTERVAL, None).unwrap();
     assert!(!run.is_followed() && run.samples.len() == 80);

@@ -169,7 +169,7 @@ impl PlatformRig {
     /// is not. A run whose set-points the controller refused ends there, see [`PlatformRun::is_followed`].
     ///
     /// # Errors
-    /// As [`PlatformRig::run`], and if the trajectory ends before its last set-point.
+    /// As [`PlatformRig::run`], and if the trajectory ends before its last set-point, or not with it.
     pub fn play(
         &mut self,
         controller: &mut dyn TickController,
@@ -194,8 +194,15 @@ impl PlatformRig {
                 break;
             }
             errors.add(&std::array::from_fn(|k| tick.target[k] - tick.pose[k]));
-            if tick.status & BUSY == 0 && (number < path.ticks || path.repeats) {
-                return Err(RunError::EndedEarly { coverage: errors.coverage(), status: tick.status });
+            let (is_busy, goes_on) = (tick.status & BUSY != 0, path.repeats || number < path.ticks);
+            if is_busy != goes_on {
+                let (coverage, status) = (errors.coverage(), tick.status);
+                let ended = if goes_on {
+                    RunError::EndedEarly { coverage, status }
+                } else {
+                    RunError::NotEnded { coverage, status }
+                };
+                return Err(ended);
             }
         }
         Ok(PlatformRun { errors, samples, trace: bench.into_trace(), status: seen, arming })

@@ -438,7 +438,7 @@ impl Experiment<'_> {
     /// Samples of a run for its file; none, and a line about it, if it did not come to the end of its path.
     fn keep(&mut self, name: &str, run: Result<PlatformRun, RunError>) -> Result<Option<PlatformRun>, Failure> {
         let run = match run {
-            Err(error @ RunError::EndedEarly { .. }) => {
+            Err(error @ (RunError::EndedEarly { .. } | RunError::NotEnded { .. })) => {
                 self.refused.push(format!("{name}: not scored: {error}"));
                 self.ended.push(name.to_owned());
                 return Ok(None);
