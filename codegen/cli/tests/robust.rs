@@ -341,10 +341,22 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
     assert!(folder.read("robust.svg").contains("the same, learned"));
     assert_eq!(single.code, 1, "{single:#?}");
     assert!(single.stderr.contains("largest rms learned error is"), "{single:#?}");
-    assert!(single.stdout.contains("learned from 2 passes on each") && single.stdout.contains("learned, nm rms"));
+    assert!(single.stdout.contains("learned, nm rms"));
+    // What is learned was measured over a time of its own.
+    let over = |line: &str| {
+        let line = single.stdout.lines().find(|one| one.starts_with(line)).unwrap();
+        line.split_once("measured over ").unwrap().1.to_owned()
+    };
+    assert!(!over("each ").is_empty() && !over("learned from 2 passes on each, ").is_empty(), "{}", single.stdout);
+    assert!(single.stdout.contains(" nm learned in ") && single.stdout.contains(" passes over "), "{}", single.stdout);
     let report: Value = serde_json::from_slice(&std::fs::read(folder.path("single/report.json")).unwrap()).unwrap();
-    for one in report["runs"].as_array().unwrap() {
+    let table = folder.read("single/runs.csv");
+    let (head, rows) = table.split_once('\n').unwrap();
+    assert!(head.ends_with(",seconds,path_seconds,learned_seconds,learned_path_seconds"), "{head}");
+    for (one, row) in report["runs"].as_array().unwrap().iter().zip(rows.lines()) {
         let ran = &one["outcome"]["ran"];
+        let times = ["seconds", "path_seconds"].map(|key| ran["learned"][key].as_f64().unwrap());
+        assert!(row.ends_with(&format!(",{},{}", times[0], times[1])) && times[0] > 0.0, "{row}");
         let [before, after] = [&ran["error_nm"], &ran["learned"]["error_nm"]].map(|nm| nm.as_f64().unwrap());
         assert!(after < 0.6 * before, "{one}");
     }

@@ -231,8 +231,8 @@ impl<'a> Found<'a> {
                     let _ = write!(out, ", {rms:.1} nrad rms, {peak:.1} nrad peak");
                 }
                 let _ = write!(out, ", over {}", f.coverage.brief());
-                if let Some(Learnt { error_nm, passes, grew, .. }) = f.learned {
-                    let _ = write!(out, ", {error_nm:.2} nm learned in {passes} passes");
+                if let Some(Learnt { error_nm, passes, grew, coverage }) = f.learned {
+                    let _ = write!(out, ", {error_nm:.2} nm learned in {passes} passes over {}", coverage.brief());
                     out.push_str(if grew { ", then it grew" } else { "" });
                 }
                 if f.limited_percent > 0.0 {
@@ -284,7 +284,11 @@ impl<'a> Found<'a> {
                 let _ = write!(out, ",{factor}[{leg}]");
             }
         }
-        out.push_str(",seconds,path_seconds\n");
+        out.push_str(",seconds,path_seconds");
+        if self.work.learning.is_some() {
+            out.push_str(",learned_seconds,learned_path_seconds");
+        }
+        out.push('\n');
         for (member, outcome) in self.runs {
             let diverged = outcome.figures().is_none();
             let _ = write!(out, "{},{},{},{diverged},", member.name, member.seed, member.drawn);
@@ -302,12 +306,26 @@ impl<'a> Found<'a> {
             for value in EACH.into_iter().flat_map(|factor| each(d, factor)) {
                 let _ = write!(out, ",{value}");
             }
-            let _ = match outcome.figures().map(|figures| figures.coverage) {
-                Some(Coverage { seconds, path_seconds }) => writeln!(out, ",{seconds},{path_seconds}"),
-                None => writeln!(out, ",,"),
-            };
+            let figures = outcome.figures();
+            let mut measured = vec![figures.map(|figures| figures.coverage)];
+            if self.work.learning.is_some() {
+                measured.push(figures.and_then(|figures| Some(figures.learned?.coverage)));
+            }
+            for coverage in measured {
+                let _ = match coverage {
+                    Some(Coverage { seconds, path_seconds }) => write!(out, ",{seconds},{path_seconds}"),
+                    None => write!(out, ",,"),
+                };
+            }
+            out.push('\n');
         }
         out
+    }
+
+    /// What was measured of the motion where machines learned: of the first that did, for all follow the same path.
+    fn learned_over(&self) -> String {
+        let learned = self.runs.iter().find_map(|(_, outcome)| outcome.figures()?.learned);
+        learned.map_or_else(String::new, |learned| format!(", measured over {}", learned.coverage))
     }
 }
 
@@ -330,7 +348,8 @@ impl Shown for Report<'_> {
             let _ = writeln!(out, "each measured over {coverage}");
         }
         if let Some(Lessons { passes, band: [low, high] }) = found.work.learning {
-            let _ = writeln!(out, "learned from {passes} passes on each, {low:.1} to {high:.0} Hz");
+            let over = found.learned_over();
+            let _ = writeln!(out, "learned from {passes} passes on each, {low:.1} to {high:.0} Hz{over}");
         }
         out.push_str("varied, as factors on the spec:\n");
         for one in self.factors.iter() {
