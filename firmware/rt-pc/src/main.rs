@@ -150,7 +150,7 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
     let named = |path: &std::path::Path, error: std::io::Error| environment(format!("{}: {error}", path.display()));
     let link = options.link.as_deref().map(|path| Link::listen(path).map_err(|error| named(path, error)));
     let link = link.transpose()?;
-    outputs::check(options.record.as_deref(), options.capture.as_deref()).map_err(usage)?;
+    outputs::check(options.record.as_deref(), options.capture.as_deref())?;
     let record = options.record.as_deref().map(|path| {
         let writer = record::Writer::create(path, &config).map_err(environment)?;
         Ok::<_, Failure>((path.to_owned(), writer))

@@ -3,35 +3,52 @@
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Write};
 use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rustix::fs::{OFlags, fcntl_setfl};
+
+use crate::Failure;
+
+/// Links to other links that are followed, as the system does.
+const MOST_LINKS: usize = 40;
 
 /// Whether a record and a capture can be written to these files: they are two, nobody has protected them, and what replaces a
 /// file replaces no device.
 ///
 /// # Errors
-/// In words.
-pub fn check(record: Option<&Path>, capture: Option<&Path>) -> Result<(), String> {
+/// Two names for one file are a mistake of the call; a file that cannot be written is one of the environment.
+pub fn check(record: Option<&Path>, capture: Option<&Path>) -> Result<(), Failure> {
     let same = |a: &Metadata, b: &Metadata| (a.dev(), a.ino()) == (b.dev(), b.ino());
     let (recorded, captured) = (found(record), found(capture));
     let is_one = recorded.as_ref().zip(captured.as_ref()).is_some_and(|((_, a), (_, b))| same(a, b));
-    if is_one || record.is_some() && record == capture {
-        return Err("--record and --capture name one file; name two".to_owned());
+    if is_one || record.is_some() && record.map(whole) == capture.map(whole) {
+        return Err(Failure::Usage("--record and --capture name one file; name two".to_owned()));
     }
+    let refused = |path: &Path, why: &str| Err(Failure::Environment(format!("{}: {why}", path.display())));
     if let Some((path, _)) = captured.as_ref().filter(|(_, found)| !found.is_file()) {
-        return Err(format!("{}: a capture is written to a regular file; name one", path.display()));
+        return refused(path, "a capture is written to a regular file; name one");
     }
     for (path, found) in [recorded, captured].into_iter().flatten() {
         let kind = found.file_type();
         if kind.is_dir() || kind.is_block_device() || kind.is_socket() {
-            return Err(format!("{}: it is no file that can be written; name a regular file", path.display()));
+            return refused(path, "it is no file that can be written; name a regular file");
         }
         if found.is_file() && found.mode() & 0o222 == 0 {
-            return Err(format!("{}: it is write-protected; name another file", path.display()));
+            return refused(path, "it is write-protected; name another file");
         }
     }
     Ok(())
+}
+
+/// The same name for the same file, which need not be there: through links, too, to a file or a folder.
+fn whole(path: &Path) -> PathBuf {
+    let mut path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    for _ in 0..MOST_LINKS {
+        let Ok(target) = std::fs::read_link(&path) else { break };
+        path = path.parent().map_or(target.clone(), |folder| folder.join(&target));
+    }
+    let folder = path.parent().and_then(|folder| folder.canonicalize().ok());
+    folder.zip(path.file_name()).map_or(path.clone(), |(folder, name)| folder.join(name))
 }
 
 fn found(path: Option<&Path>) -> Option<(&Path, Metadata)> {
@@ -71,29 +88,43 @@ mod tests {
     #[test]
     fn outputs_that_would_lose_something_are_refused() {
         let folder = std::env::temp_dir().join(format!("rt-pc-outputs-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::create_dir_all(folder.join("sub")).unwrap();
         let at = |name: &str| folder.join(name);
         std::fs::write(at("a"), "").unwrap();
-        std::os::unix::fs::symlink("a", at("link")).unwrap();
+        for (target, name) in [("a", "link"), (".", "here"), ("sub/../new", "to-new")] {
+            std::os::unix::fs::symlink(target, at(name)).unwrap();
+        }
+        // Of the call, or of the environment.
         let refused = |record: &str, capture: &str| {
             let path = |name: &str| (!name.is_empty()).then(|| at(name));
-            check(path(record).as_deref(), path(capture).as_deref()).err().unwrap_or_default()
+            match check(path(record).as_deref(), path(capture).as_deref()) {
+                Ok(()) => String::new(),
+                Err(Failure::Usage(text)) => format!("usage: {text}"),
+                Err(Failure::Environment(text)) => format!("environment: {text}"),
+                Err(Failure::Run(text)) => format!("run: {text}"),
+            }
         };
-        for (record, capture, words) in [
-            ("a", "", ""),
-            ("a", "new", ""),
-            ("/dev/full", "a", ""),
-            ("a", "link", "two"),
-            ("new", "new", "two"),
-            ("", "/dev/null", "regular file"),
-            (".", "", "regular file"),
+        for (record, capture, kind, words) in [
+            ("a", "", "", ""),
+            ("a", "new", "", ""),
+            ("new", "sub/new", "", ""),
+            ("new", "here/newer", "", ""),
+            ("/dev/full", "a", "", ""),
+            ("a", "link", "usage", "two"),
+            ("new", "new", "usage", "two"),
+            ("new", "sub/../new", "usage", "two"),
+            ("here/new", "new", "usage", "two"),
+            ("to-new", "here/new", "usage", "two"),
+            ("", "/dev/null", "environment", "regular file"),
+            (".", "", "environment", "regular file"),
         ] {
-            assert!(
-                refused(record, capture).contains(words) && refused(record, capture).is_empty() == words.is_empty()
-            );
+            let text = refused(record, capture);
+            assert!(text.starts_with(kind) && text.contains(words) && text.is_empty() == words.is_empty(), "{text}");
         }
         std::fs::set_permissions(at("a"), std::fs::Permissions::from_mode(0o444)).unwrap();
-        assert!(refused("a", "").contains("write-protected") && refused("", "a").contains("write-protected"));
+        for text in [refused("a", ""), refused("", "a")] {
+            assert!(text.starts_with("environment") && text.contains("write-protected"), "{text}");
+        }
         rustix::fs::mknodat(rustix::fs::CWD, at("pipe"), rustix::fs::FileType::Fifo, rustix::fs::Mode::RWXU, 0)
             .unwrap();
         assert!(create(&at("pipe")).is_err());
