@@ -354,7 +354,7 @@ pub fn section(all: &[Followed], law: &str, interval: f64, corners: bool, comman
     }
     if !refused.is_empty() {
         section = section.text(&format!(
-            "Not run, for the controller refuses set-points that leave the workspace or move faster than control.setpoint.stream_speed: {}.",
+            "Ended early, so without a figure: the controller refused set-points that leave the workspace or move faster than control.setpoint.stream_speed: {}.",
             refused.join(", ")
         ));
     }

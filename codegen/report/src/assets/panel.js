@@ -213,7 +213,7 @@
       else if (watch && said.kind !== "error") more = state.holder + " has the orders. Hold and Ramp down work from here, too.";
       else if (!state.holder && said.kind !== "error") more = (more ? more + " " : "") + "Ask for orders first.";
       if (state.asked && state.mine) put("warning", state.asked.by + " asks for the orders.", "Hand over or keep: " + state.asked.left.toFixed(0) + "\u2009s left.", said.code || events);
-      else put(said.kind, watch && said.kind === "ok" ? "You watch." : said.what, more, row && row.status & GAUGES ? by("pose-age").textContent : said.code ? said.code + " · " + events : "no condition present" + (events ? " · " + events : ""));
+      else put(said.kind, watch && said.kind === "ok" ? "You watch." : said.what, more, [row && row.status & GAUGES ? by("pose-age").textContent : "", said.code, events].filter(Boolean).join(" · ") || "no condition present");
     }
     const down = by("down").querySelector("span"), volts = shown5.volts ? Math.max(...shown5.volts.map(Math.abs)) : NaN;
     const time = facts.ramp && isFinite(volts) ? (volts / facts.ramp).toFixed(1) + "\u2009s to 0\u2009V" : "";

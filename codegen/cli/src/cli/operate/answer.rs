@@ -78,7 +78,7 @@ impl Outcome for MachineStatus {
         let on = if self.amplifiers_on { "on" } else { "off" };
         let age = match self.age.map(Duration::from_secs_f64) {
             None => "  there was no tick yet: all of this is as at the start\n".to_owned(),
-            Some(age) if age >= FRESH => format!("  the machine makes no ticks: all of this was so {} ago\n", ago(age)),
+            Some(age) if age >= FRESH => format!("  the machine makes no ticks: this is its state {} ago\n", ago(age)),
             Some(_) => String::new(),
         };
         format!(

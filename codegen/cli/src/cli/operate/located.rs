@@ -59,12 +59,13 @@ fn why(place: &Place, status: &Status) -> Option<String> {
     let all = GAUGES >> GAUGES.trailing_zeros();
     match status.age.map(Duration::from_micros) {
         None => Some("there was no tick yet".to_owned()),
-        Some(age) if age >= FRESH => Some(format!("the machine makes no ticks, for {}", ago(age))),
+        Some(age) if age >= FRESH => Some(format!("the machine has made no tick for {}", ago(age))),
         Some(_) if bad == all => Some("the gauges are not read".to_owned()),
         Some(_) if bad != 0 => {
             let numbers: Vec<String> =
                 (0..6).filter(|gauge| bad >> gauge & 1 == 1).map(|gauge| gauge.to_string()).collect();
-            Some(format!("gauge {} is not believed", numbers.join(", ")))
+            let [gauges, are] = if numbers.len() == 1 { ["gauge", "is"] } else { ["gauges", "are"] };
+            Some(format!("{gauges} {} {are} not believed", numbers.join(", ")))
         }
         Some(_) if !place.is_measured() => Some("the gauges are not read".to_owned()),
         Some(_) => None,
@@ -167,8 +168,8 @@ mod tests {
             (GAUGES, Some(3200), Some(0), &["the gauges are not read", "3.2 s ago", "1.0000"][..], false),
             (GAUGES, None, Some(0), &["the gauges are not read"], false),
             (0x200, Some(5), Some(0), &["gauge 1 is not believed", "0.0 s ago"], true),
-            (0x2100, Some(150_000), Some(0), &["gauge 0, 5 is not believed", "150 s ago"], true),
-            (0, Some(2000), Some(2_000_000), &["no ticks, for 2.0 s", "2.0 s ago"], false),
+            (0x2100, Some(150_000), Some(0), &["gauges 0, 5 are not believed", "150 s ago"], true),
+            (0, Some(2000), Some(2_000_000), &["the machine has made no tick for 2.0 s", "2.0 s ago"], false),
             (0, Some(2000), Some(0), &["the gauges are not read", "2.0 s ago"], true),
             (0, None, None, &["there was no tick yet"], false),
         ] {
