@@ -114,7 +114,7 @@ fn an_end_from_outside_is_reported_to_programs() {
 fn full() -> Option<File> {
     let full = fs::OpenOptions::new().write(true).open("/dev/full").ok();
     if full.is_none() {
-        crate::support::skipped("there is no /dev/full here");
+        support::skipped("there is no /dev/full here");
     }
     full
 }

@@ -21,7 +21,7 @@ impl Assumptions {
     /// Those of `model`, whose files `simulated` are marked so.
     #[must_use]
     pub fn of(model: &Model, simulated: Vec<String>) -> Self {
-        let left_out = NOISE.into_iter().filter(|key| model.spans.get(*key).is_none());
+        let left_out = NOISE.into_iter().filter(|key| !model.spans.contains_key(*key));
         let values = model.assumed.iter().cloned().chain(left_out.map(|key| format!("{key} (left out: none)")));
         Self { values: values.collect(), simulated }
     }

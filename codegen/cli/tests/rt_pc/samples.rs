@@ -134,7 +134,8 @@ pub fn hosts_look_on_and_are_no_burden(bench: &Bench) {
 
     // The one that did not has lost the oldest, and sees how many.
     assert!(late[0].number > 0 && late.len() > 200, "{} {}", late[0].number, late.len());
-    assert!(late.windows(2).all(|pair| pair[1].number == pair[0].number + 1));
+    // While it takes what is left, it may lose more.
+    assert!(late.windows(2).all(|pair| pair[1].number > pair[0].number));
     for block in &late {
         let ticks = block.tick..;
         block.rows.iter().zip(ticks).for_each(|(row, tick)| check_row(row, tick, 1, &shown, &motion));
