@@ -193,8 +193,7 @@ fn run(jobs: &[Job<'_>], workers: usize, kept: &Path, durations: &Durations, mod
     let expected: Vec<Duration> = jobs.iter().map(|job| durations.expect(&job.name)).collect();
     let done = Mutex::new((Vec::new(), Progress::new(expected, workers)));
     let work = &|worker: usize| {
-        loop {
-            let Some(index) = next(worker) else { break };
+        while let Some(index) = next(worker) {
             let job = &jobs[index];
             let start = Instant::now();
             let (good, text) = job.run(kept, mode, worker);

@@ -41,7 +41,7 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     let mut time = None;
     let (targets, work): (Vec<&str>, Work) = match *arguments {
         ["keep"] => (TARGETS.to_vec(), Box::new(|target| keep(root, target))),
-        [ref all @ ..] if all.len() <= 2 => {
+        ref all if all.len() <= 2 => {
             let seconds = all.first().map_or(Some(SECONDS), |seconds| seconds.parse().ok())?;
             time = Some(seconds);
             let targets = TARGETS.into_iter().filter(|name| all.get(1).is_none_or(|only| only == name)).collect();
