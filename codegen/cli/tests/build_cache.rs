@@ -126,6 +126,7 @@ fn an_unchanged_spec_is_built_once_and_everything_else_anew() {
 }
 
 #[test]
+#[ignore = "long: a controller built beside itself"]
 fn two_at_once_build_once() {
     let counted = Counted::new();
     let commands = ["a.rec", "b.rec"].map(|file| ["sim", "legs.toml", "--record", file, "--seconds", "0.1"]);
@@ -140,6 +141,7 @@ fn two_at_once_build_once() {
 }
 
 #[test]
+#[ignore = "long: two controllers built without a cache"]
 fn a_cache_that_cannot_be_written_costs_one_line() {
     let counted = Counted::new();
     let mut nowhere = counted.command(&SIM);

@@ -125,6 +125,7 @@ const RULES: &[Rule] = &[
     motion::streams_within_slew,
     motion::workspace_is_used,
     triggers::more_than_one,
+    triggers::some_at_all,
     triggers::steps_apart,
     triggers::above_noise,
     triggers::pulses_apart,

@@ -49,6 +49,7 @@ fn pairs(facts: &Facts) -> Vec<Pair> {
         of("ramp_rate", spec.ramp_rate, defaults::ramp_rate(model), ("V/s", 1.0), NEAR_DEFAULT),
         of("stuck_motion", spec.stuck_motion, defaults::stuck_motion(model, step), ("nm", 1e9), NEAR_DEFAULT),
         of("disagreement", spec.disagreement, defaults::disagreement(model), ("um", 1e6), PART_OF_WHOLE),
+        of("missed_ticks", Some(f64::from(spec.missed_ticks)), 3.0, ("ticks", 1.0), NEAR_DEFAULT),
         of("tracking_error", Some(spec.tracking_error), 0.2, ("", 1.0), PART_OF_WHOLE),
     ];
     if let Some(task) = &model.task_space {
@@ -111,6 +112,21 @@ pub(super) fn near_one(facts: &Facts, found: &mut Found) {
             &format!("robust.{name}[{end}]"),
             format!("`robust.{name}` would be tried at {} times what the spec says", figure(factor)),
             "give the smallest and the largest factor on the value of the spec: a tolerance of 5 % is [0.95, 1.05]",
+        );
+    }
+    for (key, range) in ranges.map(|(name, range)| (format!("robust.{name}"), range)) {
+        let Some([low, high]) = range.filter(|[low, high]| SOUND_FACTOR.contains(low) && SOUND_FACTOR.contains(high))
+        else {
+            continue;
+        };
+        if low <= 1.0 && high >= 1.0 {
+            continue;
+        }
+        found.add(
+            codes::FACTOR_ODD,
+            &key,
+            format!("`{key}` goes from {} to {}: what the spec says, 1, is not in it", figure(low), figure(high)),
+            "give a smallest factor of at most 1 and a largest of at least 1; correct the value itself if it is off",
         );
     }
 }

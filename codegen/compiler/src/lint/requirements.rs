@@ -14,6 +14,8 @@ pub(super) fn ask_something(facts: &Facts, found: &mut Found) {
     let one = |key: &str, limit: Option<f64>, about: usize| limit.map(|limit| (key.to_owned(), limit, about));
     let mut limits = vec![
         one("requirements.precision", model.requirements.precision, 0),
+        one("requirements.noise", model.requirements.noise, 0),
+        one("requirements.rotation_noise", model.requirements.rotation_noise, 1),
         one("robust.max_error", model.robust.max_error, 0),
         one("robust.max_learned", model.robust.max_learned, 0),
         one("robust.max_orientation", model.robust.max_orientation, 1),

@@ -70,20 +70,24 @@ pub(super) fn lead_of_the_lag(facts: &Facts, found: &mut Found) {
             "check the unit (ms or us); `specgen identify rate` measures it",
         );
     }
-    let Some(lead) = model.task_space.as_ref().and_then(|task| task.lead) else { return };
-    if lead <= LARGEST_LEAD * lag {
-        return;
+    let Some(task) = &model.task_space else { return };
+    let of_paths =
+        task.trajectories.iter().enumerate().map(|(index, one)| (format!("trajectory[{index}].lead"), one.lead));
+    for (key, lead) in std::iter::once(("control.lead".to_owned(), task.lead)).chain(of_paths) {
+        let Some(lead) = lead.filter(|lead| *lead > LARGEST_LEAD * lag) else { continue };
+        found.add(
+            codes::LEAD_TOO_LONG,
+            &key,
+            format!(
+                "legs are asked for {} ms early, but amplifier and tick together lag {} ms",
+                figure(lead * 1e3),
+                figure(lag * 1e3)
+            ),
+            &format!(
+                "leave `{key}` out, and the compiler takes the lag out; or check its unit and that of `amplifier.lag`"
+            ),
+        );
     }
-    found.add(
-        codes::LEAD_TOO_LONG,
-        "control.lead",
-        format!(
-            "legs are asked for {} ms early, but amplifier and tick together lag {} ms",
-            figure(lead * 1e3),
-            figure(lag * 1e3)
-        ),
-        "leave `control.lead` out, and the compiler takes the lag out; or check its unit and that of `amplifier.lag`",
-    );
 }
 
 /// The offset of a change of mode fades over some ticks and not for ever.

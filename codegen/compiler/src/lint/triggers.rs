@@ -45,6 +45,20 @@ pub(super) fn more_than_one(facts: &Facts, found: &mut Found) {
     }
 }
 
+/// What may have a pulse does not end before it begins.
+pub(super) fn some_at_all(facts: &Facts, found: &mut Found) {
+    let triggers = facts.model.task_space.iter().flat_map(|task| task.triggers.iter().enumerate());
+    for (index, trigger) in triggers {
+        let Some(last) = trigger.last.filter(|last| *last < trigger.first) else { continue };
+        found.add(
+            codes::TRIGGER_SINGLE,
+            &format!("trigger[{index}].last"),
+            format!("`last` of trigger[{index}] is {last}, before its `first`, {}: it gives no pulse", trigger.first),
+            "exchange the two, or leave `last` out",
+        );
+    }
+}
+
 /// Positions are apart by more than the hysteresis, and not so many that a single precision cannot tell them apart.
 pub(super) fn steps_apart(facts: &Facts, found: &mut Found) {
     for (index, trigger) in of_kind(facts, &[TriggerKind::Position]) {

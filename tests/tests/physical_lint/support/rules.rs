@@ -226,6 +226,16 @@ pub const RULES: &[Rule] = &[
         ["transfer_time   =", "lead = \"0.57 ms\"\ntransfer_time   =", "lead = \"0.56 ms\"\ntransfer_time   ="],
     )
     .at("lead = "),
+    of(
+        "W0831",
+        "trajectory[0].lead",
+        [
+            "kind      = \"case-1\"",
+            "kind      = \"case-1\"\nlead = \"0.57 ms\"",
+            "kind      = \"case-1\"\nlead = \"0.56 ms\"",
+        ],
+    )
+    .at("lead = "),
     of("W0832", "control.transfer_time", ["\"50 ms\"", "\"99 us\"", "\"100 us\""]),
     of("W0833", "control.velocity_cutoff", ["\"1.9e4 rad/s\"", "\"226 rad/s\"", "\"227 rad/s\""]),
     of("W0834", "timing.period", ["\"200 us\"", "\"0.7 ms\"", "\"0.69 ms\""])
@@ -336,6 +346,8 @@ pub const RULES: &[Rule] = &[
     ),
     of("W0866", "requirements.precision", ["\"50 nm\"", "\"3.01 um\"", "\"2.99 um\""])
         .with(&[("[timing]\n", "[requirements]\nprecision = \"50 nm\"\n\n[timing]\n")]),
+    of("W0866", "requirements.noise", ["\"50 nm\"", "\"3.01 um\"", "\"2.99 um\""])
+        .with(&[("[timing]\n", "[requirements]\nnoise = \"50 nm\"\n\n[timing]\n")]),
     of(
         "W0867",
         "control.setpoint.stream_speed[0]",
@@ -481,9 +493,21 @@ pub const RULES: &[Rule] = &[
     )
     .at("gauge_time = "),
     of(
+        "W0888",
+        "supervisor.missed_ticks",
+        ["[timing]\n", "[supervisor]\nmissed_ticks = 151\n\n[timing]\n", "[supervisor]\nmissed_ticks = 150\n\n[timing]\n"],
+    )
+    .at("missed_ticks = "),
+    of(
         "W0889",
         "robust.mass[0]",
         ["[timing]\n", "[robust]\nmass = [0.24, 1.05]\n\n[timing]\n", "[robust]\nmass = [0.26, 1.05]\n\n[timing]\n"],
+    )
+    .at("mass = ["),
+    of(
+        "W0889",
+        "robust.mass",
+        ["[timing]\n", "[robust]\nmass = [1.01, 1.2]\n\n[timing]\n", "[robust]\nmass = [1.0, 1.2]\n\n[timing]\n"],
     )
     .at("mass = ["),
     // What is far off, and what the spec lets pass.
