@@ -350,6 +350,38 @@ fn what_cannot_be_written_is_left_alone() {
     assert!(run.code == 3 && run.stderr.contains("no program reads this pipe"), "{run:#?}");
 }
 
+/// What the spec names belongs to it, though the command does not read it.
+#[test]
+fn no_output_replaces_a_table_of_the_spec() {
+    let folder = Folder::new();
+    fs::create_dir(folder.path("waves")).unwrap();
+    folder.write("waves/w.csv", "x_um\n0\n1\n0\n");
+    let path = "[[trajectory]]\nname = \"w\"\nkind = \"waveform\"\nfile = \"waves/w.csv\"\nperiod = \"10 ms\"\n\n[[trajectory]]";
+    folder.write("m.toml", folder.read("reference.toml").replacen("[[trajectory]]", path, 1));
+    folder.run(&["forc", "m.toml", "-o", "waves/w.csv"]).says(2, &["waves/w.csv` is not written: it is an input"]);
+    assert_eq!(folder.read("waves/w.csv"), "x_um\n0\n1\n0\n");
+}
+
+/// Files that a command writes together are all written or none.
+#[test]
+fn of_several_outputs_none_is_written_if_one_cannot_be() {
+    let folder = Folder::new();
+    let before = folder.run(&["forc", "-o", "r.csv", "--grid", "8"]);
+    assert_eq!(before.code, 0, "{before:?}");
+    let names = ["leg-static.csv", "leg-dead-time.csv", "leg.toml"];
+    names.iter().for_each(|name| folder.write(name, "mine"));
+    fs::set_permissions(folder.path("leg.toml"), fs::Permissions::from_mode(0o444)).unwrap();
+    let rate = ["identify", "rate", "r.csv", "--drive", "0:100", "--grid", "8", "-o", "leg"];
+    folder.run(&rate).says(3, &["leg.toml`", "write-protected", "nothing was changed"]);
+    names.iter().for_each(|name| assert_eq!(folder.read(name), "mine", "{name}"));
+
+    folder.write("rep-paper.html", folder.read("legs.toml"));
+    folder.write("rep.html", "mine");
+    let report = ["report", "rep-paper.html", "--no-target", "--paper", "--generations", "1", "-o", "rep.html"];
+    folder.run(&report).says(2, &["rep-paper.html` is not written: it is an input", "nothing was changed"]);
+    assert_eq!(folder.read("rep.html"), "mine");
+}
+
 /// What replaces a file has its permissions.
 #[test]
 fn a_file_that_others_may_not_read_stays_one() {
