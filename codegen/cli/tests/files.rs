@@ -366,12 +366,13 @@ fn no_output_replaces_a_table_of_the_spec() {
 #[test]
 fn of_several_outputs_none_is_written_if_one_cannot_be() {
     let folder = Folder::new();
-    let before = folder.run(&["forc", "-o", "r.csv", "--grid", "8"]);
-    assert_eq!(before.code, 0, "{before:?}");
+    for (name, rate) in [("slow.csv", "20"), ("fast.csv", "400")] {
+        assert_eq!(folder.run(&["forc", "-o", name, "--grid", "8", "--rate", rate]).code, 0);
+    }
     let names = ["leg-static.csv", "leg-dead-time.csv", "leg.toml"];
     names.iter().for_each(|name| folder.write(name, "mine"));
     fs::set_permissions(folder.path("leg.toml"), fs::Permissions::from_mode(0o444)).unwrap();
-    let rate = ["identify", "rate", "r.csv", "--drive", "0:100", "--grid", "8", "-o", "leg"];
+    let rate = ["identify", "rate", "slow.csv", "fast.csv", "--drive", "0:100", "--grid", "8", "-o", "leg"];
     folder.run(&rate).says(3, &["leg.toml`", "write-protected", "nothing was changed"]);
     names.iter().for_each(|name| assert_eq!(folder.read(name), "mine", "{name}"));
 

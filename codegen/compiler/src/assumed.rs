@@ -5,13 +5,10 @@ use serde::Serialize;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
 
-/// Left out, these are nothing, which every figure of noise then rests on.
-const NOISE: [&str; 2] = ["sensor.noise", "amplifier.noise"];
-
 /// Values and records that nobody measured.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Assumptions {
-    /// Paths of keys and repeated sections, as the spec's `assumed` names them, and noise that the spec leaves out.
+    /// Paths of keys and repeated sections, as the spec's `assumed` names them.
     pub values: Vec<String>,
     /// Files of the spec's `[hysteresis]` that are marked as simulated.
     pub simulated: Vec<String>,
@@ -21,9 +18,7 @@ impl Assumptions {
     /// Those of `model`, whose files `simulated` are marked so.
     #[must_use]
     pub fn of(model: &Model, simulated: Vec<String>) -> Self {
-        let left_out = NOISE.into_iter().filter(|key| !model.spans.contains_key(*key));
-        let values = model.assumed.iter().cloned().chain(left_out.map(|key| format!("{key} (left out: none)")));
-        Self { values: values.collect(), simulated }
+        Self { values: model.assumed.clone(), simulated }
     }
 
     /// Whether everything is measured or known.
