@@ -61,9 +61,8 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
         }
     }
     if let (true, Some(seconds)) = (all, time) {
-        let word = if report.has_failed() { "FAILED" } else { "good" };
-        let result = format!("{word}, {} for {seconds} s each", TARGETS.join(", "));
-        report.step("result of the fuzzing", || results::write(root, "fuzz", &result));
+        let (good, targets) = (!report.has_failed(), format!("{} for {seconds} s each", TARGETS.join(", ")));
+        report.step("result of the fuzzing", || results::write(root, "fuzz", good, &targets));
     }
     Some(report.finish())
 }

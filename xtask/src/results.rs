@@ -17,15 +17,16 @@ const OLDEST: usize = 60;
 /// The command whose age is judged.
 pub const FULL: &str = "full";
 
-/// Writes the line of a command; that of the same command is replaced.
-pub fn write(root: &Path, command: &str, result: &str) -> Outcome {
+/// Writes the line of a command, whether it was good and what it found; the line of an earlier run is replaced.
+pub fn write(root: &Path, command: &str, good: bool, found: &str) -> Outcome {
     let commit = git(root, &["rev-parse", "HEAD"]).unwrap_or_else(|| "unknown".to_owned());
     // What stands in the file itself changes nothing that is tested.
     let others = format!(":!{FILE}");
     let status = git(root, &["status", "--porcelain", "--untracked-files=no", "--", ".", &others]);
     let changed = if status.is_none_or(|text| !text.is_empty()) { " with changes" } else { "" };
     let today = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs() / 86_400);
-    let line = format!("{command:8} {} {commit}{changed} {result}", date(today));
+    let word = if good { "good" } else { "FAILED" };
+    let line = format!("{command:8} {} {commit}{changed} {word}, {found}", date(today));
     println!("{line}");
     let text = with(&std::fs::read_to_string(root.join(FILE)).unwrap_or_default(), command, &line);
     match std::fs::write(root.join(FILE), text) {
@@ -47,7 +48,7 @@ fn of(line: &str) -> &str {
 }
 
 /// Tests that passed, failed and were skipped, how long it took, and a digest of every test with its result.
-pub fn of_tests(ran: &Ran, took: Duration, good: bool) -> String {
+pub fn of_tests(ran: &Ran, took: Duration) -> String {
     let mut results = String::new();
     for (name, passed) in &ran.tests {
         // Writing to a String cannot fail.
@@ -58,8 +59,7 @@ pub fn of_tests(ran: &Ran, took: Duration, good: bool) -> String {
     }
     let passed = ran.tests.iter().filter(|(_, passed)| *passed).count();
     format!(
-        "{}, {passed} passed, {} failed, {} skipped, {:.0} min, sha256 {}",
-        if good { "good" } else { "FAILED" },
+        "{passed} passed, {} failed, {} skipped, {:.0} min, sha256 {}",
         ran.tests.len() - passed,
         ran.skipped.len(),
         took.as_secs_f64() / 60.0,
@@ -143,9 +143,9 @@ mod tests {
     #[test]
     fn one_result_that_differs_changes_the_digest() {
         let ran = |passed| Ran { tests: vec![("tests a".to_owned(), passed)], skipped: Vec::new() };
-        let of = |passed| of_tests(&ran(passed), Duration::from_secs(60), passed);
+        let of = |passed| of_tests(&ran(passed), Duration::from_secs(60));
         assert_ne!(of(true), of(false));
-        assert!(of(true).starts_with("good, 1 passed, 0 failed, 0 skipped, 1 min, sha256 "), "{}", of(true));
+        assert!(of(true).starts_with("1 passed, 0 failed, 0 skipped, 1 min, sha256 "), "{}", of(true));
     }
 
     #[test]

@@ -246,7 +246,7 @@ fn parsed(arguments: impl IntoIterator<Item = OsString>) -> Result<(Cli, ArgMatc
 
 /// What was asked for.
 fn perform(cli: &Cli, matches: &ArgMatches, ui: &mut Ui) -> Result<(), Failure> {
-    files::begin();
+    files::forget_inputs();
     named::check(matches)?;
     match &cli.command {
         None => match misspelt(cli.build.spec.as_deref()) {

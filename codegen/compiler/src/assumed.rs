@@ -30,21 +30,13 @@ impl Assumptions {
     /// How many values, such as `13 assumed values`; none if there is none.
     #[must_use]
     pub fn count(&self) -> Option<String> {
-        match self.values.len() {
-            0 => None,
-            1 => Some("1 assumed value".to_owned()),
-            many => Some(format!("{many} assumed values")),
-        }
+        counted(&self.values, |count| format!("{count} assumed values"), "1 assumed value")
     }
 
     /// The records, such as `simulated leg record`; none if there is none.
     #[must_use]
     pub fn records(&self) -> Option<String> {
-        match self.simulated.len() {
-            0 => None,
-            1 => Some("simulated leg record".to_owned()),
-            many => Some(format!("{many} simulated leg records")),
-        }
+        counted(&self.simulated, |count| format!("{count} simulated leg records"), "simulated leg record")
     }
 
     /// All of them in a few words: `13 assumed values, simulated leg record`; empty if there is none.
@@ -76,6 +68,15 @@ impl Assumptions {
             format!("the controller of a real machine would rest on {}: {}", self.summary(), self.list().join(", ")),
             format!("{}; or accept them with --assumed-ok", clear.join(", and ")),
         )
+    }
+}
+
+/// A list in words; none if it is empty.
+fn counted(list: &[String], many: impl Fn(usize) -> String, one: &str) -> Option<String> {
+    match list.len() {
+        0 => None,
+        1 => Some(one.to_owned()),
+        count => Some(many(count)),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Files that a user names: one way in, and one guard of every way out.
 //!
 //! [`open`] looks at the kind of a file before it opens it, and keeps in mind which file a command has read. [`guard`] refuses an
-//! output that would replace one of those, whatever its name. Both are of one command at a time: [`begin`] forgets. A command opens
+//! output that would replace one of those, whatever its name. Both are of one command at a time: [`forget_inputs`] forgets. A command opens
 //! its files in the thread that performs it.
 
 use std::cell::RefCell;
@@ -30,8 +30,8 @@ thread_local! {
     static INPUTS: RefCell<BTreeMap<Identity, PathBuf>> = const { RefCell::new(BTreeMap::new()) };
 }
 
-/// A command begins: nothing is read yet.
-pub fn begin() {
+/// Forgets all inputs: a new command starts.
+pub fn forget_inputs() {
     INPUTS.take();
 }
 
@@ -103,14 +103,14 @@ impl fmt::Display for Unread {
             Self::System(error) => match error.kind() {
                 io::ErrorKind::NotFound => f.write_str("there is no such file"),
                 io::ErrorKind::PermissionDenied => f.write_str("reading it is not permitted"),
-                _ => said(error, f),
+                _ => write_error(error, f),
             },
         }
     }
 }
 
 /// What the system says, in words where its own are of no help.
-fn said(error: &io::Error, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+fn write_error(error: &io::Error, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     match error.kind() {
         io::ErrorKind::InvalidFilename => f.write_str("its name is too long"),
         _ => write!(f, "{error}"),
@@ -256,7 +256,7 @@ impl fmt::Display for Unwritten {
             Self::Kind("a folder") => f.write_str("it is a folder, name a file in it"),
             Self::Kind(kind) => write!(f, "it is {kind}; name a regular file"),
             Self::Unheard => f.write_str("no program reads this pipe; start its reader first"),
-            Self::System(error) => said(error, f),
+            Self::System(error) => write_error(error, f),
         }
     }
 }

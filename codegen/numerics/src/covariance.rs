@@ -15,9 +15,10 @@ pub fn steady_covariances<const N: usize>(transition: &Matrix, inputs: [&[Vec<f6
     let mut power = transition.clone();
     for _ in 0..MOST {
         // P over 2n ticks is P over n ticks and what n ticks later is left of it.
+        let transposed = power.transposed();
         let mut converged = true;
         for sum in &mut sums {
-            let later = power.times(sum).times(&transposed(&power));
+            let later = power.times(sum).times(&transposed);
             converged &= largest(&later) <= SMALL * largest(sum);
             sum.add_scaled(1.0, &later);
         }
@@ -38,17 +39,6 @@ fn of_input(input: &[Vec<f64>]) -> Matrix {
         }
     }
     product
-}
-
-fn transposed(matrix: &Matrix) -> Matrix {
-    let size = matrix.size();
-    let mut turned = Matrix::zeros(size);
-    for i in 0..size {
-        for j in 0..size {
-            turned[(j, i)] = matrix[(i, j)];
-        }
-    }
-    turned
 }
 
 fn largest(matrix: &Matrix) -> f64 {
@@ -74,7 +64,7 @@ mod tests {
         assert!(one[(1, 1)] > 0.0 && (one[(0, 1)] - one[(1, 0)]).abs() < 1e-9);
         assert!((other[(1, 1)] - 25.0 / (1.0 - 0.0625)).abs() < 1e-9 && other[(0, 0)] == 0.0, "{other:?}");
         // P solves its equation.
-        let again = transition.times(&one).times(&transposed(&transition));
+        let again = transition.times(&one).times(&transition.transposed());
         assert!((one[(1, 1)] - again[(1, 1)]).abs() < 1e-9 * one[(1, 1)]);
     }
 

@@ -72,6 +72,18 @@ impl Matrix {
         Self { size: self.size, entries: self.entries.iter().map(|x| x * factor).collect() }
     }
 
+    /// Aᵀ.
+    #[must_use]
+    pub fn transposed(&self) -> Self {
+        let mut transposed = Self::zeros(self.size);
+        for row in 0..self.size {
+            for column in 0..self.size {
+                transposed[(column, row)] = self[(row, column)];
+            }
+        }
+        transposed
+    }
+
     /// A B; a product with a zero entry is left out, so blocks that do not couple stay exactly apart.
     #[must_use]
     pub fn times(&self, other: &Self) -> Self {

@@ -45,6 +45,13 @@ impl Pin {
     }
 }
 
+/// Gives the pins of an SPI to it: SCK, pulled to its idle level, MOSI, MISO.
+pub fn spi_bus([clock, output, input]: [Pin; 3], function: u8, idle: Pupdr) {
+    clock.function(function, Ospeedr::VERY_HIGH_SPEED, idle);
+    output.function(function, Ospeedr::VERY_HIGH_SPEED, Pupdr::FLOATING);
+    input.function(function, Ospeedr::LOW_SPEED, Pupdr::FLOATING);
+}
+
 /// A pin that is driven, push-pull.
 pub struct Output(Pin);
 

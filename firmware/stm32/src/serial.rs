@@ -80,7 +80,7 @@ impl<P: Port> Line<P> {
     pub fn open(nvic: &mut NVIC, hertz: u32, ring: &'static Ring, answer: &'static Answer) -> Self {
         let [_, received] = P::data();
         P::prepare();
-        begin::<P>(P::RECEIVE, received, ring, ring.len(), HALF | CIRCULAR);
+        start_stream::<P>(P::RECEIVE, received, ring, ring.len(), HALF | CIRCULAR);
         P::start((hertz + BAUD / 2) / BAUD);
         for interrupt in P::INTERRUPTS {
             // SAFETY: they take back what calls them, and pend the service, which the program enables.
@@ -131,12 +131,12 @@ impl<P: Port> Line<P> {
             slot.store(*value, Ordering::Relaxed);
         }
         let [to, _] = P::data();
-        begin::<P>(P::SEND, to, self.answer, bytes.len(), SENDS);
+        start_stream::<P>(P::SEND, to, self.answer, bytes.len(), SENDS);
     }
 }
 
 /// Starts a stream that has come to its end, or never ran.
-fn begin<P: Port>(number: usize, register: u32, memory: &'static [AtomicU8], count: usize, more: u32) {
+fn start_stream<P: Port>(number: usize, register: u32, memory: &'static [AtomicU8], count: usize, more: u32) {
     acknowledge(number);
     let stream = DMA1.st(number);
     stream.par().write_value(register);

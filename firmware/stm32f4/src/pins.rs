@@ -3,7 +3,7 @@
 use specgen_stm32::burst::Device;
 use specgen_stm32::converters::{ADC_MODE, AdcPins, DAC_MODE, DacPins, TriggerPins, trigger_pins};
 use specgen_stm32::enable::{self, Stop};
-use specgen_stm32::pins::Pin;
+use specgen_stm32::pins::{Pin, spi_bus};
 use specgen_stm32::pulses::Pulses;
 use specgen_stm32::serial::{self, Port};
 use stm32_metapac::gpio::vals::{Ospeedr, Pupdr};
@@ -43,9 +43,9 @@ pub fn take(hertz: u32) -> Wiring {
     for pin in [Pin(GPIOC, 7), Pin(GPIOC, 6)] {
         pin.function(2, Ospeedr::VERY_HIGH_SPEED, Pupdr::FLOATING);
     }
-    bus([Pin(GPIOA, 5), Pin(GPIOA, 7), Pin(GPIOA, 6)], 5, Pupdr::PULL_UP);
+    spi_bus([Pin(GPIOA, 5), Pin(GPIOA, 7), Pin(GPIOA, 6)], 5, Pupdr::PULL_UP);
     let adc = Registers::new(SPI1, ADC_MODE, clocks::ADC);
-    bus([Pin(GPIOC, 10), Pin(GPIOC, 12), Pin(GPIOC, 11)], 6, Pupdr::PULL_DOWN);
+    spi_bus([Pin(GPIOC, 10), Pin(GPIOC, 12), Pin(GPIOC, 11)], 6, Pupdr::PULL_DOWN);
     let dac = Registers::new(SPI3, DAC_MODE, clocks::DAC);
     let select = |pin: Pin| pin.output(true, Ospeedr::VERY_HIGH_SPEED);
     Wiring {
@@ -66,13 +66,6 @@ pub fn take(hertz: u32) -> Wiring {
         lines: trigger_pins([Pin(GPIOC, 0), Pin(GPIOC, 1), Pin(GPIOC, 2), Pin(GPIOC, 3)], Pin(GPIOC, 4)),
         stop,
     }
-}
-
-/// Hands the pins of an SPI over: SCK, pulled to where it idles, MOSI, MISO.
-fn bus([clock, output, input]: [Pin; 3], function: u8, idle: Pupdr) {
-    clock.function(function, Ospeedr::VERY_HIGH_SPEED, idle);
-    output.function(function, Ospeedr::VERY_HIGH_SPEED, Pupdr::FLOATING);
-    input.function(function, Ospeedr::LOW_SPEED, Pupdr::FLOATING);
 }
 
 /// The USART of the link: USART2.

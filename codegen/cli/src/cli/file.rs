@@ -232,7 +232,7 @@ mod tests {
     /// What a folder of results would replace is as safe as a file that is named.
     #[test]
     fn a_folder_of_results_replaces_no_input() {
-        files::begin();
+        files::forget_inputs();
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::write(at("runs.csv"), "mine").unwrap();
@@ -243,7 +243,7 @@ mod tests {
         assert!(matches!(refused, Failure::Usage(text) if text.contains("runs.csv` is not written")));
         assert!(fs::read_to_string(at("runs.csv")).unwrap() == "mine" && !at("report.json").exists());
         edit_file(&at("runs.csv"), b"edited").unwrap();
-        files::begin();
+        files::forget_inputs();
         write_folder(folder.path(), &results).unwrap();
         assert_eq!(fs::read_to_string(at("runs.csv")).unwrap(), "new");
     }

@@ -103,30 +103,22 @@ pub(super) fn near_one(facts: &Facts, found: &mut Found) {
         ("noise", robust.noise),
     ];
     for (name, range) in ranges {
-        let far = |factor: &f64| !SOUND_FACTOR.contains(factor);
-        let Some((end, factor)) = range.into_iter().flatten().enumerate().find(|(_, factor)| far(factor)) else {
-            continue;
-        };
-        found.add(
-            codes::FACTOR_ODD,
-            &format!("robust.{name}[{end}]"),
-            format!("`robust.{name}` would be tried at {} times what the spec says", figure(factor)),
-            "give the smallest and the largest factor on the value of the spec: a tolerance of 5 % is [0.95, 1.05]",
-        );
-    }
-    for (key, range) in ranges.map(|(name, range)| (format!("robust.{name}"), range)) {
-        let Some([low, high]) = range.filter(|[low, high]| SOUND_FACTOR.contains(low) && SOUND_FACTOR.contains(high))
-        else {
-            continue;
-        };
-        if low <= 1.0 && high >= 1.0 {
-            continue;
+        let Some([low, high]) = range else { continue };
+        let key = format!("robust.{name}");
+        if let Some(end) = [low, high].iter().position(|factor| !SOUND_FACTOR.contains(factor)) {
+            found.add(
+                codes::FACTOR_ODD,
+                &format!("{key}[{end}]"),
+                format!("`{key}` would be tried at {} times what the spec says", figure([low, high][end])),
+                "give the smallest and the largest factor on the value of the spec: a tolerance of 5 % is [0.95, 1.05]",
+            );
+        } else if low > 1.0 || high < 1.0 {
+            found.add(
+                codes::FACTOR_ODD,
+                &key,
+                format!("`{key}` goes from {} to {}: what the spec says, 1, is not in it", figure(low), figure(high)),
+                "give a smallest factor of at most 1 and a largest of at least 1; correct the value itself if it is off",
+            );
         }
-        found.add(
-            codes::FACTOR_ODD,
-            &key,
-            format!("`{key}` goes from {} to {}: what the spec says, 1, is not in it", figure(low), figure(high)),
-            "give a smallest factor of at most 1 and a largest of at least 1; correct the value itself if it is off",
-        );
     }
 }

@@ -22,18 +22,18 @@ struct Object {
     values: Vec<f64>,
 }
 
+/// Flags, of a byte each, and times.
+const FLAG: u32 = 0x21;
+const TIME: u32 = 0x44;
+
 /// Bytes of a value.
 fn width(kind: u32) -> Result<usize, String> {
-    Ok(match kind {
-        TEXT => 0,
-        1 | 5 | 0x21 => 1,
-        2 | 6 => 2,
-        3 | 7 | 9 | 0x19 => 4,
-        4 | 8 | 10 | 0x1a => 8,
-        // A time.
-        0x44 => 16,
-        _ => return Err(format!("it has values of type {kind:#x}")),
-    })
+    match kind {
+        TEXT => Ok(0),
+        FLAG => Ok(1),
+        TIME => Ok(16),
+        _ => form(kind).map(|(_, bytes)| bytes).ok_or_else(|| format!("it has values of type {kind:#x}")),
+    }
 }
 
 /// As [`Bytes::numbers`] has it; none for texts, flags and times.

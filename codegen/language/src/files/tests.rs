@@ -6,7 +6,7 @@ use rustix::fs::{CWD, Mode, mkfifoat};
 
 /// A folder with `read.csv`, which is read, and `free.csv`, which is not.
 fn folder() -> (tempfile::TempDir, impl Fn(&str) -> PathBuf) {
-    begin();
+    forget_inputs();
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path().to_owned();
     let at = move |name: &str| root.join(name);
@@ -34,7 +34,7 @@ fn an_input_is_no_output_whatever_its_name() {
     }
     assert!(matches!(guard(&at("free.csv")), Ok(Way::File(target)) if target.ends_with("free.csv")));
     // Another command begins.
-    begin();
+    forget_inputs();
     assert!(guard(&at("read.csv")).is_ok());
     note_input(&at("link.csv"));
     assert!(refusal(&at("read.csv")).contains("link.csv"));
@@ -96,7 +96,7 @@ fn the_kind_is_seen_before_the_file_is_opened() {
 /// What a shell makes of `<(…)` and `>(…)`.
 #[test]
 fn a_pipe_that_the_process_was_given_is_read_and_written() {
-    begin();
+    forget_inputs();
     let (reader, mut writer) = io::pipe().unwrap();
     let name = |fd: &dyn std::os::fd::AsRawFd| PathBuf::from(format!("/dev/fd/{}", fd.as_raw_fd()));
     let mut file = open(&name(&reader)).unwrap();
