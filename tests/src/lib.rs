@@ -177,6 +177,17 @@ impl Emitted {
         target::host::build_library(&stage.folder, &image_target()).unwrap_or_else(|error| panic!("{error}"))
     }
 
+    /// The emitted crate, loaded, with the analysis of its dynamics.
+    ///
+    /// # Panics
+    /// If it does not build or load.
+    #[must_use]
+    pub fn analysis(&self) -> Controller {
+        let stage = Stage::of(&self.dir);
+        let library = target::host::build_analysis(&stage.folder, &image_target());
+        Controller::load(&library.unwrap_or_else(|error| panic!("{error}"))).unwrap_or_else(|error| panic!("{error}"))
+    }
+
     /// The emitted crate, loaded.
     ///
     /// # Panics

@@ -179,9 +179,9 @@ fn every_field_agrees_with_the_reference_vectors_and_with_the_lagrangian_of_anot
 
 #[test]
 fn the_emitted_controller_agrees_with_the_reference_vectors() {
-    let double = Emitted::new("dynamics-f64", "reference.toml", &[]).controller();
+    let double = Emitted::new("dynamics-f64", "reference.toml", &[]).analysis();
     let single = Emitted::new("dynamics-f32", "reference.toml", &[("scalar = \"f64\"", "scalar = \"f32\"")]);
-    let single = single.controller();
+    let single = single.analysis();
     let platform = lower::platform(&reference_model()).unwrap();
     let (mut worst, mut worst_single) = (0.0_f64, 0.0_f64);
     for vector in reference_vectors() {

@@ -68,9 +68,8 @@ panic = \"abort\"
 [profile.release]
 panic = \"abort\"
 opt-level = 3
-lto = \"fat\"
+lto = \"off\"
 codegen-units = 1
-debug = \"line-tables-only\"
 ",
         ir.specgen_version,
         ir.name,

@@ -20,12 +20,25 @@ const LINK: [&str; 2] = ["-Clink-arg=-Wl,-z,defs", "-Clink-arg=-lc"];
 /// [`TargetError::MissingTool`] without cargo, [`TargetError::PanicPath`] if the controller can panic,
 /// [`TargetError::BuildFailed`] for everything else that cargo says.
 pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
+    build_with(&[], dir, target_dir)
+}
+
+/// [`build_loadable`] of a library that offers the analysis of the dynamics, too.
+///
+/// # Errors
+/// As there.
+pub fn build_analysis(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
+    refuse_static()?;
+    build_with(&["--features", "dynamics"], dir, target_dir)
+}
+
+fn build_with(features: &[&str], dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
     let cargo = cargo()?;
     let package = dir.join("host");
     let target_dir = target_dir.join("host");
     let mut command = clean_command(cargo);
     // `cargo rustc`, so that the link flags below reach this crate alone.
-    command.args(["rustc", "--release", "--lib"]);
+    command.args(["rustc", "--release", "--lib"]).args(features);
     let request = BuildRequest { package: &package, target_dir: &target_dir, rustc_args: &LINK, locked: false };
     let library = cargo_artifact(&mut command, &request, &package.display().to_string(), |message| {
         let is_library = message["target"]["kind"].as_array()?.iter().any(|kind| kind == "cdylib");
@@ -40,11 +53,13 @@ pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetErr
 /// # Errors
 /// As there; [`TargetError::Static`] before anything is built, if this process cannot load a library.
 pub fn build_loadable(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
-    // musl's loader is no part of a static program.
-    if cfg!(all(target_env = "musl", target_feature = "crt-static")) {
-        return Err(TargetError::Static);
-    }
+    refuse_static()?;
     build_library(dir, target_dir)
+}
+
+/// musl's loader is no part of a static program.
+fn refuse_static() -> Result<(), TargetError> {
+    if cfg!(all(target_env = "musl", target_feature = "crt-static")) { Err(TargetError::Static) } else { Ok(()) }
 }
 
 /// Builds the program in `dir/folder` for this machine and returns its path. Its dependencies are those of its lock file.

@@ -46,7 +46,9 @@ pub mod permitted;
 pub mod sensing;
 pub mod setpoint;
 pub mod snapshot;
+#[cfg(feature = "stages")]
 mod stage;
+#[cfg(feature = "stages")]
 pub mod stages;
 mod standing;
 mod state;

@@ -11,12 +11,14 @@
 
 use core::mem::{align_of, size_of};
 
+#[cfg(feature = "dynamics")]
 use controller::dynamics::{Motion, PLATFORM};
 use controller::snapshot::MACHINE_STATE_WORDS;
 use controller::supervised::{
     MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_output_words, supervise,
 };
 use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput};
+#[cfg(feature = "dynamics")]
 use specgen_runtime::Real;
 
 /// Version of this interface.
@@ -265,6 +267,7 @@ pub unsafe extern "C" fn specgen_machine_load(machine: *mut u8, words: *const u6
 ///
 /// # Safety
 /// `motion` points to 18 words, `analysis` to 96 writable words.
+#[cfg(feature = "dynamics")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_dynamics(motion: *const u64, analysis: *mut u64) {
     // SAFETY: the caller's duty.

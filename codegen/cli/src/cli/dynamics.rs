@@ -163,7 +163,7 @@ impl Generated {
         let folder = scratch.path().join("controller");
         workspace::write_scratch(&folder, &compiled.files)?;
         ui.progress("building the emitted controller for this host");
-        let library = target::host::build_loadable(&folder, &scratch.path().join("target"))?;
+        let library = target::host::build_analysis(&folder, &scratch.path().join("target"))?;
         let controller = Controller::load(&library).map_err(|error| environment(&error))?;
         Ok(Self { controller, _scratch: scratch })
     }

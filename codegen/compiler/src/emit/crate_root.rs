@@ -22,6 +22,9 @@ const PUBLIC: [&str; 16] = [
     "waves",
 ];
 
+/// Modules for measuring alone, which only the image that measures asks for.
+const MEASURED: [&str; 2] = ["stage", "stages"];
+
 /// The text for a crate of these files, `src/NAME.rs` each.
 pub fn emit<'a>(ir: &Ir, header: &str, documentation: &str, files: impl Iterator<Item = &'a str>) -> String {
     let title = format!("Controller of platform `{}`.", ir.name);
@@ -32,6 +35,9 @@ pub fn emit<'a>(ir: &Ir, header: &str, documentation: &str, files: impl Iterator
     }
     text += "#![no_std]\n#![forbid(unsafe_code)]\n#![deny(missing_docs)]\n\n";
     for module in files.filter_map(|path| path.strip_prefix("src/")?.strip_suffix(".rs")) {
+        if MEASURED.contains(&module) {
+            text += "#[cfg(feature = \"stages\")]\n";
+        }
         text += if PUBLIC.contains(&module) { "pub mod " } else { "mod " };
         text += module;
         text += ";\n";

@@ -13,6 +13,10 @@ edition = \"2024\"
 rust-version = \"1.95\"
 publish = false
 
+[features]
+# Parts of the tick as functions of their own, for measuring.
+stages = []
+
 [dependencies]
 specgen-runtime = {{ path = \"../runtime\" }}
 ",

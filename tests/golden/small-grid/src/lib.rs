@@ -41,7 +41,9 @@ pub mod passes;
 pub mod permitted;
 pub mod sensing;
 pub mod snapshot;
+#[cfg(feature = "stages")]
 mod stage;
+#[cfg(feature = "stages")]
 pub mod stages;
 mod standing;
 mod state;
