@@ -68,8 +68,9 @@ panic = \"abort\"
 [profile.release]
 panic = \"abort\"
 opt-level = 3
-lto = \"off\"
+lto = \"fat\"
 codegen-units = 1
+debug = \"line-tables-only\"
 ",
         ir.specgen_version,
         ir.name,

@@ -11,6 +11,10 @@ use std::path::{Path, PathBuf};
 /// panic would never fail. libc is for `memcpy` and `memset`, which the compiler calls by itself.
 const LINK: [&str; 2] = ["-Clink-arg=-Wl,-z,defs", "-Clink-arg=-lc"];
 
+/// The controller is one unit of code with the runtime's in it: an optimisation at the link takes as long again, and finds nothing on a
+/// host. Users' own builds, those for other targets too, have it by the workspace's profile.
+const PROFILE: [(&str, &str); 2] = [("CARGO_PROFILE_RELEASE_LTO", "off"), ("CARGO_PROFILE_RELEASE_DEBUG", "0")];
+
 /// Builds `dir/host` (a `cdylib` that links only if nothing in it can panic) and returns the library's path.
 ///
 /// `target_dir` keeps what can be used again. The library is copied to a name that holds a digest of its
@@ -38,7 +42,7 @@ fn build_with(features: &[&str], dir: &Path, target_dir: &Path) -> Result<PathBu
     let target_dir = target_dir.join("host");
     let mut command = clean_command(cargo);
     // `cargo rustc`, so that the link flags below reach this crate alone.
-    command.args(["rustc", "--release", "--lib"]).args(features);
+    command.envs(PROFILE).args(["rustc", "--release", "--lib"]).args(features);
     let request = BuildRequest { package: &package, target_dir: &target_dir, rustc_args: &LINK, locked: false };
     let library = cargo_artifact(&mut command, &request, &package.display().to_string(), |message| {
         let is_library = message["target"]["kind"].as_array()?.iter().any(|kind| kind == "cdylib");
@@ -87,7 +91,7 @@ pub fn build_program(dir: &Path, folder: &str, target_dir: &Path) -> Result<Path
 /// [`TargetError::BuildFailed`] for everything else that these say.
 pub fn build_unit(sources: &Path, package: &Path, target_dir: &Path, name: &str) -> Result<PathBuf, TargetError> {
     let mut command = clean_command(cargo()?);
-    command.args(["rustc", "--release", "--lib", "--crate-type", "staticlib"]);
+    command.envs(PROFILE).args(["rustc", "--release", "--lib", "--crate-type", "staticlib"]);
     let locked = package.with_file_name("Cargo.lock").is_file();
     let request = BuildRequest { package, target_dir: &target_dir.join("unit"), rustc_args: &[], locked };
     let archive = cargo_artifact(&mut command, &request, &package.display().to_string(), |message| {
@@ -104,8 +108,8 @@ pub fn build_unit(sources: &Path, package: &Path, target_dir: &Path, name: &str)
     command.args(["-std=c11", "-O2", "-Wall", "-Wextra", "-fPIC", "-fvisibility=hidden", "-shared"]);
     command.arg(sources.join("fmu.c")).arg(&archive.path).arg("-o").arg(&library);
     if cfg!(target_os = "linux") {
-        // Nothing undefined: what calls a panic does not link.
-        command.args(["-Wl,-z,defs", "-Wl,--exclude-libs,ALL", "-lm", "-lpthread", "-ldl", "-lc"]);
+        // Nothing undefined in what is used: what calls a panic does not link.
+        command.args(["-Wl,-z,defs", "-Wl,--gc-sections", "-Wl,--exclude-libs,ALL", "-lm", "-lpthread", "-ldl", "-lc"]);
     }
     let what = sources.join("fmu.c").display().to_string();
     let done = command.output().map_err(|error| TargetError::io("running cc on", sources.join("fmu.c"), error))?;

@@ -101,7 +101,9 @@ fn copy(from: &Path, to: &Path) {
 }
 
 fn manifest(name: &str, dependencies: &str) -> String {
-    format!("[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[dependencies]\n{dependencies}")
+    format!(
+        "[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[features]\nstages = []\n\n[dependencies]\n{dependencies}"
+    )
 }
 
 const STAGES: &str = r#"
