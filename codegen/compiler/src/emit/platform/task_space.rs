@@ -38,12 +38,13 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let hands_over = law.hands_over;
     let led = proc_macro2::Literal::usize_unsuffixed(own_leads.len());
     let notch = law.notch.as_ref().map_or_else(|| quote! { None }, |notch| with_sections(ir, notch, &matrix));
+    let import_section = law.notch.as_ref().map(|_| quote! { , Section });
     let (damped, damping) = with_damping(ir, law.damping.as_ref());
     let (corrected, correction) = with_correction(ir, law.correction.as_ref());
     quote! {
         #![doc = " Constants of the control law (7) in task space, at rest; from `actuator`, `control` and the dynamics."]
 
-        use specgen_runtime::{Affine, CorrectionLimit, Notch, Resonator, Section};
+        use specgen_runtime::{Affine, CorrectionLimit, Notch, Resonator #import_section};
 
         use crate::{LEGS, Real};
 
