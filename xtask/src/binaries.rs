@@ -59,7 +59,7 @@ pub fn compile(root: &Path) -> Result<Vec<Binary>, String> {
 pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut Ran) -> Outcome {
     let kept = root.join("target/tests");
     let durations = Durations::read(&kept.join("durations.json"));
-    let jobs = match jobs(binaries, &durations) {
+    let jobs = match jobs(binaries, &durations, mode.full) {
         Ok(jobs) => jobs,
         Err(why) => return Outcome::Failed(why),
     };
@@ -130,8 +130,8 @@ impl Binary {
         })
     }
 
-    /// Paths of its tests, without those that are ignored.
-    fn tests(&self) -> Result<Vec<String>, String> {
+    /// Paths of its tests, those that are ignored only for a `full` run.
+    fn tests(&self, full: bool) -> Result<Vec<String>, String> {
         let list = |more: &[&str]| -> Result<Vec<String>, String> {
             let mut command = Command::new(&self.executable);
             command.current_dir(&self.folder).args(["--list", "--format", "terse"]).args(more);
@@ -139,7 +139,7 @@ impl Binary {
             let text = String::from_utf8_lossy(&output.stdout).into_owned();
             Ok(text.lines().filter_map(|line| line.strip_suffix(": test")).map(str::to_owned).collect())
         };
-        let ignored = list(&["--ignored"])?;
+        let ignored = if full { Vec::new() } else { list(&["--ignored"])? };
         Ok(list(&[])?.into_iter().filter(|test| !ignored.contains(test)).collect())
     }
 }
@@ -153,11 +153,11 @@ struct Job<'a> {
 }
 
 /// The longest first: one that comes last would run alone.
-fn jobs<'a>(binaries: &'a [Binary], durations: &Durations) -> Result<Vec<Job<'a>>, String> {
+fn jobs<'a>(binaries: &'a [Binary], durations: &Durations, full: bool) -> Result<Vec<Job<'a>>, String> {
     let mut jobs = Vec::new();
     for binary in binaries {
         let mut modules: BTreeMap<String, Vec<String>> = BTreeMap::new();
-        for test in binary.tests()? {
+        for test in binary.tests(full)? {
             let module = test.split_once("::").map_or("", |(module, _)| module);
             modules.entry(module.to_owned()).or_default().push(test);
         }

@@ -185,7 +185,7 @@ fn runs_at_once_write_one_after_the_other() {
         command.args([["legs.toml", "other.toml"][k % 2], "-o", "out", "--no-build"]);
         command.stderr(std::process::Stdio::piped()).stdout(std::process::Stdio::piped()).spawn().unwrap()
     };
-    let running: Vec<_> = (0..8).map(begin).collect();
+    let running: Vec<_> = (0..4).map(begin).collect();
     for run in running {
         let output = run.wait_with_output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

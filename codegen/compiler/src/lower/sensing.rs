@@ -10,6 +10,7 @@ use specgen_runtime::{Gauges, Series};
 
 use super::kinematics::{leg_jacobian, series_of, tolerance};
 use super::linear::{grid, norm};
+use crate::figure::fixed;
 use crate::ir::{Scalar, Sensing};
 use layout::Layout;
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
@@ -219,14 +220,14 @@ fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
         codes::GAUGE_RANGE,
         "sensor.range",
         format!(
-            "within the declared workspace, {} of ±{:.4} {unit} alone takes gauge {k} to {:.3} µm, beyond its range of {:.3} µm to {:.3} µm",
+            "within the declared workspace, {} of ±{:.4} {unit} alone takes gauge {k} to {} µm, beyond its range of {} µm to {} µm",
             AXES[axis],
             model.workspace.bounds()[axis] * scale,
-            reading * 1e6,
-            low * 1e6,
-            high * 1e6
+            fixed(reading * 1e6, 3),
+            fixed(low * 1e6, 3),
+            fixed(high * 1e6, 3)
         ),
-        format!("{less}gauges whose range takes in {:.3} µm; check the unit of sensor.range", reading * 1e6),
+        format!("{less}gauges whose range takes in {} µm; check the unit of sensor.range", fixed(reading * 1e6, 3)),
     )]
 }
 

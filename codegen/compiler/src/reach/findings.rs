@@ -53,9 +53,9 @@ fn of_gauge_ends(model: &Model, reach: &Reach) -> Option<Diagnostic> {
     let code = if seen < LEAST_SEEN * reach.stroke { codes::SENSOR_RANGE } else { codes::GAUGE_SHORT_OF_STROKE };
     Some(Diagnostic::at(&model.spans, &[&format!("sensor.range[{item}]"), "sensor.range", "sensor"], code,
         format!(
-            "the gauge of a leg reads {:.3} um to {:.3} um, but the leg moves from 0 to {:.3} um",
-            low * 1e6,
-            high * 1e6,
+            "the gauge of a leg reads {} um to {} um, but the leg moves from 0 to {:.3} um",
+            fixed(low * 1e6, 3),
+            fixed(high * 1e6, 3),
             reach.stroke * 1e6
         ),
         "a leg beyond the end of its gauge is a gauge fault: keep set-points within the gauge, or take one that sees the whole stroke; check the unit of `sensor.range`".to_owned(),
