@@ -130,7 +130,7 @@ impl Binary {
         })
     }
 
-    /// Paths of its tests, those that are ignored only for a `full` run.
+    /// Paths of its tests; ignored ones only in a `full` run.
     fn tests(&self, full: bool) -> Result<Vec<String>, String> {
         let list = |more: &[&str]| -> Result<Vec<String>, String> {
             let mut command = Command::new(&self.executable);

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 /// panic would never fail. libc is for `memcpy` and `memset`, which the compiler calls by itself.
 const LINK: [&str; 2] = ["-Clink-arg=-Wl,-z,defs", "-Clink-arg=-lc"];
 
-/// The controller is one unit of code with the runtime's in it: an optimisation at the link takes as long again, and finds nothing on a
-/// host. Users' own builds, those for other targets too, have it by the workspace's profile.
+/// Without optimisation at the link: the controller's crate already holds the code of the runtime that it uses, and a second pass doubles
+/// the time of the build. A user's own build has it, by the profile of the emitted workspace.
 const PROFILE: [(&str, &str); 2] = [("CARGO_PROFILE_RELEASE_LTO", "off"), ("CARGO_PROFILE_RELEASE_DEBUG", "0")];
 
 /// Builds `dir/host` (a `cdylib` that links only if nothing in it can panic) and returns the library's path.
@@ -27,10 +27,10 @@ pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetErr
     build_with(&[], dir, target_dir)
 }
 
-/// [`build_loadable`] of a library that offers the analysis of the dynamics, too.
+/// [`build_loadable`] with the function that analyses the dynamics, `specgen_dynamics`.
 ///
 /// # Errors
-/// As there.
+/// As [`build_loadable`].
 pub fn build_analysis(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
     refuse_static()?;
     build_with(&["--features", "dynamics"], dir, target_dir)
@@ -108,7 +108,7 @@ pub fn build_unit(sources: &Path, package: &Path, target_dir: &Path, name: &str)
     command.args(["-std=c11", "-O2", "-Wall", "-Wextra", "-fPIC", "-fvisibility=hidden", "-shared"]);
     command.arg(sources.join("fmu.c")).arg(&archive.path).arg("-o").arg(&library);
     if cfg!(target_os = "linux") {
-        // Nothing undefined in what is used: what calls a panic does not link.
+        // No undefined symbol in the code that is used: a call of the panic handler does not link.
         command.args(["-Wl,-z,defs", "-Wl,--gc-sections", "-Wl,--exclude-libs,ALL", "-lm", "-lpthread", "-ldl", "-lc"]);
     }
     let what = sources.join("fmu.c").display().to_string();
