@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 
+use controller::supervised::Phase;
 use controller::waves::{self, Wave};
 use controller::{Config, GAUGE_FAULT, PLACE_WORDS, Real, passes};
 use specgen_link::{EdgeStatus, Health};
@@ -122,6 +123,29 @@ impl Console {
         self.order(Order::Configure(config));
     }
 
+    /// Whether the control law is at work, as far as is known.
+    pub fn runs(&self) -> bool {
+        self.said.is_some_and(|said| said.phase == Phase::Running)
+    }
+
+    /// What was to move and has not gone out yet is not done any more.
+    pub fn stop(&mut self) {
+        let mut number = self.number.wrapping_sub(self.orders.len() as u32);
+        for order in &mut self.orders {
+            number = number.wrapping_add(1);
+            match order {
+                Order::Wish(wish) => wish.command = None,
+                Order::Wave(_) | Order::Await(_) => {
+                    // In its place, so that numbers stay.
+                    *order = Order::StopWave;
+                    self.wave.take_if(|wave| *wave == number);
+                    self.awaited.take_if(|(awaited, _)| *awaited == number);
+                }
+                _ => {}
+            }
+        }
+    }
+
     /// Whether a wave or a pass is under way, which commands in place of hosts.
     pub fn is_engaged(&self) -> bool {
         self.wave.is_some() || self.passes.is_running()
@@ -133,7 +157,7 @@ impl Console {
     /// The machine does not run, or plays something else; a wave or a pass is under way; the word of the axis that would go beyond its limits.
     pub fn start_wave(&mut self, settings: &Settings<Real>, on_edge: bool) -> Result<(), No> {
         let limits = waves::limits(&self.config);
-        let running = self.said.filter(|said| said.phase == controller::supervised::Phase::Running);
+        let running = self.said.filter(|said| said.phase == Phase::Running);
         let Some(said) = running.filter(|_| !self.is_engaged()) else { return Err(No::State) };
         Wave::new(limits).set(settings).map_err(|refused| refused.word().map_or(No::State, No::Word))?;
         waves::may_begin(said.status, self.operator.command(), &settings.center, &limits).map_err(|_| No::State)?;
@@ -154,9 +178,9 @@ impl Console {
     /// # Errors
     /// The machine does not run at rest; a wave or a pass is under way.
     pub fn command_on_edge(&mut self, command: Command) -> Result<(), No> {
-        let rests = self.said.is_some_and(|said| {
-            said.phase == controller::supervised::Phase::Running && said.status & specgen_runtime::setpoint::BUSY == 0
-        });
+        let rests = self
+            .said
+            .is_some_and(|said| said.phase == Phase::Running && said.status & specgen_runtime::setpoint::BUSY == 0);
         if !rests || self.is_engaged() {
             return Err(No::State);
         }
@@ -193,7 +217,7 @@ impl Console {
     /// # Errors
     /// The machine does not run, or not at rest; a wave or a pass is under way; this is no pass, or too long.
     pub fn begin_pass(&mut self, course: Course) -> Result<(), No> {
-        let running = self.said.filter(|said| said.phase == controller::supervised::Phase::Running);
+        let running = self.said.filter(|said| said.phase == Phase::Running);
         let said = running.filter(|_| !self.is_engaged()).ok_or(No::State)?;
         if !passes::may_begin(said.status, self.operator.command()) {
             return Err(No::State);
@@ -209,9 +233,11 @@ impl Console {
         self.order(Order::AbortPass);
     }
 
-    /// Takes the player back: what its pass began is what is commanded.
+    /// Takes the player back: what its pass began is what is commanded, while the machine runs.
     pub fn receive_player(&mut self, player: Player) {
-        if let Some(trajectory) = self.passes.receive(player) {
+        if let Some(trajectory) = self.passes.receive(player)
+            && self.runs()
+        {
             self.operator.has_begun(trajectory);
         }
     }

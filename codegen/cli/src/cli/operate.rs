@@ -189,14 +189,33 @@ fn lines(operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
     }
     loop {
         match lines.recv_timeout(ALIVE) {
-            Ok(text) => line(&text, operator, ui)?,
+            Ok(text) => {
+                line(&text, operator, ui)?;
+                if std::mem::take(&mut operator.was_stopped) {
+                    // What was sent before is not to move it.
+                    for text in lines.try_iter() {
+                        late(&text, operator, ui)?;
+                    }
+                }
+            }
             Err(RecvTimeoutError::Timeout) => {
                 operator.look()?;
+                operator.was_stopped = false;
                 operator.show(ui);
             }
             Err(RecvTimeoutError::Disconnected) => return operator.look(),
         }
     }
+}
+
+/// Carries a line out that was sent before the machine was stopped, unless it would move.
+fn late(text: &str, operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
+    if !matches!(Order::parse(text), Ok(Some(order)) if order.moves()) {
+        return line(text, operator, ui);
+    }
+    operator.note(text, &Mistake { error: "the machine was stopped: not done".to_owned() }, ui);
+    ui.answered(&mut operator.answers);
+    Ok(())
 }
 
 /// Carries one line out, and answers it.

@@ -103,7 +103,11 @@ impl<'a> Desk<'a> {
             (Ok(()), _) | (Err(Refusal::Busy), Wanted::Hold) | (Err(_), Wanted::RampDown) => {}
             (refused, _) => return refused,
         }
-        self.console.operator.ask_by_link(wanted);
+        let stops = matches!(wanted, Wanted::Hold | Wanted::RampDown);
+        if stops {
+            self.console.stop();
+        }
+        self.console.operator.ask_by_link(wanted, self.host);
         Ok(())
     }
 
@@ -112,8 +116,16 @@ impl<'a> Desk<'a> {
         if self.console.is_engaged() {
             return Err(Refusal::State);
         }
-        let expected = COMMAND_WORDS as u16;
-        if self.console.operator.set_by_link(words) { Ok(()) } else { Err(Refusal::Length { expected }) }
+        let mut command = [0; COMMAND_WORDS];
+        if !words.read_words(&mut command) {
+            return Err(Refusal::Length { expected: COMMAND_WORDS as u16 });
+        }
+        // What came before it runs would be followed when nobody expects it any more.
+        if !self.console.runs() {
+            return Err(Refusal::State);
+        }
+        self.console.operator.set_by_link(command);
+        Ok(())
     }
 
     fn configure(&mut self, words: Bytes<'_>) -> Result<(), Refusal> {
