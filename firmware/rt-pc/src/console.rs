@@ -3,12 +3,12 @@
 
 use std::collections::VecDeque;
 
-use controller::supervised::Phase;
+use controller::supervised::{Phase, Request};
 use controller::waves::{self, Wave};
 use controller::{Config, GAUGE_FAULT, PLACE_WORDS, Real, passes};
 use specgen_link::{EdgeStatus, Health};
 use specgen_runtime::pass::Course;
-use specgen_runtime::pending::{self, EDGE};
+use specgen_runtime::pending::{self, AMPLIFIER, EDGE};
 use specgen_runtime::playback::Knot;
 use specgen_runtime::wave::Settings;
 
@@ -41,6 +41,10 @@ pub struct Console {
     pub measured: Option<u64>,
     /// What the loop noticed of itself.
     pub health: Health,
+    /// Stops that hosts asked for so far.
+    pub stops: u64,
+    /// What the loop asks for when an amplifier reports a fault.
+    on_fault: Option<Request>,
     /// Settings that are in force once all orders are taken.
     config: Config,
     /// Events that were not yet reported over the link.
@@ -58,7 +62,7 @@ pub struct Console {
 
 impl Console {
     /// At the start, with the settings of the run.
-    pub fn new(operator: Operator, capture: Capture, config: Config) -> Self {
+    pub fn new(operator: Operator, capture: Capture, config: Config, on_fault: Option<Request>) -> Self {
         let health = Health::default();
         Self {
             operator,
@@ -69,6 +73,8 @@ impl Console {
             ticked: None,
             measured: None,
             health,
+            stops: 0,
+            on_fault,
             config,
             events: 0,
             orders: VecDeque::new(),
@@ -81,13 +87,16 @@ impl Console {
 
     /// Takes what a tick gave, at this time, ns.
     pub fn update(&mut self, row: &Row, said: Said, now: u64) {
-        self.said = Some(said);
+        let was_on = self.said.replace(said).is_some_and(|said| said.on);
         self.place = row.place;
         self.ticked = Some(now);
         if said.status & GAUGE_FAULT == 0 {
             self.measured = Some(now);
         }
         self.events |= row.input.events & !EDGE;
+        if row.input.events & AMPLIFIER != 0 && was_on {
+            self.operator.amplifier_fault(self.on_fault, now);
+        }
         self.edge = row.edge;
         self.capture.update(row.recorded, row.triggered);
         let taken = |number: u32| said.orders.wrapping_sub(number).cast_signed() >= 0;
@@ -130,6 +139,7 @@ impl Console {
 
     /// What was to move and has not gone out yet is not done any more.
     pub fn stop(&mut self) {
+        self.stops += 1;
         let mut number = self.number.wrapping_sub(self.orders.len() as u32);
         for order in &mut self.orders {
             number = number.wrapping_add(1);

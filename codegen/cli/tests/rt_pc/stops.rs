@@ -1,8 +1,10 @@
 //! A stop is a stop: whoever gives it, in whatever phase, what any client had sent before it is not done any more.
 
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 use std::net::TcpStream;
+use std::os::unix::net::UnixStream;
 use std::path::Path;
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -10,10 +12,10 @@ use std::time::{Duration, Instant};
 use rustix::process::Signal;
 use serde_json::json;
 use specgen::operate::{Place, Session, SocketLine};
-use specgen_link::client::Timeout;
-use specgen_link::{Bytes, Refusal, Request};
+use specgen_link::client::{Client, Port, Timeout};
+use specgen_link::{Bytes, Counted, Device, Endpoint, Identity, Refusal, Reply, Request};
 
-use super::gcs::{Bridge, Client};
+use super::gcs::{self, Bridge};
 use super::host::Host;
 use super::panel::Panel;
 use super::{ARM, BUSY, Bench, DISARMED, HOLD, HOLDING, NONE, RAMP_DOWN, RUN, RUNNING, Running, wait_for};
@@ -76,6 +78,8 @@ fn a_stop_is_a_stop() {
     let mut look = Look::new(&link);
 
     hosts_of_the_link(&link, &mut look);
+    scripts(&bench, &link, &mut look);
+    println!("scripts: stopped");
     let bridge = Bridge::new_at(&bench, "stops.link", &[]);
     while_the_machine_comes_up(&bridge, &mut look);
     the_servo_off_and_on_again(&bridge, &mut look);
@@ -149,6 +153,118 @@ fn hosts_of_the_link(link: &Path, look: &mut Look) {
     host.done(&Request::Supervise { request: RAMP_DOWN });
     host.wait("the way down", |status| status.phase == DISARMED);
     host.done(&Request::Supervise { request: NONE });
+    drop(host);
+
+    // A host that does not wait for answers: what nobody has read when the other holds is not done.
+    let mut asks = Client::open(Paper::default(), 4, Timeout::PIPE).unwrap().0;
+    let supervise = |request| Request::Supervise { request };
+    let mut line = UnixStream::connect(link).unwrap();
+    let words = moved(1e-6);
+    for requests in [&[NONE, ARM][..], &[RUN]] {
+        for request in requests {
+            for _ in 0..120 {
+                asks.ask(&Request::Setpoint { words: Bytes(&words) }).unwrap();
+            }
+            asks.ask(&supervise(*request)).unwrap();
+        }
+        line.write_all(&std::mem::take(&mut asks.port().sent)).unwrap();
+        if requests.len() > 1 {
+            other.wait("armed", |status| status.phase == HOLDING);
+        }
+    }
+    other.done(&supervise(HOLD));
+    look.stands("held before another host's request to run was read");
+    assert_eq!(look.now().phase, HOLDING);
+    other.done(&supervise(RAMP_DOWN));
+    other.wait("the way down", |status| status.phase == DISARMED);
+}
+
+/// The other end of a link that does everything it is asked for: it keeps the frames.
+#[derive(Default)]
+struct Paper {
+    endpoint: Endpoint,
+    sent: Vec<u8>,
+    answer: Vec<u8>,
+}
+
+impl Port for Paper {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.sent.extend(bytes);
+        for byte in bytes {
+            self.answer.extend(self.endpoint.push(*byte, &mut Willing).unwrap_or_default());
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], _: Duration) -> io::Result<usize> {
+        let count = buffer.len().min(self.answer.len());
+        buffer[..count].copy_from_slice(&self.answer[..count]);
+        self.answer.drain(..count);
+        Ok(count)
+    }
+}
+
+struct Willing;
+
+impl Device for Willing {
+    fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
+        let [config_words, input_words, output_words] = [1; 3];
+        let identity =
+            Identity { config_words, input_words, output_words, stages: 0, counted: Counted::Nothing, description: 0 };
+        if *request == Request::Hello { Reply::Identity(identity) } else { Reply::Done }
+    }
+}
+
+/// `operate`: what it was told to do is over when another host stops the machine, also where it waits. Lines that wait are not done.
+fn scripts(bench: &Bench, link: &Path, look: &mut Look) {
+    let stop = |request, phase| {
+        // Gone again, so that it has no orders.
+        let mut other = Host::open(link, 5).unwrap();
+        other.done(&Request::Supervise { request });
+        other.wait("the stop", |status| status.phase == phase);
+    };
+    let operate = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
+        command.args(["operate", "--socket"]).arg(link).arg(&bench.spec).args(words).stdin(Stdio::piped());
+        Running::new(&mut command)
+    };
+    let up = ["none", "arm", "wait holding", "run", "wait arrived"];
+    let script = operate(&[&up[..], &["wait 600", "jog x=5um"]].concat());
+    look.wait("its bias pose", |place| place.phase == RUNNING && place.status & BUSY == 0);
+    stop(HOLD, HOLDING);
+    let output = script.wait();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && text.contains("the machine was stopped, and is holding"), "{text}");
+    stop(RAMP_DOWN, DISARMED);
+
+    let mut session = operate(&[]);
+    let mut input = session.0.as_mut().unwrap().stdin.take().unwrap();
+    let lines = format!("{}\njog x=8um\nwait arrived\njog x=-8um\nstatus\n", up.join("\n"));
+    input.write_all(lines.as_bytes()).unwrap();
+    look.wait("the jog", |place| place.target[0] > 1e-6);
+    stop(HOLD, HOLDING);
+    look.stands("held while it waits");
+    stop(RAMP_DOWN, DISARMED);
+    drop(input);
+    let output = session.wait();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("the machine was stopped: not done") && text.contains("tick"), "{text}");
+
+    // From a terminal a stop does not wait for what waits.
+    let mut command = Command::new("script");
+    let line =
+        format!("{} operate --socket {} {}", env!("CARGO_BIN_EXE_specgen"), link.display(), bench.spec.display());
+    command.args(["-qec", &line, "/dev/null"]).stdin(Stdio::piped());
+    let mut session = Running::new(&mut command);
+    let mut input = session.0.as_mut().unwrap().stdin.take().unwrap();
+    input.write_all(format!("{}\nwait 600\njog x=5um\n", up.join("\n")).as_bytes()).unwrap();
+    look.wait("its bias pose", |place| place.phase == RUNNING && place.status & BUSY == 0);
+    input.write_all(b"hold\n").unwrap();
+    look.wait("the hold", |place| place.phase == HOLDING);
+    look.stands("held from the terminal");
+    input.write_all(b"ramp-down\n").unwrap();
+    look.wait("the way down", |place| place.phase == DISARMED);
+    drop((input, session));
 }
 
 /// Every stop, from both, at several moments of arming and of the way to the bias.
@@ -266,9 +382,9 @@ fn crowds(bridge: &Bridge, look: &mut Look) {
     wait_for("the orders", || matches!(a.order("SVO X 1").as_str(), "0"));
     assert_eq!(a.order("MOV Z 15"), "0");
     a.settle();
-    let silent: Vec<Client> = (0..40).map(|_| bridge.client()).collect();
+    let silent: Vec<gcs::Client> = (0..40).map(|_| bridge.client()).collect();
     a.send("MOV X 30");
-    look.wait("the motion", |place| place.target[0] > 4e-6);
+    look.wait("the motion in a crowd", |place| place.target[0] > 4e-6);
     let mut stopper = bridge.client();
     stopper.0.write_all(&[24]).unwrap();
     assert_eq!(stopper.error(), "10");

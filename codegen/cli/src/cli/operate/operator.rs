@@ -153,6 +153,12 @@ impl<P: Port> Operator<P> {
         Ended::Fault(format!("the machine was stopped, and is {}, at tick {}", self.stands(), self.status().tick))
     }
 
+    /// Asks for a stop in the midst of an order, which ends with that, and all that waits.
+    pub(super) fn stop_by_hand(&mut self, request: Request) -> Result<(), ClientError> {
+        (self.ordered, self.goes_down, self.was_stopped) = (true, true, true);
+        self.session.supervise(request)
+    }
+
     /// Shows a phase that is new.
     pub fn show(&mut self, ui: &Ui) {
         let status = self.session.status();
