@@ -27,7 +27,7 @@ const RESERVED: usize = 4;
 /// Connections that are taken in a round.
 const TAKEN: usize = 16;
 /// Bytes that are read from a client at once, and in a round.
-const PART: usize = 1 << 16;
+const PART: usize = 1 << 14;
 const ROUND: usize = 1 << 20;
 /// Bytes that are read from a client to find the end of what it sent before a stop.
 const DRAINED: usize = 1 << 26;
@@ -206,7 +206,7 @@ impl<P: Port> Bridge<P> {
         for index in 0..self.clients.len() {
             let Some(client) = self.clients.get_mut(index) else { break };
             let number = client.number;
-            let may_order = self.may_order(number);
+            let may_order = index < MOST && self.may_order(number);
             if self.clients[index].read(ROUND, may_order) {
                 self.drop_moves(Some(number));
                 self.carry_out(index)?;
@@ -218,10 +218,14 @@ impl<P: Port> Bridge<P> {
     /// What clients sent until now moves nothing any more, in whatever buffer it is; `by` the one who stopped the machine only what it
     /// sent before that.
     fn drop_moves(&mut self, by: Option<u64>) {
+        let mut stopped_again = false;
         for client in self.clients.iter_mut().filter(|client| Some(client.number) != by) {
-            client.read(DRAINED, false);
+            stopped_again |= client.read(DRAINED, false);
             client.drop_moves();
             client.late = Some(Instant::now());
+        }
+        if stopped_again {
+            self.clients.iter_mut().for_each(Client::drop_moves);
         }
     }
 

@@ -296,7 +296,7 @@ impl<P: Port> Stage<P> {
         match self.halt() {
             Err(ClientError::Refused(_)) => {
                 // Set-points are another's, or a wave's until it is at rest.
-                self.goal = None;
+                (self.goal, self.goes_down) = (None, true);
                 Ok(self.ask(Request::Hold)?)
             }
             other => Ok(other?),

@@ -138,7 +138,9 @@ impl<P: Port> Operator<P> {
         if before == running && status.phase != running && !std::mem::take(&mut self.goes_down) {
             // What was to come was meant for a machine that runs.
             self.was_stopped = true;
-            if !self.attended {
+            // One that ramps down for a cause is faulted soon, and that is the better message.
+            let faults = u64::from(status.phase) == Phase::RampingDown.word() && status.cause != 0;
+            if !self.attended && !faults {
                 return Err(self.stopped_by_others());
             }
         }
