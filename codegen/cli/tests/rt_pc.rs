@@ -21,6 +21,7 @@ use specgen::{compile, emit, target, workspace};
 use specgen_link::{Bytes, RecorderAction, Refusal, Request, WaveAction};
 use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
 
+mod card;
 mod clients;
 mod edge;
 mod gcs;
@@ -29,6 +30,7 @@ mod learning;
 mod panel;
 mod samples;
 mod stale;
+mod stops;
 use host::{Host, Record};
 
 /// Length of the platform's run, s, where another than that of CI is wanted.
@@ -271,6 +273,9 @@ fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_b
     samples::hosts_look_on_and_are_no_burden(&bench);
     a_record_that_finds_no_room_brings_the_machine_down(&bench);
     a_card_is_read_driven_and_switched_off(&bench);
+    card::a_heartbeat_ends_with_the_process(&bench);
+    card::contacts_stop_the_machine(&bench);
+    card::shared_memory_that_becomes_shorter_ends_nobody(bench);
 }
 
 /// With time that waits, so that it runs on any computer.
@@ -455,7 +460,7 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
         let field = |key: &str| text.lines().find_map(|line| line.strip_prefix(key)).unwrap().to_owned();
         let numbers =
             ["reads=", "writes1=", "writes2=", "lowest=", "highest="].map(|key| field(key).parse::<u64>().unwrap());
-        (numbers, field("line="), field("directions=") == "0:1" && field("bad=").is_empty())
+        (numbers, field("line="), field("directions=") == "0:1,2:0,3:0,1:1" && field("bad=").is_empty())
     };
 
     // The spec names what it assumes, and its record is simulated: no card is opened.
@@ -472,6 +477,8 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
     assert_eq!(reads, 6 * ticks);
     assert_eq!((first, second), (4 * ticks, 2 * ticks));
     assert!(sound && highest <= 43_690);
+    let text = fs::read_to_string(bench.path("card.log")).unwrap();
+    assert!(text.contains(&format!("\nbeats={ticks}\n")), "a beat a tick: {ticks}, {text}");
     assert!(line.starts_with('0') && line.ends_with('0') && line.contains('1') == was_on(&record), "{line}");
 
     // A card that fails in the middle: counted, seen by the supervisor, off at the end.

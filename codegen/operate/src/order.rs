@@ -183,6 +183,21 @@ pub enum Until {
 }
 
 impl Order {
+    /// Whether it moves the machine, or lets it move.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        matches!(
+            self,
+            Self::Ask(Request::Arm | Request::Run)
+                | Self::Set(_)
+                | Self::Move { .. }
+                | Self::Goto(_)
+                | Self::Play { .. }
+                | Self::Wave(_)
+                | Self::OnEdge(_)
+        )
+    }
+
     /// The file that it reads, if any.
     #[must_use]
     pub fn input(&self) -> Option<&Path> {

@@ -157,6 +157,7 @@ impl<P: Port> Session<P> {
             Reply::Status(status) => {
                 self.status = status;
                 self.asked = Instant::now();
+                self.forget(status.phase);
                 Ok(&self.status)
             }
             _ => Err(ClientError::Unexpected),
@@ -179,7 +180,15 @@ impl<P: Port> Session<P> {
         let (shown, target) = (six(0), six(2 * POSE));
         let pose = motion.user(&shown).unwrap_or(shown);
         let measured = measured.map(Duration::from_micros);
+        self.forget(phase);
         Ok(Some(Place { tick, phase, status, pose, measured, target, voltage: six(3 * POSE) }))
+    }
+
+    /// A machine that does not run has forgotten what it was commanded.
+    fn forget(&mut self, phase: u8) {
+        if u64::from(phase) != supervisor::Phase::Running.word() {
+            self.command.fill(0);
+        }
     }
 
     /// What the device noticed of itself; its events are forgotten with that.

@@ -169,7 +169,8 @@ impl Visit<'_, '_> {
             return self.wait_for_edge(Awaited::Command(command), None);
         }
         self.order(|exchange| {
-            let free = !exchange.is_engaged();
+            // What came before it runs would be followed when nobody expects it any more.
+            let free = !exchange.is_engaged() && exchange.report.phase == Phase::Running;
             if free {
                 exchange.cancel_awaited();
                 exchange.orders.command = command;

@@ -75,6 +75,8 @@ pub struct Exchange {
     pub(crate) samples: Option<Samples>,
     /// The host steps the machine, and the ticks do not: how long it has been silent.
     pub lockstep: Option<Silence>,
+    /// The machine ran in the last tick.
+    ran: bool,
 }
 
 impl Default for Exchange {
@@ -107,6 +109,7 @@ impl Exchange {
             away: None,
             samples: None,
             lockstep: None,
+            ran: false,
         }
     }
 
@@ -190,6 +193,11 @@ impl Exchange {
         self.advance_wave();
         if passes::POSSIBLE {
             self.advance_pass();
+        }
+        let runs = self.report.phase == Phase::Running;
+        if core::mem::replace(&mut self.ran, runs) && !runs {
+            // What was commanded before is not followed when it runs again.
+            waves::rest(&[0.0; 6], &mut self.orders.command);
         }
     }
 

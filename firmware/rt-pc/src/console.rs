@@ -3,11 +3,12 @@
 
 use std::collections::VecDeque;
 
+use controller::supervised::{Phase, Request};
 use controller::waves::{self, Wave};
 use controller::{Config, GAUGE_FAULT, PLACE_WORDS, Real, passes};
 use specgen_link::{EdgeStatus, Health};
 use specgen_runtime::pass::Course;
-use specgen_runtime::pending::{self, EDGE};
+use specgen_runtime::pending::{self, AMPLIFIER, EDGE};
 use specgen_runtime::playback::Knot;
 use specgen_runtime::wave::Settings;
 
@@ -40,6 +41,10 @@ pub struct Console {
     pub measured: Option<u64>,
     /// What the loop noticed of itself.
     pub health: Health,
+    /// Stops that hosts asked for so far.
+    pub stops: u64,
+    /// What the loop asks for when an amplifier reports a fault.
+    on_fault: Option<Request>,
     /// Settings that are in force once all orders are taken.
     config: Config,
     /// Events that were not yet reported over the link.
@@ -57,7 +62,7 @@ pub struct Console {
 
 impl Console {
     /// At the start, with the settings of the run.
-    pub fn new(operator: Operator, capture: Capture, config: Config) -> Self {
+    pub fn new(operator: Operator, capture: Capture, config: Config, on_fault: Option<Request>) -> Self {
         let health = Health::default();
         Self {
             operator,
@@ -68,6 +73,8 @@ impl Console {
             ticked: None,
             measured: None,
             health,
+            stops: 0,
+            on_fault,
             config,
             events: 0,
             orders: VecDeque::new(),
@@ -80,13 +87,16 @@ impl Console {
 
     /// Takes what a tick gave, at this time, ns.
     pub fn update(&mut self, row: &Row, said: Said, now: u64) {
-        self.said = Some(said);
+        let was_on = self.said.replace(said).is_some_and(|said| said.on);
         self.place = row.place;
         self.ticked = Some(now);
         if said.status & GAUGE_FAULT == 0 {
             self.measured = Some(now);
         }
         self.events |= row.input.events & !EDGE;
+        if row.input.events & AMPLIFIER != 0 && was_on {
+            self.operator.amplifier_fault(self.on_fault, now);
+        }
         self.edge = row.edge;
         self.capture.update(row.recorded, row.triggered);
         let taken = |number: u32| said.orders.wrapping_sub(number).cast_signed() >= 0;
@@ -122,6 +132,30 @@ impl Console {
         self.order(Order::Configure(config));
     }
 
+    /// Whether the control law is at work, as far as is known.
+    pub fn runs(&self) -> bool {
+        self.said.is_some_and(|said| said.phase == Phase::Running)
+    }
+
+    /// What was to move and has not gone out yet is not done any more.
+    pub fn stop(&mut self) {
+        self.stops += 1;
+        let mut number = self.number.wrapping_sub(self.orders.len() as u32);
+        for order in &mut self.orders {
+            number = number.wrapping_add(1);
+            match order {
+                Order::Wish(wish) => wish.command = None,
+                Order::Wave(_) | Order::Await(_) => {
+                    // In its place, so that numbers stay.
+                    *order = Order::StopWave;
+                    self.wave.take_if(|wave| *wave == number);
+                    self.awaited.take_if(|(awaited, _)| *awaited == number);
+                }
+                _ => {}
+            }
+        }
+    }
+
     /// Whether a wave or a pass is under way, which commands in place of hosts.
     pub fn is_engaged(&self) -> bool {
         self.wave.is_some() || self.passes.is_running()
@@ -133,7 +167,7 @@ impl Console {
     /// The machine does not run, or plays something else; a wave or a pass is under way; the word of the axis that would go beyond its limits.
     pub fn start_wave(&mut self, settings: &Settings<Real>, on_edge: bool) -> Result<(), No> {
         let limits = waves::limits(&self.config);
-        let running = self.said.filter(|said| said.phase == controller::supervised::Phase::Running);
+        let running = self.said.filter(|said| said.phase == Phase::Running);
         let Some(said) = running.filter(|_| !self.is_engaged()) else { return Err(No::State) };
         Wave::new(limits).set(settings).map_err(|refused| refused.word().map_or(No::State, No::Word))?;
         waves::may_begin(said.status, self.operator.command(), &settings.center, &limits).map_err(|_| No::State)?;
@@ -154,9 +188,9 @@ impl Console {
     /// # Errors
     /// The machine does not run at rest; a wave or a pass is under way.
     pub fn command_on_edge(&mut self, command: Command) -> Result<(), No> {
-        let rests = self.said.is_some_and(|said| {
-            said.phase == controller::supervised::Phase::Running && said.status & specgen_runtime::setpoint::BUSY == 0
-        });
+        let rests = self
+            .said
+            .is_some_and(|said| said.phase == Phase::Running && said.status & specgen_runtime::setpoint::BUSY == 0);
         if !rests || self.is_engaged() {
             return Err(No::State);
         }
@@ -193,7 +227,7 @@ impl Console {
     /// # Errors
     /// The machine does not run, or not at rest; a wave or a pass is under way; this is no pass, or too long.
     pub fn begin_pass(&mut self, course: Course) -> Result<(), No> {
-        let running = self.said.filter(|said| said.phase == controller::supervised::Phase::Running);
+        let running = self.said.filter(|said| said.phase == Phase::Running);
         let said = running.filter(|_| !self.is_engaged()).ok_or(No::State)?;
         if !passes::may_begin(said.status, self.operator.command()) {
             return Err(No::State);
@@ -209,9 +243,11 @@ impl Console {
         self.order(Order::AbortPass);
     }
 
-    /// Takes the player back: what its pass began is what is commanded.
+    /// Takes the player back: what its pass began is what is commanded, while the machine runs.
     pub fn receive_player(&mut self, player: Player) {
-        if let Some(trajectory) = self.passes.receive(player) {
+        if let Some(trajectory) = self.passes.receive(player)
+            && self.runs()
+        {
             self.operator.has_begun(trajectory);
         }
     }

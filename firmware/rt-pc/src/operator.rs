@@ -103,6 +103,10 @@ pub struct Operator {
     /// The host from which the orders were taken last.
     evicted: Option<HostId>,
     timeout: Timeout,
+    /// Another host stopped the machine while it was armed, where nothing that the owner asks shows it.
+    is_overruled: bool,
+    /// In which the machine was when it was looked at last.
+    phase: Phase,
     /// An operator is present: after a fault the loop goes on instead of ending.
     attended: bool,
 }
@@ -124,6 +128,8 @@ impl Operator {
             requests: 0,
             evicted: None,
             timeout,
+            is_overruled: false,
+            phase: Phase::Disarmed,
             attended,
         }
     }
@@ -155,6 +161,11 @@ impl Operator {
 
     /// Goes on with the plan by what the supervisor said.
     pub fn update(&mut self, said: &Said, now: u64) {
+        if std::mem::replace(&mut self.phase, said.phase) == Phase::Running && said.phase != Phase::Running {
+            // What was commanded before is not followed when it runs again.
+            waves::rest(&[0.0; 6], &mut self.command);
+            (self.changed, self.commanded) = (true, true);
+        }
         let waited = now.saturating_sub(self.since);
         match (self.step, said.phase) {
             (Step::Arming | Step::Starting | Step::Playing, Phase::Faulted) => {
@@ -280,7 +291,7 @@ impl Operator {
         if self.is_ending() {
             return Err(Denied::Ending);
         }
-        if !self.may_order(host, now) {
+        if !self.may_order(host, now) || std::mem::take(&mut self.is_overruled) && self.is_hosts(host) {
             return Err(Denied::Others);
         }
         if !self.is_hosts(host) {
@@ -295,17 +306,32 @@ impl Operator {
         Ok(())
     }
 
+    /// An amplifier reports a fault, and the loop asks for this already; nothing where it was switched off.
+    pub fn amplifier_fault(&mut self, request: Option<Request>, now: u64) {
+        let text = "an amplifier reported a fault".to_owned();
+        if !self.attended {
+            self.give_up(text, now);
+            return;
+        }
+        self.failure.get_or_insert(text);
+        let before = [Request::RampDown, Request::Hold];
+        if let Some(request) = request.filter(|_| !before.contains(&self.request) && !self.is_ending()) {
+            self.ask(request);
+        }
+    }
+
     /// A host asks: it has the orders, or slows the machine down.
-    pub fn ask_by_link(&mut self, request: Request) {
+    pub fn ask_by_link(&mut self, request: Request, host: HostId) {
+        let rises = matches!(self.phase, Phase::Disarmed | Phase::Arming)
+            && matches!(self.request, Request::Arm | Request::Run);
+        self.is_overruled = rises && self.is_links() && !self.is_hosts(host);
         self.ask(request);
     }
 
-    /// The words that are no measurements, in their order, from the link; false if `words` are not as many.
-    pub fn set_by_link(&mut self, words: specgen_link::Bytes<'_>) -> bool {
-        let fits = words.read_words(&mut self.command);
-        self.changed |= fits;
-        self.commanded |= fits;
-        fits
+    /// The words that are no measurements, in their order, from the link.
+    pub fn set_by_link(&mut self, words: Command) {
+        self.command = words;
+        (self.changed, self.commanded) = (true, true);
     }
 
     /// What waited for the edge has begun, and is what is commanded.
@@ -455,7 +481,7 @@ mod tests {
         operator.left(A, None);
         assert!(!operator.linked(1) && operator.link_number() == 0, "one that only looks has no orders");
         operator.take_for_host(A, 10).unwrap();
-        operator.ask_by_link(Request::Run);
+        operator.ask_by_link(Request::Run, A);
         assert!(operator.link_number() > 0 && operator.wish().unwrap().request == Request::Run);
         assert_eq!(operator.take_for_host(B, 10 + SILENCE), Err(Denied::Others));
         assert!(operator.linked(20) && !operator.is_evicted(A));
@@ -476,6 +502,37 @@ mod tests {
         assert_eq!(operator.link_number(), 0);
         operator.ramp_down(700);
         assert_eq!(operator.take_for_host(A, 701), Err(Denied::Ending));
+    }
+
+    #[test]
+    fn what_was_commanded_before_the_machine_stopped_running_is_forgotten() {
+        let mut operator = operator();
+        operator.plan(&["setpoint[0]=1e-6".to_owned()], 0).unwrap();
+        for phase in [Phase::Arming, Phase::Running] {
+            operator.update(&said(phase, true), 1);
+        }
+        operator.command[0] = 2;
+        assert!(operator.wish().is_some());
+        operator.update(&said(Phase::Running, true), 2);
+        assert!(operator.wish().is_none());
+        operator.update(&said(Phase::Holding, true), 3);
+        assert_eq!(operator.wish().unwrap().command.unwrap()[0], 0);
+    }
+
+    #[test]
+    fn a_stop_of_another_while_the_machine_arms_is_told_with_the_next_order() {
+        let mut operator = operator();
+        operator.take_for_host(A, 0).unwrap();
+        operator.ask_by_link(Request::Arm, A);
+        operator.update(&said(Phase::Arming, true), 1);
+        assert_eq!(operator.take_for_host(B, 1), Err(Denied::Others));
+        operator.ask_by_link(Request::Hold, B);
+        assert_eq!(operator.take_for_host(A, 2), Err(Denied::Others));
+        assert_eq!(operator.take_for_host(A, 2), Ok(()));
+        // Where the phase shows it, nobody has to be told.
+        operator.update(&said(Phase::Running, true), 3);
+        operator.ask_by_link(Request::Hold, B);
+        assert_eq!(operator.take_for_host(A, 4), Ok(()));
     }
 
     #[test]

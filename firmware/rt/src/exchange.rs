@@ -213,6 +213,12 @@ impl Server {
         self.mapping.words().wait(seen, look, timeout)
     }
 
+    /// Whether the memory was taken away: somebody made the file shorter. Nothing is heard of a controller any more.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        self.mapping.words().magic.load(Ordering::Acquire) != MAGIC
+    }
+
     /// Gives a reading out.
     pub fn publish(&self, sensing: &Sensing) {
         self.mapping.words().publish(sensing);

@@ -14,7 +14,7 @@ mod watch;
 mod waves;
 
 use std::io::{BufRead, IsTerminal};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 
 use clap::{ArgGroup, Args};
 use serde::Serialize;
@@ -33,6 +33,7 @@ use specgen_compiler::compile;
 use specgen_language::interrupt;
 use specgen_language::model::Model;
 use specgen_operate::{ALIVE, Order, Session};
+use specgen_runtime::supervisor::Request;
 
 /// Arguments of `operate`.
 #[derive(Args, Debug)]
@@ -175,28 +176,55 @@ fn list(orders: &[Order], operator: &mut Operator<impl Port>, ui: &mut Ui) -> Re
 }
 
 /// Lines from standard input or the program that called, the machine looked at meanwhile. What is wrong with a line ends nothing.
-fn lines(operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
+fn lines(operator: &mut Operator<impl Port + 'static>, ui: &mut Ui) -> Result<(), Ended> {
     operator.attended = true;
+    let (urgent, stops) = channel();
+    operator.pulse = Some(Box::new(move |operator| match stops.try_recv() {
+        Ok(request) => {
+            operator.stop_by_hand(request)?;
+            Err(Ended::Refused("stopped from the terminal".to_owned()))
+        }
+        Err(_) => Ok(()),
+    }));
     let lines = match ui.orders() {
         Some(lines) => {
             line("status", operator, ui)?;
             lines
         }
-        None => reader(),
+        None => reader(urgent),
     };
     if std::io::stdin().is_terminal() {
         ui.progress(&format!("{}; commands, one a line; end with Ctrl-D", operator.stands()));
     }
     loop {
         match lines.recv_timeout(ALIVE) {
-            Ok(text) => line(&text, operator, ui)?,
+            Ok(text) => {
+                line(&text, operator, ui)?;
+                if std::mem::take(&mut operator.was_stopped) {
+                    // What was sent before is not to move it.
+                    for text in lines.try_iter() {
+                        late(&text, operator, ui)?;
+                    }
+                }
+            }
             Err(RecvTimeoutError::Timeout) => {
-                operator.look()?;
+                mistake(operator.look(), ui)?;
+                operator.was_stopped = false;
                 operator.show(ui);
             }
             Err(RecvTimeoutError::Disconnected) => return operator.look(),
         }
     }
+}
+
+/// Carries a line out that was sent before the machine was stopped, unless it would move.
+fn late(text: &str, operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
+    if !matches!(Order::parse(text), Ok(Some(order)) if order.moves()) {
+        return line(text, operator, ui);
+    }
+    operator.note(text, &Mistake { error: "the machine was stopped: not done".to_owned() }, ui);
+    ui.answered(&mut operator.answers);
+    Ok(())
 }
 
 /// Carries one line out, and answers it.
@@ -227,12 +255,18 @@ fn mistake(done: Result<(), Ended>, ui: &mut Ui) -> Result<Option<String>, Ended
     }
 }
 
-/// A thread that waits for lines, so that the link does not.
-fn reader() -> Receiver<String> {
+/// A thread that waits for lines, so that the link does not. A stop from a terminal does not wait for what was typed before.
+fn reader(urgent: Sender<Request>) -> Receiver<String> {
     let (sender, receiver) = channel();
+    let is_typed = std::io::stdin().is_terminal();
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines() {
             let Ok(line) = line else { return };
+            if is_typed && let Ok(Some(Order::Ask(request @ (Request::Hold | Request::RampDown)))) = Order::parse(&line)
+            {
+                let _ = urgent.send(request);
+                continue;
+            }
             if sender.send(line).is_err() {
                 return;
             }

@@ -106,7 +106,14 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let end = arguments.seconds.map(|seconds| clock::now() + (seconds * SECOND as f64) as u64);
     let mut seen = 0;
     while !stop.load(Ordering::Relaxed) && end.is_none_or(|end| clock::now() < end) {
-        if let Some((actuation, wanted)) = server.wait(&mut seen, look, TIMEOUT) {
+        let heard = server.wait(&mut seen, look, TIMEOUT);
+        if server.is_lost() {
+            return Err(Failure::Environment(format!(
+                "{}: somebody made the file shorter, and with it the memory that machine and controller share; start both again",
+                path.display()
+            )));
+        }
+        if let Some((actuation, wanted)) = heard {
             let start = clock::now();
             let sensing = served.answer(&actuation, wanted);
             server.publish(&sensing);

@@ -1,7 +1,8 @@
 //! A stand-in for libcomedi, built by the test: a card with sixteen inputs and four outputs whose inputs stand still. On closing
 //! it writes what was done with it. `FAKE_CODE`: code of every input; `FAKE_FAIL_AFTER`: readings after which it fails;
-//! `FAKE_HIGH_AFTER`: looks at a digital line after which that is high;
-//! `FAKE_LOG`: file to write.
+//! `FAKE_HIGH_AFTER`: looks at a digital line after which that is high; `FAKE_CONTACTS`: file whose first letters are the contacts of
+//! emergency stop and amplifiers, `0` for open, both closed without one; `FAKE_BEATS`: file that gets time (ns since 1970, u64) and level (u64) of
+//! every beat of the heartbeat; `FAKE_LOG`: file to write.
 
 use std::ffi::{c_char, c_double, c_int, c_uint, c_void};
 use std::sync::Mutex;
@@ -32,6 +33,8 @@ struct Log {
     directions: Vec<(u32, u32)>,
     looks: u64,
     sets: u64,
+    beats: u64,
+    beat_file: Option<std::fs::File>,
     bad: Vec<String>,
 }
 
@@ -44,6 +47,8 @@ static LOG: Mutex<Log> = Mutex::new(Log {
     directions: Vec::new(),
     looks: 0,
     sets: 0,
+    beats: 0,
+    beat_file: None,
     bad: Vec::new(),
 });
 
@@ -74,7 +79,7 @@ pub extern "C" fn comedi_close(_: *mut c_void) -> c_int {
         let lines: Vec<String> = log.lines.iter().map(u32::to_string).collect();
         let directions: Vec<String> = log.directions.iter().map(|(line, way)| format!("{line}:{way}")).collect();
         let text = format!(
-            "reads={}\nwrites1={}\nwrites2={}\nlowest={}\nhighest={}\nline={}\ndirections={}\nlooks={}\nsets={}\nbad={}\n",
+            "reads={}\nwrites1={}\nwrites2={}\nlowest={}\nhighest={}\nline={}\ndirections={}\nlooks={}\nsets={}\nbeats={}\nbad={}\n",
             log.reads,
             log.writes[1],
             log.writes[2],
@@ -84,6 +89,7 @@ pub extern "C" fn comedi_close(_: *mut c_void) -> c_int {
             directions.join(","),
             log.looks,
             log.sets,
+            log.beats,
             log.bad.join(";")
         );
         std::fs::write(file, text).unwrap();
@@ -189,4 +195,33 @@ pub extern "C" fn comedi_dio_write(_: *mut c_void, _: c_uint, line: c_uint, bit:
         _ => log.sets += 1,
     }
     1
+}
+
+// SAFETY: as libcomedi's: the word is the caller's.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn comedi_dio_bitfield2(_: *mut c_void, subdevice: c_uint, mask: c_uint, bits: *mut c_uint, first: c_uint) -> c_int {
+    let mut log = LOG.lock().unwrap();
+    // SAFETY: see above.
+    let bits = unsafe { &mut *bits };
+    let heartbeat = log.directions.iter().filter(|(_, way)| *way == 1).map(|(line, _)| *line).max();
+    if (subdevice, mask, Some(first)) != (2, 1, heartbeat) {
+        log.bad.push(format!("lines {mask:b} from {first} of subdevice {subdevice}"));
+    }
+    let level = u64::from(*bits & 1);
+    if level != (log.beats + 1) % 2 {
+        log.bad.push("a beat without a change".to_owned());
+    }
+    log.beats += 1;
+    if let (None, Ok(path)) = (&log.beat_file, std::env::var("FAKE_BEATS")) {
+        log.beat_file = Some(std::fs::File::create(path).unwrap());
+    }
+    if let Some(file) = &mut log.beat_file {
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap();
+        let words = [now.as_nanos() as u64, level];
+        std::io::Write::write_all(file, &words.map(u64::to_le_bytes).concat()).unwrap();
+    }
+    let contacts = std::env::var("FAKE_CONTACTS").map_or("11".to_owned(), |path| std::fs::read_to_string(path).unwrap());
+    let closed = |place: usize| u32::from(contacts.as_bytes().get(place) != Some(&b'0'));
+    *bits = *bits & 1 | closed(0) << 1 | closed(1) << 2;
+    0
 }

@@ -19,15 +19,19 @@ use super::{Bench, DISARMED, HOLDING, NONE, RUNNING, Running, signal, wait_for};
 const THERE: f64 = 0.05;
 
 /// The bridge, at a port of its own.
-struct Bridge {
+pub struct Bridge {
     process: Option<Child>,
     port: u16,
 }
 
 impl Bridge {
     fn new(bench: &Bench, more: &[&str]) -> Self {
+        Self::new_at(bench, "gcs.link", more)
+    }
+
+    pub fn new_at(bench: &Bench, link: &str, more: &[&str]) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
-        command.args(["gcs", "--listen", "127.0.0.1:0", "--socket"]).arg(bench.path("gcs.link")).arg(&bench.spec);
+        command.args(["gcs", "--listen", "127.0.0.1:0", "--socket"]).arg(bench.path(link)).arg(&bench.spec);
         let mut process = command.args(more).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let mut said = BufReader::new(process.stderr.take().unwrap()).lines();
         let port = said.find_map(|line| {
@@ -39,7 +43,7 @@ impl Bridge {
         Self { process: Some(process), port: port.unwrap() }
     }
 
-    fn client(&self) -> Client {
+    pub fn client(&self) -> Client {
         let stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
         stream.set_nodelay(true).unwrap();
@@ -47,7 +51,7 @@ impl Bridge {
     }
 
     /// As Ctrl-C does.
-    fn end(mut self) {
+    pub fn end(mut self) {
         let mut process = self.process.take().unwrap();
         signal(&process, Signal::INT);
         assert_eq!(process.wait().unwrap().code(), Some(0));
@@ -63,10 +67,10 @@ impl Drop for Bridge {
     }
 }
 
-struct Client(TcpStream);
+pub struct Client(pub TcpStream);
 
 impl Client {
-    fn send(&mut self, text: &str) {
+    pub fn send(&mut self, text: &str) {
         self.0.write_all(text.as_bytes()).unwrap();
         self.0.write_all(b"\n").unwrap();
     }
@@ -83,7 +87,7 @@ impl Client {
         bytes.into_iter().map(char::from).collect()
     }
 
-    fn ask(&mut self, text: &str) -> String {
+    pub fn ask(&mut self, text: &str) -> String {
         self.send(text);
         self.answer()
     }
@@ -99,12 +103,12 @@ impl Client {
         std::array::from_fn(|_| self.answer())
     }
 
-    fn error(&mut self) -> String {
+    pub fn error(&mut self) -> String {
         self.ask("ERR?")
     }
 
     /// Sends what has no answer; the error that it came to.
-    fn order(&mut self, text: &str) -> String {
+    pub fn order(&mut self, text: &str) -> String {
         self.send(text);
         self.error()
     }
@@ -113,7 +117,7 @@ impl Client {
         self.ask(text).split_once('=').unwrap().1.parse().unwrap()
     }
 
-    fn settle(&mut self) {
+    pub fn settle(&mut self) {
         wait_for("the end of the motion", || self.single(5) == "0");
     }
 }

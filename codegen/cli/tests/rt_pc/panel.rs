@@ -30,12 +30,12 @@ const LONG: Duration = Duration::from_secs(60);
 /// The panel, at a port of its own.
 pub struct Panel {
     process: Option<Child>,
-    address: String,
-    token: String,
+    pub address: String,
+    pub token: String,
 }
 
 impl Panel {
-    fn new(spec: &Path, link: &Path) -> Self {
+    pub fn new(spec: &Path, link: &Path) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
         command.arg("panel").arg(spec).args(["--listen", "127.0.0.1:0", "--socket"]).arg(link);
         let mut process = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
@@ -54,14 +54,14 @@ impl Panel {
     }
 
     /// The answer to a request, as it came.
-    fn get(&self, path: &str, fields: &str) -> String {
+    pub fn get(&self, path: &str, fields: &str) -> String {
         let mut stream = TcpStream::connect(&self.address).unwrap();
         stream.set_read_timeout(Some(LONG)).unwrap();
         write!(stream, "GET {path} HTTP/1.1\r\nHost: {}\r\n{fields}\r\n", self.address).unwrap();
         std::io::read_to_string(stream).unwrap()
     }
 
-    fn page(&self) -> Page {
+    pub fn page(&self) -> Page {
         let mut request = format!("ws://{}/socket?token={}", self.address, self.token).into_client_request().unwrap();
         request.headers_mut().insert("Origin", format!("http://{}", self.address).parse().unwrap());
         let stream = TcpStream::connect(&self.address).unwrap();
@@ -71,7 +71,7 @@ impl Panel {
     }
 
     /// As Ctrl-C does.
-    fn end(mut self) {
+    pub fn end(mut self) {
         let mut process = self.process.take().unwrap();
         signal(&process, Signal::INT);
         assert_eq!(process.wait().unwrap().code(), Some(0));
@@ -88,7 +88,7 @@ impl Drop for Panel {
 }
 
 /// A page as the script of the real one talks.
-struct Page {
+pub struct Page {
     socket: WebSocket<TcpStream>,
     state: Value,
     events: Vec<String>,
@@ -99,7 +99,7 @@ struct Page {
 }
 
 impl Page {
-    fn say(&mut self, what: &Value) {
+    pub fn say(&mut self, what: &Value) {
         self.socket.send(Message::text(what.to_string())).unwrap();
     }
 
@@ -187,7 +187,7 @@ impl Page {
         assert!(answer["ok"] == false && answer["why"].as_str().unwrap().contains(why), "{why}: {answer}");
     }
 
-    fn takes_the_orders(&mut self) {
+    pub fn takes_the_orders(&mut self) {
         self.say(&json!({ "do": "ask" }));
         self.wait("the orders", |state| state["mine"] == true);
     }

@@ -71,20 +71,13 @@ pub(super) struct Asked<'a> {
     pub(super) may_order: bool,
 }
 
-/// Whether a command wants the orders: it moves something, or lets it move.
-pub(super) fn is_order(piece: &Piece) -> bool {
-    let Piece::Line(line) = piece else { return false };
-    let word = line.split_whitespace().next().unwrap_or_default();
-    matches!(word, "MOV" | "MVR" | "SVO" | "FRF" | "SPI" | "VEL" | "VLS")
-}
-
 /// Carries a command out.
 pub(super) fn execute<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, piece: &Piece) -> Outcome {
     match piece {
         Piece::TooLong => Err(Code::TooLong.into()),
         Piece::Single(byte) => single(stage, asked, *byte),
         Piece::Line(line) => {
-            if is_order(piece) && !asked.may_order {
+            if piece.is_order() && !asked.may_order {
                 return Err(Code::NotNow.into());
             }
             let words: Vec<&str> = line.split_whitespace().collect();
@@ -162,11 +155,14 @@ fn order<P: Port>(stage: &mut Stage<P>, asked: &Asked<'_>, command: &str, rest: 
                 _ => return Err(Code::ParameterRange.into()),
             }
         }
-        "STP" if rest.is_empty() => return stop(stage),
-        "STP" => return Err(Code::ParameterCount.into()),
-        "HLT" => {
-            chosen(asked.axes, rest)?;
-            return stop(stage);
+        // Whatever stands behind it.
+        "STP" | "HLT" => {
+            let stopped = stop(stage);
+            return match chosen(asked.axes, rest) {
+                _ if command == "STP" && !rest.is_empty() => Err(Code::ParameterCount.into()),
+                Err(code) if command == "HLT" => Err(code.into()),
+                _ => stopped,
+            };
         }
         "FRF" => {
             chosen(asked.axes, rest)?;

@@ -1,11 +1,13 @@
-//! Bytes of a client as commands: lines that end in LF, and single bytes without one.
+//! Bytes of a client as commands: lines that end in LF, and single bytes without one. Stops overtake.
 
 use std::collections::VecDeque;
 
 /// Longest line: six axes with all their digits, many times over.
 const LONGEST: usize = 512;
-/// Commands that may wait; more are left in the socket.
-const MOST: usize = 256;
+/// What commands that wait may take, bytes with [`PIECE`] for each; more are dropped, for a stop behind them is to be found.
+const ROOM: usize = 1 << 22;
+/// What a command takes beside its letters, bytes.
+const PIECE: usize = 32;
 /// Bytes that are commands by themselves: position, status, motion, ready, macros, wave generator, stop.
 const SINGLE: [u8; 7] = [3, 4, 5, 7, 8, 9, STOP];
 /// Stops all axes.
@@ -18,8 +20,43 @@ pub(super) enum Piece {
     Single(u8),
     /// A line without its end; never empty.
     Line(String),
-    /// A line that was longer than any command.
+    /// A line that was longer than any command, or commands for which there was no room.
     TooLong,
+}
+
+impl Piece {
+    fn words(&self) -> std::str::SplitWhitespace<'_> {
+        match self {
+            Self::Line(line) => line.split_whitespace(),
+            Self::Single(_) | Self::TooLong => "".split_whitespace(),
+        }
+    }
+
+    /// Whether it wants the orders: it moves something, or lets it move.
+    pub(super) fn is_order(&self) -> bool {
+        self.is_move() || matches!(self.words().next(), Some("SVO" | "FRF" | "SPI" | "VEL" | "VLS"))
+    }
+
+    /// Whether it stops the platform, whoever sent it.
+    pub(super) fn is_stop(&self) -> bool {
+        *self == Self::Single(STOP) || matches!(self.words().next(), Some("STP" | "HLT"))
+    }
+
+    /// Whether it switches the servo off.
+    pub(super) fn is_off(&self) -> bool {
+        let is_zero = |word: &str| word.parse() == Ok(0.0);
+        let states = || self.words().skip(2).step_by(2);
+        self.words().next() == Some("SVO") && states().next().is_some() && states().all(is_zero)
+    }
+
+    /// Whether a stop takes it away: it leads to a motion.
+    fn is_move(&self) -> bool {
+        matches!(self.words().next(), Some("MOV" | "MVR")) || self.words().next() == Some("SVO") && !self.is_off()
+    }
+
+    fn size(&self) -> usize {
+        PIECE + if let Self::Line(line) = self { line.len() } else { 0 }
+    }
 }
 
 /// What a client sent and nobody looked at yet.
@@ -28,39 +65,79 @@ pub(super) struct Input {
     line: Vec<u8>,
     /// Skips to the end of a line that is too long.
     skips: bool,
+    /// The line began before a stop of another client.
+    is_late: bool,
     pieces: VecDeque<Piece>,
+    /// Something that would move was taken away.
+    has_dropped: bool,
+    /// What they take, as [`ROOM`] counts.
+    size: usize,
 }
 
 impl Input {
-    /// Takes bytes. A stop overtakes everything that waits, and takes it away: it is not to be followed by what it stopped.
-    pub(super) fn push(&mut self, bytes: &[u8]) {
+    /// Takes bytes; whether a stop is among them, or the servo is switched off by one who `may_order`. It then comes first, and what would
+    /// move and was sent before it is taken away.
+    pub(super) fn push(&mut self, bytes: &[u8], may_order: bool) -> bool {
+        let mut stops = false;
         for byte in bytes {
             match *byte {
-                b'\n' => self.end_line(),
+                b'\n' => stops |= self.end_line(may_order),
                 b'\r' => {}
                 STOP => {
-                    self.pieces.clear();
-                    self.pieces.push_back(Piece::Single(STOP));
+                    self.line.clear();
+                    self.skips = false;
+                    stops |= self.add(Piece::Single(STOP), may_order);
                 }
-                byte if SINGLE.contains(&byte) => self.pieces.push_back(Piece::Single(byte)),
+                byte if SINGLE.contains(&byte) => stops |= self.add(Piece::Single(byte), may_order),
                 byte if self.line.len() < LONGEST => self.line.push(byte),
                 _ => self.skips = true,
             }
         }
+        stops
     }
 
-    fn end_line(&mut self) {
+    fn end_line(&mut self, may_order: bool) -> bool {
         let text = String::from_utf8_lossy(&self.line).trim().to_owned();
         self.line.clear();
-        let stops = matches!(text.split_whitespace().next(), Some("STP" | "HLT"));
-        if std::mem::take(&mut self.skips) {
-            self.pieces.push_back(Piece::TooLong);
-        } else if !text.is_empty() {
-            if stops {
-                self.pieces.clear();
-            }
-            self.pieces.push_back(Piece::Line(text));
+        let is_late = std::mem::take(&mut self.is_late);
+        let piece = if std::mem::take(&mut self.skips) { Piece::TooLong } else { Piece::Line(text) };
+        let is_dropped = is_late && piece.is_move();
+        self.has_dropped |= is_dropped;
+        if is_dropped || piece == Piece::Line(String::new()) {
+            return false;
         }
+        self.add(piece, may_order)
+    }
+
+    fn add(&mut self, piece: Piece, may_order: bool) -> bool {
+        if piece.is_stop() || may_order && piece.is_off() {
+            self.drop_moves();
+            self.pieces.retain(|piece| !piece.is_stop());
+            self.pieces.push_front(piece);
+            self.size = self.pieces.iter().map(Piece::size).sum();
+            return true;
+        }
+        if self.size < ROOM {
+            self.size += piece.size();
+            self.pieces.push_back(piece);
+        } else if let Some(last) = self.pieces.back_mut() {
+            *last = Piece::TooLong;
+        }
+        false
+    }
+
+    /// Takes away what would move, the line that is coming in, too.
+    pub(super) fn drop_moves(&mut self) {
+        let before = self.pieces.len();
+        self.pieces.retain(|piece| !piece.is_move());
+        self.size = self.pieces.iter().map(Piece::size).sum();
+        self.is_late = !self.line.is_empty();
+        self.has_dropped |= self.pieces.len() < before;
+    }
+
+    /// Whether anything was taken away since this was called last.
+    pub(super) fn has_dropped(&mut self) -> bool {
+        std::mem::take(&mut self.has_dropped)
     }
 
     /// The command whose turn it is.
@@ -70,12 +147,9 @@ impl Input {
 
     /// It is done with.
     pub(super) fn done(&mut self) {
-        self.pieces.pop_front();
-    }
-
-    /// Whether as much waits as may.
-    pub(super) fn is_full(&self) -> bool {
-        self.pieces.len() >= MOST
+        if let Some(piece) = self.pieces.pop_front() {
+            self.size -= piece.size();
+        }
     }
 }
 
@@ -83,22 +157,30 @@ impl Input {
 mod tests {
     use super::*;
 
-    fn pieces(parts: &[&[u8]]) -> Vec<Piece> {
-        let mut input = Input::default();
-        for part in parts {
-            input.push(part);
-        }
+    fn all(mut input: Input) -> Vec<Piece> {
         let mut found = Vec::new();
         while let Some(piece) = input.first() {
             found.push(piece.clone());
             input.done();
         }
+        assert_eq!(input.size, 0);
         found
+    }
+
+    fn pieces(parts: &[&[u8]]) -> Vec<Piece> {
+        let mut input = Input::default();
+        for part in parts {
+            input.push(part, true);
+        }
+        all(input)
+    }
+
+    fn line(text: &str) -> Piece {
+        Piece::Line(text.to_owned())
     }
 
     #[test]
     fn lines_and_single_bytes_come_in_their_order_however_they_are_cut() {
-        let line = |text: &str| Piece::Line(text.to_owned());
         assert_eq!(
             pieces(&[b"POS? X\r\n\n  \n\x05MO", b"V X 1\nPO"]),
             [line("POS? X"), Piece::Single(5), line("MOV X 1")]
@@ -109,17 +191,39 @@ mod tests {
     }
 
     #[test]
-    fn a_stop_takes_away_what_waits() {
-        let line = |text: &str| Piece::Line(text.to_owned());
-        assert_eq!(pieces(&[b"MOV X 1\nMOV X 2\n\x18ERR?\n"]), [Piece::Single(STOP), line("ERR?")]);
-        assert_eq!(pieces(&[b"MOV X 1\nHLT X\nERR?\n"]), [line("HLT X"), line("ERR?")]);
+    fn a_stop_comes_first_and_takes_away_what_would_move() {
+        let stop = || Piece::Single(STOP);
+        assert_eq!(pieces(&[b"MOV X 1\nMVR X 2\nSVO X 1\n\x18ERR?\n"]), [stop(), line("ERR?")]);
+        assert_eq!(pieces(&[b"MOV X 1\nHLT X\nMOV X 2\n"]), [line("HLT X"), line("MOV X 2")]);
+        assert_eq!(pieces(&[b"STP\nMOV X 1\nMOV X", b" 2\x18ERR?\n"]), [stop(), line("ERR?")], "the line, too");
+        assert_eq!(pieces(&[b"POS?\nVLS 1\nMOV X 1\n\x18"]), [stop(), line("POS?"), line("VLS 1")]);
+        assert_eq!(pieces(&[b"SVO X 1\nMOV X 1\nSVO X 0 Y 0\n"]), [line("SVO X 0 Y 0")]);
+        assert_eq!(pieces(&[b"MOV X 1\nSVO X 0 Y 1\n"]).len(), 2);
+        // Of one who may not switch it off.
+        let mut input = Input::default();
+        assert!(!input.push(b"MOV X 1\nSVO X 0\n", false) && input.push(b"STP\n", false));
+        assert_eq!(all(input), [line("STP"), line("SVO X 0")]);
     }
 
     #[test]
-    fn what_waits_is_bounded() {
+    fn a_stop_of_another_takes_away_a_line_that_is_under_way() {
         let mut input = Input::default();
-        assert!(!input.is_full());
-        input.push(&b"A\n".repeat(300));
-        assert!(input.is_full());
+        input.push(b"MOV X", true);
+        input.drop_moves();
+        assert!(!input.has_dropped(), "it may be a question yet");
+        input.push(b" 2\nMOV X 3\n", true);
+        assert!(input.has_dropped() && !input.has_dropped());
+        assert_eq!(all(input), [line("MOV X 3")]);
+    }
+
+    #[test]
+    fn what_waits_is_bounded_and_a_stop_is_found_behind_it() {
+        let mut input = Input::default();
+        for _ in 0..100 {
+            input.push(&b"MOV X 1\n".repeat(10_000), true);
+        }
+        assert!(input.size <= ROOM + PIECE + LONGEST && input.pieces.back() == Some(&Piece::TooLong));
+        assert!(input.push(b"\x18", true));
+        assert_eq!(all(input), [Piece::Single(STOP), Piece::TooLong]);
     }
 }

@@ -20,6 +20,8 @@ const FRESH: Duration = Duration::from_micros(500);
 const SILENT: Duration = Duration::from_millis(100);
 /// How long it may take until the machine runs.
 const UP: Duration = Duration::from_secs(10);
+/// A machine that holds for so long after it was asked to run is held by somebody.
+const HELD: Duration = Duration::from_millis(500);
 
 /// A session with a platform.
 pub struct Stage<P> {
@@ -33,6 +35,12 @@ pub struct Stage<P> {
     ordered: (u64, Instant),
     /// On the way to a machine that runs.
     rising: Option<Rising>,
+    /// It runs, and goes to its bias pose.
+    to_bias: bool,
+    /// It is to run no more, and that was asked for here.
+    goes_down: bool,
+    /// It runs no more, or comes up no further, and that was not asked for here.
+    stopped: bool,
     /// Its tool point is the pivot point of clients: they see it move.
     frame: Frame,
     /// What went wrong after the command that asked for it had been taken.
@@ -88,6 +96,9 @@ impl<P: Port> Stage<P> {
             goal: None,
             ordered: (0, Instant::now()),
             rising: None,
+            to_bias: place.status & BUSY != 0,
+            goes_down: false,
+            stopped: false,
             frame: Frame::default(),
             mishap: None,
         })
@@ -143,6 +154,11 @@ impl<P: Port> Stage<P> {
         self.place.tick >= tick || sent.elapsed() >= SILENT
     }
 
+    /// Whether somebody else stopped it since the last call: another host, a fault, the emergency contact.
+    pub(super) fn was_stopped(&mut self) -> bool {
+        std::mem::take(&mut self.stopped)
+    }
+
     /// Takes what went wrong since the last call.
     pub(super) fn mishap(&mut self) -> Option<Code> {
         self.mishap.take()
@@ -158,6 +174,7 @@ impl<P: Port> Stage<P> {
 
     /// Asks where it is, and goes on with what is under way. Keeps the link alive.
     pub(super) fn look(&mut self) -> Result<(), ClientError> {
+        let ran = self.runs();
         if let Some(place) = self.session.place()? {
             self.place = place;
         }
@@ -166,8 +183,11 @@ impl<P: Port> Stage<P> {
             self.session.poll()?;
         }
         self.seen = Instant::now();
-        if !self.runs() {
+        if self.runs() {
+            self.to_bias = (self.to_bias || !ran) && self.place.status & BUSY != 0;
+        } else {
             self.goal = None;
+            self.stopped |= ran && !self.goes_down;
         }
         let refused = self.runs() && self.place.status & REFUSED != 0 && self.is_answered();
         if refused && self.place.status & BUSY == 0 && self.goal.is_some_and(|goal| !self.is_at(&goal)) {
@@ -185,7 +205,7 @@ impl<P: Port> Stage<P> {
     fn granted(&mut self, done: Result<(), ClientError>) -> Result<(), ClientError> {
         match done {
             Err(ClientError::Refused(Refusal::Busy | Refusal::State)) => {
-                self.rising = None;
+                self.stopped |= self.rising.take().is_some();
                 self.mishap = Some(Code::NotNow);
                 Ok(())
             }
@@ -211,13 +231,16 @@ impl<P: Port> Stage<P> {
             return Ok(());
         }
         let asked = rising.asked;
+        let came_up = matches!(asked, Request::Arm | Request::Run);
         let next = match self.phase() {
             Some(Phase::Running) => {
                 self.rising = None;
                 return Ok(());
             }
-            // It faulted on the way.
-            Some(Phase::Faulted) if matches!(asked, Request::Arm | Request::Run) => None,
+            // It faulted on the way, or somebody ramps it down, or holds it.
+            Some(Phase::Faulted | Phase::RampingDown) if came_up => None,
+            Some(Phase::Disarmed) if asked == Request::Run => None,
+            Some(Phase::Holding) if asked == Request::Run && self.ordered.1.elapsed() >= HELD => None,
             Some(Phase::Faulted) => Some(Request::Acknowledge),
             Some(Phase::Disarmed) => Some(Request::Arm),
             Some(Phase::Arming | Phase::Holding) => Some(Request::Run),
@@ -230,7 +253,7 @@ impl<P: Port> Stage<P> {
                 self.ask(next)
             }
             None => {
-                self.rising = None;
+                (self.rising, self.stopped) = (None, true);
                 self.mishap = Some(Code::ServoOff);
                 self.ask(Request::None)
             }
@@ -242,6 +265,7 @@ impl<P: Port> Stage<P> {
         if !self.servo() {
             // A request counts when it begins to be given.
             self.ask(Request::None)?;
+            self.goes_down = false;
             self.rising = Some(Rising { since: Instant::now(), asked: Request::None });
         }
         Ok(())
@@ -249,20 +273,30 @@ impl<P: Port> Stage<P> {
 
     /// Servo off: ramps down.
     pub(super) fn shut_down(&mut self) -> Result<(), No> {
-        (self.rising, self.goal) = (None, None);
+        (self.rising, self.goal, self.goes_down) = (None, None, true);
         Ok(self.ask(Request::RampDown)?)
     }
 
-    /// Stops, within the limits of stops, whoever has the orders. A machine that comes up goes on doing so.
+    /// Stops, within the limits of stops, whoever has the orders. A machine that comes up comes no further, and its servo is off then.
     pub(super) fn stop(&mut self) -> Result<(), No> {
-        if !self.runs() {
-            return Ok(());
+        let rises = self.rising.take().is_some();
+        let request = match self.phase() {
+            Some(Phase::Running) if !self.to_bias => None,
+            Some(Phase::Running) => Some(Request::Hold),
+            Some(Phase::Holding) if rises => Some(Request::Hold),
+            Some(Phase::Arming) => Some(Request::RampDown),
+            _ if rises => Some(Request::RampDown),
+            _ => return Ok(()),
+        };
+        if let Some(request) = request {
+            self.goes_down = true;
+            return Ok(self.ask(request)?);
         }
         self.session.stop_wave().or_else(refused)?;
         match self.halt() {
             Err(ClientError::Refused(_)) => {
                 // Set-points are another's, or a wave's until it is at rest.
-                self.goal = None;
+                (self.goal, self.goes_down) = (None, true);
                 Ok(self.ask(Request::Hold)?)
             }
             other => Ok(other?),
@@ -310,7 +344,13 @@ impl<P: Port> Stage<P> {
     pub(super) fn go(&mut self, pose: &[f64; 6]) -> Result<(), No> {
         let user = self.admitted(pose).ok_or(Code::Position)?;
         let words = self.session.move_words(&user).map_err(|_| Code::Position)?;
-        self.session.command(words)?;
+        match self.session.command(words) {
+            // It runs no more.
+            Err(ClientError::Refused(Refusal::State)) if self.look().is_ok() && !self.runs() => {
+                return Err(Code::ServoOff.into());
+            }
+            other => other?,
+        }
         self.goal = Some(user);
         self.ordered = (self.place.tick + SEEN, Instant::now());
         Ok(())

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use controller::supervised::{Machine, Request as Wanted};
+use controller::supervised::{Machine, Phase, Request as Wanted};
 use controller::{CONFIG_WORDS, Config, DESCRIPTION};
 use specgen_board::{COMMAND_WORDS, Desk, Exchange, Stopwatch, Visit};
 use specgen_link::{Bytes, Counted, Device, RecorderAction, Refusal, Reply, Request};
@@ -39,7 +39,10 @@ impl Bench {
 fn orders_reach_the_tick_all_at_once() {
     let mut bench = Bench::new();
     let words: Vec<u64> = (100..100 + COMMAND_WORDS as u64).collect();
-    bench.expect(&Request::Setpoint { words: Bytes(&bytes(&words)) }, Reply::Done);
+    let setpoint = Request::Setpoint { words: Bytes(&bytes(&words)) };
+    bench.expect(&setpoint, Reply::Refused(Refusal::State));
+    bench.exchange.report.phase = Phase::Running;
+    bench.expect(&setpoint, Reply::Done);
     bench.expect(&Request::Supervise { request: 2 }, Reply::Done);
     assert_eq!(bench.exchange.orders.request, Wanted::Run);
     assert_eq!(bench.exchange.orders.command[..], words);
@@ -50,6 +53,20 @@ fn orders_reach_the_tick_all_at_once() {
         assert_eq!((identity.counted, identity.stages), (Counted::Nothing, 0));
     });
     assert_eq!(bench.exchange.orders.request, Wanted::None);
+}
+
+#[test]
+fn what_was_commanded_before_the_machine_stopped_running_is_forgotten() {
+    let mut bench = Bench::new();
+    let words = bytes(&[2; COMMAND_WORDS]);
+    for (phase, kept) in [(Phase::Running, true), (Phase::Holding, false)] {
+        bench.exchange.report.phase = phase;
+        if kept {
+            bench.expect(&Request::Setpoint { words: Bytes(&words) }, Reply::Done);
+        }
+        bench.exchange.prepare();
+        assert_eq!(bench.exchange.orders.command[0] == 2, kept, "{phase:?}");
+    }
 }
 
 #[test]

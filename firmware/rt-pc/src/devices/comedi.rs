@@ -2,7 +2,9 @@
 //!
 //! Gauges are the first six differential inputs of one card, amplifiers the first outputs of one or more cards (an NI PCI-6229
 //! has four), and the enable line is the first digital line of the first card, high for on; the triggers of the spec are the lines
-//! behind it, its input the last of them. Codes are straight binary over the range of the channel: what volts they are, the spec says.
+//! behind it, its input the last of them. Behind these are the heartbeat, which changes in every tick, the emergency stop and the fault of
+//! the amplifiers, both high where all is well: a broken wire stops. Codes are straight binary over the range of the channel: what volts
+//! they are, the spec says.
 
 pub mod library;
 
@@ -13,7 +15,7 @@ use controller::sensing::CONVERTER;
 use controller::triggers::{INPUT, LINES};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges, Lines};
 
-use super::Device;
+use super::{Contacts, Device};
 use library::{ANALOG_INPUT, ANALOG_OUTPUT, Card, Comedilib, DIGITAL, Reference, channel};
 
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +32,10 @@ pub struct Settings {
 
 /// Digital line of the input, behind the enable line and the outputs.
 const INPUT_LINE: u32 = LINES as u32 + 1;
+/// Digital lines of heartbeat, emergency stop and amplifier fault, behind those.
+const HEARTBEAT: u32 = INPUT_LINE + INPUT as u32;
+const STOP: u32 = HEARTBEAT + 1;
+const FAULT: u32 = STOP + 1;
 
 /// Outputs of one card.
 struct Bank<'a> {
@@ -48,6 +54,8 @@ pub struct Comedi<'a> {
     line: u32,
     /// Triggers as they are set, bit by bit.
     high: u32,
+    /// The heartbeat as it is set.
+    beat: bool,
     banks: Vec<Bank<'a>>,
     name: String,
 }
@@ -69,18 +77,20 @@ impl<'a> Comedi<'a> {
         if !input.set_line(line, 0, false) {
             return Err(format!("{path}: digital line 0 cannot be set: amplifiers could not be switched off"));
         }
-        let triggers = LINES + usize::from(INPUT);
-        if (lines as usize).checked_sub(1 + triggers).is_none() {
+        if lines <= FAULT {
             return Err(format!(
-                "{path}: {name} has {lines} digital lines; the amplifiers need one, the triggers of the spec {triggers} more"
+                "{path}: {name} has {lines} digital lines; {} are needed: for the amplifiers, {} for triggers of the spec, heartbeat, emergency \
+                 stop and amplifier fault",
+                FAULT + 1,
+                HEARTBEAT - 1
             ));
         }
-        if INPUT {
+        for number in [STOP, FAULT].into_iter().chain(INPUT.then_some(INPUT_LINE)) {
             input
-                .make_input(line, INPUT_LINE)
-                .map_err(|error| format!("{path}: digital line {INPUT_LINE} as an input: {error}"))?;
+                .make_input(line, number)
+                .map_err(|error| format!("{path}: digital line {number} as an input: {error}"))?;
         }
-        for (number, ()) in (1..).zip([(); LINES]) {
+        for number in (1..=LINES as u32).chain([HEARTBEAT]) {
             input
                 .make_output(line, number)
                 .map_err(|error| format!("{path}: digital line {number} as an output: {error}"))?;
@@ -123,7 +133,15 @@ impl<'a> Comedi<'a> {
                 "the cards have {first} analog outputs, six amplifiers need {CHANNELS}: name more cards, such as --comedi-out {path} --comedi-out /dev/comedi1"
             ));
         }
-        Ok(Self { input, gauges: (subdevice, channels), line, high: 0, banks, name: format!("{name} at {path}") })
+        Ok(Self {
+            input,
+            gauges: (subdevice, channels),
+            line,
+            high: 0,
+            beat: false,
+            banks,
+            name: format!("{name} at {path}"),
+        })
     }
 }
 
@@ -213,6 +231,14 @@ impl Lines for Comedi<'_> {
 
 impl Device for Comedi<'_> {
     fn tick(&mut self, _tick: u64) {}
+
+    fn beat(&mut self) -> Result<Contacts, Fault> {
+        let beat = !self.beat;
+        let high = self.input.exchange_lines(self.line, HEARTBEAT, 1, u32::from(beat)).ok_or(Fault::Pin)?;
+        self.beat = beat;
+        let is_open = |number: u32| high >> (number - HEARTBEAT) & 1 == 0;
+        Ok(Contacts { stop: is_open(STOP), fault: is_open(FAULT) })
+    }
 
     fn wrench(&self) -> [f64; CHANNELS] {
         [0.0; CHANNELS]

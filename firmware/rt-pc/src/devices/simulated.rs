@@ -8,7 +8,7 @@ use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges, Lines};
 use specgen_rt::clock;
 use specgen_rt::exchange::Client;
 
-use super::Device;
+use super::{Contacts, Device};
 
 /// How long the first reading may take, ns: the machine may be pre-cycling.
 const FIRST: u64 = 60_000_000_000;
@@ -116,6 +116,11 @@ impl Lines for Simulated {
 impl Device for Simulated {
     fn tick(&mut self, tick: u64) {
         self.tick = tick;
+    }
+
+    /// Nothing is wired to it.
+    fn beat(&mut self) -> Result<Contacts, Fault> {
+        Ok(Contacts::default())
     }
 
     fn wrench(&self) -> [f64; CHANNELS] {

@@ -26,6 +26,8 @@ pub struct Desk<'a> {
     /// What is asked of the run.
     pub console: &'a mut Console,
     pub host: HostId,
+    /// What it asks for was sent before a stop of another host.
+    pub is_late: bool,
     /// Events that were not yet reported to this host.
     pub events: &'a mut u32,
     /// What it looks on with.
@@ -37,9 +39,16 @@ pub struct Desk<'a> {
 }
 
 impl<'a> Desk<'a> {
-    pub fn new(console: &'a mut Console, host: HostId, events: &'a mut u32, stream: &'a mut Stream, now: u64) -> Self {
+    pub fn new(
+        console: &'a mut Console,
+        host: HostId,
+        is_late: bool,
+        events: &'a mut u32,
+        stream: &'a mut Stream,
+        now: u64,
+    ) -> Self {
         let words = [0; size_of::<[u64; CONFIG_WORDS]>()];
-        Self { console, host, events, stream, now, words, knots: [0; KNOTS * KNOT] }
+        Self { console, host, is_late, events, stream, now, words, knots: [0; KNOTS * KNOT] }
     }
 
     fn status(&self) -> Reply<'static> {
@@ -87,6 +96,9 @@ impl<'a> Desk<'a> {
     }
 
     fn take(&mut self) -> Result<(), Refusal> {
+        if self.is_late {
+            return Err(Refusal::Busy);
+        }
         self.console.operator.take_for_host(self.host, self.now).map_err(|denied| match denied {
             Denied::Ending => Refusal::State,
             Denied::Others => Refusal::Busy,
@@ -103,7 +115,11 @@ impl<'a> Desk<'a> {
             (Ok(()), _) | (Err(Refusal::Busy), Wanted::Hold) | (Err(_), Wanted::RampDown) => {}
             (refused, _) => return refused,
         }
-        self.console.operator.ask_by_link(wanted);
+        let stops = matches!(wanted, Wanted::Hold | Wanted::RampDown);
+        if stops {
+            self.console.stop();
+        }
+        self.console.operator.ask_by_link(wanted, self.host);
         Ok(())
     }
 
@@ -112,8 +128,16 @@ impl<'a> Desk<'a> {
         if self.console.is_engaged() {
             return Err(Refusal::State);
         }
-        let expected = COMMAND_WORDS as u16;
-        if self.console.operator.set_by_link(words) { Ok(()) } else { Err(Refusal::Length { expected }) }
+        let mut command = [0; COMMAND_WORDS];
+        if !words.read_words(&mut command) {
+            return Err(Refusal::Length { expected: COMMAND_WORDS as u16 });
+        }
+        // What came before it runs would be followed when nobody expects it any more.
+        if !self.console.runs() {
+            return Err(Refusal::State);
+        }
+        self.console.operator.set_by_link(command);
+        Ok(())
     }
 
     fn configure(&mut self, words: Bytes<'_>) -> Result<(), Refusal> {

@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::os::fd::BorrowedFd;
 use std::path::Path;
 
+use rustix::io::ioctl_fionread;
 use specgen_link::{Counters, Endpoint};
 
 use super::clients::{Client, Clients, room};
@@ -45,6 +46,8 @@ struct Line {
     id: HostId,
     endpoint: Box<Endpoint>,
     unsent: Vec<u8>,
+    /// What it sends was sent before a stop of another host, until nothing of it is left.
+    is_late: bool,
     /// Events that were not yet reported to this host.
     events: u32,
     stream: Stream,
@@ -76,6 +79,7 @@ impl Link {
                 id: HostId(traffic.hosts),
                 endpoint: Box::default(),
                 unsent: Vec::new(),
+                is_late: false,
                 events: 0,
                 stream: Stream::default(),
             }
@@ -83,15 +87,26 @@ impl Link {
         let crowded = hosts.accept(now, fresh, |line| console.operator.is_hosts(line.id));
         traffic.closed += crowded.len() as u64;
         let events = console.take_events();
+        let (before, mut stopper) = (console.stops, None);
         let gone = hosts.serve(|client| {
             client.state.events |= events;
+            let stops = console.stops;
             // One that another took the orders from is to come anew, so that it does not go on as if nothing had happened.
             if console.operator.is_evicted(client.state.id) {
                 traffic.closed += 1;
                 return Err(io::ErrorKind::ConnectionAborted.into());
             }
-            serve(client, console, now)
+            let served = serve(client, console, now);
+            if console.stops != stops {
+                stopper = Some(client.state.id);
+            }
+            served
         });
+        if console.stops != before {
+            for client in hosts.iter_mut().filter(|client| Some(client.state.id) != stopper) {
+                client.state.is_late = ioctl_fionread(&client.stream).is_ok_and(|unread| unread > 0);
+            }
+        }
         for line in crowded.iter().chain(&gone) {
             traffic.add(line.endpoint.counters());
             console.operator.left(line.id, console.said.as_ref());
@@ -116,8 +131,9 @@ fn serve(client: &mut Client<Line>, console: &mut Console, now: u64) -> io::Resu
     if client.state.unsent.len() < UNREAD {
         let mut bytes = room();
         let said = client.read(&mut bytes, now)?;
-        let Line { id, endpoint, unsent, events, stream } = &mut client.state;
-        let mut desk = Desk::new(console, *id, events, stream, now);
+        let Line { id, endpoint, unsent, is_late, events, stream } = &mut client.state;
+        *is_late &= !said.is_empty();
+        let mut desk = Desk::new(console, *id, *is_late, events, stream, now);
         for byte in said {
             if let Some(answer) = endpoint.push(*byte, &mut desk) {
                 unsent.extend_from_slice(answer);

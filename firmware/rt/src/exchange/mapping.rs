@@ -1,8 +1,12 @@
 //! A file of plain atomic words in memory, and the futex calls on them.
+//!
+//! Whoever may write the file may make it shorter, which takes the memory away from all who map it: the system then sends `SIGBUS`
+//! when a word is touched. The mapping is replaced by zeros of this process, in which nothing answers any more.
 
+use core::ffi::{c_int, c_void};
 use core::marker::PhantomData;
 use core::ptr::NonNull;
-use core::sync::atomic::AtomicU32;
+use core::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::fs::{File, OpenOptions, Permissions};
 use std::io;
 use std::os::fd::AsRawFd;
@@ -16,6 +20,9 @@ pub(super) struct Mapping<T> {
     start: NonNull<T>,
     kind: PhantomData<T>,
 }
+
+/// Start and length of every mapping, zeros where there is none: more than a program has at a time.
+static MAPPED: [[AtomicUsize; 2]; 16] = [const { [const { AtomicUsize::new(0) }; 2] }; 16];
 
 /// Read and written by its owner.
 const MODE: u32 = 0o600;
@@ -102,7 +109,10 @@ impl<T> Mapping<T> {
             )
         };
         match NonNull::new(start.cast::<T>()) {
-            Some(start) if start.as_ptr().cast() != libc::MAP_FAILED => Ok(Self { start, kind: PhantomData }),
+            Some(start) if start.as_ptr().cast() != libc::MAP_FAILED => {
+                survive(start.as_ptr().expose_provenance(), size_of::<T>());
+                Ok(Self { start, kind: PhantomData })
+            }
             _ => Err(io::Error::last_os_error()),
         }
     }
@@ -115,9 +125,48 @@ impl<T> Mapping<T> {
 
 impl<T> Drop for Mapping<T> {
     fn drop(&mut self) {
+        let own = MAPPED.iter().find(|[start, _]| start.load(Ordering::Acquire) == self.start.addr().get());
+        if let Some([start, _]) = own {
+            start.store(0, Ordering::Release);
+        }
         // SAFETY: mapped in `of` with this length, and unmapped once.
         unsafe { libc::munmap(self.start.as_ptr().cast(), size_of::<T>()) };
     }
+}
+
+/// Lets the process go on when the file of this mapping becomes shorter.
+fn survive(start: usize, length: usize) {
+    for [place, size] in &MAPPED {
+        if place.compare_exchange(0, start, Ordering::AcqRel, Ordering::Relaxed).is_ok() {
+            size.store(length, Ordering::Release);
+            break;
+        }
+    }
+    // SAFETY: a plain structure of numbers, for which zeros are a value.
+    let mut action: libc::sigaction = unsafe { core::mem::zeroed() };
+    action.sa_sigaction = taken_away as *const () as usize;
+    action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;
+    // SAFETY: the handler is of the kind that the flags say, and does only what one may do.
+    unsafe { libc::sigaction(libc::SIGBUS, &raw const action, core::ptr::null_mut()) };
+}
+
+/// Puts zeros where the memory of a mapping was taken away. Whatever else ends the process, as without a handler.
+extern "C" fn taken_away(_: c_int, info: *mut libc::siginfo_t, _: *mut c_void) {
+    // SAFETY: the system hands over what it knows of the fault.
+    let at = unsafe { (*info).si_addr() }.addr();
+    for [start, length] in &MAPPED {
+        let (start, length) = (start.load(Ordering::Acquire), length.load(Ordering::Acquire));
+        if start != 0 && (start..start + length).contains(&at) {
+            let (rights, kind) =
+                (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_PRIVATE | libc::MAP_ANONYMOUS | libc::MAP_FIXED);
+            let place = core::ptr::with_exposed_provenance_mut(start);
+            // SAFETY: in the place of a mapping of this length, which stays mapped; any bytes are its words.
+            unsafe { libc::mmap(place, length, rights, kind, -1, 0) };
+            return;
+        }
+    }
+    // SAFETY: touches no memory; the fault comes again, without a handler.
+    unsafe { libc::signal(libc::SIGBUS, libc::SIG_DFL) };
 }
 
 /// Wakes whoever sleeps on `bell`, in any process.

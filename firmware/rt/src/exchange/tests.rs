@@ -179,3 +179,22 @@ fn a_file_that_is_mapped_is_never_made_shorter() {
         drop(server);
     }
 }
+
+#[test]
+fn a_file_that_becomes_shorter_ends_no_process() {
+    let path = name("shorter");
+    let server = Server::create(&path, DIGEST).unwrap();
+    let client = Client::open(&path, DIGEST).unwrap();
+    server.publish(&Sensing { session: client.session, tick: 1, codes: [7; 6], wrench: [0; 6] });
+    assert_eq!(client.sense(1, 1_000_000).map(|sensing| sensing.codes), Some([7; 6]));
+    assert!(!server.is_lost() && !client.is_abandoned());
+    std::fs::OpenOptions::new().write(true).open(&path).unwrap().set_len(0).unwrap();
+    // Nothing answers, whoever waits for it.
+    assert!(client.sense(2, 1_000_000).is_none() && client.is_abandoned());
+    client.actuate(2, true, &[1; 6]);
+    assert!(server.wait(&mut 0, 0, 1_000_000).is_none() && server.is_lost());
+    // And the next machine is another one.
+    drop(server);
+    let server = Server::create(&path, DIGEST).unwrap();
+    assert!(!server.is_lost() && Client::open(&path, DIGEST).is_ok());
+}

@@ -48,9 +48,10 @@ pub(super) fn no_input() -> Ended {
 /// Why set-points are refused while a wave makes them.
 pub(super) fn waving(error: ClientError) -> Ended {
     match error {
-        ClientError::Refused(Refusal::State) => {
-            Ended::Refused("not while a wave is under way or a host steps the machine; `wave stop` first".to_owned())
-        }
+        ClientError::Refused(Refusal::State) => Ended::Refused(
+            "set-points are taken while the machine runs, and not while a wave is under way or a host steps it"
+                .to_owned(),
+        ),
         other => other.into(),
     }
 }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use specgen_hal::Fault;
 use specgen_link::Health;
+use specgen_runtime::pending::AMPLIFIER;
 use specgen_runtime::supervisor::Cause;
 
 use super::answer::MachineStatus;
@@ -58,11 +59,12 @@ impl From<Health> for Noticed {
         let timed = |times: Option<[u64; 2]>| times.filter(|_| health.clock > 0).map(|times| times.map(microseconds));
         // Event bits are in the order of the causes from `missed tick` on.
         let events = (0..5).filter(|bit| health.events >> bit & 1 == 1);
-        let causes = events.filter_map(|bit| Cause::from_word(Cause::MissedTick.word() + bit));
+        let causes = events.filter_map(|bit| Cause::from_word(Cause::MissedTick.word() + bit)).map(Cause::name);
+        let amplifier = (health.events & AMPLIFIER != 0).then_some("amplifier fault");
         let kinds = Fault::ALL.into_iter().filter(|fault| health.faults & fault.bit() != 0);
         Self {
             events: health.events,
-            events_in_words: causes.map(Cause::name).collect(),
+            events_in_words: causes.chain(amplifier).collect(),
             converter_faults: health.converter_faults,
             converter_faults_in_words: kinds.map(|fault| fault.to_string()).collect(),
             gauge_faults: health.gauge_faults,
@@ -117,7 +119,7 @@ mod tests {
     #[test]
     fn what_a_board_noticed_is_said_with_its_units_and_what_is_not_measured_is_left_out() {
         let health = Health {
-            events: 0b01001,
+            events: 0b100_1001,
             converter_faults: 3,
             faults: Fault::NotEnded.bit(),
             clock: 200_000_000,
@@ -130,7 +132,7 @@ mod tests {
         };
         let text = Noticed::from(health).text(1e-4);
         for part in [
-            "missed tick, converter",
+            "missed tick, converter, amplifier fault",
             "50.0 us, longest 100.0 us of 100 us",
             "1.5 us late",
             "25.0 us",

@@ -45,6 +45,10 @@ pub struct Operator<P> {
     pub(super) frame: Frame,
     /// Whether anything was ordered, so that this host is missed when it leaves.
     pub ordered: bool,
+    /// This host asked it to run no more.
+    goes_down: bool,
+    /// It ran, and another host, a fault or the emergency contact ended that.
+    pub(super) was_stopped: bool,
     interrupted: &'static AtomicBool,
     /// Phase and cause that were shown last.
     shown: (u8, u8),
@@ -65,6 +69,8 @@ impl<P: Port> Operator<P> {
             marks: BTreeMap::new(),
             frame: Frame::default(),
             ordered: false,
+            goes_down: false,
+            was_stopped: false,
             interrupted,
             shown,
             attended: false,
@@ -124,16 +130,35 @@ impl<P: Port> Operator<P> {
         }
         let before = self.session.status().phase;
         self.session.poll()?;
-        let faulted = Phase::Faulted.word() as u8;
+        let [faulted, running] = [Phase::Faulted, Phase::Running].map(|phase| phase.word() as u8);
         let status = self.session.status();
         if !self.attended && status.phase == faulted && before != faulted {
             return Err(Ended::Fault(format!("the machine is {}, at tick {}", self.stands(), status.tick)));
+        }
+        if before == running && status.phase != running && !std::mem::take(&mut self.goes_down) {
+            // What was to come was meant for a machine that runs.
+            self.was_stopped = true;
+            // One that ramps down for a cause is faulted soon, and that is the better message.
+            let faults = u64::from(status.phase) == Phase::RampingDown.word() && status.cause != 0;
+            if !self.attended && !faults {
+                return Err(self.stopped_by_others());
+            }
         }
         // It may look itself.
         let Some(mut pulse) = self.pulse.take() else { return Ok(()) };
         let done = pulse(self);
         self.pulse = Some(pulse);
         done
+    }
+
+    fn stopped_by_others(&self) -> Ended {
+        Ended::Fault(format!("the machine was stopped, and is {}, at tick {}", self.stands(), self.status().tick))
+    }
+
+    /// Asks for a stop in the midst of an order, which ends with that, and all that waits.
+    pub(super) fn stop_by_hand(&mut self, request: Request) -> Result<(), ClientError> {
+        (self.ordered, self.goes_down, self.was_stopped) = (true, true, true);
+        self.session.supervise(request)
     }
 
     /// Shows a phase that is new.
@@ -262,7 +287,10 @@ impl<P: Port> Operator<P> {
     fn ask(&mut self, order: &Order) -> Result<(), Ended> {
         self.ordered = true;
         match order {
-            Order::Ask(request) => self.session.supervise(*request)?,
+            Order::Ask(request) => {
+                self.goes_down = matches!(request, Request::Hold | Request::RampDown);
+                self.session.supervise(*request)?;
+            }
             Order::Set(assignments) => {
                 let words = self.session.assign(assignments).map_err(Ended::Refused)?;
                 self.session.command(words).map_err(waving)?;
@@ -271,7 +299,10 @@ impl<P: Port> Operator<P> {
             Order::Trigger { line, settings } => self.set_trigger(*line, settings)?,
             Order::Wave(path) => self.wave(path, false)?,
             Order::StopWave => self.session.stop_wave()?,
-            Order::Stop => self.session.stop().map_err(unsupported)?,
+            Order::Stop => {
+                self.goes_down = true;
+                self.session.stop().map_err(unsupported)?;
+            }
             // The others have an answer of their own.
             _ => {}
         }
@@ -336,7 +367,13 @@ impl<P: Port> Operator<P> {
 
     pub(super) fn wait(&mut self, until: Until, limit: Duration, ui: &Ui) -> Result<(), Ended> {
         let start = Instant::now();
+        // Whoever waits for another phase expects it.
+        self.goes_down |= matches!(until, Until::Phase(phase) if phase != Phase::Running);
+        self.was_stopped = false;
         loop {
+            if until == Until::Arrived && self.was_stopped {
+                return Err(self.stopped_by_others());
+            }
             let there = match until {
                 Until::Phase(phase) => u64::from(self.session.status().phase) == phase.word(),
                 Until::Arrived => {

@@ -74,6 +74,7 @@ struct Functions {
     configure_line: unsafe extern "C" fn(Handle, c_uint, c_uint, c_uint) -> c_int,
     read_line: unsafe extern "C" fn(Handle, c_uint, c_uint, *mut c_uint) -> c_int,
     write_line: unsafe extern "C" fn(Handle, c_uint, c_uint, c_uint) -> c_int,
+    exchange_lines: unsafe extern "C" fn(Handle, c_uint, c_uint, *mut c_uint, c_uint) -> c_int,
     /// Last, so that it is unloaded after everything else.
     _library: Library,
 }
@@ -158,6 +159,7 @@ impl Functions {
                 configure_line: *library.get(b"comedi_dio_config\0")?,
                 read_line: *library.get(b"comedi_dio_read\0")?,
                 write_line: *library.get(b"comedi_dio_write\0")?,
+                exchange_lines: *library.get(b"comedi_dio_bitfield2\0")?,
                 _library: library,
             })
         }
@@ -235,6 +237,16 @@ impl Card<'_> {
         // SAFETY: an open handle, numbers, and a word that the library fills.
         let answer = unsafe { (self.library.functions.read_line)(self.handle, subdevice, line, &raw mut bit) };
         (answer >= 0).then_some(bit != 0)
+    }
+
+    /// Sets the digital lines of `mask`, as `high` says, and reads all, from line `first` on, in one call; none if it cannot.
+    #[must_use]
+    pub fn exchange_lines(&self, subdevice: u32, first: u32, mask: u32, high: u32) -> Option<u32> {
+        let mut bits: c_uint = high;
+        // SAFETY: an open handle, numbers, and a word that the library reads and fills.
+        let answer =
+            unsafe { (self.library.functions.exchange_lines)(self.handle, subdevice, mask, &raw mut bits, first) };
+        (answer >= 0).then_some(bits)
     }
 
     /// Reads channels one after the other in one call; false if not all were read.

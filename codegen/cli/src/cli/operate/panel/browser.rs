@@ -1,11 +1,12 @@
 //! One browser: what it says goes to the thread that has the machine, what that publishes goes to it. A slow one is left behind.
 
+use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::os::unix::net::UnixStream;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -16,6 +17,8 @@ use super::http::Guard;
 
 /// Pages at a time; one more is turned away.
 const MOST: usize = 32;
+/// Connections at a time that have not shown the token; the oldest makes room for the next.
+const STRANGERS: usize = 64;
 /// Messages that wait for a page before more are dropped.
 const QUEUE: usize = 64;
 /// Largest message of a page, bytes: a wave in its file.
@@ -50,30 +53,42 @@ impl Outbox {
     }
 }
 
-/// Lets browsers in, until the process ends. Each has a thread.
+/// Connections that have not shown the token, the oldest first, by number.
+type Strangers = Arc<Mutex<VecDeque<(u64, TcpStream)>>>;
+
+/// Lets browsers in, until the process ends. Each has a thread. One that is slow to say what it wants keeps nobody out.
 pub fn serve(listener: TcpListener, guard: Guard, page: String, heard: SyncSender<Heard>) {
     let (guard, page) = (Arc::new(guard), Arc::<str>::from(page));
-    let (count, there) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicUsize::new(0)));
+    let (there, strangers) = (Arc::new(AtomicUsize::new(0)), Strangers::default());
     std::thread::spawn(move || {
-        for stream in listener.incoming() {
-            let Ok(stream) = stream else {
+        for (stream, number) in listener.incoming().zip(1..) {
+            let Ok((stream, other)) = stream.and_then(|stream| Ok((stream.try_clone()?, stream))) else {
                 std::thread::sleep(REST);
                 continue;
             };
-            if there.load(Ordering::Relaxed) >= MOST {
-                continue;
-            }
-            there.fetch_add(1, Ordering::Relaxed);
-            let (guard, page, heard) = (guard.clone(), page.clone(), heard.clone());
-            let (count, there) = (count.clone(), there.clone());
-            std::thread::spawn(move || {
-                // A browser that goes away is no news but to the one who has the machine.
-                if let Ok(Some(stream)) = guard.admit(stream, &page) {
-                    let number = count.fetch_add(1, Ordering::Relaxed) + 1;
-                    let _ = talk(stream, number, &heard);
-                    let _ = heard.send(Heard::Left { page: number });
+            {
+                let mut strangers = strangers.lock().unwrap_or_else(PoisonError::into_inner);
+                strangers.push_back((number, other));
+                if strangers.len() > STRANGERS
+                    && let Some((_, oldest)) = strangers.pop_front()
+                {
+                    let _ = oldest.shutdown(Shutdown::Both);
                 }
-                there.fetch_sub(1, Ordering::Relaxed);
+            }
+            let (guard, page, heard) = (guard.clone(), page.clone(), heard.clone());
+            let (there, strangers) = (there.clone(), strangers.clone());
+            std::thread::spawn(move || {
+                let admitted = guard.admit(stream, &page, || {
+                    strangers.lock().unwrap_or_else(PoisonError::into_inner).retain(|(known, _)| *known != number);
+                });
+                // A browser that goes away is no news but to the one who has the machine.
+                if let Ok(Some(stream)) = admitted {
+                    if there.fetch_add(1, Ordering::Relaxed) < MOST {
+                        let _ = talk(stream, number, &heard);
+                        let _ = heard.send(Heard::Left { page: number });
+                    }
+                    there.fetch_sub(1, Ordering::Relaxed);
+                }
             });
         }
     });

@@ -17,6 +17,8 @@ const SILENCE: Duration = Duration::from_secs(2);
 const ANSWER: Duration = Duration::from_secs(10);
 /// Messages with samples that a page may have taken without showing them: two seconds of them. Then it is left out until it catches up.
 const BEHIND: u32 = 40;
+/// What other pages order after a hold or a ramp down they ordered before it, until they show samples that are newer, and for so long at most.
+const LATE: Duration = Duration::from_secs(1);
 /// Orders that wait.
 const WAITING: usize = 16;
 /// Messages that are heard in a round.
@@ -100,6 +102,8 @@ pub struct Hall {
     waiting: VecDeque<(u64, Asked)>,
     /// Hold or ramp down, and who wants it; the later counts, a hold does not end a ramp down.
     urgent: Option<(u64, Request)>,
+    /// The page that asked for one last, when, and the last message with samples before it.
+    stopped: Option<(u64, Instant, u32)>,
     /// The page that had the orders went away with them.
     pub is_left: bool,
     /// The check is to end.
@@ -127,6 +131,7 @@ impl Hall {
             offered: None,
             waiting: VecDeque::new(),
             urgent: None,
+            stopped: None,
             is_left: false,
             ends: false,
             number: 0,
@@ -194,8 +199,8 @@ impl Hall {
                     one.seen = number;
                 }
             }
-            Asked::RampDown => self.urgent = Some((page, Request::RampDown)),
-            Asked::Hold if self.urgent.is_none() => self.urgent = Some((page, Request::Hold)),
+            Asked::RampDown => self.stop(page, Request::RampDown),
+            Asked::Hold if self.urgent.is_none() => self.stop(page, Request::Hold),
             Asked::Hold => {}
             Asked::Ask if is_mine => {}
             Asked::Ask if self.holder.is_none() || self.offered.is_some() => self.give_to(page),
@@ -211,12 +216,29 @@ impl Hall {
             }
             Asked::EndCheck if is_mine => self.ends = true,
             Asked::Give | Asked::Offer | Asked::Keep | Asked::EndCheck => {}
+            order if self.is_late(index) => {
+                self.answer(page, order.id(), Err("another page has just stopped the machine"));
+            }
             order if is_mine && self.waiting.len() < WAITING => self.waiting.push_back((page, order)),
             order => {
                 let why = if is_mine { "too many orders wait" } else { "this page does not have the orders" };
                 self.answer(page, order.id(), Err(why));
             }
         }
+    }
+
+    /// Whatever waits was asked for before that.
+    fn stop(&mut self, page: u64, request: Request) {
+        for (page, order) in std::mem::take(&mut self.waiting) {
+            self.answer(page, order.id(), Err("the machine was stopped"));
+        }
+        (self.urgent, self.stopped) = (Some((page, request)), Some((page, Instant::now(), self.number)));
+    }
+
+    fn is_late(&self, index: usize) -> bool {
+        let page = &self.pages[index];
+        self.stopped
+            .is_some_and(|(other, since, number)| other != page.number && page.seen <= number && since.elapsed() < LATE)
     }
 
     fn give_to(&mut self, page: u64) {
@@ -250,8 +272,6 @@ impl Hall {
     /// What anybody may ask for at once, and who did.
     pub fn urgent(&mut self) -> Option<(String, Request)> {
         let (page, request) = self.urgent.take()?;
-        // Whatever waits was asked for before that.
-        self.waiting.clear();
         self.is_left = false;
         Some((named(page), request))
     }

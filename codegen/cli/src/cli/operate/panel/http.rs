@@ -47,14 +47,16 @@ impl Guard {
         &self.token
     }
 
-    /// Answers a browser. One that is to be a WebSocket comes back, its handshake done.
+    /// Answers a browser, whose request is `read` then. One that is to be a WebSocket comes back, its handshake done.
     ///
     /// # Errors
     /// It is too slow, or gone.
-    pub fn admit(&self, mut stream: TcpStream, page: &str) -> io::Result<Option<TcpStream>> {
+    pub fn admit(&self, mut stream: TcpStream, page: &str, read: impl FnOnce()) -> io::Result<Option<TcpStream>> {
         stream.set_write_timeout(Some(PATIENCE))?;
         stream.set_nodelay(true)?;
-        let head = head(&mut stream)?;
+        let head = head(&mut stream);
+        read();
+        let head = head?;
         let asked = self.asked(&head);
         let (status, kind, body) = match &asked {
             Asked::Page => ("200 OK", "text/html", page),

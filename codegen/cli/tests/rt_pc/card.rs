@@ -1,0 +1,138 @@
+//! What is left when a program is killed, what the contacts of a card do, and a machine whose memory is taken away.
+
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use rustix::process::Signal;
+use serde_json::Value;
+use specgen_link::Request;
+
+use super::host::{Host, Record};
+use super::{ARM, Bench, DISARMED, FAULTED, HOLDING, NONE, RUN, RUNNING, Running, TWO_CARDS, fake_comedi, wait_for};
+
+const RAMPING_DOWN: u8 = 4;
+const CONVERTER: u8 = 11;
+const EMERGENCY_STOP: u8 = 12;
+/// Event bit of a record: an amplifier reported a fault.
+const AMPLIFIER: u64 = 64;
+/// Control period, ns.
+const PERIOD: u64 = 100_000;
+
+fn command(bench: &Bench, library: &Path, record: &str, more: &[&str]) -> std::process::Command {
+    let mut command = std::process::Command::new(&bench.programs.binary);
+    command.args(["--allow-no-rt", "--json", "--assumed-ok", "--comedi", "/dev/fake1"]).args(TWO_CARDS).args(more);
+    command.arg("--comedi-library").arg(library).arg("--record").arg(bench.path(record));
+    command
+}
+
+/// A heartbeat that changes in every tick, and no more after `kill -9`: what the enable line shows then is nobody's.
+pub fn a_heartbeat_ends_with_the_process(bench: &Bench) {
+    let (library, file) = (fake_comedi(bench), bench.path("beats"));
+    let mut command = command(bench, &library, "killed.rec", &["--arm"]);
+    let running = Running::new(command.env("FAKE_BEATS", &file));
+    let length = || fs::metadata(&file).map_or(0, |found| found.len());
+    wait_for("the heartbeat", || length() > 16 * 2000);
+    let output = running.end(Signal::KILL);
+    let dead = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_nanos() as u64;
+    assert!(output.status.code().is_none(), "{output:?}");
+    let beats = fs::read(&file).unwrap();
+    let beats: Vec<[u64; 2]> = beats
+        .as_chunks::<16>()
+        .0
+        .iter()
+        .map(|beat| [0, 8].map(|at| u64::from_le_bytes(beat[at..at + 8].try_into().unwrap())))
+        .collect();
+    assert!(beats.windows(2).all(|pair| pair[0][1] != pair[1][1]), "it changes in every tick");
+    let span = beats[beats.len() - 1][0] - beats[0][0];
+    let mut gaps: Vec<u64> = beats.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
+    gaps.sort_unstable();
+    let median = gaps[gaps.len() / 2];
+    println!(
+        "heartbeat: {} edges in {:.3} s, {:.1} us apart (median)",
+        beats.len(),
+        span as f64 * 1e-9,
+        median as f64 * 1e-3
+    );
+    assert!(median < 2 * PERIOD, "{median}");
+    std::thread::sleep(Duration::from_millis(50));
+    assert!(beats[beats.len() - 1][0] <= dead + 2 * PERIOD && length() / 16 == beats.len() as u64);
+}
+
+/// Emergency stop and amplifier fault, with each of the three actions.
+pub fn contacts_stop_the_machine(bench: &Bench) {
+    let library = fake_comedi(bench);
+    for (contacts, action, phases, cause, failure) in [
+        ("01", "off", [FAULTED, FAULTED], EMERGENCY_STOP, "emergency stop"),
+        ("10", "off", [FAULTED, FAULTED], EMERGENCY_STOP, "an amplifier reported a fault"),
+        ("10", "ramp-down", [RAMPING_DOWN, DISARMED], 0, "an amplifier reported a fault"),
+        ("10", "hold", [HOLDING, HOLDING], 0, "an amplifier reported a fault"),
+    ] {
+        let (link, file) = (bench.path(&format!("card-{contacts}-{action}")), bench.path("contacts"));
+        let set = |contacts: &str| {
+            fs::write(bench.path("contacts.new"), contacts).unwrap();
+            fs::rename(bench.path("contacts.new"), &file).unwrap();
+        };
+        set("11");
+        let more = ["--comedi-fault", action, "--link-silence", "5000", "--link", link.to_str().unwrap()];
+        let running = Running::new(command(bench, &library, "contacts.rec", &more).env("FAKE_CONTACTS", &file));
+        wait_for("the link", || link.exists());
+        let mut host = Host::open(&link, 1).unwrap();
+        host.wait("a tick", |status| status.tick > 0);
+        for request in [NONE, ARM] {
+            host.done(&Request::Supervise { request });
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        // As soon as it is armed: gauges that stand still are no machine that runs for long.
+        host.done(&Request::Supervise { request: RUN });
+        host.wait("running", |status| status.phase == RUNNING);
+        set(contacts);
+        host.wait("the stop", |status| status.phase != RUNNING);
+        host.wait("its end", |status| status.phase == phases[1]);
+        set("11");
+        std::thread::sleep(Duration::from_millis(50));
+        let status = host.status();
+        assert_eq!((status.phase, status.amplifier_on), (phases[1], action == "hold"), "nothing goes on by itself");
+        drop(host);
+        let output = running.end(Signal::INT);
+        let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let text = summary["failure"].as_str().unwrap_or_default();
+        assert!(output.status.code() == Some(1) && text.contains(failure), "{contacts} {action}: {summary}");
+        let record = Record::new(fs::read(bench.path("contacts.rec")).unwrap());
+        let events = record.place("events");
+        let seen = |row: &host_sim::record::Row| row.input[events] & (AMPLIFIER | 16) != 0;
+        let first = record.rows.iter().position(seen).unwrap();
+        let [before, then] = [first - 1, first].map(|row| record.rows[row].supervisor);
+        assert_eq!(before & 0xff, u32::from(RUNNING), "{contacts} {action}");
+        assert_eq!(
+            then & 0xffff,
+            u32::from(phases[0]) | u32::from(cause) << 8,
+            "{contacts} {action}, in that very tick"
+        );
+    }
+}
+
+/// The memory of machine and controller is taken away in mid-run: both end in order, amplifiers off.
+pub fn shared_memory_that_becomes_shorter_ends_nobody(mut bench: Bench) {
+    let link = bench.path("shorter.link");
+    let mut command = bench.command("shorter.rec");
+    command.args(["--elastic", "--sim-timeout", "1000", "--link-silence", "20000", "--link"]).arg(&link);
+    let running = Running::new(&mut command);
+    wait_for("the link", || link.exists());
+    let mut host = Host::open(&link, 1).unwrap();
+    host.wait("a tick", |status| status.tick > 0);
+    for request in [NONE, ARM] {
+        host.done(&Request::Supervise { request });
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    host.wait("armed", |status| status.phase == HOLDING);
+    let place = Path::new("/dev/shm").join(format!("specgen-plant-{}", bench.name));
+    fs::OpenOptions::new().write(true).open(&place).unwrap().set_len(0).unwrap();
+    let ended = bench.plant.wait().unwrap();
+    assert_eq!(ended.code(), Some(3), "the machine's side says so, and ends");
+    let status = host.wait("the fault", |status| status.phase == FAULTED);
+    assert_eq!((status.cause, status.amplifier_on), (CONVERTER, false));
+    let output = running.end(Signal::INT);
+    let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((output.status.code(), &summary["last_phase"]), (Some(1), &"Faulted".into()), "{summary}");
+}

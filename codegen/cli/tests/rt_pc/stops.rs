@@ -1,0 +1,448 @@
+//! A stop is a stop: whoever gives it, in whatever phase, what any client had sent before it is not done any more.
+
+use std::io::{self, Read, Write};
+use std::net::TcpStream;
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use rustix::process::Signal;
+use serde_json::json;
+use specgen::operate::{Place, Session, SocketLine};
+use specgen_link::client::{Client, Port, Timeout};
+use specgen_link::{Bytes, Counted, Device, Endpoint, Identity, Refusal, Reply, Request};
+
+use super::gcs::{self, Bridge};
+use super::host::Host;
+use super::panel::Panel;
+use super::{ARM, BUSY, Bench, DISARMED, HOLD, HOLDING, NONE, RAMP_DOWN, RUN, RUNNING, Running, wait_for};
+
+const ARMING: u8 = 1;
+/// A platform's word to move.
+const MOVE: u64 = 2;
+/// What a stop may take, on a loaded computer whose machine waits for it.
+const RAMP: Duration = Duration::from_millis(500);
+/// How long it then has to stand.
+const STANDS: Duration = Duration::from_millis(1500);
+/// How far a platform comes while it stops, m: a stop at full speed, many times over.
+const STOPPING: f64 = 3e-6;
+
+/// The machine as another host sees it.
+struct Look(Session<SocketLine>);
+
+impl Look {
+    fn new(link: &Path) -> Self {
+        Self(Session::open(SocketLine::open(link).unwrap(), Timeout::SOCKET, None).unwrap())
+    }
+
+    fn now(&mut self) -> Place {
+        self.0.place().unwrap().unwrap()
+    }
+
+    fn wait(&mut self, what: &str, there: impl Fn(&Place) -> bool) {
+        wait_for(what, || there(&self.now()));
+    }
+
+    /// After a stop: at most a stopping ramp, and then nothing.
+    #[track_caller]
+    fn stands(&mut self, what: &str) {
+        let (start, begun) = (Instant::now(), self.now());
+        std::thread::sleep(RAMP);
+        let rest = self.now();
+        let way =
+            |a: &Place, b: &Place| a.target.iter().zip(&b.target).fold(0.0, |way: f64, (a, b)| way.max((a - b).abs()));
+        assert!(way(&begun, &rest) < STOPPING, "{what}: {begun:?} {rest:?}");
+        while start.elapsed() < RAMP + STANDS {
+            let now = self.now();
+            assert!(
+                way(&rest, &now) < 1e-12,
+                "{what}: it moves {:?} after the stop: {rest:?} {now:?}",
+                start.elapsed()
+            );
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+#[test]
+fn a_stop_is_a_stop() {
+    let bench = Bench::named("reference.toml", "stops");
+    let link = bench.path("stops.link");
+    let mut command = bench.command("stops.rec");
+    command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "20000", "--link"]).arg(&link);
+    let running = Running::new(&mut command);
+    wait_for("the link", || link.exists());
+    let mut look = Look::new(&link);
+
+    hosts_of_the_link(&link, &mut look);
+    scripts(&bench, &link, &mut look);
+    println!("scripts: stopped");
+    let bridge = Bridge::new_at(&bench, "stops.link", &[]);
+    while_the_machine_comes_up(&bridge, &mut look);
+    the_servo_off_and_on_again(&bridge, &mut look);
+    behind_moves_that_nobody_has_read(&bridge, &mut look);
+    by_another_host(&bridge, &link, &mut look);
+    crowds(&bridge, &mut look);
+    bridge.end();
+    pages(&bench, &link, &mut look);
+    drop(look);
+    let (summary, _) = bench.check(&running.end(Signal::INT), "stops.rec");
+    assert_eq!(summary["incidents"], json!([]), "{summary:#}");
+}
+
+/// Set-points that were sent before the machine stopped running, by whatever, are not followed when it runs again.
+fn hosts_of_the_link(link: &Path, look: &mut Look) {
+    let mut host = Host::open(link, 1).unwrap();
+    let moved = |x: f64| {
+        let mut words = vec![0; 21];
+        (words[0], words[3]) = (MOVE, x.to_bits());
+        words.iter().flat_map(|word: &u64| word.to_le_bytes()).collect::<Vec<u8>>()
+    };
+    let up = |host: &mut Host| {
+        for request in [NONE, ARM] {
+            host.done(&Request::Supervise { request });
+            host.wait("ticks", |status| status.tick > 0);
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        host.done(&Request::Supervise { request: RUN });
+        host.wait("its bias pose", |status| status.phase == RUNNING && status.status & BUSY == 0);
+    };
+    host.wait("a tick", |status| status.tick > 0);
+    let early = moved(4e-6);
+    assert_eq!(host.refused(&Request::Setpoint { words: Bytes(&early) }), Refusal::State, "before it runs");
+    up(&mut host);
+    let bias = look.now().target;
+    assert!(bias[0].abs() < 1e-12, "{bias:?}");
+    for (stop, phase) in [(HOLD, HOLDING), (RAMP_DOWN, DISARMED)] {
+        let words = moved(-6e-6);
+        host.done(&Request::Setpoint { words: Bytes(&words) });
+        // In mid-move, or when it has arrived.
+        host.wait("the motion", |status| status.status & BUSY == 0 || stop == HOLD);
+        host.done(&Request::Supervise { request: stop });
+        host.wait("the stop", |status| status.phase == phase);
+        if stop == HOLD {
+            look.stands("held over the link");
+            let before = look.now().target;
+            host.done(&Request::Supervise { request: RUN });
+            host.wait("running", |status| status.phase == RUNNING);
+            look.stands("run after a hold");
+            assert!((look.now().target[0] - before[0]).abs() < 1e-9);
+        } else {
+            up(&mut host);
+            look.stands("run after a ramp down");
+            assert!(look.now().target[0].abs() < 1e-12, "an old target: {:?}", look.now());
+        }
+    }
+    host.done(&Request::Supervise { request: RAMP_DOWN });
+    host.wait("the way down", |status| status.phase == DISARMED);
+
+    // Another host holds while this one arms: what it asks for next was on its way before.
+    let mut other = Host::open(link, 2).unwrap();
+    for request in [NONE, ARM] {
+        host.done(&Request::Supervise { request });
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    other.done(&Request::Supervise { request: HOLD });
+    assert_eq!(host.refused(&Request::Supervise { request: RUN }), Refusal::Busy, "it is to hear of the stop");
+    host.wait("armed", |status| status.phase == HOLDING);
+    look.stands("held while it armed");
+    assert_eq!(look.now().phase, HOLDING);
+    host.done(&Request::Supervise { request: RAMP_DOWN });
+    host.wait("the way down", |status| status.phase == DISARMED);
+    host.done(&Request::Supervise { request: NONE });
+    drop(host);
+
+    // A host that does not wait for answers: what nobody has read when the other holds is not done.
+    let mut asks = Client::open(Paper::default(), 4, Timeout::PIPE).unwrap().0;
+    let supervise = |request| Request::Supervise { request };
+    let mut line = UnixStream::connect(link).unwrap();
+    let words = moved(1e-6);
+    for requests in [&[NONE, ARM][..], &[RUN]] {
+        for request in requests {
+            for _ in 0..120 {
+                asks.ask(&Request::Setpoint { words: Bytes(&words) }).unwrap();
+            }
+            asks.ask(&supervise(*request)).unwrap();
+        }
+        line.write_all(&std::mem::take(&mut asks.port().sent)).unwrap();
+        if requests.len() > 1 {
+            other.wait("armed", |status| status.phase == HOLDING);
+        }
+    }
+    other.done(&supervise(HOLD));
+    look.stands("held before another host's request to run was read");
+    assert_eq!(look.now().phase, HOLDING);
+    other.done(&supervise(RAMP_DOWN));
+    other.wait("the way down", |status| status.phase == DISARMED);
+}
+
+/// The other end of a link that does everything it is asked for: it keeps the frames.
+#[derive(Default)]
+struct Paper {
+    endpoint: Endpoint,
+    sent: Vec<u8>,
+    answer: Vec<u8>,
+}
+
+impl Port for Paper {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.sent.extend(bytes);
+        for byte in bytes {
+            self.answer.extend(self.endpoint.push(*byte, &mut Willing).unwrap_or_default());
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], _: Duration) -> io::Result<usize> {
+        let count = buffer.len().min(self.answer.len());
+        buffer[..count].copy_from_slice(&self.answer[..count]);
+        self.answer.drain(..count);
+        Ok(count)
+    }
+}
+
+struct Willing;
+
+impl Device for Willing {
+    fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
+        let [config_words, input_words, output_words] = [1; 3];
+        let identity =
+            Identity { config_words, input_words, output_words, stages: 0, counted: Counted::Nothing, description: 0 };
+        if *request == Request::Hello { Reply::Identity(identity) } else { Reply::Done }
+    }
+}
+
+/// `operate`: what it was told to do is over when another host stops the machine, also where it waits. Lines that wait are not done.
+fn scripts(bench: &Bench, link: &Path, look: &mut Look) {
+    let stop = |request, phase| {
+        // Gone again, so that it has no orders.
+        let mut other = Host::open(link, 5).unwrap();
+        other.done(&Request::Supervise { request });
+        other.wait("the stop", |status| status.phase == phase);
+    };
+    let operate = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
+        command.args(["operate", "--socket"]).arg(link).arg(&bench.spec).args(words).stdin(Stdio::piped());
+        Running::new(&mut command)
+    };
+    let up = ["none", "arm", "wait holding", "run", "wait arrived"];
+    let script = operate(&[&up[..], &["wait 600", "jog x=5um"]].concat());
+    look.wait("its bias pose", |place| place.phase == RUNNING && place.status & BUSY == 0);
+    stop(HOLD, HOLDING);
+    let output = script.wait();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && text.contains("the machine was stopped, and is holding"), "{text}");
+    stop(RAMP_DOWN, DISARMED);
+
+    let mut session = operate(&[]);
+    let mut input = session.0.as_mut().unwrap().stdin.take().unwrap();
+    let lines = format!("{}\njog x=8um\nwait arrived\njog x=-8um\nstatus\n", up.join("\n"));
+    input.write_all(lines.as_bytes()).unwrap();
+    look.wait("the jog", |place| place.target[0] > 1e-6);
+    stop(HOLD, HOLDING);
+    look.stands("held while it waits");
+    stop(RAMP_DOWN, DISARMED);
+    drop(input);
+    let output = session.wait();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("the machine was stopped: not done") && text.contains("tick"), "{text}");
+
+    // From a terminal a stop does not wait for what waits.
+    let mut command = Command::new("script");
+    let line =
+        format!("{} operate --socket {} {}", env!("CARGO_BIN_EXE_specgen"), link.display(), bench.spec.display());
+    command.args(["-qec", &line, "/dev/null"]).stdin(Stdio::piped());
+    let mut session = Running::new(&mut command);
+    let mut input = session.0.as_mut().unwrap().stdin.take().unwrap();
+    input.write_all(format!("{}\nwait 600\njog x=5um\n", up.join("\n")).as_bytes()).unwrap();
+    look.wait("its bias pose", |place| place.phase == RUNNING && place.status & BUSY == 0);
+    input.write_all(b"hold\n").unwrap();
+    look.wait("the hold", |place| place.phase == HOLDING);
+    look.stands("held from the terminal");
+    input.write_all(b"ramp-down\n").unwrap();
+    look.wait("the way down", |place| place.phase == DISARMED);
+    drop((input, session));
+}
+
+/// Every stop, from both, at several moments of arming and of the way to the bias.
+fn while_the_machine_comes_up(bridge: &Bridge, look: &mut Look) {
+    let (mut a, mut b) = (bridge.client(), bridge.client());
+    for (count, stop) in ["\u{18}", "STP\n", "HLT X\n", "\u{18}"].into_iter().enumerate() {
+        a.send("SVO X 1\nMOV X 5\nMOV X -5 Y 2");
+        match count {
+            0 => look.wait("arming", |place| place.phase == ARMING),
+            1 => look.wait("the way to the bias", |place| place.phase == RUNNING),
+            _ => {}
+        }
+        let who = if count == 3 { &mut a } else { &mut b };
+        who.0.write_all(stop.as_bytes()).unwrap();
+        assert_eq!(who.error(), "10", "{stop:?}");
+        look.stands(&format!("{stop:?} while it comes up, {count}"));
+        assert!(look.now().target[0].abs() < 1e-12, "{:?}", look.now());
+        if count < 3 {
+            assert_eq!(a.error(), "10", "it is told that its moves were taken away");
+        }
+        // And nothing of it comes back.
+        assert_eq!(a.order("SVO X 1"), "0");
+        a.settle();
+        look.stands("at its bias pose");
+        assert!(look.now().phase == RUNNING && look.now().target[0].abs() < 1e-12, "{:?}", look.now());
+        assert_eq!(a.order("SVO X 0"), "0");
+        look.wait("the way down", |place| place.phase == DISARMED);
+    }
+}
+
+fn the_servo_off_and_on_again(bridge: &Bridge, look: &mut Look) {
+    let mut client = bridge.client();
+    assert_eq!([client.order("SVO X 1"), client.order("MOV X -6")], ["0", "0"]);
+    client.settle();
+    assert!((look.now().target[0] + 6e-6).abs() < 1e-12);
+    // Behind moves, too.
+    client.send("MOV X 4\nMOV X -4\nSVO X 0");
+    look.wait("the way down", |place| place.phase == DISARMED);
+    assert_eq!(client.order("SVO X 1"), "10");
+    client.settle();
+    look.stands("the servo on again");
+    assert!(look.now().target[0].abs() < 1e-12, "an old target: {:?}", look.now());
+}
+
+/// Twenty thousand moves in one piece.
+fn flood() -> Vec<u8> {
+    (0..20_000_u32).flat_map(|count| format!("MOV X {}\n", 3 - 6 * (count as i32 % 2)).into_bytes()).collect()
+}
+
+fn behind_moves_that_nobody_has_read(bridge: &Bridge, look: &mut Look) {
+    let mut b = bridge.client();
+    for who in ["the same client", "another client", "another client, the first one gone"] {
+        let mut a = bridge.client();
+        // One that is gone leaves the orders.
+        wait_for("the orders", || matches!(a.order("SVO X 1").as_str(), "0"));
+        a.settle();
+        let mut bytes = flood();
+        if who == "the same client" {
+            bytes.push(24);
+        }
+        a.0.write_all(&bytes).unwrap();
+        let answer = if who == "the same client" {
+            a.error()
+        } else {
+            if who != "another client" {
+                drop(a);
+            }
+            std::thread::sleep(Duration::from_millis(5));
+            b.0.write_all(&[24]).unwrap();
+            b.error()
+        };
+        assert_eq!(answer, "10", "{who}");
+        look.stands(who);
+        assert_eq!(look.now().phase, RUNNING);
+    }
+    // What comes after it counts.
+    let mut a = bridge.client();
+    a.0.write_all(&[&flood()[..], &b"\x18MOV X 2\n"[..]].concat()).unwrap();
+    wait_for("the move", || (look.now().target[0] - 2e-6).abs() < 1e-12);
+    assert_eq!(a.error(), "10");
+}
+
+/// A hold and a ramp down over the link: what clients of the bridge sent before is not done when the machine runs again.
+fn by_another_host(bridge: &Bridge, link: &Path, look: &mut Look) {
+    let (mut a, mut host) = (bridge.client(), Host::open(link, 3).unwrap());
+    for (request, phase) in [(HOLD, HOLDING), (RAMP_DOWN, DISARMED)] {
+        assert_eq!(a.order("SVO X 1"), "0");
+        a.settle();
+        a.0.write_all(&[&flood()[..], &b"SVO X 1\nMOV X 5\n"[..]].concat()).unwrap();
+        host.done(&Request::Supervise { request });
+        host.wait("the stop", |status| status.phase == phase);
+        look.stands("stopped by another host");
+        assert_eq!((look.now().phase, a.error().as_str()), (phase, "10"));
+        assert_eq!(a.order("SVO X 1"), "0");
+        a.settle();
+        let before = look.now();
+        look.stands("run again");
+        assert!(before.phase == RUNNING && (phase == HOLDING || before.target[0].abs() < 1e-12), "{before:?}");
+    }
+    // While it comes up.
+    assert_eq!(a.order("SVO X 0"), "0");
+    look.wait("the way down", |place| place.phase == DISARMED);
+    a.send("SVO X 1\nMOV X 5");
+    look.wait("arming", |place| place.phase == ARMING);
+    host.done(&Request::Supervise { request: HOLD });
+    look.stands("held while it armed");
+    assert!(look.now().phase != RUNNING, "{:?}", look.now());
+    assert_eq!(a.order("SVO X 0"), "10");
+    look.wait("the way down", |place| place.phase == DISARMED);
+}
+
+/// Clients that keep every place: the next one may stop the machine, and gets a place of one that has long been silent.
+fn crowds(bridge: &Bridge, look: &mut Look) {
+    let mut a = bridge.client();
+    wait_for("the orders", || matches!(a.order("SVO X 1").as_str(), "0"));
+    assert_eq!(a.order("MOV Z 15"), "0");
+    a.settle();
+    let silent: Vec<gcs::Client> = (0..40).map(|_| bridge.client()).collect();
+    a.send("MOV X 30");
+    look.wait("the motion in a crowd", |place| place.target[0] > 4e-6);
+    let mut stopper = bridge.client();
+    stopper.0.write_all(&[24]).unwrap();
+    assert_eq!(stopper.error(), "10");
+    look.stands("from a client for whom there is no room");
+    assert!(look.now().target[0] < 29e-6 && a.error() == "0", "the first is still there");
+    wait_for("a place", || bridge.client().order("HLP") == "2");
+    drop(silent);
+    assert_eq!(a.order("SVO X 0"), "0");
+    look.wait("the way down", |place| place.phase == DISARMED);
+}
+
+/// Pages: a hold of one ends what another had asked for; connections without the token keep nobody out.
+fn pages(bench: &Bench, link: &Path, look: &mut Look) {
+    let panel = Panel::new(&bench.spec, link);
+    let (mut first, mut second) = (panel.page(), panel.page());
+    first.takes_the_orders();
+    for request in ["arm", "run"] {
+        first.say(&json!({ "do": "begin", "request": request, "id": 900 }));
+    }
+    for count in 0..8 {
+        first.say(&json!({ "do": "order", "line": format!("jog x={}um", 1 + count), "id": 901 + count }));
+    }
+    look.wait("arming", |place| place.phase == ARMING);
+    second.say(&json!({ "do": "hold" }));
+    look.wait("armed", |place| place.phase == HOLDING);
+    look.stands("held from another page");
+    assert_eq!(look.now().phase, HOLDING);
+    second.say(&json!({ "do": "ramp-down" }));
+    look.wait("the way down", |place| place.phase == DISARMED);
+
+    // A hundred that are slow with their heads, for ever.
+    let over = Arc::new(AtomicBool::new(false));
+    let crowd: Vec<_> = (0..100)
+        .map(|_| {
+            let (over, address) = (over.clone(), panel.address.clone());
+            std::thread::spawn(move || {
+                while !over.load(Ordering::Relaxed) {
+                    let Ok(mut stream) = TcpStream::connect(&address) else { continue };
+                    let _ = stream.set_read_timeout(Some(Duration::from_millis(100)));
+                    while !over.load(Ordering::Relaxed) && stream.write_all(b"G").is_ok() {
+                        if matches!(stream.read(&mut [0; 64]), Ok(_)) {
+                            break;
+                        }
+                    }
+                }
+            })
+        })
+        .collect();
+    std::thread::sleep(Duration::from_millis(300));
+    for load in 0..48 {
+        let page = panel.get(&format!("/?token={}", panel.token), "");
+        assert!(page.starts_with("HTTP/1.1 200"), "load {load}: {page:.60}");
+    }
+    second.say(&json!({ "do": "ask" }));
+    over.store(true, Ordering::Relaxed);
+    for thread in crowd {
+        thread.join().unwrap();
+    }
+    drop((first, second));
+    panel.end();
+}
