@@ -87,7 +87,7 @@ pub fn record_after(machine: &Machine, input: &MachineInput, output: &MachineOut
     let row = Row {
         codes: output.tick.dac_code,
         status: output.tick.status,
-        supervisor: output.phase.word() as u32 | (output.cause.word() as u32) << 8 | (output.amplifier_on as u32) << 16,
+        supervisor: output.supervisor_word(),
     };
     recorder.push(&input.to_words(), &row, || machine.digest());
 }

@@ -20,6 +20,7 @@ const SUPERVISION: Supervision<f64> = Supervision {
     disagreement_samples: 3,
     tracking: [1e-6; 6],
     tracking_samples: 3,
+    wiring: None,
 };
 
 #[test]

@@ -36,6 +36,7 @@ fn plan(bounds: &Bounds) -> Supervision<f64> {
         disagreement_samples: samples,
         tracking: bounds.tracking,
         tracking_samples: samples,
+        wiring: None,
     }
 }
 
