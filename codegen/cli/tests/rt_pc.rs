@@ -29,6 +29,7 @@ mod learning;
 mod panel;
 mod samples;
 mod stale;
+mod wiring;
 use host::{Host, Record};
 
 /// Length of the platform's run, s, where another than that of CI is wanted.

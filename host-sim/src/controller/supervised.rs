@@ -1,6 +1,7 @@
 //! The supervised tick of a controller library: what the other targets run.
 
 mod snapshot;
+mod standing;
 
 use std::fmt;
 
@@ -10,6 +11,7 @@ use specgen_runtime::supervisor::{Cause, Finding, Named, Phase};
 use super::{Buffer, Controller, ControllerError, TickController};
 
 pub use snapshot::SnapshotError;
+pub use standing::Standing;
 
 /// Words that the supervised tick takes beyond those of the control law: request, events.
 const MORE_INPUTS: usize = 2;

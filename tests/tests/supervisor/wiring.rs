@@ -13,8 +13,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::compile::Compiled;
 use specgen::machine;
+use specgen::model::Mcu;
+use specgen::target;
 use specgen_runtime::supervisor::{Fault, Finding, Named, with};
 use specgen_tests::Emitted;
+use std::time::Duration;
 
 type Six = [f64; 6];
 type Matrix = [Six; 6];
@@ -38,8 +41,20 @@ trait Machine {
     fn read(&mut self) -> Six;
 }
 
-/// Arms until it holds or is faulted: the last word, its ticks, the largest displacement of a leg.
-fn arm(supervised: &mut Supervised, machine: &mut dyn Machine, compiled: &Compiled) -> (MachineWord, u32, f64) {
+/// How a machine was armed, until it held or was faulted.
+struct Armed {
+    /// The supervisor's last word.
+    word: MachineWord,
+    ticks: u32,
+    /// Largest displacement of a leg, m.
+    moved: f64,
+    /// Rows of input and output, and digests of the machine, of every tick.
+    inputs: Vec<Vec<u64>>,
+    outputs: Vec<Vec<u64>>,
+    digests: Vec<u64>,
+}
+
+fn arm(supervised: &mut Supervised, machine: &mut dyn Machine, compiled: &Compiled) -> Armed {
     supervised.reset();
     let scalar = supervised.controller().description().scalar;
     let (inputs, outputs) = (supervised.input_names(), supervised.output_names());
@@ -49,20 +64,30 @@ fn arm(supervised: &mut Supervised, machine: &mut dyn Machine, compiled: &Compil
     let voltages = place(&outputs, "voltage[0]");
     let request = place(&inputs, "request");
     let (mut input, mut output) = (vec![0; inputs.len()], vec![0; outputs.len()]);
-    let mut most = 0.0_f64;
+    let mut armed = Armed {
+        word: MachineWord::of(0),
+        ticks: 0,
+        moved: 0.0,
+        inputs: Vec::new(),
+        outputs: Vec::new(),
+        digests: Vec::new(),
+    };
     for tick in 0..20_000 {
         for (slot, reading) in input[gauges..].iter_mut().zip(machine.read()) {
             *slot = scalar.encode(reading);
         }
         input[request] = if tick == 0 { NOTHING } else { ARM };
         let word = supervised.step(&input, &mut output);
+        (armed.word, armed.ticks) = (word, tick);
+        armed.inputs.push(input.clone());
+        armed.outputs.push(output.clone());
+        armed.digests.push(supervised.digest());
         if matches!(word.phase, HOLDING | FAULTED) {
-            return (word, tick, most);
+            return armed;
         }
         assert!(tick == 0 || matches!(word.phase, ARMING | RAMPING), "tick {tick}: {word:?}");
         let held: Six = std::array::from_fn(|leg| scalar.decode(output[voltages + leg]));
-        let moved = machine.hold(&held, compiled.model.timing.period);
-        most = most.max(moved);
+        armed.moved = armed.moved.max(machine.hold(&held, compiled.model.timing.period));
     }
     panic!("it neither holds nor is faulted");
 }
@@ -172,7 +197,8 @@ fn every_single_fault_of_a_platform_is_refused_and_named() {
     let task = compiled.model.task_space.as_ref().unwrap();
     let specimen = machine::specimen(&compiled.model, task, &LegParameters::reference(), Some(5));
     let scenario = machine::scenario(&compiled.model, task, &specimen, &Noise::of(&specimen), 5);
-    let (word, ticks, moved) = arm(&mut supervised, &mut Platform::new(scenario.rig(), Finding::None), compiled);
+    let Armed { word, ticks, moved, .. } =
+        arm(&mut supervised, &mut Platform::new(scenario.rig(), Finding::None), compiled);
     assert_eq!((word.phase, word.cause, finding(word)), (HOLDING, 0, Finding::None));
     let stroke = compiled.model.actuator.stroke;
     println!("good: armed after {ticks} ticks, a leg moved {:.2} % of its stroke", moved / stroke * 1e2);
@@ -181,7 +207,7 @@ fn every_single_fault_of_a_platform_is_refused_and_named() {
     assert!(moved > 0.003 * stroke && moved < 0.012 * stroke, "{moved}");
     let mut most = 0.0_f64;
     for fault in faults() {
-        let (word, _, moved) = arm(&mut supervised, &mut Platform::new(scenario.rig(), fault), compiled);
+        let Armed { word, moved, .. } = arm(&mut supervised, &mut Platform::new(scenario.rig(), fault), compiled);
         assert_eq!((word.phase, word.cause, word.amplifier_on), (FAULTED, 14, false), "{fault}: {}", finding(word));
         assert!(names(finding(word), fault), "{fault}: {}", finding(word));
         most = most.max(moved);
@@ -200,7 +226,7 @@ fn every_single_fault_of_six_legs_is_refused_and_named_with_what_looks_like_it()
     let alike = &compiled.ir.supervision.wiring.as_ref().unwrap().alike;
     let run = |supervised: &mut Supervised, mix| {
         let mut legs = Legs::new(&parameters, &[1.0, 0.95, 1.05, 0.98, 1.02, 1.0], mix, 7);
-        finding(arm(supervised, &mut legs, compiled).0)
+        finding(arm(supervised, &mut legs, compiled).word)
     };
     assert_eq!(run(&mut supervised, IDENTITY), Finding::None);
     for fault in faults() {
@@ -304,9 +330,74 @@ fn no_fault_free_machine_is_refused() {
     let machines = specgen_tests::length(60, 200);
     let refused: Vec<String> = (0..machines)
         .filter_map(|number| {
-            let word = arm(&mut supervised, &mut random(compiled, number), compiled).0;
+            let word = arm(&mut supervised, &mut random(compiled, number), compiled).word;
             (word.phase != HOLDING).then(|| format!("{number}: {word}, {}", finding(word)))
         })
         .collect();
     assert!(refused.is_empty(), "of {machines} machines are refused {refused:#?}");
+}
+
+/// Host and emulated MCU: the same bits of a check that passes and of one that looks for what is wrong, in f64 and in f32.
+#[test]
+fn a_check_has_the_same_bits_on_the_mcu() {
+    for (name, spec, mcu) in [
+        ("supervisor-wiring", "reference.toml", Mcu::Mps2An500),
+        ("supervisor-wiring-f32", "features/platform-f32.toml", Mcu::Mps2An386),
+    ] {
+        let emitted = Emitted::new(name, spec, &[]);
+        let compiled = &emitted.compiled;
+        let mut supervised = Supervised::new(emitted.controller()).unwrap();
+        let Some(image) = emitted.image(mcu) else { return };
+        let config = supervised.controller().default_config();
+        let parameters = machine::leg(&compiled.model, &LegParameters::reference());
+        let readings = compiled.ir.supervision.readings_per_leg.unwrap();
+        for fault in [Finding::None, Finding::Gauge(3, Fault::Swapped(5)), Finding::Leg(2, Fault::Inverted)] {
+            let mut legs = Legs::new(&parameters, &[1.0; 6], with(&readings, fault), 3);
+            let host = arm(&mut supervised, &mut legs, compiled);
+            assert_eq!(finding(host.word), fault);
+            let result = target::replay_machine(&image, &config, &host.inputs, Duration::from_secs(600)).unwrap();
+            let equal = |tick: &usize| {
+                host.outputs[*tick] == result.outputs[*tick] && host.digests[*tick] == result.digests[*tick]
+            };
+            assert!(host.inputs.len() == result.outputs.len() && host.inputs.len() > 1000);
+            assert_eq!(
+                (0..host.inputs.len()).find(|tick| !equal(tick)),
+                None,
+                "{name}, {fault}: the first tick that differs"
+            );
+            let stage = result.stats.stage("other phases").expect("no tick runs");
+            println!(
+                "{name}, {fault}: {} ticks equal in every bit; instructions {:.0} mean, {} at most; Machine {} bytes",
+                host.inputs.len(),
+                stage.mean(),
+                stage.largest,
+                result.stats.state_bytes
+            );
+        }
+    }
+}
+
+/// What `specgen check --details` says of the check.
+#[test]
+fn what_looks_alike_and_what_is_not_seen_is_printed_for_each_spec() {
+    let described = |spec: &str, section: &str| {
+        let edits = [("[timing]\n", &*format!("[supervisor.wiring_check]\n{section}\n\n[timing]\n"))];
+        let compiled = specgen_tests::compile_edited("supervisor-wiring-described", spec, &edits, &[]);
+        specgen::lower::describe_wiring(&compiled.model, &compiled.ir.supervision)
+    };
+    let text = described("reference.toml", "");
+    assert!(text.contains("0.950 V, 0.599 um, for 50.0 ms; 0.30 s in all"), "{text}");
+    assert!(text.contains("no single fault of a gauge or leg looks like another"), "{text}");
+    assert!(text.ends_with("not seen: a common factor of all gauges\n") && !text.contains("turned"), "{text}");
+    let text = described("legs.toml", "");
+    assert!(text.contains("\n      gauge 1 inverted, leg 1 inverted\n"), "{text}");
+    assert!(text.contains("\n      gauge 0 swapped with gauge 5, leg 0 swapped with leg 5\n"), "{text}");
+    assert!(text.contains("gauges turned by 2 places, those of all legs by 2"), "{text}");
+    let text = described("reference.toml", "legs = \"different\"");
+    assert!(text.contains("gains of legs are not tested until each leg has a record of its own"), "{text}");
+    assert!(text.contains("not seen: leg 0 gain × 0.50, leg 0 gain × 2.00, leg 1 gain × 0.50"), "{text}");
+    let text = described("features/six-records.toml", "legs = \"different\"");
+    assert!(!text.contains("not tested"), "legs with records of their own are compared with these: {text}");
+    let text = described("reference.toml", "off = \"a plant without gauges\"");
+    assert!(text.contains("wiring check: off (a plant without gauges)"), "{text}");
 }

@@ -4,6 +4,8 @@ pub(crate) mod defaults;
 mod rest;
 mod wiring;
 
+pub use wiring::{describe as describe_wiring, single_faults};
+
 use super::kinematics::inverse_jacobian;
 use super::sensing::{PoseNoise, pose_noise, readings_per_pose};
 use crate::figure::{AXES, figure};

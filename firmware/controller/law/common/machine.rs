@@ -79,7 +79,10 @@ impl MachineOutput {
     #[inline]
     #[must_use]
     pub fn supervisor_word(&self) -> u32 {
-        self.phase.word() as u32 | (self.cause.word() as u32) << 8 | (self.amplifier_on as u32) << 16 | self.finding << 17
+        self.phase.word() as u32
+            | (self.cause.word() as u32) << 8
+            | (self.amplifier_on as u32) << 16
+            | self.finding << 17
     }
 }
 

@@ -2,14 +2,14 @@
 
 use super::{defaults, finding, rest, whole};
 use crate::figure::figure;
-use crate::ir::{Actuation, Hysteresis, Scalar, Wiring};
+use crate::ir::{Actuation, Hysteresis, Scalar, Supervision, Wiring};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{LegMakes, Model};
 use specgen_numerics::Factor;
 use specgen_runtime::supervisor::{self, Fault, Finding, Response, with};
 
 /// Fewest ticks of a leg.
-const FEWEST: u32 = 40;
+const FEWEST: f64 = 40.0;
 /// Hz. A pulse of 50 ms holds three periods of 60 Hz, which leave nothing in it.
 const MAINS: f64 = 50.0;
 /// A period of the mains takes as many ticks at least, or it is not told from the pulse.
@@ -36,9 +36,6 @@ pub(super) fn lower(
         return None;
     }
     let period = model.timing.period;
-    let least = f64::from(FEWEST) * period;
-    let time = spec.time.unwrap_or(if least > defaults::WIRING_TIME { least } else { defaults::WIRING_TIME });
-    let ticks = whole(libm::round(time / period));
     let rest = rest::code(model, actuation);
     let gain = model.actuator.leg_gain();
     let volts = spec.amplitude * model.actuator.stroke / gain;
@@ -46,32 +43,37 @@ pub(super) fn lower(
     let room = if above >= below { above } else { below };
     // Saturates.
     let height = (libm::round(volts / actuation.volts_per_code) as i32).clamp(1, if room > 1 { room } else { 1 });
-    let steepest = libm::ceil(f64::from(height) * core::f64::consts::PI / f64::from(ticks)) + 1.0;
-    if ticks < FEWEST || steepest > f64::from(max_step) {
-        let needed = f64::from(height) * core::f64::consts::PI / (f64::from(max_step) - 1.0).max(0.5) * period;
-        let least = if needed * 1.01 > least { needed * 1.01 } else { least };
+    // Ticks that the slew rate asks for where the pulse is steepest.
+    let steepest = libm::ceil(f64::from(height) * core::f64::consts::PI / f64::from(max_step) - 1e-9);
+    let least = period * if steepest > FEWEST { steepest } else { FEWEST };
+    let time = spec.time.unwrap_or(if least > defaults::WIRING_TIME { least } else { defaults::WIRING_TIME });
+    if time < least * (1.0 - 1e-9) {
         findings.push(finding(
             model,
             codes::SUPERVISOR_TIME,
             "wiring_check.time",
             format!(
-                "a pulse of {:.6} ms is {ticks} periods, which takes {FEWEST} at least, and rises by {} codes a period, of which \
-                 `actuator.slew_rate` permits {max_step}",
+                "a pulse of {:.6} ms is shorter than {FEWEST} periods and what `actuator.slew_rate` permits, {:.6} ms",
                 time * 1e3,
-                steepest
+                least * 1e3
             ),
-            format!("write time = \"{:.6} ms\" or more in [supervisor.wiring_check]", least * 1e3),
+            format!(
+                "leave wiring_check.time out: it is then {} ms; it must be at least {:.6} ms",
+                figure(libm::fmax(least, defaults::WIRING_TIME) * 1e3),
+                least * 1e3
+            ),
         ));
         return None;
     }
+    let ticks = whole(libm::round(time / period));
     let regression = Regression::new(ticks, period, model.amplifier.lag, model.sensor.lag);
     let pulse = f64::from(height) * actuation.volts_per_code * gain;
     let noise = noise(model, &regression.weights(), pulse, readings);
     if noise > NOISE {
-        findings.push(finding(
-            model,
+        findings.push(Diagnostic::at(
+            &model.spans,
+            &["supervisor.wiring_check.amplitude", "supervisor.wiring_check", "sensor.noise", "sensor"],
             codes::SUPERVISOR_BOUND,
-            "wiring_check.amplitude",
             format!(
                 "the gauges' noise makes {:.1} % of what a pulse of {:.4} um shows of a leg or gauge, more than {:.0} %",
                 noise * 1e2,
@@ -79,7 +81,7 @@ pub(super) fn lower(
                 NOISE * 1e2
             ),
             format!(
-                "write amplitude = {} or more, or time = \"{:.0} ms\" or more, in [supervisor.wiring_check]",
+                "write wiring_check.amplitude = {} or more, or wiring_check.time = \"{:.0} ms\" or more, in [supervisor]",
                 figure(spec.amplitude * noise / NOISE * 1.05 + 1e-4),
                 time * 1e3 * (noise / NOISE) * (noise / NOISE) * 1.1 + 1.0
             ),
@@ -218,7 +220,8 @@ fn noise(model: &Model, weights: &[f64], pulse: f64, readings: &Response<f64>) -
 }
 
 /// Every single fault of a gauge or a leg.
-pub(crate) fn single_faults() -> Vec<Finding> {
+#[must_use]
+pub fn single_faults() -> Vec<Finding> {
     let one = [Fault::Inverted, Fault::Dead, Fault::Gain(GAINS[0]), Fault::Gain(GAINS[1])];
     let kinds: [fn(u32, Fault) -> Finding; 2] = [Finding::Gauge, Finding::Leg];
     let mut all = Vec::new();
@@ -276,4 +279,45 @@ fn alike(wiring: &supervisor::Wiring<f64>, readings: &Response<f64>) -> (Vec<Vec
         }
     }
     (sets, unseen)
+}
+
+/// What the wiring check does and does not tell, a line each.
+#[must_use]
+pub fn describe(model: &Model, supervision: &Supervision) -> String {
+    let Some(wiring) = &supervision.wiring else {
+        let reason = model.supervisor.wiring_check.off.as_deref().unwrap_or_default();
+        return format!(
+            "  wiring check: off ({reason}); nothing tells that gauges and legs have the right sign and order\n"
+        );
+    };
+    let name = |word: &u32| Finding::of_word(*word).to_string();
+    let volts =
+        f64::from(wiring.height) * (model.dac.range[1] - model.dac.range[0]) / f64::from((1_i32 << model.dac.bits) - 1);
+    let mut text = format!(
+        "  wiring check: each leg makes a pulse of {volts:.3} V, {:.3} um, for {:.1} ms; {:.2} s in all while arming\n",
+        libm::fabs(volts) * model.actuator.leg_gain() * 1e6,
+        f64::from(wiring.ticks) * model.timing.period * 1e3,
+        6.0 * f64::from(wiring.ticks) * model.timing.period
+    );
+    if wiring.leg_gain.is_none() {
+        text.push_str("    gains of legs are not tested until each leg has a record of its own (hysteresis.records)\n");
+    }
+    let alike = match wiring.alike.len() {
+        0 => "    no single fault of a gauge or leg looks like another on this geometry\n".to_owned(),
+        count => format!("    {count} sets of faults look alike on this geometry:\n"),
+    };
+    text.push_str(&alike);
+    for set in &wiring.alike {
+        text.push_str(&format!("      {}\n", set.iter().map(name).collect::<Vec<_>>().join(", ")));
+    }
+    if !wiring.unseen.is_empty() {
+        text.push_str(&format!("    not seen: {}\n", wiring.unseen.iter().map(name).collect::<Vec<_>>().join(", ")));
+    }
+    for [gauges, legs] in &wiring.turned {
+        text.push_str(&format!(
+            "    not seen: the connectors of all gauges turned by {gauges} places, those of all legs by {legs}\n"
+        ));
+    }
+    text.push_str("    not seen: a common factor of all gauges\n");
+    text
 }

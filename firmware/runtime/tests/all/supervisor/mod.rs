@@ -3,6 +3,7 @@
 
 mod oracle;
 mod sequences;
+mod wiring;
 
 use specgen_runtime::GaugeConverter;
 use specgen_runtime::supervisor::{Approach, Cause, Debounce, Supervision, TIMED, toward};
