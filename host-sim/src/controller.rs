@@ -419,7 +419,7 @@ impl TickController for Controller {
 
 mod supervised;
 
-pub use supervised::{MachineWord, SnapshotError, Supervised};
+pub use supervised::{MachineWord, SnapshotError, Standing, Supervised};
 
 /// Zeroed memory of a given size and alignment.
 struct Buffer {

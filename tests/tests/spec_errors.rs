@@ -280,6 +280,11 @@ fn bad_literals(item: Item) -> Vec<(&'static str, String, Code)> {
                 bad.push(("not relative", format!("\"{name}\""), codes::RECORD_PATH));
             }
         }
+        Item::Reason => {
+            for reason in ["true", "\"\"", "\"yes\"", "1"] {
+                bad.push(("no reason", reason.to_owned(), codes::WRONG_TYPE));
+            }
+        }
         Item::Name => {
             for name in ["", "1st", "two words", "größe", "a/b"] {
                 bad.push(("not a name", format!("\"{name}\""), codes::BAD_NAME));

@@ -5,6 +5,7 @@
 mod faults;
 mod session;
 mod triggers;
+mod wiring;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -83,7 +84,7 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     if !report.has_failed() {
         report.step("from boot to a record that replays", || outcome(run(&trial, false)));
         if with_faults {
-            report.step("faults", || outcome(faults::run(&trial)));
+            report.step("faults", || outcome(faults::run(&trial).and_then(|()| wiring::run(&trial))));
         }
     }
     Some(report.finish())
@@ -109,7 +110,8 @@ pub fn long(root: &Path) -> Outcome {
     each(root, &[SPECGEN, TOOL], |trial| {
         run(trial, false)?;
         run(&Trial { cycles: true, ..trial.clone() }, false)?;
-        faults::run(trial)
+        faults::run(trial)?;
+        wiring::run(trial)
     })
 }
 

@@ -31,6 +31,7 @@ mod panel;
 mod samples;
 mod stale;
 mod stops;
+mod wiring;
 use host::{Host, Record};
 
 /// Length of the platform's run, s, where another than that of CI is wanted.

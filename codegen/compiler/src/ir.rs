@@ -377,11 +377,51 @@ pub struct Supervision {
     pub tracking: [f64; 6],
     /// Samples.
     pub tracking_samples: u32,
+    /// The wiring check; none where the spec switches it off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wiring: Option<Wiring>,
     /// Reading of each gauge (rows) per leg displacement (columns); none where each leg has its own gauge.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub readings_per_leg: Option<[[f64; 6]; LEGS]>,
     /// What is left of the way to the set-point after a tick, where there is no generator.
     pub approach_keep: f64,
+}
+
+/// The constants of [`specgen_runtime::supervisor::Wiring`], where each is explained, and what hosts say of findings.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Wiring {
+    /// Ticks of a leg.
+    pub ticks: u32,
+    /// Codes.
+    pub height: i32,
+    /// Of the pulse, of the mains.
+    pub turn: [[f64; 2]; 2],
+    /// Of the pulse.
+    pub lag: [f64; 2],
+    /// Of what is regressed on.
+    pub weights: [f64; 6],
+    /// 1/m, of each leg.
+    pub per_metre: [f64; LEGS],
+    /// Range.
+    pub gauge_gain: [f64; 2],
+    /// Range; none where it is not tested.
+    pub leg_gain: Option<[f64; 2]>,
+    /// Squared.
+    pub residual: f64,
+    /// Sets of single faults that look alike on this geometry, as words of [`specgen_runtime::supervisor::Finding`].
+    pub alike: Vec<Vec<u32>>,
+    /// Single faults that the check lets pass, as such words.
+    pub unseen: Vec<u32>,
+    /// Places by which the connectors of gauges and of legs may be turned at once without the check seeing it.
+    pub turned: Vec<[usize; 2]>,
+}
+
+impl Supervision {
+    /// Sets of faults that look alike to the wiring check; none where there is no check.
+    #[must_use]
+    pub fn alike(&self) -> &[Vec<u32>] {
+        self.wiring.as_ref().map_or(&[], |wiring| &wiring.alike)
+    }
 }
 
 /// The legs at rest above the lowest voltage, risen to it from there.

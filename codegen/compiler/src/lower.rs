@@ -23,6 +23,7 @@ pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
 pub use load::describe as describe_load;
 pub(crate) use sensing::seen;
 pub use sensing::{PoseNoise, pose_noise, poses_per_reading, reading_noise};
+pub use supervision::{describe_wiring, single_faults};
 
 use crate::ir::{
     Bounds, Defaults, Hysteresis, Ir, Law, Load, PlatformDefaults, Scalar, Sensing, Setpoint, Setpoints, TaskSpace,

@@ -100,6 +100,8 @@ pub enum Item {
     Flag,
     /// A file name relative to the spec.
     File,
+    /// Why something is as it is: two words at least.
+    Reason,
     /// A name: ASCII letter first, then letters, digits, `-` and `_`, at most [`MAX_NAME`] characters.
     Name,
 }
@@ -178,6 +180,7 @@ impl Item {
             Self::Flag => "<true or false>".to_owned(),
             Self::File => "\"<file>\"".to_owned(),
             Self::Name => "\"<name>\"".to_owned(),
+            Self::Reason => "\"<reason>\"".to_owned(),
         }
     }
 }

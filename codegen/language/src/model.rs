@@ -23,7 +23,7 @@ pub use electronics::{Actuator, Amplifier, Dac, Sensor};
 pub use hysteresis::{Adaptation, AdaptationMode, Hysteresis, LARGEST_RUN_INTERVAL, MAX_GRID, RateDependence};
 pub use mcu::{Mcu, Part};
 pub use mechanics::{Geometry, LARGEST_TRAVEL, LARGEST_TURN, LegBody, RigidBody, Workspace};
-pub use supervisor::{Robust, Supervisor};
+pub use supervisor::{LegMakes, Robust, Supervisor, WiringCheck};
 pub use target::{Budget, ControllerOptions, Lint, Requirements, Scalar, SetpointKind, Target, Timing, TrackingLimit};
 pub(crate) use task_space::unit;
 pub use task_space::{
@@ -59,6 +59,7 @@ pub static SECTIONS: &[Section] = &[
     Requirements::SECTION,
     TrackingLimit::SECTION,
     Supervisor::SECTION,
+    WiringCheck::SECTION,
     Target::SECTION,
     Budget::SECTION,
     Robust::SECTION,

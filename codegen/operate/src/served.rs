@@ -1,5 +1,7 @@
 //! The simulated machine of a spec behind converters, as a controller in another process moves it: see `specgen_rt::exchange`.
 //!
+//! It may be wired wrongly: with a list of faults each is there for one time that the amplifiers are on, after the last none.
+//!
 //! Time is the controller's ticks. What the machine does while no controller speaks is left out; what it does while a
 //! controller skips ticks is not.
 
@@ -7,12 +9,24 @@ use host_sim::closed_loop::Rig;
 use host_sim::plant::LegPlant;
 use host_sim::platform::PlatformRig;
 use specgen_rt::exchange::{Actuation, CHANNELS, Sensing};
+use specgen_runtime::supervisor::{Finding, with};
 
 use specgen_compiler::ir::{self, Ir};
 use specgen_language::model::Model;
 
 /// Ticks that are simulated at once at most: of a controller that was away for longer the rest is left out.
 const MOST_TICKS: u64 = 200_000;
+
+/// Each signal where it belongs.
+const IDENTITY: [[f64; CHANNELS]; CHANNELS] = {
+    let mut rows = [[0.0; CHANNELS]; CHANNELS];
+    let mut channel = 0;
+    while channel < CHANNELS {
+        rows[channel][channel] = 1.0;
+        channel += 1;
+    }
+    rows
+};
 
 /// A prepared plant.
 pub enum Plant {
@@ -52,6 +66,10 @@ pub struct Served {
     session: u64,
     tick: u64,
     held: [f64; CHANNELS],
+    /// Faults of its wiring still to come, the last one first, and what is wrong now.
+    faults: Vec<Finding>,
+    wired: Finding,
+    enabled: bool,
     /// The last reading, which is not drawn anew.
     last: Option<Sensing>,
     /// Ticks simulated.
@@ -77,10 +95,21 @@ impl Served {
             session: 0,
             tick: 0,
             held: [rest; CHANNELS],
+            faults: Vec::new(),
+            wired: Finding::None,
+            enabled: false,
             last: None,
             ticks: 0,
             sessions: 0,
         }
+    }
+
+    /// The same with these faults of its wiring, one after the other.
+    #[must_use]
+    pub fn with_faults(mut self, faults: Vec<Finding>) -> Self {
+        self.faults = faults;
+        self.faults.reverse();
+        self
     }
 
     /// Takes the latest actuation, goes on to what the controller waits for, and reads.
@@ -105,6 +134,7 @@ impl Served {
             Some(last) if last.tick == self.tick => last,
             _ => {
                 let (gauges, wrench) = self.plant.read();
+                let gauges = if matches!(self.wired, Finding::Gauge(..)) { self.mixed(&gauges, 0.0) } else { gauges };
                 let codes = gauges.map(|value| self.code(value));
                 let sensing =
                     Sensing { session: self.session, tick: self.tick, codes, wrench: wrench.map(f64::to_bits) };
@@ -124,11 +154,27 @@ impl Served {
     }
 
     /// What amplifiers make of codes. They take no code beyond those whose voltages the spec permits.
-    fn voltages(&self, actuation: &Actuation) -> [f64; CHANNELS] {
+    fn voltages(&mut self, actuation: &Actuation) -> [f64; CHANNELS] {
+        if actuation.enable && !self.enabled {
+            self.wired = self.faults.pop().unwrap_or(Finding::None);
+        }
+        self.enabled = actuation.enable;
         let [low, high] = self.codes;
-        actuation.codes.map(|code| {
+        let volts = actuation.codes.map(|code| {
             let volts = self.volts_at_zero + f64::from(code.clamp(low, high)) * self.volts_per_code;
             if actuation.enable { volts } else { self.rest }
+        });
+        if matches!(self.wired, Finding::Leg(..)) { self.mixed(&volts, self.rest) } else { volts }
+    }
+
+    /// Six signals, counted from `zero`, as their wiring makes them.
+    fn mixed(&self, signals: &[f64; CHANNELS], zero: f64) -> [f64; CHANNELS] {
+        with(&IDENTITY, self.wired).map(|row| {
+            zero + row
+                .iter()
+                .zip(signals)
+                .map(|(part, signal)| if *part == 0.0 { 0.0 } else { part * (signal - zero) })
+                .sum::<f64>()
         })
     }
 

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use host_sim::controller::MachineWord;
 use host_sim::description::Description;
 use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::{
@@ -105,6 +106,7 @@ impl<P: Port> Session<P> {
                 tick: 0,
                 phase: 0,
                 cause: 0,
+                finding: 0,
                 amplifier_on: false,
                 status: 0,
                 events: 0,
@@ -141,6 +143,13 @@ impl<P: Port> Session<P> {
     /// What it said last.
     pub fn status(&self) -> &Status {
         &self.status
+    }
+
+    /// Phase and cause, with what looks like the finding of a wiring check on a geometry with these sets of faults.
+    #[must_use]
+    pub fn stands(&self, alike: &[Vec<u32>]) -> String {
+        let Status { phase, cause, finding, amplifier_on, .. } = self.status;
+        MachineWord { phase, cause, amplifier_on, finding: u32::from(finding) }.among(alike)
     }
 
     /// Frames from the device that came damaged.

@@ -192,6 +192,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         report.tick += 1;
         report.phase = output.phase;
         report.cause = output.cause;
+        report.finding = output.finding as u16;
         report.amplifier_on = output.amplifier_on;
         report.status = output.tick.status;
         if output.tick.status & GAUGE_FAULT == 0 {

@@ -96,6 +96,7 @@ impl Visit<'_, '_> {
                 tick: report.tick,
                 phase: report.phase.word() as u8,
                 cause: report.cause.word() as u8,
+                finding: report.finding,
                 amplifier_on: report.amplifier_on,
                 status: report.status,
                 events: report.health.events,

@@ -28,6 +28,8 @@ pub struct Report {
     pub phase: Phase,
     /// Why.
     pub cause: Cause,
+    /// What the wiring check found, if that is why.
+    pub finding: u16,
     /// Whether the amplifiers are enabled.
     pub amplifier_on: bool,
     /// The controller's status word.
@@ -93,6 +95,7 @@ impl Report {
         tick: 0,
         phase: Phase::Disarmed,
         cause: Cause::None,
+        finding: 0,
         amplifier_on: false,
         status: 0,
         missed: 0,

@@ -20,8 +20,8 @@ pub const MACHINE_OUTPUT_WORDS: usize = OUTPUT_WORDS + 2;
 /// Names of the input words. `request` is 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge; `events` holds bits.
 pub const MACHINE_INPUT_NAMES: [&str; MACHINE_INPUT_WORDS] = followed(&INPUT_NAMES, ["request", "events"]);
 
-/// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16; `conditions` has bit 1 << cause
-/// for each cause that is present, whether it has lasted or not, and from bit 16 on the gauges or legs concerned.
+/// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16 | finding of the wiring check << 17;
+/// `conditions` has bit 1 << cause for each cause that is present, whether it has lasted or not, and from bit 16 on the gauges or legs concerned.
 pub const MACHINE_OUTPUT_NAMES: [&str; MACHINE_OUTPUT_WORDS] = followed(&OUTPUT_NAMES, ["supervisor", "conditions"]);
 
 /// State of the supervisor in this controller's arithmetic.
@@ -72,6 +72,20 @@ pub struct MachineOutput {
     pub cause: Cause,
     /// Whether the amplifiers are to be on over the coming interval.
     pub amplifier_on: bool,
+    /// Word of what the wiring check found, a [`Finding`](supervisor::Finding); 0 is nothing.
+    pub finding: u32,
+}
+
+impl MachineOutput {
+    /// phase | cause << 8 | amplifier on << 16 | finding << 17.
+    #[inline]
+    #[must_use]
+    pub fn supervisor_word(&self) -> u32 {
+        self.phase.word() as u32
+            | (self.cause.word() as u32) << 8
+            | (self.amplifier_on as u32) << 16
+            | self.finding << 17
+    }
 }
 
 impl MachineInput {
@@ -107,7 +121,7 @@ pub fn machine_output_words(output: &MachineOutput, machine: &Machine) -> [u64; 
     for (slot, word) in words.iter_mut().zip(output_words(&output.tick, &machine.state)) {
         *slot = word;
     }
-    words[OUTPUT_WORDS] = output.phase.word() | output.cause.word() << 8 | (output.amplifier_on as u64) << 16;
+    words[OUTPUT_WORDS] = output.supervisor_word() as u64;
     words[OUTPUT_WORDS + 1] = machine.supervisor.conditions as u64;
     words
 }
@@ -127,17 +141,17 @@ const fn followed<const N: usize, const ALL: usize>(
     all
 }
 
-/// Codes held, or on their way to rest; the memories follow what is really sent.
+/// Codes held, on their way to rest, or in the pulse of the wiring check; the memories follow what is really sent.
 pub(crate) fn move_codes(config: &Config, state: &mut State, supervisor: &mut Supervisor) {
     let step = supervisor.step_to_rest(&SUPERVISION, config.code_limits().max_step);
-    for (leg, table) in state.legs.iter_mut().zip(&TABLES) {
-        leg.code = toward(leg.code, SUPERVISION.rest, step);
+    for ((index, leg), table) in state.legs.iter_mut().enumerate().zip(&TABLES) {
+        leg.code = toward(leg.code, supervisor.goal(&SUPERVISION, index), step);
         leg.memory.apply(table, DAC.drive(leg.code));
     }
 }
 
 /// Whether gauges are compared with the model although the law does not run: the codes must stand still.
 #[inline]
-pub(crate) fn compares(phase: Phase) -> bool {
-    matches!(phase, Phase::Arming | Phase::Holding)
+pub(crate) fn compares(supervisor: &Supervisor) -> bool {
+    matches!(supervisor.phase, Phase::Arming | Phase::Holding) && !supervisor.is_checking(&SUPERVISION)
 }

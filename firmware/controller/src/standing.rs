@@ -108,8 +108,11 @@ pub(crate) fn stand(
         leg.requested = leg.memory.displacement();
     }
     let faults = sense(config, state, &input.gauge);
-    if faults == 0 && compares(supervisor.phase) {
-        supervisor.look(&SUPERVISION, channel, &sample(&input.gauge, channel, expected, None));
+    if faults == 0 {
+        if compares(supervisor) {
+            supervisor.look(&SUPERVISION, channel, &sample(&input.gauge, channel, expected, None));
+        }
+        supervisor.check(&SUPERVISION, &READINGS_PER_LEG, &sensing::readings(&input.gauge), config.code_limits());
     }
     if !supervisor.phase.is_powered() {
         // What it knew of a load ends with the run: arming begins without.

@@ -3,7 +3,7 @@
 
 //! What the supervisor takes for a fault; from `supervisor`.
 
-use specgen_runtime::supervisor::Supervision;
+use specgen_runtime::supervisor::{Supervision, Wiring};
 use crate::hysteresis::Memory;
 use crate::{Real, limits};
 
@@ -21,7 +21,30 @@ pub const SUPERVISION: Supervision<Real> = Supervision {
     disagreement_samples: 167,
     tracking: [1e-5, 1e-5, 1.04e-5, 8e-5, 7.000000000000001e-5, 0.0001],
     tracking_samples: 167,
+    wiring: Some(Wiring {
+        ticks: 500,
+        height: 415,
+        turn: [
+            [0.9999210442038161, 0.012566039883352607],
+            [0.9995065603657316, 0.03141075907812829],
+        ],
+        lag: [0.9987218993726199, -0.05054273156000185],
+        weights: [
+            0.01807909341043573, 0.004270655935565138, -0.008924829793108251, -0.009519316944099313,
+            -0.00044515700190713873, 0.0028081981177451596,
+        ],
+        per_metre: [
+            1668416.9323888265, 1668416.9323888265, 1668416.9323888265, 1668416.9323888265,
+            1668416.9323888265, 1668416.9323888265,
+        ],
+        gauge_gain: [0.75, 1.33],
+        leg_gain: Some([0.7, 1.43]),
+        residual: 0.010000000000000002,
+    }),
 };
+
+/// Sets of single faults that look alike to the wiring check, as words of `Finding`.
+pub const LOOK_ALIKE: &[&[u32]] = &[];
 
 /// Ticks without a request over a link after which its host is lost; from `supervisor.host_lost`.
 pub const HOST_TICKS: u32 = 1000;

@@ -223,6 +223,19 @@ pub unsafe extern "C" fn specgen_machine_step(
     unsafe { output.cast::<[u64; MACHINE_OUTPUT_WORDS]>().write(words) }
 }
 
+/// Word of each gauge per displacement of each leg, row by row, near the gauges' words.
+///
+/// # Safety
+/// `gauges` points to 6 words, `rows` to 36 writable words.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_words_per_leg(gauges: *const u64, rows: *mut u64) {
+    // SAFETY: the caller's duty.
+    let gauges = unsafe { &*gauges.cast::<[u64; 6]>() }.map(Real::from_word);
+    let words = controller::sensing::words_per_leg(&gauges).map(|row| row.map(Real::to_word));
+    // SAFETY: the caller's duty.
+    unsafe { rows.cast::<[[u64; 6]; 6]>().write(words) }
+}
+
 /// Fingerprint of a `Machine`.
 ///
 /// # Safety

@@ -331,6 +331,8 @@ pub struct Status {
     pub phase: u8,
     /// Number of `supervisor::Cause`.
     pub cause: u8,
+    /// Word of what the wiring check found, a `supervisor::Finding`; 0 unless it is the cause.
+    pub finding: u16,
     /// Whether the amplifiers are enabled.
     pub amplifier_on: bool,
     /// The controller's status word.

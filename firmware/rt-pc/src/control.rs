@@ -245,9 +245,7 @@ fn row_of(output: &MachineOutput) -> recorder::Row {
     recorder::Row {
         codes: output.tick.dac_code,
         status: output.tick.status,
-        supervisor: output.phase.word() as u32
-            | (output.cause.word() as u32) << 8
-            | u32::from(output.amplifier_on) << 16,
+        supervisor: output.supervisor_word(),
     }
 }
 

@@ -4,9 +4,11 @@
 //! goes on ordering; others may then only slow the machine down. An operator only asks: whether a request is granted is the
 //! supervisor's business, and each step here waits for its answer.
 
-use controller::supervised::{Cause, MACHINE_INPUT_NAMES, Phase, Request};
+use controller::supervised::{Cause, Finding, MACHINE_INPUT_NAMES, Phase, Request};
+use controller::supervision::LOOK_ALIKE;
 use controller::{COMMAND_WORDS, Real, passes, waves};
 use specgen_rt::clock::SECOND;
+use specgen_runtime::supervisor::Named;
 
 use crate::handover::Wish;
 use crate::words::{Command, place, word_of};
@@ -21,6 +23,8 @@ const DOWN_LIMIT: u64 = 30 * SECOND;
 pub struct Said {
     pub phase: Phase,
     pub cause: Cause,
+    /// What the wiring check found, if that is the cause.
+    pub finding: Finding,
     pub on: bool,
     /// Status of the control law.
     pub status: u32,
@@ -31,6 +35,14 @@ pub struct Said {
     pub waving: bool,
     /// Ticks that were late so far.
     pub late: u64,
+}
+
+/// A cause in words, with what the wiring check found and what looks like it on this geometry.
+pub fn why(cause: Cause, finding: Finding) -> String {
+    match cause {
+        Cause::Wiring => format!("{}, {}", cause.name(), Named(finding, LOOK_ALIKE)),
+        _ => cause.name().to_owned(),
+    }
 }
 
 /// A connection over the link; no number is given twice in a run.
@@ -169,7 +181,7 @@ impl Operator {
         let waited = now.saturating_sub(self.since);
         match (self.step, said.phase) {
             (Step::Arming | Step::Starting | Step::Playing, Phase::Faulted) => {
-                self.give_up(format!("the machine faulted: {}", said.cause.name()), now);
+                self.give_up(format!("the machine faulted: {}", why(said.cause, said.finding)), now);
             }
             (Step::Arming, Phase::Running) | (Step::Starting, Phase::Running) => {
                 for (place, word) in std::mem::take(&mut self.assignments) {
@@ -403,7 +415,7 @@ mod tests {
     const B: HostId = HostId(2);
 
     fn said(phase: Phase, on: bool) -> Said {
-        Said { phase, cause: Cause::None, on, status: 0, tick: 7, orders: 0, waving: false, late: 0 }
+        Said { phase, cause: Cause::None, finding: Finding::None, on, status: 0, tick: 7, orders: 0, waving: false, late: 0 }
     }
 
     fn operator() -> Operator {

@@ -11,7 +11,7 @@ use std::os::fd::BorrowedFd;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use controller::supervised::{Cause, Phase};
+use controller::supervised::{Cause, Finding, Phase};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use specgen_rt::clock;
 
@@ -46,6 +46,8 @@ pub struct Incident {
     /// Phase that it led to.
     pub phase: Phase,
     pub cause: Cause,
+    /// What the wiring check found, if that is the cause.
+    pub finding: Finding,
 }
 
 /// What is known at the end.
@@ -145,7 +147,7 @@ impl Service<'_> {
             let faulted = said.phase == Phase::Faulted && before.0 != Phase::Faulted;
             let held = said.phase == Phase::Holding && said.cause != Cause::None && (said.phase, said.cause) != before;
             if faulted || held {
-                outcome.incidents.push(Incident { tick: said.tick, phase: said.phase, cause: said.cause });
+                outcome.incidents.push(Incident { tick: said.tick, phase: said.phase, cause: said.cause, finding: said.finding });
             }
             self.console.update(&row, said, now);
             if let Some(link) = &mut self.link {
@@ -184,6 +186,7 @@ fn said(row: &Row) -> Said {
     Said {
         phase: Phase::from_word(word & 0xff).unwrap_or(Phase::Faulted),
         cause: Cause::from_word(word >> 8 & 0xff).unwrap_or(Cause::None),
+        finding: Finding::of_word(row.output.supervisor >> 17),
         on: word >> 16 & 1 == 1,
         status: row.output.status,
         tick: row.tick,

@@ -7,6 +7,7 @@ use specgen_rt::account::{Account, Cause as Late};
 use specgen_rt::allocation;
 use specgen_rt::histogram::Histogram;
 
+use crate::operator::why;
 use crate::service::{Incident, Outcome, Traffic};
 
 pub struct Summary<'a> {
@@ -114,9 +115,10 @@ impl Summary<'_> {
             silent("device_faults", self.device_faults.into()),
             (
                 "incidents",
-                Json::list(&outcome.incidents, |Incident { tick, phase, cause }| {
-                    let [phase, cause] = [format!("{phase:?}"), format!("{cause:?}")].map(Json::from);
-                    Json::object([("tick", (*tick).into()), ("phase", phase), ("cause", cause)])
+                Json::list(&outcome.incidents, |Incident { tick, phase, cause, finding }| {
+                    let why = why(*cause, *finding);
+                    let [phase, cause, why] = [format!("{phase:?}"), format!("{cause:?}"), why].map(Json::from);
+                    Json::object([("tick", (*tick).into()), ("phase", phase), ("cause", cause), ("why", why)])
                 }),
                 lines(outcome.incidents.iter().map(words).collect()),
             ),
@@ -170,9 +172,9 @@ fn quantiles(times: &Histogram) -> Json {
 }
 
 fn words(incident: &Incident) -> String {
-    let Incident { tick, phase, cause } = incident;
+    let Incident { tick, phase, cause, finding } = incident;
     let did = if *phase == Phase::Faulted { "faulted" } else { "held" };
-    format!("the machine {did} at tick {tick}: {}", cause.name())
+    format!("the machine {did} at tick {tick}: {}", why(*cause, *finding))
 }
 
 fn hertz(period: u64) -> f64 {

@@ -1,7 +1,7 @@
 //! The supervisor: which phase the machine is in, why, and what the codes do in it.
 //!
 //! ```text
-//!             arm                    time, all good               run
+//!             arm              time and wiring, all good          run
 //! disarmed ────────► arming ───────────────────────────► holding ◄────► running
 //!     ▲                 │                                   │   hold       │
 //!     │   codes at rest │ ramp down, or a cause             │              │
@@ -10,7 +10,7 @@
 //!     └───────── faulted ◄────────┘            a cause that takes the amplifiers off at once: from any phase to faulted
 //! ```
 //! The law runs in one phase only. In all others codes stand still or go to rest by whole codes, never by more than the slew
-//! limit, so that no reading and no request can make a jump. `docs/supervisor.md` has the table of causes.
+//! limit, so that no reading and no request can make a jump; while arming, each leg makes one small pulse. `docs/supervisor.md` has the table of causes.
 //!
 //! | module | what |
 //! |---|---|
@@ -19,6 +19,7 @@
 //! | `debounce` | for how long a condition must last before it is a cause |
 //! | `watch` | what the gauges show against what was sent: stuck, disagreeing, astray |
 //! | `phases` | the state machine |
+//! | `wiring` | the check that arming ends with: each leg in turn, against the Jacobian |
 //! | `approach` | set-points from where the legs are to where they are asked for |
 
 mod approach;
@@ -27,6 +28,7 @@ mod kinds;
 mod phases;
 mod supervision;
 mod watch;
+mod wiring;
 
 pub use approach::Approach;
 pub use debounce::Debounce;
@@ -37,6 +39,7 @@ pub use kinds::{
 pub use phases::Supervisor;
 pub use supervision::{Supervision, TIMED, TIMERS};
 pub use watch::{Channel, Sample, Watch};
+pub use wiring::{Check, Fault, Finding, Named, Response, Wiring, explains, with};
 
 /// `code` moved towards `goal` by at most `step` (≥ 0) codes.
 #[inline]

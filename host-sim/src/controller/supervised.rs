@@ -1,15 +1,17 @@
 //! The supervised tick of a controller library: what the other targets run.
 
 mod snapshot;
+mod standing;
 
 use std::fmt;
 
 use libloading::Symbol;
-use specgen_runtime::supervisor::{Cause, Phase};
+use specgen_runtime::supervisor::{Cause, Finding, Named, Phase};
 
 use super::{Buffer, Controller, ControllerError, TickController};
 
 pub use snapshot::SnapshotError;
+pub use standing::Standing;
 
 /// Words that the supervised tick takes beyond those of the control law: request, events.
 const MORE_INPUTS: usize = 2;
@@ -22,32 +24,44 @@ pub struct MachineWord {
     /// 0 disarmed, 1 arming, 2 running, 3 holding, 4 ramping down, 5 faulted.
     pub phase: u8,
     /// 0 none, 1 gauge not finite, 2 gauge range, 3 gauge stuck, 4 gauge disagreement, 5 tracking error, 6 voltage saturation,
-    /// 7 slew saturation, 8 missed tick, 9 link lost, 10 integrity, 11 converter, 12 emergency stop, 13 host gone.
+    /// 7 slew saturation, 8 missed tick, 9 link lost, 10 integrity, 11 converter, 12 emergency stop, 13 host gone, 14 wiring.
     pub cause: u8,
     /// Whether the amplifiers are to be on.
     pub amplifier_on: bool,
+    /// Word of what the wiring check found, a [`Finding`]; 0 is nothing.
+    pub finding: u32,
 }
 
 impl MachineWord {
-    /// phase | cause << 8 | amplifier on << 16.
+    /// phase | cause << 8 | amplifier on << 16 | finding << 17.
     #[must_use]
     pub fn of(word: u64) -> Self {
         let [phase, cause, on, ..] = word.to_le_bytes();
-        Self { phase, cause, amplifier_on: on & 1 == 1 }
+        Self { phase, cause, amplifier_on: on & 1 == 1, finding: (word as u32) >> 17 }
     }
 }
 
 /// Phase and, if there is one, cause in words; a number where there is no such.
 impl fmt::Display for MachineWord {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match Phase::from_word(u64::from(self.phase)) {
-            Some(phase) => f.write_str(phase.name())?,
-            None => write!(f, "phase {}", self.phase)?,
-        }
-        match Cause::from_word(u64::from(self.cause)) {
-            Some(Cause::None) => Ok(()),
-            Some(cause) => write!(f, ": {}", cause.name()),
-            None => write!(f, ": cause {}", self.cause),
+        f.write_str(&self.among::<[u32; 0]>(&[]))
+    }
+}
+
+impl MachineWord {
+    /// The same, and which faults look like what the wiring check found: `alike` are sets of such, as words of [`Finding`].
+    #[must_use]
+    pub fn among<S: AsRef<[u32]>>(&self, alike: &[S]) -> String {
+        let Self { phase, cause, finding, .. } = *self;
+        let of =
+            Phase::from_word(u64::from(phase)).map_or_else(|| format!("phase {phase}"), |phase| phase.name().into());
+        match Cause::from_word(u64::from(cause)) {
+            Some(Cause::None) => of,
+            Some(Cause::Wiring) => {
+                format!("{of}: {}, {}", Cause::Wiring.name(), Named(Finding::of_word(finding), alike))
+            }
+            Some(cause) => format!("{of}: {}", cause.name()),
+            None => format!("{of}: cause {cause}"),
         }
     }
 }

@@ -36,7 +36,7 @@ pub enum Ended {
 }
 
 /// A controller under its supervisor, with a recorder. After a reset the first tick is preceded by those that arm the machine, with
-/// the readings of that tick, for nothing moves meanwhile; they are recorded too.
+/// the readings of that tick and what the legs add to them in the wiring check, by the controller's model; they are recorded too.
 ///
 /// Where something fails it gives voltages that are no numbers, which ends every scenario at once; [`Recorded::ended`] says why.
 pub struct Recorded<'r, 'm> {
@@ -49,6 +49,7 @@ pub struct Recorded<'r, 'm> {
     /// Places of codes and status in an output.
     codes: [usize; 6],
     status: usize,
+    supervisor: usize,
     fresh: bool,
     ended: Option<Ended>,
 }
@@ -66,6 +67,7 @@ impl<'r, 'm> Recorded<'r, 'm> {
         let description = machine.controller().description();
         let codes = description.outputs("dac_code")?;
         let status = description.output("status")?;
+        let supervisor = description.output_names.len();
         Ok(Self {
             config: machine.controller().default_config(),
             input: vec![0; machine.input_names().len()],
@@ -75,6 +77,7 @@ impl<'r, 'm> Recorded<'r, 'm> {
             taker,
             codes,
             status,
+            supervisor,
             fresh: true,
             ended: None,
         })
@@ -128,7 +131,7 @@ impl<'r, 'm> Recorded<'r, 'm> {
         let row = Row {
             codes: self.codes.map(|code| place(code) as i32),
             status: place(self.status) as u32,
-            supervisor: u32::from(word.phase) | u32::from(word.cause) << 8 | u32::from(word.amplifier_on) << 16,
+            supervisor: place(self.supervisor) as u32,
         };
         let machine = &self.machine;
         self.recorder.push(&self.input, &row, || machine.digest());
@@ -139,14 +142,17 @@ impl<'r, 'm> Recorded<'r, 'm> {
     fn advance(&mut self, input: &[u64]) -> Result<(), Ended> {
         if self.fresh {
             self.fresh = false;
-            let mut word = self.tick(input, ARM)?;
+            let mut input = input.to_vec();
+            let mut standing = self.machine.standing(&input).map_err(Ended::Controller)?;
+            let mut word = self.tick(&input, ARM)?;
             let start = self.recorder.tick();
             while word.phase != RUNNING {
                 if self.recorder.tick() - start >= ARMING {
                     return Err(Ended::Supervisor { tick: self.recorder.tick() - 1, word });
                 }
                 // A request to arm that could not be followed at once waits for as long as it is given.
-                word = self.tick(input, if word.phase == DISARMED { ARM } else { RUN })?;
+                standing.show(&self.machine, &self.output, &mut input);
+                word = self.tick(&input, if word.phase == DISARMED { ARM } else { RUN })?;
             }
         }
         let word = self.tick(input, RUN)?;

@@ -23,6 +23,7 @@ voltage_time      = \"2 ms\"
 slew_time         = \"1 ms\"
 missed_ticks      = 2
 host_lost         = [\"0.4 ms\", \"1.4 ms\"]
+wiring_check      = { off = \"sequences of 24 ticks\" }
 
 [timing]
 ";

@@ -13,3 +13,4 @@ mod refusals;
 mod sequences;
 mod stops;
 mod table;
+mod wiring;

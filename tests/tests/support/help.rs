@@ -79,6 +79,7 @@ fn value(placeholder: &str, item: Option<Item>) -> String {
         Some(Item::Flag) => "true".to_owned(),
         // The trajectory of the spec with every key.
         Some(Item::Name) => "circle".to_owned(),
+        Some(Item::Reason) => "no stacks are connected".to_owned(),
         Some(Item::File) | None => "a".to_owned(),
     }
 }

@@ -55,6 +55,11 @@ impl Report {
 
 impl Session {
     pub fn begin(trial: &Trial) -> Result<Self, String> {
+        Self::with(trial, &[])
+    }
+
+    /// The same with more arguments for `specgen plant`.
+    pub fn with(trial: &Trial, more: &[&str]) -> Result<Self, String> {
         static BEGUN: AtomicU32 = AtomicU32::new(0);
         let engine = provision::engine(&mut |_| {}).map_err(|error| error.to_string())?;
         let bits = gauge_bits(&trial.spec)?;
@@ -63,7 +68,13 @@ impl Session {
         let shared = Path::new("/dev/shm").join(format!("specgen-plant-{name}"));
         let socket = trial.folder.join(format!("{name}.sock"));
         let mut plant = Command::new(trial.programs.join("specgen"));
-        plant.arg("plant").arg(&trial.spec).args(["--name", &name]).stdout(Stdio::null()).stderr(Stdio::null());
+        plant
+            .arg("plant")
+            .arg(&trial.spec)
+            .args(["--name", &name])
+            .args(more)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
         let plant = plant.spawn().map_err(|error| format!("specgen plant: {error}"))?;
         let mut board = Command::new(trial.programs.join("emulated-board"));
         board.arg("--library").arg(engine).args(["--target", trial.target, "--bits", &bits, "--plant", &name]);
@@ -202,14 +213,16 @@ impl Host {
         Ok(Self { process, lines: lines_of(output) })
     }
 
-    /// Gives orders and waits for these words.
-    pub fn order(&mut self, orders: &str, words: &str) -> Result<(), String> {
+    /// Gives orders and waits for these words; the line that they stand in.
+    pub fn order(&mut self, orders: &str, words: &str) -> Result<String, String> {
         let input = self.process.stdin.as_mut().ok_or("specgen operate has no pipe")?;
         writeln!(input, "{orders}").map_err(|error| format!("specgen operate: {error}"))?;
-        while !self.lines.recv_timeout(ANSWER).map_err(|_| format!("the host does not say `{words}`"))?.contains(words)
-        {
+        loop {
+            let line = self.lines.recv_timeout(ANSWER).map_err(|_| format!("the host does not say `{words}`"))?;
+            if line.contains(words) {
+                return Ok(line);
+            }
         }
-        Ok(())
     }
 
     pub fn end(&mut self) {

@@ -168,6 +168,7 @@ pub fn describe(compiled: &Compiled) -> String {
     if let Some(reach) = &compiled.reach {
         text.push_str(&reach::describe(reach, compiled.design.is_some()));
     }
+    text.push_str(&lower::describe_wiring(&compiled.model, &compiled.ir.supervision));
     for demand in &compiled.demands {
         let current = demand.current.map_or_else(String::new, |amperes| format!(", {:.3} A", amperes));
         let _ = writeln!(

@@ -3,7 +3,6 @@
 use std::net::{SocketAddr, TcpListener};
 
 use clap::{ArgGroup, Args};
-use host_sim::controller::MachineWord;
 use specgen_language::interrupt;
 use specgen_operate::gcs::{Axes, Bridge, Stage};
 
@@ -48,11 +47,11 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         ui.progress("warning: whoever reaches this address can move the machine");
     }
     ui.progress(&format!("{name}: GCS at {address}; Ctrl-C ramps down and ends"));
+    let alike = compiled.as_ref().map(|compiled| compiled.ir.supervision.alike().to_vec()).unwrap_or_default();
     let mut shown = String::new();
     let ended = bridge.run(stop, |session| {
         let status = session.status();
-        let stands =
-            MachineWord { phase: status.phase, cause: status.cause, amplifier_on: status.amplifier_on }.to_string();
+        let stands = session.stands(&alike);
         if stands != shown {
             ui.progress(&format!("tick {}: {stands}", status.tick));
             shown = stands;
@@ -65,6 +64,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     };
     ended.map_err(|error| lost(&error))?;
     let mut operator = Operator::new(bridge.into_session(), stop);
+    operator.alike = alike;
     let stands =
         if operator.is_powered() { operator.ramp_down(ui).map_err(|error| lost(&error))? } else { operator.stands() };
     ui.result(&Served { device: name, listened: address.to_string(), stands });

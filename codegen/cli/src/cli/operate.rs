@@ -58,6 +58,7 @@ pub struct Arguments {
 struct Device {
     digest: Option<String>,
     model: Option<Model>,
+    alike: Vec<Vec<u32>>,
     has_one_host: bool,
 }
 
@@ -100,8 +101,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         }
     }
     let digest = compiled.as_ref().map(|compiled| compiled.ir.digest.clone());
-    let device =
-        Device { digest, model: compiled.map(|compiled| compiled.model), has_one_host: arguments.line.port.is_some() };
+    let alike = compiled.as_ref().map(|compiled| compiled.ir.supervision.alike().to_vec()).unwrap_or_default();
+    let model = compiled.map(|compiled| compiled.model);
+    let device = Device { digest, model, alike, has_one_host: arguments.line.port.is_some() };
     // The machine is not to be left alone.
     interrupt::heed();
     let (session, name) = arguments.line.open(device.digest.as_deref())?;
@@ -154,6 +156,7 @@ fn operate(
     }
     let mut operator = Operator::new(session, interrupt::heed());
     operator.model = device.model;
+    operator.alike = device.alike;
     // A serial line has one end here: whoever asks over it is the host.
     operator.ordered = device.has_one_host;
     if let Source::List(orders) = &source {

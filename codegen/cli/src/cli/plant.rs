@@ -15,8 +15,10 @@ use super::sim::{PlantArguments, environment};
 use super::spec;
 use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
+use specgen_compiler::lower;
 use specgen_language::interrupt;
 use specgen_operate::served::{Plant, Served};
+use specgen_runtime::supervisor::Finding;
 use specgen_studies::machine;
 
 /// How long it waits for a controller before it looks whether it is to end, ns.
@@ -42,8 +44,28 @@ pub struct Arguments {
     /// SCHED_FIFO priority, below the controller's; an ordinary process if not given.
     #[arg(long, value_name = "P", allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(1..=98))]
     priority: Option<u8>,
+    /// A fault of its wiring, such as "gauge 3 inverted", "leg 1 swapped with leg 4", "leg 2 dead", "gauge 0 gain x 0.50". Each is
+    /// there for one time that the amplifiers are on, one after the other; "all" are all single faults.
+    #[arg(long, value_name = "FAULT", value_parser = faults)]
+    wrong: Vec<Faults>,
     #[command(flatten)]
     plant: PlantArguments,
+}
+
+/// Faults that one argument names.
+#[derive(Debug, Clone)]
+struct Faults(Vec<Finding>);
+
+fn faults(text: &str) -> Result<Faults, String> {
+    let named = |fault: &Finding| text == "all" || fault.to_string().replace('×', "x") == text;
+    let found: Vec<Finding> = lower::single_faults().into_iter().filter(named).collect();
+    if found.is_empty() {
+        return Err(format!(
+            "expected \"all\" or a fault such as \"gauge 3 inverted\", \"leg 2 dead\", \"leg 1 swapped with leg 4\", \"gauge 0 gain x 0.50\", \
+             \"leg 5 gain x 2.00\", found `{text}`"
+        ));
+    }
+    Ok(Faults(found))
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -82,7 +104,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let path = exchange::path_of(&arguments.name).map_err(|error| Failure::Usage(format!("--name: {error}")))?;
     let compiled = spec::looked_up(&arguments.spec, ui)?;
     let plant = prepared(arguments, &compiled, ui)?;
-    let mut served = Served::new(plant, &compiled.model, &compiled.ir);
+    let faults = arguments.wrong.iter().flat_map(|faults| faults.0.clone()).collect();
+    let mut served = Served::new(plant, &compiled.model, &compiled.ir).with_faults(faults);
     for refused in
         [arguments.cpu.map_or(Ok(()), scheduling::pin), arguments.priority.map_or(Ok(()), scheduling::set_fifo)]
     {

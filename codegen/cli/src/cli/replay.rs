@@ -186,13 +186,16 @@ struct PhaseAt {
     phase: u8,
     cause: u8,
     amplifiers_on: bool,
+    /// In words.
+    stands: String,
 }
 
 impl Report {
     fn of(title: String, found: Replay, period: f64) -> Self {
         let phase = |change: &PhaseChange| {
-            let MachineWord { phase, cause, amplifier_on } = MachineWord::of(u64::from(change.supervisor));
-            PhaseAt { tick: change.tick, phase, cause, amplifiers_on: amplifier_on }
+            let word = MachineWord::of(u64::from(change.supervisor));
+            let MachineWord { phase, cause, amplifier_on, .. } = word;
+            PhaseAt { tick: change.tick, phase, cause, amplifiers_on: amplifier_on, stands: word.to_string() }
         };
         Self {
             title,
@@ -228,9 +231,9 @@ impl Outcome for Report {
         let event = |out: &mut String, tick: u64, what: &str| {
             row(out, &columns, &[&tick, &format_args!("{:.4}", tick as f64 * self.period), &what]);
         };
-        for &PhaseAt { tick, phase, cause, amplifiers_on: amplifier_on } in self.phases.iter().take(SHOWN) {
-            let on = if amplifier_on { "on" } else { "off" };
-            event(&mut out, tick, &format!("{}, amplifiers {on}", MachineWord { phase, cause, amplifier_on }));
+        for PhaseAt { tick, amplifiers_on, stands, .. } in self.phases.iter().take(SHOWN) {
+            let on = if *amplifiers_on { "on" } else { "off" };
+            event(&mut out, *tick, &format!("{stands}, amplifiers {on}"));
         }
         let more = self.phases.len().saturating_sub(SHOWN);
         if more > 0 {

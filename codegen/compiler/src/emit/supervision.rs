@@ -11,8 +11,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let real = |value| literal::real(ir.scalar, value);
     let count = |value: u32| literal::count(value as usize);
     let counts = |values: &[u32]| {
-        let values = values.iter().map(|value| count(*value));
-        quote! { [#(#values),*] }
+        let values = counts_in(values);
+        quote! { [#values] }
     };
     let (arm_ticks, rest) = (count(s.arm_ticks), literal::integer(s.rest));
     let (ramp_step, ramp_every) = (literal::integer(s.ramp_step), count(s.ramp_every));
@@ -31,7 +31,14 @@ pub fn emit(ir: &Ir) -> TokenStream {
         }
         None => {
             let keep = real(s.approach_keep);
+            let own = (0..6).map(|gauge| {
+                let row: [f64; 6] = std::array::from_fn(|leg| if leg == gauge { 1.0 } else { 0.0 });
+                let row = literal::reals(ir.scalar, &row);
+                quote! { [#row] }
+            });
             quote! {
+                /// Reading of each gauge (rows) per displacement of each leg (columns): each leg has its own.
+                pub const READINGS_PER_LEG: [[Real; 6]; 6] = [#(#own),*];
                 /// What is left after a tick of the way to the set-point when the law begins; from `supervisor.arm_time`.
                 pub const APPROACH_KEEP: Real = #keep;
                 /// A way this short, m and rad, is none.
@@ -40,11 +47,14 @@ pub fn emit(ir: &Ir) -> TokenStream {
         }
     };
     let at_rest = at_rest(ir);
+    let wiring = wiring(ir);
+    let alike = s.wiring.iter().flat_map(|wiring| &wiring.alike).map(|set| counts_in(set));
+    let uses = s.wiring.is_some().then(|| quote! { , Wiring });
     let limits = s.risen.is_none().then(|| quote! { , limits });
     quote! {
         #![doc = " What the supervisor takes for a fault; from `supervisor`."]
 
-        use specgen_runtime::supervisor::Supervision;
+        use specgen_runtime::supervisor::{Supervision #uses};
 
         use crate::hysteresis::Memory;
         use crate::{Real #limits};
@@ -63,11 +73,52 @@ pub fn emit(ir: &Ir) -> TokenStream {
             disagreement_samples: #disagreement_samples,
             tracking: [#tracking],
             tracking_samples: #tracking_samples,
+            wiring: #wiring,
         };
+        /// Sets of single faults that look alike to the wiring check, as words of `Finding`.
+        pub const LOOK_ALIKE: &[&[u32]] = &[#(&[#alike]),*];
         /// Ticks without a request over a link after which its host is lost; from `supervisor.host_lost`.
         pub const HOST_TICKS: u32 = #host_ticks;
         #of_kind
         #at_rest
+    }
+}
+
+fn counts_in(words: &[u32]) -> TokenStream {
+    let words = words.iter().map(|word| literal::count(*word as usize));
+    quote! { #(#words),* }
+}
+
+/// The wiring check.
+fn wiring(ir: &Ir) -> TokenStream {
+    let Some(wiring) = &ir.supervision.wiring else { return quote! { None } };
+    let reals = |values: &[f64]| {
+        let values = literal::reals(ir.scalar, values);
+        quote! { [#values] }
+    };
+    let (ticks, height) = (literal::count(wiring.ticks as usize), literal::integer(wiring.height));
+    let [pulse, mains] = wiring.turn.map(|turn| reals(&turn));
+    let (lag, weights, per_metre) = (reals(&wiring.lag), reals(&wiring.weights), reals(&wiring.per_metre));
+    let (gauge_gain, residual) = (reals(&wiring.gauge_gain), literal::real(ir.scalar, wiring.residual));
+    let leg_gain = match &wiring.leg_gain {
+        Some(range) => {
+            let range = reals(range);
+            quote! { Some(#range) }
+        }
+        None => quote! { None },
+    };
+    quote! {
+        Some(Wiring {
+            ticks: #ticks,
+            height: #height,
+            turn: [#pulse, #mains],
+            lag: #lag,
+            weights: #weights,
+            per_metre: #per_metre,
+            gauge_gain: #gauge_gain,
+            leg_gain: #leg_gain,
+            residual: #residual,
+        })
     }
 }
 

@@ -2,6 +2,9 @@
 
 pub(crate) mod defaults;
 mod rest;
+mod wiring;
+
+pub use wiring::{describe as describe_wiring, single_faults};
 
 use super::kinematics::inverse_jacobian;
 use super::sensing::{PoseNoise, pose_noise, readings_per_pose};
@@ -21,6 +24,16 @@ const NOISE_MARGIN: f64 = 8.0;
 const LARGEST_SHARE: f64 = 10.0;
 /// Fewest steps of the converter by which a sound gauge must have moved.
 const FEWEST_STEPS: f64 = 2.0;
+/// Reading of each gauge per leg displacement where each leg has its own.
+const OWN_GAUGES: [[f64; 6]; 6] = {
+    let mut rows = [[0.0; 6]; 6];
+    let mut leg = 0;
+    while leg < 6 {
+        rows[leg][leg] = 1.0;
+        leg += 1;
+    }
+    rows
+};
 /// Missed ticks are counted over this time, s.
 const MISSED_WINDOW: f64 = 1.0;
 
@@ -60,6 +73,8 @@ pub(super) fn lower(
     };
     let rest = rest::code(model, actuation);
     findings.extend(rest::beyond(model));
+    let readings = readings_per_leg.unwrap_or(OWN_GAUGES);
+    let wiring = wiring::lower(model, hysteresis, actuation, max_step, &readings, scalar, &mut findings);
     if !findings.is_empty() {
         return Err(findings);
     }
@@ -79,6 +94,7 @@ pub(super) fn lower(
         disagreement_samples,
         tracking: tracking.map(round),
         tracking_samples,
+        wiring,
         readings_per_leg: readings_per_leg.map(|rows| rows.map(|row| row.map(round))),
         approach_keep: round(libm::exp(-1.0 / f64::from(arm_ticks))),
     })

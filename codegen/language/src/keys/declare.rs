@@ -146,6 +146,7 @@ pub(crate) const fn six(along: Item, about: Item) -> [Item; 6] {
 
 pub(crate) const FLAG: Shape = Shape::One(Item::Flag);
 pub(crate) const NAME: Shape = Shape::One(Item::Name);
+pub(crate) const REASON: Shape = Shape::One(Item::Reason);
 pub(crate) const CENTER: Item = item(Dimension::LENGTH, Range::closed(-10.0, 10.0), "mm");
 pub(crate) const VOLTS: Item = item(Dimension::VOLTAGE, Range::closed(-1e4, 1e4), "V");
 pub(crate) const RATIO: Item = Item::Number(Range::above(0.0, 10.0));

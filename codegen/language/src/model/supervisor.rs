@@ -40,6 +40,42 @@ section! {
         /// How long a host that has the orders may be silent until the machine holds, and until it ramps down and switches off.
         host_lost: Option<[f64; 2]> = list(&[SILENCE; 2]), Rule(r#"["100 ms", "10 s"]"#), "", ["100 ms", "10 s"];
     }
+    and |fields, _table| {
+        /// The check that arming ends with.
+        wiring_check: WiringCheck = WiringCheck::read(fields, "supervisor.wiring_check")?;
+    }
+}
+
+choice! {
+    /// Whether the six legs are of one make.
+    LegMakes {
+        /// They are: each is held against the others.
+        Alike = "alike",
+        /// They are not: gains are not tested until each leg has a record of its own.
+        Different = "different",
+    }
+}
+
+section! {
+    /// The wiring check that arming ends with: each leg in turn makes a small pulse, and the controller holds what the gauges show against the geometry of the spec: sign, order and gain of gauges and legs. On a mismatch the machine does not run; docs/supervisor.md.
+    ///
+    /// In s.
+    "supervisor.wiring_check" ["first_power"], Plain => WiringCheck {
+        /// Switches the check off, and says why, in words: nothing then tells that feedback has the right sign.
+        off: Option<String> = REASON, Optional, "" ["disabled", "reason"], "no stacks are connected";
+        /// Height of a pulse, as a share of `actuator.stroke`.
+        amplitude: f64 = number(Range::above(0.0, 0.02)), Default(0.01), "" ["height", "share"], 0.01;
+        /// Time of a pulse, one leg after the other.
+        time: Option<f64> = TIMEOUT, Rule("50 ms, at least 40 periods and what the slew rate takes"), "" ["duration"], "50 ms";
+        /// Smallest and largest gain of a gauge over the median of all six.
+        gauge_gain: [f64; 2] = list(&[RATIO; 2]), Default([0.75, 1.33]), "", [0.75, 1.33];
+        /// Smallest and largest gain of a leg over the mean of the five others. With six records each is held against its own.
+        leg_gain: [f64; 2] = list(&[RATIO; 2]), Default([0.7, 1.43]), "", [0.7, 1.43];
+        /// Whether legs are of one make. The gains of legs of different makes are not tested while one record stands for all.
+        legs: LegMakes = one_of(LegMakes::WORDS), Default("alike"), "" ["makes"], "alike";
+        /// Largest part of what the gauges show that no gains of gauges and legs explain.
+        residual: f64 = number(Range::open(0.0, 0.3)), Default(0.1), "", 0.1;
+    }
 }
 
 section! {

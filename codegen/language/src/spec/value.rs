@@ -195,6 +195,10 @@ impl ValueReader<'_> {
             },
             Item::File => self.file(path, value).map(Scalar::Name),
             Item::Name => self.name(path, value).map(Scalar::Name),
+            Item::Reason => match value.get_ref() {
+                DeValue::String(found) if found.split_whitespace().count() > 1 => Some(Scalar::Name(found.to_string())),
+                _ => self.wrong_type(path, value, "a reason in words, in quotes", None),
+            },
         }
     }
 

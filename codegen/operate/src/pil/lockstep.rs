@@ -77,7 +77,7 @@ pub struct Cost {
 }
 
 /// The host's controller with a device beside it. As a [`TickController`] it closes the loop of any scenario; after a reset the
-/// first tick is preceded by those that arm the machine, with the readings of that tick, for nothing moves meanwhile.
+/// first tick is preceded by those that arm the machine, with the readings of that tick and what the legs add to them.
 ///
 /// Where the two differ, the link fails or the supervisor leaves its running phase it gives voltages that are no numbers, which
 /// ends every scenario at once; [`Lockstep::stop`] then says why.
@@ -255,20 +255,22 @@ impl<P: Port> Lockstep<P> {
         Ok(word)
     }
 
-    /// Arms the machine where it stands, at rest: the codes do not move, so neither do the readings.
+    /// Arms the machine where it stands, at rest: the readings move by what the legs do in the wiring check, by the controller's model.
     ///
     /// Six legs are asked for where they stand until they run, so that what follows is the trajectory from its first tick on:
     /// the supervisor would lead them from where they stand to its first point for as long as a period takes, which is not what
     /// the run measures.
     fn arm(&mut self, input: &[u64]) -> Result<(), Stop> {
-        let input = &self.stays(input);
-        let mut word = self.tick(input, ARM)?;
+        let mut input = self.stays(input);
+        let mut standing = self.host.standing(&input).map_err(Stop::Settings)?;
+        let mut word = self.tick(&input, ARM)?;
         while word.phase != RUNNING {
             if self.tick >= ARMING {
                 return Err(Stop::Supervisor { tick: self.tick, word });
             }
             // Run is taken once it is armed.
-            word = self.tick(input, if word.phase == DISARMED { ARM } else { RUN })?;
+            standing.show(&self.host, &self.ours, &mut input);
+            word = self.tick(&input, if word.phase == DISARMED { ARM } else { RUN })?;
         }
         Ok(())
     }

@@ -295,8 +295,8 @@
     allow(by("check"), "");
     const runs = check && check.runs;
     by("check-bar").style.width = (check ? (check.runs ? 100 * check.done / 6 : check.verdict ? 100 : 0) : 0) + "%";
-    by("check-note").textContent = runs ? "leg " + Math.min(check.done, 5) + " is driven" : "";
-    allow(by("check-begin"), runs ? "under way" : phase !== "holding" ? "arm first" : orders, "press 1\u2009s");
+    by("check-note").textContent = runs ? "leg " + Math.min(check.done, 5) + " moves" : "";
+    allow(by("check-begin"), runs ? "under way" : phase !== "disarmed" ? "ramp down first" : orders, "press 1\u2009s");
     allow(by("check-end"), runs ? orders : "not under way");
     const verdict = check && check.verdict, text = JSON.stringify(verdict || null);
     if (checked.shown === text) return;
@@ -304,13 +304,9 @@
     const box = by("verdict");
     box.replaceChildren();
     if (!verdict) return;
-    html("h3", box, verdict.what.charAt(0).toUpperCase() + verdict.what.slice(1));
-    for (const one of [...verdict.legs, ...verdict.gauges]) {
-      const line = html("div", box, "", "row");
-      line.innerHTML = '<svg class="mark"><use href="#m-' + (one.good ? "ok" : "error") + '"/></svg>';
-      html("span", line, one.what.charAt(0).toUpperCase() + one.what.slice(1) + "." + (one.mend ? " Do: " + one.mend : ""));
-      html("span", line, "gain " + shown(one.gain.toFixed(2)));
-    }
+    const line = html("div", box, "", "row");
+    line.innerHTML = '<svg class="mark"><use href="#m-' + (verdict.good ? "ok" : "error") + '"/></svg>';
+    html("span", line, verdict.what.charAt(0).toUpperCase() + verdict.what.slice(1) + (verdict.mend ? " Do: " + verdict.mend : ""));
   }
 
   // ── What is pressed ──

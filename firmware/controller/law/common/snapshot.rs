@@ -84,10 +84,6 @@ pub fn record_before(config: &Config, machine: &Machine, recorder: &mut Recorder
 /// What it keeps after the tick. Compiled here, for speed, and in a frame of its own, which is done with before the law needs the stack.
 #[inline(never)]
 pub fn record_after(machine: &Machine, input: &MachineInput, output: &MachineOutput, recorder: &mut Recorder<'_>) {
-    let row = Row {
-        codes: output.tick.dac_code,
-        status: output.tick.status,
-        supervisor: output.phase.word() as u32 | (output.cause.word() as u32) << 8 | (output.amplifier_on as u32) << 16,
-    };
+    let row = Row { codes: output.tick.dac_code, status: output.tick.status, supervisor: output.supervisor_word() };
     recorder.push(&input.to_words(), &row, || machine.digest());
 }

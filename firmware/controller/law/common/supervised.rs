@@ -4,7 +4,9 @@ pub use crate::machine::{
     MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS, Machine, MachineInput,
     MachineOutput, Supervisor, machine_output_words,
 };
-pub use specgen_runtime::supervisor::{CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, STOP};
+pub use specgen_runtime::supervisor::{
+    CONVERTER, Cause, Finding, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, STOP,
+};
 
 use crate::standing::{begin, come_to_rest, expectation, look, readings, run_law, stand};
 use crate::step::outputs;
@@ -36,7 +38,8 @@ pub fn supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -
     };
     let status = status | act(config, state, phase, &input.tick, status);
     // Of the state and at the end: what is as large as an output is slow to move.
-    MachineOutput { tick: outputs(state, status), phase, cause, amplifier_on: phase.is_powered() }
+    let finding = supervisor.finding();
+    MachineOutput { tick: outputs(state, status), phase, cause, amplifier_on: phase.is_powered(), finding }
 }
 
 /// The law at work; returns its status. Of the channel: what is `expected`, and its `target`.

@@ -2,7 +2,14 @@
 
 pub use crate::gauges::{CONVERTER, GAUGE, LEG_SETPOINT};
 
+use crate::supervision::READINGS_PER_LEG;
 use crate::{LEGS, Real};
+
+/// Word of each gauge (rows) per displacement of each leg (columns): for a host that stands in for gauges.
+#[must_use]
+pub fn words_per_leg(_raw: &[Real; 6]) -> [[Real; 6]; 6] {
+    READINGS_PER_LEG
+}
 
 /// A gauge reading is finite and within [`GAUGE`].
 #[inline]

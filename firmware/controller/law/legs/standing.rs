@@ -4,7 +4,7 @@ use crate::hysteresis::LED;
 use crate::machine::{Supervisor, compares, move_codes};
 use crate::sensing::{gauge_is_accepted, leg_setpoint_is_accepted};
 use crate::step::advance;
-use crate::supervision::{APPROACH_KEEP, APPROACH_NEGLIGIBLE, SUPERVISION};
+use crate::supervision::{APPROACH_KEEP, APPROACH_NEGLIGIBLE, READINGS_PER_LEG, SUPERVISION};
 use crate::{Config, LEGS, Real, SetpointKind, State, TickInput, kinematics};
 use specgen_runtime::linear::component;
 use specgen_runtime::supervisor::Sample;
@@ -108,9 +108,12 @@ pub(crate) fn stand(
     for leg in &mut state.legs {
         leg.lead = [0.0; LED as usize];
     }
-    if faults == 0 && compares(supervisor.phase) {
-        let reading = component(&input.displacement, channel);
-        supervisor.look(&SUPERVISION, channel, &Sample { word: reading, reading, expected, error: None });
+    if faults == 0 {
+        if compares(supervisor) {
+            let reading = component(&input.displacement, channel);
+            supervisor.look(&SUPERVISION, channel, &Sample { word: reading, reading, expected, error: None });
+        }
+        supervisor.check(&SUPERVISION, &READINGS_PER_LEG, &input.displacement, config.code_limits());
     }
     supervisor.see(faults, 0, &input.displacement, &[0; LEGS], 1);
     faults << 8

@@ -3,6 +3,8 @@
 pub use crate::gauges::{CALIBRATION, CONVERTER, GAUGES, RATE, RAW_LIMITS};
 
 use crate::Real;
+use crate::supervision::READINGS_PER_LEG;
+use specgen_runtime::linear::component;
 use specgen_runtime::sensing;
 
 /// Gauges whose word is not finite or out of [`RAW_LIMITS`]: bit k for gauge k.
@@ -20,6 +22,22 @@ pub fn readings(raw: &[Real; 6]) -> [Real; 6] {
         Some(calibration) => calibration.readings(raw),
         None => *raw,
     }
+}
+
+/// Word of each gauge (rows) per displacement of each leg (columns) near these words, per m: for a host that stands in for gauges.
+#[must_use]
+pub fn words_per_leg(raw: &[Real; 6]) -> [[Real; 6]; 6] {
+    let mut rows = READINGS_PER_LEG;
+    for (((row, raw_one), limits), gauge) in rows.iter_mut().zip(raw).zip(&RAW_LIMITS).zip(0..) {
+        let step = (limits[1] - limits[0]) * 1e-3;
+        let mut beside = *raw;
+        beside[gauge] = *raw_one + step;
+        let [here, there] = [readings(raw), readings(&beside)].map(|all| component(&all, gauge));
+        for entry in row {
+            *entry = *entry * step / (there - here);
+        }
+    }
+    rows
 }
 
 /// Pose [x y z θx θy θz] from rest (m, rad) of gauge words without [`faults`]; finite for these.

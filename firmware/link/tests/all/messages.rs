@@ -14,6 +14,7 @@ const STATUS: Status = Status {
     tick: u64::MAX,
     phase: 4,
     cause: 12,
+    finding: u16::MAX,
     amplifier_on: true,
     status: 1 << 18,
     events: 31,

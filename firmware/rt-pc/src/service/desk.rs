@@ -58,6 +58,7 @@ impl<'a> Desk<'a> {
             tick: said.map_or(0, |said| said.tick + 1),
             phase: said.map_or(Phase::Disarmed, |said| said.phase).word() as u8,
             cause: said.map_or(Cause::None, |said| said.cause).word() as u8,
+            finding: said.map_or(0, |said| said.finding.word() as u16),
             amplifier_on: said.is_some_and(|said| said.on),
             status: said.map_or(0, |said| said.status),
             events: *self.events,

@@ -5,6 +5,8 @@ use super::debounce::Debounce;
 use super::kinds::{Cause, HOLDS, Phase, RAMPS_DOWN, Request, SWITCHES_OFF};
 use super::supervision::Supervision;
 use super::watch::{Sample, Watch};
+use super::wiring::{Check, Finding, Response};
+use crate::dac::CodeLimits;
 use crate::real::Real;
 
 /// Event bits begin at the bit of [`Cause::MissedTick`], in the order of the causes.
@@ -38,6 +40,8 @@ crate::state! { |words|
         pub debounce: Debounce = Debounce::new(), part;
         /// What the gauges show against what was sent.
         pub watch: Watch<T> = Watch::new(), part;
+        /// Whether gauges and legs are wired as the spec says.
+        pub check: Check<T> = Check::new(), part;
         /// Way to the set-point that is asked for, where the law has no generator.
         pub approach: Approach<T> = Approach::new(), part;
     }
@@ -91,6 +95,7 @@ impl<T: Real> Supervisor<T> {
         if self.wants_arming && present == 0 && at_rest {
             self.wants_arming = false;
             self.fresh = true;
+            self.check = Check::new();
             self.enter(Phase::Arming, Cause::None);
         }
     }
@@ -102,9 +107,12 @@ impl<T: Real> Supervisor<T> {
             self.enter(Phase::RampingDown, Cause::None);
         } else if present != 0 {
             self.ticks = 0;
+            self.check = Check::new();
+        } else if self.check.done && self.check.finding != 0 {
+            self.enter(Phase::RampingDown, Cause::Wiring);
         } else {
             self.ticks = self.ticks.saturating_add(1);
-            if self.ticks >= supervision.arm_ticks {
+            if self.ticks >= supervision.arm_ticks && (self.check.done || supervision.wiring.is_none()) {
                 let runs = self.request == Request::Run;
                 self.enter(if runs { Phase::Running } else { Phase::Holding }, Cause::None);
                 return runs;
@@ -167,12 +175,59 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// Codes by which every leg goes towards rest in this tick, when the law does not run; never above `max_step`.
+    /// Whether a leg makes its pulse, or what they showed is judged.
+    #[inline]
+    #[must_use]
+    pub fn is_checking(&self, supervision: &Supervision<T>) -> bool {
+        self.phase == Phase::Arming && self.ticks >= supervision.arm_ticks && supervision.wiring.is_some()
+    }
+
+    /// Word of what the wiring check found, where that is why the machine does not run.
+    #[inline]
+    #[must_use]
+    pub fn finding(&self) -> u32 {
+        if self.cause == Cause::Wiring { self.check.finding } else { 0 }
+    }
+
+    /// Goes on with the wiring check, of readings that are believed (m), where one is under way. `expected`: readings per leg displacement.
+    #[inline]
+    pub fn check(
+        &mut self,
+        supervision: &Supervision<T>,
+        expected: &Response<T>,
+        readings: &[T; 6],
+        limits: CodeLimits,
+    ) {
+        if self.is_checking(supervision)
+            && let Some(wiring) = &supervision.wiring
+        {
+            let highest = supervision.rest.saturating_add(wiring.height);
+            if highest < limits.min || highest > limits.max {
+                self.check.done = true;
+                self.check.finding = Finding::NoRoom.word();
+            }
+            self.check.tick(wiring, expected, readings);
+        }
+    }
+
+    /// Where a leg goes when the law does not run: rest, or its pulse beyond it.
+    #[inline]
+    #[must_use]
+    pub fn goal(&self, supervision: &Supervision<T>, leg: usize) -> i32 {
+        match &supervision.wiring {
+            Some(wiring) if self.phase == Phase::Arming => {
+                supervision.rest.saturating_add(self.check.pulse(wiring, leg))
+            }
+            _ => supervision.rest,
+        }
+    }
+
+    /// Codes by which every leg goes towards its goal in this tick, when the law does not run; never above `max_step`.
     #[inline]
     pub fn step_to_rest(&mut self, supervision: &Supervision<T>, max_step: i32) -> i32 {
         match self.phase {
-            Phase::Arming | Phase::Holding | Phase::Running => 0,
-            Phase::Disarmed | Phase::Faulted => max_step,
+            Phase::Holding | Phase::Running => 0,
+            Phase::Disarmed | Phase::Arming | Phase::Faulted => max_step,
             Phase::RampingDown => {
                 self.ticks = self.ticks.saturating_add(1);
                 if self.ticks < supervision.ramp_every {

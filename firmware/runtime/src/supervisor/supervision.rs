@@ -1,6 +1,7 @@
 //! What the spec fixes about the supervisor.
 
 use super::kinds::Cause;
+use super::wiring::Wiring;
 
 /// Causes that are timed tick by tick, in the order of [`Supervision::timeout`]. Those of the watch are counted in samples there; all
 /// others act at once.
@@ -44,4 +45,6 @@ pub struct Supervision<T> {
     pub tracking: [T; 6],
     /// Samples for which it must be beyond, ≥ 1.
     pub tracking_samples: u32,
+    /// The wiring check that arming ends with; none where the spec switches it off.
+    pub wiring: Option<Wiring<T>>,
 }

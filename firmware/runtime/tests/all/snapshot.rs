@@ -157,7 +157,9 @@ fn every_word_of_a_supervisor_counts() {
     for _ in 0..6 {
         words = words.reals(1).whole(&[1]).reals(2).counters(3);
     }
-    let words = words.whole(&[3]).counters(5).whole(&[1]).reals(6);
+    let words = words.whole(&[3]).counters(5);
+    // The wiring check, then the approach.
+    let words = words.whole(&[2]).counters(1).reals(4 + 36 + 1).counters(1).whole(&[1]).whole(&[1]).reals(6);
     let fresh = Supervisor::<f64>::new();
     every_word_counts(&fresh, words, Supervisor::digest);
     let channels = 9 + TIMERS;
@@ -167,8 +169,11 @@ fn every_word_of_a_supervisor_counts() {
         numbers_within(&fresh, first + 2..first + 4, SIZES.request);
     }
     let end = channels + 6 * 7;
-    numbers_within(&fresh, end + 7..end + 13, LARGEST_PLACE);
-    for (place, most) in [(0, 5), (1, 13), (2, 5), (end, 6), (end + 6, 2)] {
+    let [turned, response, least, approach] = [end + 8, end + 12, end + 48, end + 51];
+    numbers_within(&fresh, (turned..response).chain([least]), 2.0);
+    numbers_within(&fresh, response..least, LARGEST);
+    numbers_within(&fresh, approach + 1..approach + 7, LARGEST_PLACE);
+    for (place, most) in [(0, 5), (1, 14), (2, 5), (end, 6), (end + 6, 6), (approach - 1, 1), (approach, 2)] {
         whole_within(&fresh, place, 0, most);
     }
 }

@@ -3,7 +3,7 @@
 
 //! What the supervisor takes for a fault; from `supervisor`.
 
-use specgen_runtime::supervisor::Supervision;
+use specgen_runtime::supervisor::{Supervision, Wiring};
 use crate::hysteresis::Memory;
 use crate::{Real, limits};
 
@@ -21,10 +21,76 @@ pub const SUPERVISION: Supervision<Real> = Supervision {
     disagreement_samples: 84,
     tracking: [1.2e-5, 1.2e-5, 1.2e-5, 1.2e-5, 1.2e-5, 1.2e-5],
     tracking_samples: 84,
+    wiring: Some(Wiring {
+        ticks: 250,
+        height: 415,
+        turn: [[0.9996842, 0.025130095], [0.9980267, 0.06279052]],
+        lag: [0.9983336, -0.057706926],
+        weights: [
+            0.036336083, 0.00862492, -0.017817322, -0.019484641, -0.00091138907, 0.0056361076,
+        ],
+        per_metre: [1751750.1, 1612168.9, 1697187.0, 1584018.0, 1662928.5, 1714623.9],
+        gauge_gain: [0.75, 1.33],
+        leg_gain: Some([0.7, 1.43]),
+        residual: 0.01,
+    }),
 };
+
+/// Sets of single faults that look alike to the wiring check, as words of `Finding`.
+pub const LOOK_ALIKE: &[&[u32]] = &[
+    &[1, 7],
+    &[13, 19],
+    &[697, 703],
+    &[2497, 2503],
+    &[37, 43],
+    &[49, 55],
+    &[61, 67],
+    &[73, 79],
+    &[85, 91],
+    &[2, 8],
+    &[14, 20],
+    &[698, 704],
+    &[2498, 2504],
+    &[50, 56],
+    &[62, 68],
+    &[74, 80],
+    &[86, 92],
+    &[3, 9],
+    &[15, 21],
+    &[699, 705],
+    &[2499, 2505],
+    &[63, 69],
+    &[75, 81],
+    &[87, 93],
+    &[4, 10],
+    &[16, 22],
+    &[700, 706],
+    &[2500, 2506],
+    &[76, 82],
+    &[88, 94],
+    &[5, 11],
+    &[17, 23],
+    &[701, 707],
+    &[2501, 2507],
+    &[89, 95],
+    &[6, 12],
+    &[18, 24],
+    &[702, 708],
+    &[2502, 2508],
+];
 
 /// Ticks without a request over a link after which its host is lost; from `supervisor.host_lost`.
 pub const HOST_TICKS: u32 = 500;
+
+/// Reading of each gauge (rows) per displacement of each leg (columns): each leg has its own.
+pub const READINGS_PER_LEG: [[Real; 6]; 6] = [
+    [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+    [0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+    [0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+    [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+];
 
 /// What is left after a tick of the way to the set-point when the law begins; from `supervisor.arm_time`.
 pub const APPROACH_KEEP: Real = 0.998002;

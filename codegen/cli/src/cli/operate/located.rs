@@ -136,6 +136,7 @@ mod tests {
             tick: 9,
             phase: 3,
             cause: 0,
+            finding: 0,
             amplifier_on: true,
             status: 0,
             events: 0,

@@ -5,7 +5,6 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use host_sim::controller::MachineWord;
 use serde_json::json;
 use specgen_link::client::{ClientError, Port};
 use specgen_link::{RecorderStatus, Refusal, Status};
@@ -39,6 +38,8 @@ pub struct Operator<P> {
     pub(super) session: Session<P>,
     /// What the device was built from, where that is known.
     pub model: Option<Model>,
+    /// Sets of faults that look alike to its wiring check.
+    pub alike: Vec<Vec<u32>>,
     /// Poses by the names that this session gave them.
     pub(super) marks: BTreeMap<String, [f64; 6]>,
     /// What poses are said in.
@@ -66,6 +67,7 @@ impl<P: Port> Operator<P> {
         Self {
             session,
             model: None,
+            alike: Vec::new(),
             marks: BTreeMap::new(),
             frame: Frame::default(),
             ordered: false,
@@ -81,8 +83,7 @@ impl<P: Port> Operator<P> {
 
     /// Phase and cause in words.
     pub fn stands(&self) -> String {
-        let Status { phase, cause, amplifier_on, .. } = *self.session.status();
-        MachineWord { phase, cause, amplifier_on }.to_string()
+        self.session.stands(&self.alike)
     }
 
     /// Number of the phase.

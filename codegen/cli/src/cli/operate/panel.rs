@@ -132,6 +132,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let stop = interrupt::heed();
     let mut operator = Operator::new(session, stop);
     operator.model = Some(compiled.model.clone());
+    operator.alike = compiled.ir.supervision.alike().to_vec();
     operator.attended = true;
     let panel = Rc::new(RefCell::new(Panel::new(Hall::new(hears), compiled)));
     let lost = |error: ClientError| {

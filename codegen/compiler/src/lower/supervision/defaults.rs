@@ -18,6 +18,8 @@ pub(crate) const VOLTAGE_TIME: f64 = 0.5;
 pub(crate) const SLEW_TIME: f64 = 0.05;
 /// Without `supervisor.host_lost`: silence of a host after which the machine holds and ramps down, s.
 pub(crate) const HOST_LOST: [f64; 2] = [0.1, 10.0];
+/// Without `supervisor.wiring_check.time`, s.
+pub(crate) const WIRING_TIME: f64 = 0.05;
 /// Of `supervisor.stuck_motion` without the key: times the noise, and steps of the gauge's converter.
 const STUCK_MARGIN: f64 = 10.0;
 /// Of the stroke, without `supervisor.disagreement`.

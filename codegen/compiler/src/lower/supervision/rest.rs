@@ -48,7 +48,7 @@ pub(super) fn risen(code: i32, hysteresis: &Hysteresis, actuation: &Actuation, s
 }
 
 /// E(`drive`, 0), with the roundings of `specgen_runtime::Everett::rising`. `nodes` as in [`Hysteresis::tables`].
-fn first_rise(nodes: &[f64], grid: usize, drive: f64, scalar: Scalar) -> f64 {
+pub(super) fn first_rise(nodes: &[f64], grid: usize, drive: f64, scalar: Scalar) -> f64 {
     let cell = (drive as usize).min(grid - 1);
     let node = |up: usize| nodes[up * (up + 1) / 2];
     let slope = scalar.round(node(cell + 1) - node(cell));

@@ -62,6 +62,7 @@ pub static PART: Part = Part {
         "src/supervisor/phases.rs",
         "src/supervisor/supervision.rs",
         "src/supervisor/watch.rs",
+        "src/supervisor/wiring.rs",
         "src/transfer.rs",
         "src/trig.rs",
         "src/trigger.rs",

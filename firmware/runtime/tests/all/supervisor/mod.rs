@@ -3,6 +3,7 @@
 
 mod oracle;
 mod sequences;
+mod wiring;
 
 use specgen_runtime::GaugeConverter;
 use specgen_runtime::supervisor::{Approach, Cause, Debounce, Supervision, TIMED, toward};
@@ -20,6 +21,7 @@ const SUPERVISION: Supervision<f64> = Supervision {
     disagreement_samples: 3,
     tracking: [1e-6; 6],
     tracking_samples: 3,
+    wiring: None,
 };
 
 #[test]

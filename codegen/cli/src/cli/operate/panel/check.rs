@@ -1,193 +1,80 @@
-//! The first-power check: each leg is driven a little, by feed-forward alone, and what the gauges show is held against the spec.
-//!
-//! The law that inverts the hysteresis and feeds nothing back does not mind what gauges say, so a gauge with a wrong sign or in the wrong
-//! place cannot make it run away; the supervisor looks on as always, and may end the way to the bias, where every leg has room. What
-//! the gauges showed until then tells what is turned.
-
-mod judge;
+//! The wiring check of a page: it arms the machine, whose controller then checks gauges and legs itself, and says what was found.
 
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
 use serde_json::{Value, json};
-use specgen_compiler::lower;
 use specgen_link::client::Port;
-use specgen_operate::motion::Motion;
-use specgen_operate::{Order, Until, Wanted};
-use specgen_runtime::setpoint::BUSY;
-use specgen_runtime::supervisor::{Phase, Request};
+use specgen_runtime::supervisor::{Cause, Finding, Named, Phase, Request};
 
-use self::judge::{Matrix, Way, at_first_sight, judge, times};
-use super::Panel;
-use super::ask::{ask, begin};
+use super::ask::begin;
+use super::{Panel, said};
 use crate::cli::operate::{Ended, Operator};
-use crate::cli::ui::Ui;
 
-/// How far a leg is driven, as part of its stroke.
-const STEP: f64 = 0.02;
-/// How long the platform may take to its bias, and to arrive after a step.
+/// How long a machine may take to arm beyond what its spec says.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// How long it may take until it runs.
-const COMES: Duration = Duration::from_secs(2);
-/// From arriving to reading: gauges and amplifiers lag.
-const SETTLE: Duration = Duration::from_millis(100);
-/// Readings of which the mean is taken.
-const READINGS: u32 = 40;
 
-/// Drives, measures, judges. The machine holds at the end, with the mode that it had.
-pub(super) fn run<P: Port + 'static>(
-    operator: &mut Operator<P>,
-    panel: &Rc<RefCell<Panel>>,
-    quiet: &Ui,
-) -> Result<Value, Ended> {
-    let no = |why: &str| Ended::Refused(why.to_owned());
-    let (expected, jacobian, inverse) = {
+/// What was found, and what to do about it.
+#[derive(Serialize)]
+struct Verdict {
+    good: bool,
+    what: String,
+    mend: &'static str,
+}
+
+/// Arms a machine that is disarmed. It holds where gauges and legs are as the spec says; else it is faulted, and the verdict says why.
+pub(super) fn run<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Panel>>) -> Result<Value, Ended> {
+    let refused = |why: String| Err(Ended::Refused(why));
+    let (rules, off, period) = {
         let panel = panel.borrow();
-        let geometry = &panel.compiled.model.geometry;
-        let expected = panel.compiled.ir.supervision.readings_per_leg;
-        let expected = expected.ok_or_else(|| no("each leg has a gauge of its own: there is no platform to check"))?;
-        let both = lower::leg_jacobian(geometry).zip(lower::inverse_jacobian(geometry));
-        let (jacobian, inverse) = both.ok_or_else(|| no("the legs of the spec hold no platform"))?;
-        (expected, jacobian, inverse)
+        let model = &panel.compiled.model;
+        (panel.compiled.ir.supervision.clone(), model.supervisor.wiring_check.off.clone(), model.timing.period)
     };
-    if u64::from(operator.phase()) != Phase::Holding.word() {
-        return Err(no(
-            "the check begins with a machine that was armed and holds at rest: ramp down if it is not, then arm",
-        ));
+    let Some(wiring) = &rules.wiring else {
+        return refused(format!("the spec switches the wiring check off: {}", off.unwrap_or_default()));
+    };
+    let phase = |operator: &Operator<P>| Phase::from_word(u64::from(operator.phase()));
+    if phase(operator) != Some(Phase::Disarmed) {
+        return refused("the check arms the machine: ramp down, or acknowledge its fault, before".to_owned());
     }
-    // Asked now: what the page knows may be of a check that was ended a moment ago.
-    let gains = ask(operator, &Order::Gains(Vec::new()), quiet)?;
-    let mode = gains["mode"].as_str().map(str::to_owned);
-    let mode = mode.and_then(|mode| Order::parse(&format!("mode {mode}")).ok().flatten());
     panel.borrow_mut().check = json!({ "runs": true, "done": 0 });
-    ask(operator, &Order::Mode(Wanted { terms: [false, true], law: Some(0) }), quiet)?;
-    let step = STEP * panel.borrow().compiled.model.actuator.stroke;
-    let mut way = Way::default();
-    let measured = measure(operator, panel, quiet, &expected, [&jacobian, &inverse], step, &mut way);
-    // Whatever came of it, it is to stand and to be as it was.
-    operator.session.supervise(Request::Hold)?;
-    operator.wait(Until::Phase(Phase::Holding), PATIENCE, quiet).or_else(|ended| match ended {
-        // A machine that ramps down or is faulted does not hold.
-        Ended::Fault(_) | Ended::Refused(_) => Ok(()),
-        other => Err(other),
-    })?;
-    if let Some(mode) = mode {
-        ask(operator, &mode, quiet)?;
-    }
-    // What is turned shows a platform that is far from its set-point: the supervisor holds it, and the way until then names it.
-    let on_the_way = || at_first_sight(&expected, &way);
-    let verdict = match measured {
-        Ok(measured) => judge(&expected, &measured),
-        Err(Ended::Fault(why)) => on_the_way().ok_or(Ended::Fault(why))?,
-        Err(ended) => return Err(ended),
-    };
-    let (kind, advice) = if verdict.good {
-        ("note", "")
-    } else {
-        ("error", "Ramp down, and mend what the check says before the loop is closed.")
-    };
-    let mut panel = panel.borrow_mut();
-    panel.hall.note(kind, &format!("First-power check: {}", verdict.what), advice, None);
-    panel.check = json!({ "runs": false, "verdict": verdict });
-    Ok(json!(verdict))
-}
-
-/// Readings of the gauges (rows) per displacement of a leg (columns); `way` is what was seen before a leg was driven.
-fn measure<P: Port + 'static>(
-    operator: &mut Operator<P>,
-    panel: &Rc<RefCell<Panel>>,
-    quiet: &Ui,
-    expected: &Matrix,
-    [jacobian, inverse]: [&Matrix; 2],
-    step: f64,
-    way: &mut Way,
-) -> Result<Matrix, Ended> {
-    let motion = operator.motion().map_err(Ended::Refused)?.clone();
-    let along = |leg: usize, standing: &[f64; 6]| -> Option<[f64; 6]> {
-        let from = motion.platform(standing)?;
-        motion.user(&core::array::from_fn(|axis| from[axis] + inverse[axis][leg] * step))
-    };
-    begin(operator, Request::Run)?;
-    let since = Instant::now();
-    let start = loop {
-        heed(operator, panel)?;
-        let place = operator.place()?;
-        let runs = u64::from(place.phase) == Phase::Running.word();
-        if runs {
-            let shown = times(expected, &times(jacobian, &motion.platform(&place.pose).unwrap_or(place.pose)));
-            way.seen(times(jacobian, &motion.platform(&place.target).unwrap_or(place.target)), shown);
-            if place.status & BUSY == 0 {
-                break place.target;
+    let first = operator.status().tick + u64::from(rules.arm_ticks);
+    begin(operator, Request::Arm)?;
+    let whole = f64::from(rules.arm_ticks) + 6.0 * f64::from(wiring.ticks);
+    let (since, limit) = (Instant::now(), PATIENCE + Duration::from_secs_f64(whole * period));
+    let verdict = loop {
+        operator.look()?;
+        if std::mem::take(&mut panel.borrow_mut().hall.ends) {
+            return refused("the check was ended".to_owned());
+        }
+        let legs = operator.status().tick.saturating_sub(first) / u64::from(wiring.ticks);
+        panel.borrow_mut().check["done"] = json!(legs.min(6));
+        let status = operator.session.status();
+        match phase(operator) {
+            Some(Phase::Holding | Phase::Running) => {
+                let what = match wiring.leg_gain {
+                    Some(_) => "Gauges and legs are as the spec says: sign, order and gain.",
+                    None => {
+                        "Gauges and legs are as the spec says: sign and order. Gains of legs are not tested until each has a record."
+                    }
+                };
+                break Verdict { good: true, what: what.to_owned(), mend: "" };
             }
-        }
-        let comes = u64::from(place.phase) == Phase::Holding.word() && since.elapsed() < COMES;
-        if !runs && !comes || since.elapsed() > PATIENCE {
-            return Err(Ended::Fault(format!(
-                "the platform does not come to its bias: the machine is {}",
-                operator.stands()
-            )));
+            Some(Phase::Faulted | Phase::RampingDown) if u64::from(status.cause) == Cause::Wiring.word() => {
+                let finding = Finding::of_word(u32::from(status.finding));
+                let what = format!("{}.", Named(finding, rules.alike()));
+                break Verdict { good: false, what, mend: said::mend(finding) };
+            }
+            Some(Phase::Faulted) => return Err(Ended::Fault(format!("the machine is {}", operator.stands()))),
+            _ if since.elapsed() > limit => return refused(format!("the machine is still {}", operator.stands())),
+            _ => std::thread::sleep(Duration::from_millis(2)),
         }
     };
-    let mut measured = [[0.0; 6]; 6];
-    for leg in 0..6 {
-        let before = readings(operator, panel, &motion, expected, jacobian)?;
-        let to = along(leg, &start).ok_or_else(|| Ended::Refused("a leg has no room".to_owned()))?;
-        operator.go(to)?;
-        operator.wait(Until::Arrived, PATIENCE, quiet)?;
-        let after = readings(operator, panel, &motion, expected, jacobian)?;
-        for (row, (after, before)) in measured.iter_mut().zip(after.iter().zip(before)) {
-            row[leg] = (after - before) / step;
-        }
-        operator.go(start)?;
-        operator.wait(Until::Arrived, PATIENCE, quiet)?;
-        panel.borrow_mut().check = json!({ "runs": true, "done": leg + 1 });
-    }
-    Ok(measured)
-}
-
-/// Looks, which serves the pages, and ends where one asks for it.
-fn heed<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Panel>>) -> Result<(), Ended> {
-    operator.look()?;
-    if std::mem::take(&mut panel.borrow_mut().hall.ends) {
-        return Err(Ended::Refused("the check was ended".to_owned()));
-    }
-    std::thread::sleep(Duration::from_millis(2));
-    Ok(())
-}
-
-/// The same, and ends where the machine does not run.
-fn looked<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Panel>>) -> Result<(), Ended> {
-    heed(operator, panel)?;
-    if u64::from(operator.phase()) != Phase::Running.word() {
-        return Err(Ended::Fault(format!(
-            "the machine is {}: gauges or legs are not as the spec says, or something holds the platform",
-            operator.stands()
-        )));
-    }
-    Ok(())
-}
-
-/// What the gauges show, m: the mean of some looks, from the pose that the controller makes of them.
-fn readings<P: Port + 'static>(
-    operator: &mut Operator<P>,
-    panel: &Rc<RefCell<Panel>>,
-    motion: &Motion,
-    per_leg: &Matrix,
-    jacobian: &Matrix,
-) -> Result<[f64; 6], Ended> {
-    let since = Instant::now();
-    while since.elapsed() < SETTLE {
-        looked(operator, panel)?;
-    }
-    let mut pose = [0.0; 6];
-    for _ in 0..READINGS {
-        looked(operator, panel)?;
-        let place = operator.place()?;
-        let from_rest = motion.platform(&place.pose).unwrap_or(place.pose);
-        for (sum, value) in pose.iter_mut().zip(from_rest) {
-            *sum += value / f64::from(READINGS);
-        }
-    }
-    Ok(times(per_leg, &times(jacobian, &pose)))
+    let kind = if verdict.good { "note" } else { "error" };
+    let mut panel = panel.borrow_mut();
+    panel.hall.note(kind, &format!("Wiring check: {}", verdict.what), verdict.mend, None);
+    panel.check = json!({ "runs": false, "done": 6, "verdict": verdict });
+    Ok(json!(verdict))
 }

@@ -64,7 +64,7 @@ pub enum Asked {
     Download {
         id: u32,
     },
-    /// The first-power check.
+    /// The wiring check.
     Check {
         id: u32,
     },

@@ -101,8 +101,8 @@ pub(super) fn carry_out<P: Port + 'static>(
             Ok(json!(record.len()))
         }
         Asked::Check { .. } => {
-            panel.borrow_mut().hall.note("note", &format!("Page {page} began the first-power check."), "", None);
-            let checked = check::run(operator, panel, quiet);
+            panel.borrow_mut().hall.note("note", &format!("Page {page} began the wiring check."), "", None);
+            let checked = check::run(operator, panel);
             panel.borrow_mut().check["runs"] = json!(false);
             checked
         }

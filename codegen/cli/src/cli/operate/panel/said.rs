@@ -5,7 +5,7 @@ use specgen_language::model::Model;
 use specgen_link::Status;
 use specgen_operate::GAUGES;
 use specgen_runtime::setpoint::{BUSY, REFUSED, STALE};
-use specgen_runtime::supervisor::{Cause, Phase};
+use specgen_runtime::supervisor::{Cause, Fault, Finding, Named, Phase};
 
 /// Kind of a mark (`ok`, `note`, `warning`, `error`), what is so, what to do, and the number of the cause with its limit.
 pub struct Said {
@@ -37,6 +37,27 @@ fn cause(cause: Cause) -> (&'static str, &'static str) {
         Cause::Converter => ("A converter does not answer.", "Check its supply and cables."),
         Cause::EmergencyStop => ("The hardware stop is pressed.", "Release it when it is safe."),
         Cause::HostGone => ("The host was gone for too long.", "Check the link."),
+        Cause::Wiring => ("Gauges or legs are not wired as the spec says.", "Mend it with the amplifiers off."),
+    }
+}
+
+/// What to do about what the wiring check found.
+pub fn mend(finding: Finding) -> &'static str {
+    match finding {
+        Finding::None => "",
+        Finding::Gauge(_, Fault::Inverted) => "Exchange the wires of the gauge, or turn its `direction` in the spec.",
+        Finding::Gauge(_, Fault::Dead) => "Check cable and supply of the gauge.",
+        Finding::Gauge(_, Fault::Swapped(_)) => {
+            "Exchange the cables of the two gauges, or their `[[gauge]]` in the spec."
+        }
+        Finding::Gauge(_, Fault::Gain(_)) => "Check `sensor.range` or its calibration, and the range of its converter.",
+        Finding::Leg(_, Fault::Inverted) => "Exchange the wires of the stack.",
+        Finding::Leg(_, Fault::Dead) => "Check amplifier, cable and bolts of the leg.",
+        Finding::Leg(_, Fault::Swapped(_)) => "Exchange the amplifier cables of the two legs.",
+        Finding::Leg(_, Fault::Gain(_)) => "Check the amplifier's gain, `dac.range` and the record of the leg.",
+        Finding::Nothing => "Check the supplies of amplifiers and gauges, and that stacks are connected.",
+        Finding::Unexplained => "Check gauge by gauge and leg by leg, with the others unplugged.",
+        Finding::NoRoom => "Widen `code_min` and `code_max`.",
     }
 }
 
@@ -58,9 +79,16 @@ fn limit(of: Cause, rules: &Supervision, model: &Model) -> Option<String> {
 
 /// The same of a machine with this status.
 pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
+    let finding = Finding::of_word(u32::from(status.finding));
     let phase = Phase::from_word(u64::from(status.phase));
     let of = Cause::from_word(u64::from(status.cause)).unwrap_or(Cause::None);
-    let (what, mend) = cause(of);
+    let (what, mend) = match cause(of) {
+        (what, _) if finding != Finding::None => {
+            (format!("{what} The wiring check found: {}.", Named(finding, rules.alike())), mend(finding))
+        }
+        (what, mend) => (what.to_owned(), mend),
+    };
+    let what = what.as_str();
     let code = (of != Cause::None).then(|| {
         let limit = limit(of, rules, model).map_or(String::new(), |limit| format!(" · {limit}"));
         format!("cause {}{limit}", of.word())
@@ -68,7 +96,7 @@ pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
     let said = |kind, what: &str, advice| Said { kind, what: what.to_owned(), advice, code: code.clone() };
     match phase {
         Some(Phase::Disarmed) => said("note", "Disarmed. Amplifiers are off.", "To begin: arm, then run."),
-        Some(Phase::Arming) => said("note", "Arming. Gauges and model are compared.", "Run may be asked for now."),
+        Some(Phase::Arming) => said("note", "Arming. The wiring is checked, leg by leg.", "Run may be asked for now."),
         Some(Phase::Running) => {
             let bits = status.status & !BUSY;
             let (kind, what, advice) = if bits & REFUSED != 0 {

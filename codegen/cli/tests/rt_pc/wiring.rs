@@ -1,0 +1,76 @@
+//! A machine that is wired wrongly: the real-time program refuses to run it and names the fault, for its hosts and in its summary, and
+//! the record of the checks replays to the bit.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Command, Stdio};
+
+use rustix::process::Signal;
+use specgen::lower::single_faults;
+use specgen_runtime::supervisor::{Fault, Finding};
+
+use super::{Bench, Running, wait_for};
+
+const REFUSED: &str = ": faulted: wiring, ";
+
+#[test]
+fn every_single_fault_of_gauges_and_legs_is_refused_and_named() {
+    let bench = Bench::named("reference.toml", "wiring");
+    let faults: Vec<Finding> = single_faults().into_iter().step_by(crate::support::length(11, 1)).collect();
+    let name = format!("{}-wrong", bench.name);
+    let mut plant = Command::new(env!("CARGO_BIN_EXE_specgen"));
+    plant.arg("plant").arg(&bench.spec).args(["--name", &name]).stdout(Stdio::null()).stderr(Stdio::null());
+    for fault in &faults {
+        plant.args(["--wrong", &fault.to_string().replace('×', "x")]);
+    }
+    let mut plant = plant.spawn().unwrap();
+    let place = std::path::Path::new("/dev/shm").join(format!("specgen-plant-{name}"));
+    wait_for("the machine", || place.exists());
+    let link = bench.path("wiring.link");
+    let mut command = Command::new(&bench.programs.binary);
+    command
+        .args(["--sim", &name, "--allow-no-rt", "--elastic", "--sim-timeout", "10000", "--json", "--record"])
+        .arg(bench.path("wiring.rec"));
+    let running = Running::new(command.arg("--link").arg(&link));
+    wait_for("the link", || link.exists());
+    let mut operate = Command::new(env!("CARGO_BIN_EXE_specgen"));
+    operate.arg("operate").arg("--socket").arg(&link).arg(&bench.spec);
+    let mut host = operate.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(host.stdout.take().unwrap()).lines();
+    let mut order = |orders: &str, words: &str| {
+        writeln!(host.stdin.as_mut().unwrap(), "{orders}").unwrap();
+        lines.by_ref().map(Result::unwrap).find(|line| line.contains(words)).unwrap_or_else(|| panic!("no {words}"))
+    };
+    for fault in &faults {
+        let line = order("arm\nwait faulted 60\nstatus", REFUSED);
+        let found = line.split(REFUSED).nth(1).unwrap();
+        assert!(is_named(found, *fault), "{fault}: {line}");
+        assert!(line.contains("amplifiers off"), "{line}");
+        order("acknowledge\nwait disarmed 60\nnone\nstatus", ": disarmed");
+    }
+    // The last fault was mended.
+    order("arm\nwait holding 60\nstatus", ": holding");
+    order("ramp-down\nwait disarmed 60\nstatus", ": disarmed");
+    drop(host.stdin.take());
+    host.wait().unwrap();
+    let (summary, _) = bench.check(&running.end(Signal::TERM), "wiring.rec");
+    let incidents = summary["incidents"].as_array().unwrap();
+    assert_eq!(incidents.len(), faults.len(), "{summary}");
+    for (incident, fault) in incidents.iter().zip(&faults) {
+        let why = incident["why"].as_str().and_then(|why| why.strip_prefix("wiring, ")).unwrap();
+        assert!(is_named(why, *fault), "{fault}: {incident}");
+    }
+    plant.kill().unwrap();
+    plant.wait().unwrap();
+    let _ = fs::remove_file(place);
+}
+
+/// Whether a text begins with the words of the fault; of a gain, with one that is as wrong.
+fn is_named(text: &str, fault: Finding) -> bool {
+    let (Finding::Gauge(_, Fault::Gain(made)) | Finding::Leg(_, Fault::Gain(made))) = fault else {
+        return text.starts_with(&fault.to_string());
+    };
+    let words = fault.to_string().split_inclusive("× ").next().unwrap().to_owned();
+    let gain = text.strip_prefix(&words).and_then(|rest| rest.get(..4)).and_then(|gain| gain.parse::<f64>().ok());
+    gain.is_some_and(|gain| if made < 100 { (0.3..0.72).contains(&gain) } else { (1.42..2.8).contains(&gain) })
+}

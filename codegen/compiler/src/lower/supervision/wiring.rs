@@ -1,0 +1,323 @@
+//! The wiring check: the pulse of a leg, the weights of its samples, and the faults that look alike on this geometry.
+
+use super::{defaults, finding, rest, whole};
+use crate::figure::figure;
+use crate::ir::{Actuation, Hysteresis, Scalar, Supervision, Wiring};
+use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::model::{LegMakes, Model};
+use specgen_numerics::Factor;
+use specgen_runtime::supervisor::{self, Fault, Finding, Response, with};
+
+/// Fewest ticks of a leg.
+const FEWEST: f64 = 40.0;
+/// Hz. A pulse of 50 ms holds three periods of 60 Hz, which leave nothing in it.
+const MAINS: f64 = 50.0;
+/// A period of the mains takes as many ticks at least, or it is not told from the pulse.
+const MAINS_TICKS: f64 = 4.0;
+/// Least gain of small motions over that of large ones, stiff joints and legs of little gain included.
+const LEAST_GAIN: f64 = 0.4;
+/// Part of what a gauge or leg shows that its noise may be, rms.
+const NOISE: f64 = 0.03;
+/// Gains of a gauge or leg that is faulty, hundredths.
+const GAINS: [u32; 2] = [50, 200];
+
+/// Constants of the check; none where the spec switches it off. `readings`: of each gauge (rows) per displacement of each leg.
+pub(super) fn lower(
+    model: &Model,
+    hysteresis: &Hysteresis,
+    actuation: &Actuation,
+    max_step: i32,
+    readings: &Response<f64>,
+    scalar: Scalar,
+    findings: &mut Vec<Diagnostic>,
+) -> Option<Wiring> {
+    let spec = &model.supervisor.wiring_check;
+    if spec.off.is_some() {
+        return None;
+    }
+    let period = model.timing.period;
+    let rest = rest::code(model, actuation);
+    let gain = model.actuator.leg_gain();
+    let volts = spec.amplitude * model.actuator.stroke / gain;
+    let [above, below] = [actuation.code_max - rest, rest - actuation.code_min];
+    let room = if above >= below { above } else { below };
+    // Saturates.
+    let height = (libm::round(volts / actuation.volts_per_code) as i32).clamp(1, if room > 1 { room } else { 1 });
+    // Ticks that the slew rate asks for where the pulse is steepest.
+    let steepest = libm::ceil(f64::from(height) * core::f64::consts::PI / f64::from(max_step) - 1e-9);
+    let least = period * if steepest > FEWEST { steepest } else { FEWEST };
+    let time = spec.time.unwrap_or(if least > defaults::WIRING_TIME { least } else { defaults::WIRING_TIME });
+    if time < least * (1.0 - 1e-9) {
+        findings.push(finding(
+            model,
+            codes::SUPERVISOR_TIME,
+            "wiring_check.time",
+            format!(
+                "a pulse of {:.6} ms is shorter than {FEWEST} periods and what `actuator.slew_rate` permits, {:.6} ms",
+                time * 1e3,
+                least * 1e3
+            ),
+            format!(
+                "leave wiring_check.time out: it is then {} ms; it must be at least {:.6} ms",
+                figure(libm::fmax(least, defaults::WIRING_TIME) * 1e3),
+                least * 1e3
+            ),
+        ));
+        return None;
+    }
+    let ticks = whole(libm::round(time / period));
+    let regression = Regression::new(ticks, period, model.amplifier.lag, model.sensor.lag);
+    let pulse = f64::from(height) * actuation.volts_per_code * gain;
+    let noise = noise(model, &regression.weights(), pulse, readings);
+    if noise > NOISE {
+        findings.push(Diagnostic::at(
+            &model.spans,
+            &["supervisor.wiring_check.amplitude", "supervisor.wiring_check", "sensor.noise", "sensor"],
+            codes::SUPERVISOR_BOUND,
+            format!(
+                "the gauges' noise makes {:.1} % of what a pulse of {:.4} um shows of a leg or gauge, more than {:.0} %",
+                noise * 1e2,
+                pulse * 1e6,
+                NOISE * 1e2
+            ),
+            format!(
+                "write wiring_check.amplitude = {} or more, or wiring_check.time = \"{:.0} ms\" or more, in [supervisor]",
+                figure(spec.amplitude * noise / NOISE * 1.05 + 1e-4),
+                time * 1e3 * (noise / NOISE) * (noise / NOISE) * 1.1 + 1.0
+            ),
+        ));
+        return None;
+    }
+    let identified = hysteresis.tables.len() > 1;
+    let compares = identified || spec.legs == LegMakes::Alike;
+    let round = |value: f64| scalar.round(value);
+    let signed = if above >= below { height } else { -height };
+    // Where the pulse goes down the gauges do, too, and u is its depth.
+    let per_leg = legs(hysteresis, actuation, [rest, rest + signed]);
+    let mut wiring = Wiring {
+        ticks,
+        height: signed,
+        turn: regression.turn.map(|turn| turn.map(round)),
+        lag: regression.lag.map(round),
+        weights: regression.coefficients.map(round),
+        per_metre: per_leg.map(|leg| round(f64::from(signed.signum()) / (pulse * leg))),
+        gauge_gain: spec.gauge_gain.map(round),
+        leg_gain: compares.then(|| spec.leg_gain.map(round)),
+        residual: round(spec.residual * spec.residual),
+        alike: Vec::new(),
+        unseen: Vec::new(),
+        turned: Vec::new(),
+    };
+    let constants = runtime(&wiring);
+    (wiring.alike, wiring.unseen) = alike(&constants, readings);
+    wiring.turned = turned(&constants, readings);
+    Some(wiring)
+}
+
+/// As the controller has them.
+fn runtime(wiring: &Wiring) -> supervisor::Wiring<f64> {
+    supervisor::Wiring {
+        ticks: wiring.ticks,
+        height: wiring.height,
+        turn: wiring.turn,
+        lag: wiring.lag,
+        weights: wiring.weights,
+        per_metre: wiring.per_metre,
+        gauge_gain: wiring.gauge_gain,
+        leg_gain: wiring.leg_gain,
+        residual: wiring.residual,
+    }
+}
+
+/// What a leg moves at the pulse by its own table, over the mean of all: legs that were measured one by one are held against their own.
+fn legs(hysteresis: &Hysteresis, actuation: &Actuation, codes: [i32; 2]) -> [f64; 6] {
+    let drive = |code: i32| actuation.cells_at_zero + f64::from(code) * actuation.cells_per_code;
+    let moves: Vec<f64> = hysteresis
+        .tables
+        .iter()
+        .map(|table| {
+            let [from, to] = codes.map(|code| rest::first_rise(table, hysteresis.grid, drive(code), Scalar::F64));
+            libm::fabs(to - from)
+        })
+        .collect();
+    let moved = hysteresis.table_of_leg.map(|table| moves[table]);
+    let mean = moved.iter().sum::<f64>() / 6.0;
+    // A table that is flat there says nothing of its leg.
+    if moved.iter().all(|moved| *moved > 0.1 * mean) { moved.map(|moved| moved / mean) } else { [1.0; 6] }
+}
+
+/// What the samples of a leg are regressed on: the pulse as the gauges see it, its way, a constant, time, and the mains.
+struct Regression {
+    ticks: u32,
+    turn: [[f64; 2]; 2],
+    lag: [f64; 2],
+    coefficients: [f64; 6],
+}
+
+impl Regression {
+    fn new(ticks: u32, period: f64, amplifier_lag: f64, sensor_lag: f64) -> Self {
+        let circle = |turns: f64| {
+            let angle = 2.0 * core::f64::consts::PI * turns;
+            [libm::cos(angle), libm::sin(angle)]
+        };
+        // A code counts from the tick on that gave it, and the amplifier follows a staircase: at once where it has no lag.
+        let steps = if amplifier_lag > 0.0 { 1.0 / (1.0 - libm::exp(-period / amplifier_lag)) } else { 1.0 };
+        let delay = steps + sensor_lag / period;
+        let share = 1.0 / f64::from(ticks);
+        let has_mains = MAINS * period * MAINS_TICKS <= 1.0;
+        let mut regression = Self {
+            ticks,
+            turn: [circle(share), if has_mains { circle(MAINS * period) } else { [1.0, 0.0] }],
+            lag: circle(-delay * share),
+            coefficients: [0.0; 6],
+        };
+        let count = if has_mains { 6 } else { 4 };
+        let rows = regression.rows();
+        let gram = |a: usize, b: usize| rows.iter().map(|row| row[a] * row[b]).sum::<f64>();
+        if let Some(factor) = Factor::of(count, gram) {
+            let mut solution = vec![0.0; count];
+            solution[0] = 1.0;
+            factor.solve(&mut solution);
+            regression.coefficients[..count].copy_from_slice(&solution);
+        }
+        regression
+    }
+
+    /// The regressors of every tick, in the order of the weights of [`supervisor::Wiring`].
+    fn rows(&self) -> Vec<[f64; 6]> {
+        let rotated = |[x, y]: [f64; 2], [cosine, sine]: [f64; 2]| [x * cosine - y * sine, y * cosine + x * sine];
+        let [mut pulse, mut mains] = [[1.0, 0.0]; 2];
+        (0..self.ticks)
+            .map(|tick| {
+                let [cosine, sine] = rotated(pulse, self.lag);
+                let along = (1.0 - cosine) * 0.5;
+                let way = if sine < 0.0 { 2.0 - along } else { along };
+                let row = [along, way, 1.0, f64::from(tick) / f64::from(self.ticks), mains[0], mains[1]];
+                pulse = rotated(pulse, self.turn[0]);
+                mains = rotated(mains, self.turn[1]);
+                row
+            })
+            .collect()
+    }
+
+    /// Of every sample.
+    fn weights(&self) -> Vec<f64> {
+        self.rows().iter().map(|row| row.iter().zip(&self.coefficients).map(|(a, b)| a * b).sum()).collect()
+    }
+}
+
+/// What noise makes of what the least moved gauge or leg shows, rms.
+fn noise(model: &Model, weights: &[f64], pulse: f64, readings: &Response<f64>) -> f64 {
+    let [low, high] = model.sensor.range;
+    let step = (high - low) / libm::exp2(f64::from(model.sensor.bits));
+    let of_reading = libm::sqrt(model.sensor.noise * model.sensor.noise + step * step / 12.0);
+    let of_entry = of_reading / pulse * libm::sqrt(weights.iter().map(|weight| weight * weight).sum());
+    let size = |entries: [f64; 6]| libm::sqrt(entries.iter().map(|entry| entry * entry).sum());
+    let rows = readings.iter().map(|row| size(*row));
+    let columns = (0..6).map(|leg| size(core::array::from_fn(|gauge| readings[gauge][leg])));
+    let least = rows.chain(columns).fold(f64::INFINITY, |least, size| if size < least { size } else { least });
+    of_entry / (LEAST_GAIN * least)
+}
+
+/// Every single fault of a gauge or a leg.
+#[must_use]
+pub fn single_faults() -> Vec<Finding> {
+    let one = [Fault::Inverted, Fault::Dead, Fault::Gain(GAINS[0]), Fault::Gain(GAINS[1])];
+    let kinds: [fn(u32, Fault) -> Finding; 2] = [Finding::Gauge, Finding::Leg];
+    let mut all = Vec::new();
+    for kind in kinds {
+        for place in 0..6 {
+            all.extend(one.map(|fault| kind(place, fault)));
+            all.extend((place + 1..6).map(|other| kind(place, Fault::Swapped(other))));
+        }
+    }
+    all
+}
+
+fn is_dead(fault: Finding) -> bool {
+    matches!(fault, Finding::Gauge(_, Fault::Dead) | Finding::Leg(_, Fault::Dead))
+}
+
+/// Places by which the connectors of gauges and legs may both be turned without the check seeing it.
+fn turned(wiring: &supervisor::Wiring<f64>, readings: &Response<f64>) -> Vec<[usize; 2]> {
+    let ways = (1..36).map(|way| [way / 6, way % 6]);
+    let shown = |[gauges, legs]: [usize; 2]| -> Response<f64> {
+        core::array::from_fn(|gauge| core::array::from_fn(|leg| 0.7 * readings[(gauge + gauges) % 6][(leg + legs) % 6]))
+    };
+    ways.filter(|way| supervisor::explains(wiring, readings, &shown(*way))).collect()
+}
+
+/// Sets of faults that look alike to the check, and those that it does not see, as words.
+fn alike(wiring: &supervisor::Wiring<f64>, readings: &Response<f64>) -> (Vec<Vec<u32>>, Vec<u32>) {
+    let faults = single_faults();
+    let small = |response: Response<f64>| response.map(|row| row.map(|entry| 0.7 * entry));
+    let (mut sets, mut unseen): (Vec<Vec<u32>>, Vec<u32>) = (Vec::new(), Vec::new());
+    for fault in &faults {
+        let shown = small(with(readings, *fault));
+        if supervisor::explains(wiring, readings, &shown) {
+            unseen.push(fault.word());
+        }
+        // The first that looks like it leads its set.
+        if sets.iter().any(|set| set.contains(&fault.word())) {
+            continue;
+        }
+        let looks_like = |other: &Finding| {
+            let [one, two] = [*fault, *other].map(|fault| small(with(readings, fault)));
+            match [is_dead(*fault), is_dead(*other)] {
+                [true, true] => one == two,
+                [false, false] => supervisor::explains(wiring, &with(readings, *other), &shown),
+                _ => false,
+            }
+        };
+        let others = faults.iter().filter(|other| looks_like(other));
+        let mut set: Vec<u32> = others.map(|other| other.word()).collect();
+        if !set.contains(&fault.word()) {
+            set.insert(0, fault.word());
+        }
+        if set.len() > 1 {
+            sets.push(set);
+        }
+    }
+    (sets, unseen)
+}
+
+/// What the wiring check does and does not tell, a line each.
+#[must_use]
+pub fn describe(model: &Model, supervision: &Supervision) -> String {
+    let Some(wiring) = &supervision.wiring else {
+        let reason = model.supervisor.wiring_check.off.as_deref().unwrap_or_default();
+        return format!(
+            "  wiring check: off ({reason}); nothing tells that gauges and legs have the right sign and order\n"
+        );
+    };
+    let name = |word: &u32| Finding::of_word(*word).to_string();
+    let volts =
+        f64::from(wiring.height) * (model.dac.range[1] - model.dac.range[0]) / f64::from((1_i32 << model.dac.bits) - 1);
+    let mut text = format!(
+        "  wiring check: each leg makes a pulse of {volts:.3} V, {:.3} um, for {:.1} ms; {:.2} s in all while arming\n",
+        libm::fabs(volts) * model.actuator.leg_gain() * 1e6,
+        f64::from(wiring.ticks) * model.timing.period * 1e3,
+        6.0 * f64::from(wiring.ticks) * model.timing.period
+    );
+    if wiring.leg_gain.is_none() {
+        text.push_str("    gains of legs are not tested until each leg has a record of its own (hysteresis.records)\n");
+    }
+    let alike = match wiring.alike.len() {
+        0 => "    no single fault of a gauge or leg looks like another on this geometry\n".to_owned(),
+        count => format!("    {count} sets of faults look alike on this geometry:\n"),
+    };
+    text.push_str(&alike);
+    for set in &wiring.alike {
+        text.push_str(&format!("      {}\n", set.iter().map(name).collect::<Vec<_>>().join(", ")));
+    }
+    if !wiring.unseen.is_empty() {
+        text.push_str(&format!("    not seen: {}\n", wiring.unseen.iter().map(name).collect::<Vec<_>>().join(", ")));
+    }
+    for [gauges, legs] in &wiring.turned {
+        text.push_str(&format!(
+            "    not seen: the connectors of all gauges turned by {gauges} places, those of all legs by {legs}\n"
+        ));
+    }
+    text.push_str("    not seen: a common factor of all gauges\n");
+    text
+}

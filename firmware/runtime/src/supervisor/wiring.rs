@@ -1,0 +1,487 @@
+//! The wiring check: before feedback is allowed, each leg in turn makes a small pulse, and what the gauges show of it is held
+//! against the Jacobian.
+//!
+//! ```text
+//! one leg    u = (1 − cos θ)/2 of the pulse, θ once around; of every gauge the part along u, beside the way of u (hysteresis),
+//!            a constant, a drift and the mains: a weight for each sample, known before          → a column of the response Y
+//! all legs   Y ≈ diag(a) S diag(b): S readings per leg displacement, a gains of the gauges, b of the legs
+//! ```
+//! A gauge or leg whose gain leaves its range is named. What no gains explain is tried with one gauge inverted, or two gauges or two
+//! legs swapped: what explains it best is named. The response is in the spec's displacement of a leg at the pulse, which makes
+//! b the gain of small motions over the spec's; a common factor of all gauges is not seen, it is in b.
+
+use core::fmt;
+
+use crate::linear::component;
+use crate::real::{Real, saturate};
+use crate::snapshot::LARGEST;
+
+/// Readings of the gauges (rows) per displacement of the legs (columns).
+pub type Response<T> = [[T; 6]; 6];
+
+/// Constants of the check; from `supervisor.wiring_check`.
+#[derive(Debug, Clone, Copy)]
+pub struct Wiring<T> {
+    /// Ticks of a leg, ≥ 8.
+    pub ticks: u32,
+    /// Height of the pulse, codes; below zero where there is no room above rest.
+    pub height: i32,
+    /// Cosine and sine of a tick's part of the pulse, then of the mains.
+    pub turn: [[T; 2]; 2],
+    /// Cosine and sine of what the readings lag, of the pulse.
+    pub lag: [T; 2],
+    /// Weights of u, of its way, of a constant, of the time (0 to 1), of the mains' cosine and sine: their sum is the weight of a
+    /// sample.
+    pub weights: [T; 6],
+    /// Of each leg, what its response is counted in: one over the displacement that the spec has for it at the pulse, 1/m.
+    pub per_metre: [T; 6],
+    /// Lowest and highest gain of a gauge over the median of all.
+    pub gauge_gain: [T; 2],
+    /// Lowest and highest gain of a leg over the mean of the five others; none where legs differ and nobody knows by how much.
+    pub leg_gain: Option<[T; 2]>,
+    /// Largest part of the response that no gains explain, squared.
+    pub residual: T,
+}
+
+/// Below this gain a leg is dead; of the gauges likewise. Creep and hysteresis leave half of it and more.
+const DEAD: f64 = 0.16;
+/// Gains of gauges that are looked for.
+const GAUGE: [f64; 2] = [0.05, 8.0];
+/// Rounds of the fit: gains that are 2 come out as 1.8 at least on the reference platform.
+const ROUNDS: usize = 8;
+/// What is tried beyond gains: six gauges inverted, fifteen pairs of gauges, fifteen of legs.
+const TRIALS: u32 = 36;
+
+/// What is wrong with one gauge, or one leg.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fault {
+    /// It shows or moves the wrong way.
+    Inverted,
+    /// It shows or moves nothing.
+    Dead,
+    /// It has the place of that one.
+    Swapped(u32),
+    /// It shows or moves so many hundredths of what it should.
+    Gain(u32),
+}
+
+/// What a check found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Finding {
+    /// Nothing, or none was made.
+    None,
+    /// One gauge (0 to 5).
+    Gauge(u32, Fault),
+    /// One leg (0 to 5).
+    Leg(u32, Fault),
+    /// No gauge shows any leg.
+    Nothing,
+    /// No single fault explains the response.
+    Unexplained,
+    /// The limits of the codes leave no room for the pulse.
+    NoRoom,
+}
+
+const UNEXPLAINED: u32 = 0x7fff;
+const NO_ROOM: u32 = 0x7ffe;
+const NOTHING: u32 = 0x7ffd;
+const SUBJECTS: u32 = 12;
+const FIRST_GAIN: u32 = 8;
+/// Largest gain that a word has, hundredths.
+const LARGEST_GAIN: u32 = 2000;
+
+impl Finding {
+    /// Bits that a word takes.
+    pub const BITS: u32 = 15;
+
+    /// As a word of [`Finding::BITS`] bits; 0 is none.
+    #[must_use]
+    pub const fn word(self) -> u32 {
+        let (subject, fault) = match self {
+            Self::None => return 0,
+            Self::Nothing => return NOTHING,
+            Self::Unexplained => return UNEXPLAINED,
+            Self::NoRoom => return NO_ROOM,
+            Self::Gauge(gauge, fault) => (gauge, fault),
+            Self::Leg(leg, fault) => (6 + leg, fault),
+        };
+        let kind = match fault {
+            Fault::Inverted => 0,
+            Fault::Dead => 1,
+            Fault::Swapped(other) => 2 + other,
+            Fault::Gain(gain) => FIRST_GAIN + if gain > LARGEST_GAIN { LARGEST_GAIN } else { gain },
+        };
+        1 + subject + SUBJECTS * kind
+    }
+
+    /// The inverse of [`Finding::word`]; a word that is none is unexplained.
+    #[must_use]
+    pub const fn of_word(word: u32) -> Self {
+        match word {
+            0 => return Self::None,
+            NOTHING => return Self::Nothing,
+            NO_ROOM => return Self::NoRoom,
+            _ => {}
+        }
+        let (subject, kind) = ((word - 1) % SUBJECTS, (word - 1) / SUBJECTS);
+        let fault = match kind {
+            0 => Fault::Inverted,
+            1 => Fault::Dead,
+            2..FIRST_GAIN => Fault::Swapped(kind - 2),
+            _ if kind - FIRST_GAIN > LARGEST_GAIN => return Self::Unexplained,
+            _ => Fault::Gain(kind - FIRST_GAIN),
+        };
+        if subject < 6 { Self::Gauge(subject, fault) } else { Self::Leg(subject - 6, fault) }
+    }
+}
+
+impl Finding {
+    /// Whether that word is the same fault; of gains, too little or too much.
+    fn is_like(self, word: u32) -> bool {
+        let less = |gain: u32| gain < 100;
+        match (self, Self::of_word(word)) {
+            (Self::Gauge(a, Fault::Gain(one)), Self::Gauge(b, Fault::Gain(two)))
+            | (Self::Leg(a, Fault::Gain(one)), Self::Leg(b, Fault::Gain(two))) => a == b && less(one) == less(two),
+            (one, two) => one == two,
+        }
+    }
+}
+
+/// In words for people; empty where there is none.
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (what, place, fault) = match self {
+            Self::None => return Ok(()),
+            Self::Nothing => return f.write_str("no gauge shows any leg"),
+            Self::Unexplained => return f.write_str("more than one fault of gauges or legs"),
+            Self::NoRoom => return f.write_str("the code limits leave no room for the pulse"),
+            Self::Gauge(gauge, fault) => ("gauge", gauge, fault),
+            Self::Leg(leg, fault) => ("leg", leg, fault),
+        };
+        match fault {
+            Fault::Inverted => write!(f, "{what} {place} inverted"),
+            Fault::Dead => write!(f, "{what} {place} dead"),
+            Fault::Swapped(other) => write!(f, "{what} {place} swapped with {what} {other}"),
+            Fault::Gain(gain) => write!(f, "{what} {place} gain × {}.{:02}", gain / 100, gain % 100),
+        }
+    }
+}
+
+/// A finding, and what looks like it on a geometry with these sets of alike faults, in words for people.
+#[derive(Debug, Clone, Copy)]
+pub struct Named<'a, S>(pub Finding, pub &'a [S]);
+
+impl<S: AsRef<[u32]>> fmt::Display for Named<'_, S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(finding, alike) = self;
+        fmt::Display::fmt(finding, f)?;
+        for other in
+            alike.iter().map(AsRef::as_ref).filter(|set| set.iter().any(|word| finding.is_like(*word))).flatten()
+        {
+            if !finding.is_like(*other) {
+                write!(f, ", or {}", Self::of_gain(*finding, Finding::of_word(*other)))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<S> Named<'_, S> {
+    /// What looks like it, with the gain that was found.
+    fn of_gain(finding: Finding, other: Finding) -> Finding {
+        match (finding, other) {
+            (
+                Finding::Gauge(_, gain @ Fault::Gain(_)) | Finding::Leg(_, gain @ Fault::Gain(_)),
+                Finding::Gauge(gauge, _),
+            ) => Finding::Gauge(gauge, gain),
+            (
+                Finding::Gauge(_, gain @ Fault::Gain(_)) | Finding::Leg(_, gain @ Fault::Gain(_)),
+                Finding::Leg(leg, _),
+            ) => Finding::Leg(leg, gain),
+            _ => other,
+        }
+    }
+}
+
+crate::state! { |words|
+    /// A check under way.
+    pub struct Check<T>[T: Real] {
+        /// The leg that moves, 0 to 5; then 6, while what it gave is judged.
+        pub leg: usize = 0, place(6);
+        /// Ticks of this leg, or trials, that are done.
+        pub tick: u32 = 0, tally;
+        /// Cosine and sine of θ, then of the mains.
+        pub turned: [[T; 2]; 2] = [[T::ONE, T::ZERO]; 2], rows(2.0);
+        /// What the gauges showed (rows) of each leg (columns), in the spec's displacement of a leg at the pulse.
+        pub response: Response<T> = [[T::ZERO; 6]; 6], rows(LARGEST);
+        /// Least that a trial left unexplained so far.
+        pub least: T = T::ONE, number(2.0);
+        /// Word of the finding of that trial; after the check, of the check.
+        pub finding: u32 = 0, tally;
+        /// It is over.
+        pub done: bool = false, set;
+    }
+}
+
+impl<T: Real> Check<T> {
+    /// Codes by which a leg is away from rest.
+    #[inline]
+    #[must_use]
+    pub fn pulse(&self, wiring: &Wiring<T>, leg: usize) -> i32 {
+        if leg != self.leg || self.done {
+            return 0;
+        }
+        let height = (T::ONE - self.turned[0][0]) * T::HALF * T::from_i32(wiring.height);
+        if wiring.height < 0 { (height - T::HALF).truncate() } else { (height + T::HALF).truncate() }
+    }
+
+    /// Takes the readings (m, finite) of a tick, or goes on to judge them. `expected`: readings per leg displacement.
+    #[cold]
+    #[inline(never)]
+    pub fn tick(&mut self, wiring: &Wiring<T>, expected: &Response<T>, readings: &[T; 6]) {
+        if self.leg < 6 {
+            self.sample(wiring, readings);
+        } else if !self.done {
+            self.judge(wiring, expected);
+        }
+    }
+
+    fn sample(&mut self, wiring: &Wiring<T>, readings: &[T; 6]) {
+        let leg = if self.leg < 6 { self.leg } else { 0 };
+        let [pulse, mains] = &mut self.turned;
+        let [cosine, sine] = rotated(*pulse, wiring.lag);
+        let along = (T::ONE - cosine) * T::HALF;
+        let way = if sine < T::ZERO { T::ONE + T::ONE - along } else { along };
+        let time = T::from_i32(self.tick as i32) / T::from_i32(wiring.ticks as i32);
+        let [of_pulse, of_way, constant, of_time, of_cosine, of_sine] = wiring.weights;
+        let weight =
+            of_pulse * along + of_way * way + constant + of_time * time + of_cosine * mains[0] + of_sine * mains[1];
+        let weight = weight * component(&wiring.per_metre, leg);
+        for (row, reading) in self.response.iter_mut().zip(readings) {
+            row[leg] = row[leg] + weight * *reading;
+        }
+        let [of_pulse, of_mains] = wiring.turn;
+        *pulse = rotated(*pulse, of_pulse);
+        *mains = rotated(*mains, of_mains);
+        self.tick = self.tick.saturating_add(1);
+        if self.tick >= wiring.ticks {
+            self.turned = [[T::ONE, T::ZERO]; 2];
+            self.tick = 0;
+            self.leg = leg + 1;
+        }
+    }
+
+    /// One fit a tick: of gains first, then of what may be inverted or swapped.
+    fn judge(&mut self, wiring: &Wiring<T>, expected: &Response<T>) {
+        let trial = trial(self.tick);
+        let fit = Fit::of(&self.response, &with(expected, trial));
+        let explains = fit.residual <= wiring.residual;
+        if self.tick == 0 {
+            self.done = explains || fit.nothing;
+            self.finding = if fit.nothing {
+                NOTHING
+            } else if explains {
+                fit.finding(wiring).word()
+            } else {
+                UNEXPLAINED
+            };
+        } else {
+            if fit.residual < self.least && explains && fit.finding(wiring) == Finding::None {
+                self.least = fit.residual;
+                self.finding = trial.word();
+            }
+            self.done = self.tick >= TRIALS;
+        }
+        self.tick = self.tick.saturating_add(1);
+    }
+}
+
+/// A vector of the plane, turned.
+#[inline]
+fn rotated<T: Real>([x, y]: [T; 2], [cosine, sine]: [T; 2]) -> [T; 2] {
+    [x * cosine - y * sine, y * cosine + x * sine]
+}
+
+/// What a trial of [`Check::judge`] takes to be wrong: nothing, then gauges inverted, pairs of gauges swapped, pairs of legs.
+fn trial(number: u32) -> Finding {
+    if number == 0 {
+        return Finding::None;
+    }
+    if number <= 6 {
+        return Finding::Gauge(number - 1, Fault::Inverted);
+    }
+    let mut pair = (number - 7) % 15;
+    let mut first = 0;
+    while pair >= 5 - first {
+        pair -= 5 - first;
+        first += 1;
+    }
+    let fault = Fault::Swapped(first + 1 + pair);
+    if number < 22 { Finding::Gauge(first, fault) } else { Finding::Leg(first, fault) }
+}
+
+/// What the gauges show of legs whose machine has this fault; a gain of 0 where it is dead.
+#[must_use]
+pub fn with<T: Real>(expected: &Response<T>, finding: Finding) -> Response<T> {
+    let mut shown = *expected;
+    let (of_gauge, subject, fault) = match finding {
+        Finding::Gauge(gauge, fault) => (true, gauge as usize, fault),
+        Finding::Leg(leg, fault) => (false, leg as usize, fault),
+        _ => return shown,
+    };
+    let (other, gain) = match fault {
+        Fault::Inverted => (subject, -T::ONE),
+        Fault::Dead => (subject, T::ZERO),
+        Fault::Swapped(other) => (other as usize, T::ONE),
+        Fault::Gain(gain) => (subject, T::from_i32(gain as i32) / T::from_i32(100)),
+    };
+    for (gauge, row) in shown.iter_mut().enumerate() {
+        for (leg, entry) in row.iter_mut().enumerate() {
+            let place = if of_gauge { gauge } else { leg };
+            let from = if place == subject {
+                other
+            } else if place == other {
+                subject
+            } else {
+                continue;
+            };
+            let [row, column] = if of_gauge { [from, leg] } else { [gauge, from] };
+            *entry = gain * entry_of(expected, row, column);
+        }
+    }
+    shown
+}
+
+/// Whether gauges and legs that are good explain the `response` of a machine that shows `expected`: what the check lets pass.
+#[must_use]
+pub fn explains<T: Real>(wiring: &Wiring<T>, expected: &Response<T>, response: &Response<T>) -> bool {
+    let fit = Fit::of(response, expected);
+    fit.residual <= wiring.residual && fit.finding(wiring) == Finding::None
+}
+
+fn entry_of<T: Real>(matrix: &Response<T>, row: usize, column: usize) -> T {
+    match matrix.get(row) {
+        Some(row) => component(row, column),
+        None => T::ZERO,
+    }
+}
+
+/// diag(a) S diag(b), as near as may be to a response.
+struct Fit<T> {
+    gauges: [T; 6],
+    legs: [T; 6],
+    /// What it leaves of the response, in power.
+    residual: T,
+    /// The response is nothing.
+    nothing: bool,
+}
+
+impl<T: Real> Fit<T> {
+    fn of(response: &Response<T>, expected: &Response<T>) -> Self {
+        let (mut gauges, mut legs) = ([T::ONE; 6], [T::ZERO; 6]);
+        for round in 1..=ROUNDS {
+            for (leg, gain) in legs.iter_mut().enumerate() {
+                let column = |matrix: &Response<T>| column(matrix, leg);
+                *gain = gain_of(&column(response), &column(expected), &gauges, T::ZERO);
+            }
+            if round < ROUNDS {
+                for ((gain, shown), expected) in gauges.iter_mut().zip(response).zip(expected) {
+                    let [low, high] = GAUGE.map(T::from_f64);
+                    *gain = saturate(gain_of(shown, expected, &legs, T::ONE), low, high);
+                }
+            }
+        }
+        let [mut left, mut power, mut whole] = [T::ZERO; 3];
+        for ((shown, expected), gauge) in response.iter().zip(expected).zip(&gauges) {
+            for ((shown, expected), leg) in shown.iter().zip(expected).zip(&legs) {
+                let off = *shown - *gauge * *expected * *leg;
+                left = left + off * off;
+                power = power + *shown * *shown;
+                whole = whole + *expected * *expected;
+            }
+        }
+        let dead = T::from_f64(DEAD);
+        let nothing = power <= dead * dead * whole;
+        let residual = if nothing { T::ONE } else { left / power };
+        let middle = median(&gauges);
+        for (gauge, leg) in gauges.iter_mut().zip(&mut legs) {
+            *gauge = *gauge / middle;
+            *leg = *leg * middle;
+        }
+        Self { gauges, legs, residual, nothing }
+    }
+
+    /// What the gains say.
+    fn finding(&self, wiring: &Wiring<T>) -> Finding {
+        let dead = T::from_f64(DEAD);
+        let mut sum = T::ZERO;
+        for (leg, gain) in (0..).zip(self.legs) {
+            if gain < dead {
+                return Finding::Leg(leg, if gain <= -dead { Fault::Inverted } else { Fault::Dead });
+            }
+            sum = sum + gain;
+        }
+        if let Some((gauge, gain)) = furthest(&self.gauges, wiring.gauge_gain) {
+            return Finding::Gauge(gauge, if gain < dead { Fault::Dead } else { Fault::Gain(hundredths(gain)) });
+        }
+        if let Some(range) = wiring.leg_gain {
+            let five = T::from_i32(5);
+            let mut relative = self.legs;
+            for gain in &mut relative {
+                *gain = *gain * five / (sum - *gain);
+            }
+            if let Some((leg, gain)) = furthest(&relative, range) {
+                return Finding::Leg(leg, Fault::Gain(hundredths(gain)));
+            }
+        }
+        Finding::None
+    }
+}
+
+fn column<T: Real>(matrix: &Response<T>, index: usize) -> [T; 6] {
+    let mut column = [T::ZERO; 6];
+    for (row, entry) in column.iter_mut().enumerate() {
+        *entry = entry_of(matrix, row, index);
+    }
+    column
+}
+
+/// The gain with which `expected` times `gains` is nearest to `shown`; `otherwise` where that is nothing.
+fn gain_of<T: Real>(shown: &[T; 6], expected: &[T; 6], gains: &[T; 6], otherwise: T) -> T {
+    let (mut along, mut power) = (T::ZERO, T::ZERO);
+    for ((shown, expected), gain) in shown.iter().zip(expected).zip(gains) {
+        let expected = *expected * *gain;
+        along = along + *shown * expected;
+        power = power + expected * expected;
+    }
+    if power > T::from_f64(1e-9) { along / power } else { otherwise }
+}
+
+/// Of the gains (> 0) beyond their range that which is furthest.
+fn furthest<T: Real>(gains: &[T; 6], [low, high]: [T; 2]) -> Option<(u32, T)> {
+    let (mut worst, mut found) = (T::ONE, None);
+    for (place, gain) in (0..).zip(gains) {
+        let beyond = if *gain > high { *gain / high } else { low / *gain };
+        if beyond > worst {
+            worst = beyond;
+            found = Some((place, *gain));
+        }
+    }
+    found
+}
+
+fn hundredths<T: Real>(gain: T) -> u32 {
+    // A gain that is looked at is above zero.
+    (gain * T::from_i32(100) + T::HALF).truncate() as u32
+}
+
+fn median<T: Real>(values: &[T; 6]) -> T {
+    let mut sum = T::ZERO;
+    for (place, value) in values.iter().enumerate() {
+        let before = |(other, than): (usize, &T)| *than < *value || (*than == *value && other < place);
+        if matches!(values.iter().enumerate().filter(|other| before(*other)).count(), 2 | 3) {
+            sum = sum + *value;
+        }
+    }
+    sum * T::HALF
+}

@@ -1,0 +1,61 @@
+//! Gauges of a machine that has no plant yet: what they show while it is armed, when each leg in turn makes a small pulse.
+
+use libloading::Symbol;
+
+use super::Supervised;
+use crate::controller::{ControllerError, TickController};
+
+type WordsPerLeg = unsafe extern "C" fn(*const u64, *mut u64);
+
+/// Readings that stand but for what the legs move by the controller's own model.
+#[derive(Debug, Clone)]
+pub struct Standing {
+    /// Places of the gauges' words in an input, and of the legs' displacements in an output.
+    gauges: usize,
+    requested: usize,
+    words: [f64; 6],
+    per_leg: [[f64; 6]; 6],
+    /// Displacements at rest; none before the first tick.
+    rest: Option<[f64; 6]>,
+}
+
+impl Supervised {
+    /// Of a machine that stands at rest, as this input reads.
+    ///
+    /// # Errors
+    /// A word or the library's function is missing: it is of an older specgen.
+    pub fn standing(&self, input: &[u64]) -> Result<Standing, ControllerError> {
+        let description = self.controller.description();
+        let gauges = description.input("gauge[0]").or_else(|_| description.input("displacement[0]"))?;
+        let [requested, ..] = description.outputs("requested")?;
+        let failed = |cause| ControllerError::Load { path: self.controller.path.clone(), cause };
+        let mut bits = [0; 6];
+        for (bits, word) in bits.iter_mut().zip(input.iter().skip(gauges)) {
+            *bits = *word;
+        }
+        let mut rows = [[0; 6]; 6];
+        // SAFETY: the type is that of the interface's version; both arrays have the lengths that it takes, and the library stays loaded.
+        unsafe {
+            let per_leg: Symbol<'_, WordsPerLeg> =
+                self.controller.library.get(b"specgen_words_per_leg\0").map_err(failed)?;
+            per_leg(bits.as_ptr(), rows.as_mut_ptr().cast());
+        }
+        let scalar = description.scalar;
+        let per_leg = rows.map(|row| row.map(|word| scalar.decode(word)));
+        Ok(Standing { gauges, requested, words: bits.map(|word| scalar.decode(word)), per_leg, rest: None })
+    }
+}
+
+impl Standing {
+    /// Puts what the gauges show after a tick with this output into an input.
+    pub fn show(&mut self, machine: &Supervised, output: &[u64], input: &mut [u64]) {
+        let scalar = machine.controller.description().scalar;
+        let moved =
+            std::array::from_fn(|leg| scalar.decode(output.get(self.requested + leg).copied().unwrap_or_default()));
+        let rest = *self.rest.get_or_insert(moved);
+        for ((slot, word), row) in input.iter_mut().skip(self.gauges).zip(self.words).zip(self.per_leg) {
+            let way: f64 = (0..6).map(|leg| row[leg] * (moved[leg] - rest[leg])).sum();
+            *slot = scalar.encode(word + way);
+        }
+    }
+}
