@@ -11,8 +11,9 @@ use core::sync::atomic::Ordering;
 use controller::sensing;
 use controller::snapshot::recorder;
 use controller::supervised::{
-    CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, supervise,
+    CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, STALLED, supervise,
 };
+use controller::supervision::STALL_TICKS;
 use controller::{Config, LEGS, Real, place_words, triggers};
 use specgen_rt::account::{Account, Stamps};
 use specgen_rt::clock::{self, Usage};
@@ -87,6 +88,9 @@ impl<D: Device> Loop<'_, D> {
             let mut events = self.standing_events;
             if over > 0 {
                 events |= MISSED_TICK;
+            }
+            if over > u64::from(STALL_TICKS) {
+                events |= STALLED;
             }
             let silence = woken.saturating_sub(self.shared.service_alive.load(Ordering::Relaxed));
             if silence > SERVICE_TIMEOUT || link.is_lost(self.shared.link.load(Ordering::Relaxed), tick) {

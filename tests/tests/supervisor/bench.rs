@@ -6,7 +6,7 @@ use specgen_tests::Emitted;
 use std::collections::BTreeMap;
 
 pub use super::oracle::{
-    ACKNOWLEDGE, ARM, ARMING, DISARMED, FAULTED, HOLD, HOLDING, NOTHING, RAMP_DOWN, RAMPING, RUN, RUNNING,
+    ACKNOWLEDGE, ARM, ARMING, DISARMED, FAULTED, HOLD, HOLDING, NOTHING, RAMP_DOWN, RAMPING, RUN, RUNNING, STALLED,
 };
 
 /// Short times, so that a sequence gets somewhere; `timing.period` of the two kinds.

@@ -4,7 +4,9 @@ pub use crate::machine::{
     MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS, Machine, MachineInput,
     MachineOutput, Supervisor, machine_output_words,
 };
-pub use specgen_runtime::supervisor::{CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, STOP};
+pub use specgen_runtime::supervisor::{
+    CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, STALLED, STOP,
+};
 
 use crate::standing::{begin, come_to_rest, expectation, look, readings, run_law, stand};
 use crate::step::outputs;

@@ -153,7 +153,7 @@ fn every_word_of_the_small_states_counts() {
 
 #[test]
 fn every_word_of_a_supervisor_counts() {
-    let mut words = Words::default().whole(&[4, 13, 5, 0, 1, 1]).counters(3 + TIMERS);
+    let mut words = Words::default().whole(&[4, 14, 5, 0, 1, 1]).counters(3 + TIMERS);
     for _ in 0..6 {
         words = words.reals(1).whole(&[1]).reals(2).counters(3);
     }
@@ -168,7 +168,7 @@ fn every_word_of_a_supervisor_counts() {
     }
     let end = channels + 6 * 7;
     numbers_within(&fresh, end + 7..end + 13, LARGEST_PLACE);
-    for (place, most) in [(0, 5), (1, 13), (2, 5), (end, 6), (end + 6, 2)] {
+    for (place, most) in [(0, 5), (1, 14), (2, 5), (end, 6), (end + 6, 2)] {
         whole_within(&fresh, place, 0, most);
     }
 }

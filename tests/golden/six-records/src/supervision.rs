@@ -26,6 +26,10 @@ pub const SUPERVISION: Supervision<Real> = Supervision {
 /// Ticks without a request over a link after which its host is lost; from `supervisor.host_lost`.
 pub const HOST_TICKS: u32 = 500;
 
+/// Missed ticks in a row of which more are the event [`STALLED`](specgen_runtime::supervisor::STALLED); from
+/// `supervisor.missed_in_a_row`.
+pub const STALL_TICKS: u32 = 100;
+
 /// What is left after a tick of the way to the set-point when the law begins; from `supervisor.arm_time`.
 pub const APPROACH_KEEP: Real = 0.998002;
 
