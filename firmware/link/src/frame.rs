@@ -7,7 +7,7 @@
 use crc::{CRC_32_ISCSI, Crc, Table};
 
 /// Version of the protocol, the first byte of every frame.
-pub const VERSION: u8 = 3;
+pub const VERSION: u8 = 4;
 /// Longest frame, bytes, with the zero at its end.
 pub const FRAME: usize = 1024;
 /// Longest message, bytes.
