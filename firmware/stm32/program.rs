@@ -7,7 +7,8 @@ use specgen_stm32::{converters, timer};
 /// The machine on this board's converters.
 type Board = converters::OnBoard<spi::Registers, { pins::OUTPUT }, { clocks::DELAY }>;
 
-const _: () = assert!(timer::period(clocks::TIMER).is_some(), "timing.period is nothing that the timer of this board counts");
+const _: () =
+    assert!(timer::period(clocks::TIMER).is_some(), "timing.period is nothing that the timer of this board counts");
 
 /// For specgen's estimate of the tick.
 #[unsafe(no_mangle)]
@@ -29,7 +30,9 @@ mod app {
     use core::sync::atomic::AtomicU8;
 
     use controller::supervised::Machine;
-    use specgen_board::{Desk, Exchange, Health, Noticed, Probes, Schedule, Kept, SampleMemory, catch_up, gather, learn};
+    use specgen_board::{
+        Desk, Exchange, Health, Kept, Noticed, Probes, SampleMemory, Schedule, catch_up, gather, learn,
+    };
     use specgen_link::Endpoint;
     use specgen_stm32::cycles::{self, CYCLES};
     use specgen_stm32::enable::Stop;
@@ -88,7 +91,7 @@ mod app {
 
         let intact = memory_intact() && controller::integrity::intact();
         let exchange = context.local.exchange;
-        exchange.probes = Probes { hertz, stack: stack_used };
+        exchange.probes = Probes { hertz, stack: stack_used, reset_cause: clocks::reset_cause() };
         let machine = converters::at_reset(context.local.machine);
         exchange.record(context.local.record, converters::kept(context.local.kept, machine));
         exchange.play(context.local.passes);
@@ -103,13 +106,11 @@ mod app {
         let line = Line::open(&mut core.NVIC, hertz / 2, context.local.ring, context.local.answer);
         timer::start(&mut schedule);
         watchdog.feed();
-        (
-            Shared { exchange, board },
-            Local { schedule, health: Health::new(), watchdog, stop: wiring.stop, line },
-        )
+        (Shared { exchange, board }, Local { schedule, health: Health::new(), watchdog, stop: wiring.stop, line })
     }
 
-    #[task(binds = TIM2, priority = 16, shared = [exchange, board], local = [schedule, health, watchdog, stop])]
+    // One below the highest, which is the voltage detector's.
+    #[task(binds = TIM2, priority = 15, shared = [exchange, board], local = [schedule, health, watchdog, stop])]
     fn tick(context: tick::Context) {
         let local = context.local;
         let begin = timer::now();

@@ -12,8 +12,8 @@ fn main() {
     if !is_meant {
         eprintln!(
             "error: this would compute floating-point numbers in software, or without optimisation: no tick would be in time\n\
-             = help: `specgen build SPEC --target stm32h743`, or in this folder\n        \
-             RUSTFLAGS=-Ctarget-cpu=cortex-m7 cargo build --release --target thumbv7em-none-eabihf"
+             = help: `specgen build SPEC --target stm32h743`, or in this folder, whose .cargo/config.toml says the rest:\n        \
+             cargo build --release"
         );
         exit(1);
     }

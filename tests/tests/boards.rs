@@ -7,12 +7,14 @@
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::process::Command;
 use std::sync::Mutex;
 
 use specgen::emit;
 use specgen::model::Mcu;
 use specgen::target::callgraph::CallGraph;
 use specgen::target::checks::{self, Rule, Rules};
+use specgen::target::toolchain::CoreLibrary;
 use specgen::target::{self, build, image, stack, toolchain};
 use specgen::workspace;
 use specgen_tests::{compile_edited, image_target, kept, repository, scratch};
@@ -191,6 +193,46 @@ fn no_path_of_this_machine_is_in_flash(board: &Board, elf: &[u8]) {
 fn the_stm32h743_image_fits_and_its_tick_cannot_fail() {
     check(&H743);
     own_board_builds();
+}
+
+/// As docs/images.md says it, with what the folder's own `.cargo/config.toml` says and no flag of specgen's.
+#[test]
+#[ignore = "long: images of real boards"]
+fn a_folder_of_a_board_is_built_by_hand() {
+    let Some(toolchain) = target::found_or_skipped(toolchain::find()).unwrap_or_else(|missing| panic!("{missing}"))
+    else {
+        return;
+    };
+    for board in [&H743, &F446] {
+        let compiled = compile_edited(board.name, "reference.toml", board.edits, &[]);
+        let dir = scratch(board.name);
+        let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[board.folder]);
+        workspace::write_scratch(&dir, &files).unwrap();
+        let mut cargo = Command::new(&toolchain.cargo);
+        cargo.current_dir(dir.join(board.folder)).args(["build", "--release", "--locked"]);
+        for name in
+            ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "CARGO_TARGET_DIR", "RUSTUP_TOOLCHAIN"]
+        {
+            cargo.env_remove(name);
+        }
+        cargo.env("RUSTC", &toolchain.rustc);
+        if toolchain.core == CoreLibrary::FromSource {
+            // A compiler that has the target's library in source.
+            cargo.env("RUSTC_BOOTSTRAP", "1").arg("-Zbuild-std=core");
+        }
+        if let Some(linker) = &toolchain.linker {
+            cargo.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker);
+        }
+        let output = cargo.output().unwrap();
+        assert!(output.status.success(), "{}: {}", board.name, String::from_utf8_lossy(&output.stderr));
+        let elf = fs::read(dir.join(board.folder).join("target/thumbv7em-none-eabihf/release/firmware")).unwrap();
+        let rules = Rules { single: board.mcu == Mcu::Stm32F446Re, whole_image: false };
+        let faults = checks::check(&elf, Some("TIM2"), rules).unwrap().faults;
+        assert!(faults.is_empty(), "{}: {faults:#?}", board.name);
+        let config = fs::read_to_string(dir.join(board.folder).join(".cargo/config.toml")).unwrap();
+        let chip = board.mcu.part().chip.unwrap();
+        assert!(config.contains(&format!("runner = \"probe-rs run --chip {chip}")), "{config}");
+    }
 }
 
 #[test]

@@ -130,6 +130,15 @@ fn flashing(folder: &Folder, image: &str) {
     let probe = flash(&path, &[&board[..], &["--probe", "0483:374e:1"]].concat());
     assert_eq!(probe.code, 0, "{probe:#?}");
     assert!(asked().contains("--verify --probe 0483:374e:1 out/target/qemu.elf"), "{}", asked());
+    let chosen = ["--speed", "500", "--connect-under-reset"];
+    let slow = flash(&path, &[&board[..], &chosen].concat());
+    assert_eq!(slow.code, 0, "{slow:#?}");
+    let both = [
+        "download --chip STM32H743ZITx --verify --speed 500 --connect-under-reset out/target/qemu.elf",
+        "reset --chip STM32H743ZITx --speed 500 --connect-under-reset",
+    ];
+    assert!(asked().ends_with(&format!("{}\n", both.join("\n"))), "{}", asked());
+    flash(&path, &[&board[..], &["--speed", "0"]].concat()).says(2, &["--speed"]);
     // It fails half-way: said, with what to run again.
     let failing = fake_probe_rs(folder, 5);
     flash(&failing, &board).says(3, &["probe-rs failed", "keep the amplifiers", &commands[0]]);

@@ -361,6 +361,8 @@ pub struct Supervision {
     pub ramp_every: u32,
     /// Ticks without a request over a link after which its host is lost.
     pub host_ticks: u32,
+    /// Missed ticks in a row of which more are a fault.
+    pub stall_ticks: u32,
     /// Counts at which a condition is a cause: gauge not finite, gauge range, voltage, slew, missed tick, converter, host gone.
     pub timeout: [u32; TIMERS],
     /// What a tick with the condition counts.

@@ -27,8 +27,8 @@ const SYMBOL: &str = "SPECGEN_TIMES";
 /// Where the flash begins; memory of the core lies below.
 const FLASH: u64 = 0x0800_0000;
 /// Of its layout.
-const VERSION: u32 = 1;
-const WORDS: usize = 15;
+const VERSION: u32 = 2;
+const WORDS: usize = 16;
 /// A tick that leaves less of its period has little room.
 const ROOM: f64 = 0.2;
 /// The period that would do has so much room: other set-points come with another period.
@@ -52,8 +52,8 @@ pub struct Clocks {
     core: u64,
     /// FLASH_ACR and CCR.
     registers: [u32; 2],
-    /// Hz: of ADC and DACs.
-    sclk: [u64; 2],
+    /// Hz: of ADC and DACs, and of these where they are read back.
+    sclk: [u64; 3],
     byte: Work,
     frame: Work,
     /// Around the tick, in its interrupt.
@@ -79,19 +79,20 @@ impl Clocks {
         let section = file.section_by_index(index).map_err(malformed)?;
         let bytes = section.data_range(symbol.address(), 4 * WORDS as u64).map_err(malformed)?.ok_or_else(strange)?;
         let words: Vec<u32> = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
-        let [version, core, access, control, adc, dac, rest @ ..] = words.first_chunk::<WORDS>().ok_or_else(strange)?;
+        let [version, core, access, control, adc, dac, back, rest @ ..] =
+            words.first_chunk::<WORDS>().ok_or_else(strange)?;
         let work = |at: usize| Work {
             reads: u64::from(rest[at]),
             writes: u64::from(rest[at + 1]),
             instructions: u64::from(rest[at + 2]),
         };
-        if *version != VERSION || *core == 0 || *adc == 0 || *dac == 0 {
+        if *version != VERSION || *core == 0 || *adc == 0 || *dac == 0 || *back == 0 {
             return Err(strange());
         }
         Ok(Self {
             core: u64::from(*core),
             registers: [*access, *control],
-            sclk: [u64::from(*adc), u64::from(*dac)],
+            sclk: [u64::from(*adc), u64::from(*dac), u64::from(*back)],
             byte: work(0),
             frame: work(3),
             interrupt: work(6),
@@ -113,13 +114,13 @@ impl Clocks {
         }
     }
 
-    /// Of a byte and a frame on the buses of ADC and DACs, and of a look at a pin, ns.
+    /// Of a byte and a frame on the buses of ADC and DACs, of a look at a pin, and what a byte that is read back takes more, ns.
     #[must_use]
-    pub fn buses(&self) -> [u64; 5] {
+    pub fn buses(&self) -> [u64; 6] {
         let nanoseconds = |cycles: u64| cycles * 1_000_000_000 / self.core;
         let [byte, frame] = [self.byte, self.frame].map(|work| nanoseconds(self.cycles(work)));
-        let [adc, dac] = self.sclk.map(|hertz| byte.max(8_000_000_000 / hertz));
-        [adc, frame, dac, frame, nanoseconds(self.cycles(LOOK))]
+        let [adc, dac, back] = self.sclk.map(|hertz| byte.max(8_000_000_000 / hertz));
+        [adc, frame, dac, frame, nanoseconds(self.cycles(LOOK)), back.saturating_sub(dac)]
     }
 
     fn cycles(&self, work: Work) -> u64 {

@@ -118,7 +118,7 @@ pub struct Trace<'a> {
 pub fn trace<'a>(
     image: &'a Image,
     inputs: &[Vec<u64>],
-    buses: [u64; 5],
+    buses: [u64; 6],
     limit: Duration,
 ) -> Result<Trace<'a>, TargetError> {
     let emulator = Emulator::find()?;

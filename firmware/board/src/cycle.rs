@@ -1,7 +1,10 @@
 //! One control tick on real converters.
 
 use controller::snapshot::record_after;
-use controller::supervised::{CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, Request, STOP};
+use controller::supervised::{
+    CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, Request, STALLED, STOP,
+};
+use controller::supervision::STALL_TICKS;
 use controller::{GAUGE_FAULT, Real, passes, sensing, triggers};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges, Lines};
 use specgen_link::Silence;
@@ -14,7 +17,7 @@ use crate::words::GAUGE_BITS;
 /// What the target noticed since the last tick.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Noticed {
-    /// Ticks that never came.
+    /// Ticks in a row that never came.
     pub missed: u32,
     /// The emergency stop is open.
     pub stop: bool,
@@ -147,6 +150,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         self.done(report, A::ask);
         for (happened, event) in [
             (noticed.missed > 0, MISSED_TICK),
+            (noticed.missed > STALL_TICKS, STALLED),
             (noticed.stop, STOP),
             (silence.tick(), LINK_LOST),
             (!self.intact, INTEGRITY),

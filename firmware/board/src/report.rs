@@ -12,11 +12,13 @@ pub struct Probes {
     pub hertz: u32,
     /// Most bytes of the stack seen in use, and bytes there are. Takes some µs: for the background.
     pub stack: fn() -> [u32; 2],
+    /// Why the program began: bits of [`reset_cause`](specgen_link::reset_cause).
+    pub reset_cause: u8,
 }
 
 impl Probes {
     /// Where nothing is measured: on a host.
-    pub const NONE: Self = Self { hertz: 0, stack: || [0; 2] };
+    pub const NONE: Self = Self { hertz: 0, stack: || [0; 2], reset_cause: 0 };
 }
 
 /// What the ticks have to say.
@@ -85,6 +87,7 @@ impl Counts {
             output: timed(output),
             latest: tick.map(|_| u64::from(latest)),
             stack: if reserved > 0 { Some(stack) } else { None },
+            reset_cause: probes.reset_cause,
         }
     }
 }

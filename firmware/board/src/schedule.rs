@@ -41,9 +41,9 @@ impl Schedule {
 
     /// The tick begins at counter value `now`.
     pub const fn begin(&mut self, now: u32) -> Due {
-        // Before its time, by a spurious interrupt, counts as in time.
-        let since = now.wrapping_sub(self.due);
-        let late = if since > u32::MAX / 2 { 0 } else { since };
+        // Before its time, by a spurious interrupt, counts as in time. By more than a period it is one that was stopped for long.
+        let early = self.due.wrapping_sub(now) <= self.period.get();
+        let late = if early { 0 } else { now.wrapping_sub(self.due) };
         // Divided by a number that is not zero.
         let missed = late / self.period.get();
         self.due = self.due.wrapping_add(self.period.get().wrapping_mul(missed)).wrapping_add(self.period.get());

@@ -57,7 +57,7 @@ pub struct MachineInput {
     pub request: Request,
     /// What the target noticed since the last tick, as bits: [`MISSED_TICK`](supervisor::MISSED_TICK),
     /// [`LINK_LOST`](supervisor::LINK_LOST), [`INTEGRITY`](supervisor::INTEGRITY), [`CONVERTER`](supervisor::CONVERTER),
-    /// [`STOP`](supervisor::STOP).
+    /// [`STOP`](supervisor::STOP), [`STALLED`](supervisor::STALLED).
     pub events: u32,
 }
 

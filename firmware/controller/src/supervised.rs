@@ -7,7 +7,7 @@ pub use crate::machine::{
     MachineOutput, Supervisor, machine_output_words,
 };
 pub use specgen_runtime::supervisor::{
-    CONVERTER, Cause, Finding, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, STOP,
+    CONVERTER, Cause, Finding, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, STALLED, STOP,
 };
 
 use crate::standing::{begin, come_to_rest, expectation, look, readings, run_law, stand};

@@ -49,6 +49,10 @@ pub const LOOK_ALIKE: &[&[u32]] = &[];
 /// Ticks without a request over a link after which its host is lost; from `supervisor.host_lost`.
 pub const HOST_TICKS: u32 = 1000;
 
+/// Missed ticks in a row of which more are the event [`STALLED`](specgen_runtime::supervisor::STALLED); from
+/// `supervisor.missed_in_a_row`.
+pub const STALL_TICKS: u32 = 100;
+
 /// Reading of each gauge (rows) per displacement of each leg (columns) at rest, m/m; from `gauge` and `geometry`.
 pub const READINGS_PER_LEG: [[Real; 6]; 6] = [
     [

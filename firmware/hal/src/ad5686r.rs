@@ -6,7 +6,8 @@
 //! | --- | --- |
 //! | frame | 24 bits, MSB first: command C3–C0, address D C B A (one bit a channel), 16 data bits |
 //! | SPI | mode 1: data are taken on falling SCLK; SYNC low for the frame, high for 30 ns between frames |
-//! | SCLK | at most 50 MHz, 25 MHz with read-back at VLOGIC of 2.7 V and more: 25 MHz or less is used |
+//! | SCLK | at most 50 MHz where nothing comes back: 25 MHz or less is used |
+//! | SDO | valid up to 25 ns after rising SCLK, for VLOGIC of 2.7 V and more and 20 pF; taken on the falling edge, half a cycle later. Frames that only write go by `write` of the SPI, frames whose answer counts by `transfer_in_place`, which is to have a clock slow enough for SDO and its wire: docs/bring-up.md has the figures |
 //! | LDAC | held high; a low pulse of 15 ns or more moves all input registers to the outputs of both parts at once |
 //! | read-back | command 1001 with one channel: the next frame brings out its DAC register in the lower 16 bits |
 //! | power-up | all channels on, at zero scale with RSTSEL low, internal reference on; RESET high, GAIN low 2.5 V or high 5 V |
@@ -23,10 +24,10 @@
 //! | no daisy chain | `0x800000` |
 //! | read back | `0x9a0000` |
 //!
-//! Legs 0 to 2 are channels A, B, C of the first part, legs 3 to 5 those of the second. In every tick one channel of each
-//! part is read back, so each within three ticks: what it gives must be the code written in the tick before. The question goes
-//! out while the gauges are converted, the answer comes with the first code. Frames of a tick alternate between the parts: SYNC
-//! of one is high for as long as a frame of the other lasts.
+//! Legs 0 to 2 are channels A, B, C of the first part, legs 3 to 5 those of the second. In every tick one channel is read back, of the
+//! parts in turn, so each within six ticks: what it gives must be the code written in the tick before. One that gave another code is a
+//! fault in every tick until it gives the right one. Question and answer go while the gauges are converted. Codes of a tick
+//! alternate between the parts: SYNC of one is high for as long as a frame of the other lasts.
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::OutputPin;
@@ -114,10 +115,18 @@ struct Part<SPI> {
 }
 
 impl<SPI: SpiDevice> Part<SPI> {
-    /// Sends a frame and returns the lower 16 bits of what came back meanwhile.
+    /// Sends a frame; what comes back meanwhile does not count.
     #[inline]
-    fn send(&mut self, command: Command) -> Result<u16, Fault> {
-        let mut frame = command.frame();
+    fn send(&mut self, command: Command) -> Result<(), Fault> {
+        self.spi.write(&command.frame()).map_err(|_| Fault::Bus)
+    }
+
+    /// What stands in the register of a channel: the lower 16 bits of the frame after the question.
+    #[inline]
+    fn read_back(&mut self, channel: Channel, delay: &mut impl DelayNs) -> Result<u16, Fault> {
+        self.send(Command::ReadBack(channel))?;
+        delay.delay_ns(SYNC_HIGH);
+        let mut frame = Command::NoOperation.frame();
         self.spi.transfer_in_place(&mut frame).map_err(|_| Fault::Bus)?;
         let [_, high, low] = frame;
         Ok(u16::from_be_bytes([high, low]))
@@ -133,20 +142,17 @@ impl<SPI: SpiDevice> Part<SPI> {
             Command::PowerUp,
             Command::WriteThroughAll(0),
         ];
-        let mut send = |command| {
-            let answer = self.send(command);
-            delay.delay_ns(SYNC_HIGH);
-            answer
-        };
         for command in SETTINGS {
-            send(command)?;
+            self.send(command)?;
+            delay.delay_ns(SYNC_HIGH);
         }
         for pattern in PATTERNS.into_iter().chain([0]) {
-            send(Command::WriteThrough(Channel::D, pattern))?;
-            send(Command::ReadBack(Channel::D))?;
-            if send(Command::NoOperation)? != pattern {
+            self.send(Command::WriteThrough(Channel::D, pattern))?;
+            delay.delay_ns(SYNC_HIGH);
+            if self.read_back(Channel::D, delay)? != pattern {
                 return Err(Fault::ReadBack);
             }
+            delay.delay_ns(SYNC_HIGH);
         }
         Ok(())
     }
@@ -166,10 +172,10 @@ pub struct Ad5686rPair<FIRST, SECOND, LDAC, ENABLE, DELAY> {
     written: Option<[u16; CHANNELS]>,
     /// Whether the codes that were written last are others than those before them, which are out.
     changed: bool,
-    /// What both parts were asked for must give this.
-    asked: Option<[u16; 2]>,
-    /// Which of the three channels is asked for next.
-    turn: usize,
+    /// Channels whose last answer was another code: a bit for each `turn`.
+    refuted: u8,
+    /// Which channel is read back next, 0 to 5: A of the first part, A of the second, B of the first.
+    turn: u8,
 }
 
 impl<FIRST, SECOND, LDAC, ENABLE, DELAY> Ad5686rPair<FIRST, SECOND, LDAC, ENABLE, DELAY>
@@ -191,7 +197,7 @@ where
             on: false,
             written: None,
             changed: true,
-            asked: None,
+            refuted: 0,
             turn: 0,
         }
     }
@@ -199,18 +205,6 @@ where
     /// Gives the pins back, in the order of [`Self::new`].
     pub fn release(self) -> (FIRST, SECOND, LDAC, ENABLE, DELAY) {
         (self.first.spi, self.second.spi, self.ldac, self.enable, self.delay)
-    }
-
-    /// The next channel to ask for, with what it must give: none where nothing is known.
-    fn question(&mut self) -> Option<(Channel, [u16; 2])> {
-        let [a, b, c, d, e, f] = self.written?;
-        let question = match self.turn {
-            0 => (Channel::A, [a, d]),
-            1 => (Channel::B, [b, e]),
-            _ => (Channel::C, [c, f]),
-        };
-        self.turn = if self.turn < LEGS_PER_PART - 1 { self.turn + 1 } else { 0 };
-        Some(question)
     }
 }
 
@@ -227,7 +221,7 @@ where
     /// Amplifiers disabled, both parts at power-up state with outputs at zero, and both proved to answer: channel D of each
     /// gives [`PATTERNS`] back.
     fn start(&mut self) -> Result<(), Fault> {
-        (self.written, self.asked) = (None, None);
+        (self.written, self.refuted) = (None, 0);
         self.enable(false)?;
         self.ldac.hold();
         // Both, so that one part that does not answer leaves the other at zero.
@@ -238,48 +232,47 @@ where
         Ok(())
     }
 
-    /// One frame to each part.
+    /// Two frames to one part.
     fn ask(&mut self) -> Result<(), Fault> {
         // The codes of the last tick are out by now, and these are not to go out by halves.
         self.ldac.hold();
-        self.asked = None;
-        let Some((channel, expected)) = self.question() else { return Ok(()) };
-        let first = self.first.send(Command::ReadBack(channel));
-        let second = self.second.send(Command::ReadBack(channel));
-        first.and(second)?;
-        self.asked = Some(expected);
-        Ok(())
+        let Some([a, b, c, d, e, f]) = self.written else { return Ok(()) };
+        let (channel, [of_first, of_second]) = match self.turn / 2 {
+            0 => (Channel::A, [a, d]),
+            1 => (Channel::B, [b, e]),
+            _ => (Channel::C, [c, f]),
+        };
+        let is_right = match self.turn % 2 {
+            0 => self.first.read_back(channel, &mut self.delay)? == of_first,
+            _ => self.second.read_back(channel, &mut self.delay)? == of_second,
+        };
+        let bit = 1 << self.turn;
+        self.refuted = if is_right { self.refuted & !bit } else { self.refuted | bit };
+        self.turn = if self.turn < CHANNELS as u8 - 1 { self.turn + 1 } else { 0 };
+        if self.refuted == 0 { Ok(()) } else { Err(Fault::ReadBack) }
     }
 
-    /// Six frames and LDAC. Codes go out even where a read-back differs: the other channels need theirs.
+    /// Six frames and LDAC. Codes go out even where one part does not take them: the other needs its own.
     fn write(&mut self, codes: &[i32; CHANNELS]) -> Result<(), Fault> {
         if codes.iter().any(|&code| !(0..=LARGEST).contains(&code)) {
             return Err(Fault::Code);
         }
         // Checked: 16 bits.
         let [a, b, c, d, e, f] = codes.map(|code| code as u16);
-        let asked = self.asked.take();
         self.changed = self.written.take() != Some([a, b, c, d, e, f]);
-        // The frame after the question brings the answer.
-        let first = self.first.send(Command::WriteInput(Channel::A, a));
-        let second = self.second.send(Command::WriteInput(Channel::A, d));
-        let mut sent = [first.map(|_| ()), second.map(|_| ())];
-        for (channel, codes) in [(Channel::B, [b, e]), (Channel::C, [c, f])] {
+        let mut sent = Ok(());
+        for (channel, codes) in [(Channel::A, [a, d]), (Channel::B, [b, e]), (Channel::C, [c, f])] {
             let [first, second] = codes.map(|code| Command::WriteInput(channel, code));
             let results = [self.first.send(first), self.second.send(second)];
-            for (sent, result) in sent.iter_mut().zip(results) {
-                *sent = sent.and(result.map(|_| ()));
+            for result in results {
+                sent = sent.and(result);
             }
         }
         self.delay.delay_ns(SYNC_HIGH);
         self.ldac.give()?;
-        let [one, other] = sent;
-        one.and(other)?;
+        sent?;
         self.written = Some([a, b, c, d, e, f]);
-        match (asked, first, second) {
-            (Some(expected), Ok(one), Ok(other)) if [one, other] != expected => Err(Fault::ReadBack),
-            _ => Ok(()),
-        }
+        Ok(())
     }
 
     fn enable(&mut self, on: bool) -> Result<(), Fault> {

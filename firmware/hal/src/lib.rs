@@ -72,11 +72,10 @@ pub trait Amplifiers {
         self.enable(false)
     }
 
-    /// Asks the parts what can be asked while the gauges are converted; what comes back, [`Self::write`] looks at. At most once
-    /// between two writes.
+    /// Looks, while the gauges are converted, whether the parts hold what was written. At most once between two writes.
     ///
     /// # Errors
-    /// [`Fault::Bus`] or [`Fault::Pin`]; the next write does not look then.
+    /// [`Fault::ReadBack`] if one does not, [`Fault::Bus`] or [`Fault::Pin`].
     fn ask(&mut self) -> Result<(), Fault> {
         Ok(())
     }

@@ -23,6 +23,7 @@ mod frame;
 pub mod lockstep;
 mod message;
 mod receiver;
+pub mod reset_cause;
 pub mod samples;
 mod silence;
 

@@ -371,6 +371,8 @@ pub struct Health {
     pub latest: Option<u64>,
     /// Most bytes of the stack seen in use, and bytes there are.
     pub stack: Option<[u32; 2]>,
+    /// Why its program began: bits of [`reset_cause`](crate::reset_cause); 0 where that is not known.
+    pub reset_cause: u8,
 }
 
 /// What a stage has cost.

@@ -11,8 +11,10 @@ use core::sync::atomic::Ordering;
 use controller::sensing;
 use controller::snapshot::recorder;
 use controller::supervised::{
-    CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, Request, STOP, supervise,
+    CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, Request, STALLED, STOP,
+    supervise,
 };
+use controller::supervision::STALL_TICKS;
 use controller::{Config, LEGS, Real, place_words, triggers};
 use specgen_rt::account::{Account, Stamps};
 use specgen_rt::clock::{self, Usage};
@@ -89,6 +91,9 @@ impl<D: Device> Loop<'_, D> {
             let mut events = self.standing_events;
             if over > 0 {
                 events |= MISSED_TICK;
+            }
+            if over > u64::from(STALL_TICKS) {
+                events |= STALLED;
             }
             let silence = woken.saturating_sub(self.shared.service_alive.load(Ordering::Relaxed));
             if silence > SERVICE_TIMEOUT || link.is_lost(self.shared.link.load(Ordering::Relaxed), tick) {

@@ -159,6 +159,7 @@ impl Shared {
             output: self.output.get(),
             latest: self.delay.get().map(|[_, longest]| longest),
             stack: None,
+            reset_cause: 0,
         }
     }
 }

@@ -33,8 +33,8 @@ mod wiring;
 pub use approach::Approach;
 pub use debounce::Debounce;
 pub use kinds::{
-    CONVERTER, Cause, HOLDS, INTEGRITY, LINK_LOST, MISSED_TICK, OF_GAUGES, Phase, RAMPS_DOWN, Request, STOP,
-    SWITCHES_OFF,
+    CONVERTER, Cause, EVENTS, FIRST_EVENT, HOLDS, INTEGRITY, LINK_LOST, MISSED_TICK, OF_GAUGES, Phase, RAMPS_DOWN,
+    Request, STALLED, STOP, SWITCHES_OFF,
 };
 pub use phases::Supervisor;
 pub use supervision::{Supervision, TIMED, TIMERS};

@@ -34,6 +34,10 @@ pub trait Burst {
         send: impl FnMut(usize) -> u8,
         take: impl FnMut(usize, u8),
     ) -> Result<(), Stuck>;
+
+    /// The clock of the exchanges that follow: that of frames whose answer counts, or that of others. Where one clock does for both,
+    /// nothing.
+    fn pace(&mut self, answered: bool);
 }
 
 /// A part behind a chip select. `CYCLES` as in [`CycleDelay`].
@@ -57,15 +61,25 @@ impl<BUS: Burst, const CYCLES: u32> Device<BUS, CYCLES> {
         self.select.set(true);
         result
     }
+
+    /// The same of a frame whose answer counts.
+    #[inline]
+    fn answered<T>(&mut self, action: impl FnOnce(&mut BUS) -> T) -> T {
+        self.bus.pace(true);
+        let result = self.selected(action);
+        self.bus.pace(false);
+        result
+    }
 }
 
 impl<BUS, const CYCLES: u32> ErrorType for Device<BUS, CYCLES> {
     type Error = Stuck;
 }
 
+/// By `write` alone nothing comes back: all else has the clock of frames whose answer counts.
 impl<BUS: Burst, const CYCLES: u32> SpiDevice for Device<BUS, CYCLES> {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Stuck> {
-        self.selected(|bus| {
+        self.answered(|bus| {
             for operation in operations {
                 match operation {
                     Operation::Read(bytes) => bus.exchange(bytes.len(), |_| 0, |k, byte| put(bytes, k, byte))?,
@@ -83,7 +97,12 @@ impl<BUS: Burst, const CYCLES: u32> SpiDevice for Device<BUS, CYCLES> {
 
     #[inline]
     fn transfer_in_place(&mut self, bytes: &mut [u8]) -> Result<(), Stuck> {
-        self.selected(|bus| in_place(bus, bytes))
+        self.answered(|bus| in_place(bus, bytes))
+    }
+
+    #[inline]
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Stuck> {
+        self.selected(|bus| bus.exchange(bytes.len(), |k| at(bytes, k), |_, _| {}))
     }
 }
 

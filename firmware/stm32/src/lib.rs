@@ -10,6 +10,7 @@ pub mod cycles;
 mod delay;
 pub mod enable;
 mod memory;
+pub mod oscillator;
 pub mod pins;
 pub mod pulses;
 pub mod serial;

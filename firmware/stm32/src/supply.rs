@@ -14,8 +14,8 @@ const THRESHOLD: u8 = 6;
 /// Of the EXTI that the detector is on.
 const LINE: usize = 16;
 
-/// Watches the supply from here on: `interrupt`, that of the detector, comes at the highest priority when it is too low. False if it is
-/// already.
+/// Watches the supply from here on: `interrupt`, that of the detector, comes at the highest priority when it is too low, above the tick.
+/// False if it is already.
 #[must_use]
 pub fn watch(interrupt: Interrupt) -> bool {
     PWR.cr1().modify(|w| {
@@ -24,6 +24,7 @@ pub fn watch(interrupt: Interrupt) -> bool {
     });
     EXTI.rtsr(0).modify(|w| w.set_line(LINE, true));
     EXTI.imr(0).modify(|w| w.set_line(LINE, true));
+    // Its priority is that of reset, the highest.
     // SAFETY: its handler stops the program, whatever it was about to do.
     unsafe { NVIC::unmask(interrupt) };
     !PWR.csr1().read().pvdo()

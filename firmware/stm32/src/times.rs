@@ -21,28 +21,29 @@ pub struct Times {
     core: u32,
     /// FLASH_ACR and CCR, as they are while ticks run.
     registers: [u32; 2],
-    /// SCLK of ADC and DACs, Hz.
-    sclk: [u32; 2],
+    /// SCLK of ADC and DACs, and of these where they are read back, Hz.
+    sclk: [u32; 3],
     /// What a byte on a bus takes of the core, while the next one is on the wires.
     byte: Work,
     /// A frame beside its bytes: select, the first bytes, the end of the last one.
     frame: Work,
-    /// The interrupt around the tick: the timer, the watchdog, the stop contact.
+    /// The interrupt around the tick: the timer, the watchdog, the stop contact; what a frame that is read back has besides.
     interrupt: Work,
 }
 
 impl Times {
-    /// Clock of the core, Hz; FLASH_ACR and CCR; SCLK of ADC and DACs.
+    /// Clock of the core, Hz; FLASH_ACR and CCR; SCLK of ADC and DACs, and of these where they are read back.
     #[must_use]
-    pub const fn new(core: u32, registers: [u32; 2], sclk: [u32; 2]) -> Self {
+    pub const fn new(core: u32, registers: [u32; 2], sclk: [u32; 3]) -> Self {
         Self {
-            version: 1,
+            version: 2,
             core,
             registers,
             sclk,
             byte: Work { reads: 3, writes: 1, instructions: 16 },
             frame: Work { reads: 3, writes: 6, instructions: 60 },
-            interrupt: Work { reads: 6, writes: 4, instructions: 150 },
+            // With two changes of the DACs' clock.
+            interrupt: Work { reads: 12, writes: 14, instructions: 190 },
         }
     }
 }

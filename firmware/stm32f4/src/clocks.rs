@@ -1,5 +1,7 @@
-//! Clocks of the NUCLEO-F446RE: 8 MHz of the ST-LINK, 180 MHz core, 90 MHz timers, 45 and 90 MHz SPI.
+//! Clocks of the NUCLEO-F446RE from 8 MHz at the HSE pin, or HSI: 180 MHz core, 90 MHz timers, 45 and 90 MHz SPI.
 
+use specgen_link::reset_cause;
+use specgen_stm32::oscillator;
 use specgen_stm32::times::Times;
 use stm32_metapac::flash::vals::Latency;
 use stm32_metapac::pwr::vals::Vos;
@@ -14,18 +16,23 @@ pub const COPY: u32 = TIMER / 1_000_000 * 40;
 pub const DELAY: u32 = 180;
 /// Divides 90 MHz to SCLK of the ADC: 17 MHz at most at 3.3 V, and a divider is a power of two.
 pub const ADC: u32 = 8;
-/// Divides 45 MHz to SCLK of the DACs: 25 MHz at most where something is read back.
+/// Divides 45 MHz to SCLK of the DACs, where they are written.
 pub const DAC: u32 = 2;
+/// The same where they are read back: 5.625 MHz. Half a cycle, 88 ns, is more than SDO takes with its resistor: docs/bring-up.md.
+pub const READ_BACK: u32 = 8;
 /// From sampling to the change of the outputs, ns: codes that are written by then are out at this instant, later ones when they are
 /// written.
 pub const OUTPUT: u32 = 95_000;
 
 /// For the estimate of a tick: 180 MHz; five wait states of the flash, its accelerator on.
-pub const TIMES: Times = Times::new(180_000_000, [0b111 << 8 | 5, 0], [90_000_000 / ADC, 45_000_000 / DAC]);
+pub const TIMES: Times =
+    Times::new(180_000_000, [0b111 << 8 | 5, 0], [90_000_000 / ADC, 45_000_000 / DAC, 45_000_000 / READ_BACK]);
 
 /// Clocks as above, of every device that is used, too; that of TIM2 and TIM3, Hz, which is twice that of their bus. The core runs from
 /// HSI until then, as after every reset. Names: RM0390, chapters 3 (flash), 5 (PWR) and 6 (RCC).
 pub fn start() -> u32 {
+    // While a debugger holds the core TIM1 stands still with its outputs off, ENABLE among them (RM0390, debug mode of TIM1).
+    DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
     // A debugger sees the core while it sleeps.
     DBGMCU.cr().modify(|w| {
         w.set_dbg_sleep(true);
@@ -40,14 +47,11 @@ pub fn start() -> u32 {
     PWR.cr1().modify(|w| w.set_odswen(true));
     while !PWR.csr1().read().odswrdy() {}
 
-    // HSE: a clock from outside.
-    RCC.cr().modify(|w| w.set_hsebyp(true));
-    RCC.cr().modify(|w| w.set_hseon(true));
-    while !RCC.cr().read().hserdy() {}
-    // 8 MHz / 4 * 180 / 2; Q and R are not used.
+    // 2 MHz * 180 / 2; Q and R are not used.
+    let (source, divider) = if oscillator::external() { (Pllsrc::HSE, Pllm::DIV4) } else { (Pllsrc::HSI, Pllm::DIV8) };
     RCC.pllcfgr().write(|w| {
-        w.set_pllsrc(Pllsrc::HSE);
-        w.set_pllm(Pllm::DIV4);
+        w.set_pllsrc(source);
+        w.set_pllm(divider);
         w.set_plln(Plln::MUL180);
         w.set_pllp(Pllp::DIV2);
     });
@@ -64,8 +68,25 @@ pub fn start() -> u32 {
         w.set_ppre2(Ppre::DIV2);
     });
     while RCC.cfgr().read().sws() != Sw::PLL1_P {}
+    oscillator::secure();
     accelerate();
     TIMER
+}
+
+/// Why the part was reset last, and whether it runs on HSI.
+pub fn reset_cause() -> u8 {
+    let flags = RCC.csr().read();
+    RCC.csr().modify(|w| w.set_rmvf(true));
+    reset_cause::of([
+        flags.porrstf(),
+        flags.borrstf(),
+        flags.padrstf(),
+        flags.sftrstf(),
+        flags.wdgrstf(),
+        flags.wwdgrstf(),
+        flags.lpwrrstf(),
+        RCC.pllcfgr().read().pllsrc() == Pllsrc::HSI,
+    ])
 }
 
 /// Clocks of devices. What is read back has been written, and by then they run.

@@ -2,7 +2,8 @@
 //!
 //! | priority | what |
 //! | --- | --- |
-//! | 16, the highest | `tick`: TIM2, once a control period |
+//! | 16, the highest | the voltage detector: stops with the amplifiers off |
+//! | 15 | `tick`: TIM2, once a control period |
 //! | 8 of the NVIC | DMA and USART2 |
 //! | 1 | `link`: requests of the host |
 //! | idle | shows the tick that the background is alive, sleeps |

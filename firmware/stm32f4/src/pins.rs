@@ -44,9 +44,9 @@ pub fn take(hertz: u32) -> Wiring {
         pin.function(2, Ospeedr::VERY_HIGH_SPEED, Pupdr::FLOATING);
     }
     spi_bus([Pin(GPIOA, 5), Pin(GPIOA, 7), Pin(GPIOA, 6)], 5, Pupdr::PULL_UP);
-    let adc = Registers::new(SPI1, ADC_MODE, clocks::ADC);
+    let adc = Registers::new(SPI1, ADC_MODE, [clocks::ADC; 2]);
     spi_bus([Pin(GPIOC, 10), Pin(GPIOC, 12), Pin(GPIOC, 11)], 6, Pupdr::PULL_DOWN);
-    let dac = Registers::new(SPI3, DAC_MODE, clocks::DAC);
+    let dac = Registers::new(SPI3, DAC_MODE, [clocks::DAC, clocks::READ_BACK]);
     let select = |pin: Pin| pin.output(true, Ospeedr::VERY_HIGH_SPEED);
     Wiring {
         adc: AdcPins {

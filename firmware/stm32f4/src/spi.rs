@@ -11,13 +11,15 @@ const LOOKS: usize = 100;
 /// Its registers, set up.
 pub struct Registers {
     spi: Spi,
+    /// Of frames that are written, and of those whose answer counts.
+    dividers: [u32; 2],
 }
 
 impl Registers {
     /// Sets up an SPI that is as after reset, and has its clock and its pins: master, bytes, MSB first, SCLK the clock divided by
-    /// `divider`, a power of two.
+    /// a power of two: of frames that are written, of those whose answer counts.
     #[must_use]
-    pub fn new(spi: Spi, mode: Mode, divider: u32) -> Self {
+    pub fn new(spi: Spi, mode: Mode, dividers: [u32; 2]) -> Self {
         spi.cr2().modify(|w| w.set_ssoe(true));
         spi.cr1().modify(|w| {
             w.set_mstr(Mstr::MASTER);
@@ -27,23 +29,38 @@ impl Registers {
             } else {
                 Cpha::FIRST_EDGE
             });
-            w.set_br(Br::from_bits(divider.ilog2() as u8 - 1));
+            w.set_br(rate(dividers[0]));
             // Its own select is not looked at: as if it were high.
             w.set_ssm(true);
             w.set_ssi(true);
             w.set_spe(true);
         });
-        Self { spi }
+        Self { spi, dividers }
     }
 
     /// The same registers once more, for another chip select.
     #[must_use]
     pub const fn again(&self) -> Self {
-        Self { spi: self.spi }
+        Self { spi: self.spi, dividers: self.dividers }
     }
 }
 
+/// BR of a divider.
+fn rate(divider: u32) -> Br {
+    Br::from_bits(divider.ilog2() as u8 - 1)
+}
+
 impl Burst for Registers {
+    /// Written only while nothing moves: the last bit was taken half a cycle before that.
+    #[inline]
+    fn pace(&mut self, answered: bool) {
+        let [written, read] = self.dividers;
+        if written != read {
+            let _ = (0..LOOKS).any(|_| !self.spi.sr().read().bsy());
+            self.spi.cr1().modify(|w| w.set_br(rate(if answered { read } else { written })));
+        }
+    }
+
     #[inline]
     fn exchange(
         &mut self,

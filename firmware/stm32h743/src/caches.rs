@@ -1,4 +1,5 @@
-//! Caches, and the regions that are special: what the DMA shares with the core, and the code in ITCM.
+//! Caches, and what may be accessed: memory that is there. What is not there has no access, so that the core, which reads ahead of its
+//! program, does not read where nothing answers. Special are what the DMA shares with the core, and the code in ITCM.
 
 #![allow(unsafe_code)] // Registers of the MPU.
 
@@ -7,32 +8,49 @@ use cortex_m::peripheral::{CPUID, MPU, SCB};
 
 use crate::clocks;
 
-/// AXI SRAM, where the buffers of the DMA are.
-const BASE: u32 = 0x2400_0000;
-/// 512 KiB: 2^(18 + 1) bytes.
-const SIZE: u32 = 18;
+/// Of RASR: on, with a size of 2^bits bytes.
+const fn size(bits: u32) -> u32 {
+    (bits - 1) << 1 | 1
+}
 
+/// Of RASR: execute never, whoever may access it.
+const NO_CODE: u32 = 1 << 28;
+const READ_ONLY: u32 = 0b110 << 24;
+const FULL: u32 = 0b011 << 24;
+/// TEX 1 C 0 B 0: normal memory that no cache keeps. C alone: written through, as the default map has flash.
+const NOT_CACHED: u32 = 0b001 << 19;
+const CACHED: u32 = 1 << 17;
+/// Eighths of a region where it does not count, 512 MB of the whole: there the default map does, for devices and the core's registers.
+const DEVICES: u32 = 1 << (8 + 2) | 1 << (8 + 7);
+
+/// Base and RASR of the regions by their number; of those that overlap the highest counts.
+const REGIONS: [[u32; 2]; 5] = [
+    // No access.
+    [0, NO_CODE | DEVICES | size(32)],
+    [0x0800_0000, READ_ONLY | CACHED | size(21)],
+    // ITCM; a write through a null pointer is a fault.
+    [0, READ_ONLY | NOT_CACHED | size(16)],
+    // DTCM, which no cache keeps anyway.
+    [0x2000_0000, NO_CODE | FULL | NOT_CACHED | size(17)],
+    // AXI SRAM, where the buffers of the DMA are.
+    [0x2400_0000, NO_CODE | FULL | NOT_CACHED | size(19)],
+];
 /// RBAR: the region number of the same write is valid.
 const VALID: u32 = 1 << 4;
-/// RASR: execute never, full access, TEX 1 C 0 B 0 (normal memory that no cache keeps), enabled.
-const NOT_CACHED: u32 = 1 << 28 | 0b011 << 24 | 0b001 << 19 | SIZE << 1 | 1;
-/// ITCM as region 1: 64 KiB, read-only (AP 110), normal memory that no cache keeps, enabled. A write through a null pointer is a fault.
-const ITCM: u32 = VALID | 1;
-const READ_ONLY: u32 = 0b110 << 24 | 0b001 << 19 | 15 << 1 | 1;
 /// READ_ISS_OVERRIDE of the AXI SRAM's port, AXI_TARG7_FN_MOD.
 const AXI_SRAM_READS: *mut u32 = 0x5100_8108 as *mut u32;
 /// CTRL: on, the default map elsewhere.
 const ENABLED: u32 = 1 << 2 | 1;
 
-/// AXI SRAM out of the caches, ITCM read-only, then both caches on: code and constants come from flash with wait states.
+/// The regions, then both caches on: code and constants come from flash with wait states.
 pub fn enable(mpu: &mut MPU, scb: &mut SCB, cpuid: &mut CPUID) {
     asm::dmb();
-    // SAFETY: one region over memory that nothing has used yet, with the access rights that it had; one over code that nobody writes.
+    // SAFETY: what memory.x uses keeps the access that the program needs of it; AXI SRAM nothing has used yet.
     unsafe {
-        mpu.rbar.write(BASE | VALID);
-        mpu.rasr.write(NOT_CACHED);
-        mpu.rbar.write(ITCM);
-        mpu.rasr.write(READ_ONLY);
+        for ([base, rights], number) in REGIONS.into_iter().zip(0..) {
+            mpu.rbar.write(base | VALID | number);
+            mpu.rasr.write(rights);
+        }
         mpu.ctrl.write(ENABLED);
     }
     if !clocks::is_revision_v() {

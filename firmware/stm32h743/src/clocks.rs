@@ -1,6 +1,8 @@
-//! Clocks of the NUCLEO-H743ZI2 from the 8 MHz of the ST-LINK: core 480 MHz, or 400 where the revision allows no more; buses half
-//! of that, timers as the buses; 33.3 and 50 MHz for the SPI of ADC and DACs.
+//! Clocks of the NUCLEO-H743ZI2 from 8 MHz at the HSE pin, or an eighth of HSI: core 480 MHz, or 400 where the revision allows no more;
+//! buses half of that, timers as the buses; 33.3 and 50 MHz for the SPI of ADC and DACs.
 
+use specgen_link::reset_cause;
+use specgen_stm32::oscillator;
 use specgen_stm32::times::Times;
 use stm32_metapac::pwr::vals::Vos;
 use stm32_metapac::rcc::vals::{Hpre, Plldiv, Pllm, Plln, Pllrge, Pllsrc, Pllvcosel, Ppre, Saisel, Spi45sel, Sw};
@@ -14,14 +16,17 @@ pub const COPY: u32 = TIMER / 1_000_000 * 12;
 pub const DELAY: u32 = 960;
 /// Divides 33.3 MHz to SCLK of the ADC: 17 MHz at most at 3.3 V.
 pub const ADC: u32 = 2;
-/// Divides 50 MHz to SCLK of the DACs: 25 MHz at most where something is read back.
+/// Divides 50 MHz to SCLK of the DACs, where they are written.
 pub const DAC: u32 = 2;
+/// The same where they are read back: 6.25 MHz. Half a cycle, 80 ns, is more than SDO takes with its resistor: docs/bring-up.md.
+pub const READ_BACK: u32 = 8;
 /// From sampling to the change of the outputs, ns: codes that are written by then are out at this instant, later ones when they are
 /// written.
 pub const OUTPUT: u32 = 48_000;
 
 /// For the estimate of a tick: 480 MHz; four wait states of the flash, both caches.
-pub const TIMES: Times = Times::new(480_000_000, [4, 1 << 17 | 1 << 16], [33_333_333 / ADC, 50_000_000 / DAC]);
+pub const TIMES: Times =
+    Times::new(480_000_000, [4, 1 << 17 | 1 << 16], [33_333_333 / ADC, 50_000_000 / DAC, 50_000_000 / READ_BACK]);
 
 /// REV_ID of revision V, the first with voltage scale 0 and so 480 MHz (ES0392).
 const REVISION_V: u16 = 0x2003;
@@ -35,6 +40,8 @@ pub fn is_revision_v() -> bool {
 /// HSI until then, as after every reset. Names and order: RM0433, chapters 6 (PWR) and 8 (RCC).
 pub fn start() -> u32 {
     let fast = is_revision_v();
+    // While a debugger holds the core TIM1 stands still with its outputs off, ENABLE among them (RM0433, debug mode of TIM1).
+    DBGMCU.apb2fzr1().modify(|w| w.set_tim1(true));
     // A debugger sees the core while it sleeps.
     DBGMCU.cr().modify(|w| {
         w.set_dbgsleep_d1(true);
@@ -46,11 +53,7 @@ pub fn start() -> u32 {
     devices();
     voltage(fast);
 
-    // HSE: a clock from outside.
-    RCC.cr().modify(|w| w.set_hsebyp(true));
-    RCC.cr().modify(|w| w.set_hseon(true));
-    while !RCC.cr().read().hserdy() {}
-    plls(fast);
+    plls(fast, oscillator::external());
 
     // Wait states of the flash before the clock gets faster (table: FLASH recommended number of wait states and programming delay).
     let latency = if fast { 4 } else { 2 };
@@ -72,11 +75,29 @@ pub fn start() -> u32 {
     RCC.d3cfgr().modify(|w| w.set_d3ppre(Ppre::DIV2));
     RCC.cfgr().modify(|w| w.set_sw(Sw::PLL1_P));
     while RCC.cfgr().read().sws() != Sw::PLL1_P {}
+    oscillator::secure();
     RCC.d2ccip1r().modify(|w| {
         w.set_spi123sel(Saisel::PLL2_P);
         w.set_spi45sel(Spi45sel::PLL2_Q);
     });
     if fast { TIMER } else { 200_000_000 }
+}
+
+/// Why the part was reset last, and whether it runs on HSI.
+pub fn reset_cause() -> u8 {
+    let flags = RCC.rsr().read();
+    RCC.rsr().modify(|w| w.set_rmvf(true));
+    RCC.rsr().modify(|w| w.set_rmvf(false));
+    reset_cause::of([
+        flags.porrstf(),
+        flags.borrstf(),
+        flags.pinrstf(),
+        flags.sftrstf(),
+        flags.iwdg1rstf(),
+        flags.wwdg1rstf(),
+        flags.lpwrrstf(),
+        RCC.pllckselr().read().pllsrc() == Pllsrc::HSI,
+    ])
 }
 
 /// Clocks of devices. What is read back has been written, and by then they run.
@@ -123,11 +144,12 @@ fn voltage(fast: bool) {
 
 /// PLL1 for the core: 960 MHz / 2, or 800 / 2; PLL2 for the SPIs, whatever the core has: 400 MHz / 12 and / 8. Source and dividers are
 /// written while no PLL runs; afterwards they are locked.
-fn plls(fast: bool) {
+fn plls(fast: bool, external: bool) {
+    let (source, divider) = if external { (Pllsrc::HSE, Pllm::DIV1) } else { (Pllsrc::HSI, Pllm::DIV8) };
     RCC.pllckselr().modify(|w| {
-        w.set_pllsrc(Pllsrc::HSE);
-        w.set_divm(0, Pllm::DIV1);
-        w.set_divm(1, Pllm::DIV1);
+        w.set_pllsrc(source);
+        w.set_divm(0, divider);
+        w.set_divm(1, divider);
     });
     RCC.pllcfgr().modify(|w| {
         for (pll, oscillator) in [Pllvcosel::WIDE_VCO, Pllvcosel::MEDIUM_VCO].into_iter().enumerate() {

@@ -16,16 +16,18 @@ pub struct Registers {
     spi: Spi,
     /// CR1 while it runs.
     running: Cr1,
+    /// Of frames that are written, and of those whose answer counts.
+    dividers: [u32; 2],
 }
 
 impl Registers {
     /// Sets up an SPI that is as after reset, and has its clock and its pins: master, bytes, MSB first, SCLK the clock divided by
-    /// `divider`, a power of two.
+    /// a power of two: of frames that are written, of those whose answer counts.
     ///
     /// Transfers have no size (TSIZE 0): what is in the FIFO goes out, without a start for each. ES0392 (SPI: a master's transfer
     /// stalls if it is started within a cycle of SCLK after the end of the last one) names this as the way around it.
     #[must_use]
-    pub fn new(spi: Spi, mode: Mode, divider: u32) -> Self {
+    pub fn new(spi: Spi, mode: Mode, dividers: [u32; 2]) -> Self {
         spi.cfg2().modify(|w| {
             w.set_master(Master::MASTER);
             w.set_cpol(if mode.polarity == Polarity::IdleHigh { Cpol::IDLE_HIGH } else { Cpol::IDLE_LOW });
@@ -42,14 +44,14 @@ impl Registers {
         });
         spi.cr2().write(|w| w.set_tsize(0));
         spi.cfg1().modify(|w| {
-            w.set_mbr(Mbr::from_bits(divider.ilog2() as u8 - 1));
+            w.set_mbr(rate(dividers[0]));
             w.set_dsize(7);
             w.set_fthlv(Fthlv::ONE_FRAME);
         });
         let mut running = spi.cr1().read();
         running.set_spe(true);
         running.set_cstart(true);
-        let registers = Self { spi, running };
+        let registers = Self { spi, running, dividers };
         registers.start();
         registers
     }
@@ -57,7 +59,7 @@ impl Registers {
     /// The same registers once more, for another chip select.
     #[must_use]
     pub const fn again(&self) -> Self {
-        Self { spi: self.spi, running: self.running }
+        Self { spi: self.spi, running: self.running, dividers: self.dividers }
     }
 
     /// With empty FIFOs.
@@ -70,7 +72,23 @@ impl Registers {
     }
 }
 
+/// MBR of a divider.
+fn rate(divider: u32) -> Mbr {
+    Mbr::from_bits(divider.ilog2() as u8 - 1)
+}
+
 impl Burst for Registers {
+    /// Written only while it is off; its pins are driven then, too.
+    #[inline]
+    fn pace(&mut self, answered: bool) {
+        let [written, read] = self.dividers;
+        if written != read {
+            self.spi.cr1().modify(|w| w.set_spe(false));
+            self.spi.cfg1().modify(|w| w.set_mbr(rate(if answered { read } else { written })));
+            self.start();
+        }
+    }
+
     #[inline]
     fn exchange(
         &mut self,

@@ -147,13 +147,13 @@ fn dacs(bench: &Bench) -> Dacs<'_> {
 
 /// What the buses of the board take, ns.
 fn rates() -> Result<Rates, Exit> {
-    let mut words = [0; 5];
+    let mut words = [0; 6];
     let file = File::open(b"rates.bin\0").ok_or(Exit::NoInput)?;
     if file.read(&mut words) != size_of_val(&words) {
         return Err(Exit::InputSize);
     }
-    let [adc_byte, adc_frame, dac_byte, dac_frame, look] = words;
-    Ok(Rates { adc: [adc_byte, adc_frame], dac: [dac_byte, dac_frame], look })
+    let [adc_byte, adc_frame, dac_byte, dac_frame, look, back] = words;
+    Ok(Rates { adc: [adc_byte, adc_frame], dac: [dac_byte, dac_frame], look, back })
 }
 
 /// What the gauges' converter gave.

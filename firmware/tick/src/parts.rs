@@ -25,6 +25,8 @@ pub struct Rates {
     pub dac: [u64; 2],
     /// Of a look at a pin.
     pub look: u64,
+    /// What a byte that a DAC is read back by takes more.
+    pub back: u64,
 }
 
 /// What a tick did: bytes and frames of the ADC, of the DACs, ns of waits, looks at pins and edges of pins.
@@ -88,26 +90,34 @@ impl Bench {
         self.pass(bytes as u64 * byte + frame);
     }
 
+    /// Bytes that are read back take longer than others.
+    fn slower(&self, bytes: u64) {
+        let more = bytes * self.rates.get().back;
+        self.count(WAITS, more);
+        self.pass(more);
+    }
+
     /// What a DAC answers, and what it takes.
-    fn exchange(&self, part: usize, frame: &mut [u8]) {
-        let [command, high, low] = frame else { return };
+    fn exchange(&self, part: usize, frame: [u8; 3]) -> [u8; 2] {
+        let [command, high, low] = frame;
+        let mut back = [0; 2];
         let (mut registers, mut answers) = (self.registers.get(), self.answers.get());
         if let (Some([input, output]), Some(answer)) = (registers.get_mut(part), answers.get_mut(part)) {
-            let data = u16::from_be_bytes([*high, *low]);
-            let asked = *answer;
-            let channel = (*command & 0xf).trailing_zeros() as usize;
-            match *command >> 4 {
+            let data = u16::from_be_bytes([high, low]);
+            back = answer.to_be_bytes();
+            let channel = (command & 0xf).trailing_zeros() as usize;
+            match command >> 4 {
                 1 => input.iter_mut().skip(channel).take(1).for_each(|slot| *slot = data),
                 // To one channel at once, or to all.
-                3 if *command & 0xf == 0xf => (*input, *output) = ([data; 4], [data; 4]),
+                3 if command & 0xf == 0xf => (*input, *output) = ([data; 4], [data; 4]),
                 3 => output.iter_mut().skip(channel).take(1).for_each(|slot| *slot = data),
                 9 => *answer = output.get(channel).copied().unwrap_or(0),
                 _ => {}
             }
-            [*high, *low] = asked.to_be_bytes();
         }
         self.registers.set(registers);
         self.answers.set(answers);
+        back
     }
 
     /// LDAC.
@@ -154,16 +164,21 @@ impl SpiDevice for Bus<'_> {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
         specgen_aside(|| {
             for operation in operations {
-                let Operation::TransferInPlace(frame) = operation else { continue };
-                match self.dac {
-                    None => {
+                match (operation, self.dac) {
+                    (Operation::TransferInPlace(frame), None) => {
                         self.bench.frame(ADC, frame.len());
                         self.bench.sample(frame);
                     }
-                    Some(part) => {
-                        self.bench.frame(DAC, frame.len());
-                        self.bench.exchange(part, frame);
+                    (Operation::Write([command, high, low]), Some(part)) => {
+                        self.bench.frame(DAC, 3);
+                        self.bench.exchange(part, [*command, *high, *low]);
                     }
+                    (Operation::TransferInPlace([command, high, low]), Some(part)) => {
+                        self.bench.frame(DAC, 3);
+                        self.bench.slower(3);
+                        [*high, *low] = self.bench.exchange(part, [*command, *high, *low]);
+                    }
+                    _ => {}
                 }
             }
         });

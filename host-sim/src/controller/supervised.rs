@@ -24,7 +24,8 @@ pub struct MachineWord {
     /// 0 disarmed, 1 arming, 2 running, 3 holding, 4 ramping down, 5 faulted.
     pub phase: u8,
     /// 0 none, 1 gauge not finite, 2 gauge range, 3 gauge stuck, 4 gauge disagreement, 5 tracking error, 6 voltage saturation,
-    /// 7 slew saturation, 8 missed tick, 9 link lost, 10 integrity, 11 converter, 12 emergency stop, 13 host gone, 14 wiring.
+    /// 7 slew saturation, 8 missed tick, 9 link lost, 10 integrity, 11 converter, 12 emergency stop, 13 host gone, 14 wiring,
+    /// 15 stalled.
     pub cause: u8,
     /// Whether the amplifiers are to be on.
     pub amplifier_on: bool,

@@ -4,12 +4,15 @@ use crate::spi::Byte;
 use crate::time::{Time, nanoseconds};
 use crate::violations::Violations;
 
-/// SYNC low until the first falling edge of SCLK.
-const SELECT: Time = nanoseconds(15);
+/// SYNC low until the first falling edge of SCLK, with read-back.
+const SELECT: Time = nanoseconds(20);
 /// SYNC high between frames.
 const HIGH: Time = nanoseconds(30);
 /// A cycle of SCLK with read-back: 25 MHz.
 const CLOCK: Time = nanoseconds(40);
+/// SDO is valid so long after SCLK rises, through 1 kΩ into 40 pF to 0.7 of the level, and before SCLK falls: the data sheet, 1.2 RC, the
+/// set-up time of the microcontroller's input.
+const SDO: Time = nanoseconds(25) + nanoseconds(48) + nanoseconds(5);
 /// LDAC low.
 const LDAC_LOW: Time = nanoseconds(15);
 /// From the end of a frame until LDAC falls.
@@ -39,6 +42,8 @@ pub struct Ad5686r {
     bits: u32,
     /// Comes out with the next frame.
     answer: u16,
+    /// The last bit on SDO, which is there until the next one is.
+    shown: u8,
     ldac: Option<(bool, Time)>,
     pub fault: Option<Fault>,
 }
@@ -56,6 +61,7 @@ impl Ad5686r {
             frame: 0,
             bits: 0,
             answer: 0,
+            shown: 0,
             ldac: None,
             fault: None,
         }
@@ -107,7 +113,10 @@ impl Ad5686r {
         };
         self.frame = self.frame << 8 | u32::from(byte.value);
         self.bits += 8;
-        Some(back)
+        // Taken in the middle of a cycle: before it is valid it is the bit before.
+        let seen = if byte.period() / 2 < SDO { back >> 1 | self.shown << 7 } else { back };
+        self.shown = back & 1;
+        Some(seen)
     }
 
     /// LDAC changed.
@@ -160,15 +169,19 @@ impl Ad5686r {
 mod tests {
     use super::*;
 
-    const PERIOD: Time = nanoseconds(80);
+    const PERIOD: Time = nanoseconds(160);
 
     /// Sends a frame from `at` on; the lower 16 bits that came back.
     fn frame(dac: &mut Ad5686r, word: u32, at: Time, violations: &mut Violations) -> (u16, Time) {
+        frame_at(dac, word, at, PERIOD, violations)
+    }
+
+    fn frame_at(dac: &mut Ad5686r, word: u32, at: Time, period: Time, violations: &mut Violations) -> (u16, Time) {
         dac.select(true, false, at, violations);
         let mut at = at + SELECT;
         let mut back = 0;
         for value in &word.to_be_bytes()[1..] {
-            let byte = Byte { value: *value, begin: at, end: at + 8 * PERIOD, mode: MODE };
+            let byte = Byte { value: *value, begin: at, end: at + 8 * period, mode: MODE };
             back = back << 8 | u16::from(dac.exchange(byte, violations).unwrap());
             at = byte.end;
         }
@@ -190,6 +203,20 @@ mod tests {
         let (back, _) = frame(&mut dac, 0, at + HIGH, &mut violations);
         assert_eq!(back, 0xabcd);
         assert!(violations.none(), "{violations:?}");
+    }
+
+    /// 6.25 and 5.625 MHz are slow enough for SDO and its resistor, 25, 22.5 and 12.5 MHz are not.
+    #[test]
+    fn what_is_taken_before_it_is_valid_is_the_bit_before() {
+        for (period, expected) in [(160, 0xa55a), (177, 0xa55a), (40, 0x52ad), (44, 0x52ad), (80, 0x52ad)] {
+            let mut violations = Violations::default();
+            let mut dac = Ad5686r::new("DAC");
+            let (_, at) = frame(&mut dac, 0x38_a55a, 0, &mut violations);
+            let (_, at) = frame(&mut dac, 0x98_0000, at + HIGH, &mut violations);
+            let (back, _) = frame_at(&mut dac, 0, at + HIGH, nanoseconds(period), &mut violations);
+            assert_eq!(back, expected, "{period} ns");
+            assert!(violations.none(), "{violations:?}");
+        }
     }
 
     #[test]

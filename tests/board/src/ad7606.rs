@@ -17,6 +17,8 @@ const SETUP: Time = nanoseconds(253_000);
 const CLOCK: Time = nanoseconds(58);
 /// CS low until the first edge of SCLK, and its last edge until CS is high.
 const SELECT: Time = nanoseconds(30);
+/// DOUTA is valid so long after SCLK rises, for VDRIVE of 2.7 V and more, and before SCLK falls: set-up of the microcontroller's input.
+const DOUT: Time = nanoseconds(27) + nanoseconds(2);
 /// CPOL 1, CPHA 0.
 const MODE: u8 = 2;
 const NAME: &str = "ADC";
@@ -161,8 +163,11 @@ impl Ad7606 {
         if self.given == 0 {
             violations.shorter(NAME, "CS to SCLK", byte.begin - since, SELECT, byte.begin);
         }
+        // The first bit is there before SCLK; each one after it, taken in the middle of a cycle before it is valid, is the one before.
+        let late = u32::from(byte.period() / 2 < DOUT);
         let shift = u32::from(self.fault == Some(Fault::Shifted));
-        let value = (0..8).fold(0, |value, bit| value << 1 | self.bit((self.given + bit).checked_sub(shift)));
+        let shown = |index: u32| self.bit(index.checked_sub(shift + late.min(index)));
+        let value = (self.given..self.given + 8).fold(0, |value, index| value << 1 | shown(index));
         self.given += 8;
         self.last = byte.end;
         if self.fault == Some(Fault::Blank) { 0 } else { value }
@@ -197,13 +202,17 @@ mod tests {
         at + low
     }
 
-    fn read(adc: &mut Ad7606, mut at: Time, violations: &mut Violations) -> Vec<u8> {
+    fn read(adc: &mut Ad7606, at: Time, violations: &mut Violations) -> Vec<u8> {
+        read_at(adc, at, PERIOD, violations)
+    }
+
+    fn read_at(adc: &mut Ad7606, mut at: Time, period: Time, violations: &mut Violations) -> Vec<u8> {
         adc.select(true, false, at, violations);
         at += SELECT;
         let mut bytes = Vec::new();
         for _ in 0..16 {
-            bytes.push(adc.exchange(Byte { value: 0, begin: at, end: at + 8 * PERIOD, mode: 2 }, violations));
-            at += 8 * PERIOD;
+            bytes.push(adc.exchange(Byte { value: 0, begin: at, end: at + 8 * period, mode: 2 }, violations));
+            at += 8 * period;
         }
         adc.select(false, false, at, violations);
         bytes
@@ -220,6 +229,19 @@ mod tests {
         assert_eq!(bytes[..8], [0, 0, 0x80, 0, 0x7f, 0xff, 0, 1]);
         assert_eq!(bytes[14..], [0x40, 0]);
         assert!(violations.none(), "{violations:?}");
+    }
+
+    /// 16.7 MHz leaves 30 ns from edge to edge.
+    #[test]
+    fn what_is_taken_before_it_is_valid_is_the_bit_before() {
+        for (period, expected) in [(60, [0xa5, 0x5a]), (56, [0xd2, 0xad])] {
+            let mut violations = Violations::default();
+            let (mut adc, at) = ready(&mut violations);
+            let at = convert(&mut adc, CONVST_LOW, at, &mut violations);
+            adc.sample([0x255a, 0, 0, 0, 0, 0], true);
+            let bytes = read_at(&mut adc, at + CONVERSION, nanoseconds(period), &mut violations);
+            assert_eq!(bytes[..2], expected, "{period} ns");
+        }
     }
 
     #[test]

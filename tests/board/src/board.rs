@@ -10,8 +10,12 @@ use crate::fault::Fault;
 use crate::gpio::{self, Gpio};
 use crate::line::Line;
 use crate::meter::Meter;
+use crate::mpu::{self, Access, Mpu};
 use crate::nvic::Nvic;
-use crate::part::{DMA_INTERRUPTS, PULSES_FUNCTION, Part, Pin, SPI1, TIM1, TIM2, TIM2_INTERRUPT};
+use crate::part::{
+    DMA_INTERRUPTS, Family, HSE_ON, PLLS_ON, PULSES_FUNCTION, Part, Pin, SECURED, SPI1, SUPPLY_INTERRUPT, TIM1, TIM2,
+    TIM2_INTERRUPT,
+};
 use crate::plant::Plant;
 use crate::pulses::Pulses;
 use crate::rcc::{self, Clocks};
@@ -64,14 +68,17 @@ struct Devices {
     dma: Dma,
     usart: Usart,
     watchdog: Watchdog,
+    mpu: Mpu,
     clocks: Clocks,
 }
 
 impl Devices {
-    fn new(part: &Part) -> Self {
+    /// `cause`: bits of [`Part::reset_cause`].
+    fn new(part: &Part, cause: u32) -> Self {
         let mut store = Store::default();
         // HSI is on.
         store.set(part.rcc, 1);
+        store.set(part.reset_cause.register, cause);
         if let Some([address, word]) = part.identity {
             store.set(address, word);
         }
@@ -87,6 +94,7 @@ impl Devices {
             dma: Dma::default(),
             usart: Usart::new(part.family, part.usart),
             watchdog: Watchdog::new(),
+            mpu: Mpu::default(),
             clocks,
         }
     }
@@ -147,7 +155,8 @@ pub struct Board {
 impl Board {
     /// `bits`: of the ADC and of a gauge; `modelled`: cycles by the model of [`Cost`].
     pub fn new(part: &'static Part, code: [Vec<u8>; 2], bits: [u32; 2], plant: Plant, modelled: bool) -> Self {
-        let devices = Devices::new(part);
+        let cause = &part.reset_cause;
+        let devices = Devices::new(part, cause.power | cause.brown_out | cause.pin);
         let levels = Levels {
             convst: true,
             select: true,
@@ -194,7 +203,15 @@ impl Board {
     /// The microcontroller is reset; the converters are not.
     pub fn reset(&mut self, why: &str) {
         self.say(&format!("reset: {why}"));
-        self.devices = Devices::new(self.part);
+        let known = &self.part.reset_cause;
+        let cause = match why {
+            "watchdog" => known.watchdog,
+            "brown-out" => known.brown_out,
+            _ => known.software,
+        };
+        // What the program did not clear is still there.
+        let before = self.devices.store.word(known.register);
+        self.devices = Devices::new(self.part, before | cause | known.pin);
         self.resets += 1;
         self.conditional = 0;
         self.meter = Meter::default();
@@ -231,6 +248,7 @@ impl Board {
                 self.faults.extend([Fault::Hang, Fault::Stop]);
                 self.contact();
             }
+            Fault::Clock => self.clock_failed(),
             Fault::Uart => self.devices.usart.damaged = true,
             Fault::Noise => self.devices.usart.noise = true,
             _ => {}
@@ -245,6 +263,71 @@ impl Board {
         self.dacs[0].fault = None;
         self.devices.usart.noise = false;
         self.contact();
+    }
+
+    /// The clock at the HSE pin stops: with the clock security system the part goes on with HSI, without it the core stands.
+    fn clock_failed(&mut self) {
+        let (rcc, switch) = (self.part.rcc, self.part.rcc + self.part.switch);
+        let control = self.devices.store.word(rcc);
+        if control & HSE_ON == 0 {
+            return;
+        }
+        if control & SECURED == 0 {
+            self.faults.push(Fault::Hang);
+            return;
+        }
+        self.devices.store.set(rcc, control & !(HSE_ON | PLLS_ON));
+        let chosen = self.devices.store.word(switch);
+        self.devices.store.set(switch, chosen & !7);
+        self.clocked();
+        self.devices.enable.clock_failed();
+        self.pins();
+    }
+
+    /// Whether its failure is an exception of the core.
+    pub fn is_secured(&self) -> bool {
+        self.devices.store.word(self.part.rcc) & SECURED != 0
+    }
+
+    /// A debugger takes the core, for so long, or gives it back. The watchdog stands still meanwhile: that is the debugger's doing.
+    pub fn hold(&mut self, time: Option<Time>) {
+        self.devices.enable.frozen = time.is_some() && self.devices.store.word(self.part.freeze) & 1 == 1;
+        self.devices.watchdog.frozen(time.unwrap_or(0));
+        self.pins();
+    }
+
+    /// A tick begins.
+    pub fn tick_begins(&mut self) {
+        self.meter.begin(self.now, self.instructions);
+        if self.has(Fault::Supply) {
+            self.faults.retain(|fault| *fault != Fault::Supply);
+            self.say("fault Supply, in a tick");
+            self.devices.nvic.line(SUPPLY_INTERRUPT, true);
+        }
+        self.check_access();
+    }
+
+    /// An M7 reads ahead of its program where it has access: it must have none where no memory is, and some where there is.
+    fn check_access(&mut self) {
+        let part = self.part;
+        if part.family != Family::H7 {
+            return;
+        }
+        for [base, length] in part.memories {
+            let last = base + (length - 1);
+            let beyond = last.wrapping_add(1);
+            if [*base, last].iter().any(|at| self.devices.mpu.access(*at) == Access::None) {
+                self.violations.note("MPU", &format!("no access to memory at {base:#x}"), self.now);
+            }
+            if self.devices.mpu.access(beyond) != Access::None {
+                self.violations.note("MPU", &format!("absent memory at {beyond:#x} may be read ahead"), self.now);
+            }
+        }
+        for absent in [0x6000_0000, 0xdfff_ffff] {
+            if self.devices.mpu.access(absent) != Access::None {
+                self.violations.note("MPU", &format!("absent memory at {absent:#x} may be read ahead"), self.now);
+            }
+        }
     }
 
     /// The emergency contact works on the enable line by itself.
@@ -556,7 +639,11 @@ impl Guest for Board {
                 word
             }
             _ if within(part.watchdog, 0x400) => devices.watchdog.read(aligned - part.watchdog),
+            _ if aligned == part.rcc && self.faults.contains(&Fault::Clock) => {
+                rcc::read(part.family, 0, devices.store.word(aligned)) & !rcc::HSE_READY
+            }
             _ if within(part.rcc, 0x400) => rcc::read(part.family, aligned - part.rcc, devices.store.word(aligned)),
+            _ if mpu::REGISTERS.contains(&address) => devices.mpu.read(aligned),
             _ if within(part.pwr, 0x400) => rcc::power(part.family, aligned - part.pwr, devices.store.word(aligned)),
             _ => {
                 self.unmodelled.insert(aligned);
@@ -607,6 +694,10 @@ impl Guest for Board {
             _ if within(part.dma, 0x400) => devices.dma.write(aligned - part.dma, value),
             _ if within(part.usart, 0x400) => devices.usart.write(aligned - part.usart, value),
             _ if within(part.watchdog, 0x400) => devices.watchdog.write(aligned - part.watchdog, value, self.now),
+            _ if mpu::REGISTERS.contains(&address) => devices.mpu.write(aligned, value),
+            _ if aligned == part.reset_cause.register && value & part.reset_cause.clear != 0 => {
+                devices.store.set(aligned, 0);
+            }
             _ if aligned == part.rcc + rcc::SOURCE
                 && rcc::refused(part.family, devices.store.word(part.rcc), devices.store.word(aligned), value) =>
             {

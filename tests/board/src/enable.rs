@@ -19,6 +19,8 @@ pub struct Enable {
     status: u32,
     /// Level of the break input.
     open: bool,
+    /// It stands still because a debugger holds the core.
+    pub frozen: bool,
 }
 
 impl Enable {
@@ -26,6 +28,14 @@ impl Enable {
     pub fn contact(&mut self, open: bool) {
         self.open = open;
         self.protect();
+    }
+
+    /// The clock security system has found no clock, which is a break, too.
+    pub fn clock_failed(&mut self) {
+        if self.dead_time & ENABLED != 0 {
+            self.dead_time &= !MAIN;
+            self.status |= BROKEN;
+        }
     }
 
     fn breaks(&self) -> bool {
@@ -44,7 +54,7 @@ impl Enable {
         let place = channel - 1;
         let mode = self.registers[1 + place / 2] >> (8 * (place % 2) + 4) & 7;
         let connected = self.registers[3] >> (4 * place) & 1 == 1;
-        self.dead_time & MAIN != 0 && connected && mode == ACTIVE
+        self.dead_time & MAIN != 0 && !self.frozen && connected && mode == ACTIVE
     }
 
     fn register(offset: u32) -> Option<usize> {
@@ -97,5 +107,11 @@ mod tests {
         enable.write(0x10, !BROKEN);
         enable.write(0x44, MAIN);
         assert!(enable.level(2) && enable.read(0x10) & BROKEN == 0);
+        enable.frozen = true;
+        assert!(!enable.level(2));
+        enable.frozen = false;
+        assert!(enable.level(2));
+        enable.clock_failed();
+        assert!(!enable.level(2) && enable.read(0x10) & BROKEN != 0);
     }
 }

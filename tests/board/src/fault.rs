@@ -24,12 +24,18 @@ pub enum Fault {
     HangStop,
     /// The core takes a hard fault.
     Hard,
+    /// A debugger holds the core for a second, and the watchdog with it.
+    Halt,
+    /// The clock at the HSE pin stops, until it is healed.
+    Clock,
+    /// The voltage detector finds the supply too low, at the beginning of a tick.
+    Supply,
     /// The supply breaks down and comes back: a reset, with RAM that is no longer what it was.
     BrownOut,
 }
 
 /// Names, for commands.
-pub const NAMES: [(&str, Fault); 16] = [
+pub const NAMES: [(&str, Fault); 19] = [
     ("stop", Fault::Stop),
     ("adc-dead", Fault::Adc(ad7606::Fault::Dead)),
     ("adc-endless", Fault::Adc(ad7606::Fault::Endless)),
@@ -45,6 +51,9 @@ pub const NAMES: [(&str, Fault); 16] = [
     ("hang", Fault::Hang),
     ("hang-stop", Fault::HangStop),
     ("hard-fault", Fault::Hard),
+    ("halt", Fault::Halt),
+    ("clock", Fault::Clock),
+    ("supply", Fault::Supply),
     ("brown-out", Fault::BrownOut),
 ];
 

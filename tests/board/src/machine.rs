@@ -5,8 +5,9 @@ use std::path::Path;
 use crate::board::{Board, Stop};
 use crate::elf::Segment;
 use crate::fault::Fault;
-use crate::nvic::{FIRST, HARD_FAULT};
+use crate::nvic::{FIRST, HARD_FAULT, NMI};
 use crate::part::{DEVICES, TIM2_INTERRUPT};
+use crate::time::{MICROSECOND, Time};
 use crate::unicorn::{Core, Engine, Register};
 
 /// Returns from exceptions are jumps to here, from where nothing can be executed.
@@ -17,6 +18,8 @@ const TO_THREAD: u32 = 0xffff_ffe9;
 /// R0 to R3, R12, LR, PC, xPSR, S0 to S15, FPSCR, one for alignment.
 const FRAME: u32 = 26;
 const ALIGNED: u32 = 1 << 9;
+/// How long a debugger holds the core.
+const HALT: Time = 1_000_000 * MICROSECOND;
 
 pub struct Machine {
     engine: Engine<Board>,
@@ -115,11 +118,22 @@ impl Machine {
         }
     }
 
-    /// A hard fault, or a supply that broke down.
+    /// What is no matter of the board alone: exceptions of the core, a debugger, a supply that broke down.
     pub fn fail(&mut self, fault: Fault) {
         self.board().fail(fault);
         match fault {
             Fault::Hard => self.enter(HARD_FAULT, self.at),
+            Fault::Clock if self.board().is_secured() => self.enter(NMI, self.at),
+            Fault::Halt => {
+                let (core, board) = self.engine.parts();
+                let end = board.now + HALT;
+                board.hold(Some(HALT));
+                while board.now < end {
+                    board.sleep(&core);
+                    board.look(None);
+                }
+                board.hold(None);
+            }
             Fault::BrownOut => {
                 let (core, board) = self.engine.parts();
                 for [base, length] in &board.part.memories[1..] {
@@ -155,9 +169,11 @@ impl Machine {
         core.set(Register::LR, if board.nvic().depth() == 0 { TO_THREAD } else { TO_HANDLER });
         self.at = core.word(board.part.flash + 4 * number as u32).unwrap_or(0) & !1;
         if number == FIRST + TIM2_INTERRUPT {
-            board.meter.begin(board.now, board.instructions);
+            board.nvic().enter(number);
+            board.tick_begins();
+        } else {
+            board.nvic().enter(number);
         }
-        board.nvic().enter(number);
         board.now += board.entry();
         board.lowest_stack(base);
     }

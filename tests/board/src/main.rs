@@ -13,6 +13,7 @@ mod gpio;
 mod line;
 mod machine;
 mod meter;
+mod mpu;
 mod nvic;
 mod part;
 mod plant;

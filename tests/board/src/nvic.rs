@@ -1,6 +1,7 @@
 //! Exceptions: what is pending, enabled and active, and which one comes next.
 
 /// Exception numbers.
+pub const NMI: usize = 2;
 pub const HARD_FAULT: usize = 3;
 pub const PEND_SV: usize = 14;
 const SYS_TICK: usize = 15;

@@ -28,6 +28,12 @@ pub struct Part {
     /// The timer that drives CONVST and LDAC, and its channels for them, counted from 0.
     pub pulses: u32,
     pub channels: [usize; 2],
+    /// Register with the bit that stops TIM1 while a debugger holds the core: bit 0.
+    pub freeze: u32,
+    /// Why the part was reset: the register, its bits after power-up, by the watchdog, by the program, and the bit that clears them.
+    pub reset_cause: ResetCause,
+    /// CFGR of RCC.
+    pub switch: u32,
     /// DBGMCU_IDCODE, where the program reads it.
     pub identity: Option<[u32; 2]>,
     pub convst: Pin,
@@ -43,6 +49,24 @@ pub struct Part {
     pub input: Pin,
 }
 
+/// Bits of [`Part::reset_cause`].
+#[derive(Debug)]
+pub struct ResetCause {
+    pub register: u32,
+    pub power: u32,
+    pub brown_out: u32,
+    pub pin: u32,
+    pub software: u32,
+    pub watchdog: u32,
+    pub clear: u32,
+}
+
+/// CR of RCC: HSE on, clock security system, PLLs on.
+pub const HSE_ON: u32 = 1 << 16;
+pub const SECURED: u32 = 1 << 19;
+pub const PLLS_ON: u32 = 0x1500_0000;
+/// The interrupt of the voltage detector.
+pub const SUPPLY_INTERRUPT: usize = 1;
 /// The same on both.
 pub const TIM1: u32 = 0x4001_0000;
 pub const TIM2: u32 = 0x4000_0000;
@@ -97,6 +121,17 @@ pub const H743: Part = Part {
     dac_spi: 0x4001_3400,
     pulses: 0x4000_0800,
     channels: [3, 1],
+    freeze: 0x5c00_104c,
+    reset_cause: ResetCause {
+        register: 0x5802_44d0,
+        power: 1 << 23,
+        brown_out: 1 << 21,
+        pin: 1 << 22,
+        software: 1 << 24,
+        watchdog: 1 << 26,
+        clear: 1 << 16,
+    },
+    switch: 0x10,
     // Revision V.
     identity: Some([0x5c00_1000, 0x2003_6450]),
     convst: (D, 15),
@@ -140,6 +175,17 @@ pub const F446: Part = Part {
     dac_spi: 0x4000_3c00,
     pulses: 0x4000_0400,
     channels: [1, 0],
+    freeze: 0xe004_200c,
+    reset_cause: ResetCause {
+        register: 0x4002_3874,
+        power: 1 << 27,
+        brown_out: 1 << 25,
+        pin: 1 << 26,
+        software: 1 << 28,
+        watchdog: 1 << 29,
+        clear: 1 << 24,
+    },
+    switch: 8,
     identity: None,
     convst: (C, 7),
     busy: (A, 9),

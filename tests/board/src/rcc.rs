@@ -73,6 +73,9 @@ pub fn clocks(family: Family, rcc: u32, registers: &Store) -> Clocks {
 /// PLLCKSELR of an H7.
 pub const SOURCE: u32 = 0x28;
 
+/// CR: there is a clock at the pin.
+pub const HSE_READY: u32 = 1 << 17;
+
 /// Whether a write of [`SOURCE`] is not allowed, with CR as it stands: of the source while a PLL runs, or of the divider of one that
 /// does.
 pub fn refused(family: Family, control: u32, before: u32, after: u32) -> bool {

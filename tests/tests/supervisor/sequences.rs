@@ -1,7 +1,7 @@
 //! Random sequences of requests, events, readings and set-points.
 
 use super::bench::*;
-use super::oracle::{Bounds, Oracle};
+use super::oracle::{Bounds, EVENTS, Oracle};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::collections::BTreeSet;
@@ -24,7 +24,7 @@ pub fn run(bench: &mut Bench, seed: u64, sequences: u32, mut each: impl FnMut(&B
         let wrong = draw(4) == 0;
         let gauge = draw(6) as usize;
         let kind = draw(9);
-        let event = 1 << draw(5);
+        let event = EVENTS[draw(6) as usize];
         let away = [0, 0, 0, 3, 8, 12, 24, 24][draw(8) as usize];
         bench.frozen = [false; 6];
         bench.offset = [0.0; 6];

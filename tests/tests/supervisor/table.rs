@@ -3,7 +3,7 @@
 use super::bench::*;
 use std::collections::BTreeMap;
 
-const NAMES: [&str; 14] = [
+const NAMES: [&str; 16] = [
     "none",
     "gauge not finite",
     "gauge range",
@@ -18,6 +18,8 @@ const NAMES: [&str; 14] = [
     "converter",
     "emergency stop",
     "host gone",
+    "wiring",
+    "stalled",
 ];
 
 /// What is wrong from now on, tick by tick, for one cause.
@@ -68,7 +70,8 @@ fn inject(bench: &mut Bench, cause: u8, tick: u32, request: u64) -> u8 {
         9 => bench.prepare(request, 2),
         10 => bench.prepare(request, 4),
         11 => bench.prepare(request, 8),
-        _ => bench.prepare(request, 16),
+        12 => bench.prepare(request, 16),
+        _ => bench.prepare(request, STALLED),
     }
     bench.step().phase
 }
@@ -76,7 +79,7 @@ fn inject(bench: &mut Bench, cause: u8, tick: u32, request: u64) -> u8 {
 /// Where a cause leads from a phase, and the cause that is shown then; `None` if it changes nothing.
 fn expected(cause: u8, phase: u8) -> Option<(u8, u8)> {
     let off = matches!(cause, 10 | 12);
-    let ramp = matches!(cause, 1..=4 | 11);
+    let ramp = matches!(cause, 1..=4 | 11 | 15);
     match phase {
         // Disarmed machines do not mind gauges or links: they only refuse to arm.
         DISARMED => off.then_some((FAULTED, cause)),
@@ -108,7 +111,7 @@ fn applies(kind: Kind, cause: u8, phase: u8) -> bool {
 fn table(kind: Kind) {
     let emitted = emitted(&format!("supervisor-table-{kind:?}").to_lowercase(), kind.spec(), &[]);
     let mut reached: BTreeMap<&str, String> = BTreeMap::new();
-    for cause in 1..=12_u8 {
+    for cause in (1..=12_u8).chain([15]) {
         for phase in [DISARMED, ARMING, RUNNING, HOLDING, RAMPING, FAULTED] {
             if !applies(kind, cause, phase) {
                 continue;
@@ -163,7 +166,7 @@ fn at_once_or_later(cause: u8, first: Option<u32>, kind: Kind, what: &str) {
         1 | 2 => assert_eq!(first, per_ms, "{what}"),
         // 3.6 ms of samples, from the first one of its channel on.
         4 => assert!((per_ms * 36 / 10 - 6..=per_ms * 36 / 10 + 7).contains(&first), "{what}: {first}"),
-        9 | 10 | 12 => assert_eq!(first, 0, "{what}"),
+        9 | 10 | 12 | 15 => assert_eq!(first, 0, "{what}"),
         8 => assert_eq!(first, 1, "{what}"),
         11 => assert_eq!(first, per_ms - 1, "{what}"),
         _ => assert!(first >= per_ms, "{what}: {first} is no debounce"),

@@ -15,6 +15,10 @@ const RECOVERS: f64 = 200.0;
 const STEP: f64 = 20.0;
 /// Of the emergency contact, in hardware, ms.
 const CONTACT: f64 = 0.001;
+/// Of the interrupt of the voltage detector, within a tick, ms.
+const DETECTOR: f64 = 0.002;
+/// How long a debugger holds the core, ms.
+const HELD: f64 = 1000.0;
 /// Of the watchdog's 20 ms, with the start of the program behind it, ms.
 const WATCHDOG: f64 = 25.0;
 /// Of a background that is dead, ms.
@@ -56,10 +60,12 @@ enum End {
     Off(fn(&Times) -> f64),
     /// Nothing: the host goes on.
     RunsOn,
+    /// Amplifiers off while the core is held, then a ramp and the fault that says so.
+    Stalled,
 }
 
 /// Of a DAC some codes may happen to be what they ought to be: a count that leaks takes longer, here at most twice the time.
-const FAULTS: [(&str, End); 16] = [
+const FAULTS: [(&str, End); 19] = [
     ("stop", End::Off(|_| CONTACT)),
     ("adc-dead", End::Off(|times| times.gauge + times.down)),
     ("adc-endless", End::Off(|times| times.gauge + times.down)),
@@ -75,6 +81,9 @@ const FAULTS: [(&str, End); 16] = [
     ("hang", End::Off(|_| WATCHDOG)),
     ("hang-stop", End::Off(|_| CONTACT)),
     ("hard-fault", End::Off(|times| times.period)),
+    ("halt", End::Stalled),
+    ("clock", End::Off(|_| CONTACT)),
+    ("supply", End::Off(|_| DETECTOR)),
     ("brown-out", End::Off(|times| times.period)),
 ];
 
@@ -127,11 +136,32 @@ fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, St
             if took > limit {
                 return Err(format!("amplifiers off after {took:.3} ms, at most {limit:.3} ms"));
             }
-            session.command("heal")?;
             host.end();
+            // Without a clock at its pin it goes on, too.
+            if name != "clock" {
+                session.command("heal")?;
+            }
             session.pass(RECOVERS)?;
+            shows(trial, &session, told_of(name))?;
             arms_again(trial, &session)?;
             format!("amplifiers off after {took:.3} ms, at most {limit:.3} ms; acknowledged, it arms again")
+        }
+        End::Stalled => {
+            session.report()?;
+            let (Some(begun), Some(off)) = (session.logged("fault "), session.first_logged("amplifiers off")) else {
+                return Err("amplifiers stay on while the core is held".to_owned());
+            };
+            if off - begun > CONTACT {
+                return Err(format!("amplifiers off {:.3} ms after the core was held", off - begun));
+            }
+            session.pass(times.down + RECOVERS)?;
+            host.end();
+            shows(trial, &session, "faulted: stalled, amplifiers off")?;
+            arms_again(trial, &session)?;
+            format!(
+                "amplifiers off {:.3} ms after the core was held for {HELD:.0} ms, then faulted: stalled; it arms again",
+                off - begun
+            )
         }
         End::RunsOn => {
             if let Some(took) = off(&mut session, RUNS_ON)? {
@@ -142,6 +172,24 @@ fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, St
         }
     };
     Ok(text)
+}
+
+/// What `status` says of the board's reset after a fault, for those that end in one.
+fn told_of(name: &str) -> &'static str {
+    match name {
+        "hang" | "hard-fault" | "supply" => "reset cause: reset pin, watchdog\n",
+        "clock" => "reset cause: reset pin, watchdog, no external clock\n",
+        "brown-out" => "reset cause: brown-out, reset pin\n",
+        _ => "",
+    }
+}
+
+/// A new host is told this by `status`.
+fn shows(trial: &Trial, session: &Session, words: &str) -> Result<(), String> {
+    let output = session.command_of(trial, "operate").arg("status").output();
+    let output = output.map_err(|error| format!("specgen operate: {error}"))?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    if text.contains(words) { Ok(()) } else { Err(format!("`status` does not say `{words}`:\n{text}")) }
 }
 
 /// A new host acknowledges once and arms.

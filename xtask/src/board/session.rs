@@ -117,8 +117,17 @@ impl Session {
 
     /// When the board wrote down last that this happened, ms.
     pub fn logged(&self, what: &str) -> Option<f64> {
-        let mut lines = self.log.iter().filter_map(|line| line.split_once(" ms: "));
-        lines.rfind(|(_, text)| text.starts_with(what))?.0.parse().ok()
+        self.times(what).next_back()
+    }
+
+    /// The same of the first time.
+    pub fn first_logged(&self, what: &str) -> Option<f64> {
+        self.times(what).next()
+    }
+
+    fn times<'a>(&'a self, what: &'a str) -> impl DoubleEndedIterator<Item = f64> + 'a {
+        let lines = self.log.iter().filter_map(|line| line.split_once(" ms: "));
+        lines.filter(move |(_, text)| text.starts_with(what)).filter_map(|(time, _)| time.parse().ok())
     }
 
     pub fn report(&mut self) -> Result<Report, String> {

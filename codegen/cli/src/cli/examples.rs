@@ -75,7 +75,9 @@ pub const FLASH: &str = "\
 Examples:
   specgen flash platform.toml          # (board) build, check, write by probe-rs
   specgen flash controller/target/stm32h743.elf  # (board)
-      an image that is there";
+      an image that is there
+  specgen flash platform.toml --speed 500 --connect-under-reset  # (board)
+      a long cable, a part that does not answer";
 
 pub const SIM: &str = "\
 Examples:

@@ -16,7 +16,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     };
     let (arm_ticks, rest) = (count(s.arm_ticks), literal::integer(s.rest));
     let (ramp_step, ramp_every) = (literal::integer(s.ramp_step), count(s.ramp_every));
-    let host_ticks = count(s.host_ticks);
+    let (host_ticks, stall_ticks) = (count(s.host_ticks), count(s.stall_ticks));
     let (timeout, weight) = (counts(&s.timeout), counts(&s.weight));
     let (stuck_motion, stuck_samples) = (real(s.stuck_motion), count(s.stuck_samples));
     let (disagreement, disagreement_samples) = (real(s.disagreement), count(s.disagreement_samples));
@@ -79,6 +79,9 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const LOOK_ALIKE: &[&[u32]] = &[#(&[#alike]),*];
         /// Ticks without a request over a link after which its host is lost; from `supervisor.host_lost`.
         pub const HOST_TICKS: u32 = #host_ticks;
+        /// Missed ticks in a row of which more are the event [`STALLED`](specgen_runtime::supervisor::STALLED); from
+        /// `supervisor.missed_in_a_row`.
+        pub const STALL_TICKS: u32 = #stall_ticks;
         #of_kind
         #at_rest
     }

@@ -50,6 +50,7 @@ fn pairs(facts: &Facts) -> Vec<Pair> {
         of("stuck_motion", spec.stuck_motion, defaults::stuck_motion(model, step), ("nm", 1e9), NEAR_DEFAULT),
         of("disagreement", spec.disagreement, defaults::disagreement(model), ("um", 1e6), PART_OF_WHOLE),
         of("missed_ticks", Some(f64::from(spec.missed_ticks)), 3.0, ("ticks", 1.0), NEAR_DEFAULT),
+        of("missed_in_a_row", Some(f64::from(spec.missed_in_a_row)), 100.0, ("ticks", 1.0), NEAR_DEFAULT),
         of("tracking_error", Some(spec.tracking_error), 0.2, ("", 1.0), PART_OF_WHOLE),
     ];
     if let Some(task) = &model.task_space {

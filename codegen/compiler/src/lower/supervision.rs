@@ -86,6 +86,7 @@ pub(super) fn lower(
         ramp_step,
         ramp_every,
         host_ticks,
+        stall_ticks: spec.missed_in_a_row,
         timeout: [gauge, gauge, voltage, slew, missed, gauge, host_gone],
         weight: [1, 1, 1, 1, window, 1, 1],
         stuck_motion: round(stuck_motion),

@@ -37,6 +37,8 @@ section! {
         slew_time: Option<f64> = TIMEOUT, Rule("50 ms, at least a period"), "", "50 ms";
         /// Missed ticks within a second that are a fault.
         missed_ticks: u32 = integer(1, 1000), Default(3), "", 3;
+        /// Missed ticks in a row, of which more are a fault that ramps down: codes and amplifiers were left alone for so long.
+        missed_in_a_row: u32 = integer(1, 1000), Default(100), "", 100;
         /// How long a host that has the orders may be silent until the machine holds, and until it ramps down and switches off.
         host_lost: Option<[f64; 2]> = list(&[SILENCE; 2]), Rule(r#"["100 ms", "10 s"]"#), "", ["100 ms", "10 s"];
     }

@@ -157,8 +157,10 @@ fn configuration(package: &Path, context: &mut Digester) -> Option<()> {
                 return None;
             }
             if table.as_table().is_some_and(|table| !table.is_empty()) {
-                // Paths in it are meant from where it is.
-                context.add(path.as_os_str().as_encoded_bytes());
+                // Paths in it are meant from where it is; the package's own has none.
+                if folder != package.join(".cargo") {
+                    context.add(path.as_os_str().as_encoded_bytes());
+                }
                 context.add(format!("{table:?}"));
             }
         }

@@ -7,8 +7,8 @@ use std::rc::Rc;
 
 use controller::sensing;
 use controller::supervised::{
-    CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, Request, STOP,
-    supervise,
+    CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, Request, STALLED,
+    STOP, supervise,
 };
 use controller::{Command, CommandKind, Config, INPUT_WORDS, Real, Target, TickInput};
 use rand_chacha::ChaCha8Rng;
@@ -130,6 +130,7 @@ fn a_board_does_what_the_controller_says_whatever_happens() {
         let mut chance = |one_in: u32| random.next_u32() % one_in == 0;
         let (gauge_fails, write_fails, stop) = (chance(50), chance(50), chance(200));
         let missed = if chance(40) { 1 + random.next_u32() % 3 } else { 0 };
+        let missed = if random.next_u32() % 1000 == 0 { 100 + random.next_u32() % 2 } else { missed };
         if random.next_u32() % 20 == 0 {
             exchange.orders.request = REQUESTS[random.next_u32() as usize % 6];
             exchange.orders.command[0] = u64::from(random.next_u32() % 5);
@@ -148,7 +149,9 @@ fn a_board_does_what_the_controller_says_whatever_happens() {
         let restarted = board.tick(&mut exchange, Noticed { missed, stop });
 
         let mut events = carried;
-        for (happened, event) in [(gauge_fails, CONVERTER), (missed > 0, MISSED_TICK), (stop, STOP)] {
+        for (happened, event) in
+            [(gauge_fails, CONVERTER), (missed > 0, MISSED_TICK), (missed > 100, STALLED), (stop, STOP)]
+        {
             events |= if happened { event } else { 0 };
         }
         let gauge = if gauge_fails { [Real::NAN; 6] } else { codes.map(|code| sensing::CONVERTER.reading(code >> 1)) };
@@ -308,6 +311,34 @@ fn a_converter_that_failed_names_the_cause_and_one_acknowledgement_is_enough_onc
         assert_eq!(exchange.report.phase, Phase::Disarmed);
         assert_eq!(parts.0.borrow().done.iter().filter(|&&done| done == Done::Start).count(), 2);
         assert!(exchange.report.health.gauge_faults > 100);
+    }
+}
+
+/// A debugger that held the core while the watchdog stood still: `supervisor.missed_in_a_row` is 100.
+#[test]
+fn a_machine_that_stood_still_ramps_down_and_its_record_says_so() {
+    for (missed, phase, cause) in [
+        (0, Phase::Holding, Cause::None),
+        (100, Phase::Holding, Cause::None),
+        (101, Phase::Faulted, Cause::Stalled),
+        (9_999, Phase::Faulted, Cause::Stalled),
+        (u32::MAX, Phase::Faulted, Cause::Stalled),
+    ] {
+        let (parts, mut board, mut exchange) = started(true);
+        let mut tick = |exchange: &mut Exchange, missed| {
+            exchange.silence.heard();
+            board.tick(exchange, Noticed { missed, stop: false });
+        };
+        exchange.orders.request = Request::Arm;
+        (0..1500).for_each(|_| tick(&mut exchange, 0));
+        assert!(exchange.report.amplifier_on);
+        exchange.report.health.events = 0;
+        tick(&mut exchange, missed);
+        let seen = if missed > 100 { MISSED_TICK | STALLED } else { missed.min(1) };
+        assert_eq!(exchange.report.health.events, seen, "{missed}");
+        (0..20_000).for_each(|_| tick(&mut exchange, 0));
+        assert_eq!((exchange.report.phase, exchange.report.cause), (phase, cause), "{missed}");
+        assert_eq!(parts.0.borrow().done.last() == Some(&Done::Enable(true)), cause == Cause::None, "{missed}");
     }
 }
 

@@ -50,6 +50,17 @@ fn a_tick_before_its_time_is_in_time_and_a_restart_counts_nothing() {
     assert_eq!(schedule.begin(1734), Due { late: 0, missed: 3, next: 1834 });
 }
 
+/// Up to a turn of the counter less a period; half a turn is 9 s of 240 MHz.
+#[test]
+fn a_tick_that_comes_long_after_its_time_is_not_one_before_it() {
+    let period = NonZeroU32::new(24_000).unwrap();
+    for missed in [9_999, u32::MAX / 2 / 24_000 + 1, u32::MAX / 24_000 - 2] {
+        let mut schedule = Schedule::new(period, 0);
+        let due = schedule.begin(24_000_u32.wrapping_add(24_000 * missed).wrapping_add(7));
+        assert_eq!((due.missed, due.late), (missed, 7));
+    }
+}
+
 #[test]
 fn a_dead_background_ramps_down_and_then_starves_the_watchdog() {
     let mut health = Health::new();

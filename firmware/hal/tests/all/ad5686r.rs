@@ -16,11 +16,12 @@ fn frames(pairs: &[(Word, Word)]) -> Vec<SpiStep<u8>> {
     pairs
         .iter()
         .flat_map(|(sent, answer)| {
-            [
-                SpiStep::transaction_start(),
-                SpiStep::transfer_in_place(sent.to_vec(), answer.to_vec()),
-                SpiStep::transaction_end(),
-            ]
+            // Only the frame that does nothing brings an answer that counts.
+            let step = match sent {
+                [0, 0, 0] => SpiStep::transfer_in_place(sent.to_vec(), answer.to_vec()),
+                _ => SpiStep::write_vec(sent.to_vec()),
+            };
+            [SpiStep::transaction_start(), step, SpiStep::transaction_end()]
         })
         .collect()
 }
@@ -51,15 +52,16 @@ fn start_words(answers: [u16; 3]) -> Vec<(Word, Word)> {
 
 const GOOD: [u16; 3] = [0xa55a, 0x5aa5, 0x0000];
 
-/// A write tick of one part: what channel is read back, what it answers, the three codes.
-fn write_words(address: u8, answer: u16, codes: [u16; 3]) -> Vec<(Word, Word)> {
-    let [high, low] = answer.to_be_bytes();
-    let mut words = vec![([0x90 | address, 0, 0], NONE)];
-    for (channel, (code, answer)) in
-        [0x11, 0x12, 0x14].into_iter().zip(codes.into_iter().zip([[0, high, low], NONE, NONE]))
-    {
-        let [code_high, code_low] = code.to_be_bytes();
-        words.push(([channel, code_high, code_low], answer));
+/// What a part is told in a tick: which channel is read back, if it is its turn, and what it answers; then the three codes.
+fn write_words(asked: Option<(u8, u16)>, codes: [u16; 3]) -> Vec<(Word, Word)> {
+    let mut words = Vec::new();
+    if let Some((address, answer)) = asked {
+        let [high, low] = answer.to_be_bytes();
+        words.extend([([0x90 | address, 0, 0], NONE), ([0; 3], [0, high, low])]);
+    }
+    for (channel, code) in [0x11, 0x12, 0x14].into_iter().zip(codes) {
+        let [high, low] = code.to_be_bytes();
+        words.push(([channel, high, low], NONE));
     }
     words
 }
@@ -139,47 +141,57 @@ fn a_part_that_gives_nothing_back_is_found_at_start_and_the_other_is_at_zero_all
 }
 
 #[test]
-fn six_codes_and_one_ldac_and_each_channel_read_back_within_three_ticks() {
-    let mut first = start_words(GOOD);
-    let mut second = start_words(GOOD);
+fn six_codes_and_one_ldac_and_each_channel_read_back_within_six_ticks() {
+    let mut parts = [start_words(GOOD), start_words(GOOD)];
     let codes = |tick: u16| [1, 2, 3, 4, 5, 6].map(|leg| 0x100 * leg + tick);
     let mut expected = [0; 6];
-    for tick in 0..4 {
-        let address = [1, 2, 4][tick % 3];
+    for tick in 0..7 {
         let [a, b, c, d, e, f] = codes(tick as u16);
-        first.extend(write_words(address, expected[tick % 3], [a, b, c]));
-        second.extend(write_words(address, expected[3 + tick % 3], [d, e, f]));
+        for ((part, words), codes) in parts.iter_mut().enumerate().zip([[a, b, c], [d, e, f]]) {
+            let channel = tick / 2 % 3;
+            let asked = (tick % 2 == part).then_some(([1, 2, 4][channel], expected[3 * part + channel]));
+            words.extend(write_words(asked, codes));
+        }
         expected = codes(tick as u16);
     }
-    let ldac: Vec<PinStep> = (0..4).flat_map(|_| [low(), high()]).collect();
+    // The turn of the seventh tick is that of the first.
+    let [mut first, mut second] = parts;
+    let [a, b, c, d, e, f] = codes(7);
+    first.extend(write_words(None, [a, b, c]));
+    second.extend(write_words(Some((1, expected[3])), [d, e, f]));
+    let ldac: Vec<PinStep> = (0..8).flat_map(|_| [low(), high()]).collect();
     let mut dacs = pair(&first, &second, &ldac, &[low(), high(), low()]);
     assert_eq!(dacs.start(), Ok(()));
     assert_eq!(dacs.enable(true), Ok(()));
-    for k in 0..4 {
+    for k in 0..8 {
         assert_eq!(tick(&mut dacs, codes(k).map(i32::from)), Ok(()));
     }
     assert_eq!(dacs.enable(false), Ok(()));
     done(dacs);
 }
 
+/// In every tick, so that a count of them adds up, until the channel gives the right code in its turn.
 #[test]
-fn a_code_that_comes_back_changed_is_a_fault_and_the_codes_go_out_all_the_same() {
+fn a_code_that_comes_back_changed_is_a_fault_until_it_is_right_and_the_codes_go_out_all_the_same() {
     for bit in 0..16 {
-        let mut first = start_words(GOOD);
-        first.extend(write_words(1, 0, [7, 7, 7]));
-        first.extend(write_words(2, 7 ^ (1 << bit), [8, 8, 8]));
-        // What stands in the registers is known again, so the next tick checks again.
-        first.extend(write_words(4, 8, [9, 9, 9]));
-        let mut second = start_words(GOOD);
-        second.extend(write_words(1, 0, [7, 7, 7]));
-        second.extend(write_words(2, 7, [8, 8, 8]));
-        second.extend(write_words(4, 8, [9, 9, 9]));
-        let ldac: Vec<PinStep> = (0..3).flat_map(|_| [low(), high()]).collect();
+        let mut parts = [start_words(GOOD), start_words(GOOD)];
+        for tick in 0..8_u16 {
+            for (part, words) in (0..).zip(&mut parts) {
+                // All six have the same code; the first answer of all is another one.
+                let answer = if tick == 0 { 1 << bit } else { 6 + tick };
+                let asked = (tick % 2 == part).then_some(([1, 2, 4][usize::from(tick) / 2 % 3], answer));
+                words.extend(write_words(asked, [7 + tick; 3]));
+            }
+        }
+        let ldac: Vec<PinStep> = (0..8).flat_map(|_| [low(), high()]).collect();
+        let [first, second] = parts;
         let mut dacs = pair(&first, &second, &ldac, &[low()]);
         assert_eq!(dacs.start(), Ok(()));
-        assert_eq!(tick(&mut dacs, [7; 6]), Ok(()));
-        assert_eq!(tick(&mut dacs, [8; 6]), Err(Fault::ReadBack), "bit {bit}");
-        assert_eq!(tick(&mut dacs, [9; 6]), Ok(()));
+        for tick in 0..8 {
+            let expected = if tick < 6 { Err(Fault::ReadBack) } else { Ok(()) };
+            assert_eq!(dacs.ask(), expected, "bit {bit}, tick {tick}");
+            assert_eq!(dacs.write(&[7 + tick; 6]), Ok(()));
+        }
         done(dacs);
     }
 }
@@ -215,14 +227,14 @@ impl embedded_hal::spi::SpiDevice for Broken {
 fn an_error_of_the_bus_is_a_fault_and_the_other_part_still_gets_its_codes() {
     let mut second = start_words(GOOD);
     // The registers of the first part are unknown, so nothing is read back.
-    second.extend(write_words(0, 0, [4, 5, 6]).split_off(1));
+    second.extend(write_words(None, [4, 5, 6]));
     let ldac = [low(), high()];
     let mut dacs = Ad5686rPair::new(Broken(0), Spi::new(&frames(&second)), pulse(&ldac), Pin::new(&[low()]), NoopDelay);
     assert_eq!(dacs.start(), Err(Fault::Bus));
     assert_eq!(dacs.ask(), Ok(()));
     assert_eq!(dacs.write(&[1, 2, 3, 4, 5, 6]), Err(Fault::Bus));
     let (first, mut second, mut ldac, mut enable, _) = dacs.release();
-    assert_eq!(first.0, 4);
+    assert_eq!(first.0, 4, "once at start, three codes");
     second.done();
     ldac.pin.done();
     enable.done();

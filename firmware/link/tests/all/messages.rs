@@ -34,6 +34,7 @@ const HEALTH: Health = Health {
     output: Some([16_000, 17_000]),
     latest: None,
     stack: Some([7_932, 8_192]),
+    reset_cause: 0b0001_0100,
 };
 
 fn requests() -> Vec<Request<'static>> {

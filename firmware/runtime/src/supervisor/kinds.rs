@@ -12,6 +12,12 @@ pub const INTEGRITY: u32 = 4;
 pub const CONVERTER: u32 = 8;
 /// Bit of an event word: emergency stop.
 pub const STOP: u32 = 16;
+/// Bit of an event word: more ticks in a row never came than the spec permits, `supervisor.missed_in_a_row`.
+pub const STALLED: u32 = 1 << (Cause::Stalled.word() - FIRST_EVENT);
+/// Bits of an event word that the supervisor looks at; the others are for records.
+pub const EVENTS: u32 = MISSED_TICK | LINK_LOST | INTEGRITY | CONVERTER | STOP | STALLED;
+/// The cause of an event's bit is its number and this.
+pub const FIRST_EVENT: u64 = Cause::MissedTick.word();
 
 choice! {
     /// What the machine is doing.
@@ -93,12 +99,14 @@ choice! {
         HostGone = 13 => "host gone",
         /// Gauges or legs are not wired as the spec says: the wiring check found it while arming.
         Wiring = 14 => "wiring",
+        /// [`STALLED`].
+        Stalled = 15 => "stalled",
     }
 }
 
 impl Cause {
     /// All but [`Cause::None`], in the order of their words.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::GaugeNotFinite,
         Self::GaugeRange,
         Self::GaugeStuck,
@@ -113,6 +121,7 @@ impl Cause {
         Self::EmergencyStop,
         Self::HostGone,
         Self::Wiring,
+        Self::Stalled,
     ];
 
     /// 1 << word: its bit in conditions.
@@ -129,7 +138,11 @@ pub const OF_GAUGES: u32 =
 /// Causes that take the amplifiers off at once, in any phase.
 pub const SWITCHES_OFF: u32 = Cause::Integrity.bit() | Cause::EmergencyStop.bit();
 /// Causes that bring the codes to rest, then take the amplifiers off.
-pub const RAMPS_DOWN: u32 = OF_GAUGES | Cause::Converter.bit() | Cause::HostGone.bit() | Cause::Wiring.bit();
+pub const RAMPS_DOWN: u32 = OF_GAUGES
+    | Cause::Converter.bit()
+    | Cause::HostGone.bit()
+    | Cause::Wiring.bit()
+    | Cause::Stalled.bit();
 /// Causes that hold the codes.
 pub const HOLDS: u32 = Cause::TrackingError.bit()
     | Cause::VoltageSaturation.bit()
@@ -147,13 +160,13 @@ mod tests {
             assert_eq!(Phase::from_word(word).map(Phase::word), Some(word));
             assert_eq!(Request::from_word(word).word(), word);
         }
-        for word in 0..15 {
+        for word in 0..16 {
             assert_eq!(Cause::from_word(word).map(Cause::word), Some(word));
         }
         for (index, cause) in (1..).zip(Cause::ALL) {
             assert_eq!(cause.word(), index);
         }
-        assert_eq!((Phase::from_word(6), Cause::from_word(15)), (None, None));
+        assert_eq!((Phase::from_word(6), Cause::from_word(16)), (None, None));
         assert_eq!((Request::from_word(6), Request::from_word(u64::MAX)), (Request::Hold, Request::Hold));
     }
 

@@ -2,16 +2,13 @@
 
 use super::approach::Approach;
 use super::debounce::Debounce;
-use super::kinds::{Cause, HOLDS, Phase, RAMPS_DOWN, Request, SWITCHES_OFF};
+use super::kinds::{Cause, EVENTS, FIRST_EVENT, HOLDS, Phase, RAMPS_DOWN, Request, SWITCHES_OFF};
 use super::supervision::Supervision;
 use super::watch::{Sample, Watch};
 use super::wiring::{Check, Finding, Response};
 use crate::dac::CodeLimits;
 use crate::real::Real;
 
-/// Event bits begin at the bit of [`Cause::MissedTick`], in the order of the causes.
-const FIRST_EVENT: u64 = Cause::MissedTick.word();
-const EVENTS: u32 = 0x1f;
 /// Conditions name the gauges or legs that they are about from this bit on.
 const FIRST_CHANNEL: u32 = 16;
 

@@ -153,7 +153,7 @@ fn every_word_of_the_small_states_counts() {
 
 #[test]
 fn every_word_of_a_supervisor_counts() {
-    let mut words = Words::default().whole(&[4, 13, 5, 0, 1, 1]).counters(3 + TIMERS);
+    let mut words = Words::default().whole(&[4, 14, 5, 0, 1, 1]).counters(3 + TIMERS);
     for _ in 0..6 {
         words = words.reals(1).whole(&[1]).reals(2).counters(3);
     }
@@ -173,7 +173,7 @@ fn every_word_of_a_supervisor_counts() {
     numbers_within(&fresh, (turned..response).chain([least]), 2.0);
     numbers_within(&fresh, response..least, LARGEST);
     numbers_within(&fresh, approach + 1..approach + 7, LARGEST_PLACE);
-    for (place, most) in [(0, 5), (1, 14), (2, 5), (end, 6), (end + 6, 6), (approach - 1, 1), (approach, 2)] {
+    for (place, most) in [(0, 5), (1, 15), (2, 5), (end, 6), (end + 6, 6), (approach - 1, 1), (approach, 2)] {
         whole_within(&fresh, place, 0, most);
     }
 }

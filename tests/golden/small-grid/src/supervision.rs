@@ -98,6 +98,9 @@ pub const READINGS_PER_LEG: [[Real; 6]; 6] = [
     [0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
     [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
 ];
+/// Missed ticks in a row of which more are the event [`STALLED`](specgen_runtime::supervisor::STALLED); from
+/// `supervisor.missed_in_a_row`.
+pub const STALL_TICKS: u32 = 100;
 
 /// What is left after a tick of the way to the set-point when the law begins; from `supervisor.arm_time`.
 pub const APPROACH_KEEP: Real = 0.9980019986673331;

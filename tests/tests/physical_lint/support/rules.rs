@@ -499,6 +499,12 @@ pub const RULES: &[Rule] = &[
     )
     .at("missed_ticks = "),
     of(
+        "W0888",
+        "supervisor.missed_in_a_row",
+        ["[timing]\n", "[supervisor]\nmissed_in_a_row = 1\n\n[timing]\n", "[supervisor]\nmissed_in_a_row = 2\n\n[timing]\n"],
+    )
+    .at("missed_in_a_row = "),
+    of(
         "W0889",
         "robust.mass[0]",
         ["[timing]\n", "[robust]\nmass = [0.24, 1.05]\n\n[timing]\n", "[robust]\nmass = [0.26, 1.05]\n\n[timing]\n"],

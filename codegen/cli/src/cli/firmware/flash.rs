@@ -38,6 +38,12 @@ pub struct Arguments {
     /// Which debug probe, as `probe-rs list` names it, if several are connected.
     #[arg(long, value_name = "VID:PID:SERIAL")]
     probe: Option<String>,
+    /// Clock of the probe, kHz: a slower one for a long cable.
+    #[arg(long, value_name = "KHZ", value_parser = clap::value_parser!(u32).range(1..))]
+    speed: Option<u32>,
+    /// Hold the part in reset until the probe has it: for a program that hangs, or resets the part over and over.
+    #[arg(long)]
+    connect_under_reset: bool,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
@@ -51,7 +57,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let Some(chip) = part.chip else {
         return Err(not_a_board(part.board));
     };
-    let probe: Vec<&str> = arguments.probe.iter().flat_map(|probe| ["--probe", probe.as_str()]).collect();
+    let speed = arguments.speed.map(|speed| speed.to_string());
+    let mut probe: Vec<&str> = arguments.probe.iter().flat_map(|probe| ["--probe", probe.as_str()]).collect();
+    probe.extend(speed.iter().flat_map(|speed| ["--speed", speed.as_str()]));
+    probe.extend(arguments.connect_under_reset.then_some("--connect-under-reset"));
     let download = [&["download", "--chip", chip, "--verify"], &probe[..], &[image.as_str()]].concat();
     let reset = [&["reset", "--chip", chip], &probe[..]].concat();
     let shown = |words: &[&str]| words.iter().fold(shell::line(PROBE_RS), |line, word| line.word(word));

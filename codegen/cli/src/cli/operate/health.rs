@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 use specgen_hal::Fault;
-use specgen_link::Health;
+use specgen_link::{Health, reset_cause};
 use specgen_runtime::pending::AMPLIFIER;
-use specgen_runtime::supervisor::Cause;
+use specgen_runtime::supervisor::{Cause, EVENTS, FIRST_EVENT};
 
 use super::answer::MachineStatus;
 use super::located::Located;
@@ -51,15 +51,16 @@ pub struct Noticed {
     latest_us: Option<f64>,
     /// Most in use, and what there is.
     stack_bytes: Option<[u32; 2]>,
+    /// Why its program began; empty where that is not known.
+    reset_cause: Vec<&'static str>,
 }
 
 impl From<Health> for Noticed {
     fn from(health: Health) -> Self {
         let microseconds = |counts: u64| counts as f64 * 1e6 / f64::from(health.clock);
         let timed = |times: Option<[u64; 2]>| times.filter(|_| health.clock > 0).map(|times| times.map(microseconds));
-        // Event bits are in the order of the causes from `missed tick` on.
-        let events = (0..5).filter(|bit| health.events >> bit & 1 == 1);
-        let causes = events.filter_map(|bit| Cause::from_word(Cause::MissedTick.word() + bit)).map(Cause::name);
+        let is_event = |cause: &Cause| u64::from(health.events & EVENTS) << FIRST_EVENT >> cause.word() & 1 == 1;
+        let causes = Cause::ALL.into_iter().filter(is_event);
         let amplifier = (health.events & AMPLIFIER != 0).then_some("amplifier fault");
         let kinds = Fault::ALL.into_iter().filter(|fault| health.faults & fault.bit() != 0);
         Self {
@@ -73,6 +74,7 @@ impl From<Health> for Noticed {
             gauges_to_outputs_us: timed(health.output),
             latest_us: health.latest.filter(|_| health.clock > 0).map(microseconds),
             stack_bytes: health.stack,
+            reset_cause: reset_cause::names(health.reset_cause).collect(),
         }
     }
 }
@@ -108,18 +110,24 @@ impl Noticed {
         if let Some([used, there]) = self.stack_bytes {
             let _ = writeln!(text, "  stack: at most {used} of {there} bytes in use");
         }
+        if !self.reset_cause.is_empty() {
+            let _ = writeln!(text, "  reset cause: {}", self.reset_cause.join(", "));
+        }
         text
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use specgen_runtime::pending::EDGE;
+    use specgen_runtime::supervisor::{CONVERTER, MISSED_TICK, STALLED};
+
     use super::*;
 
     #[test]
     fn what_a_board_noticed_is_said_with_its_units_and_what_is_not_measured_is_left_out() {
         let health = Health {
-            events: 0b100_1001,
+            events: MISSED_TICK | CONVERTER | STALLED | EDGE | AMPLIFIER,
             converter_faults: 3,
             faults: Fault::NotEnded.bit(),
             clock: 200_000_000,
@@ -128,22 +136,24 @@ mod tests {
             latest: Some(300),
             overruns: Some(2),
             stack: Some([100, 8192]),
+            reset_cause: 0b1001_0100,
             ..Health::default()
         };
         let text = Noticed::from(health).text(1e-4);
         for part in [
-            "missed tick, converter, amplifier fault",
+            "asked last: missed tick, converter, stalled, amplifier fault\n",
             "50.0 us, longest 100.0 us of 100 us",
             "1.5 us late",
             "25.0 us",
             "BUSY stayed high",
             "100 of 8192",
             "2 overruns",
+            "reset cause: reset pin, watchdog, no external clock\n",
         ] {
             assert!(text.contains(part), "{part}: {text}");
         }
         let bare = Noticed::from(Health::default()).text(1e-4);
-        assert!(!bare.contains("stack") && bare.contains("none"), "{bare}");
+        assert!(!bare.contains("stack") && !bare.contains("reset") && bare.contains("none"), "{bare}");
         // A zero that nothing counted is no figure, and neither is the end of a word.
         assert!(bare.contains("times of a tick: not measured") && bare.contains("overruns not measured"), "{bare}");
         let waits = Health { clock: 1_000_000_000, tick: Some([12_300, 6_000_000_000]), ..Health::default() };

@@ -19,6 +19,7 @@ pub static PART: Part = Part {
         "src/lockstep.rs",
         "src/message.rs",
         "src/receiver.rs",
+        "src/reset_cause.rs",
         "src/samples.rs",
         "src/silence.rs",
     },

@@ -18,6 +18,7 @@ pub static PART: Part = Part {
         "src/enable.rs",
         "src/lib.rs",
         "src/memory.rs",
+        "src/oscillator.rs",
         "src/pins.rs",
         "src/pulses.rs",
         "src/serial.rs",

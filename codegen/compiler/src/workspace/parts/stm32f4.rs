@@ -9,6 +9,7 @@ pub static PART: Part = Part {
     needs: "target `thumbv7em-none-eabihf`",
     with: &["board", "hal", "link", "stm32", "tick"],
     files: files! { "stm32f4":
+        ".cargo/config.toml",
         "Cargo.lock",
         "Cargo.toml",
         "build.rs",

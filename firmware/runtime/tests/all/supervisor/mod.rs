@@ -82,7 +82,7 @@ fn conditions_become_causes_when_they_have_lasted() {
     // Three within a window of 100 ticks, not three that are further apart.
     assert_eq!(lasts(Cause::MissedTick, |tick| tick % 49 == 0), Some(98));
     assert_eq!(lasts(Cause::MissedTick, |tick| tick % 101 == 0), None);
-    for cause in [Cause::LinkLost, Cause::Integrity, Cause::EmergencyStop] {
+    for cause in [Cause::LinkLost, Cause::Integrity, Cause::EmergencyStop, Cause::Stalled] {
         assert_eq!(lasts(cause, |_| true), Some(0), "{cause:?}");
     }
 }

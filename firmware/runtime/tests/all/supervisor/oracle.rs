@@ -15,6 +15,10 @@ pub const HOLD: u64 = 3;
 pub const RAMP_DOWN: u64 = 4;
 pub const ACKNOWLEDGE: u64 = 5;
 
+/// Missed tick, link lost, integrity, converter, stop, stalled.
+pub const EVENTS: [u64; 6] = [1, 2, 4, 8, 16, STALLED];
+pub const STALLED: u64 = 128;
+
 /// What the section of `bench` makes of a spec.
 #[derive(Debug, Clone)]
 pub struct Bounds {
@@ -80,7 +84,7 @@ enum Act {
 fn act(cause: u8) -> Act {
     match cause {
         10 | 12 => Act::Off,
-        1..=4 | 11 | 13 => Act::Ramp,
+        1..=4 | 11 | 13 | 15 => Act::Ramp,
         _ => Act::Hold,
     }
 }
@@ -110,7 +114,7 @@ pub struct Oracle {
     concerned: u64,
     /// Causes that the readings of the last tick showed, and their counts by cause.
     seen: Vec<u8>,
-    counts: [i64; 14],
+    counts: [i64; 16],
     channels: [Channel; 6],
     lasted: Vec<u8>,
     turn: usize,
@@ -129,7 +133,7 @@ impl Oracle {
             conditions: 0,
             concerned: 0,
             seen: Vec::new(),
-            counts: [0; 14],
+            counts: [0; 16],
             channels: Default::default(),
             lasted: Vec::new(),
             turn: 0,
@@ -141,8 +145,8 @@ impl Oracle {
         let request = if request > 5 { HOLD } else { request };
         let new_request = std::mem::replace(&mut self.request, request) != request;
         let mut present = self.seen.clone();
-        for (bit, cause) in (0..5).zip(8..) {
-            if events >> bit & 1 == 1 {
+        for (bit, cause) in EVENTS.into_iter().zip([8, 9, 10, 11, 12, 15]) {
+            if events & bit != 0 {
                 present.push(cause);
             }
         }
@@ -172,7 +176,7 @@ impl Oracle {
                 lasted.push(cause);
             }
         }
-        lasted.extend(present.iter().filter(|cause| matches!(cause, 9 | 10 | 12)));
+        lasted.extend(present.iter().filter(|cause| matches!(cause, 9 | 10 | 12 | 15)));
         lasted.sort_unstable();
         let strongest = lasted.iter().map(|cause| act(*cause)).max();
         let first = |least: Act| lasted.iter().copied().find(|cause| act(*cause) >= least).unwrap_or(0);
@@ -231,7 +235,7 @@ impl Oracle {
         self.cause = cause;
         self.good = 0;
         if phase != HOLDING && phase != RAMPING {
-            self.counts = [0; 14];
+            self.counts = [0; 16];
             self.channels = Default::default();
             self.lasted.clear();
         }

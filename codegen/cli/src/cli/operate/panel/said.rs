@@ -38,6 +38,7 @@ fn cause(cause: Cause) -> (&'static str, &'static str) {
         Cause::EmergencyStop => ("The hardware stop is pressed.", "Release it when it is safe."),
         Cause::HostGone => ("The host was gone for too long.", "Check the link."),
         Cause::Wiring => ("Gauges or legs are not wired as the spec says.", "Mend it with the amplifiers off."),
+        Cause::Stalled => ("The controller stood still.", "Was a debugger attached, or the computer suspended?"),
     }
 }
 
@@ -70,6 +71,7 @@ fn limit(of: Cause, rules: &Supervision, model: &Model) -> Option<String> {
         Cause::GaugeStuck => Some(micrometres(rules.stuck_motion)),
         Cause::TrackingError => Some(format!("limit {share:.0}\u{2009}% of the workspace")),
         Cause::MissedTick => Some(format!("limit {} in 1\u{2009}s", model.supervisor.missed_ticks)),
+        Cause::Stalled => Some(format!("limit {} in a row", model.supervisor.missed_in_a_row)),
         Cause::LinkLost => {
             Some(format!("limit {:.0}\u{2009}ms", f64::from(rules.host_ticks) * model.timing.period * 1e3))
         }
