@@ -45,6 +45,7 @@ mod sensing_emitted;
 mod setpoint;
 mod setpoint_emitted;
 mod settings;
+mod snapshots;
 mod spec_corpus;
 mod spec_errors;
 mod spec_fuzz;

@@ -22,13 +22,13 @@ fn ticks() -> usize {
 }
 /// Ticks that instructions are counted over.
 const EXERCISE: u32 = 5000;
-const CREEP: &str = "memory  = 64\nrate = \"creep\"\ncreep_times = [\"2 s\", \"50 ms\", \"4 ms\"]\ncreep_weights = [0.03, 0.05, 0.08]\ndead_time = \"0.35 ms\"";
-const DYNAMIC: &str = "memory  = 8\nrate = \"dynamic-preisach\"\nrate_tables = [\"records/mu1.csv\"]";
+pub const CREEP: &str = "memory  = 64\nrate = \"creep\"\ncreep_times = [\"2 s\", \"50 ms\", \"4 ms\"]\ncreep_weights = [0.03, 0.05, 0.08]\ndead_time = \"0.35 ms\"";
+pub const DYNAMIC: &str = "memory  = 8\nrate = \"dynamic-preisach\"\nrate_tables = [\"records/mu1.csv\"]";
 /// STATIC_INVERSE.
 const FELL_BACK: u64 = 0x3f00_0000;
 
 /// A second table of either sign: a lag in the lower half of the range, a lead above.
-fn rate_table() -> String {
+pub fn rate_table() -> String {
     let (grid, high) = (32, 100.0);
     let nodes = (1..=grid)
         .flat_map(|up: usize| {

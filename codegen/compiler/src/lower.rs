@@ -106,31 +106,34 @@ pub fn lower(
         return Err(unseen);
     }
     let gauge_converter = gauge_converter::lower(model, task_space.as_ref().map(|task| &task.sensing), scalar);
+    let kinematics = kinematics::lower(model, scalar)?;
+    let bounds = Bounds {
+        pose: model.workspace.bounds().map(round),
+        leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
+        sensor: model.sensor.range.map(round),
+        stroke: self::stroke(model, tables),
+    };
     Ok(Ir {
         name: model.name.clone(),
         digest: origin.digest.to_owned(),
         assumed: origin.assumed,
         specgen_version: env!("CARGO_PKG_VERSION").to_owned(),
         scalar,
-        kinematics: kinematics::lower(model, scalar)?,
+        permitted: permitted::lower(
+            &actuation,
+            &defaults,
+            task_space.as_ref(),
+            &bounds,
+            &hysteresis,
+            &kinematics,
+            scalar,
+        ),
+        kinematics,
         dynamics,
         supervision: supervision::lower(model, &hysteresis, &actuation, max_step, scalar)?,
         hysteresis,
-        bounds: Bounds {
-            pose: model.workspace.bounds().map(round),
-            leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
-            sensor: model.sensor.range.map(round),
-            stroke: self::stroke(model, tables),
-        },
+        bounds,
         gauge_converter,
-        permitted: permitted::lower(
-            &actuation,
-            max_step,
-            model.sensor.range,
-            task_space.as_ref(),
-            &model.workspace.bounds(),
-            scalar,
-        ),
         actuation,
         defaults,
         task_space,

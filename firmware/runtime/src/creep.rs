@@ -15,7 +15,6 @@ use crate::crc::Crc32;
 use crate::everett::{Everett, LastLine};
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
-use crate::snapshot::LARGEST_PLACE;
 
 /// `K` creep operators in parallel, for one length of the tick.
 #[derive(Debug, Clone, Copy)]
@@ -54,9 +53,9 @@ crate::state! { |words|
     pub struct CreepMemory<T, CAP, K>[T: Real, const CAP: usize, const K: usize] {
         memory: ReversalMemory<T, CAP> = ReversalMemory::new(), part;
         /// x_j, m.
-        states: [T; K] = [T::ZERO; K], numbers(LARGEST_PLACE);
+        states: [T; K] = [T::ZERO; K], numbers(words.sizes().leg);
         /// y at the end of the tick, m.
-        displacement: T = T::ZERO, number(LARGEST_PLACE);
+        displacement: T = T::ZERO, number(words.sizes().leg);
     }
 }
 

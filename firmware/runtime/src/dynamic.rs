@@ -16,7 +16,6 @@
 use crate::everett::{Everett, LastLine};
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
-use crate::snapshot::LARGEST_PLACE;
 
 /// The two Everett functions of one leg.
 #[derive(Debug, Clone, Copy)]
@@ -34,11 +33,11 @@ crate::state! { |words|
     pub struct DynamicMemory<T, CAP>[T: Real, const CAP: usize] {
         memory: ReversalMemory<T, CAP> = ReversalMemory::new(), part;
         /// Γ₁ at each extremum of the memory, m per cell a tick.
-        rate_at: [T; CAP] = [T::ZERO; CAP], stored(memory.depth(), LARGEST_PLACE);
+        rate_at: [T; CAP] = [T::ZERO; CAP], stored(memory.depth(), words.sizes().leg_rate);
         /// Γ₁ at the present drive.
-        rate: T = T::ZERO, number(LARGEST_PLACE);
+        rate: T = T::ZERO, number(words.sizes().leg_rate);
         /// h of the last tick, m.
-        displacement: T = T::ZERO, number(LARGEST_PLACE);
+        displacement: T = T::ZERO, number(words.sizes().leg);
         /// The last inverse was the static one.
         fell_back: bool = false, set;
     }

@@ -12,7 +12,7 @@
 
 use crate::everett::{Everett, LastLine, Line};
 use crate::real::{Real, saturate};
-use crate::snapshot::{LARGEST, LARGEST_PLACE};
+use crate::snapshot::LARGEST;
 
 crate::state! { |words|
     /// Staircase of at most `CAP` ≥ 4 extrema. Drives in cells of the Everett grid, displacements in m.
@@ -25,12 +25,12 @@ crate::state! { |words|
         /// Pairs dropped because the memory was full.
         dropped: u32 = 0, tally;
         drive: T = T::ZERO, number(LARGEST);
-        displacement: T = T::ZERO, number(LARGEST_PLACE);
+        displacement: T = T::ZERO, number(words.sizes().leg);
         /// p_k; even k are minima, odd k maxima; p₀ = 0.
         extrema: [T; CAP] = [T::ZERO; CAP], stored(*len, LARGEST)
             if is_staircase(extrema.get(..*len).unwrap_or_default(), *drive);
         /// f_k.
-        displacements: [T; CAP] = [T::ZERO; CAP], stored(*len, LARGEST_PLACE);
+        displacements: [T; CAP] = [T::ZERO; CAP], stored(*len, words.sizes().leg);
     }
 }
 

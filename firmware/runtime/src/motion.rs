@@ -1,18 +1,17 @@
 //! A motion of the platform at one instant.
 
 use crate::real::Real;
-use crate::snapshot::{LARGEST, LARGEST_PLACE};
 
 crate::state! { |words|
     /// Six coordinates with their first and second time derivatives. Standstill at rest at reset.
     #[derive(PartialEq)]
     pub struct Motion<T>[T: Real] {
         /// m and rad.
-        pub pose: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        pub pose: [T; 6] = [T::ZERO; 6], axes(words.sizes().place);
         /// m/s and rad/s.
-        pub rate: [T; 6] = [T::ZERO; 6], numbers(LARGEST);
+        pub rate: [T; 6] = [T::ZERO; 6], axes(words.sizes().rate);
         /// m/s² and rad/s².
-        pub acceleration: [T; 6] = [T::ZERO; 6], numbers(LARGEST);
+        pub acceleration: [T; 6] = [T::ZERO; 6], axes(words.sizes().acceleration);
     }
 }
 

@@ -20,9 +20,32 @@ pub const LARGEST_PLACE: f64 = 16.0;
 /// Largest |rate|, |acceleration| or |force| that is loaded, in SI units.
 pub const LARGEST: f64 = 1e9;
 
-/// How large the numbers of a state may be where settings and gauges decide about it; the emitted `permitted::STATE`.
+/// How large the numbers of a state may be: magnitudes, by axis where there are six. What the spec's workspace, gauges, tables and
+/// settings allow; the emitted `permitted::STATE`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sizes {
+    /// Set-point as it is given out: the workspace, m and rad.
+    pub place: [f64; 6],
+    /// The same in the user's coordinates.
+    pub user: [f64; 6],
+    /// Its rate in either, m/s and rad/s.
+    pub rate: [f64; 6],
+    /// Its acceleration, m/s² and rad/s².
+    pub acceleration: [f64; 6],
+    /// Measured pose, m and rad.
+    pub pose: [f64; 6],
+    /// Its rate, m/s and rad/s.
+    pub pose_rate: [f64; 6],
+    /// Pose error behind the notch, m and rad.
+    pub error: f64,
+    /// Measured wrench, N and N m.
+    pub wrench: [f64; 6],
+    /// Displacement of a leg, demanded or by its model, m.
+    pub leg: f64,
+    /// What a cell a tick adds to it, m.
+    pub leg_rate: f64,
+    /// Position of an output line's settings, m and rad.
+    pub line: f64,
     /// What the law asks for or withholds, m and rad: deflection, load, excess, offset of a change of mode, estimates, and what
     /// the notch remembers of them. Gains may make it larger than any place.
     pub request: f64,
@@ -30,6 +53,26 @@ pub struct Sizes {
     pub reading: f64,
     /// Stiffness of the environment, N/m and N m/rad.
     pub stiffness: f64,
+}
+
+impl Sizes {
+    /// Of a state of no particular spec: what any machine has.
+    pub const ANY: Self = Self {
+        place: [LARGEST_PLACE; 6],
+        user: [LARGEST_PLACE; 6],
+        rate: [LARGEST; 6],
+        acceleration: [LARGEST; 6],
+        pose: [LARGEST_PLACE; 6],
+        pose_rate: [LARGEST; 6],
+        error: LARGEST_PLACE,
+        wrench: [LARGEST; 6],
+        leg: LARGEST_PLACE,
+        leg_rate: LARGEST_PLACE,
+        line: LARGEST_PLACE,
+        request: LARGEST_PLACE,
+        reading: LARGEST_PLACE,
+        stiffness: LARGEST,
+    };
 }
 
 /// Something that later ticks depend on. [`state!`](crate::state) declares it: its fields, what they are at reset, and the walk over them.
@@ -193,8 +236,7 @@ impl<'a> Reader<'a> {
     /// From the first of `words` on.
     #[must_use]
     pub fn new(words: &'a [u64]) -> Self {
-        let sizes = Sizes { request: LARGEST_PLACE, reading: LARGEST_PLACE, stiffness: LARGEST };
-        Self { words, count: 0, sizes }
+        Self { words, count: 0, sizes: Sizes::ANY }
     }
 
     /// The same for a state with numbers of these sizes.

@@ -78,13 +78,13 @@ crate::state! { |words|
         /// Of positions.
         pub direction: Direction = Direction::Both, choice;
         /// First position, or lower end of the level, from rest: m or rad.
-        pub start: T = T::ZERO, number(LARGEST_PLACE);
+        pub start: T = T::ZERO, number(words.sizes().line);
         /// Last position, or upper end of the level; not below `start`.
-        pub stop: T = T::ZERO, number(LARGEST_PLACE);
+        pub stop: T = T::ZERO, number(words.sizes().line);
         /// From position to position, > 0 and so large that there are at most [`MOST_STEPS`].
         pub step: T = T::ONE, number(LARGEST_PLACE);
         /// h, m or rad.
-        pub hysteresis: T = T::ZERO, number(LARGEST_PLACE);
+        pub hysteresis: T = T::ZERO, number(words.sizes().line);
         /// First set-point or tick with a pulse, ≥ 1.
         pub first: u32 = 1, tally;
         /// Set-points or ticks from pulse to pulse, ≥ 1.

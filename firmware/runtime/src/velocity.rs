@@ -9,7 +9,6 @@
 //! σ (α/T) √(2/(2 − α)) on the rate.
 
 use crate::real::Real;
-use crate::snapshot::{LARGEST, LARGEST_PLACE};
 
 /// The filter of one controller: constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,9 +23,9 @@ crate::state! { |words|
     /// Rates of six coordinates: what is remembered. At rest and without a last pose at reset.
     pub struct Rate<T>[T: Real] {
         /// Last pose, m and rad.
-        previous: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        previous: [T; 6] = [T::ZERO; 6], axes(words.sizes().pose);
         /// Last rate, per s.
-        value: [T; 6] = [T::ZERO; 6], numbers(LARGEST);
+        value: [T; 6] = [T::ZERO; 6], axes(words.sizes().pose_rate);
         /// There is a last pose to take a difference from.
         primed: bool = false, set;
     }

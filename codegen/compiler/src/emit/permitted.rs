@@ -20,8 +20,15 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let count = literal::count(rows.len());
     let names = table.names();
     let words = literal::count(ranges.len());
-    let [request, reading, stiffness] =
-        [table.state.request, table.state.reading, table.state.stiffness].map(|most| literal::real(Scalar::F64, most));
+    let of = |most: f64| literal::real(Scalar::F64, most);
+    let state = &table.state;
+    let axes = [state.place, state.user, state.rate, state.acceleration, state.pose, state.pose_rate, state.wrench];
+    let [place, user, rate, acceleration, pose, pose_rate, wrench] = axes.map(|six| {
+        let six = six.map(of);
+        quote! { [#(#six),*] }
+    });
+    let one = [state.error, state.leg, state.leg_rate, state.line, state.request, state.reading, state.stiffness];
+    let [error, leg, leg_rate, line, request, reading, stiffness] = one.map(of);
     quote! {
         #![doc = " What settings may be, and how large the numbers of a state may become: nothing beyond the limits of the spec."]
 
@@ -38,7 +45,10 @@ pub fn emit(ir: &Ir) -> TokenStream {
         /// most `code_max`.
         pub const SETTINGS: [(Permitted<Real>, usize); #count] = [#(#rows),*];
         /// Largest numbers of a state, under any of these settings.
-        pub const STATE: Sizes = Sizes { request: #request, reading: #reading, stiffness: #stiffness };
+        pub const STATE: Sizes = Sizes {
+            place: #place, user: #user, rate: #rate, acceleration: #acceleration, pose: #pose, pose_rate: #pose_rate, error: #error,
+            wrench: #wrench, leg: #leg, leg_rate: #leg_rate, line: #line, request: #request, reading: #reading, stiffness: #stiffness,
+        };
     }
 }
 

@@ -48,6 +48,28 @@ pub enum Range {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct State {
     /// m and rad.
+    pub place: [f64; 6],
+    /// m and rad.
+    pub user: [f64; 6],
+    /// m/s and rad/s.
+    pub rate: [f64; 6],
+    /// m/s² and rad/s².
+    pub acceleration: [f64; 6],
+    /// m and rad.
+    pub pose: [f64; 6],
+    /// m/s and rad/s.
+    pub pose_rate: [f64; 6],
+    /// m and rad.
+    pub error: f64,
+    /// N and N m.
+    pub wrench: [f64; 6],
+    /// m.
+    pub leg: f64,
+    /// m.
+    pub leg_rate: f64,
+    /// m and rad.
+    pub line: f64,
+    /// m and rad.
     pub request: f64,
     /// m, or V with a calibration.
     pub reading: f64,

@@ -4,29 +4,34 @@ use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE};
 use specgen_runtime::trigger::LONGEST;
 
 use super::triggers;
-use crate::ir::{Actuation, ControlLaw, Notch, Permitted, Range, Resonator, Scalar, Setting, State, TaskSpace};
+use crate::ir::{
+    Actuation, Bounds, ControlLaw, Defaults, Frames, Hysteresis, Kinematics, Notch, Permitted, Range, RateModel,
+    Resonator, Scalar, Sensing, Setpoints, Setting, State, TaskSpace,
+};
 use specgen_language::model::{LARGEST_GAIN, LARGEST_RUN_INTERVAL, LARGEST_TRAVEL, LARGEST_TURN};
 use specgen_numerics::Matrix6;
 
 /// Between what the bounds below say and what is loaded: they neglect what is quadratic, and rounding.
 const MARGIN: f64 = 16.0;
+/// What the scalar rounds of a pose in the user's coordinates, as a part of it.
+const ROUNDING: f64 = 1e-5;
 /// No number of a state is larger: products with constants stay finite in both scalars.
 const FINITE: f64 = 1e30;
 
-/// `max_step` is the slew limit in codes a tick, `bounds` are those of the workspace, m and rad.
 pub(super) fn lower(
     actuation: &Actuation,
-    max_step: i32,
-    sensor: [f64; 2],
+    defaults: &Defaults,
     task: Option<&TaskSpace>,
-    bounds: &[f64; 6],
+    bounds: &Bounds,
+    hysteresis: &Hysteresis,
+    kinematics: &Kinematics,
     scalar: Scalar,
 ) -> Permitted {
     let codes = Range::Whole(actuation.code_min, actuation.code_max);
     let code_limits = [
         one(
             "max_step_codes",
-            Range::Whole(1, max_step),
+            Range::Whole(1, defaults.max_step),
             "codes",
             "Largest change of a leg's code in a tick.",
             "`actuator.slew_rate`",
@@ -51,10 +56,8 @@ pub(super) fn lower(
             "`adaptation.drift_weight`",
         ),
     ];
-    let readings = |limits: &[[f64; 2]]| {
-        limits.iter().flatten().fold(0.0, |most: f64, limit| if limit.abs() > most { limit.abs() } else { most })
-    };
-    let (settings, request, reading) = match task {
+    let legs = legs(hysteresis, bounds, kinematics);
+    let (settings, state) = match task {
         None => {
             let mut settings = vec![
                 one("mode", Range::Whole(0, 2), "", "0 invhys, 1 ewma, 2 pcc.", "`adaptation.mode`"),
@@ -69,8 +72,7 @@ pub(super) fn lower(
                 "`adaptation.run_interval`",
             ));
             settings.extend(code_limits);
-            // Estimates are means of readings less displacements.
-            (settings, LARGEST_PLACE, readings(&[sensor]))
+            (settings, of_legs(bounds, kinematics, legs))
         }
         Some(task) => {
             let mut settings = vec![
@@ -92,14 +94,129 @@ pub(super) fn lower(
             settings.extend(weights);
             settings.extend(code_limits);
             settings.extend(of_gains(scalar));
-            settings.extend((0..task.defaults.triggers.len()).flat_map(|line| of_line(line, bounds, scalar)));
-            (settings, largest_request(&task.law), readings(&task.sensing.raw_limits))
+            settings.extend((0..task.defaults.triggers.len()).flat_map(|line| of_line(line, &bounds.pose, scalar)));
+            (settings, of_platform(task, bounds, legs, defaults.period))
         }
     };
-    Permitted {
-        settings,
-        state: State { request, reading: scalar.round(reading), stiffness: scalar.round(LARGEST_GAIN) },
+    let state = State { reading: scalar.round(state.reading), stiffness: scalar.round(LARGEST_GAIN), ..state };
+    Permitted { settings, state }
+}
+
+/// Largest displacement of a leg, m, and what a cell a tick adds to it: by the tables and what accounts for the rate, and as demanded.
+fn legs(hysteresis: &Hysteresis, bounds: &Bounds, kinematics: &Kinematics) -> [f64; 2] {
+    let full = |tables: &[Vec<f64>]| largest(tables.iter().flatten().copied());
+    let still = full(&hysteresis.tables);
+    // Legs do not creep, or move, by more than twice what the model has them do from one end to the other.
+    let (displacement, rate) = match &hysteresis.rate {
+        None => (still, 0.0),
+        Some(RateModel::DynamicPreisach { tables, .. }) => {
+            let rate = full(tables);
+            (still + hysteresis.grid as f64 * rate, rate)
+        }
+        Some(RateModel::Creep { weights, .. }) => (still * (1.0 + weights.iter().map(|w| w.abs()).sum::<f64>()), 0.0),
+    };
+    let lead = hysteresis.lead.as_ref().map_or(0.0, |lead| lead.limit);
+    let demanded = largest(bounds.leg.into_iter().chain([bounds.stroke, kinematics.largest_displacement])) + lead;
+    [2.0 * if displacement > demanded { displacement } else { demanded }, 2.0 * rate]
+}
+
+/// Six legs, each with a gauge of its own: set-points are poses or displacements.
+fn of_legs(bounds: &Bounds, kinematics: &Kinematics, [leg, leg_rate]: [f64; 2]) -> State {
+    let reading = largest(bounds.sensor);
+    // A leg begins where its gauge shows it; the pose that this makes is of first order, which the margin makes up for.
+    let leg = largest([leg, reading]);
+    let place = core::array::from_fn(|axis| {
+        let seen: f64 = kinematics.inverse_jacobian[axis].iter().map(|value| value.abs() * leg).sum();
+        MARGIN * largest([bounds.pose[axis], leg, seen])
+    });
+    State {
+        place,
+        user: place,
+        leg,
+        leg_rate,
+        reading,
+        // Estimates are means of readings less displacements, and differences of these.
+        request: 4.0 * (reading + leg),
+        // These have none.
+        rate: [LARGEST; 6],
+        acceleration: [LARGEST; 6],
+        pose: [LARGEST_PLACE; 6],
+        pose_rate: [LARGEST; 6],
+        error: LARGEST_PLACE,
+        wrench: [LARGEST; 6],
+        line: LARGEST_PLACE,
+        stiffness: LARGEST_GAIN,
     }
+}
+
+/// A platform under a generator of set-points, `period` in s.
+fn of_platform(task: &TaskSpace, bounds: &Bounds, [leg, leg_rate]: [f64; 2], period: f64) -> State {
+    let place = bounds.pose;
+    let user = user(&task.setpoints, &place);
+    let reading = largest(task.sensing.raw_limits.into_iter().flatten());
+    let pose = measured(&task.sensing);
+    // No motion is faster than from one end to the other in a tick, and back in the next.
+    let far: [f64; 6] =
+        core::array::from_fn(|axis| largest([user[axis], place[axis], task.setpoints.stream_rate[axis] * period]));
+    let rate = far.map(|far| MARGIN * far / period);
+    let apart = largest(place) + largest(pose);
+    let error = error(&task.law, apart);
+    State {
+        place,
+        user,
+        rate,
+        acceleration: rate.map(|rate| MARGIN * rate / period),
+        pose,
+        pose_rate: pose.map(|pose| MARGIN * pose / period),
+        error: MARGIN * error,
+        wrench: task.law.wrench_limit,
+        leg,
+        leg_rate,
+        line: triggers::extent(&place)[0] * 2.0,
+        request: largest_request(&task.law, apart, error),
+        reading,
+        stiffness: LARGEST_GAIN,
+    }
+}
+
+/// The workspace in the user's coordinates, m and rad: t = W q − (R − I) c + bias, with |R − I| at most the sum of the angles.
+fn user(setpoints: &Setpoints, place: &[f64; 6]) -> [f64; 6] {
+    let away: [f64; 6] = core::array::from_fn(|axis| place[axis] + setpoints.bias[axis].abs());
+    let [x, y, z, ..] = away;
+    let arm = |point: &[f64; 3], turn: f64| point.iter().map(|value| value.abs()).sum::<f64>() * turn;
+    let user = match &setpoints.frames {
+        Frames::Parallel => away,
+        Frames::Tool { point, .. } => {
+            let shift = arm(point, away[3] + away[4] + away[5]);
+            [x + shift, y + shift, z + shift, away[3], away[4], away[5]]
+        }
+        Frames::Work { point, largest_angle, .. } => {
+            let far = x + y + z + arm(point, 3.0 * largest_angle);
+            [far, far, far, *largest_angle, *largest_angle, *largest_angle]
+        }
+    };
+    core::array::from_fn(|axis| (1.0 + ROUNDING) * largest([user[axis], place[axis], setpoints.home[axis].abs()]))
+}
+
+/// The largest pose that gauges show within their limits, m and rad: to first order, which [`MARGIN`] makes up for.
+fn measured(sensing: &Sensing) -> [f64; 6] {
+    let reading = |gauge: usize| {
+        let ends = sensing.raw_limits[gauge];
+        match &sensing.calibration {
+            None => largest(ends),
+            // Each power at its largest.
+            Some(calibration) => {
+                let end = largest(ends);
+                calibration[gauge].iter().rev().fold(0.0, |sum: f64, coefficient| sum * end + coefficient.abs())
+            }
+        }
+    };
+    sensing.inverse.map(|row| MARGIN * (0..6).map(|gauge| row[gauge].abs() * reading(gauge)).sum::<f64>())
+}
+
+/// The largest magnitude.
+fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, |most: f64, value| if value.abs() > most { value.abs() } else { most })
 }
 
 fn one(name: &'static str, range: Range, unit: &'static str, doc: &'static str, from: &'static str) -> Setting {
@@ -167,16 +284,23 @@ fn of_line(line: usize, bounds: &[f64; 6], scalar: Scalar) -> [Setting; 11] {
     .map(|setting| Setting { line: Some(line), ..setting })
 }
 
-/// The largest that a leg is asked for under any settings, and what the estimates and the notch make of it. Poses are taken to be
-/// as large as any, rates and the force of the integral as they are bounded; the largest gain is on every axis.
-fn largest_request(law: &ControlLaw) -> f64 {
-    let (to_modes, to_pose, ring) = match &law.notch {
-        None => (1.0, 1.0, 1.0),
-        Some(notch) => (norm(&notch.pose_to_modes), norm(&notch.modes_to_pose), ring(notch)),
+/// What the notch makes of set-point and pose that lie `apart`, m and rad.
+fn error(law: &ControlLaw, apart: f64) -> f64 {
+    match &law.notch {
+        None => apart,
+        Some(notch) => norm(&notch.modes_to_pose) * ring(notch) * norm(&notch.pose_to_modes) * apart,
+    }
+}
+
+/// The largest that a leg is asked for under any settings, and what the estimates and the notch make of it, where set-point and pose
+/// lie `apart` and the notch makes `error` of that, m and rad. The force of the integral is as it is bounded; the largest gain is on
+/// every axis.
+fn largest_request(law: &ControlLaw, apart: f64, error: f64) -> f64 {
+    let (to_modes, ring) = match &law.notch {
+        None => (1.0, 1.0),
+        Some(notch) => (norm(&notch.pose_to_modes), ring(notch)),
     };
-    let apart = 2.0 * LARGEST_PLACE;
     let modal = to_modes * apart;
-    let error = to_pose * ring * modal;
     let lead = law.own_leads.iter().fold(law.lead, |most, lead| if *lead > most { *lead } else { most });
     let deflection = norm(&law.force_to_modes) * (LARGEST_GAIN * error + LARGEST);
     // Environment, damping, and all that is measured or computed of the motion.

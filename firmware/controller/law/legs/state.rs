@@ -3,7 +3,7 @@
 use crate::hysteresis::{GRID, LED, Memory};
 use crate::supervision::{code_at_rest, memory_at_rest};
 use crate::{LEGS, Real, limits};
-use specgen_runtime::snapshot::{LARGEST_PLACE, Snapshot};
+use specgen_runtime::snapshot::Snapshot;
 use specgen_runtime::{Digest, Estimate};
 
 specgen_runtime::state! { |words|
@@ -16,7 +16,7 @@ specgen_runtime::state! { |words|
         /// δ̂ and φ̂, m.
         pub estimate: Estimate<Real> = Estimate::new(), part;
         /// What the leg is asked for beyond the demand, so that it arrives in time, m; none without `hysteresis.dead_time`.
-        pub lead: [Real; LED as usize] = [0.0; LED as usize], numbers(LARGEST_PLACE);
+        pub lead: [Real; LED as usize] = [0.0; LED as usize], numbers(words.sizes().leg);
     }
 }
 
@@ -27,7 +27,7 @@ specgen_runtime::state! { |words|
         pub legs: [LegState; LEGS] =
             [LegState::new(0), LegState::new(1), LegState::new(2), LegState::new(3), LegState::new(4), LegState::new(5)], parts;
         /// T: leg displacements demanded by the last accepted set-point, m.
-        pub demand: [Real; LEGS] = [0.0; LEGS], numbers(LARGEST_PLACE);
+        pub demand: [Real; LEGS] = [0.0; LEGS], numbers(words.sizes().leg);
         /// Ticks since the last run ended.
         pub ticks_in_run: u32 = 0, tally;
     }

@@ -29,7 +29,7 @@ use super::stop::Stop;
 use super::trajectory::{Cursor, MOST};
 use super::{Command, CommandKind, Frames, Setpoints, Target};
 use crate::real::{Real, saturate};
-use crate::snapshot::{LARGEST, LARGEST_PLACE};
+use crate::snapshot::Sizes;
 
 mod snapshot;
 
@@ -57,12 +57,12 @@ crate::state! { |words|
     pub struct Generator<T>[T: Real] {
         phase: Phase = Phase::Reset, part;
         /// Where it is in the user's frames, and how it moves; where the bias leads, until it is reached.
-        place: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
-        rate: [T; 6] = [T::ZERO; 6], numbers(LARGEST);
+        place: [T; 6] = [T::ZERO; 6], axes(words.sizes().user);
+        rate: [T; 6] = [T::ZERO; 6], axes(words.sizes().rate);
         /// Straight motion under way: start, end, end − start; its course and tick below.
-        start: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
-        goal: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
-        way: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        start: [T; 6] = [T::ZERO; 6], axes(ends(*phase, &words.sizes()));
+        goal: [T; 6] = [T::ZERO; 6], axes(ends(*phase, &words.sizes()));
+        way: [T; 6] = [T::ZERO; 6], axes(ends(*phase, &words.sizes()).map(|most| 2.0 * most));
         /// What was given out last.
         target: Target<T> = Target::new(), part;
         profile: Profile<T> = Profile::new(), part;
@@ -75,6 +75,11 @@ crate::state! { |words|
         sequence: u32 = 0, tally;
         age: u32 = 0, tally;
     }
+}
+
+/// How far start and end of a straight motion may lie: the way to the bias is one of the platform itself, which nothing admits.
+fn ends(phase: Phase, sizes: &Sizes) -> [f64; 6] {
+    if phase == Phase::Bias { sizes.place } else { sizes.user }
 }
 
 impl<T: Real> Generator<T> {

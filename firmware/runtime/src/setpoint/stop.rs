@@ -8,7 +8,6 @@
 use super::profile::{LONGEST, largest, least};
 use super::{Frames, Setpoints, Target};
 use crate::real::Real;
-use crate::snapshot::LARGEST_PLACE;
 
 /// Halvings of D that are tried: after them a tick is all that is left.
 const HALVINGS: u32 = 21;
@@ -44,9 +43,9 @@ crate::state! { |words|
     #[derive(PartialEq)]
     pub struct Stop<T>[T: Real] {
         /// Where it began, in the user's frames, m and rad.
-        start: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        start: [T; 6] = [T::ZERO; 6], axes(words.sizes().user);
         /// Rate there, m and rad per tick.
-        rate: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        rate: [T; 6] = [T::ZERO; 6], axes(words.sizes().rate);
         /// D.
         ticks: i32 = 1, ticks(LONGEST) if *ticks != 0;
         /// k.

@@ -88,7 +88,7 @@ pub trait Words: Sized {
     /// No matter: what is shown has its size.
     #[inline]
     fn sizes(&self) -> Sizes {
-        Sizes { request: LARGEST, reading: LARGEST, stiffness: LARGEST }
+        Sizes::ANY
     }
 
     /// A number within ±`largest`.
@@ -102,6 +102,12 @@ pub trait Words: Sized {
     #[inline]
     fn numbers<T: Real>(&mut self, values: &[T], _largest: f64) -> Result<(), Infallible> {
         self.stored(values, values.len(), LARGEST)
+    }
+
+    /// Six numbers, each within a bound of its own.
+    #[inline]
+    fn axes<T: Real>(&mut self, values: &[T; 6], _largest: [f64; 6]) -> Result<(), Infallible> {
+        self.numbers(values, LARGEST)
     }
 
     /// Rows of such numbers.
@@ -257,6 +263,14 @@ impl Reader<'_> {
     /// No state holds the word.
     pub fn numbers<T: Real>(&mut self, values: &mut [T], largest: f64) -> Result<(), Invalid> {
         self.reals(values, largest)
+    }
+
+    /// [`Words::axes`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    pub fn axes<T: Real>(&mut self, values: &mut [T; 6], largest: [f64; 6]) -> Result<(), Invalid> {
+        values.iter_mut().zip(largest).try_for_each(|(value, largest)| self.number(value, largest))
     }
 
     /// [`Words::rows`], restored.

@@ -2,7 +2,6 @@
 
 use crate::choice::choice;
 use crate::real::Real;
-use crate::snapshot::LARGEST_PLACE;
 
 choice! {
     /// How far an approach has come.
@@ -20,7 +19,7 @@ crate::state! { |words|
     pub struct Approach<T>[T: Real] {
         stage: Stage = Stage::Done, choice;
         /// Where it starts, then what is left of the way; in the coordinates of the set-point.
-        offset: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        offset: [T; 6] = [T::ZERO; 6], axes(words.sizes().user);
     }
 }
 

@@ -93,6 +93,19 @@ fn invhys_keeps_no_estimate() {
     assert_eq!(estimate.correction(), 0.0);
 }
 
+/// What would grow beyond ±1 stays at the bound of its own sign; a neighbour within it keeps its value.
+#[test]
+fn an_estimate_beyond_the_bound_is_held_there_with_its_sign() {
+    for sign in [1.0, -1.0] {
+        let mut six = [Estimate::<f64>::new(); 6];
+        Estimate::correct(&mut six, Law::Pcc, 1.0, 0.25, &[8.0 * sign, 8.0 * sign, 1e-6, 0.0, 0.0, 0.0]);
+        let found = six.map(|estimate| [estimate.level, estimate.drift]);
+        assert_eq!(found[..3], [[sign; 2], [sign; 2], [1e-6, 0.25e-6]]);
+        Estimate::correct(&mut six, Law::Ewma, 1.0, 0.0, &[-8.0 * sign; 6]);
+        assert!(six.iter().all(|estimate| (estimate.level, estimate.drift) == (-sign, 0.0)), "{six:?}");
+    }
+}
+
 /// With a filter that turns the innovation's sign and delays it, no weight is stable: the estimates stay finite all the same,
 /// leave their neighbours alone, and find the offset when the filter is taken away.
 #[test]
