@@ -60,7 +60,7 @@ impl From<Health> for Noticed {
         let microseconds = |counts: u64| counts as f64 * 1e6 / f64::from(health.clock);
         let timed = |times: Option<[u64; 2]>| times.filter(|_| health.clock > 0).map(|times| times.map(microseconds));
         let is_event = |cause: &Cause| u64::from(health.events & EVENTS) << FIRST_EVENT >> cause.word() & 1 == 1;
-        let causes = Cause::ALL.into_iter().filter(is_event);
+        let causes = Cause::ALL.into_iter().filter(is_event).map(Cause::name);
         let amplifier = (health.events & AMPLIFIER != 0).then_some("amplifier fault");
         let kinds = Fault::ALL.into_iter().filter(|fault| health.faults & fault.bit() != 0);
         Self {
