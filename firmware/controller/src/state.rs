@@ -9,7 +9,7 @@ use crate::supervision::{code_at_rest, displacement_at_rest, memory_at_rest};
 use crate::task_space::{CORRECTED, DAMPED};
 use crate::{LEGS, Real, limits};
 use specgen_runtime::setpoint::Generator;
-use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE, Snapshot};
+use specgen_runtime::snapshot::Snapshot;
 use specgen_runtime::trigger::Triggers;
 use specgen_runtime::{
     ControlMode, Correction, Damping, Digest, Estimate, Integral, Interaction, LastLine, NotchState, Rate, Transfer,
@@ -25,7 +25,7 @@ specgen_runtime::state! { |words|
         /// Converter code now held at the output.
         pub code: i32 = code_at_rest(), ticks(limits::CODES[1]) if *code >= limits::CODES[0];
         /// q̂ = ρ̂X: displacement really requested by the code held, in the model of the mode it was asked in, m.
-        pub requested: Real = displacement_at_rest(leg), number(LARGEST_PLACE);
+        pub requested: Real = displacement_at_rest(leg), number(words.sizes().leg);
         /// Part of the last request that a limit withheld, m; zero for a leg that was free.
         pub excess: Real = 0.0, number(words.sizes().request);
     }
@@ -36,13 +36,13 @@ specgen_runtime::state! { |words|
     #[repr(C)]
     pub struct State {
         /// h: pose from rest, from the last gauge readings that were believed, m and rad.
-        pub pose: [Real; 6] = [0.0; 6], numbers(LARGEST_PLACE);
+        pub pose: [Real; 6] = [0.0; 6], axes(words.sizes().pose);
         /// ḣ: its filtered derivative.
         pub rate: Rate<Real> = Rate::new(), part;
         /// Where set-points come from; its target is h_d at the end of the interval now running.
         pub generator: Generator<Real> = Generator::new(), part;
         /// N(h_d − h), the pose error behind the notch, m and rad.
-        pub error: [Real; 6] = [0.0; 6], numbers(LARGEST_PLACE);
+        pub error: [Real; 6] = [0.0; 6], numbers(words.sizes().error);
         /// Notch on the pose error.
         pub error_notch: NotchState<Real> = NotchState::new(), part;
         /// Notch on the innovation.
@@ -58,11 +58,11 @@ specgen_runtime::state! { |words|
         /// K⁻¹F in modal coordinates: what the feedback takes the platform to deflect by, over the interval now running.
         pub deflection: [Real; 6] = [0.0; 6], numbers(words.sizes().request);
         /// Δl(h_d) of the interval now running, m.
-        pub demand: [Real; LEGS] = [0.0; LEGS], numbers(LARGEST_PLACE);
+        pub demand: [Real; LEGS] = [0.0; LEGS], numbers(words.sizes().leg);
         /// p: deflection of each leg under the known load of the interval now running, m.
         pub load: [Real; LEGS] = [0.0; LEGS], numbers(words.sizes().request);
         /// Interaction wrench last believed, N and N m.
-        pub wrench: [Real; 6] = [0.0; 6], numbers(LARGEST);
+        pub wrench: [Real; 6] = [0.0; 6], axes(words.sizes().wrench);
         /// What is left of the last change of mode.
         pub transfer: Transfer<Real> = Transfer::new(), part;
         /// Some leg was held back by a limit in the last tick.

@@ -82,6 +82,10 @@ pub const LOOK_ALIKE: &[&[u32]] = &[
 /// Ticks without a request over a link after which its host is lost; from `supervisor.host_lost`.
 pub const HOST_TICKS: u32 = 500;
 
+/// Missed ticks in a row of which more are the event [`STALLED`](specgen_runtime::supervisor::STALLED); from
+/// `supervisor.missed_in_a_row`.
+pub const STALL_TICKS: u32 = 100;
+
 /// Reading of each gauge (rows) per displacement of each leg (columns): each leg has its own.
 pub const READINGS_PER_LEG: [[Real; 6]; 6] = [
     [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -91,9 +95,6 @@ pub const READINGS_PER_LEG: [[Real; 6]; 6] = [
     [0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
     [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
 ];
-/// Missed ticks in a row of which more are the event [`STALLED`](specgen_runtime::supervisor::STALLED); from
-/// `supervisor.missed_in_a_row`.
-pub const STALL_TICKS: u32 = 100;
 
 /// What is left after a tick of the way to the set-point when the law begins; from `supervisor.arm_time`.
 pub const APPROACH_KEEP: Real = 0.998002;
