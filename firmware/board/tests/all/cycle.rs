@@ -5,11 +5,14 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use controller::hysteresis::{Memory, TABLES};
+use controller::limits::DAC;
 use controller::sensing;
 use controller::supervised::{
     CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, Request, STALLED,
     STOP, supervise,
 };
+use controller::supervision::READINGS_PER_LEG;
 use controller::{Command, CommandKind, Config, INPUT_WORDS, Real, Target, TickInput};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -32,6 +35,24 @@ struct Bench {
     write_fault: Option<Fault>,
     start_fault: Option<Fault>,
     done: Vec<Done>,
+    /// Legs that the codes move and the gauges see; none stand where they are.
+    legs: Option<[Memory; 6]>,
+}
+
+/// Ticks that arming takes, the wiring check of six legs included, and some more.
+const ARMED: u32 = 4500;
+/// Codes of gauges in the middle of their range.
+const MIDDLE: i32 = 1 << 17;
+
+/// Where the codes of the amplifiers bring the gauges.
+fn follow(legs: &mut [Memory; 6], codes: &[i32; 6]) -> [i32; 6] {
+    for ((leg, table), code) in legs.iter_mut().zip(&TABLES).zip(codes) {
+        leg.apply(table, DAC.drive(*code));
+    }
+    READINGS_PER_LEG.map(|row| {
+        let moved: Real = row.iter().zip(&*legs).map(|(part, leg)| part * leg.displacement()).sum();
+        MIDDLE + (2.0 * moved / sensing::CONVERTER.per_code).round() as i32
+    })
 }
 
 #[derive(Clone, Default)]
@@ -59,6 +80,10 @@ impl Amplifiers for Parts {
     fn write(&mut self, codes: &[i32; 6]) -> Result<(), Fault> {
         let mut bench = self.0.borrow_mut();
         bench.done.push(Done::Write(*codes));
+        if let Some(mut legs) = bench.legs.take() {
+            bench.codes = follow(&mut legs, codes);
+            bench.legs = Some(legs);
+        }
         bench.write_fault.map_or(Ok(()), Err)
     }
 
@@ -75,12 +100,19 @@ fn at_reset() -> &'static mut Machine {
 
 fn started(intact: bool) -> (Parts, Board<'static, Parts, Parts>, Exchange) {
     let parts = Parts::default();
-    parts.0.borrow_mut().codes = [1 << 17; 6];
+    parts.0.borrow_mut().codes = [MIDDLE; 6];
     let mut board = Board::new(parts.clone(), parts.clone(), at_reset(), intact);
     let mut exchange = Exchange::new();
     board.start(&mut exchange.report);
     exchange.silence.heard();
     parts.0.borrow_mut().done.clear();
+    (parts, board, exchange)
+}
+
+/// The same with legs that move.
+fn moving() -> (Parts, Board<'static, Parts, Parts>, Exchange) {
+    let (parts, board, exchange) = started(true);
+    parts.0.borrow_mut().legs = Some([Memory::new(); 6]);
     (parts, board, exchange)
 }
 
@@ -281,7 +313,7 @@ fn the_command_stands_before_the_gauges() {
 #[test]
 fn a_converter_that_failed_names_the_cause_and_one_acknowledgement_is_enough_once_it_answers() {
     for stop in [false, true] {
-        let (parts, mut board, mut exchange) = started(true);
+        let (parts, mut board, mut exchange) = moving();
         let mut run = |exchange: &mut Exchange, request: Request, ticks: u32, stop: bool| {
             exchange.orders.request = request;
             for _ in 0..ticks {
@@ -289,7 +321,7 @@ fn a_converter_that_failed_names_the_cause_and_one_acknowledgement_is_enough_onc
                 board.tick(exchange, Noticed { missed: 0, stop });
             }
         };
-        run(&mut exchange, Request::Arm, 1500, false);
+        run(&mut exchange, Request::Arm, ARMED, false);
         assert_eq!(exchange.report.phase, Phase::Holding);
         parts.0.borrow_mut().gauge_fault = Some(Fault::NotEnded);
         run(&mut exchange, Request::Arm, 99, false);
@@ -324,13 +356,13 @@ fn a_machine_that_stood_still_ramps_down_and_its_record_says_so() {
         (9_999, Phase::Faulted, Cause::Stalled),
         (u32::MAX, Phase::Faulted, Cause::Stalled),
     ] {
-        let (parts, mut board, mut exchange) = started(true);
+        let (parts, mut board, mut exchange) = moving();
         let mut tick = |exchange: &mut Exchange, missed| {
             exchange.silence.heard();
             board.tick(exchange, Noticed { missed, stop: false });
         };
         exchange.orders.request = Request::Arm;
-        (0..1500).for_each(|_| tick(&mut exchange, 0));
+        (0..ARMED).for_each(|_| tick(&mut exchange, 0));
         assert!(exchange.report.amplifier_on);
         exchange.report.health.events = 0;
         tick(&mut exchange, missed);
@@ -344,7 +376,7 @@ fn a_machine_that_stood_still_ramps_down_and_its_record_says_so() {
 
 #[test]
 fn without_its_background_a_board_ramps_down_whatever_was_asked_for() {
-    let (_, mut board, mut exchange) = started(true);
+    let (_, mut board, mut exchange) = moving();
     let mut ticks = |exchange: &mut Exchange, request: Request, count: u32| {
         exchange.orders.request = request;
         for _ in 0..count {
@@ -353,7 +385,7 @@ fn without_its_background_a_board_ramps_down_whatever_was_asked_for() {
         }
         exchange.report.phase
     };
-    ticks(&mut exchange, Request::Arm, 1500);
+    ticks(&mut exchange, Request::Arm, ARMED);
     assert_eq!(ticks(&mut exchange, Request::Hold, 10), Phase::Holding);
     exchange.orphaned = true;
     assert_eq!(ticks(&mut exchange, Request::Run, 10), Phase::Disarmed);

@@ -3,13 +3,29 @@
 use std::fmt::Debug;
 
 use specgen_runtime::setpoint::{Generator, LONGEST, Profile, Stop};
-use specgen_runtime::snapshot::{Field, Invalid, LARGEST, LARGEST_PLACE, Piece, Reader, Sizes, Snapshot, Writer};
+use specgen_runtime::snapshot::{Field, Invalid, LARGEST, Piece, Reader, Sizes, Snapshot, Writer};
 use specgen_runtime::supervisor::{Approach, Supervisor, TIMERS};
 use specgen_runtime::{
     CreepMemory, Damping, Digest, DynamicMemory, Estimate, Integral, Motion, NotchState, Rate, ReversalMemory, Transfer,
 };
 
-const SIZES: Sizes = Sizes { request: 32.0, reading: 8.0, stiffness: 2.0 };
+/// No two bounds are alike.
+const SIZES: Sizes = Sizes {
+    place: [1.0, 1.1, 1.2, 1.3, 1.4, 1.5],
+    user: [2.0, 2.1, 2.2, 2.3, 2.4, 2.5],
+    rate: [3.0, 3.1, 3.2, 3.3, 3.4, 3.5],
+    acceleration: [4.0, 4.1, 4.2, 4.3, 4.4, 4.5],
+    pose: [5.0, 5.1, 5.2, 5.3, 5.4, 5.5],
+    pose_rate: [6.0, 6.1, 6.2, 6.3, 6.4, 6.5],
+    error: 7.0,
+    wrench: [8.0, 8.1, 8.2, 8.3, 8.4, 8.5],
+    leg: 9.0,
+    leg_rate: 10.0,
+    line: 11.0,
+    request: 32.0,
+    reading: 12.0,
+    stiffness: 2.0,
+};
 const GARBAGE: u64 = 0x5555_5555_5555_5555;
 
 fn save<S: Snapshot>(state: &S) -> Vec<u64> {
@@ -108,6 +124,13 @@ fn numbers_within<S: Snapshot + Clone + Debug>(state: &S, places: impl IntoItera
     }
 }
 
+/// From this place on numbers of six axes, each up to its `largest`.
+fn axes_within<S: Snapshot + Clone + Debug>(state: &S, first: usize, largest: [f64; 6]) {
+    for (place, largest) in (first..).zip(largest) {
+        numbers_within(state, [place], largest);
+    }
+}
+
 /// At a place whole numbers from `least` to `most` and no others.
 fn whole_within<S: Snapshot + Clone + Debug>(state: &S, place: usize, least: u64, most: u64) {
     let words = save(state);
@@ -128,8 +151,9 @@ fn whole_within<S: Snapshot + Clone + Debug>(state: &S, place: usize, least: u64
 fn every_word_of_the_small_states_counts() {
     let motion = Motion::<f64>::new();
     every_word_counts(&motion, Words::default().reals(18), Motion::digest);
-    numbers_within(&motion, 0..6, LARGEST_PLACE);
-    numbers_within(&motion, 6..18, LARGEST);
+    for (first, largest) in [(0, SIZES.place), (6, SIZES.rate), (12, SIZES.acceleration)] {
+        axes_within(&motion, first, largest);
+    }
     let estimate = Estimate::<f64>::new();
     every_word_counts(&estimate, Words::default().reals(2), Estimate::digest);
     numbers_within(&estimate, 0..2, SIZES.request);
@@ -147,8 +171,8 @@ fn every_word_of_the_small_states_counts() {
     numbers_within(&transfer, 0..6, SIZES.request);
     let rate = Rate::<f64>::new();
     every_word_counts(&rate, Words::default().reals(12).whole(&[1]), Rate::digest);
-    numbers_within(&rate, 0..6, LARGEST_PLACE);
-    numbers_within(&rate, 6..12, LARGEST);
+    axes_within(&rate, 0, SIZES.pose);
+    axes_within(&rate, 6, SIZES.pose_rate);
 }
 
 #[test]
@@ -172,7 +196,7 @@ fn every_word_of_a_supervisor_counts() {
     let [turned, response, least, approach] = [end + 8, end + 12, end + 48, end + 51];
     numbers_within(&fresh, (turned..response).chain([least]), 2.0);
     numbers_within(&fresh, response..least, LARGEST);
-    numbers_within(&fresh, approach + 1..approach + 7, LARGEST_PLACE);
+    axes_within(&fresh, approach + 1, SIZES.user);
     for (place, most) in [(0, 5), (1, 15), (2, 5), (end, 6), (end + 6, 6), (approach - 1, 1), (approach, 2)] {
         whole_within(&fresh, place, 0, most);
     }
@@ -191,7 +215,8 @@ fn every_word_of_a_generator_counts() {
     whole_within(&Stop::<f64>::new(), 12, 1, longest);
     whole_within(&Stop::<f64>::new(), 13, 0, longest);
     numbers_within(&Profile::<f64>::new(), 3..6, 1.0);
-    numbers_within(&Stop::<f64>::new(), 0..12, LARGEST_PLACE);
+    axes_within(&Stop::<f64>::new(), 0, SIZES.user);
+    axes_within(&Stop::<f64>::new(), 6, SIZES.rate);
 
     let fresh = Generator::<f64>::new();
     let words = |phase: u64, index: u64, finished: u64| {
@@ -209,8 +234,17 @@ fn every_word_of_a_generator_counts() {
     let digests: Vec<u64> =
         (0..8).map(|phase| digest(|digest| restore(&fresh, &words(phase, 0, 1).0).unwrap().digest(digest))).collect();
     assert!((0..8).all(|a| (0..a).all(|b| digests[a] != digests[b])), "phases that a digest does not tell apart");
-    numbers_within(&fresh, (2..8).chain(14..38), LARGEST_PLACE);
-    numbers_within(&fresh, (8..14).chain(38..50), LARGEST);
+    for (first, largest) in [(2, SIZES.user), (8, SIZES.rate), (32, SIZES.place), (38, SIZES.rate)] {
+        axes_within(&fresh, first, largest);
+    }
+    axes_within(&fresh, 44, SIZES.acceleration);
+    // Start, goal and the way between them: to the bias they are the platform's own.
+    let to_bias = restore(&fresh, &words(1, 0, 1).0).unwrap();
+    for (state, largest) in [(&fresh, SIZES.user), (&to_bias, SIZES.place)] {
+        axes_within(state, 14, largest);
+        axes_within(state, 20, largest);
+        axes_within(state, 26, largest.map(|largest| 2.0 * largest));
+    }
     for (place, most) in [(0, 7), (56, 1 << 30), (71, 1 << 30), (72, 1 << 30), (74, u32::MAX.into())] {
         whole_within(&fresh, place, 0, most);
     }
@@ -280,7 +314,13 @@ fn every_word_of_the_reversal_memories_counts() {
     assert_eq!(restore(&CreepMemory::<f64, CAP, 3>::new(), &creep().0).unwrap().highest(), 20.0);
     assert_eq!(restore(&DynamicMemory::<f64, CAP>::new(), &dynamic().0).unwrap().highest(), 20.0);
     whole_within(&restored, 1, 0, u32::MAX.into());
-    numbers_within(&restored, [3].into_iter().chain(4 + CAP..Plain::WORDS), LARGEST_PLACE);
+    numbers_within(&restored, [3].into_iter().chain(4 + CAP..Plain::WORDS), SIZES.leg);
+    let creeping = restore(&CreepMemory::<f64, CAP, 3>::new(), &creep().0).unwrap();
+    numbers_within(&creeping, Plain::WORDS..Plain::WORDS + 4, SIZES.leg);
+    let changing = restore(&DynamicMemory::<f64, CAP>::new(), &dynamic().0).unwrap();
+    let rates = Plain::WORDS..Plain::WORDS + CAP;
+    numbers_within(&changing, rates.chain([Plain::WORDS + CAP]), SIZES.leg_rate);
+    numbers_within(&changing, [Plain::WORDS + CAP + 1], SIZES.leg);
 }
 
 #[test]
@@ -331,7 +371,7 @@ fn a_way_to_a_set_point_reads_back_from_its_words_and_nothing_else_does() {
     let words = || Words::default().whole(&[2]).reals(6);
     every_word_counts(&fresh, words(), Approach::digest);
     whole_within(&restore(&fresh, &words().0).unwrap(), 0, 0, 2);
-    numbers_within(&restore(&fresh, &words().0).unwrap(), 1..7, LARGEST_PLACE);
+    axes_within(&restore(&fresh, &words().0).unwrap(), 1, SIZES.user);
     for stage in 0..3 {
         let mut words = words().0;
         words[0] = stage;
@@ -388,7 +428,7 @@ fn a_reader_takes_what_is_asked_for_and_names_what_is_not() {
     let half = u64::from(0.5_f32.to_bits());
     let words = [7, 7, 1, 2, u64::from(u32::MAX), 1 << 32, half, half | 1 << 40, 3, 0];
     let mut reader = Reader::new(&words);
-    assert_eq!(reader.sizes(), Sizes { request: LARGEST_PLACE, reading: LARGEST_PLACE, stiffness: LARGEST });
+    assert_eq!(reader.sizes(), Sizes::ANY);
     assert_eq!(reader.refused(), Invalid { word: 0 });
     assert_eq!((reader.word(7), reader.word(6)), (Ok(7), Err(Invalid { word: 1 })));
     assert_eq!((reader.flag(), reader.flag()), (Ok(true), Err(Invalid { word: 3 })));
