@@ -2,7 +2,8 @@
 //! stay finite and within limits from there on.
 
 use crate::rate_options::{CREEP, DYNAMIC, rate_table};
-use host_sim::controller::Supervised;
+use host_sim::controller::{Standing, Supervised};
+use host_sim::controller::TickController as _;
 use host_sim::word::Scalar;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -10,12 +11,14 @@ use specgen_tests::{Emitted, length};
 
 const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
 
-/// Ticks from reset to the snapshots that are changed: on the way to the bias pose, at it, in motion.
-const MOMENTS: [u32; 4] = [900, 1600, 9000, 9300];
+/// Ticks from reset to the snapshots that are changed: in the wiring check, on the way to the bias pose, at it, in motion.
+const MOMENTS: [u32; 4] = [2000, 5200, 9000, 9300];
 
 /// A machine under sensible inputs, tick by tick.
 struct Course {
     machine: Supervised,
+    /// Gauges that show what the legs move until the machine runs, and stand still from then on.
+    standing: Standing,
     input: Vec<u64>,
     output: Vec<u64>,
     /// Where the set-point and the gauges stand among the inputs.
@@ -29,8 +32,10 @@ impl Course {
     fn new(emitted: &Emitted) -> Self {
         let machine = Supervised::new(emitted.controller()).expect("a library with the supervised tick");
         let names = machine.input_names();
+        let input = vec![0; names.len()];
         Self {
-            input: vec![0; names.len()],
+            standing: machine.standing(&input).expect("a library with the wiring check"),
+            input,
             output: vec![0; machine.output_names().len()],
             setpoint: names.iter().position(|name| name == "setpoint[0]").expect("an input"),
             scalar: machine.controller().description().scalar,
@@ -43,7 +48,8 @@ impl Course {
     /// Arms, runs, and moves to one pose after the other; the gauges stand still.
     fn step(&mut self) {
         self.tick += 1;
-        let request = if self.tick < 5 { 0 } else { 1 + u64::from(self.tick > 800) };
+        let runs = self.tick > 5000;
+        let request = if self.tick < 5 { 0 } else { 1 + u64::from(runs) };
         let words = self.input.len();
         self.input[words - 2] = request;
         if self.tick > 9000 || !self.platform {
@@ -54,6 +60,9 @@ impl Course {
             self.input[self.setpoint + 2] = self.scalar.encode(place);
         }
         self.machine.step(&self.input, &mut self.output);
+        if !runs {
+            self.standing.show(&self.machine, &self.output, &mut self.input);
+        }
     }
 }
 
