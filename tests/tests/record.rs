@@ -311,20 +311,28 @@ fn quiet(names: &[String], rng: &mut ChaCha8Rng, single: bool, request: u64) -> 
     names.iter().map(word).collect()
 }
 
-/// Brings a machine from wherever it is to its running phase.
+/// Brings a machine from wherever it is to its running phase. While it arms, its gauges show what its legs move.
 fn bring_to_run(machine: &mut Supervised, names: &[String], rng: &mut ChaCha8Rng, single: bool) {
     let mut output = vec![0; machine.output_names().len()];
-    for tick in 0..200_000_u32 {
-        let request =
-            match machine.step(&quiet(names, rng, single, if tick % 2 == 0 { 0 } else { 5 }), &mut output).phase {
-                2 => return,
-                0 => 1,
-                5 => 5,
-                // What was held for a cause is brought to rest, and armed again.
-                3 if tick > 100_000 => 4,
-                _ => 2,
-            };
-        if machine.step(&quiet(names, rng, single, request), &mut output).phase == 2 {
+    let mut standing = machine.standing(&quiet(names, rng, single, 0)).unwrap();
+    let mut phase = 0;
+    for tick in 0..400_000_u32 {
+        let request = match phase {
+            _ if tick % 4 < 2 => 5 * u64::from(tick % 4),
+            0 => 1,
+            5 => 5,
+            // What was held for a cause is brought to rest, and armed again.
+            3 if tick > 200_000 => 4,
+            _ => 2,
+        };
+        let mut input = quiet(names, rng, single, request);
+        if phase == 1 {
+            standing.show(machine, &output, &mut input);
+        } else {
+            standing = machine.standing(&input).unwrap();
+        }
+        phase = machine.step(&input, &mut output).phase;
+        if phase == 2 {
             return;
         }
     }

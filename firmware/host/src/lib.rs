@@ -18,7 +18,6 @@ use controller::supervised::{
     MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_output_words, supervise,
 };
 use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput};
-#[cfg(feature = "dynamics")]
 use specgen_runtime::Real;
 
 /// Version of this interface.

@@ -147,8 +147,9 @@ impl Finding {
     }
 }
 
-/// In words for people; empty where there is none.
+/// In words for people; empty where there is none. Inlined: no controller is to be linked with the machinery of texts for it.
 impl fmt::Display for Finding {
+    #[inline]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (what, place, fault) = match self {
             Self::None => return Ok(()),
