@@ -270,6 +270,22 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_full_run_takes_the_long_tests_too_and_the_short_run_takes_none() {
+        let executable = std::env::current_exe().unwrap();
+        let binary = Binary { name: "xtask".to_owned(), executable, folder: PathBuf::from(".") };
+        let [short, full] = [false, true].map(|full| binary.tests(full).unwrap());
+        let more: Vec<&String> = full.iter().filter(|test| !short.contains(test)).collect();
+        assert_eq!(more, ["binaries::tests::a_long_test"]);
+        assert!(short.iter().all(|test| full.contains(test)));
+    }
+
+    #[test]
+    #[ignore = "long: it is there for the test above, and fails wherever a run that is not full takes it"]
+    fn a_long_test() {
+        assert!(std::env::var_os(FULL).is_some(), "{FULL} is not set");
+    }
+
+    #[test]
     fn tests_that_were_not_run_have_not_passed() {
         let binary = Binary { name: "a all".to_owned(), executable: PathBuf::new(), folder: PathBuf::new() };
         let tests = ["m::x", "m::y"].map(str::to_owned).to_vec();
