@@ -247,11 +247,7 @@ impl Link {
 
 /// What a record keeps of a tick's outputs.
 fn row_of(output: &MachineOutput) -> recorder::Row {
-    recorder::Row {
-        codes: output.tick.dac_code,
-        status: output.tick.status,
-        supervisor: output.supervisor_word(),
-    }
+    recorder::Row { codes: output.tick.dac_code, status: output.tick.status, supervisor: output.supervisor_word() }
 }
 
 /// The event bit of tables or settings that are not what the compiler made.

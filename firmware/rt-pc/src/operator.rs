@@ -415,7 +415,17 @@ mod tests {
     const B: HostId = HostId(2);
 
     fn said(phase: Phase, on: bool) -> Said {
-        Said { phase, cause: Cause::None, finding: Finding::None, on, status: 0, tick: 7, orders: 0, waving: false, late: 0 }
+        Said {
+            phase,
+            cause: Cause::None,
+            finding: Finding::None,
+            on,
+            status: 0,
+            tick: 7,
+            orders: 0,
+            waving: false,
+            late: 0,
+        }
     }
 
     fn operator() -> Operator {

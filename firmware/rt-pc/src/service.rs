@@ -147,7 +147,12 @@ impl Service<'_> {
             let faulted = said.phase == Phase::Faulted && before.0 != Phase::Faulted;
             let held = said.phase == Phase::Holding && said.cause != Cause::None && (said.phase, said.cause) != before;
             if faulted || held {
-                outcome.incidents.push(Incident { tick: said.tick, phase: said.phase, cause: said.cause, finding: said.finding });
+                outcome.incidents.push(Incident {
+                    tick: said.tick,
+                    phase: said.phase,
+                    cause: said.cause,
+                    finding: said.finding,
+                });
             }
             self.console.update(&row, said, now);
             if let Some(link) = &mut self.link {

@@ -1,11 +1,12 @@
-//! A stand-in for libcomedi, built by the test: a card with sixteen inputs and four outputs whose inputs stand still. On closing
-//! it writes what was done with it. `FAKE_CODE`: code of every input; `FAKE_FAIL_AFTER`: readings after which it fails;
+//! A stand-in for libcomedi, built by the test: two cards with sixteen inputs and four outputs each. On closing it writes what was done
+//! with it. Its inputs stand still, or follow the outputs: `FAKE_PER_CODE` has 36 numbers, steps of each of six inputs (rows) per step of
+//! each of six outputs. `FAKE_FAIL_AFTER`: readings after which it fails;
 //! `FAKE_HIGH_AFTER`: looks at a digital line after which that is high; `FAKE_CONTACTS`: file whose first letters are the contacts of
 //! emergency stop and amplifiers, `0` for open, both closed without one; `FAKE_BEATS`: file that gets time (ns since 1970, u64) and level (u64) of
 //! every beat of the heartbeat; `FAKE_LOG`: file to write.
 
 use std::ffi::{c_char, c_double, c_int, c_uint, c_void};
-use std::sync::Mutex;
+use std::sync::{LazyLock, Mutex};
 
 #[repr(C)]
 pub struct Instruction {
@@ -28,6 +29,7 @@ struct Log {
     reads: u64,
     writes: [u64; 3],
     codes: [u32; 2],
+    outputs: [u32; 6],
     lines: Vec<u32>,
     /// Digital lines with their directions, and how often one was looked at or, but for the first, set.
     directions: Vec<(u32, u32)>,
@@ -43,6 +45,7 @@ static LOG: Mutex<Log> = Mutex::new(Log {
     reads: 0,
     writes: [0; 3],
     codes: [u32::MAX, 0],
+    outputs: [0; 6],
     lines: Vec::new(),
     directions: Vec::new(),
     looks: 0,
@@ -51,6 +54,16 @@ static LOG: Mutex<Log> = Mutex::new(Log {
     beat_file: None,
     bad: Vec::new(),
 });
+
+/// Code of an input, in the middle of its range with every output at 0.
+fn follow(input: usize, outputs: &[u32; 6]) -> u32 {
+    static PER_CODE: LazyLock<Vec<f64>> = LazyLock::new(|| {
+        let text = std::env::var("FAKE_PER_CODE").unwrap_or_default();
+        text.split_whitespace().map(|number| number.parse().unwrap()).collect()
+    });
+    let row = PER_CODE.iter().skip(6 * input).zip(outputs);
+    (65_536.0 + row.map(|(per_code, code)| per_code * f64::from(*code)).sum::<f64>()).round() as u32
+}
 
 fn number(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
@@ -155,10 +168,11 @@ pub unsafe extern "C" fn comedi_do_insnlist(card: *mut c_void, list: *mut List) 
                 if log.reads > number("FAKE_FAIL_AFTER", u64::MAX) {
                     return -1;
                 }
-                *code = number("FAKE_CODE", 65_536) as u32;
+                *code = follow(place as usize, &log.outputs);
             }
             (0x0800_0001, 1, 1) if instruction.channel == ground && place < 4 => {
                 log.writes[card as usize] += 1;
+                log.outputs[(card as usize - 1) * 4 + place as usize] = *code;
                 log.codes = [log.codes[0].min(*code), log.codes[1].max(*code)];
             }
             odd => log.bad.push(format!("{odd:?} channel {:x}", instruction.channel)),

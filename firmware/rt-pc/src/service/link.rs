@@ -90,21 +90,30 @@ impl Link {
         let (before, mut stopper) = (console.stops, None);
         let gone = hosts.serve(|client| {
             client.state.events |= events;
-            let stops = console.stops;
             // One that another took the orders from is to come anew, so that it does not go on as if nothing had happened.
             if console.operator.is_evicted(client.state.id) {
                 traffic.closed += 1;
                 return Err(io::ErrorKind::ConnectionAborted.into());
             }
-            let served = serve(client, console, now);
+            if console.stops != before {
+                client.find_late();
+            }
+            let stops = console.stops;
+            obey(client, console, now)?;
             if console.stops != stops {
                 stopper = Some(client.state.id);
+                return Ok(());
             }
-            served
+            send(client)
         });
         if console.stops != before {
+            // A stop is answered when it is known what the others sent before it: what comes after the answer counts.
             for client in hosts.iter_mut().filter(|client| Some(client.state.id) != stopper) {
-                client.state.is_late = ioctl_fionread(&client.stream).is_ok_and(|unread| unread > 0);
+                client.find_late();
+            }
+            for client in hosts.iter_mut().filter(|client| Some(client.state.id) == stopper) {
+                // The next call finds out what became of a line that fails.
+                let _ = send(client);
             }
         }
         for line in crowded.iter().chain(&gone) {
@@ -126,8 +135,15 @@ impl Link {
     }
 }
 
-/// An error ends the connection.
-fn serve(client: &mut Client<Line>, console: &mut Console, now: u64) -> io::Result<()> {
+impl Client<Line> {
+    /// Whether something that was sent by now is still to be read.
+    fn find_late(&mut self) {
+        self.state.is_late = ioctl_fionread(&self.stream).is_ok_and(|unread| unread > 0);
+    }
+}
+
+/// Does what the host asks for. An error ends the connection, here and below.
+fn obey(client: &mut Client<Line>, console: &mut Console, now: u64) -> io::Result<()> {
     if client.state.unsent.len() < UNREAD {
         let mut bytes = room();
         let said = client.read(&mut bytes, now)?;
@@ -140,6 +156,11 @@ fn serve(client: &mut Client<Line>, console: &mut Console, now: u64) -> io::Resu
             }
         }
     }
+    Ok(())
+}
+
+/// Sends what there is for the host, as far as it takes it.
+fn send(client: &mut Client<Line>) -> io::Result<()> {
     while !client.state.unsent.is_empty() {
         match client.stream.write(&client.state.unsent) {
             Ok(count) => {
