@@ -295,13 +295,13 @@ fn a_recorded_run_stands_beside_the_simulation_of_its_commands() {
     );
     has_numbers(&page);
     is_drawn(&folder, "run.html", &document.value["result"]["figures"]);
-    // Of six legs; and without its first block, so that it begins in the middle of a run.
+    // Of six legs; and without its first two blocks, in which the machine is armed, so that it begins in the middle of a run.
     let run = folder.run(&["sim", "legs.toml", "--record", "legs.rec", "--seconds", "1.5"]);
     assert_eq!(run.code, 0, "{}", run.stderr);
     let whole = std::fs::read(folder.path("legs.rec")).unwrap();
     let mut blocks = whole.windows(8).enumerate().filter(|(_, word)| word == b"SPGBLOCK").map(|(place, _)| place);
-    let [first, second] = [blocks.next().unwrap(), blocks.next().unwrap()];
-    std::fs::write(folder.path("middle.rec"), [&whole[..first], &whole[second..]].concat()).unwrap();
+    let [first, third] = [blocks.next().unwrap(), blocks.nth(1).unwrap()];
+    std::fs::write(folder.path("middle.rec"), [&whole[..first], &whole[third..]].concat()).unwrap();
     for (record, drawn_only) in [("legs.rec", false), ("middle.rec", true)] {
         let document = folder.json(&["report", "legs.toml", "--record", record, "-o", "legs.html"]);
         assert_eq!(document.code, 0, "{:#}", document.value);

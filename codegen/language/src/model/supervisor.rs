@@ -68,7 +68,7 @@ section! {
         /// Height of a pulse, as a share of `actuator.stroke`.
         amplitude: f64 = number(Range::above(0.0, 0.02)), Default(0.01), "" ["height", "share"], 0.01;
         /// Time of a pulse, one leg after the other.
-        time: Option<f64> = TIMEOUT, Rule("50 ms, at least 40 periods and what the slew rate takes"), "" ["duration"], "50 ms";
+        time: Option<f64> = TIMEOUT, Rule("50 ms, at least 40 periods and what the slew rate takes, up to 200 ms where the noise of the gauges asks for it"), "" ["duration"], "50 ms";
         /// Smallest and largest gain of a gauge over the median of all six.
         gauge_gain: [f64; 2] = list(&[RATIO; 2]), Default([0.75, 1.33]), "", [0.75, 1.33];
         /// Smallest and largest gain of a leg over the mean of the five others. With six records each is held against its own.

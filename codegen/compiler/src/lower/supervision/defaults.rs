@@ -20,6 +20,8 @@ pub(crate) const SLEW_TIME: f64 = 0.05;
 pub(crate) const HOST_LOST: [f64; 2] = [0.1, 10.0];
 /// Without `supervisor.wiring_check.time`, s.
 pub(crate) const WIRING_TIME: f64 = 0.05;
+/// The same where the gauges' noise asks for more, at most.
+pub(crate) const LONGEST_WIRING_TIME: f64 = 0.2;
 /// Of `supervisor.stuck_motion` without the key: times the noise, and steps of the gauge's converter.
 const STUCK_MARGIN: f64 = 10.0;
 /// Of the stroke, without `supervisor.disagreement`.

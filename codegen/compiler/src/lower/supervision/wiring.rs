@@ -46,7 +46,7 @@ pub(super) fn lower(
     // Ticks that the slew rate asks for where the pulse is steepest.
     let steepest = libm::ceil(f64::from(height) * core::f64::consts::PI / f64::from(max_step) - 1e-9);
     let least = period * if steepest > FEWEST { steepest } else { FEWEST };
-    let time = spec.time.unwrap_or(if least > defaults::WIRING_TIME { least } else { defaults::WIRING_TIME });
+    let mut time = spec.time.unwrap_or(if least > defaults::WIRING_TIME { least } else { defaults::WIRING_TIME });
     if time < least * (1.0 - 1e-9) {
         findings.push(finding(
             model,
@@ -65,10 +65,20 @@ pub(super) fn lower(
         ));
         return None;
     }
-    let ticks = whole(libm::round(time / period));
-    let regression = Regression::new(ticks, period, model.amplifier.lag, model.sensor.lag);
     let pulse = f64::from(height) * actuation.volts_per_code * gain;
-    let noise = noise(model, &regression.weights(), pulse, readings);
+    let in_time = |time: f64| {
+        let ticks = whole(libm::round(time / period));
+        let regression = Regression::new(ticks, period, model.amplifier.lag, model.sensor.lag);
+        let noise = noise(model, &regression.weights(), pulse, readings);
+        (ticks, regression, noise)
+    };
+    let (mut ticks, mut regression, mut noise) = in_time(time);
+    if spec.time.is_none() && noise > NOISE {
+        // Noise goes with the root of the time.
+        time =
+            libm::fmax(time, libm::fmin(time * (noise / NOISE) * (noise / NOISE) * 1.1, defaults::LONGEST_WIRING_TIME));
+        (ticks, regression, noise) = in_time(time);
+    }
     if noise > NOISE {
         findings.push(Diagnostic::at(
             &model.spans,

@@ -20,6 +20,7 @@ pub(super) const SIMULATOR: &[(&str, &str)] = files! { "" as "host-sim":
     "src/controller.rs",
     "src/controller/supervised.rs",
     "src/controller/supervised/snapshot.rs",
+    "src/controller/supervised/standing.rs",
     "src/coverage.rs",
     "src/description.rs",
     "src/forc.rs",
