@@ -56,7 +56,7 @@ impl Course {
             if self.platform {
                 self.input[0] = 2;
             }
-            let place = if self.tick / 2000 % 2 == 0 { 2e-6 } else { 4e-6 };
+            let place = if (self.tick / 2000).is_multiple_of(2) { 2e-6 } else { 4e-6 };
             self.input[self.setpoint + 2] = self.scalar.encode(place);
         }
         self.machine.step(&self.input, &mut self.output);

@@ -307,7 +307,10 @@ fn a_pose_that_is_noisier_at_rest_than_asked_for_is_not_good() {
         ("legs.toml", "2.2 nm", "precision = \"20 nm\"", None),
     ] {
         let text = folder.read(spec).replace("noise = \"2.2 nm\"", &format!("noise = \"{noise}\""));
-        folder.write("own.toml", text.replace("[timing]", &format!("[requirements]\n{requirements}\n\n[timing]")));
+        // As long a wiring check as the noise asks for.
+        let supervisor = "[supervisor]\nwiring_check.time = \"5 s\"";
+        let more = format!("{supervisor}\n\n[requirements]\n{requirements}\n\n[timing]");
+        folder.write("own.toml", text.replace("[timing]", &more));
         let case = format!("{spec}, {noise}, {requirements}");
         let run = folder.run(&["own.toml", "-o", "out", "--no-build"]);
         let (code, document) = json_of(&folder, &["check", "own.toml"]);

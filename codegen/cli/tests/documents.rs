@@ -38,11 +38,12 @@ fn links_lead_somewhere() {
             if !target.contains("://") {
                 links += 1;
                 let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
-                assert!(folder.join(file).exists(), "{name} links to {target}");
+                let file = if file.is_empty() { repository().join(&name) } else { folder.join(file) };
+                assert!(file.exists(), "{name} links to {target}");
                 let is_heading = |line: &str| {
                     line.starts_with('#') && line.to_lowercase().replace(' ', "-").ends_with(&format!("#-{anchor}"))
                 };
-                let found = anchor.is_empty() || fs::read_to_string(folder.join(file)).unwrap().lines().any(is_heading);
+                let found = anchor.is_empty() || fs::read_to_string(file).unwrap().lines().any(is_heading);
                 assert!(found, "{name} links to {target}");
             }
         }

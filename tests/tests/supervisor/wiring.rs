@@ -314,8 +314,8 @@ fn random(compiled: &Compiled, number: u64) -> Legs {
     let stiffness = draw.six(0.2).map(|factor| factor * model.actuator.axial_stiffness);
     let weighted = std::array::from_fn(|leg| jacobian[leg].map(|part| part * stiffness[leg]));
     let mut of_pose = times(&transposed(&jacobian), &weighted);
-    for axis in 0..6 {
-        of_pose[axis][axis] *= 1.0 + draw.within(0.0, 0.05);
+    for (axis, row) in of_pose.iter_mut().enumerate() {
+        row[axis] *= 1.0 + draw.within(0.0, 0.05);
     }
     let pose = times(&inverse(&of_pose), &transposed(&weighted));
     let mix = times(&gauges, &pose).map(|row| row.map(|entry| entry * gain));

@@ -9,9 +9,7 @@ use serde_json::Value;
 use specgen_link::Request;
 
 use super::host::{Host, Record};
-use super::{
-    ACKNOWLEDGE, ARM, Bench, DISARMED, FAULTED, HOLDING, NONE, RUN, RUNNING, Running, TWO_CARDS, fake_comedi, wait_for,
-};
+use super::{ARM, Bench, DISARMED, FAULTED, HOLDING, NONE, RUN, RUNNING, Running, TWO_CARDS, fake_comedi, wait_for};
 
 const RAMPING_DOWN: u8 = 4;
 const CONVERTER: u8 = 11;

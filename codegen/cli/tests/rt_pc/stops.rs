@@ -97,7 +97,7 @@ fn a_stop_is_a_stop() {
 fn hosts_of_the_link(link: &Path, look: &mut Look) {
     let mut host = Host::open(link, 1).unwrap();
     let moved = |x: f64| {
-        let mut words = vec![0; 21];
+        let mut words = [0; 21];
         (words[0], words[3]) = (MOVE, x.to_bits());
         words.iter().flat_map(|word: &u64| word.to_le_bytes()).collect::<Vec<u8>>()
     };
@@ -425,7 +425,7 @@ fn pages(bench: &Bench, link: &Path, look: &mut Look) {
                     let Ok(mut stream) = TcpStream::connect(&address) else { continue };
                     let _ = stream.set_read_timeout(Some(Duration::from_millis(100)));
                     while !over.load(Ordering::Relaxed) && stream.write_all(b"G").is_ok() {
-                        if matches!(stream.read(&mut [0; 64]), Ok(_)) {
+                        if stream.read(&mut [0; 64]).is_ok() {
                             break;
                         }
                     }

@@ -138,11 +138,8 @@ pub const OF_GAUGES: u32 =
 /// Causes that take the amplifiers off at once, in any phase.
 pub const SWITCHES_OFF: u32 = Cause::Integrity.bit() | Cause::EmergencyStop.bit();
 /// Causes that bring the codes to rest, then take the amplifiers off.
-pub const RAMPS_DOWN: u32 = OF_GAUGES
-    | Cause::Converter.bit()
-    | Cause::HostGone.bit()
-    | Cause::Wiring.bit()
-    | Cause::Stalled.bit();
+pub const RAMPS_DOWN: u32 =
+    OF_GAUGES | Cause::Converter.bit() | Cause::HostGone.bit() | Cause::Wiring.bit() | Cause::Stalled.bit();
 /// Causes that hold the codes.
 pub const HOLDS: u32 = Cause::TrackingError.bit()
     | Cause::VoltageSaturation.bit()
