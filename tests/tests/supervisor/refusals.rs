@@ -42,7 +42,7 @@ fn what_cannot_work_is_refused_with_a_fix_that_works() {
         ("reference.toml", "host_lost = [\"5 ms\", \"5 ms\"]", "E0470"),
         ("reference.toml", "host_lost = [\"0.05 ms\", \"5 s\"]", "E0470"),
         ("legs.toml", "wiring_check.time = \"3 ms\"", "E0470"),
-        ("reference.toml", "wiring_check.amplitude = 0.0003", "E0471"),
+        ("reference.toml", "wiring_check = { amplitude = 0.0003, time = \"50 ms\" }", "E0471"),
         ("legs.toml", "ramp_rate = \"41 V/ms\"", "E0472"),
         ("legs.toml", "rest_voltage = \"101 V\"", "E0473"),
         ("reference.toml", "rest_voltage = \"-1 V\"", "E0473"),

@@ -61,7 +61,9 @@ def main(controller_path: str, plant_path: str, inputs_path: str, ticks: int, ou
             words = []
             for k, (variable, word) in enumerate(zip(inputs, row)):
                 if variable.type == "Real":
-                    value = seen[k] if k in seen else struct.unpack("=d", struct.pack("=Q", word))[0]
+                    # Until the plant moves, the gauges show what the check of the wiring is to see.
+                    moves = k in seen and tick >= first
+                    value = seen[k] if moves else struct.unpack("=d", struct.pack("=Q", word))[0]
                     controller.setReal([variable.valueReference], [value])
                 else:
                     value = struct.unpack("=i", struct.pack("=I", word))[0]
