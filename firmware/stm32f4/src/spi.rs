@@ -12,7 +12,7 @@ const LOOKS: usize = 100;
 pub struct Registers {
     spi: Spi,
     /// Of frames that are written, and of those whose answer counts.
-    dividers: [u32; 2],
+    rates: [Br; 2],
 }
 
 impl Registers {
@@ -20,6 +20,7 @@ impl Registers {
     /// a power of two: of frames that are written, of those whose answer counts.
     #[must_use]
     pub fn new(spi: Spi, mode: Mode, dividers: [u32; 2]) -> Self {
+        let rates = dividers.map(rate);
         spi.cr2().modify(|w| w.set_ssoe(true));
         spi.cr1().modify(|w| {
             w.set_mstr(Mstr::MASTER);
@@ -29,19 +30,19 @@ impl Registers {
             } else {
                 Cpha::FIRST_EDGE
             });
-            w.set_br(rate(dividers[0]));
+            w.set_br(rates[0]);
             // Its own select is not looked at: as if it were high.
             w.set_ssm(true);
             w.set_ssi(true);
             w.set_spe(true);
         });
-        Self { spi, dividers }
+        Self { spi, rates }
     }
 
     /// The same registers once more, for another chip select.
     #[must_use]
     pub const fn again(&self) -> Self {
-        Self { spi: self.spi, dividers: self.dividers }
+        Self { spi: self.spi, rates: self.rates }
     }
 }
 
@@ -54,10 +55,10 @@ impl Burst for Registers {
     /// Written only while nothing moves: the last bit was taken half a cycle before that.
     #[inline]
     fn pace(&mut self, answered: bool) {
-        let [written, read] = self.dividers;
+        let [written, read] = self.rates;
         if written != read {
             let _ = (0..LOOKS).any(|_| !self.spi.sr().read().bsy());
-            self.spi.cr1().modify(|w| w.set_br(rate(if answered { read } else { written })));
+            self.spi.cr1().modify(|w| w.set_br(if answered { read } else { written }));
         }
     }
 

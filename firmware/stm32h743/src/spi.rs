@@ -17,7 +17,7 @@ pub struct Registers {
     /// CR1 while it runs.
     running: Cr1,
     /// Of frames that are written, and of those whose answer counts.
-    dividers: [u32; 2],
+    rates: [Mbr; 2],
 }
 
 impl Registers {
@@ -28,6 +28,7 @@ impl Registers {
     /// stalls if it is started within a cycle of SCLK after the end of the last one) names this as the way around it.
     #[must_use]
     pub fn new(spi: Spi, mode: Mode, dividers: [u32; 2]) -> Self {
+        let rates = dividers.map(rate);
         spi.cfg2().modify(|w| {
             w.set_master(Master::MASTER);
             w.set_cpol(if mode.polarity == Polarity::IdleHigh { Cpol::IDLE_HIGH } else { Cpol::IDLE_LOW });
@@ -44,14 +45,14 @@ impl Registers {
         });
         spi.cr2().write(|w| w.set_tsize(0));
         spi.cfg1().modify(|w| {
-            w.set_mbr(rate(dividers[0]));
+            w.set_mbr(rates[0]);
             w.set_dsize(7);
             w.set_fthlv(Fthlv::ONE_FRAME);
         });
         let mut running = spi.cr1().read();
         running.set_spe(true);
         running.set_cstart(true);
-        let registers = Self { spi, running, dividers };
+        let registers = Self { spi, running, rates };
         registers.start();
         registers
     }
@@ -59,7 +60,7 @@ impl Registers {
     /// The same registers once more, for another chip select.
     #[must_use]
     pub const fn again(&self) -> Self {
-        Self { spi: self.spi, running: self.running, dividers: self.dividers }
+        Self { spi: self.spi, running: self.running, rates: self.rates }
     }
 
     /// With empty FIFOs.
@@ -81,10 +82,10 @@ impl Burst for Registers {
     /// Written only while it is off; its pins are driven then, too.
     #[inline]
     fn pace(&mut self, answered: bool) {
-        let [written, read] = self.dividers;
+        let [written, read] = self.rates;
         if written != read {
             self.spi.cr1().modify(|w| w.set_spe(false));
-            self.spi.cfg1().modify(|w| w.set_mbr(rate(if answered { read } else { written })));
+            self.spi.cfg1().modify(|w| w.set_mbr(if answered { read } else { written }));
             self.start();
         }
     }
