@@ -147,6 +147,8 @@ fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, St
             format!("amplifiers off after {took:.3} ms, at most {limit:.3} ms; acknowledged, it arms again")
         }
         End::Stalled => {
+            // What happened is told behind the answer to the command.
+            session.pass(STEP)?;
             session.report()?;
             let (Some(begun), Some(off)) = (session.logged("fault "), session.first_logged("amplifiers off")) else {
                 return Err("amplifiers stay on while the core is held".to_owned());
