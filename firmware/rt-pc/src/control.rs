@@ -92,7 +92,8 @@ impl<D: Device> Loop<'_, D> {
             if over > 0 {
                 events |= MISSED_TICK;
             }
-            if over > u64::from(STALL_TICKS) {
+            // In a PC that sleeps this clock stands still, too.
+            if over > u64::from(STALL_TICKS) || (suspended && !elastic) {
                 events |= STALLED;
             }
             let silence = woken.saturating_sub(self.shared.service_alive.load(Ordering::Relaxed));

@@ -154,7 +154,7 @@ pub fn contacts_stop_the_machine(bench: &Bench) {
 pub fn shared_memory_that_becomes_shorter_ends_nobody(mut bench: Bench) {
     let link = bench.path("shorter.link");
     let mut command = bench.command("shorter.rec");
-    command.args(["--elastic", "--sim-timeout", "1000", "--link-silence", "20000", "--link"]).arg(&link);
+    command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "20000", "--link"]).arg(&link);
     let running = Running::new(&mut command);
     wait_for("the link", || link.exists());
     let mut host = Host::open(&link, 1).unwrap();

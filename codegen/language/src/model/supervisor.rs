@@ -35,7 +35,7 @@ section! {
         voltage_time: Option<f64> = TIMEOUT, Rule("500 ms, at least a period"), "", "500 ms";
         /// Time that a leg may stay at the limit of its slew rate.
         slew_time: Option<f64> = TIMEOUT, Rule("50 ms, at least a period"), "", "50 ms";
-        /// Missed ticks within a second that are a fault.
+        /// Gaps within a second that are a fault, each of one missed tick or more.
         missed_ticks: u32 = integer(1, 1000), Default(3), "", 3;
         /// Missed ticks in a row, of which more are a fault that ramps down: codes and amplifiers were left alone for so long.
         missed_in_a_row: u32 = integer(1, 1000), Default(100), "", 100;

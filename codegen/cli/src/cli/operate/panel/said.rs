@@ -52,7 +52,9 @@ pub fn mend(finding: Finding) -> &'static str {
             "Exchange the cables of the two gauges, or their `[[gauge]]` in the spec."
         }
         Finding::Gauge(_, Fault::Gain(_)) => "Check `sensor.range` or its calibration, and the range of its converter.",
-        Finding::Leg(_, Fault::Inverted) => "Exchange the wires of the stack.",
+        Finding::Leg(_, Fault::Inverted) => {
+            "Switch off. Exchange the wires of the stack only if its marking shows that they are wrong; else see its gauge."
+        }
         Finding::Leg(_, Fault::Dead) => "Check amplifier, cable and bolts of the leg.",
         Finding::Leg(_, Fault::Swapped(_)) => "Exchange the amplifier cables of the two legs.",
         Finding::Leg(_, Fault::Gain(_)) => "Check the amplifier's gain, `dac.range` and the record of the leg.",
