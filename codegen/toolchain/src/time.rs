@@ -7,7 +7,7 @@
 //! | law | besides: by how much the longest tick of the exercise has more instructions than the mean one |
 //! | buses | bytes and frames that the drivers moved, by SCLK and by the registers that a byte and a frame take |
 //! | waits | what the drivers waited: the conversion, and what data sheets ask for |
-//! | interrupt | entry and return, the timer; what holds the tick off: a copy of the settings |
+//! | interrupt | entry and return, the timer; what holds the tick off: knots of a pass, a piece of a record |
 //! | caches | empty when a tick begins; constants are there |
 //!
 //! Interrupts of the link are below the tick and do not delay it.

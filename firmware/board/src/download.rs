@@ -6,8 +6,10 @@ use controller::snapshot::recorder::Recorder;
 use specgen_runtime::Crc32;
 use specgen_runtime::record::write_header;
 
-/// Words of a piece at most: what is copied while the tick is held off.
+/// Words of a piece at most.
 pub(crate) const WORDS: usize = 64;
+/// So many of them are copied while the tick is held off: an H7 takes a microsecond for it.
+const AT_ONCE: usize = 16;
 const WORD: usize = size_of::<u64>();
 /// Bytes of the file before its first block: magic, format and length of the text, the text, padding, checksum.
 const HEADER: usize = 16 + DESCRIPTION.len().next_multiple_of(WORD) + WORD;
@@ -51,19 +53,14 @@ impl Download {
     ) -> Option<(u32, &'p [u8])> {
         let offset = usize::try_from(offset).unwrap_or(usize::MAX);
         let mut words = [0; WORDS];
-        let (mut place, mut total, mut count) = (Place::End, 0, 0);
-        let stands = look(&mut |recorder| {
-            (place, total) = find(recorder, offset);
-            if let Place::Block(block, _, byte) = place {
-                count = copy(recorder, block, byte / WORD, &mut words);
-            }
-        });
-        if !stands {
+        let (mut place, mut total) = (Place::End, 0);
+        if !look(&mut |recorder| (place, total) = find(recorder, offset)) {
             return None;
         }
         let range = match place {
             Place::Header => header(offset, piece),
             Place::Block(block, _, byte) => {
+                let count = copied(block, byte / WORD, &mut words, &mut look)?;
                 let words = words.get(..count).unwrap_or_default();
                 self.sum(block, byte / WORD, words);
                 let bytes = words.iter().flat_map(|word| word.to_le_bytes());
@@ -103,10 +100,10 @@ impl Download {
             (self.crc, self.block, self.summed) = (Crc32::new(), block, 0);
         }
         while self.summed < length {
-            let (mut words, mut count) = ([0; WORDS], 0);
+            let mut words = [0; WORDS];
             let first = self.summed;
-            let stands = look(&mut |recorder| count = copy(recorder, block, first, &mut words));
-            if !stands || count == 0 {
+            let count = copied(block, first, &mut words, look)?;
+            if count == 0 {
                 return None;
             }
             self.sum(block, first, words.get(..count).unwrap_or_default());
@@ -153,8 +150,23 @@ fn find(recorder: &Recorder<'static>, offset: usize) -> (Place, usize) {
     (place, start)
 }
 
+/// Copies words of a block, a few at a time; how many. None if it records again.
+fn copied(block: usize, first: usize, out: &mut [u64; WORDS], look: &mut impl Look) -> Option<usize> {
+    let mut count = 0;
+    for few in out.as_chunks_mut::<AT_ONCE>().0 {
+        let before = count;
+        if !look(&mut |recorder| count += copy(recorder, block, first + before, few)) {
+            return None;
+        }
+        if count < before + AT_ONCE {
+            break;
+        }
+    }
+    Some(count)
+}
+
 /// Copies words of a block; how many.
-fn copy(recorder: &Recorder<'static>, block: usize, first: usize, out: &mut [u64; WORDS]) -> usize {
+fn copy(recorder: &Recorder<'static>, block: usize, first: usize, out: &mut [u64; AT_ONCE]) -> usize {
     let words = recorder.block(block).and_then(|words| words.get(first..)).unwrap_or_default();
     let mut count = 0;
     for (slot, word) in out.iter_mut().zip(words) {

@@ -56,8 +56,6 @@ struct Timed<'m> {
     exchange: Exchange,
     /// Settings that a host wrote.
     settings: Config,
-    /// What a background copies while it holds the tick off.
-    held: &'m mut Kept,
     /// Beside the exchange, whose commands are those of the rows.
     wave: Wave,
     waved: [u64; COMMAND_WORDS],
@@ -78,7 +76,7 @@ fn run() -> Result<(), Exit> {
     // It begins to run with the first tick, as after arming.
     machine.supervisor.phase = Phase::Holding;
     let mut exchange = Exchange::new();
-    let (words, [kept, held], knots, samples) = memories();
+    let (words, kept, knots, samples) = memories();
     exchange.record(words, kept);
     exchange.show(samples, u32::MAX);
     let _ = exchange.watch(WATCHED);
@@ -92,7 +90,6 @@ fn run() -> Result<(), Exit> {
         board,
         exchange,
         settings: Config::new(),
-        held,
         wave,
         waved: [0; COMMAND_WORDS],
         player: Player::new(knots),
@@ -169,8 +166,6 @@ fn codes_of(row: &[u64; INPUT_WORDS]) -> [i32; CHANNELS] {
 #[inline(never)]
 #[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.
 fn specgen_timed_tick(timed: &mut Timed<'_>) {
-    // What holds a tick off longest is that the machine is kept for the recorder.
-    timed.held.keep(core::hint::black_box(&timed.settings), timed.board.machine());
     if let Some(motion) = timed.wave.advance() {
         waves::write(&motion, timed.wave.sequence(), &mut timed.waved);
     }
@@ -202,15 +197,13 @@ extern "C" fn specgen_timed_end() {
 
 /// The recorder's memories, for the one call that there is.
 #[allow(unsafe_code, clippy::deref_addrof)] // Statics that are written, to which no plain reference may be taken.
-fn memories() -> (&'static mut [u64], [&'static mut Kept; 2], &'static mut [Knot], &'static mut SampleMemory) {
+fn memories() -> (&'static mut [u64], &'static mut Kept, &'static mut [Knot], &'static mut SampleMemory) {
     static mut MEMORY: [u64; RECORD] = [0; RECORD];
     static mut KEPT: Kept = Kept::new();
-    static mut HELD: Kept = Kept::new();
     static mut PLAYED: [Knot; 2 * KNOTS] = [[0; 6]; 2 * KNOTS];
     static mut SAMPLES: SampleMemory = SampleMemory::new();
     // SAFETY: called once, by `run`; no interrupt is enabled.
     unsafe {
-        let kept = [&mut *(&raw mut KEPT), &mut *(&raw mut HELD)];
-        (&mut *(&raw mut MEMORY), kept, &mut *(&raw mut PLAYED), &mut *(&raw mut SAMPLES))
+        (&mut *(&raw mut MEMORY), &mut *(&raw mut KEPT), &mut *(&raw mut PLAYED), &mut *(&raw mut SAMPLES))
     }
 }

@@ -47,8 +47,8 @@ pub struct Wiring<T> {
 const DEAD: f64 = 0.16;
 /// Gains of gauges that are looked for.
 const GAUGE: [f64; 2] = [0.05, 8.0];
-/// Rounds of the fit: gains that are 2 come out as 1.8 at least on the reference platform.
-const ROUNDS: usize = 8;
+/// Rounds of the fit, one a tick: gains that are 2 come out as 1.8 at least on the reference platform.
+const ROUNDS: u32 = 8;
 /// What is tried beyond gains: six gauges inverted, fifteen pairs of gauges, fifteen of legs.
 const TRIALS: u32 = 36;
 
@@ -209,12 +209,14 @@ crate::state! { |words|
     pub struct Check<T>[T: Real] {
         /// The leg that moves, 0 to 5; then 6, while what it gave is judged.
         pub leg: usize = 0, place(6);
-        /// Ticks of this leg, or trials, that are done.
+        /// Ticks of this leg, or rounds of all trials, that are done.
         pub tick: u32 = 0, tally;
         /// Cosine and sine of θ, then of the mains.
         pub turned: [[T; 2]; 2] = [[T::ONE, T::ZERO]; 2], rows(2.0);
         /// What the gauges showed (rows) of each leg (columns), in the spec's displacement of a leg at the pulse.
         pub response: Response<T> = [[T::ZERO; 6]; 6], rows(LARGEST);
+        /// Gains of the gauges after the last round of a trial.
+        pub gauges: [T; 6] = [T::ONE; 6], numbers(GAUGE[1]);
         /// Least that a trial left unexplained so far.
         pub least: T = T::ONE, number(2.0);
         /// Word of the finding of that trial; after the check, of the check.
@@ -272,12 +274,20 @@ impl<T: Real> Check<T> {
         }
     }
 
-    /// One fit a tick: of gains first, then of what may be inverted or swapped.
+    /// One round of a fit a tick, as a whole fit takes longer than one has: of gains first, then of what may be inverted or swapped.
     fn judge(&mut self, wiring: &Wiring<T>, expected: &Response<T>) {
-        let trial = trial(self.tick);
-        let fit = Fit::of(&self.response, &with(expected, trial));
+        let (number, round) = (self.tick / ROUNDS, self.tick % ROUNDS);
+        self.tick = self.tick.saturating_add(1);
+        let trial = trial(number);
+        let expected = with(expected, trial);
+        if round < ROUNDS - 1 {
+            self.gauges = next_gauges(&self.response, &expected, &self.gauges);
+            return;
+        }
+        let fit = Fit::of_gauges(&self.response, &expected, self.gauges);
+        self.gauges = [T::ONE; 6];
         let explains = fit.residual <= wiring.residual;
-        if self.tick == 0 {
+        if number == 0 {
             self.done = explains || fit.nothing;
             self.finding = if fit.nothing {
                 NOTHING
@@ -291,9 +301,8 @@ impl<T: Real> Check<T> {
                 self.least = fit.residual;
                 self.finding = trial.word();
             }
-            self.done = self.tick >= TRIALS;
+            self.done = number >= TRIALS;
         }
-        self.tick = self.tick.saturating_add(1);
     }
 }
 
@@ -379,19 +388,20 @@ struct Fit<T> {
 
 impl<T: Real> Fit<T> {
     fn of(response: &Response<T>, expected: &Response<T>) -> Self {
-        let (mut gauges, mut legs) = ([T::ONE; 6], [T::ZERO; 6]);
-        for round in 1..=ROUNDS {
-            for (leg, gain) in legs.iter_mut().enumerate() {
-                let column = |matrix: &Response<T>| column(matrix, leg);
-                *gain = gain_of(&column(response), &column(expected), &gauges, T::ZERO);
-            }
-            if round < ROUNDS {
-                for ((gain, shown), expected) in gauges.iter_mut().zip(response).zip(expected) {
-                    let [low, high] = GAUGE.map(T::from_f64);
-                    *gain = saturate(gain_of(shown, expected, &legs, T::ONE), low, high);
-                }
-            }
+        let mut gauges = [T::ONE; 6];
+        for _ in 1..ROUNDS {
+            gauges = next_gauges(response, expected, &gauges);
         }
+        Self::of_gauges(response, expected, gauges)
+    }
+
+    /// The last round, whose gains of gauges are those of the one before.
+    fn of_gauges(response: &Response<T>, expected: &Response<T>, mut gauges: [T; 6]) -> Self {
+        // As they are, but for those of a snapshot that nobody made.
+        for gain in &mut gauges {
+            *gain = held(*gain);
+        }
+        let mut legs = legs_of(response, expected, &gauges);
         let [mut left, mut power, mut whole] = [T::ZERO; 3];
         for ((shown, expected), gauge) in response.iter().zip(expected).zip(&gauges) {
             for ((shown, expected), leg) in shown.iter().zip(expected).zip(&legs) {
@@ -437,6 +447,31 @@ impl<T: Real> Fit<T> {
         }
         Finding::None
     }
+}
+
+/// Gains of the legs that fit best to these of the gauges.
+fn legs_of<T: Real>(response: &Response<T>, expected: &Response<T>, gauges: &[T; 6]) -> [T; 6] {
+    let mut legs = [T::ZERO; 6];
+    for (leg, gain) in legs.iter_mut().enumerate() {
+        *gain = gain_of(&column(response, leg), &column(expected, leg), gauges, T::ZERO);
+    }
+    legs
+}
+
+/// A round of the fit: gains of the legs, then those of the gauges that fit best to them.
+fn next_gauges<T: Real>(response: &Response<T>, expected: &Response<T>, gauges: &[T; 6]) -> [T; 6] {
+    let legs = legs_of(response, expected, gauges);
+    let mut next = [T::ONE; 6];
+    for ((gain, shown), expected) in next.iter_mut().zip(response).zip(expected) {
+        *gain = held(gain_of(shown, expected, &legs, T::ONE));
+    }
+    next
+}
+
+/// The gain of a gauge, within what is looked for.
+fn held<T: Real>(gain: T) -> T {
+    let [low, high] = GAUGE.map(T::from_f64);
+    saturate(gain, low, high)
 }
 
 fn column<T: Real>(matrix: &Response<T>, index: usize) -> [T; 6] {

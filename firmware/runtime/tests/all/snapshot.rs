@@ -183,7 +183,7 @@ fn every_word_of_a_supervisor_counts() {
     }
     let words = words.whole(&[3]).counters(5);
     // The wiring check, then the approach.
-    let words = words.whole(&[2]).counters(1).reals(4 + 36 + 1).counters(1).whole(&[1]).whole(&[1]).reals(6);
+    let words = words.whole(&[2]).counters(1).reals(4 + 36 + 6 + 1).counters(1).whole(&[1]).whole(&[1]).reals(6);
     let fresh = Supervisor::<f64>::new();
     every_word_counts(&fresh, words, Supervisor::digest);
     let channels = 9 + TIMERS;
@@ -193,9 +193,10 @@ fn every_word_of_a_supervisor_counts() {
         numbers_within(&fresh, first + 2..first + 4, SIZES.request);
     }
     let end = channels + 6 * 7;
-    let [turned, response, least, approach] = [end + 8, end + 12, end + 48, end + 51];
+    let [turned, response, gauges, least, approach] = [end + 8, end + 12, end + 48, end + 54, end + 57];
     numbers_within(&fresh, (turned..response).chain([least]), 2.0);
-    numbers_within(&fresh, response..least, LARGEST);
+    numbers_within(&fresh, response..gauges, LARGEST);
+    numbers_within(&fresh, gauges..least, 8.0);
     axes_within(&fresh, approach + 1, SIZES.user);
     for (place, most) in [(0, 5), (1, 15), (2, 5), (end, 6), (end + 6, 6), (approach - 1, 1), (approach, 2)] {
         whole_within(&fresh, place, 0, most);
