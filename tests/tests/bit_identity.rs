@@ -84,6 +84,7 @@ fn f32_on_the_host_the_m7_and_the_m4f_is_equal_in_every_bit() {
 
 /// With room for eight extrema the memory overflows all the time, and what it drops is the same everywhere.
 #[test]
+#[ignore = "long: a controller of little memory"]
 fn an_overflowing_memory_is_equal_in_every_bit() {
     let emitted = Emitted::new("bits-memory", "legs.toml", &[ALIGNED, ("memory  = 64", "memory  = 8")]);
     let mut controller = emitted.controller();

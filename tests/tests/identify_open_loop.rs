@@ -108,6 +108,7 @@ fn residual(plant: &RateModel, hysteresis: &ir::Hysteresis, frequency: f64) -> f
 }
 
 #[test]
+#[ignore = "long: a leg at three rates"]
 fn the_feed_forward_leaves_little_of_a_sine_and_no_other_dead_time_leaves_less_at_all_rates() {
     let records: Vec<Record> =
         ["forc-20hz.csv", "forc-40hz.csv", "forc-100hz.csv"].into_iter().map_while(measured).collect();

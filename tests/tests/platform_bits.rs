@@ -144,6 +144,7 @@ fn f32_on_the_host_the_m7_and_the_m4f_is_equal_in_every_bit_of_every_mode() {
 
 /// The comparison is falsifiable: one flipped ulp of one constant of each emitted file is found, and named.
 #[test]
+#[ignore = "long: another controller; that of six legs is in the short run"]
 fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
     let good = Emitted::new("platform-ulp-good", "reference.toml", &[]);
     let Some(image) = good.image(Mcu::Mps2An500) else { return };

@@ -154,6 +154,7 @@ fn a_cache_that_cannot_be_written_costs_one_line() {
 }
 
 #[test]
+#[ignore = "long: five builds without a cache"]
 fn what_lies_in_the_output_folder_is_not_believed() {
     let counted = Counted::new();
     let build = ["build", "minimal.toml", "--target", "host", "-o", "out", "--json"];

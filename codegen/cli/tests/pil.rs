@@ -253,6 +253,7 @@ fn without_the_emulator_the_command_that_installs_it_is_named() {
 }
 
 #[test]
+#[ignore = "long: an image of its own for the serial port"]
 fn a_board_at_a_serial_port_is_stepped_like_the_emulator() {
     let (_one, folder) = workspace();
     built(&folder, false);

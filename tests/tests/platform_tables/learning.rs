@@ -310,6 +310,7 @@ fn every_machine_within_the_intervals_learns() {
 
 /// Half of the stiffness is far outside the intervals: the modes lie where learning turns the wrong way.
 #[test]
+#[ignore = "long: a machine on which learning diverges"]
 fn learning_that_diverges_ends_by_itself_and_keeps_the_best_pass() {
     let bench = plays();
     let mut specimen = bench.specimen.clone();

@@ -339,6 +339,7 @@ fn no_fault_free_machine_is_refused() {
 
 /// Host and emulated MCU: the same bits of a check that passes and of one that looks for what is wrong, in f64 and in f32.
 #[test]
+#[ignore = "long: the check on the emulated M7"]
 fn a_check_has_the_same_bits_on_the_mcu() {
     for (name, spec, mcu) in [
         ("supervisor-wiring", "reference.toml", Mcu::Mps2An500),
