@@ -2,7 +2,11 @@
 
 use crate::keys::declare::*;
 
-const TIMEOUT: Shape = one(Dimension::TIME, Range::closed(1e-6, 60.0), "ms");
+/// Longest time of a key, s.
+pub const LONGEST_TIMEOUT: f64 = 60.0;
+/// Largest pulse of the wiring check, share of the stroke.
+pub const LARGEST_PULSE: f64 = 0.02;
+const TIMEOUT: Shape = one(Dimension::TIME, Range::closed(1e-6, LONGEST_TIMEOUT), "ms");
 const SILENCE: Item = item(Dimension::TIME, Range::closed(1e-6, 3600.0), "ms");
 const FACTORS: Shape = Shape::List(&[RATIO; 2]);
 
@@ -66,7 +70,7 @@ section! {
         /// Switches the check off, and says why, in words: nothing then tells that feedback has the right sign.
         off: Option<String> = REASON, Optional, "" ["disabled", "reason"], "no stacks are connected";
         /// Height of a pulse, as a share of `actuator.stroke`.
-        amplitude: f64 = number(Range::above(0.0, 0.02)), Default(0.01), "" ["height", "share"], 0.01;
+        amplitude: f64 = number(Range::above(0.0, LARGEST_PULSE)), Default(0.01), "" ["height", "share"], 0.01;
         /// Time of a pulse, one leg after the other.
         time: Option<f64> = TIMEOUT, Rule("50 ms, at least 40 periods and what the slew rate takes, up to 200 ms where the noise of the gauges asks for it"), "" ["duration"], "50 ms";
         /// Smallest and largest gain of a gauge over the median of all six.

@@ -4,7 +4,7 @@ use super::{defaults, finding, rest, whole};
 use crate::figure::figure;
 use crate::ir::{Actuation, Hysteresis, Scalar, Supervision, Wiring};
 use specgen_language::diagnostic::{Diagnostic, codes};
-use specgen_language::model::{LegMakes, Model};
+use specgen_language::model::{LARGEST_PULSE, LONGEST_TIMEOUT, LegMakes, Model};
 use specgen_numerics::Factor;
 use specgen_runtime::supervisor::{self, Fault, Finding, Response, with};
 
@@ -18,9 +18,6 @@ const MAINS_TICKS: f64 = 4.0;
 const LEAST_GAIN: f64 = 0.4;
 /// Part of what a gauge or leg shows that its noise may be, rms.
 const NOISE: f64 = 0.03;
-/// What `wiring_check.amplitude` and `wiring_check.time`, ms, stay below.
-const MOST_AMPLITUDE: f64 = 0.02;
-const MOST_TIME: f64 = 60e3;
 /// Gains of a gauge or leg that is faulty, hundredths.
 const GAINS: [u32; 2] = [50, 200];
 
@@ -127,9 +124,9 @@ pub(super) fn lower(
 fn larger_or_longer(amplitude: f64, time: f64) -> String {
     let (amplitude, time) = (amplitude * 1.05 + 1e-4, time * 1.1e3 + 1.0);
     let longer = format!("wiring_check.time = \"{time:.0} ms\" or more");
-    if amplitude < MOST_AMPLITUDE {
+    if amplitude < LARGEST_PULSE {
         format!("write wiring_check.amplitude = {} or more, or {longer}, in [supervisor]", figure(amplitude))
-    } else if time < MOST_TIME {
+    } else if time < LONGEST_TIMEOUT * 1e3 {
         format!("write {longer}, in [supervisor]")
     } else {
         "write wiring_check = { off = \"the gauges are too noisy\" } in [supervisor]: nothing then proves the signs"
