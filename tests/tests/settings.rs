@@ -20,7 +20,7 @@ const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
 /// Bounds so wide that hostile readings are not always a fault, and no wiring check: drawn at random, none passes it.
 const WIDE: (&str, &str) = (
     "[timing]\n",
-    "[supervisor]\nwiring_check = { off = \"random readings\" }\narm_time = \"1 ms\"\nramp_rate = \"40 V/ms\"\ndisagreement = \"200 um\"\ntracking_error = 9.0\nvoltage_time = \"5 s\"\nslew_time = \"5 s\"\n\n[timing]\n",
+    "[supervisor]\nwiring_check = { off = \"random readings\" }\narm_time = \"1 ms\"\nramp_rate = \"40 V/ms\"\ndisagreement = \"200 um\"\nleap = \"10 mm\"\ntracking_error = 9.0\nvoltage_time = \"5 s\"\nslew_time = \"5 s\"\n\n[timing]\n",
 );
 
 struct Draw {

@@ -175,7 +175,8 @@ fn the_example_in_c_runs() {
 /// The status bits of the page are those of the emitted controller.
 #[test]
 fn status_bits_are_those_that_are_emitted() {
-    let (page, step) = (read("docs/control-law.md"), read("firmware/controller/src/tick.rs"));
+    let page = read("docs/control-law.md");
+    let step = read("firmware/controller/src/tick.rs") + &read("firmware/runtime/src/supervisor/sift.rs");
     for (rows, constant, value) in [
         ("0–5", "LEG_LIMITED", 0x3f_u32),
         ("8–13", "GAUGE_FAULT", 0x3f00),
@@ -186,6 +187,8 @@ fn status_bits_are_those_that_are_emitted() {
         ("6, 7, 14, 15", "TRIGGER_HIGH", 0xc0c0),
         ("20", "CORRECTION_LIMITED", 1 << 20),
         ("21", "TRIGGER_MISSED", 1 << 21),
+        ("22", "SAMPLE_REPLACED", 1 << 22),
+        ("23", "SAMPLE_REPEATED", 1 << 23),
     ] {
         assert!(page.contains(&format!("\n| {rows} | ")), "no row {rows}");
         let line = step.lines().find(|line| line.contains(&format!("const {constant}: u32"))).unwrap();

@@ -379,6 +379,10 @@ pub struct Supervision {
     pub tracking: [f64; 6],
     /// Samples.
     pub tracking_samples: u32,
+    /// Of each gauge, in the unit of its words.
+    pub leap: [f64; 6],
+    /// A count; 0 where repeated samples say nothing.
+    pub repeats: u32,
     /// The wiring check; none where the spec switches it off.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wiring: Option<Wiring>,

@@ -21,7 +21,8 @@ pub const MACHINE_OUTPUT_WORDS: usize = OUTPUT_WORDS + 2;
 pub const MACHINE_INPUT_NAMES: [&str; MACHINE_INPUT_WORDS] = followed(&INPUT_NAMES, ["request", "events"]);
 
 /// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16 | finding of the wiring check << 17;
-/// `conditions` has bit 1 << cause for each cause that is present, whether it has lasted or not, and from bit 16 on the gauges or legs concerned.
+/// `conditions` has bit 1 << cause for each cause that is present, whether it has lasted or not, from bit 16 on the gauges or legs concerned, and from
+/// bit 22 on the gauges whose words were replaced by predictions.
 pub const MACHINE_OUTPUT_NAMES: [&str; MACHINE_OUTPUT_WORDS] = followed(&OUTPUT_NAMES, ["supervisor", "conditions"]);
 
 /// State of the supervisor in this controller's arithmetic.

@@ -21,6 +21,11 @@ pub const SUPERVISION: Supervision<Real> = Supervision {
     disagreement_samples: 167,
     tracking: [1e-5, 1e-5, 1.04e-5, 8e-5, 7.000000000000001e-5, 0.0001],
     tracking_samples: 167,
+    leap: [
+        1.8686295668855383e-6, 1.8686291357119891e-6, 1.8686291357119891e-6, 2.7241182674448394e-6,
+        4.064080209343311e-6, 3.615357787701626e-6,
+    ],
+    repeats: 12,
     wiring: Some(Wiring {
         ticks: 500,
         height: 415,

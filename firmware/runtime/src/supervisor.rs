@@ -19,6 +19,7 @@
 //! | `debounce` | for how long a condition must last before it is a cause |
 //! | `watch` | what the gauges show against what was sent: stuck, disagreeing, astray |
 //! | `phases` | the state machine |
+//! | `sift` | samples that leap are replaced, those that repeat are counted |
 //! | `wiring` | the check that arming ends with: each leg in turn, against the Jacobian |
 //! | `approach` | set-points from where the legs are to where they are asked for |
 
@@ -26,6 +27,7 @@ mod approach;
 mod debounce;
 mod kinds;
 mod phases;
+mod sift;
 mod supervision;
 mod watch;
 mod wiring;
@@ -37,6 +39,7 @@ pub use kinds::{
     Request, STALLED, STOP, SWITCHES_OFF,
 };
 pub use phases::Supervisor;
+pub use sift::{SAMPLE_REPEATED, SAMPLE_REPLACED, Sift, WRONG};
 pub use supervision::{Supervision, TIMED, TIMERS};
 pub use watch::{Channel, Sample, Watch};
 pub use wiring::{Check, Fault, Finding, Named, Response, Wiring, explains, with};

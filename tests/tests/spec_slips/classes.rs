@@ -185,6 +185,7 @@ const CLASSES: &[Slip] = &[
     Slip(TIME, Legs, &[Add("timing", "\n[supervisor]\nramp_rate = \"0.1 V/s\"")], &["supervisor.ramp_rate"]),
     Slip(TIME, Reference, &[Add("timing", "\n[supervisor]\nstuck_motion = \"100 um\"")], &["supervisor.stuck_motion"]),
     Slip(TIME, Legs, &[Add("timing", "\n[supervisor]\ndisagreement = \"0.5 mm\"")], &["supervisor.disagreement"]),
+    Slip(TIME, Reference, &[Add("timing", "\n[supervisor]\nleap = \"2 mm\"")], &["supervisor.leap"]),
     Slip(TIME, Reference, &[Add("timing", "\n[supervisor]\ntracking_error = 5.0")], &["supervisor.tracking_error"]),
     Slip(TIME, Legs, &[Add("hysteresis", "dead_time = \"10 ms\"")], &["hysteresis.dead_time"]),
     Slip(TIME, Triggers, &[Add("trigger[0]", "width = \"0.1 us\"")], &["trigger[0].width"]),

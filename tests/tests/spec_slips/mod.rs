@@ -182,6 +182,7 @@ fn a_value_that_the_supervisor_refuses_is_found_once() {
         ("host_lost = [\"50 us\", \"70 us\"]", "E0470", "[\"100 ms\", \"10000 ms\"]"),
         ("ramp_rate = \"50 V/ms\"", "E0472", "\"100 V/s\""),
         ("disagreement = \"2 nm\"", "E0471", ""),
+        ("leap = \"40 nm\"", "E0471", ""),
         ("tracking_error = 1e-6", "E0471", ""),
     ] {
         let with = |line: &str| base.text.replace("\n[timing]", &format!("\n[supervisor]\n{line}\n\n[timing]"));

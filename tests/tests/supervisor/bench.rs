@@ -17,6 +17,7 @@ gauge_time        = \"1 ms\"
 stuck_time        = \"3.6 ms\"
 disagreement      = \"20 um\"
 disagreement_time = \"3.6 ms\"
+leap              = \"10 mm\"
 tracking_error    = 0.1
 tracking_time     = \"3.6 ms\"
 voltage_time      = \"2 ms\"

@@ -10,6 +10,7 @@ mod lost;
 #[path = "../../../firmware/runtime/tests/all/supervisor/oracle.rs"]
 mod oracle;
 mod refusals;
+mod samples;
 mod sequences;
 mod stops;
 mod table;

@@ -21,6 +21,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let (stuck_motion, stuck_samples) = (real(s.stuck_motion), count(s.stuck_samples));
     let (disagreement, disagreement_samples) = (real(s.disagreement), count(s.disagreement_samples));
     let (tracking, tracking_samples) = (literal::reals(ir.scalar, &s.tracking), count(s.tracking_samples));
+    let (leap, repeats) = (literal::reals(ir.scalar, &s.leap), count(s.repeats));
     let of_kind = match &s.readings_per_leg {
         Some(rows) => {
             let rows = literal::matrix(ir.scalar, rows);
@@ -73,6 +74,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
             disagreement_samples: #disagreement_samples,
             tracking: [#tracking],
             tracking_samples: #tracking_samples,
+            leap: [#leap],
+            repeats: #repeats,
             wiring: #wiring,
         };
         /// Sets of single faults that look alike to the wiring check, as words of `Finding`.

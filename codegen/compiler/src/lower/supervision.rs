@@ -2,6 +2,7 @@
 
 pub(crate) mod defaults;
 mod rest;
+pub(crate) mod samples;
 mod wiring;
 
 pub use wiring::{describe as describe_wiring, single_faults};
@@ -9,7 +10,7 @@ pub use wiring::{describe as describe_wiring, single_faults};
 use super::kinematics::inverse_jacobian;
 use super::sensing::{PoseNoise, pose_noise, readings_per_pose};
 use crate::figure::{AXES, figure};
-use crate::ir::{Actuation, Hysteresis, Scalar, Supervision};
+use crate::ir::{Actuation, Hysteresis, Scalar, Sensing, Supervision};
 use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::Model;
 use specgen_numerics::multiply6;
@@ -46,6 +47,7 @@ pub(super) fn lower(
     hysteresis: &Hysteresis,
     actuation: &Actuation,
     max_step: i32,
+    sensing: Option<&Sensing>,
     scalar: Scalar,
 ) -> Result<Supervision, Vec<Diagnostic>> {
     let spec = &model.supervisor;
@@ -74,6 +76,7 @@ pub(super) fn lower(
     let rest = rest::code(model, actuation);
     findings.extend(rest::beyond(model));
     let readings = readings_per_leg.unwrap_or(OWN_GAUGES);
+    let leap = samples::leap(model, &readings, sensing, &mut findings);
     let wiring = wiring::lower(model, hysteresis, actuation, max_step, &readings, scalar, &mut findings);
     if !findings.is_empty() {
         return Err(findings);
@@ -95,6 +98,8 @@ pub(super) fn lower(
         disagreement_samples,
         tracking: tracking.map(round),
         tracking_samples,
+        leap: leap.map(round),
+        repeats: samples::repeats(model),
         wiring,
         readings_per_leg: readings_per_leg.map(|rows| rows.map(|row| row.map(round))),
         approach_keep: round(libm::exp(-1.0 / f64::from(arm_ticks))),

@@ -5,10 +5,11 @@ pub use crate::machine::{
     MachineOutput, Supervisor, machine_output_words,
 };
 pub use specgen_runtime::supervisor::{
-    CONVERTER, Cause, Finding, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, STALLED, STOP,
+    CONVERTER, Cause, Finding, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, SAMPLE_REPEATED, SAMPLE_REPLACED,
+    STALLED, STOP,
 };
 
-use crate::standing::{begin, come_to_rest, expectation, look, readings, run_law, stand};
+use crate::standing::{begin, come_to_rest, expectation, faults, look, readings, readings_of, run_law, stand};
 use crate::step::outputs;
 use crate::supervision::SUPERVISION;
 use crate::tick::{GAUGE_FAULT, LEG_LIMITED};
@@ -21,6 +22,13 @@ use crate::{Config, LEGS, Real, State, TickInput};
 /// them.
 pub fn supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {
     let Machine { state, supervisor } = machine;
+    let sifted;
+    let input = if supervisor.accepts(&SUPERVISION, readings(&input.tick)) {
+        input
+    } else {
+        sifted = sift(supervisor, input);
+        &sifted
+    };
     let at_rest = supervisor.phase != Phase::Running && state.legs.iter().all(|leg| leg.code == SUPERVISION.rest);
     let begins = supervisor.decide(&SUPERVISION, input.request, input.events, at_rest);
     if begins {
@@ -36,10 +44,22 @@ pub fn supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -
     } else {
         stand(config, state, supervisor, &input.tick, channel, expected)
     };
-    let status = status | act(config, state, phase, &input.tick, status);
+    let status = status | act(config, state, phase, &input.tick, status) | supervisor.sift.status();
+    if status & GAUGE_FAULT != 0 {
+        supervisor.sift.forget();
+    }
     // Of the state and at the end: what is as large as an output is slow to move.
     let finding = supervisor.finding();
     MachineOutput { tick: outputs(state, status), phase, cause, amplifier_on: phase.is_powered(), finding }
+}
+
+/// The input with predictions for the words that leapt.
+#[cold]
+#[inline(never)]
+fn sift(supervisor: &mut Supervisor, input: &MachineInput) -> MachineInput {
+    let mut sifted = *input;
+    supervisor.sift(&SUPERVISION, readings_of(&mut sifted.tick), faults);
+    sifted
 }
 
 /// The law at work; returns its status. Of the channel: what is `expected`, and its `target`.

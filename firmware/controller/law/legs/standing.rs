@@ -16,6 +16,22 @@ pub(crate) fn readings(input: &TickInput) -> &[Real; 6] {
     &input.displacement
 }
 
+/// The same, to be replaced.
+#[inline]
+pub(crate) fn readings_of(input: &mut TickInput) -> &mut [Real; 6] {
+    &mut input.displacement
+}
+
+/// Gauges whose word is not believed: bit k for gauge k.
+#[inline]
+pub(crate) fn faults(displacements: &[Real; 6]) -> u32 {
+    let mut faults = 0;
+    for (index, reading) in displacements.iter().enumerate() {
+        faults |= (!gauge_is_accepted(*reading) as u32) << index;
+    }
+    faults
+}
+
 /// A tick of the law; its status.
 #[inline]
 pub(crate) fn run_law(config: &Config, state: &mut State, supervisor: &mut Supervisor, input: &TickInput) -> u32 {
@@ -101,10 +117,7 @@ pub(crate) fn stand(
     expected: Real,
 ) -> u32 {
     move_codes(config, state, supervisor);
-    let mut faults = 0;
-    for (index, reading) in input.displacement.iter().enumerate() {
-        faults |= (!gauge_is_accepted(*reading) as u32) << index;
-    }
+    let faults = faults(&input.displacement);
     for leg in &mut state.legs {
         leg.lead = [0.0; LED as usize];
     }

@@ -5,6 +5,7 @@ use crate::setpoint::SETPOINTS;
 use crate::step::{advance, sense};
 use crate::supervision::{READINGS_PER_LEG, SUPERVISION};
 use crate::tick::GAUGE_FAULT;
+pub(crate) use crate::sensing::faults;
 use crate::{Config, LEGS, Real, State, TickInput, kinematics, sensing};
 use specgen_runtime::linear::component;
 use specgen_runtime::setpoint::{CommandKind, Generator};
@@ -15,6 +16,12 @@ use specgen_runtime::{Correction, Damping, Estimate, Integral, NotchState, Trans
 #[inline]
 pub(crate) fn readings(input: &TickInput) -> &[Real; 6] {
     &input.gauge
+}
+
+/// The same, to be replaced.
+#[inline]
+pub(crate) fn readings_of(input: &mut TickInput) -> &mut [Real; 6] {
+    &mut input.gauge
 }
 
 /// A tick of the law; its status.

@@ -3,6 +3,7 @@
 use super::approach::Approach;
 use super::debounce::Debounce;
 use super::kinds::{Cause, EVENTS, FIRST_EVENT, HOLDS, Phase, RAMPS_DOWN, Request, SWITCHES_OFF};
+use super::sift::Sift;
 use super::supervision::Supervision;
 use super::watch::{Sample, Watch};
 use super::wiring::{Check, Finding, Response};
@@ -29,7 +30,8 @@ crate::state! { |words|
         pub busy: bool = false, set;
         /// What the last tick showed of gauges and limits: bits of causes, and of channels.
         pub seen: u32 = 0, tally;
-        /// Conditions of the present tick: bits of causes, and from bit 16 on the gauges or legs that they are about.
+        /// Conditions of the present tick: bits of causes, from bit 16 on the gauges or legs that they are about, from bit 22 on the
+        /// gauges whose words were replaced.
         pub conditions: u32 = 0, tally;
         /// Ticks without a condition while arming; ticks of a ramp.
         pub ticks: u32 = 0, tally;
@@ -37,6 +39,8 @@ crate::state! { |words|
         pub debounce: Debounce = Debounce::new(), part;
         /// What the gauges show against what was sent.
         pub watch: Watch<T> = Watch::new(), part;
+        /// Samples of the gauges before this one.
+        pub sift: Sift<T> = Sift::new(), part;
         /// Whether gauges and legs are wired as the spec says.
         pub check: Check<T> = Check::new(), part;
         /// Way to the set-point that is asked for, where the law has no generator.
@@ -45,6 +49,18 @@ crate::state! { |words|
 }
 
 impl<T: Real> Supervisor<T> {
+    /// Whether the gauges' words may be used as they are; where not, [`Supervisor::sift`] them. Before [`Supervisor::decide`].
+    #[inline]
+    pub fn accepts(&mut self, supervision: &Supervision<T>, words: &[T; 6]) -> bool {
+        !self.phase.is_powered() || self.sift.accepts(supervision, words)
+    }
+
+    /// Replaces words that leapt. `faults`: which words the law does not believe, bit by bit.
+    pub fn sift(&mut self, supervision: &Supervision<T>, words: &mut [T; 6], faults: impl Fn(&[T; 6]) -> u32) {
+        let stands = self.phase == Phase::Arming && !self.is_checking(supervision);
+        self.watch.lasted |= self.sift.sift(supervision, words, faults, stands);
+    }
+
     /// Brings the machine into the phase of the coming interval; returns whether it begins to run with it.
     ///
     /// `events` are what the target noticed since the last tick, `at_rest` whether every code is at rest (not asked while
@@ -54,7 +70,7 @@ impl<T: Real> Supervisor<T> {
         let begun = request != self.request;
         self.request = request;
         let present = (self.seen & CAUSES) | self.watch.present | (events & EVENTS) << FIRST_EVENT;
-        self.conditions = self.seen | present | self.watch.suspected() << FIRST_CHANNEL;
+        self.conditions = self.seen | present | self.watch.suspected() << FIRST_CHANNEL | self.sift.conditions();
         let lasted = self.debounce.count(supervision, present, &mut self.busy) | self.watch.lasted;
         self.watch.lasted = 0;
         if self.phase == Phase::Running && lasted == 0 && !matches!(request, Request::Hold | Request::RampDown) {
@@ -164,6 +180,9 @@ impl<T: Real> Supervisor<T> {
         self.phase = phase;
         self.cause = cause;
         self.ticks = 0;
+        if phase == Phase::Arming || !phase.is_powered() {
+            self.sift = Sift::new();
+        }
         // What was suspected before belongs to the phase before. A ramp and a hold go on with it.
         if !matches!(phase, Phase::Holding | Phase::RampingDown) {
             self.watch.forgive();

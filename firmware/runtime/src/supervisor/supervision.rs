@@ -45,6 +45,10 @@ pub struct Supervision<T> {
     pub tracking: [T; 6],
     /// Samples for which it must be beyond, ≥ 1.
     pub tracking_samples: u32,
+    /// Largest |word − prediction| of each gauge, in the unit of its words; beyond it the word is replaced.
+    pub leap: [T; 6],
+    /// Count of repeated samples, [`WRONG`](super::WRONG) each, at which they are a fault; 0 where they say nothing.
+    pub repeats: u32,
     /// The wiring check that arming ends with; none where the spec switches it off.
     pub wiring: Option<Wiring<T>>,
 }

@@ -182,7 +182,8 @@ fn every_word_of_a_supervisor_counts() {
         words = words.reals(1).whole(&[1]).reals(2).counters(3);
     }
     let words = words.whole(&[3]).counters(5);
-    // The wiring check, then the approach.
+    // Samples, the wiring check, then the approach.
+    let words = words.reals(12).whole(&[1, 2, 1]).counters(6).whole(&[1, 0]);
     let words = words.whole(&[2]).counters(1).reals(4 + 36 + 6 + 1).counters(1).whole(&[1]).whole(&[1]).reals(6);
     let fresh = Supervisor::<f64>::new();
     every_word_counts(&fresh, words, Supervisor::digest);
@@ -193,12 +194,21 @@ fn every_word_of_a_supervisor_counts() {
         numbers_within(&fresh, first + 2..first + 4, SIZES.request);
     }
     let end = channels + 6 * 7;
-    let [turned, response, gauges, least, approach] = [end + 8, end + 12, end + 48, end + 54, end + 57];
+    let samples = end + 6;
+    numbers_within(&fresh, samples..samples + 12, SIZES.reading);
+    for (place, most) in [(12, 1), (13, 2), (14, 3)] {
+        whole_within(&fresh, samples + place, 0, most);
+    }
+    let leg = samples + 23;
+    let mut quiet = save(&fresh);
+    quiet[leg - 1] = 1;
+    assert_eq!(restore(&fresh, &quiet).err(), Some(Invalid { word: leg - 1 }), "quiet without two samples");
+    let [turned, response, gauges, least, approach] = [leg + 2, leg + 6, leg + 42, leg + 48, leg + 51];
     numbers_within(&fresh, (turned..response).chain([least]), 2.0);
     numbers_within(&fresh, response..gauges, LARGEST);
     numbers_within(&fresh, gauges..least, 8.0);
     axes_within(&fresh, approach + 1, SIZES.user);
-    for (place, most) in [(0, 5), (1, 15), (2, 5), (end, 6), (end + 6, 6), (approach - 1, 1), (approach, 2)] {
+    for (place, most) in [(0, 5), (1, 15), (2, 5), (end, 6), (leg, 6), (approach - 1, 1), (approach, 2)] {
         whole_within(&fresh, place, 0, most);
     }
 }

@@ -21,6 +21,11 @@ pub const SUPERVISION: Supervision<Real> = Supervision {
     disagreement_samples: 84,
     tracking: [1.2e-5, 1.2e-5, 1.2e-5, 1.2e-5, 1.2e-5, 1.2e-5],
     tracking_samples: 84,
+    leap: [
+        5.770668736049107e-6, 5.770668736049107e-6, 5.770668736049107e-6, 5.770668736049107e-6,
+        5.770668736049107e-6, 5.770668736049107e-6,
+    ],
+    repeats: 0,
     wiring: Some(Wiring {
         ticks: 250,
         height: 415,

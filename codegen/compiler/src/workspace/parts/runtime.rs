@@ -60,6 +60,7 @@ pub static PART: Part = Part {
         "src/supervisor/debounce.rs",
         "src/supervisor/kinds.rs",
         "src/supervisor/phases.rs",
+        "src/supervisor/sift.rs",
         "src/supervisor/supervision.rs",
         "src/supervisor/watch.rs",
         "src/supervisor/wiring.rs",

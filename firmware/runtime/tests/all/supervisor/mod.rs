@@ -3,6 +3,7 @@
 
 mod oracle;
 mod sequences;
+mod sift;
 mod wiring;
 
 use specgen_runtime::GaugeConverter;
@@ -21,6 +22,8 @@ const SUPERVISION: Supervision<f64> = Supervision {
     disagreement_samples: 3,
     tracking: [1e-6; 6],
     tracking_samples: 3,
+    leap: [1.0; 6],
+    repeats: 0,
     wiring: None,
 };
 

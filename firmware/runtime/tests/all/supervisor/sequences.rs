@@ -36,6 +36,8 @@ fn plan(bounds: &Bounds) -> Supervision<f64> {
         disagreement_samples: samples,
         tracking: bounds.tracking,
         tracking_samples: samples,
+        leap: [1.0; 6],
+        repeats: 0,
         wiring: None,
     }
 }

@@ -1,0 +1,241 @@
+//! Samples of the gauges against the two before them: one that leaps is replaced by its prediction, one that repeats is counted.
+//!
+//! ```text
+//! prediction   2 y(n−1) − y(n−2)            wrong by no more than the legs can accelerate, and noise: the bound `leap`
+//! replaced     |y(n) − prediction| > leap; times 3, 6, … where y(n−1), y(n−2), … were missing or repeated. Not where y(n) is as near to
+//!              y(n−2): then it was y(n−1) that leapt, by less than the bound, and the middle stands for it from here on
+//! repeated     all six words are those of the sample before, or of the one before that
+//! ```
+//! Both are leaky counts: 4 for a tick with it, 1 taken off by one without. Three replaced in a row are a fault, or every third over long. Of
+//! repeated ones the spec says how many: none where the noise is below a step of the converter, or where the gauges showed no noise
+//! while the machine armed.
+
+use super::kinds::Cause;
+use super::supervision::Supervision;
+use crate::linear::each;
+use crate::real::Real;
+
+/// Bit 22 of the status: the word of a gauge leapt and was replaced by its prediction.
+pub const SAMPLE_REPLACED: u32 = 0x40_0000;
+/// Bit 23 of the status: six gauges gave the very words of a sample before.
+pub const SAMPLE_REPEATED: u32 = 0x80_0000;
+/// What a tick with a wrong sample counts.
+pub const WRONG: u32 = 4;
+/// Count of replaced samples at which they are a fault.
+const REPLACED_LIMIT: u32 = 3 * WRONG;
+/// Predictions in a row after which a sample is taken as it comes.
+const MOST_PREDICTED: usize = 3;
+/// Conditions name gauges whose words were replaced from this bit on.
+const FIRST_REPLACED: u32 = 22;
+/// Conditions name the gauges that they are about from this bit on.
+const FIRST_CHANNEL: u32 = 16;
+
+crate::state! { |words|
+    /// What is remembered of samples. At reset none is known.
+    pub struct Sift<T>[T: Real] {
+        /// The two samples before this one. Every word was believed.
+        pub samples: [[T; 6]; 2] = [[T::ZERO; 6]; 2], rows(words.sizes().reading);
+        /// Which of them is the newer one.
+        pub newer: usize = 0, place(1);
+        /// How many there are.
+        pub known: usize = 0, place(2);
+        /// How many of the last ones, in a row, were missing or repeated.
+        pub predicted: usize = 0, place(MOST_PREDICTED);
+        /// What the words of the last two samples came to, the newer one first, where they may not be in `samples`.
+        pub came: [u32; 2] = [0; 2], tallies;
+        /// Leaky count of samples with replaced words.
+        pub leapt: u32 = 0, tally;
+        /// Leaky count of repeated samples.
+        pub stale: u32 = 0, tally;
+        /// Leaky count of new samples while the machine arms and stands: whether the gauges show noise.
+        pub noisy: u32 = 0, tally;
+        /// Gauges whose words were replaced in this tick, bit by bit.
+        pub replaced: u32 = 0, tally;
+        /// The sample of this tick was a repeated one.
+        pub repeated: bool = false, set;
+        /// Two samples are known, neither is a prediction, and nothing is being counted.
+        pub quiet: bool = false, set if !*quiet || *known == 2;
+    }
+}
+
+impl<T: Real> Sift<T> {
+    /// Takes a sample in which nothing is wrong. Where it returns false nothing has changed: [`Sift::sift`] it.
+    #[inline]
+    pub fn accepts(&mut self, supervision: &Supervision<T>, words: &[T; 6]) -> bool {
+        if !self.quiet {
+            return false;
+        }
+        let [even, odd] = &mut self.samples;
+        let (newer, older) = if self.newer == 0 { (even, odd) } else { (odd, even) };
+        if supervision.repeats != 0 && (words == newer || words == older) {
+            return false;
+        }
+        for (((word, newer), older), leap) in words.iter().zip(newer.iter()).zip(older.iter()).zip(&supervision.leap) {
+            if !is_within(*word, predict(*newer, *older), *leap) {
+                return false;
+            }
+        }
+        *older = *words;
+        self.newer = usize::from(self.newer == 0);
+        true
+    }
+
+    /// Takes any sample, and replaces the words that leapt. Returns the causes that have lasted, as bits.
+    ///
+    /// `faults` says which words the law does not believe: such a sample is left to the law. `stands`: the machine arms, and no leg moves.
+    #[cold]
+    #[inline(never)]
+    pub fn sift(
+        &mut self,
+        supervision: &Supervision<T>,
+        words: &mut [T; 6],
+        faults: impl Fn(&[T; 6]) -> u32,
+        stands: bool,
+    ) -> u32 {
+        let [even, odd] = self.samples;
+        let (newer, older) = if self.newer == 0 { (even, odd) } else { (odd, even) };
+        let came = if self.quiet { [sum(&newer), sum(&older)] } else { self.came };
+        let now = sum(words);
+        let same = now == came[0] || now == came[1];
+        self.came = [now, came[0]];
+        let predicted = self.predicted;
+        let believed = faults(words) == 0;
+        if stands && believed {
+            self.noisy = if same { self.noisy.saturating_sub(1) } else { self.noisy.saturating_add(3) };
+            let most = supervision.arm_ticks.saturating_mul(3);
+            if self.noisy > most {
+                self.noisy = most;
+            }
+        }
+        let noisy = self.noisy.saturating_mul(2) > supervision.arm_ticks;
+        self.repeated = same && believed && supervision.repeats != 0 && noisy;
+        // A prediction is believed, or it is the word before.
+        let mut prediction = each(|gauge| predict(newer[gauge], older[gauge]));
+        if self.known < 2 || faults(&prediction) != 0 {
+            prediction = newer;
+        }
+        self.replaced = 0;
+        let mut taken = *words;
+        let mut mended = newer;
+        if !believed {
+            taken = prediction;
+        } else if self.known == 2 {
+            let intervals = self.predicted as i32 + 1;
+            let factor = T::from_i32(intervals * (intervals + 1) / 2);
+            for (gauge, (word, predicted)) in words.iter_mut().zip(&prediction).enumerate() {
+                let leap = supervision.leap[gauge];
+                if is_within(*word, *predicted, leap * factor) {
+                    continue;
+                }
+                if is_within(*word, older[gauge], leap) {
+                    mended[gauge] = (*word + older[gauge]) * T::HALF;
+                } else {
+                    self.replaced |= 1 << gauge;
+                    *word = *predicted;
+                }
+            }
+            // A repeated sample is given to the law, but says nothing of how the legs move.
+            taken = if self.repeated { prediction } else { *words };
+        }
+        if !believed && (self.known < 2 || self.predicted >= MOST_PREDICTED) {
+            self.known = 0;
+            self.predicted = 0;
+        } else {
+            self.samples[self.newer & 1] = mended;
+            self.take(words, &taken, !believed || self.repeated);
+        }
+        count(&mut self.leapt, self.replaced != 0, REPLACED_LIMIT);
+        count(&mut self.stale, self.repeated, supervision.repeats);
+        let counts = self.leapt | self.stale;
+        self.quiet =
+            self.known == 2 && self.predicted == 0 && predicted == 0 && counts == 0 && mended == newer && !stands;
+        let mut lasted = 0;
+        if self.replaced != 0 && self.leapt >= REPLACED_LIMIT {
+            // From here on it is the gauges that are right: what is predicted from predictions runs away.
+            self.known = 0;
+            lasted |= Cause::GaugeDisagreement.bit();
+        }
+        if self.repeated && self.stale >= supervision.repeats {
+            lasted |= Cause::GaugeStuck.bit();
+        }
+        lasted
+    }
+
+    /// The law does not believe the sample of this tick. One that was let pass, close to the bound of the range, is not remembered.
+    #[cold]
+    #[inline(never)]
+    pub fn forget(&mut self) {
+        if self.quiet {
+            self.samples = [[T::ZERO; 6]; 2];
+            self.known = 0;
+            self.quiet = false;
+        }
+    }
+
+    /// Remembers what was `taken` for the `words` of a sample. After too many predictions in a row it begins anew with the words.
+    fn take(&mut self, words: &[T; 6], taken: &[T; 6], is_predicted: bool) {
+        let begins = is_predicted && (self.known < 2 || self.predicted >= MOST_PREDICTED);
+        if begins {
+            self.known = 0;
+        }
+        self.predicted = if begins || !is_predicted { 0 } else { self.predicted + 1 };
+        self.newer = usize::from(self.newer == 0);
+        self.samples[self.newer] = if begins { *words } else { *taken };
+        if self.known < 2 {
+            self.known += 1;
+        }
+    }
+
+    /// What this tick's sample is as conditions: causes, and from bit 16 and bit 22 on the gauges.
+    #[inline]
+    #[must_use]
+    pub fn conditions(&self) -> u32 {
+        if self.quiet {
+            return 0;
+        }
+        let leapt = if self.replaced == 0 { 0 } else { Cause::GaugeDisagreement.bit() };
+        let stale = if self.repeated { Cause::GaugeStuck.bit() | 0x3f << FIRST_CHANNEL } else { 0 };
+        leapt | stale | self.replaced << FIRST_CHANNEL | self.replaced << FIRST_REPLACED
+    }
+
+    /// The same as bits of the status.
+    #[inline]
+    #[must_use]
+    pub fn status(&self) -> u32 {
+        if self.quiet {
+            return 0;
+        }
+        let leapt = if self.replaced == 0 { 0 } else { SAMPLE_REPLACED };
+        leapt | if self.repeated { SAMPLE_REPEATED } else { 0 }
+    }
+}
+
+/// Where a word goes on in a straight line.
+#[inline(always)]
+fn predict<T: Real>(newer: T, older: T) -> T {
+    newer + newer - older
+}
+
+/// Written so that what is no number is not within.
+#[inline(always)]
+fn is_within<T: Real>(word: T, predicted: T, bound: T) -> bool {
+    (word - predicted).abs() <= bound
+}
+
+/// One number for the bits of six words.
+fn sum<T: Real>(words: &[T; 6]) -> u32 {
+    words.iter().fold(1, |sum: u32, word| {
+        let word = word.to_word();
+        (sum ^ word as u32 ^ ((word >> 32) as u32).rotate_left(11)).wrapping_mul(0x9e37_79b1)
+    })
+}
+
+/// A leaky count, held at its limit.
+fn count(count: &mut u32, wrong: bool, limit: u32) {
+    if !wrong {
+        *count = count.saturating_sub(1);
+        return;
+    }
+    let sum = count.saturating_add(WRONG);
+    *count = if sum > limit { limit } else { sum };
+}
