@@ -86,14 +86,8 @@ fn run() -> Result<(), Exit> {
     let mut lines = [(); triggers::LINES].into_iter();
     let lines = [(); triggers::MOST].map(|()| lines.next().map(|()| Pin { bench }));
     let board = Board::with_lines(adc(bench), dacs(bench), lines, &mut machine, true);
-    let mut timed = Timed {
-        board,
-        exchange,
-        settings: Config::new(),
-        wave,
-        waved: [0; COMMAND_WORDS],
-        player: Player::new(knots),
-    };
+    let mut timed =
+        Timed { board, exchange, settings: Config::new(), wave, waved: [0; COMMAND_WORDS], player: Player::new(knots) };
     bench.codes.set(codes_of(&[0; INPUT_WORDS]));
     timed.board.start(&mut timed.exchange.report);
     bench.take();
@@ -203,7 +197,5 @@ fn memories() -> (&'static mut [u64], &'static mut Kept, &'static mut [Knot], &'
     static mut PLAYED: [Knot; 2 * KNOTS] = [[0; 6]; 2 * KNOTS];
     static mut SAMPLES: SampleMemory = SampleMemory::new();
     // SAFETY: called once, by `run`; no interrupt is enabled.
-    unsafe {
-        (&mut *(&raw mut MEMORY), &mut *(&raw mut KEPT), &mut *(&raw mut PLAYED), &mut *(&raw mut SAMPLES))
-    }
+    unsafe { (&mut *(&raw mut MEMORY), &mut *(&raw mut KEPT), &mut *(&raw mut PLAYED), &mut *(&raw mut SAMPLES)) }
 }
