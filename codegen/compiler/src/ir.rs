@@ -4,6 +4,7 @@
 //! Numbers are already rounded to the controller's scalar, so that the text is the constant.
 
 mod permitted;
+mod steadiness;
 mod task_space;
 
 use serde::Serialize;
@@ -12,6 +13,7 @@ pub use permitted::*;
 use specgen_runtime::dynamics::Leg;
 use specgen_runtime::supervisor::TIMERS;
 use specgen_runtime::{Platform, Real};
+pub use steadiness::Steadiness;
 pub use task_space::*;
 
 /// Number of legs.
@@ -383,6 +385,8 @@ pub struct Supervision {
     pub leap: [f64; 6],
     /// A count; 0 where repeated samples say nothing.
     pub repeats: u32,
+    /// What a sustained oscillation is told by.
+    pub steadiness: Steadiness,
     /// The wiring check; none where the spec switches it off.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wiring: Option<Wiring>,

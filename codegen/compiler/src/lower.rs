@@ -85,6 +85,16 @@ pub fn lower(
         period: model.timing.period,
         leg_gain: model.actuator.leg_gain(),
     };
+    let rings = match &task {
+        // In every control mode: without a notch the feedback leaves the platform's modes a part of their damping only.
+        Some((design, _)) => {
+            design.margins.iter().flat_map(|margins| &margins.modes).fold(0.0, |longest: f64, mode| {
+                let rings = 1.0 / (core::f64::consts::TAU * mode.frequency * mode.damping_ratio);
+                if mode.frequency > supervision::LOWEST_SWING && rings > longest { rings } else { longest }
+            })
+        }
+        None => 1.0 / (core::f64::consts::TAU * model.actuator.resonance * model.actuator.damping_ratio),
+    };
     let dynamics = dynamics::lower(model, scalar)?;
     let task_space = match (&model.task_space, task) {
         (Some(task), Some((design, setpoints))) => {
@@ -136,6 +146,7 @@ pub fn lower(
             &actuation,
             max_step,
             task_space.as_ref().map(|task| &task.sensing),
+            rings,
             scalar,
         )?,
         hysteresis,

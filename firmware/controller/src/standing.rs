@@ -28,8 +28,8 @@ pub(crate) fn readings_of(input: &mut TickInput) -> &mut [Real; 6] {
 
 /// A tick of the law; its status.
 #[inline]
-pub(crate) fn run_law(config: &Config, state: &mut State, _supervisor: &mut Supervisor, input: &TickInput) -> u32 {
-    advance(config, state, input.command.kind, input)
+pub(crate) fn run_law(config: &Config, state: &mut State, supervisor: &mut Supervisor, input: &TickInput) -> u32 {
+    advance(config, state, supervisor.oscillation.stage, input.command.kind, input)
 }
 
 /// Puts the law where the machine is. No leg moves in the first tick: a mode that begins takes over what is held.
@@ -73,8 +73,10 @@ pub(crate) fn look(
     expected: Real,
     target: Real,
 ) {
-    let error = Some(target - component(&state.pose, channel));
-    supervisor.look(&SUPERVISION, channel, &sample(&input.gauge, channel, expected, error));
+    let error = target - component(&state.pose, channel);
+    supervisor.look(&SUPERVISION, channel, &sample(&input.gauge, channel, expected, Some(error)));
+    let given = state.correction.pose().map(|correction| component(&correction, channel));
+    supervisor.follow(&SUPERVISION, channel, error, target, given);
 }
 
 /// Brings a motion that was under way to rest where the law is to be suspended: the status; none where nothing moves.
@@ -94,7 +96,7 @@ pub(crate) fn come_to_rest(
 #[cold]
 #[inline(never)]
 fn stop(config: &Config, state: &mut State, supervisor: &mut Supervisor, input: &TickInput) -> u32 {
-    let faults = advance(config, state, CommandKind::Hold, input) & GAUGE_FAULT;
+    let faults = advance(config, state, supervisor.oscillation.stage, CommandKind::Hold, input) & GAUGE_FAULT;
     supervisor.see(faults >> 8, 0, &input.gauge, &[0; LEGS], 1);
     faults
 }

@@ -39,16 +39,26 @@ use crate::{Config, LEGS, LegState, Real, State, TickInput, TickOutput, dynamics
 use specgen_runtime::feedback::{force_of, winds_up};
 use specgen_runtime::linear::{difference, each, transform};
 use specgen_runtime::setpoint::CommandKind;
+use specgen_runtime::supervisor::Fallback;
 use specgen_runtime::{ControlMode, Damping, Estimate, Integral, Interaction, Law, NotchState};
 
 /// One control tick. See the module for the timing.
 pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
-    let status = advance(config, state, input.command.kind, input);
+    let status = advance(config, state, Fallback::None, input.command.kind, input);
     outputs(state, status)
 }
 
-/// The work of a tick, with `kind` in place of that of the command; returns its status.
-pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, input: &TickInput) -> u32 {
+/// The work of a tick of the law, or of what it has fallen back to, with `kind` in place of that of the command; returns its status.
+pub(crate) fn advance(
+    config: &Config,
+    state: &mut State,
+    fallback: Fallback,
+    kind: CommandKind,
+    input: &TickInput,
+) -> u32 {
+    if state.fallback != fallback {
+        fall_back(state, fallback);
+    }
     let entered = enter_mode(config, state);
     let gauge_faults = sense(config, state, &input.gauge);
     if gauge_faults == 0 {
@@ -185,6 +195,31 @@ fn hand_over(config: &Config, state: &mut State, request: &[Real; LEGS]) {
     state.transfer.begin(offset);
 }
 
+/// The law falls back, or has all its parts again. What damping and gains asked for against the oscillation ends at once: to keep
+/// what it happened to be in this tick would put the platform off by as much. Integral and estimates stay.
+#[cold]
+#[inline(never)]
+fn fall_back(state: &mut State, fallback: Fallback) {
+    state.fallback = fallback;
+    state.damping = Damping::new();
+    if fallback == Fallback::FeedForward {
+        for estimate in &mut state.estimates {
+            // δ̂ would go on with φ̂.
+            *estimate = Estimate { level: estimate.correction(), drift: 0.0 };
+        }
+    }
+}
+
+/// An error, or an innovation, as far as the fallback lets it count.
+#[cold]
+#[inline(never)]
+fn weaken(fallback: Fallback, values: &mut [Real; 6]) {
+    let share: Real = fallback.share();
+    for value in values {
+        *value *= share;
+    }
+}
+
 /// The set-point has come to rest: the estimates take over what the integral gathered on the way. Nothing else of the request changes. Both
 /// work on one error; the integral would give back at the rate of k_I/(1 + k_p) what the estimates unlearn at theirs.
 #[cold]
@@ -221,11 +256,15 @@ pub(crate) fn sense(config: &Config, state: &mut State, gauge: &[Real; 6]) -> u3
 pub(crate) fn learn(config: &Config, state: &mut State) {
     let mode = config.mode();
     let error = modal_error(&difference(&state.generator.target().pose, &state.pose));
-    if mode.damps_modes() {
+    let fallback = state.fallback;
+    if mode.damps_modes() && fallback == Fallback::None {
         state.damping.act(&DAMPING, &error);
     }
     if mode.feeds_back() {
         state.error = notch_error(&mut state.error_notch, &error);
+        if fallback != Fallback::None {
+            weaken(fallback, &mut state.error);
+        }
         let growth = Integral::growth(&config.active_gains().integral, PERIOD, &state.error);
         if !(state.limited && would_wind_up(&state.legs, &growth)) {
             state.integral.grow(&growth);
@@ -240,7 +279,10 @@ pub(crate) fn learn(config: &Config, state: &mut State) {
             let withheld = transform(&LEGS_TO_MODES, &withheld);
             innovation = each(|mode| innovation[mode] + withheld[mode]);
         }
-        let innovation = notch_innovation(&mut state.innovation_notch, &innovation);
+        let mut innovation = notch_innovation(&mut state.innovation_notch, &innovation);
+        if fallback != Fallback::None {
+            weaken(fallback, &mut innovation);
+        }
         let (level, drift) = (config.level_weight(), config.drift_weight());
         Estimate::correct(&mut state.estimates, mode.law(), level, drift, &innovation);
     }
@@ -272,7 +314,10 @@ fn damping(config: &Config, state: &State) -> Option<[Real; LEGS]> {
     if !config.damps() {
         return None;
     }
-    let error = difference(&state.generator.target().rate, state.rate.value());
+    let mut error = difference(&state.generator.target().rate, state.rate.value());
+    if state.fallback != Fallback::None {
+        weaken(state.fallback, &mut error);
+    }
     Some(transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error)))
 }
 

@@ -7,8 +7,8 @@ pub use crate::machine::{
     MachineOutput, Supervisor, machine_output_words,
 };
 pub use specgen_runtime::supervisor::{
-    CONVERTER, Cause, Finding, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, SAMPLE_REPEATED, SAMPLE_REPLACED,
-    STALLED, STOP,
+    CONVERTER, Cause, Fallback, Finding, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, SAMPLE_REPEATED,
+    SAMPLE_REPLACED, STALLED, STOP,
 };
 
 use crate::standing::{begin, come_to_rest, expectation, faults, look, readings, readings_of, run_law, stand};

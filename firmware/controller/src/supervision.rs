@@ -3,7 +3,7 @@
 
 //! What the supervisor takes for a fault; from `supervisor`.
 
-use specgen_runtime::supervisor::{Supervision, Wiring};
+use specgen_runtime::supervisor::{Steadiness, Supervision, Wiring};
 use crate::hysteresis::Memory;
 use crate::{Real, limits};
 
@@ -26,6 +26,16 @@ pub const SUPERVISION: Supervision<Real> = Supervision {
         4.064080209343311e-6, 3.615357787701626e-6,
     ],
     repeats: 12,
+    steadiness: Steadiness {
+        per_limit: [25000000.0, 25000000.0, 25000000.0, 2500000.0, 2500000.0, 2500000.0],
+        follow: 0.20243717584702448,
+        motion: 4.9398041432650155,
+        keep: 0.9988679472056063,
+        keep_fallen: 0.9969840397062935,
+        one_way: 18,
+        first: 50,
+        next: 167,
+    },
     wiring: Some(Wiring {
         ticks: 500,
         height: 415,

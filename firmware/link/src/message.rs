@@ -331,7 +331,7 @@ pub struct Status {
     pub phase: u8,
     /// Number of `supervisor::Cause`.
     pub cause: u8,
-    /// Word of what the wiring check found, a `supervisor::Finding`; 0 unless it is the cause.
+    /// Word of what the wiring check found, if that is the cause, or of what the law has fallen back to, a `supervisor::Finding`; else 0.
     pub finding: u16,
     /// Whether the amplifiers are enabled.
     pub amplifier_on: bool,

@@ -37,11 +37,11 @@ pub struct Said {
     pub late: u64,
 }
 
-/// A cause in words, with what the wiring check found and what looks like it on this geometry.
+/// A cause in words, with what the wiring check found and what looks like it on this geometry, or what the law has fallen back to.
 pub fn why(cause: Cause, finding: Finding) -> String {
-    match cause {
-        Cause::Wiring => format!("{}, {}", cause.name(), Named(finding, LOOK_ALIKE)),
-        _ => cause.name().to_owned(),
+    match finding {
+        Finding::None => cause.name().to_owned(),
+        _ => format!("{}, {}", cause.name(), Named(finding, LOOK_ALIKE)),
     }
 }
 

@@ -54,7 +54,7 @@ pub struct Incident {
 #[derive(Debug, Default)]
 pub struct Outcome {
     pub last: Option<Said>,
-    /// Faults, and holds for a cause, in order.
+    /// Faults, holds for a cause, and what the law fell back to, in order.
     pub incidents: Vec<Incident>,
     /// The record's rows, or why it is not whole.
     pub record: Option<(PathBuf, io::Result<u64>)>,
@@ -144,9 +144,11 @@ impl Service<'_> {
             outcome.rows += 1;
             let said = said(&row);
             let before = self.console.said.map_or((Phase::Disarmed, Cause::None), |said| (said.phase, said.cause));
+            let finding = self.console.said.map_or(Finding::None, |said| said.finding);
+            let fell_back = matches!(said.finding, Finding::Fallback(_)) && said.finding != finding;
             let faulted = said.phase == Phase::Faulted && before.0 != Phase::Faulted;
             let held = said.phase == Phase::Holding && said.cause != Cause::None && (said.phase, said.cause) != before;
-            if faulted || held {
+            if faulted || held || fell_back {
                 outcome.incidents.push(Incident {
                     tick: said.tick,
                     phase: said.phase,

@@ -38,6 +38,8 @@ pub struct Sizes {
     pub pose_rate: [f64; 6],
     /// Pose error behind the notch, m and rad.
     pub error: f64,
+    /// Set-point, and what it is off the measured pose: of each axis, m and rad, or of each leg, m.
+    pub apart: [f64; 6],
     /// Measured wrench, N and N m.
     pub wrench: [f64; 6],
     /// Displacement of a leg, demanded or by its model, m.
@@ -65,6 +67,7 @@ impl Sizes {
         pose: [LARGEST_PLACE; 6],
         pose_rate: [LARGEST; 6],
         error: LARGEST_PLACE,
+        apart: [LARGEST_PLACE; 6],
         wrench: [LARGEST; 6],
         leg: LARGEST_PLACE,
         leg_rate: LARGEST_PLACE,

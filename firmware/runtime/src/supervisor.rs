@@ -21,11 +21,13 @@
 //! | `phases` | the state machine |
 //! | `sift` | samples that leap are replaced, those that repeat are counted |
 //! | `wiring` | the check that arming ends with: each leg in turn, against the Jacobian |
+//! | `oscillation` | an error that goes on oscillating, and the stages that the law falls back to |
 //! | `approach` | set-points from where the legs are to where they are asked for |
 
 mod approach;
 mod debounce;
 mod kinds;
+mod oscillation;
 mod phases;
 mod sift;
 mod supervision;
@@ -38,8 +40,9 @@ pub use kinds::{
     CONVERTER, Cause, EVENTS, FIRST_EVENT, HOLDS, INTEGRITY, LINK_LOST, MISSED_TICK, OF_GAUGES, Phase, RAMPS_DOWN,
     Request, STALLED, STOP, SWITCHES_OFF,
 };
+pub use oscillation::{Fallback, Motion, Oscillation, Steadiness};
 pub use phases::Supervisor;
-pub use sift::{SAMPLE_REPEATED, SAMPLE_REPLACED, Sift, WRONG};
+pub use sift::{Activity, SAMPLE_REPEATED, SAMPLE_REPLACED, Sift, WRONG};
 pub use supervision::{Supervision, TIMED, TIMERS};
 pub use watch::{Channel, Sample, Watch};
 pub use wiring::{Check, Fault, Finding, Named, Response, Wiring, explains, with};

@@ -25,11 +25,11 @@ pub struct MachineWord {
     pub phase: u8,
     /// 0 none, 1 gauge not finite, 2 gauge range, 3 gauge stuck, 4 gauge disagreement, 5 tracking error, 6 voltage saturation,
     /// 7 slew saturation, 8 missed tick, 9 link lost, 10 integrity, 11 converter, 12 emergency stop, 13 host gone, 14 wiring,
-    /// 15 stalled.
+    /// 15 stalled, 16 oscillation.
     pub cause: u8,
     /// Whether the amplifiers are to be on.
     pub amplifier_on: bool,
-    /// Word of what the wiring check found, a [`Finding`]; 0 is nothing.
+    /// Word of what the wiring check found, or of what the law has fallen back to, a [`Finding`]; 0 is nothing.
     pub finding: u32,
 }
 
@@ -50,18 +50,19 @@ impl fmt::Display for MachineWord {
 }
 
 impl MachineWord {
-    /// The same, and which faults look like what the wiring check found: `alike` are sets of such, as words of [`Finding`].
+    /// The same with what the wiring check found or the law has fallen back to, and which faults look like it: `alike` are sets of such, as words of [`Finding`].
     #[must_use]
     pub fn among<S: AsRef<[u32]>>(&self, alike: &[S]) -> String {
         let Self { phase, cause, finding, .. } = *self;
         let of =
             Phase::from_word(u64::from(phase)).map_or_else(|| format!("phase {phase}"), |phase| phase.name().into());
         match Cause::from_word(u64::from(cause)) {
-            Some(Cause::None) => of,
-            Some(Cause::Wiring) => {
-                format!("{of}: {}, {}", Cause::Wiring.name(), Named(Finding::of_word(finding), alike))
+            Some(cause) => {
+                let finding = Finding::of_word(finding);
+                let parts = [cause.name().to_owned(), Named(finding, alike).to_string()];
+                let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+                if parts.is_empty() { of } else { format!("{of}: {}", parts.join(", ")) }
             }
-            Some(cause) => format!("{of}: {}", cause.name()),
             None => format!("{of}: cause {cause}"),
         }
     }

@@ -23,6 +23,7 @@ tracking_time     = \"3.6 ms\"
 voltage_time      = \"2 ms\"
 slew_time         = \"1 ms\"
 missed_ticks      = 2
+disturbance       = \"10 mm\"
 host_lost         = [\"0.4 ms\", \"1.4 ms\"]
 wiring_check      = { off = \"sequences of 24 ticks\" }
 
@@ -218,7 +219,7 @@ impl Bench {
             let step = (code - before).abs();
             assert!(step <= self.max_step, "tick {}: leg {leg} moves by {step} codes", self.tick);
         }
-        assert!(self.word.phase <= FAULTED && self.word.cause <= 15, "tick {}: {:?}", self.tick, self.word);
+        assert!(self.word.phase <= FAULTED && self.word.cause <= 16, "tick {}: {:?}", self.tick, self.word);
         let powered = matches!(self.word.phase, ARMING | RUNNING | HOLDING | RAMPING);
         assert_eq!(self.word.amplifier_on, powered, "tick {}: amplifiers", self.tick);
         // A platform in motion is first brought to rest.

@@ -9,6 +9,7 @@ mod fuzz;
 mod lost;
 #[path = "../../../firmware/runtime/tests/all/supervisor/oracle.rs"]
 mod oracle;
+mod oscillation;
 mod refusals;
 mod samples;
 mod sequences;

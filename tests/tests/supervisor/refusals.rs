@@ -38,6 +38,7 @@ fn what_cannot_work_is_refused_with_a_fix_that_works() {
         ("reference.toml", "disagreement = \"10 nm\"", "E0471"),
         ("reference.toml", "tracking_error = 0.0002", "E0471"),
         ("legs.toml", "tracking_error = 0.0001", "E0471"),
+        ("reference.toml", "disturbance = \"5 nm\"", "E0471"),
         ("legs.toml", "host_lost = [\"2 s\", \"1 s\"]", "E0470"),
         ("reference.toml", "host_lost = [\"5 ms\", \"5 ms\"]", "E0470"),
         ("reference.toml", "host_lost = [\"0.05 ms\", \"5 s\"]", "E0470"),

@@ -22,8 +22,17 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let words = literal::count(ranges.len());
     let of = |most: f64| literal::real(Scalar::F64, most);
     let state = &table.state;
-    let axes = [state.place, state.user, state.rate, state.acceleration, state.pose, state.pose_rate, state.wrench];
-    let [place, user, rate, acceleration, pose, pose_rate, wrench] = axes.map(|six| {
+    let axes = [
+        state.place,
+        state.user,
+        state.rate,
+        state.acceleration,
+        state.pose,
+        state.pose_rate,
+        state.apart,
+        state.wrench,
+    ];
+    let [place, user, rate, acceleration, pose, pose_rate, apart, wrench] = axes.map(|six| {
         let six = six.map(of);
         quote! { [#(#six),*] }
     });
@@ -47,7 +56,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         /// Largest numbers of a state, under any of these settings.
         pub const STATE: Sizes = Sizes {
             place: #place, user: #user, rate: #rate, acceleration: #acceleration, pose: #pose, pose_rate: #pose_rate, error: #error,
-            wrench: #wrench, leg: #leg, leg_rate: #leg_rate, line: #line, request: #request, reading: #reading, stiffness: #stiffness,
+            apart: #apart, wrench: #wrench, leg: #leg, leg_rate: #leg_rate, line: #line, request: #request, reading: #reading, stiffness: #stiffness,
         };
     }
 }

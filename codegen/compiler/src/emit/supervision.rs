@@ -22,6 +22,11 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let (disagreement, disagreement_samples) = (real(s.disagreement), count(s.disagreement_samples));
     let (tracking, tracking_samples) = (literal::reals(ir.scalar, &s.tracking), count(s.tracking_samples));
     let (leap, repeats) = (literal::reals(ir.scalar, &s.leap), count(s.repeats));
+    let steadiness = &s.steadiness;
+    let per_limit = literal::reals(ir.scalar, &steadiness.per_limit);
+    let [follow, motion] = [steadiness.follow, steadiness.motion].map(real);
+    let [keep_explained, keep_fallen] = [steadiness.keep, steadiness.keep_fallen].map(real);
+    let [one_way, first, next] = [steadiness.one_way, steadiness.first, steadiness.next].map(count);
     let of_kind = match &s.readings_per_leg {
         Some(rows) => {
             let rows = literal::matrix(ir.scalar, rows);
@@ -55,7 +60,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     quote! {
         #![doc = " What the supervisor takes for a fault; from `supervisor`."]
 
-        use specgen_runtime::supervisor::{Supervision #uses};
+        use specgen_runtime::supervisor::{Steadiness, Supervision #uses};
 
         use crate::hysteresis::Memory;
         use crate::{Real #limits};
@@ -76,6 +81,16 @@ pub fn emit(ir: &Ir) -> TokenStream {
             tracking_samples: #tracking_samples,
             leap: [#leap],
             repeats: #repeats,
+            steadiness: Steadiness {
+                per_limit: [#per_limit],
+                follow: #follow,
+                motion: #motion,
+                keep: #keep_explained,
+                keep_fallen: #keep_fallen,
+                one_way: #one_way,
+                first: #first,
+                next: #next,
+            },
             wiring: #wiring,
         };
         /// Sets of single faults that look alike to the wiring check, as words of `Finding`.

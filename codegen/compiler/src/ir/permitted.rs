@@ -61,6 +61,8 @@ pub struct State {
     pub pose_rate: [f64; 6],
     /// m and rad.
     pub error: f64,
+    /// m and rad, or m.
+    pub apart: [f64; 6],
     /// N and N m.
     pub wrench: [f64; 6],
     /// m.

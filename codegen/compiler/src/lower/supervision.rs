@@ -3,8 +3,10 @@
 pub(crate) mod defaults;
 mod rest;
 pub(crate) mod samples;
+mod steadiness;
 mod wiring;
 
+pub(crate) use steadiness::LOWEST as LOWEST_SWING;
 pub use wiring::{describe as describe_wiring, single_faults};
 
 use super::kinematics::inverse_jacobian;
@@ -38,7 +40,7 @@ const OWN_GAUGES: [[f64; 6]; 6] = {
 /// Missed ticks are counted over this time, s.
 const MISSED_WINDOW: f64 = 1.0;
 
-/// Every constant of the supervisor.
+/// Every constant of the supervisor, for a platform or legs whose modes ring for `rings` (s) at most, as a time constant.
 ///
 /// # Errors
 /// A time that is shorter than it can be seen, a bound below the noise, a ramp faster than the slew rate.
@@ -48,6 +50,7 @@ pub(super) fn lower(
     actuation: &Actuation,
     max_step: i32,
     sensing: Option<&Sensing>,
+    rings: f64,
     scalar: Scalar,
 ) -> Result<Supervision, Vec<Diagnostic>> {
     let spec = &model.supervisor;
@@ -77,6 +80,7 @@ pub(super) fn lower(
     findings.extend(rest::beyond(model));
     let readings = readings_per_leg.unwrap_or(OWN_GAUGES);
     let leap = samples::leap(model, &readings, sensing, &mut findings);
+    let steadiness = steadiness::lower(model, noise.as_ref(), rings, scalar, &mut findings);
     let wiring = wiring::lower(model, hysteresis, actuation, max_step, &readings, scalar, &mut findings);
     if !findings.is_empty() {
         return Err(findings);
@@ -100,6 +104,7 @@ pub(super) fn lower(
         tracking_samples,
         leap: leap.map(round),
         repeats: samples::repeats(model),
+        steadiness,
         wiring,
         readings_per_leg: readings_per_leg.map(|rows| rows.map(|row| row.map(round))),
         approach_keep: round(libm::exp(-1.0 / f64::from(arm_ticks))),

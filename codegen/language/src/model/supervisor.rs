@@ -37,6 +37,8 @@ section! {
         tracking_time: Option<f64> = TIMEOUT, Rule("100 ms, at least 12 periods"), "", "100 ms";
         /// Largest leap of a gauge's reading from the straight line through the two before it. A reading beyond is replaced by that line, and a fault if that goes on.
         leap: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-2), "um"), Rule("what voltages that turn round at `actuator.slew_rate` make of a reading behind the lags of amplifier and gauge, with noise and converter; of a calibrated gauge 1.5 times that"), "" ["jump", "sample_jump"], "2 um";
+        /// Largest amplitude of an error that environment and noise may make for as long as they like, from 60 Hz on; about the axes, at the platform joints. What oscillates beyond it is a fault, unless the motion explains it.
+        disturbance: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-10, 1e-2), "nm"), Rule("a 1500th of `actuator.stroke`, at least 6 times what the gauges' noise makes of an axis"), "" ["vibration", "oscillation"], "40 nm";
         /// Time that a leg may stay at a limit of its voltage or table.
         voltage_time: Option<f64> = TIMEOUT, Rule("500 ms, at least a period"), "", "500 ms";
         /// Time that a leg may stay at the limit of its slew rate.

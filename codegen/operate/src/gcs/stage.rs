@@ -23,12 +23,17 @@ const UP: Duration = Duration::from_secs(10);
 /// A machine that holds for so long after it was asked to run is held by somebody.
 const HELD: Duration = Duration::from_millis(500);
 
+/// The status is asked for this often at least.
+const POLL: Duration = Duration::from_secs(1);
+
 /// A session with a platform.
 pub struct Stage<P> {
     session: Session<P>,
     motion: Motion,
     place: Place,
     seen: Instant,
+    /// When its status was asked for last.
+    polled: Instant,
     /// Where the last move leads, in the user's coordinates; none if nothing is known of one.
     goal: Option<[f64; 6]>,
     /// The last order: a tick from which on the place shows what became of it, and when it was sent.
@@ -93,6 +98,7 @@ impl<P: Port> Stage<P> {
             motion,
             place,
             seen: Instant::now(),
+            polled: Instant::now(),
             goal: None,
             ordered: (0, Instant::now()),
             rising: None,
@@ -178,9 +184,10 @@ impl<P: Port> Stage<P> {
         if let Some(place) = self.session.place()? {
             self.place = place;
         }
-        if self.place.phase != self.session.status().phase {
-            // With its cause, to be shown.
+        if self.place.phase != self.session.status().phase || self.polled.elapsed() >= POLL {
+            // With its cause, to be shown; what the law has fallen back to is no other phase.
             self.session.poll()?;
+            self.polled = Instant::now();
         }
         self.seen = Instant::now();
         if self.runs() {

@@ -253,7 +253,7 @@
     allow(by("hold"), held ? "" : "not armed", "acts at once · key H");
     allow(by("arm"), phase === "faulted" ? "acknowledge first" : phase !== "disarmed" ? "armed" : orders, "press 1\u2009s");
     allow(by("run"), phase === "running" ? "running" : phase !== "holding" && phase !== "arming" ? "not armed" : orders, "press 1\u2009s");
-    allow(by("acknowledge"), phase !== "faulted" ? "no fault" : orders, "press 1\u2009s");
+    allow(by("acknowledge"), phase !== "faulted" && status.cause !== 16 ? "no fault" : orders, "press 1\u2009s");
     for (const [id, next] of [["arm", "disarmed"], ["run", "holding"], ["acknowledge", "faulted"]]) by(id).classList.toggle("next", phase === next && !by(id).disabled);
     const events = known.standing && known.standing.health ? known.standing.health.events_in_words : null;
     by("stop").textContent = "Hardware stop: " + (events ? (events.includes("emergency stop") ? "pressed" : "not pressed") : "–") + ".";

@@ -18,9 +18,10 @@ pub const MACHINE_OUTPUT_WORDS: usize = OUTPUT_WORDS + 2;
 /// Names of the input words. `request` is 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge; `events` holds bits.
 pub const MACHINE_INPUT_NAMES: [&str; MACHINE_INPUT_WORDS] = followed(&INPUT_NAMES, ["request", "events"]);
 
-/// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16 | finding of the wiring check << 17;
-/// `conditions` has bit 1 << cause for each cause that is present, whether it has lasted or not, from bit 16 on the gauges or legs concerned, and from
-/// bit 22 on the gauges whose words were replaced by predictions.
+/// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16 | finding of the wiring check, or what the law has fallen back to << 17;
+/// `conditions` has bit 1 << cause for each cause that is present, whether it has lasted or not, from bit 16 on the gauges or legs concerned, from
+/// bit 22 on the gauges whose words were replaced by predictions; bit 28 is cause 16, from bit 29 on stands how far the law has fallen back, see
+/// [`Fallback`](supervisor::Fallback).
 pub const MACHINE_OUTPUT_NAMES: [&str; MACHINE_OUTPUT_WORDS] = followed(&OUTPUT_NAMES, ["supervisor", "conditions"]);
 
 /// State of the supervisor in this controller's arithmetic.
@@ -71,7 +72,7 @@ pub struct MachineOutput {
     pub cause: Cause,
     /// Whether the amplifiers are to be on over the coming interval.
     pub amplifier_on: bool,
-    /// Word of what the wiring check found, a [`Finding`](supervisor::Finding); 0 is nothing.
+    /// Word of what the wiring check found, or of what the law has fallen back to, a [`Finding`](supervisor::Finding); 0 is nothing.
     pub finding: u32,
 }
 

@@ -42,7 +42,7 @@ pub(crate) fn run_law(config: &Config, state: &mut State, supervisor: &mut Super
         approached = approaching(config, supervisor, input);
         &approached
     };
-    advance(config, state, given)
+    advance(config, state, supervisor.oscillation.stage, given)
 }
 
 /// Legs have no rate that would have to be brought to rest.
@@ -101,8 +101,9 @@ pub(crate) fn look(
     target: Real,
 ) {
     let reading = component(&input.displacement, channel);
-    let error = Some(target - reading);
-    supervisor.look(&SUPERVISION, channel, &Sample { word: reading, reading, expected, error });
+    let error = target - reading;
+    supervisor.look(&SUPERVISION, channel, &Sample { word: reading, reading, expected, error: Some(error) });
+    supervisor.follow(&SUPERVISION, channel, error, target, None);
 }
 
 /// Codes held or on their way to rest, the law suspended. Returns the status.

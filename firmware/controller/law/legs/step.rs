@@ -11,15 +11,16 @@ use crate::{Config, LegState, Real, SetpointKind, State, TickInput, TickOutput, 
 use specgen_runtime::Law;
 use specgen_runtime::linear::each;
 use specgen_runtime::real::saturate;
+use specgen_runtime::supervisor::Fallback;
 
 /// One control tick. See the module for the timing.
 pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
-    let status = advance(config, state, input);
+    let status = advance(config, state, Fallback::None, input);
     outputs(state, status)
 }
 
-/// The work of a tick; returns its status.
-pub(crate) fn advance(config: &Config, state: &mut State, input: &TickInput) -> u32 {
+/// The work of a tick of the law, or of what it has fallen back to; returns its status.
+pub(crate) fn advance(config: &Config, state: &mut State, fallback: Fallback, input: &TickInput) -> u32 {
     let demand_before = state.demand;
     let accepted = take_setpoint(config, state, input);
     let run_ends = count_run(config, state);
@@ -28,7 +29,7 @@ pub(crate) fn advance(config: &Config, state: &mut State, input: &TickInput) -> 
         let gauge = input.displacement[index];
         let gauge_good = gauge_is_accepted(gauge);
         if config.law() == Law::Invhys || (run_ends && gauge_good) {
-            adapt(config, leg, gauge);
+            adapt(config, leg, fallback, gauge);
         }
         for lead in &mut leg.lead {
             *lead = saturate((state.demand[index] - demand_before[index]) * LEAD, -LEAD_LIMIT, LEAD_LIMIT);
@@ -90,11 +91,13 @@ fn shown(leg: &LegState) -> Real {
     }
 }
 
-/// m = Y − ρ̂X, then (AII.3) or (AII.5), (AII.6).
+/// m = Y − ρ̂X, then (AII.3) or (AII.5), (AII.6), with what the fallback leaves of the weights.
 #[inline]
-fn adapt(config: &Config, leg: &mut LegState, gauge: Real) {
+fn adapt(config: &Config, leg: &mut LegState, fallback: Fallback, gauge: Real) {
     let model_error = gauge - shown(leg);
-    leg.estimate.update(config.law(), config.level_weight(), config.drift_weight(), model_error);
+    let share: Real = fallback.share();
+    let (level, drift) = (config.level_weight() * share, config.drift_weight() * share);
+    leg.estimate.update(config.law(), level, drift, model_error);
 }
 
 /// u = Γ⁻¹(T − δ̂ − φ̂) as a permitted code; the memory then holds what that code really requests. Returns whether a

@@ -8,6 +8,7 @@ use crate::task_space::{CORRECTED, DAMPED};
 use crate::{LEGS, Real, limits};
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::snapshot::Snapshot;
+use specgen_runtime::supervisor::Fallback;
 use specgen_runtime::trigger::Triggers;
 use specgen_runtime::{
     ControlMode, Correction, Damping, Digest, Estimate, Integral, Interaction, LastLine, NotchState, Rate, Transfer,
@@ -65,6 +66,8 @@ specgen_runtime::state! { |words|
         pub transfer: Transfer<Real> = Transfer::new(), part;
         /// Some leg was held back by a limit in the last tick.
         pub limited: bool = false, set;
+        /// How much of the law the last tick had.
+        pub fallback: Fallback = Fallback::None, choice;
         /// Mode of the last tick; none before the first.
         pub mode: Option<ControlMode> = None, choice;
         /// Where the last tick took the interaction force from.

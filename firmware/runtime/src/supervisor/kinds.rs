@@ -16,6 +16,8 @@ pub const STOP: u32 = 16;
 pub const STALLED: u32 = 1 << (Cause::Stalled.word() - FIRST_EVENT);
 /// Bits of an event word that the supervisor looks at; the others are for records.
 pub const EVENTS: u32 = MISSED_TICK | LINK_LOST | INTEGRITY | CONVERTER | STOP | STALLED;
+/// Bits of conditions that stand between those of causes.
+const BEYOND: u64 = 12;
 /// The cause of an event's bit is its number and this.
 pub const FIRST_EVENT: u64 = Cause::MissedTick.word();
 
@@ -101,12 +103,14 @@ choice! {
         Wiring = 14 => "wiring",
         /// [`STALLED`].
         Stalled = 15 => "stalled",
+        /// The error goes on oscillating. While running it is the cause of what the law has fallen back to.
+        Oscillation = 16 => "oscillation",
     }
 }
 
 impl Cause {
     /// All but [`Cause::None`], in the order of their words.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::GaugeNotFinite,
         Self::GaugeRange,
         Self::GaugeStuck,
@@ -122,13 +126,24 @@ impl Cause {
         Self::HostGone,
         Self::Wiring,
         Self::Stalled,
+        Self::Oscillation,
     ];
 
-    /// 1 << word: its bit in conditions.
+    /// Its bit in conditions: 1 << word, and beyond 15, where gauges and legs stand, from bit 28 on.
     #[inline]
     #[must_use]
     pub const fn bit(self) -> u32 {
-        1 << self.word()
+        let word = self.word();
+        1 << if word < 16 { word } else { word + BEYOND }
+    }
+
+    /// The cause of the lowest bit; none without any.
+    pub(super) const fn of_lowest(bits: u32) -> Self {
+        let bit = bits.trailing_zeros() as u64;
+        match Self::from_word(if bit < 16 { bit } else { bit.saturating_sub(BEYOND) }) {
+            Some(cause) if cause.bit() & bits != 0 => cause,
+            _ => Self::None,
+        }
     }
 }
 
@@ -138,8 +153,12 @@ pub const OF_GAUGES: u32 =
 /// Causes that take the amplifiers off at once, in any phase.
 pub const SWITCHES_OFF: u32 = Cause::Integrity.bit() | Cause::EmergencyStop.bit();
 /// Causes that bring the codes to rest, then take the amplifiers off.
-pub const RAMPS_DOWN: u32 =
-    OF_GAUGES | Cause::Converter.bit() | Cause::HostGone.bit() | Cause::Wiring.bit() | Cause::Stalled.bit();
+pub const RAMPS_DOWN: u32 = OF_GAUGES
+    | Cause::Converter.bit()
+    | Cause::HostGone.bit()
+    | Cause::Wiring.bit()
+    | Cause::Stalled.bit()
+    | Cause::Oscillation.bit();
 /// Causes that hold the codes.
 pub const HOLDS: u32 = Cause::TrackingError.bit()
     | Cause::VoltageSaturation.bit()
@@ -157,13 +176,16 @@ mod tests {
             assert_eq!(Phase::from_word(word).map(Phase::word), Some(word));
             assert_eq!(Request::from_word(word).word(), word);
         }
-        for word in 0..16 {
+        for word in 0..17 {
             assert_eq!(Cause::from_word(word).map(Cause::word), Some(word));
         }
         for (index, cause) in (1..).zip(Cause::ALL) {
             assert_eq!(cause.word(), index);
+            assert_eq!(Cause::of_lowest(cause.bit()), cause);
         }
-        assert_eq!((Phase::from_word(6), Cause::from_word(16)), (None, None));
+        assert_eq!(Cause::of_lowest(0x2fff_0000), Cause::None, "gauges, legs, and what else stands there");
+        assert_eq!(Cause::Oscillation.bit(), 1 << 28);
+        assert_eq!((Phase::from_word(6), Cause::from_word(17)), (None, None));
         assert_eq!((Request::from_word(6), Request::from_word(u64::MAX)), (Request::Hold, Request::Hold));
     }
 

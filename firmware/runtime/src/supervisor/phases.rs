@@ -3,7 +3,8 @@
 use super::approach::Approach;
 use super::debounce::Debounce;
 use super::kinds::{Cause, EVENTS, FIRST_EVENT, HOLDS, Phase, RAMPS_DOWN, Request, SWITCHES_OFF};
-use super::sift::Sift;
+use super::oscillation::{Fallback, Motion, Oscillation};
+use super::sift::{Activity, Sift};
 use super::supervision::Supervision;
 use super::watch::{Sample, Watch};
 use super::wiring::{Check, Finding, Response};
@@ -43,6 +44,8 @@ crate::state! { |words|
         pub sift: Sift<T> = Sift::new(), part;
         /// Whether gauges and legs are wired as the spec says.
         pub check: Check<T> = Check::new(), part;
+        /// Whether the error goes on oscillating, and what the law has fallen back to.
+        pub oscillation: Oscillation<T> = Oscillation::new(), part;
         /// Way to the set-point that is asked for, where the law has no generator.
         pub approach: Approach<T> = Approach::new(), part;
     }
@@ -57,8 +60,14 @@ impl<T: Real> Supervisor<T> {
 
     /// Replaces words that leapt. `faults`: which words the law does not believe, bit by bit.
     pub fn sift(&mut self, supervision: &Supervision<T>, words: &mut [T; 6], faults: impl Fn(&[T; 6]) -> u32) {
-        let stands = self.phase == Phase::Arming && !self.is_checking(supervision);
-        self.watch.lasted |= self.sift.sift(supervision, words, faults, stands);
+        let activity = if self.phase == Phase::Arming && !self.is_checking(supervision) {
+            Activity::Standing
+        } else if self.oscillation.is_counted() {
+            Activity::Oscillating
+        } else {
+            Activity::Moving
+        };
+        self.watch.lasted |= self.sift.sift(supervision, words, faults, activity);
     }
 
     /// Brings the machine into the phase of the coming interval; returns whether it begins to run with it.
@@ -70,10 +79,15 @@ impl<T: Real> Supervisor<T> {
         let begun = request != self.request;
         self.request = request;
         let present = (self.seen & CAUSES) | self.watch.present | (events & EVENTS) << FIRST_EVENT;
-        self.conditions = self.seen | present | self.watch.suspected() << FIRST_CHANNEL | self.sift.conditions();
+        self.conditions = self.seen
+            | present
+            | self.watch.suspected() << FIRST_CHANNEL
+            | self.sift.conditions()
+            | self.oscillation.conditions;
         let lasted = self.debounce.count(supervision, present, &mut self.busy) | self.watch.lasted;
         self.watch.lasted = 0;
-        if self.phase == Phase::Running && lasted == 0 && !matches!(request, Request::Hold | Request::RampDown) {
+        let goes_on = !matches!(request, Request::Hold | Request::RampDown | Request::Acknowledge);
+        if self.phase == Phase::Running && lasted == 0 && goes_on {
             return false;
         }
         self.change(supervision, begun, present, lasted, at_rest)
@@ -90,7 +104,7 @@ impl<T: Real> Supervisor<T> {
         match self.phase {
             Phase::Disarmed => self.disarmed(begun, present, at_rest),
             Phase::Arming => return self.arming(supervision, present, lasted),
-            Phase::Running => self.running(lasted),
+            Phase::Running => self.running(begun, lasted),
             Phase::Holding => return self.holding(begun, present, lasted),
             Phase::RampingDown => self.ramping_down(lasted, at_rest),
             Phase::Faulted => {
@@ -134,15 +148,26 @@ impl<T: Real> Supervisor<T> {
         false
     }
 
-    fn running(&mut self, lasted: u32) {
+    fn running(&mut self, begun: bool, mut lasted: u32) {
+        if lasted & Cause::Oscillation.bit() != 0 && self.oscillation.fall_back() {
+            self.cause = Cause::Oscillation;
+            lasted &= !Cause::Oscillation.bit();
+        }
         if lasted & RAMPS_DOWN != 0 {
             self.enter(Phase::RampingDown, first(lasted & RAMPS_DOWN));
         } else if self.request == Request::RampDown {
             self.enter(Phase::RampingDown, first(lasted));
-        } else {
-            // For a cause, or because it is requested.
+        } else if lasted != 0 || self.request == Request::Hold {
             self.enter(Phase::Holding, first(lasted));
+        } else if self.request == Request::Acknowledge && begun {
+            self.recover();
         }
+    }
+
+    /// The user knows of the oscillation: all of the law is at work again.
+    fn recover(&mut self) {
+        self.oscillation = Oscillation::new();
+        self.cause = Cause::None;
     }
 
     fn holding(&mut self, begun: bool, present: u32, lasted: u32) -> bool {
@@ -155,7 +180,7 @@ impl<T: Real> Supervisor<T> {
         }
         match self.request {
             Request::RampDown => self.enter(Phase::RampingDown, self.cause),
-            Request::Acknowledge if begun && present == 0 => self.cause = Cause::None,
+            Request::Acknowledge if begun && present == 0 => self.recover(),
             // After a cause, only a request that begins now shows that the user knows of it.
             Request::Run if present == 0 && (begun || self.cause == Cause::None) => {
                 self.enter(Phase::Running, Cause::None);
@@ -183,6 +208,12 @@ impl<T: Real> Supervisor<T> {
         if phase == Phase::Arming || !phase.is_powered() {
             self.sift = Sift::new();
         }
+        match phase {
+            // It stays fallen back until the user acknowledges it, or arms anew.
+            Phase::Running if self.oscillation.stage != Fallback::None => self.cause = Cause::Oscillation,
+            Phase::Running | Phase::Holding | Phase::RampingDown => self.oscillation.forgive(),
+            Phase::Disarmed | Phase::Arming | Phase::Faulted => self.oscillation = Oscillation::new(),
+        }
         // What was suspected before belongs to the phase before. A ramp and a hold go on with it.
         if !matches!(phase, Phase::Holding | Phase::RampingDown) {
             self.watch.forgive();
@@ -198,11 +229,15 @@ impl<T: Real> Supervisor<T> {
         self.phase == Phase::Arming && self.ticks >= supervision.arm_ticks && supervision.wiring.is_some()
     }
 
-    /// Word of what the wiring check found, where that is why the machine does not run.
+    /// Word of what the wiring check found, where that is why the machine does not run; or of what the law has fallen back to.
     #[inline]
     #[must_use]
     pub fn finding(&self) -> u32 {
-        if self.cause == Cause::Wiring { self.check.finding } else { 0 }
+        match (self.cause, self.oscillation.stage) {
+            (Cause::Wiring, _) => self.check.finding,
+            (_, Fallback::None) => 0,
+            (_, stage) => Finding::Fallback(stage).word(),
+        }
     }
 
     /// Goes on with the wiring check, of readings that are believed (m), where one is under way. `expected`: readings per leg displacement.
@@ -266,6 +301,15 @@ impl<T: Real> Supervisor<T> {
     pub fn look(&mut self, supervision: &Supervision<T>, channel: usize, sample: &Sample<T>) {
         self.watch.look(supervision, channel, sample);
     }
+
+    /// Takes error and set-point (m or rad, finite) of that channel while the law runs, and what is asked for beside the law, if there is such.
+    #[inline]
+    pub fn follow(&mut self, supervision: &Supervision<T>, channel: usize, error: T, target: T, given: Option<T>) {
+        let limited = self.seen & Cause::VoltageSaturation.bit() != 0;
+        if self.oscillation.look(&supervision.steadiness, channel, &Motion { error, target, given, limited }) {
+            self.watch.lasted |= Cause::Oscillation.bit();
+        }
+    }
 }
 
 /// Bits of all causes.
@@ -273,10 +317,7 @@ const CAUSES: u32 = SWITCHES_OFF | RAMPS_DOWN | HOLDS;
 
 /// The cause of the lowest bit.
 fn first(bits: u32) -> Cause {
-    match Cause::from_word(bits.trailing_zeros() as u64) {
-        Some(cause) => cause,
-        None => Cause::None,
-    }
+    Cause::of_lowest(bits)
 }
 
 /// Gauge faults and limits as conditions.

@@ -3,7 +3,8 @@
 //! ```text
 //! prediction   2 y(n−1) − y(n−2)            wrong by no more than the legs can accelerate, and noise: the bound `leap`
 //! replaced     |y(n) − prediction| > leap; times 3, 6, … where y(n−1), y(n−2), … were missing or repeated. Not where y(n) is as near to
-//!              y(n−2): then it was y(n−1) that leapt, by less than the bound, and the middle stands for it from here on
+//!              y(n−2): then it was y(n−1) that leapt, by less than the bound, and the middle stands for it from here on. Nor while an
+//!              oscillation is counted, which no straight line predicts
 //! repeated     all six words are those of the sample before, or of the one before that
 //! ```
 //! Both are leaky counts: 4 for a tick with it, 1 taken off by one without. Three replaced in a row are a fault, or every third over long. Of
@@ -30,6 +31,17 @@ const FIRST_REPLACED: u32 = 22;
 /// Conditions name the gauges that they are about from this bit on.
 const FIRST_CHANNEL: u32 = 16;
 
+/// What the machine does, as far as its samples tell it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Activity {
+    /// It arms, and no leg moves.
+    Standing,
+    /// A straight line through two samples predicts the next one.
+    Moving,
+    /// An oscillation is being counted.
+    Oscillating,
+}
+
 crate::state! { |words|
     /// What is remembered of samples. At reset none is known.
     pub struct Sift<T>[T: Real] {
@@ -41,14 +53,14 @@ crate::state! { |words|
         pub known: usize = 0, place(2);
         /// How many of the last ones, in a row, were missing or repeated.
         pub predicted: usize = 0, place(MOST_PREDICTED);
-        /// What the words of the last two samples came to, the newer one first, where they may not be in `samples`.
-        pub came: [u32; 2] = [0; 2], tallies;
+        /// Checksums of the words of the last two samples, the newer one first, where they may not be in `samples`.
+        pub sums: [u32; 2] = [0; 2], tallies;
         /// Leaky count of samples with replaced words.
         pub leapt: u32 = 0, tally;
         /// Leaky count of repeated samples.
         pub stale: u32 = 0, tally;
         /// Leaky count of new samples while the machine arms and stands: whether the gauges show noise.
-        pub noisy: u32 = 0, tally;
+        pub noise: u32 = 0, tally;
         /// Gauges whose words were replaced in this tick, bit by bit.
         pub replaced: u32 = 0, tally;
         /// The sample of this tick was a repeated one.
@@ -82,7 +94,7 @@ impl<T: Real> Sift<T> {
 
     /// Takes any sample, and replaces the words that leapt. Returns the causes that have lasted, as bits.
     ///
-    /// `faults` says which words the law does not believe: such a sample is left to the law. `stands`: the machine arms, and no leg moves.
+    /// `faults` says which words the law does not believe: such a sample is left to the law.
     #[cold]
     #[inline(never)]
     pub fn sift(
@@ -90,65 +102,36 @@ impl<T: Real> Sift<T> {
         supervision: &Supervision<T>,
         words: &mut [T; 6],
         faults: impl Fn(&[T; 6]) -> u32,
-        stands: bool,
+        activity: Activity,
     ) -> u32 {
-        let [even, odd] = self.samples;
-        let (newer, older) = if self.newer == 0 { (even, odd) } else { (odd, even) };
-        let came = if self.quiet { [sum(&newer), sum(&older)] } else { self.came };
-        let now = sum(words);
-        let same = now == came[0] || now == came[1];
-        self.came = [now, came[0]];
-        let predicted = self.predicted;
+        let before = self.predicted;
         let believed = faults(words) == 0;
-        if stands && believed {
-            self.noisy = if same { self.noisy.saturating_sub(1) } else { self.noisy.saturating_add(3) };
-            let most = supervision.arm_ticks.saturating_mul(3);
-            if self.noisy > most {
-                self.noisy = most;
-            }
-        }
-        let noisy = self.noisy.saturating_mul(2) > supervision.arm_ticks;
-        self.repeated = same && believed && supervision.repeats != 0 && noisy;
+        self.repeated = self.repeats(supervision, words, believed, activity) && believed;
+        let (newer, older) = self.last_two();
         // A prediction is believed, or it is the word before.
         let mut prediction = each(|gauge| predict(newer[gauge], older[gauge]));
         if self.known < 2 || faults(&prediction) != 0 {
             prediction = newer;
         }
         self.replaced = 0;
-        let mut taken = *words;
-        let mut mended = newer;
-        if !believed {
-            taken = prediction;
-        } else if self.known == 2 {
-            let intervals = self.predicted as i32 + 1;
-            let factor = T::from_i32(intervals * (intervals + 1) / 2);
-            for (gauge, (word, predicted)) in words.iter_mut().zip(&prediction).enumerate() {
-                let leap = supervision.leap[gauge];
-                if is_within(*word, *predicted, leap * factor) {
-                    continue;
-                }
-                if is_within(*word, older[gauge], leap) {
-                    mended[gauge] = (*word + older[gauge]) * T::HALF;
-                } else {
-                    self.replaced |= 1 << gauge;
-                    *word = *predicted;
-                }
-            }
-            // A repeated sample is given to the law, but says nothing of how the legs move.
-            taken = if self.repeated { prediction } else { *words };
+        let mut smoothed = newer;
+        if believed && self.known == 2 && activity != Activity::Oscillating {
+            smoothed = self.replace(supervision, words, &prediction);
         }
         if !believed && (self.known < 2 || self.predicted >= MOST_PREDICTED) {
             self.known = 0;
             self.predicted = 0;
         } else {
-            self.samples[self.newer & 1] = mended;
-            self.take(words, &taken, !believed || self.repeated);
+            self.samples[self.newer & 1] = smoothed;
+            // A repeated sample is given to the law, but says nothing of how the legs move.
+            let by_prediction = !believed || (self.repeated && self.known == 2);
+            let remembered = if by_prediction { prediction } else { *words };
+            self.remember(words, &remembered, !believed || self.repeated);
         }
         count(&mut self.leapt, self.replaced != 0, REPLACED_LIMIT);
         count(&mut self.stale, self.repeated, supervision.repeats);
-        let counts = self.leapt | self.stale;
-        self.quiet =
-            self.known == 2 && self.predicted == 0 && predicted == 0 && counts == 0 && mended == newer && !stands;
+        let undisturbed = self.predicted == 0 && before == 0 && self.leapt | self.stale == 0 && smoothed == newer;
+        self.quiet = self.known == 2 && undisturbed && activity != Activity::Standing;
         let mut lasted = 0;
         if self.replaced != 0 && self.leapt >= REPLACED_LIMIT {
             // From here on it is the gauges that are right: what is predicted from predictions runs away.
@@ -159,6 +142,49 @@ impl<T: Real> Sift<T> {
             lasted |= Cause::GaugeStuck.bit();
         }
         lasted
+    }
+
+    /// The two samples before this one, the newer one first.
+    fn last_two(&self) -> ([T; 6], [T; 6]) {
+        let [even, odd] = self.samples;
+        if self.newer == 0 { (even, odd) } else { (odd, even) }
+    }
+
+    /// Whether the words are those of a sample before, on a machine whose gauges showed noise while it stood.
+    fn repeats(&mut self, supervision: &Supervision<T>, words: &[T; 6], believed: bool, activity: Activity) -> bool {
+        let (newer, older) = self.last_two();
+        let sums = if self.quiet { [sum(&newer), sum(&older)] } else { self.sums };
+        let now = sum(words);
+        let same = now == sums[0] || now == sums[1];
+        self.sums = [now, sums[0]];
+        if activity == Activity::Standing && believed {
+            self.noise = if same { self.noise.saturating_sub(1) } else { self.noise.saturating_add(3) };
+            let most = supervision.arm_ticks.saturating_mul(3);
+            if self.noise > most {
+                self.noise = most;
+            }
+        }
+        same && supervision.repeats != 0 && self.noise.saturating_mul(2) > supervision.arm_ticks
+    }
+
+    /// Replaces the words that leapt by their prediction. Returns the sample before, without what turns out to have leapt in it.
+    fn replace(&mut self, supervision: &Supervision<T>, words: &mut [T; 6], prediction: &[T; 6]) -> [T; 6] {
+        let (mut newer, older) = self.last_two();
+        let intervals = self.predicted as i32 + 1;
+        let factor = T::from_i32(intervals * (intervals + 1) / 2);
+        for (gauge, (word, predicted)) in words.iter_mut().zip(prediction).enumerate() {
+            let leap = supervision.leap[gauge];
+            if is_within(*word, *predicted, leap * factor) {
+                continue;
+            }
+            if is_within(*word, older[gauge], leap) {
+                newer[gauge] = (*word + older[gauge]) * T::HALF;
+            } else {
+                self.replaced |= 1 << gauge;
+                *word = *predicted;
+            }
+        }
+        newer
     }
 
     /// The law does not believe the sample of this tick. One that was let pass, close to the bound of the range, is not remembered.
@@ -172,15 +198,15 @@ impl<T: Real> Sift<T> {
         }
     }
 
-    /// Remembers what was `taken` for the `words` of a sample. After too many predictions in a row it begins anew with the words.
-    fn take(&mut self, words: &[T; 6], taken: &[T; 6], is_predicted: bool) {
+    /// Remembers a sample. After too many predictions in a row it begins anew with the words.
+    fn remember(&mut self, words: &[T; 6], remembered: &[T; 6], is_predicted: bool) {
         let begins = is_predicted && (self.known < 2 || self.predicted >= MOST_PREDICTED);
         if begins {
             self.known = 0;
         }
         self.predicted = if begins || !is_predicted { 0 } else { self.predicted + 1 };
         self.newer = usize::from(self.newer == 0);
-        self.samples[self.newer] = if begins { *words } else { *taken };
+        self.samples[self.newer] = if begins { *words } else { *remembered };
         if self.known < 2 {
             self.known += 1;
         }

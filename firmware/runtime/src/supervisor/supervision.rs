@@ -1,6 +1,7 @@
 //! What the spec fixes about the supervisor.
 
 use super::kinds::Cause;
+use super::oscillation::Steadiness;
 use super::wiring::Wiring;
 
 /// Causes that are timed tick by tick, in the order of [`Supervision::timeout`]. Those of the watch are counted in samples there; all
@@ -49,6 +50,8 @@ pub struct Supervision<T> {
     pub leap: [T; 6],
     /// Count of repeated samples, [`WRONG`](super::WRONG) each, at which they are a fault; 0 where they say nothing.
     pub repeats: u32,
+    /// What a sustained oscillation is told by.
+    pub steadiness: Steadiness<T>,
     /// The wiring check that arming ends with; none where the spec switches it off.
     pub wiring: Option<Wiring<T>>,
 }

@@ -12,6 +12,7 @@
 
 use core::fmt;
 
+use super::oscillation::Fallback;
 use crate::linear::component;
 use crate::real::{Real, saturate};
 use crate::snapshot::LARGEST;
@@ -80,11 +81,15 @@ pub enum Finding {
     Unexplained,
     /// The limits of the codes leave no room for the pulse.
     NoRoom,
+    /// Nothing of the check: what the law has fallen back to, for an oscillation.
+    Fallback(Fallback),
 }
 
 const UNEXPLAINED: u32 = 0x7fff;
 const NO_ROOM: u32 = 0x7ffe;
 const NOTHING: u32 = 0x7ffd;
+/// And a stage, 0 to 2.
+const FALLBACK: u32 = 0x7ff0;
 const SUBJECTS: u32 = 12;
 const FIRST_GAIN: u32 = 8;
 /// Largest gain that a word has, hundredths.
@@ -102,6 +107,8 @@ impl Finding {
             Self::Nothing => return NOTHING,
             Self::Unexplained => return UNEXPLAINED,
             Self::NoRoom => return NO_ROOM,
+            Self::Fallback(Fallback::None) => return 0,
+            Self::Fallback(stage) => return FALLBACK + stage.word() as u32,
             Self::Gauge(gauge, fault) => (gauge, fault),
             Self::Leg(leg, fault) => (6 + leg, fault),
         };
@@ -122,6 +129,11 @@ impl Finding {
             NOTHING => return Self::Nothing,
             NO_ROOM => return Self::NoRoom,
             _ => {}
+        }
+        if word > FALLBACK
+            && let Some(stage) = Fallback::from_word((word - FALLBACK) as u64)
+        {
+            return Self::Fallback(stage);
         }
         let (subject, kind) = ((word - 1) % SUBJECTS, (word - 1) / SUBJECTS);
         let fault = match kind {
@@ -156,6 +168,7 @@ impl fmt::Display for Finding {
             Self::Nothing => return f.write_str("no gauge shows any leg"),
             Self::Unexplained => return f.write_str("more than one fault of gauges or legs"),
             Self::NoRoom => return f.write_str("the code limits leave no room for the pulse"),
+            Self::Fallback(stage) => return f.write_str(stage.name()),
             Self::Gauge(gauge, fault) => ("gauge", gauge, fault),
             Self::Leg(leg, fault) => ("leg", leg, fault),
         };

@@ -18,6 +18,7 @@ const SIZES: Sizes = Sizes {
     pose: [5.0, 5.1, 5.2, 5.3, 5.4, 5.5],
     pose_rate: [6.0, 6.1, 6.2, 6.3, 6.4, 6.5],
     error: 7.0,
+    apart: [13.0, 13.1, 13.2, 13.3, 13.4, 13.5],
     wrench: [8.0, 8.1, 8.2, 8.3, 8.4, 8.5],
     leg: 9.0,
     leg_rate: 10.0,
@@ -182,9 +183,10 @@ fn every_word_of_a_supervisor_counts() {
         words = words.reals(1).whole(&[1]).reals(2).counters(3);
     }
     let words = words.whole(&[3]).counters(5);
-    // Samples, the wiring check, then the approach.
+    // Samples, the wiring check, the oscillation, then the approach.
     let words = words.reals(12).whole(&[1, 2, 1]).counters(6).whole(&[1, 0]);
-    let words = words.whole(&[2]).counters(1).reals(4 + 36 + 6 + 1).counters(1).whole(&[1]).whole(&[1]).reals(6);
+    let words = words.whole(&[2]).counters(1).reals(4 + 36 + 6 + 1).counters(1).whole(&[1]);
+    let words = words.whole(&[1]).reals(18 + 1).counters(14).whole(&[1]).reals(6);
     let fresh = Supervisor::<f64>::new();
     every_word_counts(&fresh, words, Supervisor::digest);
     let channels = 9 + TIMERS;
@@ -203,12 +205,17 @@ fn every_word_of_a_supervisor_counts() {
     let mut quiet = save(&fresh);
     quiet[leg - 1] = 1;
     assert_eq!(restore(&fresh, &quiet).err(), Some(Invalid { word: leg - 1 }), "quiet without two samples");
-    let [turned, response, gauges, least, approach] = [leg + 2, leg + 6, leg + 42, leg + 48, leg + 51];
+    let [turned, response, gauges, least, stage] = [leg + 2, leg + 6, leg + 42, leg + 48, leg + 51];
+    let approach = stage + 1 + 19 + 14;
     numbers_within(&fresh, (turned..response).chain([least]), 2.0);
     numbers_within(&fresh, response..gauges, LARGEST);
     numbers_within(&fresh, gauges..least, 8.0);
+    axes_within(&fresh, stage + 1, SIZES.apart);
+    axes_within(&fresh, stage + 7, SIZES.apart);
+    numbers_within(&fresh, stage + 13..stage + 20, 1e30);
     axes_within(&fresh, approach + 1, SIZES.user);
-    for (place, most) in [(0, 5), (1, 15), (2, 5), (end, 6), (leg, 6), (approach - 1, 1), (approach, 2)] {
+    let flags = [(stage - 1, 1), (stage, 2), (approach, 2)];
+    for (place, most) in [(0, 5), (1, 16), (2, 5), (end, 36), (leg, 6)].into_iter().chain(flags) {
         whole_within(&fresh, place, 0, most);
     }
 }

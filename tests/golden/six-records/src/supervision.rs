@@ -3,7 +3,7 @@
 
 //! What the supervisor takes for a fault; from `supervisor`.
 
-use specgen_runtime::supervisor::{Supervision, Wiring};
+use specgen_runtime::supervisor::{Steadiness, Supervision, Wiring};
 use crate::hysteresis::Memory;
 use crate::{Real, limits};
 
@@ -23,6 +23,18 @@ pub const SUPERVISION: Supervision<Real> = Supervision {
     tracking_samples: 84,
     leap: [5.770669e-6, 5.770669e-6, 5.770669e-6, 5.770669e-6, 5.770669e-6, 5.770669e-6],
     repeats: 0,
+    steadiness: Steadiness {
+        per_limit: [
+            25000000.0, 25000000.0, 25000000.0, 25000000.0, 25000000.0, 25000000.0,
+        ],
+        follow: 0.36389354,
+        motion: 2.7480564,
+        keep: 0.9933555,
+        keep_fallen: 0.9933555,
+        one_way: 9,
+        first: 25,
+        next: 83,
+    },
     wiring: Some(Wiring {
         ticks: 250,
         height: 415,

@@ -3,7 +3,7 @@
 
 //! What the supervisor takes for a fault; from `supervisor`.
 
-use specgen_runtime::supervisor::{Supervision, Wiring};
+use specgen_runtime::supervisor::{Steadiness, Supervision, Wiring};
 use crate::hysteresis::Memory;
 use crate::{Real, limits};
 
@@ -26,6 +26,18 @@ pub const SUPERVISION: Supervision<Real> = Supervision {
         5.770668736049107e-6, 5.770668736049107e-6,
     ],
     repeats: 0,
+    steadiness: Steadiness {
+        per_limit: [
+            25000000.0, 25000000.0, 25000000.0, 25000000.0, 25000000.0, 25000000.0,
+        ],
+        follow: 0.3638935415291299,
+        motion: 2.748056466728881,
+        keep: 0.9933555062550344,
+        keep_fallen: 0.9933555062550344,
+        one_way: 9,
+        first: 25,
+        next: 83,
+    },
     wiring: Some(Wiring {
         ticks: 250,
         height: 415,

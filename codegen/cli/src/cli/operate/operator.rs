@@ -51,8 +51,8 @@ pub struct Operator<P> {
     /// It ran, and another host, a fault or the emergency contact ended that.
     pub(super) was_stopped: bool,
     interrupted: &'static AtomicBool,
-    /// Phase and cause that were shown last.
-    shown: (u8, u8),
+    /// Phase, cause and finding that were shown last.
+    shown: (u8, u8, u16),
     /// A person looks at it: a fault is shown, and ends nothing.
     pub attended: bool,
     /// Done at every look, however long an order takes.
@@ -63,7 +63,7 @@ pub struct Operator<P> {
 
 impl<P: Port> Operator<P> {
     pub fn new(session: Session<P>, interrupted: &'static AtomicBool) -> Self {
-        let shown = (session.status().phase, session.status().cause);
+        let shown = (session.status().phase, session.status().cause, session.status().finding);
         Self {
             session,
             model: None,
@@ -165,7 +165,7 @@ impl<P: Port> Operator<P> {
     /// Shows a phase that is new.
     pub fn show(&mut self, ui: &Ui) {
         let status = self.session.status();
-        let now = (status.phase, status.cause);
+        let now = (status.phase, status.cause, status.finding);
         if now != self.shown {
             self.shown = now;
             ui.progress(&format!("tick {}: {}", status.tick, self.stands()));

@@ -82,8 +82,8 @@ struct Panel {
     lost: (u64, Instant),
     framed: Instant,
     stated: Instant,
-    /// Phase, cause and late ticks that were told last.
-    told: Option<(u8, u8, u32)>,
+    /// Phase, cause and finding that were told last; late ticks.
+    told: Option<((u8, u8, u16), u32)>,
     /// Late ticks that were not told yet, and when some were told last.
     late: (u32, Option<Instant>),
     /// An order is under way: what ends it is told as an error.
@@ -334,21 +334,21 @@ impl Panel {
     /// Tells how the machine stands, and what is new.
     fn say<P: Port>(&mut self, operator: &Operator<P>) {
         let status = operator.session.status();
-        let told = (status.phase, status.cause, status.late);
+        let told = ((status.phase, status.cause, status.finding), status.late);
         let said = said::stands(status, &self.compiled.ir.supervision, &self.compiled.model);
         if let Some(before) = self.told.replace(told) {
-            if (before.0, before.1) != (told.0, told.1) {
+            if before.0 != told.0 {
                 self.hall.note(
                     if said.kind == "ok" { "note" } else { said.kind },
                     &said.what,
                     said.advice,
                     said.code.as_deref(),
                 );
-                if u64::from(told.0) != Phase::Running.word() {
+                if u64::from(status.phase) != Phase::Running.word() {
                     self.wave = Value::Null;
                 }
             }
-            self.late.0 += told.2.saturating_sub(before.2);
+            self.late.0 += told.1.saturating_sub(before.1);
             if self.late.0 > 0 && self.late.1.is_none_or(|last| last.elapsed() >= LATE) {
                 let late = std::mem::take(&mut self.late.0);
                 let again = self.late.1.replace(Instant::now()).is_some();

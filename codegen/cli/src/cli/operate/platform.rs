@@ -362,6 +362,9 @@ impl<P: Port> Operator<P> {
             }
             (Phase::RampingDown, _) => "`wait disarmed`, or faulted".to_owned(),
             (Phase::Faulted, cause) => format!("mend the cause ({}), then `none`, `acknowledge`, `arm`", cause.name()),
+            (Phase::Running, Cause::Oscillation) => {
+                "it oscillated, and the law has fallen back: when that is mended, `none`, then `acknowledge`".to_owned()
+            }
             (Phase::Running, _) if status.status & STALE != 0 => {
                 "the stream has stopped: send set-points, or move".to_owned()
             }

@@ -27,6 +27,14 @@ const STUCK_MARGIN: f64 = 10.0;
 /// Of the stroke, without `supervisor.disagreement`.
 const DISAGREEMENT_SHARE: f64 = 0.2;
 
+/// Of the stroke, without `supervisor.disturbance`.
+const DISTURBANCE_SHARE: f64 = 1.0 / 1500.0;
+
+/// Without `supervisor.disturbance`, m; more where the gauges' noise makes more.
+pub(crate) fn disturbance(model: &Model) -> f64 {
+    DISTURBANCE_SHARE * model.actuator.stroke
+}
+
 /// Without `supervisor.stuck_motion`, m, for a gauge whose converter has such a `step`, m.
 pub(crate) fn stuck_motion(model: &Model, step: f64) -> f64 {
     let noise = model.sensor.noise;

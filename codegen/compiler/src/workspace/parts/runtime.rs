@@ -59,6 +59,7 @@ pub static PART: Part = Part {
         "src/supervisor/approach.rs",
         "src/supervisor/debounce.rs",
         "src/supervisor/kinds.rs",
+        "src/supervisor/oscillation.rs",
         "src/supervisor/phases.rs",
         "src/supervisor/sift.rs",
         "src/supervisor/supervision.rs",

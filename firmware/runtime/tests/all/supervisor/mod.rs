@@ -2,12 +2,13 @@
 //! steps to rest, debounce, approach.
 
 mod oracle;
+mod oscillation;
 mod sequences;
 mod sift;
 mod wiring;
 
 use specgen_runtime::GaugeConverter;
-use specgen_runtime::supervisor::{Approach, Cause, Debounce, Supervision, TIMED, toward};
+use specgen_runtime::supervisor::{Approach, Cause, Debounce, Steadiness, Supervision, TIMED, toward};
 
 const SUPERVISION: Supervision<f64> = Supervision {
     arm_ticks: 10,
@@ -24,6 +25,16 @@ const SUPERVISION: Supervision<f64> = Supervision {
     tracking_samples: 3,
     leap: [1.0; 6],
     repeats: 0,
+    steadiness: Steadiness {
+        per_limit: [0.0; 6],
+        follow: 0.2,
+        motion: 5.0,
+        keep: 0.997,
+        keep_fallen: 0.99,
+        one_way: 18,
+        first: 50,
+        next: 167,
+    },
     wiring: None,
 };
 

@@ -19,6 +19,10 @@ pub const ACKNOWLEDGE: u64 = 5;
 pub const EVENTS: [u64; 6] = [1, 2, 4, 8, 16, STALLED];
 pub const STALLED: u64 = 128;
 
+/// Which channel is looked at, tick by tick.
+const TURNS: [usize; 36] =
+    [2, 4, 0, 1, 5, 3, 1, 3, 5, 2, 4, 0, 4, 1, 0, 5, 2, 3, 3, 1, 2, 5, 0, 4, 2, 1, 3, 4, 0, 5, 5, 3, 4, 1, 2, 0];
+
 /// What the section of `bench` makes of a spec.
 #[derive(Debug, Clone)]
 pub struct Bounds {
@@ -261,8 +265,8 @@ impl Oracle {
     ) {
         self.seen.clear();
         self.concerned = 0;
-        let turn = self.turn;
-        self.turn = (turn + 1) % 6;
+        let turn = TURNS[self.turn];
+        self.turn = (self.turn + 1) % TURNS.len();
         let mut believed = true;
         for leg in 0..6 {
             let reading = readings[leg];

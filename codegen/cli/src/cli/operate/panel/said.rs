@@ -39,6 +39,10 @@ fn cause(cause: Cause) -> (&'static str, &'static str) {
         Cause::HostGone => ("The host was gone for too long.", "Check the link."),
         Cause::Wiring => ("Gauges or legs are not wired as the spec says.", "Mend it with the amplifiers off."),
         Cause::Stalled => ("The controller stood still.", "Was a debugger attached, or the computer suspended?"),
+        Cause::Oscillation => (
+            "The platform oscillates.",
+            "Look for a structural mode that the spec lacks, loose bolts, vibration of the floor. Then acknowledge.",
+        ),
     }
 }
 
@@ -61,6 +65,7 @@ pub fn mend(finding: Finding) -> &'static str {
         Finding::Nothing => "Check the supplies of amplifiers and gauges, and that stacks are connected.",
         Finding::Unexplained => "Check gauge by gauge and leg by leg, with the others unplugged.",
         Finding::NoRoom => "Widen `code_min` and `code_max`.",
+        Finding::Fallback(_) => cause(Cause::Oscillation).1,
     }
 }
 
@@ -74,6 +79,8 @@ fn limit(of: Cause, rules: &Supervision, model: &Model) -> Option<String> {
         Cause::TrackingError => Some(format!("limit {share:.0}\u{2009}% of the workspace")),
         Cause::MissedTick => Some(format!("limit {} in 1\u{2009}s", model.supervisor.missed_ticks)),
         Cause::Stalled => Some(format!("limit {} in a row", model.supervisor.missed_in_a_row)),
+        // The third axis is one of translation, or the third leg.
+        Cause::Oscillation => Some(format!("limit {:.0}\u{2009}nm", 1e9 / rules.steadiness.per_limit[2])),
         Cause::LinkLost => {
             Some(format!("limit {:.0}\u{2009}ms", f64::from(rules.host_ticks) * model.timing.period * 1e3))
         }
@@ -87,6 +94,8 @@ pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
     let phase = Phase::from_word(u64::from(status.phase));
     let of = Cause::from_word(u64::from(status.cause)).unwrap_or(Cause::None);
     let (what, mend) = match cause(of) {
+        (_, _) if of == Cause::None && matches!(finding, Finding::Fallback(_)) => (String::new(), mend(finding)),
+        (what, mend) if matches!(finding, Finding::Fallback(_)) => (format!("{what} Fallen back: {finding}."), mend),
         (what, _) if finding != Finding::None => {
             (format!("{what} The wiring check found: {}.", Named(finding, rules.alike())), mend(finding))
         }
@@ -103,7 +112,9 @@ pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
         Some(Phase::Arming) => said("note", "Arming. The wiring is checked, leg by leg.", "Run may be asked for now."),
         Some(Phase::Running) => {
             let bits = status.status & !BUSY;
-            let (kind, what, advice) = if bits & REFUSED != 0 {
+            let (kind, what, advice) = if of != Cause::None {
+                return said("error", &format!("Running. {what}"), mend);
+            } else if bits & REFUSED != 0 {
                 ("warning", "Running. The last command is refused.", "Hold, run, and move to where there is reach.")
             } else if bits & STALE != 0 {
                 ("warning", "Running. The stream of set-points has stopped.", "Move, or send set-points.")
@@ -117,6 +128,9 @@ pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
                 ("ok", "Running. Nothing to do.", "")
             };
             said(kind, what, advice)
+        }
+        Some(Phase::Holding) if of == Cause::None && matches!(finding, Finding::Fallback(_)) => {
+            said("warning", &format!("Holding. It oscillated; fallen back: {finding}."), mend)
         }
         Some(Phase::Holding) if of == Cause::None => said("note", "Holding. The law is suspended.", "Run goes on."),
         Some(Phase::Holding) => said("warning", &format!("Holding. {what}"), mend),

@@ -1,0 +1,83 @@
+//! A sustained oscillation: what noise, environment and motion explain of an error, and for how long it must last.
+
+use super::{CHANNELS, above, defaults, finding, whole};
+use crate::ir::{Scalar, Steadiness};
+use crate::lower::sensing::PoseNoise;
+use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::model::Model;
+
+/// Errors are looked at from here on, Hz: below it the feedback is at work.
+pub(crate) const LOWEST: f64 = 60.0;
+/// Times the noise (rms) of an axis that an oscillation must exceed at least.
+const NOISE_MARGIN: f64 = 6.0;
+/// Swing of the error that a swing of the set-point explains, as a part of it.
+const MOTION: f64 = 1.0;
+/// How long what was explained is held, as a time constant: times that of the slowest ring by the model, more where machines differ from it
+/// and close modes beat, less in a stage; and at least so long, s.
+const HELD: [f64; 2] = [8.0, 3.0];
+const SHORTEST_HELD: f64 = 0.06;
+/// Time that leads to the first stage, and from one to the next, s.
+const FIRST: f64 = 0.03;
+const NEXT: f64 = 0.1;
+/// Longest time that an oscillation goes one way, s: half a period of 45 Hz.
+const ONE_WAY: f64 = 0.011;
+const FEWEST_ONE_WAY: f64 = 3.0;
+/// Fewest samples.
+const FEWEST: f64 = 12.0;
+
+pub(super) fn lower(
+    model: &Model,
+    noise: Option<&PoseNoise>,
+    rings: f64,
+    scalar: Scalar,
+    findings: &mut Vec<Diagnostic>,
+) -> Steadiness {
+    let between = CHANNELS * model.timing.period;
+    let (arms, noise) = match noise {
+        Some(noise) => {
+            let radius = model.geometry.joint_radius();
+            ([1.0, 1.0, 1.0, radius, radius, radius], noise.pose)
+        }
+        None => ([1.0; 6], [model.sensor.noise; 6]),
+    };
+    let least = (0..6).fold(0.0, |most: f64, axis| {
+        let of_axis = NOISE_MARGIN * noise[axis] * arms[axis];
+        if of_axis > most { of_axis } else { most }
+    });
+    let usual = defaults::disturbance(model);
+    let disturbance = model.supervisor.disturbance.unwrap_or(if usual > least { usual } else { least });
+    if disturbance < least {
+        findings.push(finding(
+            model,
+            codes::SUPERVISOR_BOUND,
+            "disturbance",
+            format!(
+                "a disturbance of {:.4} nm is below what the gauges' noise makes of one axis, {:.4} nm",
+                disturbance * 1e9,
+                least * 1e9
+            ),
+            format!("write disturbance = \"{:.4} nm\" or more", above(least * 1e9)),
+        ));
+    }
+    let follow = 1.0 - libm::exp(-core::f64::consts::TAU * LOWEST * between);
+    let [keep, keep_fallen] = HELD.map(|times| {
+        let held = times * rings;
+        let held = if held > SHORTEST_HELD { held } else { SHORTEST_HELD };
+        libm::exp(-2.0 * model.timing.period / held)
+    });
+    let samples = |time: f64, fewest: f64| {
+        let samples = libm::round(time / between);
+        whole(if samples > fewest { samples } else { fewest })
+    };
+    let round = |value: f64| scalar.round(value);
+    Steadiness {
+        per_limit: arms.map(|arm| round(arm / disturbance)),
+        follow: round(follow),
+        motion: round(MOTION / follow),
+        keep: round(keep),
+        keep_fallen: round(keep_fallen),
+        one_way: samples(ONE_WAY, FEWEST_ONE_WAY),
+        first: samples(FIRST, FEWEST),
+        next: samples(NEXT, FEWEST),
+    }
+}
