@@ -36,6 +36,7 @@ mod app {
     use specgen_link::Endpoint;
     use specgen_stm32::cycles::{self, CYCLES};
     use specgen_stm32::enable::Stop;
+    use specgen_stm32::pins::Input;
     use specgen_stm32::serial::{Answer, Line, Ring};
     use specgen_stm32::watchdog::Watchdog;
     use specgen_stm32::{converters, serial, stack_used, supply, timer};
@@ -55,6 +56,7 @@ mod app {
         health: Health,
         watchdog: Watchdog,
         stop: Stop,
+        fault: Input,
         line: Line<Link>,
     }
 
@@ -106,18 +108,21 @@ mod app {
         let line = Line::open(&mut core.NVIC, hertz / 2, context.local.ring, context.local.answer);
         timer::start(&mut schedule);
         watchdog.feed();
-        (Shared { exchange, board }, Local { schedule, health: Health::new(), watchdog, stop: wiring.stop, line })
+        (
+            Shared { exchange, board },
+            Local { schedule, health: Health::new(), watchdog, stop: wiring.stop, fault: wiring.fault, line },
+        )
     }
 
     // One below the highest, which is the voltage detector's.
-    #[task(binds = TIM2, priority = 15, shared = [exchange, board], local = [schedule, health, watchdog, stop])]
+    #[task(binds = TIM2, priority = 15, shared = [exchange, board], local = [schedule, health, watchdog, stop, fault])]
     fn tick(context: tick::Context) {
         let local = context.local;
         let begin = timer::now();
         timer::acknowledge();
         let due = local.schedule.begin(begin);
         timer::arm(due.next);
-        let noticed = Noticed { missed: due.missed, stop: local.stop.is_open() };
+        let noticed = Noticed { missed: due.missed, stop: local.stop.is_open(), amplifier: local.fault.level() };
         (context.shared.exchange, context.shared.board).lock(|exchange, board| {
             if crate::specgen_tick(board, exchange, noticed) {
                 timer::restart(local.schedule);

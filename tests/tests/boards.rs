@@ -266,7 +266,7 @@ fn the_wiring_table_is_that_of_the_programs() {
         .take_while(|line| line.starts_with('|'))
         .map(|line| line.split('|').map(str::trim).collect())
         .collect();
-    assert_eq!(table.len(), 18);
+    assert_eq!(table.len(), 19);
     for (board, column) in [(&H743, 3), (&F446, 4)] {
         let source = repository().join("firmware").join(board.folder).join("src/pins.rs");
         let program = fs::read_to_string(source).unwrap();

@@ -54,13 +54,14 @@ struct Trial {
     cycles: bool,
 }
 
-/// `cargo xtask board SPEC [--target stm32h743|stm32f4] [--cycles | --faults]`, or `--tested [--faults]` for the images that the
+/// `cargo xtask board SPEC [--target stm32h743|stm32f4] [--cycles | --faults [NAME]]`, or `--tested [--faults]` for the images that the
 /// tests built; none if the arguments are something else.
 pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
-    let (arguments, with_faults, cycles) = match arguments {
-        [rest @ .., "--faults"] => (rest, true, false),
-        [rest @ .., "--cycles"] => (rest, false, true),
-        all => (all, false, false),
+    let (arguments, with_faults, fault, cycles) = match arguments {
+        [rest @ .., "--faults"] => (rest, true, None, false),
+        [rest @ .., "--faults", name] if faults::is_known(name) => (rest, true, Some(*name), false),
+        [rest @ .., "--cycles"] => (rest, false, None, true),
+        all => (all, false, None, false),
     };
     let (spec, target) = match *arguments {
         ["--tested"] => return Some(tested(root, with_faults)),
@@ -78,13 +79,17 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
         programs: built_in(root).join("release"),
         cycles,
     };
-    let mut report = Report::new(3 + usize::from(with_faults));
+    let mut report = Report::new(2 + usize::from(fault.is_none()) + usize::from(with_faults));
     report.step("the tool, the engine and specgen", || built(root, &[SPECGEN, TOOL]));
     report.step("the image", || image(&trial));
     if !report.has_failed() {
-        report.step("from boot to a record that replays", || outcome(run(&trial, false)));
-        if with_faults {
-            report.step("faults", || outcome(faults::run(&trial).and_then(|()| wiring::run(&trial))));
+        if let Some(name) = fault {
+            report.step("a fault", || outcome(faults::run(&trial, Some(name))));
+        } else {
+            report.step("from boot to a record that replays", || outcome(run(&trial, false)));
+            if with_faults {
+                report.step("faults", || outcome(faults::run(&trial, None).and_then(|()| wiring::run(&trial))));
+            }
         }
     }
     Some(report.finish())
@@ -110,7 +115,7 @@ pub fn long(root: &Path) -> Outcome {
     each(root, &[SPECGEN, TOOL], |trial| {
         run(trial, false)?;
         run(&Trial { cycles: true, ..trial.clone() }, false)?;
-        faults::run(trial)?;
+        faults::run(trial, None)?;
         wiring::run(trial)
     })
 }

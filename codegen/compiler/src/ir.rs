@@ -7,9 +7,10 @@ mod permitted;
 mod steadiness;
 mod task_space;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 pub use permitted::*;
+use specgen_language::model::FaultAction;
 use specgen_runtime::dynamics::Leg;
 use specgen_runtime::supervisor::TIMERS;
 use specgen_runtime::{Platform, Real};
@@ -387,6 +388,9 @@ pub struct Supervision {
     pub repeats: u32,
     /// What a sustained oscillation is told by.
     pub steadiness: Steadiness,
+    /// What a fault of an amplifier leads to.
+    #[serde(serialize_with = "word_of")]
+    pub amplifier_fault: FaultAction,
     /// The wiring check; none where the spec switches it off.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wiring: Option<Wiring>,
@@ -424,6 +428,10 @@ pub struct Wiring {
     pub unseen: Vec<u32>,
     /// Places by which the connectors of gauges and of legs may be turned at once without the check seeing it.
     pub turned: Vec<[usize; 2]>,
+}
+
+fn word_of<S: Serializer>(action: &FaultAction, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(action.word())
 }
 
 impl Supervision {
@@ -501,6 +509,6 @@ pub struct Integrity {
 }
 
 /// Words in hexadecimal: as numbers, readers that know `f64` alone would round them.
-fn as_hex<S: serde::Serializer>(words: &[u64], serializer: S) -> Result<S::Ok, S::Error> {
+fn as_hex<S: Serializer>(words: &[u64], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(words.iter().map(|word| format!("{word:#x}")))
 }

@@ -23,7 +23,7 @@ pub use electronics::{Actuator, Amplifier, Dac, Sensor};
 pub use hysteresis::{Adaptation, AdaptationMode, Hysteresis, LARGEST_RUN_INTERVAL, MAX_GRID, RateDependence};
 pub use mcu::{Mcu, Part};
 pub use mechanics::{Geometry, LARGEST_TRAVEL, LARGEST_TURN, LegBody, RigidBody, Workspace};
-pub use supervisor::{LARGEST_PULSE, LONGEST_TIMEOUT, LegMakes, Robust, Supervisor, WiringCheck};
+pub use supervisor::{FaultAction, LARGEST_PULSE, LONGEST_TIMEOUT, LegMakes, Robust, Supervisor, WiringCheck};
 pub use target::{Budget, ControllerOptions, Lint, Requirements, Scalar, SetpointKind, Target, Timing, TrackingLimit};
 pub(crate) use task_space::unit;
 pub use task_space::{

@@ -70,6 +70,7 @@ pub struct Running {
     health: Health,
     watchdog: IndependentWatchdog<'static, IWDG1>,
     stop: Input<'static>,
+    fault: Input<'static>,
 }
 
 /// The line to the host, served by the background.
@@ -115,8 +116,9 @@ pub fn start(
 
     let mut schedule = Schedule::new(PERIOD, 0);
     timer::start(&mut schedule)?;
-    let stop = Input::new(p.PB12, Pull::Up);
-    let running = Running { board, exchange, schedule, health: Health::new(), watchdog, stop };
+    // Contacts to ground: open is a stop, a fault of the amplifiers.
+    let (stop, fault) = (Input::new(p.PB12, Pull::Up), Input::new(p.PB13, Pull::Up));
+    let running = Running { board, exchange, schedule, health: Health::new(), watchdog, stop, fault };
     Some((running, Link { uart, endpoint: Endpoint::new(), desk: Desk::new(Stopwatch::NONE) }))
 }
 
@@ -158,7 +160,7 @@ impl Running {
         timer::acknowledge();
         let due = self.schedule.begin(begin);
         timer::arm(due.next);
-        let noticed = Noticed { missed: due.missed, stop: self.stop.is_high() };
+        let noticed = Noticed { missed: due.missed, stop: self.stop.is_high(), amplifier: self.fault.is_high() };
         if specgen_tick(&mut self.board, &mut self.exchange, noticed) {
             // It started the converters anew, which takes longer than a tick.
             timer::arm(self.schedule.restart(timer::now()));

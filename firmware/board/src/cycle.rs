@@ -2,7 +2,7 @@
 
 use controller::snapshot::record_after;
 use controller::supervised::{
-    CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, Request, STALLED, STOP,
+    AMPLIFIER, CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, Request, STALLED, STOP,
 };
 use controller::supervision::STALL_TICKS;
 use controller::{GAUGE_FAULT, Real, passes, sensing, triggers};
@@ -21,6 +21,8 @@ pub struct Noticed {
     pub missed: u32,
     /// The emergency stop is open.
     pub stop: bool,
+    /// An amplifier reports a fault, or its line is broken.
+    pub amplifier: bool,
 }
 
 /// The machine with its converters. Owned by the interrupt that ticks.
@@ -152,6 +154,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             (noticed.missed > 0, MISSED_TICK),
             (noticed.missed > STALL_TICKS, STALLED),
             (noticed.stop, STOP),
+            (noticed.amplifier, AMPLIFIER),
             (silence.tick(), LINK_LOST),
             (!self.intact, INTEGRITY),
             (!self.started, CONVERTER),
@@ -232,8 +235,10 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         self.show(report, 0);
         report.tick += 1;
         report.missed = report.missed.saturating_add(noticed.missed);
-        if noticed.stop {
-            report.health.events |= STOP;
+        for (happened, event) in [(noticed.stop, STOP), (noticed.amplifier, AMPLIFIER)] {
+            if happened {
+                report.health.events |= event;
+            }
         }
         if exchange.lockstep.as_mut().is_none_or(Silence::tick) {
             exchange.leave_lockstep(self.machine);

@@ -59,7 +59,7 @@ pub struct MachineInput {
     pub request: Request,
     /// What the target noticed since the last tick, as bits: [`MISSED_TICK`](supervisor::MISSED_TICK),
     /// [`LINK_LOST`](supervisor::LINK_LOST), [`INTEGRITY`](supervisor::INTEGRITY), [`CONVERTER`](supervisor::CONVERTER),
-    /// [`STOP`](supervisor::STOP), [`STALLED`](supervisor::STALLED).
+    /// [`STOP`](supervisor::STOP), [`AMPLIFIER`](supervisor::AMPLIFIER), [`STALLED`](supervisor::STALLED).
     pub events: u32,
 }
 

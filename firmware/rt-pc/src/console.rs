@@ -3,12 +3,12 @@
 
 use std::collections::VecDeque;
 
-use controller::supervised::{Phase, Request};
+use controller::supervised::Phase;
 use controller::waves::{self, Wave};
 use controller::{Config, GAUGE_FAULT, PLACE_WORDS, Real, passes};
 use specgen_link::{EdgeStatus, Health};
 use specgen_runtime::pass::Course;
-use specgen_runtime::pending::{self, AMPLIFIER, EDGE};
+use specgen_runtime::pending::{self, EDGE};
 use specgen_runtime::playback::Knot;
 use specgen_runtime::wave::Settings;
 
@@ -43,8 +43,6 @@ pub struct Console {
     pub health: Health,
     /// Stops that hosts asked for so far.
     pub stops: u64,
-    /// What the loop asks for when an amplifier reports a fault.
-    on_fault: Option<Request>,
     /// Settings that are in force once all orders are taken.
     config: Config,
     /// Events that were not yet reported over the link.
@@ -62,7 +60,7 @@ pub struct Console {
 
 impl Console {
     /// At the start, with the settings of the run.
-    pub fn new(operator: Operator, capture: Capture, config: Config, on_fault: Option<Request>) -> Self {
+    pub fn new(operator: Operator, capture: Capture, config: Config) -> Self {
         let health = Health::default();
         Self {
             operator,
@@ -74,7 +72,6 @@ impl Console {
             measured: None,
             health,
             stops: 0,
-            on_fault,
             config,
             events: 0,
             orders: VecDeque::new(),
@@ -87,16 +84,13 @@ impl Console {
 
     /// Takes what a tick gave, at this time, ns.
     pub fn update(&mut self, row: &Row, said: Said, now: u64) {
-        let was_on = self.said.replace(said).is_some_and(|said| said.on);
+        self.said = Some(said);
         self.place = row.place;
         self.ticked = Some(now);
         if said.status & GAUGE_FAULT == 0 {
             self.measured = Some(now);
         }
         self.events |= row.input.events & !EDGE;
-        if row.input.events & AMPLIFIER != 0 && was_on {
-            self.operator.amplifier_fault(self.on_fault, now);
-        }
         self.edge = row.edge;
         self.capture.update(row.recorded, row.triggered);
         let taken = |number: u32| said.orders.wrapping_sub(number).cast_signed() >= 0;

@@ -11,15 +11,15 @@ use core::sync::atomic::Ordering;
 use controller::sensing;
 use controller::snapshot::recorder;
 use controller::supervised::{
-    CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, Request, STALLED, STOP,
-    supervise,
+    AMPLIFIER, CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, STALLED,
+    STOP, supervise,
 };
 use controller::supervision::STALL_TICKS;
 use controller::{Config, LEGS, Real, place_words, triggers};
 use specgen_rt::account::{Account, Stamps};
 use specgen_rt::clock::{self, Usage};
 use specgen_rt::{allocation, scheduling};
-use specgen_runtime::pending::{AMPLIFIER, EDGE};
+use specgen_runtime::pending::EDGE;
 use specgen_runtime::supervisor::OF_GAUGES;
 
 use crate::devices::Device;
@@ -43,8 +43,6 @@ pub struct Timing {
     pub limit: u64,
     /// Ticks without a request after which a link is lost.
     pub silence: u64,
-    /// What a fault of an amplifier leads to: this request; none switches off at once.
-    pub on_fault: Option<Request>,
     /// Time waits for the loop: no tick is skipped, the next one is planned for when it can be. For machines that are simulated.
     pub elastic: bool,
 }
@@ -107,12 +105,11 @@ impl<D: Device> Loop<'_, D> {
             let contacts = self.device.beat();
             broken |= contacts.is_err();
             let contacts = contacts.unwrap_or_default();
+            if contacts.stop {
+                events |= STOP;
+            }
             if contacts.fault {
                 events |= AMPLIFIER;
-                setpoints.overrule(self.timing.on_fault);
-            }
-            if contacts.stop || contacts.fault && self.timing.on_fault.is_none() {
-                events |= STOP;
             }
             let mut rose = false;
             if triggers::INPUT {

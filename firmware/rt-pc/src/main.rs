@@ -132,7 +132,6 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
         period,
         limit: (period as f64 * options.late_after) as u64,
         silence: options.link_silence.map_or(u64::from(HOST_TICKS), |silence| silence.div_ceil(period)),
-        on_fault: options.comedi_fault,
         elastic: options.elastic,
     };
     // A host or a time ends it, not a fault.
@@ -158,7 +157,7 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
     });
     let record = record.transpose()?;
     let (capture, tape) = Capture::new(options.capture.as_deref()).map_err(environment)?;
-    let console = Console::new(operator, capture, config, options.comedi_fault);
+    let console = Console::new(operator, capture, config);
 
     let (inner, outer) = handover::rings(record.is_some());
     let shared = Shared::default();

@@ -318,20 +318,6 @@ impl Operator {
         Ok(())
     }
 
-    /// An amplifier reports a fault, and the loop asks for this already; nothing where it was switched off.
-    pub fn amplifier_fault(&mut self, request: Option<Request>, now: u64) {
-        let text = "an amplifier reported a fault".to_owned();
-        if !self.attended {
-            self.give_up(text, now);
-            return;
-        }
-        self.failure.get_or_insert(text);
-        let before = [Request::RampDown, Request::Hold];
-        if let Some(request) = request.filter(|_| !before.contains(&self.request) && !self.is_ending()) {
-            self.ask(request);
-        }
-    }
-
     /// A host asks: it has the orders, or slows the machine down.
     pub fn ask_by_link(&mut self, request: Request, host: HostId) {
         let rises = matches!(self.phase, Phase::Disarmed | Phase::Arming)

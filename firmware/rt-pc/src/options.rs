@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use controller::supervised::Request;
 use lexopt::prelude::*;
 use specgen_rt::clock::SECOND;
 
@@ -17,7 +16,6 @@ Machine
   --comedi-out DEVICE  a card of the amplifiers, once for each in order (default: that of the gauges)
   --comedi-range LOW:HIGH       voltages that the range of a gauge's input must hold (default -10:10)
   --comedi-out-range LOW:HIGH   voltages that the range of an amplifier's output must hold (default -10:10)
-  --comedi-fault ACTION         what a fault of an amplifier leads to: off (default), ramp-down or hold
   --assumed-ok         with --comedi: the machine may rest on what nobody measured: assumed values of the spec, simulated records
   --comedi-library FILE         another libcomedi than the system's
   --sim-timeout MS     how long a reading of the simulated machine may take before it counts as broken (default 20)
@@ -65,7 +63,6 @@ pub struct Options {
     pub comedi_ranges: [[f64; 2]; 2],
     pub comedi_library: Option<PathBuf>,
     /// What a fault of an amplifier leads to; none switches off at once.
-    pub comedi_fault: Option<Request>,
     /// A card may be driven by a controller that rests on assumptions.
     pub assumed_ok: bool,
     /// ns.
@@ -118,7 +115,6 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
         comedi_outputs: Vec::new(),
         comedi_ranges: [[-10.0, 10.0]; 2],
         comedi_library: None,
-        comedi_fault: None,
         assumed_ok: false,
         sim_timeout: 20_000_000,
         sim_edge_every: None,
@@ -152,16 +148,6 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
             Long("comedi-out") => options.comedi_outputs.push(parser.value()?.into()),
             Long("comedi-range") => options.comedi_ranges[0] = range(&mut parser, "--comedi-range")?,
             Long("comedi-out-range") => options.comedi_ranges[1] = range(&mut parser, "--comedi-out-range")?,
-            Long("comedi-fault") => {
-                options.comedi_fault = match parser.value()?.string()?.as_str() {
-                    "off" => None,
-                    "ramp-down" => Some(Request::RampDown),
-                    "hold" => Some(Request::Hold),
-                    found => {
-                        return Err(format!("--comedi-fault: expected off, ramp-down or hold, found `{found}`").into());
-                    }
-                }
-            }
             Long("comedi-library") => options.comedi_library = Some(parser.value()?.into()),
             Long("assumed-ok") => options.assumed_ok = true,
             Long("sim-timeout") => {
@@ -241,7 +227,6 @@ mod tests {
             ("--link-silence 0", "from 1 to 60000, found `0`"),
             ("--late-after 2", "from 0.01 to 1, found `2`"),
             ("--comedi-range 10:-10", "two voltages such as -10:10, found `10:-10`"),
-            ("--comedi-fault on", "expected off, ramp-down or hold, found `on`"),
             ("--cpu x", "cannot parse"),
             ("--elastic --comedi /dev/comedi0", "a real one does not wait"),
             ("now", "unexpected argument"),

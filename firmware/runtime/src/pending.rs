@@ -7,8 +7,6 @@ use crate::choice::choice;
 
 /// Bit of an event word, none of the supervisor's: the input line has risen in this tick.
 pub const EDGE: u32 = 32;
-/// Bit of an event word, as that: an amplifier reported a fault.
-pub const AMPLIFIER: u32 = 64;
 
 choice! {
     /// What became of the last order that was to wait.

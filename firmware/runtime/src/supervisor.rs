@@ -37,8 +37,8 @@ mod wiring;
 pub use approach::Approach;
 pub use debounce::Debounce;
 pub use kinds::{
-    CONVERTER, Cause, EVENTS, FIRST_EVENT, HOLDS, INTEGRITY, LINK_LOST, MISSED_TICK, OF_GAUGES, Phase, RAMPS_DOWN,
-    Request, STALLED, STOP, SWITCHES_OFF,
+    AMPLIFIER, CONVERTER, Cause, EVENTS, FIRST_EVENT, HOLDS, INTEGRITY, LINK_LOST, MISSED_TICK, OF_GAUGES, Phase,
+    RAMPS_DOWN, Reaction, Request, STALLED, STOP, SWITCHES_OFF,
 };
 pub use oscillation::{Fallback, Motion, Oscillation, Steadiness};
 pub use phases::Supervisor;

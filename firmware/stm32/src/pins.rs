@@ -94,6 +94,16 @@ impl OutputPin for Output {
 /// A pin that is read.
 pub struct Input(Pin);
 
+impl Input {
+    /// Whether it is high.
+    #[inline]
+    #[must_use]
+    pub fn level(&self) -> bool {
+        let Pin(port, number) = self.0;
+        port.idr().read().0 >> number & 1 == 1
+    }
+}
+
 impl ErrorType for Input {
     type Error = Infallible;
 }
@@ -101,8 +111,7 @@ impl ErrorType for Input {
 impl InputPin for Input {
     #[inline]
     fn is_high(&mut self) -> Result<bool, Infallible> {
-        let Pin(port, number) = self.0;
-        Ok(port.idr().read().0 >> number & 1 == 1)
+        Ok(self.level())
     }
 
     #[inline]

@@ -3,7 +3,7 @@
 use specgen_stm32::burst::Device;
 use specgen_stm32::converters::{ADC_MODE, AdcPins, DAC_MODE, DacPins, TriggerPins, trigger_pins};
 use specgen_stm32::enable::{self, Stop};
-use specgen_stm32::pins::{Pin, spi_bus};
+use specgen_stm32::pins::{Input, Pin, spi_bus};
 use specgen_stm32::pulses::Pulses;
 use specgen_stm32::serial::{self, Port};
 use stm32_metapac::gpio::vals::{Ospeedr, Pupdr};
@@ -34,6 +34,8 @@ pub struct Wiring {
     pub lines: TriggerPins,
     /// Emergency stop: a closed contact to ground, at the break input of TIM1; open is stop.
     pub stop: Stop,
+    /// Fault of an amplifier: closed to ground while all are well; open is a fault.
+    pub fault: Input,
 }
 
 /// Takes the pins; `hertz` is the clock of TIM4. The enable line comes first and is driven low: channel 2 of TIM1, with its break
@@ -67,6 +69,7 @@ pub fn take(hertz: u32) -> Wiring {
         },
         lines: trigger_pins([Pin(GPIOE, 7), Pin(GPIOE, 8), Pin(GPIOE, 10), Pin(GPIOE, 12)], Pin(GPIOE, 14)),
         stop,
+        fault: Pin(GPIOB, 11).input(Pupdr::PULL_UP),
     }
 }
 

@@ -197,6 +197,7 @@ impl Board {
             unmodelled: std::collections::BTreeSet::new(),
         };
         board.clocked();
+        board.contact();
         board
     }
 
@@ -243,7 +244,7 @@ impl Board {
         match fault {
             Fault::Adc(fault) => self.adc.fault = Some(fault),
             Fault::Dac(fault) => self.dacs[0].fault = Some(fault),
-            Fault::Stop => self.contact(),
+            Fault::Stop | Fault::Amplifier => self.contact(),
             Fault::HangStop => {
                 self.faults.extend([Fault::Hang, Fault::Stop]);
                 self.contact();
@@ -330,8 +331,10 @@ impl Board {
         }
     }
 
-    /// The emergency contact works on the enable line by itself.
+    /// The emergency contact works on the enable line by itself; that of the amplifiers is read.
     fn contact(&mut self) {
+        let open = self.has(Fault::Amplifier);
+        self.devices.gpio.contact(self.part.fault, open);
         self.devices.enable.contact(self.has(Fault::Stop));
         self.pins();
     }

@@ -7,6 +7,8 @@ use crate::{ad5686r, ad7606};
 pub enum Fault {
     /// The emergency contact opens.
     Stop,
+    /// An amplifier reports a fault: its contact opens.
+    Amplifier,
     Adc(ad7606::Fault),
     /// Of the first part.
     Dac(ad5686r::Fault),
@@ -35,8 +37,9 @@ pub enum Fault {
 }
 
 /// Names, for commands.
-pub const NAMES: [(&str, Fault); 19] = [
+pub const NAMES: [(&str, Fault); 20] = [
     ("stop", Fault::Stop),
+    ("amplifier", Fault::Amplifier),
     ("adc-dead", Fault::Adc(ad7606::Fault::Dead)),
     ("adc-endless", Fault::Adc(ad7606::Fault::Endless)),
     ("adc-shifted", Fault::Adc(ad7606::Fault::Shifted)),

@@ -32,6 +32,14 @@ impl Gpio {
         port.level = port.level & !(1 << pin) | u32::from(high) << pin;
     }
 
+    /// A contact from the pin to ground, closed or open.
+    pub fn contact(&mut self, pin: Pin, open: bool) {
+        self.drive(pin, false);
+        if open {
+            self.ports[pin.0].driven &= !(1 << pin.1);
+        }
+    }
+
     /// Whether the pin is an output.
     pub fn is_output(&self, (port, pin): Pin) -> bool {
         self.ports[port].settings[0] >> (2 * pin) & 3 == 1
@@ -99,5 +107,11 @@ mod tests {
         assert!(gpio.level((1, 5)));
         gpio.drive((1, 5), false);
         assert!(!gpio.level((1, 5)));
+        for open in [true, false, true] {
+            gpio.contact((1, 5), open);
+            assert_eq!(gpio.level((1, 5)), open, "pulled up");
+        }
+        gpio.write(0x40c, 0);
+        assert!(!gpio.level((1, 5)), "without a pull an open contact is low here");
     }
 }

@@ -47,6 +47,8 @@ pub struct Part {
     /// Triggers, in their order, and the input.
     pub triggers: [Pin; 4],
     pub input: Pin,
+    /// Fault of an amplifier.
+    pub fault: Pin,
 }
 
 /// Bits of [`Part::reset_cause`].
@@ -143,6 +145,7 @@ pub const H743: Part = Part {
     enable: ((E, 11), 2),
     triggers: [(E, 7), (E, 8), (E, 10), (E, 12)],
     input: (E, 14),
+    fault: (B, 11),
 };
 
 pub const F446: Part = Part {
@@ -196,4 +199,5 @@ pub const F446: Part = Part {
     enable: ((A, 8), 1),
     triggers: [(C, 0), (C, 1), (C, 2), (C, 3)],
     input: (C, 4),
+    fault: (B, 13),
 };

@@ -6,7 +6,8 @@ use specgen_tests::Emitted;
 use std::collections::BTreeMap;
 
 pub use super::oracle::{
-    ACKNOWLEDGE, ARM, ARMING, DISARMED, FAULTED, HOLD, HOLDING, NOTHING, RAMP_DOWN, RAMPING, RUN, RUNNING, STALLED,
+    ACKNOWLEDGE, AMPLIFIER, AMPLIFIER_FAULT, ARM, ARMING, DISARMED, FAULTED, HOLD, HOLDING, NOTHING, RAMP_DOWN,
+    RAMPING, RUN, RUNNING, STALLED,
 };
 
 /// Short times, so that a sequence gets somewhere; `timing.period` of the two kinds.
@@ -219,7 +220,12 @@ impl Bench {
             let step = (code - before).abs();
             assert!(step <= self.max_step, "tick {}: leg {leg} moves by {step} codes", self.tick);
         }
-        assert!(self.word.phase <= FAULTED && self.word.cause <= 16, "tick {}: {:?}", self.tick, self.word);
+        assert!(
+            self.word.phase <= FAULTED && self.word.cause <= AMPLIFIER_FAULT,
+            "tick {}: {:?}",
+            self.tick,
+            self.word
+        );
         let powered = matches!(self.word.phase, ARMING | RUNNING | HOLDING | RAMPING);
         assert_eq!(self.word.amplifier_on, powered, "tick {}: amplifiers", self.tick);
         // A platform in motion is first brought to rest.

@@ -26,6 +26,7 @@ fn causes_and_what_they_do_are_those_of_the_runtime() {
             bit if bit & SWITCHES_OFF != 0 => "switch off",
             bit if bit & RAMPS_DOWN != 0 => "ramp down",
             bit if bit & HOLDS != 0 => "hold",
+            _ if cause == Cause::AmplifierFault => "`amplifier_fault`: switch off, ramp down, or hold",
             _ => "nothing",
         };
         assert_eq!(row[4], action, "{name}");

@@ -24,7 +24,7 @@ pub fn run(bench: &mut Bench, seed: u64, sequences: u32, mut each: impl FnMut(&B
         let wrong = draw(4) == 0;
         let gauge = draw(6) as usize;
         let kind = draw(9);
-        let event = EVENTS[draw(6) as usize];
+        let event = EVENTS[draw(EVENTS.len() as u64) as usize];
         let away = [0, 0, 0, 3, 8, 12, 24, 24][draw(8) as usize];
         bench.frozen = [false; 6];
         bench.offset = [0.0; 6];
@@ -158,7 +158,7 @@ fn phases_and_causes_of_random_sequences_are_those_of_the_oracle() {
     let mut bench = Bench::new(Kind::Legs, &emitted, &[("setpoint_kind", 1.0), ("mode", 2.0)]);
     let max_step = i64::from(emitted.compiled.ir.defaults.max_step);
     let met = follow(&mut bench, Oracle::new(Bounds::legs()), max_step, sequences());
-    for cause in 1..=13 {
+    for cause in (1..=13).chain([AMPLIFIER_FAULT]) {
         assert!(met.iter().any(|(_, found)| *found == cause), "cause {cause} never came: {met:?}");
     }
 }
@@ -175,7 +175,7 @@ fn phases_and_causes_of_a_platform_are_those_of_the_oracle() {
     let bounds = Bounds::platform([x, y, z, a, b, c], model.sensor.range);
     // Fewer do not meet every cause.
     let met = follow(&mut bench, Oracle::new(bounds.clone()), max_step, 20_000);
-    for cause in [1, 4, 6, 8, 9, 10, 11, 12, 13] {
+    for cause in [1, 4, 6, 8, 9, 10, 11, 12, 13, AMPLIFIER_FAULT] {
         assert!(met.iter().any(|(_, found)| *found == cause), "cause {cause} never came: {met:?}");
     }
     // The comparison can fail: an oracle whose gauges are given a tick more is distinguished.

@@ -1,9 +1,11 @@
 //! Every cause in every phase: what it does, after how long, and how the machine is armed again.
 
 use super::bench::*;
+use specgen::model::FaultAction;
+use specgen_tests::Emitted;
 use std::collections::BTreeMap;
 
-const NAMES: [&str; 16] = [
+const NAMES: [&str; 18] = [
     "none",
     "gauge not finite",
     "gauge range",
@@ -20,6 +22,8 @@ const NAMES: [&str; 16] = [
     "host gone",
     "wiring",
     "stalled",
+    "",
+    "amplifier fault",
 ];
 
 /// What is wrong from now on, tick by tick, for one cause.
@@ -71,18 +75,21 @@ fn inject(bench: &mut Bench, cause: u8, tick: u32, request: u64) -> u8 {
         10 => bench.prepare(request, 4),
         11 => bench.prepare(request, 8),
         12 => bench.prepare(request, 16),
+        AMPLIFIER_FAULT => bench.prepare(request, AMPLIFIER),
         _ => bench.prepare(request, STALLED),
     }
     bench.step().phase
 }
 
 /// Where a cause leads from a phase, and the cause that is shown then; `None` if it changes nothing.
-fn expected(cause: u8, phase: u8) -> Option<(u8, u8)> {
-    let off = matches!(cause, 10 | 12);
-    let ramp = matches!(cause, 1..=4 | 11 | 15);
+/// `amplifier`: what the spec says of a fault of an amplifier.
+fn expected(cause: u8, phase: u8, amplifier: FaultAction) -> Option<(u8, u8)> {
+    let amplifier = (cause == AMPLIFIER_FAULT).then_some(amplifier);
+    let off = matches!(cause, 10 | 12) || amplifier == Some(FaultAction::Off);
+    let ramp = matches!(cause, 1..=4 | 11 | 15) || amplifier == Some(FaultAction::RampDown);
     match phase {
-        // Disarmed machines do not mind gauges or links: they only refuse to arm.
-        DISARMED => off.then_some((FAULTED, cause)),
+        // Disarmed machines do not mind gauges, links or amplifiers: they only refuse to arm.
+        DISARMED => (off && amplifier.is_none()).then_some((FAULTED, cause)),
         FAULTED => None,
         // From the first cause on: another one does not hide it.
         RAMPING => Some((FAULTED, cause)),
@@ -110,8 +117,13 @@ fn applies(kind: Kind, cause: u8, phase: u8) -> bool {
 
 fn table(kind: Kind) {
     let emitted = emitted(&format!("supervisor-table-{kind:?}").to_lowercase(), kind.spec(), &[]);
+    rows(kind, &emitted, (1..=12_u8).chain([15, AMPLIFIER_FAULT]));
+}
+
+fn rows(kind: Kind, emitted: &Emitted, causes: impl IntoIterator<Item = u8>) {
+    let amplifier = emitted.compiled.ir.supervision.amplifier_fault;
     let mut reached: BTreeMap<&str, String> = BTreeMap::new();
-    for cause in (1..=12_u8).chain([15]) {
+    for cause in causes {
         for phase in [DISARMED, ARMING, RUNNING, HOLDING, RAMPING, FAULTED] {
             if !applies(kind, cause, phase) {
                 continue;
@@ -127,7 +139,7 @@ fn table(kind: Kind) {
             if kind == Kind::Legs {
                 settings.push(("setpoint_kind", 1.0));
             }
-            let mut bench = Bench::new(kind, &emitted, &settings);
+            let mut bench = Bench::new(kind, emitted, &settings);
             bench.bring_to(phase);
             let request = match phase {
                 RUNNING => RUN,
@@ -143,7 +155,7 @@ fn table(kind: Kind) {
                 }
             }
             let what = format!("{kind:?}: {} in phase {phase}", NAMES[usize::from(cause)]);
-            match expected(cause, phase) {
+            match expected(cause, phase, amplifier) {
                 None => assert_eq!((ended, bench.word.cause), before, "{what}"),
                 Some(expected) => assert_eq!((ended, bench.word.cause), expected, "{what}"),
             }
@@ -154,7 +166,7 @@ fn table(kind: Kind) {
             recovers(&mut bench, &what);
         }
     }
-    println!("{kind:?}: ticks from the fault to what it does: {reached:?}");
+    println!("{kind:?}, {amplifier:?}: ticks from the fault to what it does: {reached:?}");
 }
 
 /// Times of [`super::bench`]'s section in ticks.
@@ -166,7 +178,7 @@ fn at_once_or_later(cause: u8, first: Option<u32>, kind: Kind, what: &str) {
         1 | 2 => assert_eq!(first, per_ms, "{what}"),
         // 3.6 ms of samples, from the first one of its channel on.
         4 => assert!((per_ms * 36 / 10 - 11..=per_ms * 36 / 10 + 12).contains(&first), "{what}: {first}"),
-        9 | 10 | 12 | 15 => assert_eq!(first, 0, "{what}"),
+        9 | 10 | 12 | 15 | AMPLIFIER_FAULT => assert_eq!(first, 0, "{what}"),
         8 => assert_eq!(first, 1, "{what}"),
         11 => assert_eq!(first, per_ms - 1, "{what}"),
         _ => assert!(first >= per_ms, "{what}: {first} is no debounce"),
@@ -227,6 +239,17 @@ fn every_cause_in_every_phase_of_a_platform() {
     table(Kind::Platform);
 }
 
+/// What a fault of an amplifier leads to where the spec says so; switching off, the default, is among every cause above.
+#[test]
+fn a_fault_of_an_amplifier_ramps_down_or_holds_as_the_spec_says() {
+    for (action, kind) in [("ramp-down", Kind::Platform), ("hold", Kind::Legs)] {
+        let line = format!("arm_time          = \"2 ms\"\namplifier_fault = \"{action}\"");
+        let emitted = emitted(&format!("supervisor-{action}"), kind.spec(), &[("arm_time          = \"2 ms\"", &line)]);
+        assert_eq!(emitted.compiled.ir.supervision.amplifier_fault.word(), action);
+        rows(kind, &emitted, [AMPLIFIER_FAULT]);
+    }
+}
+
 /// Without a request to arm that begins now, and with any condition, a machine stays disarmed.
 #[test]
 fn arming_takes_a_request_that_begins_and_a_machine_that_is_well() {
@@ -239,6 +262,10 @@ fn arming_takes_a_request_that_begins_and_a_machine_that_is_well() {
     }
     for _ in 0..20 {
         assert_eq!(bench.tick(ARM, 8).phase, DISARMED, "a converter that does not answer");
+    }
+    for _ in 0..20 {
+        assert_eq!(bench.tick(ARM, AMPLIFIER).phase, DISARMED, "an amplifier with a fault");
+        assert_eq!(bench.conditions(), 1 << 31);
     }
     assert_eq!(bench.tick(ARM, 0).phase, ARMING, "the request waits as long as it is given");
     bench.until(HOLDING, ARM);

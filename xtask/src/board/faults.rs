@@ -4,6 +4,7 @@ use std::process::Stdio;
 
 use specgen_compiler::compile;
 use specgen_compiler::ir::Ir;
+use specgen_language::model::FaultAction;
 
 use super::Trial;
 use super::session::{Host, Session};
@@ -37,6 +38,8 @@ struct Times {
     host: f64,
     /// To come to rest, and down from the highest code.
     down: f64,
+    /// What a fault of an amplifier leads to.
+    amplifier: FaultAction,
 }
 
 impl Times {
@@ -50,6 +53,7 @@ impl Times {
             gauge: gauge * period,
             host: (f64::from(supervision.host_ticks) + gone) * period,
             down: STOPS + steps * f64::from(supervision.ramp_every) * period,
+            amplifier: supervision.amplifier_fault,
         }
     }
 }
@@ -60,13 +64,18 @@ enum End {
     Off(fn(&Times) -> f64),
     /// Nothing: the host goes on.
     RunsOn,
+    /// What the spec says of a fault of an amplifier.
+    Amplifier,
+    /// The machine holds, amplifiers on, and goes on when it is asked to run anew.
+    Holds,
     /// Amplifiers off while the core is held, then a ramp and the fault that says so.
     Stalled,
 }
 
 /// Of a DAC some codes may happen to be what they ought to be: a count that leaks takes longer, here at most twice the time.
-const FAULTS: [(&str, End); 19] = [
+const FAULTS: [(&str, End); 20] = [
     ("stop", End::Off(|_| CONTACT)),
+    ("amplifier", End::Amplifier),
     ("adc-dead", End::Off(|times| times.gauge + times.down)),
     ("adc-endless", End::Off(|times| times.gauge + times.down)),
     ("adc-shifted", End::Off(|times| times.gauge + times.down)),
@@ -87,12 +96,17 @@ const FAULTS: [(&str, End); 19] = [
     ("brown-out", End::Off(|times| times.period)),
 ];
 
-/// Every fault on a machine of its own.
-pub fn run(trial: &Trial) -> Result<(), String> {
+/// Whether a fault has this name.
+pub fn is_known(name: &str) -> bool {
+    FAULTS.iter().any(|(known, _)| *known == name)
+}
+
+/// Every fault on a machine of its own, or the one of this name.
+pub fn run(trial: &Trial, only: Option<&str>) -> Result<(), String> {
     let compiled = compile::compile(&trial.spec).map_err(|_| format!("{} is refused", trial.spec.display()))?;
     let times = Times::of(&compiled.ir);
     let mut wrong = Vec::new();
-    for (name, end) in &FAULTS {
+    for (name, end) in FAULTS.iter().filter(|(name, _)| only.is_none_or(|only| only == *name)) {
         match one(trial, name, end, &times) {
             Ok(text) => println!("{} {name}: {text}", trial.target),
             Err(why) => wrong.push(format!("{name}: {why}")),
@@ -129,7 +143,25 @@ fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, St
             left -= STEP;
         }
     };
+    // Read once a tick.
+    let end = match (end, times.amplifier) {
+        (End::Amplifier, FaultAction::Off) => &End::Off(|times| 2.0 * times.period),
+        (End::Amplifier, FaultAction::RampDown) => &End::Off(|times| 2.0 * times.period + times.down),
+        (End::Amplifier, FaultAction::Hold) => &End::Holds,
+        (other, _) => other,
+    };
     let text = match end {
+        End::Amplifier => return Err("it has no end".to_owned()),
+        End::Holds => {
+            if let Some(took) = off(&mut session, RUNS_ON)? {
+                return Err(format!("amplifiers off after {took:.3} ms"));
+            }
+            host.order("run\nwait 0.1\nstatus", ": holding: amplifier fault, ")?;
+            session.command("heal")?;
+            session.pass(STEP)?;
+            host.order("hold\nrun\nwait running 60\nstatus", ": running, ")?;
+            "the machine holds, whatever is asked for; mended, it runs again".to_owned()
+        }
         End::Off(limit) => {
             let limit = limit(times);
             let took = off(&mut session, limit + STEP)?.ok_or(format!("amplifiers still on after {limit:.1} ms"))?;
@@ -180,6 +212,7 @@ fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, St
 fn told_of(name: &str) -> &'static str {
     match name {
         "hang" | "hard-fault" | "supply" => "reset cause: reset pin, watchdog\n",
+        "amplifier" => "faulted: amplifier fault, amplifiers off",
         "clock" => "reset cause: reset pin, watchdog, no external clock\n",
         "brown-out" => "reset cause: brown-out, reset pin\n",
         _ => "",

@@ -33,12 +33,13 @@ const REQUESTS: [(&str, u32); 6] = [
     ("ACKNOWLEDGE", Request::Acknowledge as u32),
 ];
 /// Bits of its events.
-const EVENTS: [(&str, u32); 6] = [
+const EVENTS: [(&str, u32); 7] = [
     ("MISSED_TICK", supervisor::MISSED_TICK),
     ("LINK_LOST", supervisor::LINK_LOST),
     ("INTEGRITY", supervisor::INTEGRITY),
     ("CONVERTER", supervisor::CONVERTER),
     ("STOP", supervisor::STOP),
+    ("AMPLIFIER", supervisor::AMPLIFIER),
     ("STALLED", supervisor::STALLED),
 ];
 /// Of the words that the caller's memory is made of, bytes.

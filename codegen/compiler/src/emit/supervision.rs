@@ -2,6 +2,7 @@
 
 use proc_macro2::TokenStream;
 use quote::quote;
+use specgen_language::model::FaultAction;
 
 use super::literal;
 use crate::ir::{Ir, RateModel};
@@ -52,6 +53,11 @@ pub fn emit(ir: &Ir) -> TokenStream {
             }
         }
     };
+    let amplifier_fault = match s.amplifier_fault {
+        FaultAction::Off => quote! { Off },
+        FaultAction::RampDown => quote! { RampDown },
+        FaultAction::Hold => quote! { Hold },
+    };
     let at_rest = at_rest(ir);
     let wiring = wiring(ir);
     let alike = s.wiring.iter().flat_map(|wiring| &wiring.alike).map(|set| counts_in(set));
@@ -60,7 +66,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     quote! {
         #![doc = " What the supervisor takes for a fault; from `supervisor`."]
 
-        use specgen_runtime::supervisor::{Steadiness, Supervision #uses};
+        use specgen_runtime::supervisor::{Reaction, Steadiness, Supervision #uses};
 
         use crate::hysteresis::Memory;
         use crate::{Real #limits};
@@ -91,6 +97,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
                 first: #first,
                 next: #next,
             },
+            amplifier_fault: Reaction::#amplifier_fault,
             wiring: #wiring,
         };
         /// Sets of single faults that look alike to the wiring check, as words of `Finding`.

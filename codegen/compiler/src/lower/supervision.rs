@@ -105,6 +105,7 @@ pub(super) fn lower(
         leap: leap.map(round),
         repeats: samples::repeats(model),
         steadiness,
+        amplifier_fault: spec.amplifier_fault,
         wiring,
         readings_per_leg: readings_per_leg.map(|rows| rows.map(|row| row.map(round))),
         approach_keep: round(libm::exp(-1.0 / f64::from(arm_ticks))),

@@ -47,12 +47,26 @@ section! {
         missed_ticks: u32 = integer(1, 1000), Default(3), "", 3;
         /// Missed ticks in a row, of which more are a fault that ramps down: codes and amplifiers were left alone for so long.
         missed_in_a_row: u32 = integer(1, 1000), Default(100), "", 100;
+        /// What happens when an amplifier reports a fault, or the wire of that line breaks: amplifiers off at once, a ramp down, or a hold.
+        amplifier_fault: FaultAction = one_of(FaultAction::WORDS), Default("off"), "" ["amplifier_alarm", "on_amplifier_fault"], "ramp-down";
         /// How long a host that has the orders may be silent until the machine holds, and until it ramps down and switches off.
         host_lost: Option<[f64; 2]> = list(&[SILENCE; 2]), Rule(r#"["100 ms", "10 s"]"#), "", ["100 ms", "10 s"];
     }
     and |fields, _table| {
         /// The check that arming ends with.
         wiring_check: WiringCheck = WiringCheck::read(fields, "supervisor.wiring_check")?;
+    }
+}
+
+choice! {
+    /// What a fault that the machine reports leads to.
+    FaultAction {
+        /// Amplifiers off at once.
+        Off = "off",
+        /// Voltages to rest, then amplifiers off.
+        RampDown = "ramp-down",
+        /// Voltages held.
+        Hold = "hold",
     }
 }
 

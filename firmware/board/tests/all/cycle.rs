@@ -9,8 +9,8 @@ use controller::hysteresis::{Memory, TABLES};
 use controller::limits::DAC;
 use controller::sensing;
 use controller::supervised::{
-    CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, Request, STALLED,
-    STOP, supervise,
+    AMPLIFIER, CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase,
+    Request, STALLED, STOP, supervise,
 };
 use controller::supervision::READINGS_PER_LEG;
 use controller::{Command, CommandKind, Config, INPUT_WORDS, Real, Target, TickInput};
@@ -160,7 +160,7 @@ fn a_board_does_what_the_controller_says_whatever_happens() {
     let (mut faults, mut enabled) = (0, 0);
     for tick in 0..20_000_u64 {
         let mut chance = |one_in: u32| random.next_u32() % one_in == 0;
-        let (gauge_fails, write_fails, stop) = (chance(50), chance(50), chance(200));
+        let (gauge_fails, write_fails, stop, amplifier) = (chance(50), chance(50), chance(200), chance(200));
         let missed = if chance(40) { 1 + random.next_u32() % 3 } else { 0 };
         let missed = if random.next_u32() % 1000 == 0 { 100 + random.next_u32() % 2 } else { missed };
         if random.next_u32() % 20 == 0 {
@@ -178,12 +178,16 @@ fn a_board_does_what_the_controller_says_whatever_happens() {
             bench.write_fault = write_fails.then_some(Fault::ReadBack);
         }
         let (orders, codes) = (exchange.orders, parts.0.borrow().codes);
-        let restarted = board.tick(&mut exchange, Noticed { missed, stop });
+        let restarted = board.tick(&mut exchange, Noticed { missed, stop, amplifier });
 
         let mut events = carried;
-        for (happened, event) in
-            [(gauge_fails, CONVERTER), (missed > 0, MISSED_TICK), (missed > 100, STALLED), (stop, STOP)]
-        {
+        for (happened, event) in [
+            (gauge_fails, CONVERTER),
+            (missed > 0, MISSED_TICK),
+            (missed > 100, STALLED),
+            (stop, STOP),
+            (amplifier, AMPLIFIER),
+        ] {
             events |= if happened { event } else { 0 };
         }
         let gauge = if gauge_fails { [Real::NAN; 6] } else { codes.map(|code| sensing::CONVERTER.reading(code >> 1)) };
@@ -318,7 +322,7 @@ fn a_converter_that_failed_names_the_cause_and_one_acknowledgement_is_enough_onc
             exchange.orders.request = request;
             for _ in 0..ticks {
                 exchange.silence.heard();
-                board.tick(exchange, Noticed { missed: 0, stop });
+                board.tick(exchange, Noticed { stop, ..Noticed::default() });
             }
         };
         run(&mut exchange, Request::Arm, ARMED, false);
@@ -359,7 +363,7 @@ fn a_machine_that_stood_still_ramps_down_and_its_record_says_so() {
         let (parts, mut board, mut exchange) = moving();
         let mut tick = |exchange: &mut Exchange, missed| {
             exchange.silence.heard();
-            board.tick(exchange, Noticed { missed, stop: false });
+            board.tick(exchange, Noticed { missed, ..Noticed::default() });
         };
         exchange.orders.request = Request::Arm;
         (0..ARMED).for_each(|_| tick(&mut exchange, 0));
@@ -372,6 +376,38 @@ fn a_machine_that_stood_still_ramps_down_and_its_record_says_so() {
         assert_eq!((exchange.report.phase, exchange.report.cause), (phase, cause), "{missed}");
         assert_eq!(parts.0.borrow().done.last() == Some(&Done::Enable(true)), cause == Cause::None, "{missed}");
     }
+}
+
+/// `supervisor.amplifier_fault` of this controller is "off".
+#[test]
+fn a_fault_of_an_amplifier_switches_off_in_its_tick_and_is_shown_until_it_is_gone() {
+    let (parts, mut board, mut exchange) = moving();
+    let mut run = |exchange: &mut Exchange, request: Request, ticks: u32, amplifier: bool| {
+        exchange.orders.request = request;
+        exchange.report.health.events = 0;
+        for _ in 0..ticks {
+            exchange.silence.heard();
+            board.tick(exchange, Noticed { amplifier, ..Noticed::default() });
+        }
+        let report = &exchange.report;
+        (report.phase, report.cause, report.health.events & AMPLIFIER != 0)
+    };
+    assert_eq!(
+        run(&mut exchange, Request::Arm, ARMED, true),
+        (Phase::Disarmed, Cause::None, true),
+        "it refuses to arm"
+    );
+    run(&mut exchange, Request::None, 1, false);
+    assert_eq!(run(&mut exchange, Request::Arm, ARMED, false), (Phase::Holding, Cause::None, false));
+    assert_eq!(parts.0.borrow().done.last(), Some(&Done::Enable(true)));
+    parts.0.borrow_mut().done.clear();
+    assert_eq!(run(&mut exchange, Request::Arm, 1, true), (Phase::Faulted, Cause::AmplifierFault, true));
+    assert!(!exchange.report.amplifier_on && parts.0.borrow().done.contains(&Done::Enable(false)));
+    assert!(!parts.0.borrow().done.contains(&Done::Enable(true)));
+    run(&mut exchange, Request::None, 20_000, true);
+    assert_eq!(run(&mut exchange, Request::Acknowledge, 100, true), (Phase::Faulted, Cause::AmplifierFault, true));
+    assert_eq!(run(&mut exchange, Request::None, 1, false), (Phase::Faulted, Cause::AmplifierFault, false));
+    assert_eq!(run(&mut exchange, Request::Acknowledge, 2, false), (Phase::Disarmed, Cause::None, false));
 }
 
 #[test]

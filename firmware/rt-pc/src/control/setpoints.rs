@@ -15,8 +15,6 @@ use crate::words::Command;
 pub struct Setpoints {
     command: Command,
     request: Request,
-    /// In place of it, until one comes that does not move the machine.
-    overruled: Option<Request>,
     wave: Wave,
     /// Set-points given by waves so far: a new wave goes on counting, or its first would look like an old one's last.
     sequence: u32,
@@ -32,7 +30,6 @@ impl Setpoints {
         Self {
             command: [0; COMMAND_WORDS],
             request: Request::None,
-            overruled: None,
             wave: Wave::new(waves::limits(config)),
             sequence: 0,
             waving: false,
@@ -48,12 +45,6 @@ impl Setpoints {
             self.command = command;
         }
         self.request = wish.request;
-        self.overruled.take_if(|_| !matches!(wish.request, Request::Arm | Request::Run));
-    }
-
-    /// Asks for this whatever is asked for; the service follows.
-    pub fn overrule(&mut self, request: Option<Request>) {
-        self.overruled = request.or(self.overruled);
     }
 
     /// The input line in a tick, as [`Pending::sense`].
@@ -106,10 +97,7 @@ impl Setpoints {
     }
 
     pub fn request(&self) -> Request {
-        match self.request {
-            Request::RampDown => Request::RampDown,
-            asked => self.overruled.unwrap_or(asked),
-        }
+        self.request
     }
 
     /// Begins a wave, in place of what waits for the edge, if none is under way. What it asks for was looked at when it was ordered, and is looked at again here.

@@ -4,7 +4,11 @@ use super::kinds::Cause;
 use super::supervision::{Supervision, TIMED, TIMERS};
 
 /// Causes that act in the tick in which they are seen.
-const AT_ONCE: u32 = Cause::LinkLost.bit() | Cause::Integrity.bit() | Cause::EmergencyStop.bit() | Cause::Stalled.bit();
+const AT_ONCE: u32 = Cause::LinkLost.bit()
+    | Cause::Integrity.bit()
+    | Cause::EmergencyStop.bit()
+    | Cause::Stalled.bit()
+    | Cause::AmplifierFault.bit();
 
 /// The bit of the condition that a cause waits for: its own, or that of the cause before it in time.
 const fn condition(cause: Cause) -> u32 {

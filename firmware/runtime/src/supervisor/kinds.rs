@@ -12,14 +12,18 @@ pub const INTEGRITY: u32 = 4;
 pub const CONVERTER: u32 = 8;
 /// Bit of an event word: emergency stop.
 pub const STOP: u32 = 16;
+/// Bit of an event word: an amplifier reports a fault.
+pub const AMPLIFIER: u32 = 64;
 /// Bit of an event word: more ticks in a row never came than the spec permits, `supervisor.missed_in_a_row`.
 pub const STALLED: u32 = 1 << (Cause::Stalled.word() - FIRST_EVENT);
-/// Bits of an event word that the supervisor looks at; the others are for records.
+/// Bits of an event word that are causes by [`FIRST_EVENT`]. [`AMPLIFIER`] is a cause as well; the other bits are for records.
 pub const EVENTS: u32 = MISSED_TICK | LINK_LOST | INTEGRITY | CONVERTER | STOP | STALLED;
-/// Bits of conditions that stand between those of causes.
-const BEYOND: u64 = 12;
 /// The cause of an event's bit is its number and this.
 pub const FIRST_EVENT: u64 = Cause::MissedTick.word();
+/// Bit of [`Cause::Oscillation`] in conditions, where bits 16 to 27 are taken by the gauges and legs concerned, 29 and 30 by the stage.
+pub(super) const OSCILLATION_CONDITION: u32 = 28;
+/// Bit of [`Cause::AmplifierFault`] in conditions.
+pub(super) const AMPLIFIER_CONDITION: u32 = 31;
 
 choice! {
     /// What the machine is doing.
@@ -105,12 +109,14 @@ choice! {
         Stalled = 15 => "stalled",
         /// The error goes on oscillating. While running it is the cause of what the law has fallen back to.
         Oscillation = 16 => "oscillation",
+        /// [`AMPLIFIER`]. The spec says what it leads to: [`Reaction`].
+        AmplifierFault = 17 => "amplifier fault",
     }
 }
 
 impl Cause {
     /// All but [`Cause::None`], in the order of their words.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::GaugeNotFinite,
         Self::GaugeRange,
         Self::GaugeStuck,
@@ -127,24 +133,43 @@ impl Cause {
         Self::Wiring,
         Self::Stalled,
         Self::Oscillation,
+        Self::AmplifierFault,
     ];
 
-    /// Its bit in conditions: 1 << word, and beyond 15, where gauges and legs stand, from bit 28 on.
+    /// Its bit in conditions: 1 << word, of those beyond 15 what gauges and legs leave.
     #[inline]
     #[must_use]
     pub const fn bit(self) -> u32 {
-        let word = self.word();
-        1 << if word < 16 { word } else { word + BEYOND }
+        match self {
+            Self::Oscillation => 1 << OSCILLATION_CONDITION,
+            Self::AmplifierFault => 1 << AMPLIFIER_CONDITION,
+            other => 1 << other.word(),
+        }
     }
 
     /// The cause of the lowest bit; none without any.
     pub(super) const fn of_lowest(bits: u32) -> Self {
-        let bit = bits.trailing_zeros() as u64;
-        match Self::from_word(if bit < 16 { bit } else { bit.saturating_sub(BEYOND) }) {
+        let word = match bits.trailing_zeros() {
+            OSCILLATION_CONDITION => Self::Oscillation.word(),
+            AMPLIFIER_CONDITION => Self::AmplifierFault.word(),
+            bit => bit as u64,
+        };
+        match Self::from_word(word) {
             Some(cause) if cause.bit() & bits != 0 => cause,
             _ => Self::None,
         }
     }
+}
+
+/// What a fault of an amplifier leads to; from `supervisor.amplifier_fault`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reaction {
+    /// Amplifiers off in that very tick.
+    Off,
+    /// Codes to rest, then amplifiers off.
+    RampDown,
+    /// Codes held.
+    Hold,
 }
 
 /// Causes that are about a gauge.
@@ -176,16 +201,18 @@ mod tests {
             assert_eq!(Phase::from_word(word).map(Phase::word), Some(word));
             assert_eq!(Request::from_word(word).word(), word);
         }
-        for word in 0..17 {
+        for word in 0..18 {
             assert_eq!(Cause::from_word(word).map(Cause::word), Some(word));
         }
         for (index, cause) in (1..).zip(Cause::ALL) {
             assert_eq!(cause.word(), index);
             assert_eq!(Cause::of_lowest(cause.bit()), cause);
         }
-        assert_eq!(Cause::of_lowest(0x2fff_0000), Cause::None, "gauges, legs, and what else stands there");
-        assert_eq!(Cause::Oscillation.bit(), 1 << 28);
-        assert_eq!((Phase::from_word(6), Cause::from_word(17)), (None, None));
+        for bits in [0, 1 << 16, 1 << 22, 1 << 29, 1 << 30, 0x6fff_0000] {
+            assert_eq!(Cause::of_lowest(bits), Cause::None, "gauges, legs, and what else stands there");
+        }
+        assert_eq!([Cause::Oscillation.bit(), Cause::AmplifierFault.bit()], [1 << 28, 1 << 31]);
+        assert_eq!((Phase::from_word(6), Cause::from_word(18)), (None, None));
         assert_eq!((Request::from_word(6), Request::from_word(u64::MAX)), (Request::Hold, Request::Hold));
     }
 

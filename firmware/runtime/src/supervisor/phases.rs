@@ -2,7 +2,9 @@
 
 use super::approach::Approach;
 use super::debounce::Debounce;
-use super::kinds::{Cause, EVENTS, FIRST_EVENT, HOLDS, Phase, RAMPS_DOWN, Request, SWITCHES_OFF};
+use super::kinds::{
+    AMPLIFIER, AMPLIFIER_CONDITION, Cause, EVENTS, FIRST_EVENT, HOLDS, Phase, RAMPS_DOWN, Request, SWITCHES_OFF,
+};
 use super::oscillation::{Fallback, Motion, Oscillation};
 use super::sift::{Activity, Sift};
 use super::supervision::Supervision;
@@ -31,8 +33,8 @@ crate::state! { |words|
         pub busy: bool = false, set;
         /// What the last tick showed of gauges and limits: bits of causes, and of channels.
         pub seen: u32 = 0, tally;
-        /// Conditions of the present tick: bits of causes, from bit 16 on the gauges or legs that they are about, from bit 22 on the
-        /// gauges whose words were replaced.
+        /// Conditions of the present tick: bits of causes (bit 31 for a fault of an amplifier), from bit 16 on the gauges or legs that
+        /// they are about, from bit 22 on the gauges whose words were replaced.
         pub conditions: u32 = 0, tally;
         /// Ticks without a condition while arming; ticks of a ramp.
         pub ticks: u32 = 0, tally;
@@ -78,7 +80,8 @@ impl<T: Real> Supervisor<T> {
     pub fn decide(&mut self, supervision: &Supervision<T>, request: Request, events: u32, at_rest: bool) -> bool {
         let begun = request != self.request;
         self.request = request;
-        let present = (self.seen & CAUSES) | self.watch.present | (events & EVENTS) << FIRST_EVENT;
+        let amplifier = (events & AMPLIFIER) << (AMPLIFIER_CONDITION - AMPLIFIER.trailing_zeros());
+        let present = (self.seen & CAUSES) | self.watch.present | (events & EVENTS) << FIRST_EVENT | amplifier;
         self.conditions = self.seen
             | present
             | self.watch.suspected() << FIRST_CHANNEL
@@ -97,15 +100,16 @@ impl<T: Real> Supervisor<T> {
     #[cold]
     #[inline(never)]
     fn change(&mut self, supervision: &Supervision<T>, begun: bool, present: u32, lasted: u32, at_rest: bool) -> bool {
-        if lasted & SWITCHES_OFF != 0 && self.phase != Phase::Faulted {
-            self.enter(Phase::Faulted, first(lasted & SWITCHES_OFF));
+        let off = lasted & supervision.switches_off(self.phase.is_powered());
+        if off != 0 && self.phase != Phase::Faulted {
+            self.enter(Phase::Faulted, Cause::of_lowest(off));
             return false;
         }
         match self.phase {
             Phase::Disarmed => self.disarmed(begun, present, at_rest),
             Phase::Arming => return self.arming(supervision, present, lasted),
-            Phase::Running => self.running(begun, lasted),
-            Phase::Holding => return self.holding(begun, present, lasted),
+            Phase::Running => self.running(supervision, begun, lasted),
+            Phase::Holding => return self.holding(supervision, begun, present, lasted),
             Phase::RampingDown => self.ramping_down(lasted, at_rest),
             Phase::Faulted => {
                 if self.request == Request::Acknowledge && begun && present == 0 && at_rest {
@@ -128,8 +132,8 @@ impl<T: Real> Supervisor<T> {
     }
 
     fn arming(&mut self, supervision: &Supervision<T>, present: u32, lasted: u32) -> bool {
-        if lasted & (RAMPS_DOWN | HOLDS) != 0 {
-            self.enter(Phase::RampingDown, first(lasted));
+        if lasted != 0 {
+            self.enter(Phase::RampingDown, Cause::of_lowest(lasted));
         } else if self.request == Request::RampDown {
             self.enter(Phase::RampingDown, Cause::None);
         } else if present != 0 {
@@ -148,17 +152,18 @@ impl<T: Real> Supervisor<T> {
         false
     }
 
-    fn running(&mut self, begun: bool, mut lasted: u32) {
+    fn running(&mut self, supervision: &Supervision<T>, begun: bool, mut lasted: u32) {
         if lasted & Cause::Oscillation.bit() != 0 && self.oscillation.fall_back() {
             self.cause = Cause::Oscillation;
             lasted &= !Cause::Oscillation.bit();
         }
-        if lasted & RAMPS_DOWN != 0 {
-            self.enter(Phase::RampingDown, first(lasted & RAMPS_DOWN));
+        let ramp = lasted & supervision.ramps_down();
+        if ramp != 0 {
+            self.enter(Phase::RampingDown, Cause::of_lowest(ramp));
         } else if self.request == Request::RampDown {
-            self.enter(Phase::RampingDown, first(lasted));
+            self.enter(Phase::RampingDown, Cause::of_lowest(lasted));
         } else if lasted != 0 || self.request == Request::Hold {
-            self.enter(Phase::Holding, first(lasted));
+            self.enter(Phase::Holding, Cause::of_lowest(lasted));
         } else if self.request == Request::Acknowledge && begun {
             self.recover();
         }
@@ -170,13 +175,14 @@ impl<T: Real> Supervisor<T> {
         self.cause = Cause::None;
     }
 
-    fn holding(&mut self, begun: bool, present: u32, lasted: u32) -> bool {
-        if lasted & RAMPS_DOWN != 0 {
-            self.enter(Phase::RampingDown, first(lasted & RAMPS_DOWN));
+    fn holding(&mut self, supervision: &Supervision<T>, begun: bool, present: u32, lasted: u32) -> bool {
+        let ramp = lasted & supervision.ramps_down();
+        if ramp != 0 {
+            self.enter(Phase::RampingDown, Cause::of_lowest(ramp));
             return false;
         }
         if self.cause == Cause::None {
-            self.cause = first(lasted);
+            self.cause = Cause::of_lowest(lasted);
         }
         match self.request {
             Request::RampDown => self.enter(Phase::RampingDown, self.cause),
@@ -193,7 +199,7 @@ impl<T: Real> Supervisor<T> {
 
     fn ramping_down(&mut self, lasted: u32, at_rest: bool) {
         if self.cause == Cause::None {
-            self.cause = first(lasted);
+            self.cause = Cause::of_lowest(lasted);
         }
         if at_rest {
             let phase = if self.cause == Cause::None { Phase::Disarmed } else { Phase::Faulted };
@@ -314,11 +320,6 @@ impl<T: Real> Supervisor<T> {
 
 /// Bits of all causes.
 const CAUSES: u32 = SWITCHES_OFF | RAMPS_DOWN | HOLDS;
-
-/// The cause of the lowest bit.
-fn first(bits: u32) -> Cause {
-    Cause::of_lowest(bits)
-}
 
 /// Gauge faults and limits as conditions.
 #[cold]

@@ -1,6 +1,6 @@
 //! What the spec fixes about the supervisor.
 
-use super::kinds::Cause;
+use super::kinds::{Cause, RAMPS_DOWN, Reaction, SWITCHES_OFF};
 use super::oscillation::Steadiness;
 use super::wiring::Wiring;
 
@@ -52,6 +52,24 @@ pub struct Supervision<T> {
     pub repeats: u32,
     /// What a sustained oscillation is told by.
     pub steadiness: Steadiness<T>,
+    /// What a fault of an amplifier leads to.
+    pub amplifier_fault: Reaction,
     /// The wiring check that arming ends with; none where the spec switches it off.
     pub wiring: Option<Wiring<T>>,
+}
+
+impl<T> Supervision<T> {
+    /// Causes that take the amplifiers off at once, where they are on or not (`powered`). A disarmed machine minds no amplifier: it refuses to arm.
+    pub(super) fn switches_off(&self, powered: bool) -> u32 {
+        SWITCHES_OFF | if powered { self.where_it_is(Reaction::Off) } else { 0 }
+    }
+
+    /// Causes that bring the codes to rest, then take the amplifiers off.
+    pub(super) fn ramps_down(&self) -> u32 {
+        RAMPS_DOWN | self.where_it_is(Reaction::RampDown)
+    }
+
+    fn where_it_is(&self, reaction: Reaction) -> u32 {
+        if self.amplifier_fault == reaction { Cause::AmplifierFault.bit() } else { 0 }
+    }
 }

@@ -5,8 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use specgen_hal::Fault;
 use specgen_link::{Health, reset_cause};
-use specgen_runtime::pending::AMPLIFIER;
-use specgen_runtime::supervisor::{Cause, EVENTS, FIRST_EVENT};
+use specgen_runtime::supervisor::{AMPLIFIER, Cause, EVENTS, FIRST_EVENT};
 
 use super::answer::MachineStatus;
 use super::located::Located;
@@ -61,7 +60,7 @@ impl From<Health> for Noticed {
         let timed = |times: Option<[u64; 2]>| times.filter(|_| health.clock > 0).map(|times| times.map(microseconds));
         let is_event = |cause: &Cause| u64::from(health.events & EVENTS) << FIRST_EVENT >> cause.word() & 1 == 1;
         let causes = Cause::ALL.into_iter().filter(is_event).map(Cause::name);
-        let amplifier = (health.events & AMPLIFIER != 0).then_some("amplifier fault");
+        let amplifier = (health.events & AMPLIFIER != 0).then_some(Cause::AmplifierFault.name());
         let kinds = Fault::ALL.into_iter().filter(|fault| health.faults & fault.bit() != 0);
         Self {
             events: health.events,

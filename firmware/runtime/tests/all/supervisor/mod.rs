@@ -8,7 +8,7 @@ mod sift;
 mod wiring;
 
 use specgen_runtime::GaugeConverter;
-use specgen_runtime::supervisor::{Approach, Cause, Debounce, Steadiness, Supervision, TIMED, toward};
+use specgen_runtime::supervisor::{Approach, Cause, Debounce, Reaction, Steadiness, Supervision, TIMED, toward};
 
 const SUPERVISION: Supervision<f64> = Supervision {
     arm_ticks: 10,
@@ -35,6 +35,7 @@ const SUPERVISION: Supervision<f64> = Supervision {
         first: 50,
         next: 167,
     },
+    amplifier_fault: Reaction::Off,
     wiring: None,
 };
 
@@ -96,7 +97,7 @@ fn conditions_become_causes_when_they_have_lasted() {
     // Three within a window of 100 ticks, not three that are further apart.
     assert_eq!(lasts(Cause::MissedTick, |tick| tick % 49 == 0), Some(98));
     assert_eq!(lasts(Cause::MissedTick, |tick| tick % 101 == 0), None);
-    for cause in [Cause::LinkLost, Cause::Integrity, Cause::EmergencyStop, Cause::Stalled] {
+    for cause in [Cause::LinkLost, Cause::Integrity, Cause::EmergencyStop, Cause::Stalled, Cause::AmplifierFault] {
         assert_eq!(lasts(cause, |_| true), Some(0), "{cause:?}");
     }
 }

@@ -15,9 +15,13 @@ pub const HOLD: u64 = 3;
 pub const RAMP_DOWN: u64 = 4;
 pub const ACKNOWLEDGE: u64 = 5;
 
-/// Missed tick, link lost, integrity, converter, stop, stalled.
-pub const EVENTS: [u64; 6] = [1, 2, 4, 8, 16, STALLED];
+/// Missed tick, link lost, integrity, converter, stop, stalled, fault of an amplifier.
+pub const EVENTS: [u64; 7] = [1, 2, 4, 8, 16, STALLED, AMPLIFIER];
 pub const STALLED: u64 = 128;
+pub const AMPLIFIER: u64 = 64;
+/// The cause of the last, and its bit in conditions.
+pub const AMPLIFIER_FAULT: u8 = 17;
+const AMPLIFIER_BIT: u8 = 31;
 
 /// Which channel is looked at, tick by tick.
 const TURNS: [usize; 36] =
@@ -38,6 +42,8 @@ pub struct Bounds {
     /// Of each axis, or of each leg: m, rad.
     pub tracking: [f64; 6],
     pub gauge_range: [f64; 2],
+    /// What a fault of an amplifier leads to.
+    pub amplifier: Act,
 }
 
 pub const DISAGREEMENT: f64 = 20e-6;
@@ -58,6 +64,7 @@ impl Bounds {
             gone_ticks: 6,
             tracking: [6e-6; 6],
             gauge_range: [-2e-6, 48e-6],
+            amplifier: Act::Off,
         }
     }
 
@@ -73,24 +80,26 @@ impl Bounds {
             gone_ticks: 11,
             tracking: workspace.map(|full| 0.1 * full),
             gauge_range,
+            amplifier: Act::Off,
+        }
+    }
+
+    fn act(&self, cause: u8) -> Act {
+        match cause {
+            10 | 12 => Act::Off,
+            1..=4 | 11 | 13 | 15 => Act::Ramp,
+            AMPLIFIER_FAULT => self.amplifier,
+            _ => Act::Hold,
         }
     }
 }
 
 /// What is done about a cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Act {
+pub enum Act {
     Hold,
     Ramp,
     Off,
-}
-
-fn act(cause: u8) -> Act {
-    match cause {
-        10 | 12 => Act::Off,
-        1..=4 | 11 | 13 | 15 => Act::Ramp,
-        _ => Act::Hold,
-    }
 }
 
 #[derive(Debug, Clone, Default)]
@@ -149,7 +158,7 @@ impl Oracle {
         let request = if request > 5 { HOLD } else { request };
         let new_request = std::mem::replace(&mut self.request, request) != request;
         let mut present = self.seen.clone();
-        for (bit, cause) in EVENTS.into_iter().zip([8, 9, 10, 11, 12, 15]) {
+        for (bit, cause) in EVENTS.into_iter().zip([8, 9, 10, 11, 12, 15, AMPLIFIER_FAULT]) {
             if events & bit != 0 {
                 present.push(cause);
             }
@@ -159,7 +168,9 @@ impl Oracle {
                 present.push(cause);
             }
         }
-        self.conditions = present.iter().fold(self.concerned << 16, |bits, cause| bits | 1 << cause);
+        self.conditions = present.iter().fold(self.concerned << 16, |bits, cause| {
+            bits | 1 << if *cause == AMPLIFIER_FAULT { AMPLIFIER_BIT } else { *cause }
+        });
         for (gauge, channel) in self.channels.iter().enumerate() {
             self.conditions |= u64::from(channel.present.contains(&true)) << (16 + gauge);
         }
@@ -181,9 +192,12 @@ impl Oracle {
             }
         }
         lasted.extend(present.iter().filter(|cause| matches!(cause, 9 | 10 | 12 | 15)));
+        // Amplifiers that are off anyway are not minded.
+        lasted.extend(present.iter().filter(|cause| **cause == AMPLIFIER_FAULT && self.phase != DISARMED));
         lasted.sort_unstable();
-        let strongest = lasted.iter().map(|cause| act(*cause)).max();
-        let first = |least: Act| lasted.iter().copied().find(|cause| act(*cause) >= least).unwrap_or(0);
+        let strongest = lasted.iter().map(|cause| self.bounds.act(*cause)).max();
+        let bounds = self.bounds.clone();
+        let first = |least: Act| lasted.iter().copied().find(|cause| bounds.act(*cause) >= least).unwrap_or(0);
         let well = present.is_empty();
 
         if strongest == Some(Act::Off) && self.phase != FAULTED {

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use specgen_runtime::supervisor::{Phase, Request, Sample, Supervision, Supervisor, toward};
+use specgen_runtime::supervisor::{Cause, Phase, Reaction, Request, Sample, Supervision, Supervisor, toward};
 
 use super::oracle::*;
 use crate::common::Random;
@@ -39,6 +39,11 @@ fn plan(bounds: &Bounds) -> Supervision<f64> {
         leap: [1.0; 6],
         repeats: 0,
         steadiness: super::SUPERVISION.steadiness,
+        amplifier_fault: match bounds.amplifier {
+            Act::Off => Reaction::Off,
+            Act::Ramp => Reaction::RampDown,
+            Act::Hold => Reaction::Hold,
+        },
         wiring: None,
     }
 }
@@ -166,8 +171,26 @@ impl World {
         ];
         let count = self.choose(&[0, 0, 0, 1, 1, 2, 4]);
         self.wrong = (0..count).map(|_| (self.below(6), self.choose(&kinds))).collect();
-        self.events =
-            self.choose(&[0, 0, 0, 0, 0, 0, 1, 2, 4, 8, 16, 31, STALLED, !EVENTS.iter().sum::<u64>() & 0xffff_ffff]);
+        let others = !EVENTS.iter().sum::<u64>() & 0xffff_ffff;
+        self.events = self.choose(&[
+            0,
+            0,
+            0,
+            0,
+            0,
+            0,
+            1,
+            2,
+            4,
+            8,
+            16,
+            31,
+            STALLED,
+            AMPLIFIER,
+            AMPLIFIER | 2,
+            AMPLIFIER | 8,
+            others,
+        ]);
         self.away = self.choose(&[2, 4, 12, 24, 72]);
         self.share = self.choose(&[1, 7]);
     }
@@ -254,12 +277,17 @@ fn follow(machine: &Bounds, oracle: Bounds, sequences: u32) -> Result<BTreeSet<(
 
 #[test]
 fn phases_causes_and_conditions_of_random_sequences_are_those_of_the_oracle() {
-    for bounds in [Bounds::legs(), platform_bounds()] {
+    for bounds in [
+        Bounds::legs(),
+        platform_bounds(),
+        Bounds { amplifier: Act::Ramp, ..Bounds::legs() },
+        Bounds { amplifier: Act::Hold, ..Bounds::legs() },
+    ] {
         let met = follow(&bounds, bounds.clone(), 6000).unwrap();
         for phase in DISARMED..=FAULTED {
             assert!(met.iter().any(|(found, _)| *found == phase), "phase {phase} never came");
         }
-        for cause in (0..=13).chain([15]) {
+        for cause in (0..=13).chain([15, AMPLIFIER_FAULT]) {
             assert!(met.iter().any(|(_, found)| *found == cause), "cause {cause} never came: {met:?}");
         }
         assert!(met.len() > 30, "{met:?}");
@@ -270,7 +298,7 @@ fn phases_causes_and_conditions_of_random_sequences_are_those_of_the_oracle() {
 fn an_oracle_of_any_other_time_or_bound_is_told_apart() {
     let bounds = Bounds::legs();
     type Change = (&'static str, fn(&mut Bounds));
-    let changes: [Change; 8] = [
+    let changes: [Change; 10] = [
         ("arm", |bounds| bounds.arm_ticks += 1),
         ("gauge", |bounds| bounds.gauge_ticks += 1),
         ("voltage", |bounds| bounds.voltage_ticks += 1),
@@ -279,11 +307,59 @@ fn an_oracle_of_any_other_time_or_bound_is_told_apart() {
         ("second", |bounds| bounds.ticks_per_second = 3),
         ("host", |bounds| bounds.gone_ticks += 1),
         ("tracking", |bounds| bounds.tracking[4] *= 1.01),
+        ("amplifier", |bounds| bounds.amplifier = Act::Ramp),
+        ("amplifier held", |bounds| bounds.amplifier = Act::Hold),
     ];
     for (what, change) in changes {
         let mut other = bounds.clone();
         change(&mut other);
         assert!(follow(&bounds, other, 6000).is_err(), "{what}");
+    }
+}
+
+/// A fault of an amplifier in every phase, with each reaction: phase and cause of the same tick, and the cause kept while it goes on.
+#[test]
+fn a_fault_of_an_amplifier_does_in_its_tick_what_the_spec_says() {
+    use Phase::*;
+    let fault = Cause::AmplifierFault;
+    for (reaction, running, holding, rising, falling) in [
+        (Act::Off, Faulted, Faulted, Faulted, Faulted),
+        (Act::Ramp, RampingDown, RampingDown, RampingDown, RampingDown),
+        (Act::Hold, Holding, Holding, RampingDown, RampingDown),
+    ] {
+        let plan = plan(&Bounds { amplifier: reaction, ..Bounds::legs() });
+        for (phase, then, cause) in [
+            (Disarmed, Disarmed, Cause::None),
+            (Arming, rising, fault),
+            (Running, running, fault),
+            (Holding, holding, fault),
+            (RampingDown, falling, fault),
+        ] {
+            for events in [64, 64 | 32] {
+                let mut supervisor = Supervisor::<f64>::new();
+                supervisor.phase = phase;
+                assert!(!supervisor.decide(&plan, Request::None, events, false));
+                assert_eq!((supervisor.phase, supervisor.cause), (then, cause), "{reaction:?} {phase:?}");
+                assert_eq!(supervisor.conditions, 1 << 31, "{reaction:?} {phase:?}");
+                // Neither a request to run nor to arm changes that while the fault is there.
+                for request in [Request::Arm, Request::Run] {
+                    supervisor.decide(&plan, request, events, false);
+                    assert_eq!(
+                        (supervisor.phase, supervisor.cause),
+                        (then, cause),
+                        "{reaction:?} {phase:?} {request:?}"
+                    );
+                }
+            }
+            let mut supervisor = Supervisor::<f64>::new();
+            supervisor.phase = phase;
+            supervisor.decide(&plan, Request::None, 32, false);
+            assert_eq!(
+                (supervisor.cause, supervisor.conditions),
+                (Cause::None, 0),
+                "an edge of the input line is no fault"
+            );
+        }
     }
 }
 

@@ -38,6 +38,9 @@ fn cause(cause: Cause) -> (&'static str, &'static str) {
         Cause::EmergencyStop => ("The hardware stop is pressed.", "Release it when it is safe."),
         Cause::HostGone => ("The host was gone for too long.", "Check the link."),
         Cause::Wiring => ("Gauges or legs are not wired as the spec says.", "Mend it with the amplifiers off."),
+        Cause::AmplifierFault => {
+            ("An amplifier reports a fault.", "Look at the amplifiers, then at the cable of their fault line.")
+        }
         Cause::Stalled => ("The controller stood still.", "Was a debugger attached, or the computer suspended?"),
         Cause::Oscillation => (
             "The platform oscillates.",
