@@ -2,7 +2,6 @@
 
 mod bit_identity;
 mod board_link;
-mod board_samples;
 mod board_support;
 mod boards;
 mod budgets;

@@ -28,6 +28,7 @@ const GENERATED: &[Generated] = &[
     Generated { folder: "specs/records", whole: true, make: make::records },
     Generated { folder: "specs", whole: false, make: make::schema },
     Generated { folder: "firmware/controller", whole: true, make: make::reference_controller },
+    Generated { folder: "firmware/board/tests/passes/controller/src", whole: true, make: make::controller_with_passes },
     Generated { folder: "tests/golden", whole: true, make: make::goldens },
     // Last: it names lines of the emitted files above.
     Generated { folder: "docs", whole: false, make: make::docs },

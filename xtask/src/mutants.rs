@@ -24,8 +24,17 @@ struct Group {
     bar: usize,
 }
 
-const GROUPS: [Group; 2] = [
+const GROUPS: [Group; 4] = [
     Group { package: "specgen-runtime", arguments: [&[], &["--tests"]], one_in: 32, bar: 90 },
+    // Twice: with the reference's controller, and with one that takes a correction and has an input line.
+    Group {
+        package: "specgen-board",
+        arguments: [&["--test-package", "specgen-board,specgen-board-passes"], &["--tests"]],
+        one_in: 8,
+        bar: 90,
+    },
+    // Without the test that builds it once more, for a proof about its text.
+    Group { package: "specgen-link", arguments: [&[], &["--tests", "--", "--skip", "panic_free"]], one_in: 4, bar: 90 },
     // Only `lower`, `stability` and `lint` of it. Of cargo's own arguments, for the build too: the library alone, not once more for others.
     Group { package: "specgen-compiler", arguments: [&["--cargo-arg=--lib"], &[]], one_in: 40, bar: 85 },
 ];

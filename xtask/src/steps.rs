@@ -71,7 +71,7 @@ const FORMATTED_ALONE: [&str; 12] = [
     BOARDS[1],
 ];
 /// Members of the workspace that people write.
-const HAND_WRITTEN: [&str; 20] = [
+const HAND_WRITTEN: [&str; 21] = [
     "specgen",
     "specgen-cycles",
     "specgen-numerics",
@@ -86,6 +86,7 @@ const HAND_WRITTEN: [&str; 20] = [
     "specgen-hal",
     "specgen-link",
     "specgen-board",
+    "specgen-board-passes",
     "specgen-rt",
     "host-sim",
     "plant-unit",
@@ -93,6 +94,10 @@ const HAND_WRITTEN: [&str; 20] = [
     "specgen-tests",
     "xtask",
 ];
+
+/// Members of the workspace that specgen emits and formats.
+#[cfg(test)]
+const EMITTED: [&str; 2] = ["controller", "controller-with-passes"];
 
 /// `cargo xtask setup`
 pub fn setup() -> ExitCode {
@@ -315,7 +320,8 @@ mod tests {
             let text = fs::read_to_string(crate::root().join(path)).unwrap();
             text.lines().find_map(|line| line.strip_prefix("name = ")).unwrap().trim_matches('"').to_owned()
         };
-        let names: BTreeSet<String> = members.iter().map(name).filter(|name| name != "controller").collect();
+        let names: BTreeSet<String> =
+            members.iter().map(name).filter(|name| !EMITTED.contains(&name.as_str())).collect();
         assert_eq!(names, HAND_WRITTEN.into_iter().map(str::to_owned).collect());
     }
 }

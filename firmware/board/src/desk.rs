@@ -310,7 +310,8 @@ impl Visit<'_, '_> {
     #[inline(never)]
     fn knots(&mut self, first: u32, knots: Bytes<'_>) -> Reply<'static> {
         let Some(given) = knots.knots().filter(|given| given.len() <= KNOTS) else {
-            return Reply::Refused(Refusal::Message);
+            // Not as a message that nobody can read, whose number is used again.
+            return Reply::Refused(Refusal::Length { expected: (KNOTS * KNOT / size_of::<u64>()) as u16 });
         };
         let (mut taken, count) = ([[0; 6]; KNOTS], given.len());
         for (slot, knot) in taken.iter_mut().zip(given) {

@@ -22,7 +22,7 @@ pub const MACHINE_INPUT_NAMES: [&str; MACHINE_INPUT_WORDS] = followed(&INPUT_NAM
 
 /// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16 | finding of the wiring check, or what the law has fallen back to << 17;
 /// `conditions` has bit 1 << cause for each cause that is present, whether it has lasted or not, from bit 16 on the gauges or legs concerned, from
-/// bit 22 on the gauges whose words were replaced by predictions; bit 28 is cause 16, from bit 29 on stands how far the law has fallen back, see
+/// bit 22 on the gauges whose words were replaced by predictions; bit 28 is cause 16, bits 29 and 30 say how far the law has fallen back, bit 31 is cause 17, see
 /// [`Fallback`](supervisor::Fallback).
 pub const MACHINE_OUTPUT_NAMES: [&str; MACHINE_OUTPUT_WORDS] = followed(&OUTPUT_NAMES, ["supervisor", "conditions"]);
 

@@ -7,7 +7,7 @@ pub use crate::machine::{
     MachineOutput, Supervisor, machine_output_words,
 };
 pub use specgen_runtime::supervisor::{
-    CONVERTER, Cause, Fallback, Finding, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, SAMPLE_REPEATED,
+    AMPLIFIER, CONVERTER, Cause, Fallback, Finding, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, SAMPLE_REPEATED,
     SAMPLE_REPLACED, STALLED, STOP,
 };
 

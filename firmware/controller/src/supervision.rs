@@ -3,7 +3,7 @@
 
 //! What the supervisor takes for a fault; from `supervisor`.
 
-use specgen_runtime::supervisor::{Steadiness, Supervision, Wiring};
+use specgen_runtime::supervisor::{Reaction, Steadiness, Supervision, Wiring};
 use crate::hysteresis::Memory;
 use crate::{Real, limits};
 
@@ -36,6 +36,7 @@ pub const SUPERVISION: Supervision<Real> = Supervision {
         first: 50,
         next: 167,
     },
+    amplifier_fault: Reaction::Off,
     wiring: Some(Wiring {
         ticks: 500,
         height: 415,

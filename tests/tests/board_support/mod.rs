@@ -16,8 +16,8 @@ use controller::supervision::READINGS_PER_LEG;
 use controller::{PLACE_WORDS, Real, place_words};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen_board::{Board, Desk, Exchange, Kept, Noticed, SampleMemory, Stopwatch, Visit, catch_up, gather};
-use specgen_hal::{Amplifiers, Fault, Gauges};
+use specgen_board::{Board, Desk, Exchange, Kept, Noticed, SampleMemory, Stopwatch, Visit, catch_up, gather, learn};
+use specgen_hal::{Amplifiers, Fault, Gauges, Lines};
 use specgen_link::Endpoint;
 use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::{Refusal, Reply, Request};
@@ -35,6 +35,12 @@ pub struct State {
     pub enabled: bool,
     /// Times that the amplifiers were switched on.
     pub switched_on: u32,
+    /// The input line.
+    pub input: bool,
+    /// The input line does not answer.
+    pub input_fails: bool,
+    /// The output lines, bit by bit.
+    pub lines: u32,
 }
 
 impl Gauges for Parts {
@@ -66,8 +72,27 @@ impl Amplifiers for Parts {
     }
 }
 
+/// As many as any controller of these tests has.
+impl Lines for Parts {
+    const COUNT: usize = 1;
+    const INPUT: bool = true;
+
+    fn set(&mut self, high: u32) -> Result<(), Fault> {
+        self.0.borrow_mut().lines = high;
+        Ok(())
+    }
+
+    fn input(&mut self) -> Result<bool, Fault> {
+        let state = self.0.borrow();
+        if state.input_fails { Err(Fault::Pin) } else { Ok(state.input) }
+    }
+}
+
+/// Most knots of a pass.
+pub const KNOTS_OF_A_PASS: usize = 64;
+
 pub struct Rig {
-    pub board: Board<'static, Parts, Parts>,
+    pub board: Board<'static, Parts, Parts, Parts>,
     pub exchange: Exchange,
     pub parts: Parts,
     desk: Desk,
@@ -96,10 +121,11 @@ impl Line {
     pub fn new(record: usize) -> Self {
         let parts = Parts::default();
         let machine = Box::leak(Box::new(Machine::new()));
-        let mut board = Board::new(parts.clone(), parts.clone(), machine, true);
+        let mut board = Board::with_lines(parts.clone(), parts.clone(), parts.clone(), machine, true);
         let mut exchange = Exchange::new();
         exchange.record(Box::leak(vec![0; record].into_boxed_slice()), Box::leak(Box::new(Kept::new())));
         exchange.show(Box::leak(Box::new(SampleMemory::new())), 921_600);
+        exchange.play(Box::leak(vec![[0; 6]; 2 * KNOTS_OF_A_PASS].into_boxed_slice()));
         board.start(&mut exchange.report);
         exchange.prepare();
         Self(Rc::new(RefCell::new(Rig {
@@ -152,6 +178,7 @@ impl Rig {
         catch_up(&mut |action| action(exchange, board.machine_mut()), || true);
         if !self.busy {
             gather(&mut |action| action(exchange, board.machine_mut()));
+            learn(&mut |action| action(exchange, board.machine_mut()));
         }
         if let Some(shown) = &mut self.shown {
             let report = &self.exchange.report;

@@ -4,9 +4,9 @@ use super::{Files, trace};
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
-use specgen_compiler::compile::{Compiled, compile};
+use specgen_compiler::compile::{Compiled, Refused, compile, compile_source};
 use specgen_compiler::{emit, settings, workspace};
-use specgen_language::{diagnostic, spec};
+use specgen_language::{SpecSource, diagnostic, spec};
 use std::path::Path;
 
 /// Seed of the gauge noise in the committed records.
@@ -65,6 +65,41 @@ pub fn reference_controller(root: &Path) -> Result<Files, String> {
     Ok(emit::emit(&compiled(&root.join("specs/reference.toml"))?.ir))
 }
 
+/// The reference with a correction, a line for a trigger and an input line, for the tests of the boards' common part: files that differ from
+/// [`reference_controller`], and a root that takes the others from there.
+pub fn controller_with_passes(root: &Path) -> Result<Files, String> {
+    let path = root.join("specs/reference.toml");
+    let mut source = SpecSource::read(&path).map_err(|finding| finding.message)?;
+    source.text = source.text.replacen("[control]\n", "[control]\ncorrection = \"2 um\"\n", 1);
+    for (name, kind) in [("motion", "motion"), ("start", "input")] {
+        source.text += &format!("\n[[trigger]]\nname = \"{name}\"\nkind = \"{kind}\"\n");
+    }
+    let emitted = |compiled: Result<Compiled, Refused>| compiled.map(|compiled| emit::emit(&compiled.ir));
+    let reference = emitted(compile(&path)).map_err(|refused| said(&path, &refused))?;
+    let mut files = Files::new();
+    let mut shared = Vec::new();
+    for (path, text) in emitted(compile_source(source)).map_err(|refused| said(&path, &refused))? {
+        let Some(name) = path.strip_prefix("src/") else { continue };
+        // The first line of an emitted file names the spec.
+        let body = |text: &str| text.split_once('\n').map(|(_, body)| body.to_owned());
+        let same = reference.get(&path).is_some_and(|reference| body(reference) == body(&text));
+        if same && name != "lib.rs" {
+            shared.extend(name.strip_suffix(".rs").map(str::to_owned));
+        } else {
+            files.insert(name.to_owned(), text);
+        }
+    }
+    if let Some(library) = files.get_mut("lib.rs") {
+        for module in shared {
+            for declared in [format!("\nmod {module};"), format!("\npub mod {module};")] {
+                let of_reference = format!("\n#[path = \"../../../../../controller/src/{module}.rs\"]{declared}");
+                *library = library.replace(&declared, &of_reference);
+            }
+        }
+    }
+    Ok(files)
+}
+
 /// IR and emitted crate of small specs, without what is carried over from `firmware/controller/law`.
 pub fn goldens(root: &Path) -> Result<Files, String> {
     let mut files = Files::new();
@@ -84,8 +119,10 @@ pub fn goldens(root: &Path) -> Result<Files, String> {
 }
 
 fn compiled(path: &Path) -> Result<Compiled, String> {
-    compile(path).map_err(|refused| {
-        let first = refused.findings.first().map(|finding| finding.message.clone());
-        format!("{} is refused: {}", path.display(), first.unwrap_or_default())
-    })
+    compile(path).map_err(|refused| said(path, &refused))
+}
+
+fn said(path: &Path, refused: &Refused) -> String {
+    let first = refused.findings.first().map(|finding| finding.message.clone());
+    format!("{} is refused: {}", path.display(), first.unwrap_or_default())
 }

@@ -180,7 +180,6 @@ fn a_place_says_when_its_pose_was_measured() {
         let expected = measured.map(|measured: u64| (tick - measured) * period / 1000);
         bench.ask(&Request::Place, |reply| match reply {
             Reply::Place { measured, .. } => assert_eq!(measured, expected),
-            Reply::Refused(Refusal::Unsupported) => {}
             other => panic!("{other:?}"),
         });
         bench.ask(&Request::Status, |reply| {
@@ -188,4 +187,42 @@ fn a_place_says_when_its_pose_was_measured() {
             assert_eq!(status.age, (tick > 0).then_some(0));
         });
     }
+}
+
+/// Counts up by three at every look.
+fn counter() -> u32 {
+    use std::sync::atomic::{AtomicU32, Ordering};
+    static NOW: AtomicU32 = AtomicU32::new(0);
+    let count = NOW.fetch_add(1, Ordering::Relaxed);
+    3 * count + if count % 4 < 3 { 0 } else { 5 }
+}
+
+/// Steps of 3 and of 8 counts by turns: the whole tick is the only stage.
+#[test]
+fn what_the_steps_of_a_lock_step_cost_is_told() {
+    let mut bench = Bench::new();
+    bench.desk = Desk::new(Stopwatch { counted: Counted::Cycles, now: counter });
+    bench.ask(&Request::Hello, |reply| {
+        let Reply::Identity(identity) = reply else { unreachable!() };
+        assert_eq!((identity.counted, identity.stages), (Counted::Cycles, 1));
+    });
+    let stage = |bench: &mut Bench| {
+        bench.ask(&Request::LockstepStage { index: 0 }, |reply| {
+            let Reply::Stage(stage) = reply else { unreachable!("{reply:?}") };
+            [stage.calls, stage.smallest, stage.sum, stage.largest]
+        })
+    };
+    assert_eq!(stage(&mut bench), [0; 4]);
+    (bench.exchange.report.tick, bench.exchange.report.phase) = (1, Phase::Disarmed);
+    let config = bytes(&Config::new().to_words());
+    bench.expect(&Request::LockstepReset { config: Bytes(&config) }, Reply::Done);
+    let input = bytes(&[0; controller::supervised::MACHINE_INPUT_WORDS]);
+    for number in 0..5 {
+        bench.ask(&Request::LockstepStep { input: Bytes(&input) }, |reply| {
+            let Reply::Stepped { cost, .. } = reply else { unreachable!("{reply:?}") };
+            assert_eq!(cost, if number % 2 == 0 { 3 } else { 8 });
+        });
+    }
+    assert_eq!(stage(&mut bench), [5, 3, 3 * 3 + 2 * 8, 8]);
+    bench.expect(&Request::LockstepStage { index: 1 }, Reply::Refused(Refusal::Unsupported));
 }

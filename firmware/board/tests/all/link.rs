@@ -92,6 +92,14 @@ fn a_lock_step_computes_what_the_host_computes_and_moves_nothing() {
     let settings = wave(1e-6, 5.0).to_words();
     let start = Request::Wave { action: WaveAction::Start, words: Bytes(&bytes(&settings)) };
     assert_eq!(refused(&mut client, &start), Refusal::State);
+    // An emergency stop is told all the same.
+    line.with(|rig| {
+        rig.exchange.report.health.events = 0;
+        rig.board.tick(&mut rig.exchange, specgen_board::Noticed { missed: 2, stop: true });
+        assert_eq!(rig.exchange.report.health.events, controller::supervised::STOP);
+        let missed = core::mem::replace(&mut rig.exchange.report.missed, 0);
+        assert_eq!(missed, 2);
+    });
     // Two seconds of silence give the machine back, as at power-up.
     line.tick(19_990);
     assert!(line.with(|rig| rig.exchange.lockstep.is_some()));

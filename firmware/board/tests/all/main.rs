@@ -5,4 +5,6 @@ mod board_support;
 mod cycle;
 mod desk;
 mod link;
+mod record;
+mod samples;
 mod schedule;

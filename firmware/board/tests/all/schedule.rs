@@ -45,6 +45,7 @@ fn every_due_time_is_a_tick_or_is_counted_as_missed() {
 fn a_tick_before_its_time_is_in_time_and_a_restart_counts_nothing() {
     let mut schedule = Schedule::new(NonZeroU32::new(100).unwrap(), 0);
     assert_eq!(schedule.begin(90), Due { late: 0, missed: 0, next: 200 });
+    assert_eq!(schedule.next(), 200);
     assert_eq!(schedule.restart(1234), 1334);
     assert_eq!(schedule.begin(1340), Due { late: 6, missed: 0, next: 1434 });
     assert_eq!(schedule.begin(1734), Due { late: 0, missed: 3, next: 1834 });
@@ -63,6 +64,8 @@ fn a_tick_that_comes_long_after_its_time_is_not_one_before_it() {
 
 #[test]
 fn a_dead_background_ramps_down_and_then_starves_the_watchdog() {
+    // Seconds of 100 µs, then the codes of 16 bits, four at a time.
+    const { assert!(BACKGROUND_SILENCE == 10_001 && RAMPED_DOWN > 2 * 10_001 && RAMPED_DOWN < 2 * 10_001 + 17_000) };
     let mut health = Health::new();
     for beat in 0..3 * BACKGROUND_SILENCE {
         assert!(health.tick(1 + beat / 100, 0, false));

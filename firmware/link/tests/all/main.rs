@@ -3,5 +3,6 @@
 mod damage;
 mod messages;
 mod panic_free;
+mod pieces;
 mod samples;
 mod support;

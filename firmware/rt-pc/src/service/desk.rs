@@ -192,7 +192,9 @@ impl<'a> Desk<'a> {
     }
 
     fn knots(&mut self, first: u32, knots: Bytes<'_>) -> Result<(), Refusal> {
-        let knots = knots.knots().ok_or(Refusal::Message)?;
+        // Not as a message that nobody can read, whose number is used again.
+        let whole = Refusal::Length { expected: (KNOTS * KNOT / size_of::<u64>()) as u16 };
+        let knots = knots.knots().ok_or(whole)?;
         self.console.put_knots(first, knots).map_err(refusal)
     }
 

@@ -3,7 +3,7 @@
 
 //! What the supervisor takes for a fault; from `supervisor`.
 
-use specgen_runtime::supervisor::{Steadiness, Supervision, Wiring};
+use specgen_runtime::supervisor::{Reaction, Steadiness, Supervision, Wiring};
 use crate::hysteresis::Memory;
 use crate::{Real, limits};
 
@@ -35,6 +35,7 @@ pub const SUPERVISION: Supervision<Real> = Supervision {
         first: 25,
         next: 83,
     },
+    amplifier_fault: Reaction::Off,
     wiring: Some(Wiring {
         ticks: 250,
         height: 415,

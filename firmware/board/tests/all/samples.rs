@@ -74,6 +74,10 @@ fn a_board_shows_every_tick_and_what_it_could_not() {
     ] {
         assert_eq!(refused(&mut client, &Request::Stream { every }), refusal);
     }
+    line.with(|rig| assert!(rig.exchange.report.health.gauge_faults <= 1));
+    for every in [MOST_EVERY, 0] {
+        done(&mut client, &Request::Stream { every });
+    }
     line.with(|rig| (rig.shown, rig.pace) = (Some(Vec::new()), 9));
     done(&mut client, &Request::Stream { every: LEAST });
 
