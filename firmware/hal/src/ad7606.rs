@@ -9,6 +9,7 @@
 //! | SCLK | at most 23.5 MHz at VDRIVE above 4.75 V, 17 MHz at 3.3 V: 16.7 MHz or less is used |
 //! | start | CONVST A and B together: low for 25 ns or more, then the rising edge samples all channels |
 //! | BUSY | high within 45 ns of that edge, low when all are converted: 4.2 µs at most (AD7608: 4.2 µs) without oversampling |
+//! | frame | belongs to the conversion of this tick: BUSY is high after the edge, falls once, and stays low until the last bit is read |
 //! | code | two's complement of 16 or 18 bits, MSB first, no gap between the channels |
 //! | RANGE | low ±5 V, high ±10 V on all channels |
 //! | OS0–2 | low: no oversampling |
@@ -63,6 +64,33 @@ const fn code_of(millivolts: i32, range: i32, bits: u32) -> i32 {
     ((((millivolts + range) as i64) << bits) / (2 * range as i64)) as i32
 }
 
+/// BUSY: high while the part converts.
+pub trait Busy {
+    /// Whether it is high.
+    ///
+    /// # Errors
+    /// [`Fault::Pin`] if it cannot be read.
+    fn is_high(&mut self) -> Result<bool, Fault>;
+
+    /// Every fall from here on counts.
+    fn watch(&mut self) {}
+
+    /// Whether a conversion has ended since [`Busy::watch`], or is under way. A pin that latches no edge tells only the latter.
+    ///
+    /// # Errors
+    /// [`Fault::Pin`] if it cannot be read.
+    fn converts_again(&mut self) -> Result<bool, Fault> {
+        self.is_high()
+    }
+}
+
+impl<PIN: InputPin> Busy for PIN {
+    #[inline]
+    fn is_high(&mut self) -> Result<bool, Fault> {
+        InputPin::is_high(self).map_err(|_| Fault::Pin)
+    }
+}
+
 /// The part on its pins. `BITS` is 16 or 18: a frame of eight channels has as many bytes.
 #[derive(Debug)]
 pub struct Ad7606<const BITS: usize, SPI, START, BUSY, RESET, DELAY> {
@@ -78,7 +106,7 @@ impl<const BITS: usize, SPI, START, BUSY, RESET, DELAY> Ad7606<BITS, SPI, START,
 where
     SPI: SpiDevice,
     START: Edge,
-    BUSY: InputPin,
+    BUSY: Busy,
     RESET: OutputPin,
     DELAY: DelayNs,
 {
@@ -101,6 +129,9 @@ where
         // Zeros are sent: SDI of the parts that have one ignores them in hardware mode.
         let mut frame = [0; BITS];
         self.spi.transfer_in_place(&mut frame).map_err(|_| Fault::Bus)?;
+        if self.busy.converts_again()? {
+            return Err(Fault::Again);
+        }
         if frame.iter().all(|&byte| byte == 0) || frame.iter().all(|&byte| byte == 0xff) {
             return Err(Fault::Blank);
         }
@@ -115,7 +146,8 @@ where
     /// Waits for the end of the conversion.
     fn converted(&mut self) -> Result<(), Fault> {
         for _ in 0..POLLS {
-            if self.busy.is_low().map_err(|_| Fault::Pin)? {
+            if !self.busy.is_high()? {
+                self.busy.watch();
                 return Ok(());
             }
             self.delay.delay_ns(POLL);
@@ -133,7 +165,7 @@ impl<const BITS: usize, SPI, START, BUSY, RESET, DELAY> Gauges for Ad7606<BITS, 
 where
     SPI: SpiDevice,
     START: Edge,
-    BUSY: InputPin,
+    BUSY: Busy,
     RESET: OutputPin,
     DELAY: DelayNs,
 {
@@ -155,7 +187,7 @@ where
     fn begin(&mut self) -> Result<(), Fault> {
         self.start.give()?;
         self.delay.delay_ns(BUSY_DELAY);
-        if self.busy.is_high().map_err(|_| Fault::Pin)? { Ok(()) } else { Err(Fault::NotStarted) }
+        if self.busy.is_high()? { Ok(()) } else { Err(Fault::NotStarted) }
     }
 
     fn read(&mut self) -> Result<[i32; CHANNELS], Fault> {

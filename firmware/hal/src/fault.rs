@@ -22,11 +22,13 @@ pub enum Fault {
     ReadBack = 7,
     /// A code is outside of the converter's range.
     Code = 8,
+    /// A conversion that no tick asked for began or ended while the frame was read: its words are of two conversions.
+    Again = 9,
 }
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Bus,
         Self::Pin,
         Self::NotStarted,
@@ -35,6 +37,7 @@ impl Fault {
         Self::Reference,
         Self::ReadBack,
         Self::Code,
+        Self::Again,
     ];
 
     /// Its number.
@@ -63,6 +66,7 @@ impl fmt::Display for Fault {
             }
             Self::ReadBack => "a DAC gave back another code than it was sent: are SDO, SYNC and SCLK connected?",
             Self::Code => "a code is outside of the converter's range",
+            Self::Again => "BUSY rose again while the ADC was read: is CONVST disturbed?",
         })
     }
 }

@@ -13,7 +13,7 @@ use stm32_metapac::gpio::vals::{Ospeedr, Pupdr};
 use crate::CycleDelay;
 use crate::burst::{Burst, Device};
 use crate::enable::Enable;
-use crate::pins::{Input, Output, Pin};
+use crate::pins::{Input, Latched, Output, Pin};
 use crate::pulses::{self, Sampling};
 
 /// AD7606 for gauges of up to 16 bits; the pin-compatible AD7608 or AD7606C-18 for up to 18.
@@ -23,7 +23,7 @@ const REFERENCE: Window = Window::around(2500, 50, 5000, ADC_BITS as u32);
 
 /// The ADC.
 pub type Adc<BUS, const CYCLES: u32> =
-    Ad7606<ADC_BITS, Device<BUS, CYCLES>, Sampling, Input, Output, CycleDelay<CYCLES>>;
+    Ad7606<ADC_BITS, Device<BUS, CYCLES>, Sampling, Latched, Output, CycleDelay<CYCLES>>;
 /// The DACs.
 pub type Dacs<BUS, const OUTPUT: usize, const CYCLES: u32> =
     Ad5686rPair<Device<BUS, CYCLES>, Device<BUS, CYCLES>, pulses::Output<OUTPUT>, Enable, CycleDelay<CYCLES>>;
@@ -40,7 +40,7 @@ pub struct AdcPins<BUS, const CYCLES: u32> {
     /// CONVST A and B.
     pub start: Sampling,
     /// BUSY with pull-up, so that a part that is not there is seen.
-    pub busy: Input,
+    pub busy: Latched,
     /// RESET, low.
     pub reset: Output,
 }

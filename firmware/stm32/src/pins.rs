@@ -3,8 +3,11 @@
 use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
+use specgen_hal::Fault;
+use specgen_hal::ad7606::Busy;
 use stm32_metapac::gpio::Gpio;
 use stm32_metapac::gpio::vals::{Moder, Ospeedr, Ot, Pupdr};
+use stm32_metapac::{EXTI, GPIOA, SYSCFG};
 
 /// A pin by port and number. The port has its clock, and nobody else sets up a pin of it meanwhile.
 #[derive(Clone, Copy)]
@@ -42,6 +45,44 @@ impl Pin {
     pub fn input(self, pull: Pupdr) -> Input {
         self.mode(Moder::INPUT, Ospeedr::LOW_SPEED, pull);
         Input(self)
+    }
+}
+
+/// Of a port in the address space, from [`GPIOA`] on.
+const PORT: usize = 0x400;
+
+/// An input whose falls the EXTI latches. No interrupt of the core belongs to it.
+pub struct Latched(Input);
+
+impl Pin {
+    /// An input whose falls are latched; no other port has its number there.
+    #[must_use]
+    pub fn latched(self, pull: Pupdr) -> Latched {
+        let Self(port, number) = self;
+        let place = (port.as_ptr() as usize).wrapping_sub(GPIOA.as_ptr() as usize) / PORT;
+        let input = self.input(pull);
+        SYSCFG.exticr(usize::from(number / 4 & 3)).modify(|w| w.set_exti(usize::from(number % 4), place as u8));
+        EXTI.ftsr(0).modify(|w| w.0 |= 1 << number);
+        EXTI.imr(0).modify(|w| w.0 |= 1 << number);
+        Latched(input)
+    }
+}
+
+impl Busy for Latched {
+    #[inline]
+    fn is_high(&mut self) -> Result<bool, Fault> {
+        Ok(self.0.level())
+    }
+
+    #[inline]
+    fn watch(&mut self) {
+        // A one clears.
+        EXTI.pr(0).write(|w| w.0 = 1 << self.0.0.1);
+    }
+
+    #[inline]
+    fn converts_again(&mut self) -> Result<bool, Fault> {
+        Ok(EXTI.pr(0).read().0 >> self.0.0.1 & 1 == 1 || self.0.level())
     }
 }
 
@@ -116,6 +157,6 @@ impl InputPin for Input {
 
     #[inline]
     fn is_low(&mut self) -> Result<bool, Infallible> {
-        self.is_high().map(|high| !high)
+        Ok(!self.level())
     }
 }

@@ -54,7 +54,7 @@ pub fn take(hertz: u32) -> Wiring {
         adc: AdcPins {
             spi: Device { bus: adc, select: select(Pin(GPIOB, 6)) },
             start,
-            busy: Pin(GPIOA, 9).input(Pupdr::PULL_UP),
+            busy: Pin(GPIOA, 9).latched(Pupdr::PULL_UP),
             reset: Pin(GPIOB, 10).output(false, Ospeedr::LOW_SPEED),
         },
         dac: DacPins {

@@ -56,7 +56,7 @@ pub fn take(hertz: u32) -> Wiring {
         adc: AdcPins {
             spi: Device { bus: adc, select: select(Pin(GPIOD, 14)) },
             start,
-            busy: Pin(GPIOF, 3).input(Pupdr::PULL_UP),
+            busy: Pin(GPIOF, 3).latched(Pupdr::PULL_UP),
             reset: Pin(GPIOE, 9).output(false, Ospeedr::LOW_SPEED),
         },
         dac: DacPins {

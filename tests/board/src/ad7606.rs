@@ -36,6 +36,8 @@ pub enum Fault {
     NoReference,
     /// Zeros.
     Blank,
+    /// Another edge of CONVST while it is read.
+    Again,
 }
 
 #[derive(Default)]
@@ -58,6 +60,8 @@ pub struct Ad7606 {
     wants_reset: bool,
     /// Rising edges of CONVST.
     pub conversions: u64,
+    /// Conversions that ended before the last one began.
+    ended: u64,
 }
 
 impl Ad7606 {
@@ -86,7 +90,7 @@ impl Ad7606 {
         if self.selected.is_some() {
             violations.note(NAME, "CONVST while CS is low", now);
         }
-        self.converted = (self.fault != Some(Fault::Dead)).then_some(now);
+        self.begin(now);
         self.conversions += 1;
         true
     }
@@ -98,6 +102,17 @@ impl Ad7606 {
         let seen = if reference && self.fault != Some(Fault::NoReference) { half + half / 2 } else { half };
         let inputs = [gauges[0], gauges[1], gauges[2], gauges[3], gauges[4], gauges[5], half, seen];
         self.codes = inputs.map(|code| (code ^ half) & ((1 << self.bits) - 1));
+    }
+
+    fn begin(&mut self, now: Time) {
+        self.ended = self.falls(now);
+        self.converted = (self.fault != Some(Fault::Dead)).then_some(now);
+    }
+
+    /// How often BUSY has fallen.
+    pub fn falls(&self, now: Time) -> u64 {
+        let ends = |since: Time| now >= since + CONVERSION && self.fault != Some(Fault::Endless);
+        self.ended + u64::from(self.converted.is_some_and(ends))
     }
 
     pub fn busy(&self, now: Time) -> bool {
@@ -112,6 +127,7 @@ impl Ad7606 {
         {
             violations.shorter(NAME, "RESET high", now - rose, RESET_HIGH, now);
             self.ready = Some(now + SETUP);
+            self.ended = self.falls(now);
             self.converted = None;
             if self.wants_reset {
                 (self.fault, self.wants_reset) = (None, false);
@@ -162,6 +178,9 @@ impl Ad7606 {
         violations.shorter(NAME, "a cycle of SCLK", byte.period(), CLOCK, byte.begin);
         if self.given == 0 {
             violations.shorter(NAME, "CS to SCLK", byte.begin - since, SELECT, byte.begin);
+        }
+        if self.given == 0 && self.fault == Some(Fault::Again) {
+            self.begin(byte.begin);
         }
         // The first bit is there before SCLK; each one after it, taken in the middle of a cycle before it is valid, is the one before.
         let late = u32::from(byte.period() / 2 < DOUT);

@@ -6,6 +6,7 @@ use crate::ad5686r::Ad5686r;
 use crate::ad7606::Ad7606;
 use crate::dma::Dma;
 use crate::enable::Enable;
+use crate::exti::Exti;
 use crate::fault::Fault;
 use crate::gpio::{self, Gpio};
 use crate::line::Line;
@@ -68,6 +69,7 @@ struct Devices {
     dma: Dma,
     usart: Usart,
     watchdog: Watchdog,
+    exti: Exti,
     mpu: Mpu,
     clocks: Clocks,
 }
@@ -94,6 +96,7 @@ impl Devices {
             dma: Dma::default(),
             usart: Usart::new(part.family, part.usart),
             watchdog: Watchdog::new(),
+            exti: Exti::default(),
             mpu: Mpu::default(),
             clocks,
         }
@@ -642,6 +645,7 @@ impl Guest for Board {
                 word
             }
             _ if within(part.watchdog, 0x400) => devices.watchdog.read(aligned - part.watchdog),
+            _ if aligned == part.pending => devices.exti.read(part, &devices.store, &self.adc, self.now),
             _ if aligned == part.rcc && self.faults.contains(&Fault::Clock) => {
                 rcc::read(part.family, 0, devices.store.word(aligned)) & !rcc::HSE_READY
             }
@@ -697,6 +701,7 @@ impl Guest for Board {
             _ if within(part.dma, 0x400) => devices.dma.write(aligned - part.dma, value),
             _ if within(part.usart, 0x400) => devices.usart.write(aligned - part.usart, value),
             _ if within(part.watchdog, 0x400) => devices.watchdog.write(aligned - part.watchdog, value, self.now),
+            _ if aligned == part.pending => devices.exti.write(part, value, &self.adc, self.now),
             _ if mpu::REGISTERS.contains(&address) => devices.mpu.write(aligned, value),
             _ if aligned == part.reset_cause.register && value & part.reset_cause.clear != 0 => {
                 devices.store.set(aligned, 0);

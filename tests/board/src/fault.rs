@@ -37,7 +37,7 @@ pub enum Fault {
 }
 
 /// Names, for commands.
-pub const NAMES: [(&str, Fault); 20] = [
+pub const NAMES: [(&str, Fault); 21] = [
     ("stop", Fault::Stop),
     ("amplifier", Fault::Amplifier),
     ("adc-dead", Fault::Adc(ad7606::Fault::Dead)),
@@ -45,6 +45,7 @@ pub const NAMES: [(&str, Fault); 20] = [
     ("adc-shifted", Fault::Adc(ad7606::Fault::Shifted)),
     ("adc-no-reference", Fault::Adc(ad7606::Fault::NoReference)),
     ("adc-blank", Fault::Adc(ad7606::Fault::Blank)),
+    ("adc-again", Fault::Adc(ad7606::Fault::Again)),
     ("dac-stuck", Fault::Dac(ad5686r::Fault::Stuck)),
     ("dac-mute", Fault::Dac(ad5686r::Fault::Mute)),
     ("uart", Fault::Uart),

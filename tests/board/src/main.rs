@@ -8,6 +8,7 @@ mod board;
 mod dma;
 mod elf;
 mod enable;
+mod exti;
 mod fault;
 mod gpio;
 mod line;

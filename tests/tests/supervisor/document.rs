@@ -30,10 +30,8 @@ fn causes_and_what_they_do_are_those_of_the_runtime() {
             _ => "nothing",
         };
         assert_eq!(row[4], action, "{name}");
-        let watched = matches!(
-            cause,
-            Cause::GaugeStuck | Cause::GaugeDisagreement | Cause::TrackingError | Cause::Oscillation
-        );
+        let watched =
+            matches!(cause, Cause::GaugeStuck | Cause::GaugeDisagreement | Cause::TrackingError | Cause::Oscillation);
         assert_eq!(row[3] == "at once", !watched && !TIMED.contains(&cause), "{name}");
     }
 }

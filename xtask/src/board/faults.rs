@@ -73,7 +73,7 @@ enum End {
 }
 
 /// Of a DAC some codes may happen to be what they ought to be: a count that leaks takes longer, here at most twice the time.
-const FAULTS: [(&str, End); 20] = [
+const FAULTS: [(&str, End); 21] = [
     ("stop", End::Off(|_| CONTACT)),
     ("amplifier", End::Amplifier),
     ("adc-dead", End::Off(|times| times.gauge + times.down)),
@@ -81,6 +81,7 @@ const FAULTS: [(&str, End); 20] = [
     ("adc-shifted", End::Off(|times| times.gauge + times.down)),
     ("adc-no-reference", End::Off(|times| times.gauge + times.down)),
     ("adc-blank", End::Off(|times| times.gauge + times.down)),
+    ("adc-again", End::Off(|times| times.gauge + times.down)),
     ("dac-stuck", End::Off(|times| 2.0 * times.gauge + times.down)),
     ("dac-mute", End::Off(|times| 2.0 * times.gauge + times.down)),
     ("uart", End::RunsOn),

@@ -95,7 +95,7 @@ fn a_lock_step_computes_what_the_host_computes_and_moves_nothing() {
     // An emergency stop is told all the same.
     line.with(|rig| {
         rig.exchange.report.health.events = 0;
-        rig.board.tick(&mut rig.exchange, specgen_board::Noticed { missed: 2, stop: true });
+        rig.board.tick(&mut rig.exchange, specgen_board::Noticed { missed: 2, stop: true, amplifier: false });
         assert_eq!(rig.exchange.report.health.events, controller::supervised::STOP);
         let missed = core::mem::replace(&mut rig.exchange.report.missed, 0);
         assert_eq!(missed, 2);

@@ -277,7 +277,7 @@ fn an_edge_hides_no_other_event_of_its_tick() {
     line.parts(|parts| parts.input = true);
     line.with(|rig| {
         assert_eq!(rig.exchange.report.cause, Cause::None);
-        rig.board.tick(&mut rig.exchange, Noticed { missed: 0, stop: true });
+        rig.board.tick(&mut rig.exchange, Noticed { missed: 0, stop: true, amplifier: false });
         assert_eq!(rig.exchange.report.cause, Cause::EmergencyStop);
     });
 }

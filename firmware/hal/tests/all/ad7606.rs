@@ -3,7 +3,7 @@
 use embedded_hal_mock::eh1::delay::NoopDelay;
 use embedded_hal_mock::eh1::digital::{Mock as Pin, State, Transaction as PinStep};
 use embedded_hal_mock::eh1::spi::{Mock as Spi, Transaction as SpiStep};
-use specgen_hal::ad7606::{Ad7606, CONVST_LOW, POLLS, Window};
+use specgen_hal::ad7606::{Ad7606, Busy, CONVST_LOW, POLLS, Window};
 use specgen_hal::{Fault, Gauges, Pulse};
 
 /// Two's complement codes of 16 bits as the part sends them.
@@ -43,7 +43,17 @@ fn answer(frame: &[u8]) -> Vec<SpiStep<u8>> {
 
 /// One read: what BUSY shows at each look, what the SPI does.
 fn read<const BITS: usize>(busy: &[State], spi: &[SpiStep<u8>]) -> Result<[i32; 6], Fault> {
-    let looks: Vec<PinStep> = busy.iter().map(|&state| PinStep::get(state)).collect();
+    // After the frame BUSY is looked at once more.
+    let after = (!spi.is_empty()).then_some(Low);
+    read_with_busy::<BITS>(busy, after, spi)
+}
+
+fn read_with_busy<const BITS: usize>(
+    busy: &[State],
+    after: Option<State>,
+    spi: &[SpiStep<u8>],
+) -> Result<[i32; 6], Fault> {
+    let looks: Vec<PinStep> = busy.iter().copied().chain(after).map(PinStep::get).collect();
     let (spi, start, busy, reset) = (Spi::new(spi), pulses(1), Pin::new(&looks), Pin::new(&[]));
     let mut adc: Ad7606<BITS, _, _, _, _, _> = Ad7606::new(spi, start, busy, reset, NoopDelay, window(BITS as u32));
     let result = adc.begin().and_then(|()| adc.read());
@@ -86,6 +96,40 @@ fn a_conversion_that_does_not_end_is_given_up() {
     assert_eq!(read::<16>(&looks, &answer(&frame)), Ok([0x8003; 6]));
 }
 
+/// A line that latches a fall: what each look shows, whether it falls after it is watched, and whether it is.
+struct Latching(std::vec::IntoIter<bool>, bool, bool);
+
+impl Busy for Latching {
+    fn is_high(&mut self) -> Result<bool, Fault> {
+        self.0.next().ok_or(Fault::Pin)
+    }
+
+    fn watch(&mut self) {
+        self.2 = true;
+    }
+
+    fn converts_again(&mut self) -> Result<bool, Fault> {
+        assert!(self.2, "watched since it was low");
+        Ok(self.1 | self.is_high()?)
+    }
+}
+
+#[test]
+fn a_conversion_that_no_tick_asked_for_is_a_fault() {
+    let good = answer(&frame16([3, 3, 3, 3, 3, 3, 3, REFERENCE]));
+    assert_eq!(read_with_busy::<16>(&[High, Low], Some(High), &good), Err(Fault::Again), "it still converts");
+    for (falls, expected) in [(false, Ok([0x8003; 6])), (true, Err(Fault::Again))] {
+        let busy = Latching(vec![true, true, false, false].into_iter(), falls, false);
+        let mut adc: Ad7606<16, _, _, _, _, _> =
+            Ad7606::new(Spi::new(&good), pulses(1), busy, Pin::new(&[]), NoopDelay, window(16));
+        assert_eq!(adc.begin().and_then(|()| adc.read()), expected);
+        let (mut spi, mut start, _, mut reset, _) = adc.release();
+        spi.done();
+        start.pin.done();
+        reset.done();
+    }
+}
+
 #[test]
 fn a_stuck_data_line_is_a_fault() {
     for byte in [0x00, 0xff] {
@@ -119,7 +163,8 @@ fn the_window_is_in_codes_of_the_part() {
 /// The start: reset, then one conversion that must be believable.
 fn start(busy: &[State], spi: &[SpiStep<u8>]) -> Result<(), Fault> {
     let reset = [PinStep::set(High), PinStep::set(Low)];
-    let looks: Vec<PinStep> = busy.iter().map(|&state| PinStep::get(state)).collect();
+    let after = (!spi.is_empty()).then_some(Low);
+    let looks: Vec<PinStep> = busy.iter().copied().chain(after).map(PinStep::get).collect();
     let (spi, start, busy, reset) = (Spi::new(spi), pulses(1), Pin::new(&looks), Pin::new(&reset));
     let mut adc: Ad7606<16, _, _, _, _, _> = Ad7606::new(spi, start, busy, reset, NoopDelay, window(16));
     let result = adc.start();
