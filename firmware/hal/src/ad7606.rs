@@ -9,7 +9,7 @@
 //! | SCLK | at most 23.5 MHz at VDRIVE above 4.75 V, 17 MHz at 3.3 V: 16.7 MHz or less is used |
 //! | start | CONVST A and B together: low for 25 ns or more, then the rising edge samples all channels |
 //! | BUSY | high within 45 ns of that edge, low when all are converted: 4.2 µs at most (AD7608: 4.2 µs) without oversampling |
-//! | frame | belongs to the conversion of this tick: BUSY is high after the edge, falls once, and stays low until the last bit is read |
+//! | frame | BUSY is high after the edge of this tick, falls once, and stays low until the last bit is read |
 //! | code | two's complement of 16 or 18 bits, MSB first, no gap between the channels |
 //! | RANGE | low ±5 V, high ±10 V on all channels |
 //! | OS0–2 | low: no oversampling |

@@ -69,6 +69,8 @@ impl<D: Device> Loop<'_, D> {
         let mut keeper = Keeper::new(outlets, self.tape.take(), self.shared, (&machine, &self.config));
         let mut phase = Phase::Disarmed;
         let mut enabled = false;
+        // An output of the last tick may not be what was asked for.
+        let mut undriven = false;
         let mut link = Link { number: 0, asked: 0, silence: self.timing.silence };
         let mut count = 0;
         let Timing { period, elastic, .. } = self.timing;
@@ -120,7 +122,7 @@ impl<D: Device> Loop<'_, D> {
             let usage = Usage::of_this_thread();
             let sensed = clock::now();
 
-            if broken {
+            if broken || undriven {
                 events |= CONVERTER;
             }
             let command = setpoints.next(phase, &self.config);
@@ -140,17 +142,20 @@ impl<D: Device> Loop<'_, D> {
 
             let mut driven = Ok(());
             if enabled && !output.amplifier_on {
+                // Until it is done.
                 driven = self.device.enable(false);
+                enabled = driven.is_err();
             }
             driven = driven.and(self.device.write(&output.tick.dac_code));
             if triggers::LINES != 0 {
                 driven = driven.and(self.device.set(triggers::lines(output.tick.status)));
             }
-            if output.amplifier_on && !enabled {
-                // The codes are there before the amplifiers show them.
-                driven = driven.and(self.device.enable(true));
+            if output.amplifier_on && !enabled && driven.is_ok() {
+                // The codes are there before the amplifiers show them. They may be on whatever it answers.
+                driven = self.device.enable(true);
+                enabled = true;
             }
-            enabled = output.amplifier_on;
+            undriven = driven.is_err();
             let written = clock::now();
             if broken || driven.is_err() {
                 self.shared.device_faults.fetch_add(1, Ordering::Relaxed);

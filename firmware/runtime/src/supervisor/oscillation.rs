@@ -37,6 +37,8 @@ const OWN: f64 = 0.5;
 const LARGEST: f64 = 1e30;
 /// Swing that is explained by a correction given beside the law, as a multiple of it: what a mode makes of it at its resonance.
 const GIVEN: f64 = 8.0;
+/// The first axis whose mean and set-point are known, in the word of signs.
+const FIRST_KNOWN: u32 = 1 << 8;
 /// The stage stands from this bit of the conditions on.
 const FIRST_STAGE: u32 = 29;
 
@@ -99,7 +101,8 @@ crate::state! { |words|
         explained: T = T::ONE, number(LARGEST);
         /// Samples with a power that nothing explains, less those without.
         counts: [u32; 6] = [0; 6], tallies;
-        /// Samples with such a power since the swing changed its sign, and the sign: bits, set where it is below zero.
+        /// Samples with such a power since the swing changed its sign. Bits of the signs: set where it is below zero; from bit 8 on,
+        /// where a sample is known.
         runs: [u32; 6] = [0; 6], tallies;
         signs: u32 = 0, tally;
         /// What it adds to the conditions: the bit of the cause while it is suspected, the stage from bit 29 on.
@@ -126,6 +129,12 @@ impl<T: Real> Oscillation<T> {
     pub fn look(&mut self, limits: &Steadiness<T>, index: usize, motion: &Motion<T>) -> bool {
         let index = if index < 6 { index } else { 0 };
         let per_limit = limits.per_limit[index];
+        let known = FIRST_KNOWN << index;
+        if self.signs & known == 0 {
+            self.signs |= known;
+            self.mean[index] = motion.error;
+            self.target[index] = motion.target;
+        }
         let swing = motion.error - self.mean[index];
         self.mean[index] = self.mean[index] + limits.follow * swing;
         let mut moved = (motion.target - self.target[index]) * limits.motion;
@@ -183,9 +192,10 @@ impl<T: Real> Oscillation<T> {
         lasted
     }
 
-    /// Whether an axis has swung lately by more than is explained, or a stage has not yet ended an oscillation.
+    /// Whether the error may be about to oscillate: something is counted, which an oscillation that grows is soon enough; or a stage
+    /// has not yet ended it.
     #[must_use]
-    pub(super) fn is_counted(&self) -> bool {
+    pub(super) fn is_suspected(&self) -> bool {
         let rings = self.stage != Fallback::None && self.power.iter().any(|power| *power > T::ONE);
         rings || self.counts.iter().any(|count| *count != 0)
     }

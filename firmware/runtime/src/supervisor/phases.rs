@@ -64,7 +64,7 @@ impl<T: Real> Supervisor<T> {
     pub fn sift(&mut self, supervision: &Supervision<T>, words: &mut [T; 6], faults: impl Fn(&[T; 6]) -> u32) {
         let activity = if self.phase == Phase::Arming && !self.is_checking(supervision) {
             Activity::Standing
-        } else if self.oscillation.is_counted() {
+        } else if self.phase == Phase::Running && self.oscillation.is_suspected() {
             Activity::Oscillating
         } else {
             Activity::Moving

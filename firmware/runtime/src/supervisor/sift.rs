@@ -4,10 +4,10 @@
 //! prediction   2 y(n−1) − y(n−2)            wrong by no more than the legs can accelerate, and noise: the bound `leap`
 //! replaced     |y(n) − prediction| > leap; times 3, 6, … where y(n−1), y(n−2), … were missing or repeated. Not where y(n) is as near to
 //!              y(n−2): then it was y(n−1) that leapt, by less than the bound, and the middle stands for it from here on. Nor while an
-//!              oscillation is counted, which no straight line predicts
+//!              oscillation is suspected, which no straight line predicts
 //! repeated     all six words are those of the sample before, or of the one before that
 //! ```
-//! Both are leaky counts: 4 for a tick with it, 1 taken off by one without. Three replaced in a row are a fault, or every third over long. Of
+//! Both are leaky counts: 4 for a tick with it, 1 taken off by one without. Three replaced in a row are a fault, or every fourth over long. Of
 //! repeated ones the spec says how many: none where the noise is below a step of the converter, or where the gauges showed no noise
 //! while the machine armed.
 
@@ -38,7 +38,7 @@ pub enum Activity {
     Standing,
     /// A straight line through two samples predicts the next one.
     Moving,
-    /// An oscillation is being counted.
+    /// An oscillation is suspected.
     Oscillating,
 }
 

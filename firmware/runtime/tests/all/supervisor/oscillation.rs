@@ -142,6 +142,18 @@ fn each_stage_is_reached_shown_and_left_by_an_acknowledgement() {
 }
 
 /// A ring that dies out is none, however large; one that does not is.
+/// Where the set-point stands is no motion, neither where the law begins nor after an acknowledgement.
+#[test]
+fn an_oscillation_is_found_in_time_wherever_the_set_point_stands() {
+    let sine = |now: f64| 100e-9 * (TAU * 361.0 * now).sin();
+    let mut run = Run::new();
+    for time in ["first", "acknowledged"] {
+        assert!(run.finds(0.05, sine, |_| 50e-6), "{time}");
+        run.tick(Request::Acknowledge, 3, 0.0, 50e-6, None);
+        assert_eq!((run.supervisor.phase, run.stage()), (Phase::Running, Fallback::None), "{time}");
+    }
+}
+
 #[test]
 fn a_ring_that_dies_out_is_no_oscillation() {
     for hertz in [80.0, 361.0, 795.0] {
