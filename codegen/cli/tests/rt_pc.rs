@@ -221,11 +221,15 @@ impl Running {
         Self(Some(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()))
     }
 
+    /// Whether it has not ended by itself.
+    fn goes_on(&mut self) -> bool {
+        self.0.as_mut().unwrap().try_wait().unwrap().is_none()
+    }
+
     /// Sends it a signal and waits for its end.
     fn end(mut self, name: Signal) -> Output {
-        let running = self.0.as_mut().unwrap();
-        assert!(running.try_wait().unwrap().is_none(), "it runs until it is asked to end");
-        signal(running, name);
+        assert!(self.goes_on(), "it runs until it is asked to end");
+        signal(self.0.as_ref().unwrap(), name);
         self.wait()
     }
 

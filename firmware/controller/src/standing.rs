@@ -3,11 +3,11 @@
 //! How the law begins, works and stands still under the supervisor.
 
 use crate::machine::{Supervisor, compares, move_codes};
+pub(crate) use crate::sensing::faults;
 use crate::setpoint::SETPOINTS;
 use crate::step::{advance, sense};
 use crate::supervision::{READINGS_PER_LEG, SUPERVISION};
 use crate::tick::GAUGE_FAULT;
-pub(crate) use crate::sensing::faults;
 use crate::{Config, LEGS, Real, State, TickInput, kinematics, sensing};
 use specgen_runtime::linear::component;
 use specgen_runtime::setpoint::{CommandKind, Generator};

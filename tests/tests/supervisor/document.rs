@@ -16,11 +16,8 @@ fn causes_and_what_they_do_are_those_of_the_runtime() {
     let rows = rows("| cause | word |");
     assert_eq!(rows.len(), Cause::ALL.len());
     for (row, cause) in rows.iter().zip(Cause::ALL) {
-        let name: String = format!("{cause:?}")
-            .chars()
-            .flat_map(|c| if c.is_uppercase() { vec![' ', c.to_ascii_lowercase()] } else { vec![c] })
-            .collect();
-        assert_eq!(row[0], name.trim());
+        let name = cause.name();
+        assert_eq!(row[0], name);
         assert_eq!(row[1], cause.word().to_string());
         let action = match cause.bit() {
             bit if bit & SWITCHES_OFF != 0 => "switch off",

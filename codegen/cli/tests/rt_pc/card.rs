@@ -34,10 +34,20 @@ fn command(bench: &Bench, library: &Path, record: &str, more: &[&str]) -> std::p
 pub fn a_heartbeat_ends_with_the_process(bench: &Bench) {
     let (library, file) = (fake_comedi(bench), bench.path("beats"));
     let mut command = command(bench, &library, "killed.rec", &["--arm"]);
-    let running = Running::new(command.env("FAKE_BEATS", &file));
     let length = || fs::metadata(&file).map_or(0, |found| found.len());
-    // Not for long: ticks that this computer misses end the run.
-    wait_for("the heartbeat", || length() > 16 * 300);
+    // Not for long, and again: ticks that this computer misses end the run.
+    let beats = |_| {
+        let _ = fs::remove_file(&file);
+        let mut running = Running::new(command.env("FAKE_BEATS", &file));
+        while running.goes_on() {
+            if length() > 16 * 300 {
+                return Some(running);
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        None
+    };
+    let running = (0..100).find_map(beats).expect("a run with a heartbeat");
     let output = running.end(Signal::KILL);
     let dead = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_nanos() as u64;
     assert!(output.status.code().is_none(), "{output:?}");
@@ -158,6 +168,8 @@ fn opens(bench: &Bench, stop: &Stop) {
     let more = ["--link-silence", "5000", "--link", link.to_str().unwrap()];
     let mut command = command(bench, &library, "contacts.rec", &more);
     command.env("FAKE_CONTACTS", &file).env("FAKE_PER_CODE", &per_code);
+    // More often than the end of the program would try.
+    command.env("FAKE_REFUSES", "5").env("FAKE_LOG", bench.path("contacts.log"));
     let (running, mut host) = comes_to_run(&mut command, &link);
     set(contacts);
     host.wait("the stop", |status| status.phase != RUNNING);
@@ -184,6 +196,9 @@ fn opens(bench: &Bench, stop: &Stop) {
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
     let text = summary["failure"].as_str().unwrap_or_default();
     assert!(output.status.code() == Some(1) && text.contains(name), "{name}: {summary}");
+    let log = fs::read_to_string(bench.path("contacts.log")).unwrap();
+    let enable = log.lines().find_map(|line| line.strip_prefix("line=")).unwrap();
+    assert!(enable.contains("1,0"), "tried until it is off: {enable}");
     let record = Record::new(fs::read(bench.path("contacts.rec")).unwrap());
     let events = record.place("events");
     let seen = |row: &host_sim::record::Row| row.input[events] & (AMPLIFIER | STOP) != 0;

@@ -1,7 +1,7 @@
 //! A stand-in for libcomedi, built by the test: two cards with sixteen inputs and four outputs each. On closing it writes what was done
 //! with it. Its inputs stand still, or follow the outputs: `FAKE_PER_CODE` has 36 numbers, steps of each of six inputs (rows) per step of
 //! each of six outputs. `FAKE_FAIL_AFTER`: readings after which it fails;
-//! `FAKE_HIGH_AFTER`: looks at a digital line after which that is high; `FAKE_CONTACTS`: file whose first letters are the contacts of
+//! `FAKE_REFUSES`: how often it refuses to take the enable line low once that was high; `FAKE_HIGH_AFTER`: looks at a digital line after which that is high; `FAKE_CONTACTS`: file whose first letters are the contacts of
 //! emergency stop and amplifiers, `0` for open, both closed without one; `FAKE_BEATS`: file that gets time (ns since 1970, u64) and level (u64) of
 //! every beat of the heartbeat; `FAKE_LOG`: file to write.
 
@@ -31,6 +31,7 @@ struct Log {
     codes: [u32; 2],
     outputs: [u32; 6],
     lines: Vec<u32>,
+    refused: u64,
     /// Digital lines with their directions, and how often one was looked at or, but for the first, set.
     directions: Vec<(u32, u32)>,
     looks: u64,
@@ -47,6 +48,7 @@ static LOG: Mutex<Log> = Mutex::new(Log {
     codes: [u32::MAX, 0],
     outputs: [0; 6],
     lines: Vec::new(),
+    refused: 0,
     directions: Vec::new(),
     looks: 0,
     sets: 0,
@@ -204,6 +206,10 @@ pub unsafe extern "C" fn comedi_dio_read(_: *mut c_void, _: c_uint, _: c_uint, b
 #[unsafe(no_mangle)]
 pub extern "C" fn comedi_dio_write(_: *mut c_void, _: c_uint, line: c_uint, bit: c_uint) -> c_int {
     let mut log = LOG.lock().unwrap();
+    if (line, bit, log.lines.last()) == (0, 0, Some(&1)) && log.refused < number("FAKE_REFUSES", 0) {
+        log.refused += 1;
+        return -1;
+    }
     match line {
         0 => log.lines.push(bit),
         _ => log.sets += 1,
