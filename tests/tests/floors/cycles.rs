@@ -20,7 +20,7 @@ use super::modules::Read;
 /// Folders with Rust in them.
 const FOLDERS: [&str; 6] = ["codegen", "examples", "firmware", "host-sim", "tests", "xtask"];
 /// Roots of crates by another name than `lib.rs` or `main.rs`, with modules.
-const PROGRAMS: [&str; 1] = ["firmware/qemu/src/pil.rs"];
+const PROGRAMS: [&str; 2] = ["firmware/board/tests/passes/tests.rs", "firmware/qemu/src/pil.rs"];
 /// Programs and tests of one file, beside build scripts, benchmarks and examples.
 const ALONE: [&str; 2] = ["codegen/cli/tests/rt_pc/fake_comedi.rs", "host-sim/tests/shared_library.rs"];
 /// Folders of files that are no crate here: a controller or an image is put together of them and others.
