@@ -20,6 +20,8 @@ pub const STALLED: u32 = 1 << (Cause::Stalled.word() - FIRST_EVENT);
 pub const EVENTS: u32 = MISSED_TICK | LINK_LOST | INTEGRITY | CONVERTER | STOP | STALLED;
 /// The cause of an event's bit is its number and this.
 pub const FIRST_EVENT: u64 = Cause::MissedTick.word();
+/// Conditions name the gauges or legs that they are about from this bit on.
+pub(super) const FIRST_CHANNEL: u32 = 16;
 /// Bit of [`Cause::Oscillation`] in conditions, where bits 16 to 27 are taken by the gauges and legs concerned, 29 and 30 by the stage.
 pub(super) const OSCILLATION_CONDITION: u32 = 28;
 /// Bit of [`Cause::AmplifierFault`] in conditions.

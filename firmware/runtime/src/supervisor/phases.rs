@@ -3,7 +3,8 @@
 use super::approach::Approach;
 use super::debounce::Debounce;
 use super::kinds::{
-    AMPLIFIER, AMPLIFIER_CONDITION, Cause, EVENTS, FIRST_EVENT, HOLDS, Phase, RAMPS_DOWN, Request, SWITCHES_OFF,
+    AMPLIFIER, AMPLIFIER_CONDITION, Cause, EVENTS, FIRST_CHANNEL, FIRST_EVENT, HOLDS, Phase, RAMPS_DOWN, Request,
+    SWITCHES_OFF,
 };
 use super::oscillation::{Fallback, Motion, Oscillation};
 use super::sift::{Activity, Sift};
@@ -12,9 +13,6 @@ use super::watch::{Sample, Watch};
 use super::wiring::{Check, Finding, Response};
 use crate::dac::CodeLimits;
 use crate::real::Real;
-
-/// Conditions name the gauges or legs that they are about from this bit on.
-const FIRST_CHANNEL: u32 = 16;
 
 crate::state! { |words|
     /// State of the supervisor. Disarmed at reset, nothing seen.

@@ -11,7 +11,7 @@
 //! repeated ones the spec says how many: none where the noise is below a step of the converter, or where the gauges showed no noise
 //! while the machine armed.
 
-use super::kinds::Cause;
+use super::kinds::{Cause, FIRST_CHANNEL};
 use super::supervision::Supervision;
 use crate::linear::each;
 use crate::real::Real;
@@ -28,8 +28,6 @@ const REPLACED_LIMIT: u32 = 3 * WRONG;
 const MOST_PREDICTED: usize = 3;
 /// Conditions name gauges whose words were replaced from this bit on.
 const FIRST_REPLACED: u32 = 22;
-/// Conditions name the gauges that they are about from this bit on.
-const FIRST_CHANNEL: u32 = 16;
 
 /// What the machine does, as far as its samples tell it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
