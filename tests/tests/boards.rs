@@ -56,7 +56,7 @@ const F446: Board = Board {
     name: "board-f446",
     folder: "stm32f4",
     mcu: Mcu::Stm32F446Re,
-    flash: 98 * 1024,
+    flash: 102 * 1024,
     ram: 32 * 1024,
     stack: 12 * 1024,
     tightly: None,
