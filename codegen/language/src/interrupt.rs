@@ -235,8 +235,10 @@ fn make_folder(path: &Path) -> io::Result<bool> {
         match fs::create_dir(path) {
             Ok(()) => return Ok(true),
             Err(_) if path.is_dir() => return Ok(false),
-            // It was there, and has just been removed by whoever had made it.
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && fs::symlink_metadata(path).is_err() => {}
+            // It was there, and whoever had made it has just removed it, or has made it once more by now.
+            Err(error)
+                if error.kind() == io::ErrorKind::AlreadyExists
+                    && fs::symlink_metadata(path).map_or(true, |there| there.is_dir()) => {}
             Err(error) => return Err(error),
         }
     }
