@@ -90,6 +90,14 @@ pub struct Setpoints<T: Real, F> {
     pub trajectories: &'static [Trajectory<T>],
 }
 
+impl<T: Real, F> Setpoints<T, F> {
+    /// Whether a pose of the platform, with the bias, is finite and within the workspace.
+    #[must_use]
+    pub fn reaches(&self, pose: &[T; 6]) -> bool {
+        pose.iter().zip(&self.bound).all(|(value, bound)| (-*bound..=*bound).contains(value))
+    }
+}
+
 impl<T: Real, F: Frames<T>> Setpoints<T, F> {
     /// Puts the user's set-point as one of the platform into `target`, if it is finite and within the workspace.
     #[inline]

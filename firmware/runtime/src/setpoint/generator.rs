@@ -351,6 +351,11 @@ impl<T: Real> Generator<T> {
             Phase::Hold | Phase::Reset => status,
             Phase::Bias => {
                 let (target, ended) = self.straight(setpoints);
+                if !setpoints.reaches(&target.pose) {
+                    // Only where a snapshot gave a course that does not belong to its way.
+                    self.stand_still();
+                    return status | REFUSED;
+                }
                 self.target = target;
                 self.arrive(ended);
                 if ended { status } else { busy }

@@ -1,7 +1,7 @@
 //! Where a generator begins, when it may stand still at once, and when it has to stop first.
 
 use specgen_runtime::setpoint::{
-    BUSY, Command, CommandKind, Frames, Generator, LONGEST, MoveLimits, Parallel, Profile, Target, Tool,
+    BUSY, Command, CommandKind, Frames, Generator, LONGEST, MoveLimits, Parallel, Profile, REFUSED, Target, Tool,
 };
 use specgen_runtime::snapshot::{Field, Reader, Snapshot, Writer};
 
@@ -163,4 +163,36 @@ fn no_way_takes_longer_than_the_longest_phase() {
     let way = [0.0, 1.0, 0.0, -0.5, 0.0, 0.0];
     assert_eq!(Profile::plan(&way, &limits(LONGEST)).map(|profile| profile.ticks()), Some(LONGEST + 2));
     assert_eq!(Profile::plan(&way, &limits(LONGEST + 1)), None);
+}
+
+/// The words of a snapshot are checked one by one: a course may not belong to its way, or the way not to its ends.
+#[test]
+fn a_bias_that_a_snapshot_leads_astray_ends_at_the_bias_within_the_workspace() {
+    const PHASE_AND_PLACE: usize = 2 + 12;
+    let plan = plan64();
+    let mut on_its_way = Generator::new();
+    go(&mut on_its_way, &plan, &hold(), 600);
+    let mut words = [0; Generator::<f64>::WORDS];
+    on_its_way.save(&mut Writer::new(&mut words));
+    let (way, profile) = (PHASE_AND_PLACE + 12, PHASE_AND_PLACE + 18 + 18);
+    let changes: [(usize, u64); 4] = [
+        (way, (2.0 * BOUND[0]).to_bits()),
+        (way + 2, (2.0 * BOUND[2]).to_bits()),
+        (profile + 2, 5_000_000),
+        (profile + 3, 1.0_f64.to_bits()),
+    ];
+    let mut strayed = 0;
+    for (place, word) in changes {
+        let mut changed = words;
+        changed[place] = word;
+        let mut generator = Generator::new();
+        generator.restore(&mut Reader::new(&changed)).unwrap();
+        for _ in 0..20_000 {
+            let (target, status) = generator.next(&plan, &hold());
+            strayed += u32::from(status & REFUSED != 0);
+            assert!(target.pose.iter().zip(BOUND).all(|(value, bound)| value.abs() <= bound), "{place}: {target:?}");
+        }
+        assert_eq!(*generator.target(), Target::at(BIAS), "word {place}");
+    }
+    assert!(strayed > 1, "no course left the workspace");
 }
