@@ -237,7 +237,7 @@ fn tried(root: &Path, name: &str, output: &Path) -> Result<(), String> {
         done(&mut command(&["new", "mine", "--like", "reference"]))?;
         done(&mut command(&["check", MADE_ANEW]))?;
         if target != TARGETS[0] {
-            // What has to load a library is refused, with a mend.
+            // What has to load a library is refused, with a fix.
             let refused = command(&["sim", MADE_ANEW]).output().map_err(|error| format!("{archive}: {error}"))?;
             let says = String::from_utf8_lossy(&refused.stderr);
             if refused.status.code() != Some(3) || !says.contains(TARGETS[0]) {

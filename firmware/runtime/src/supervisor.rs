@@ -35,14 +35,14 @@ mod watch;
 mod wiring;
 
 pub use approach::Approach;
-pub use debounce::Debounce;
+pub use debounce::{Debounce, WRONG};
 pub use kinds::{
     AMPLIFIER, CONVERTER, Cause, EVENTS, FIRST_EVENT, HOLDS, INTEGRITY, LINK_LOST, MISSED_TICK, OF_GAUGES, Phase,
     RAMPS_DOWN, Reaction, Request, STALLED, STOP, SWITCHES_OFF,
 };
 pub use oscillation::{Fallback, Motion, Oscillation, Steadiness};
 pub use phases::Supervisor;
-pub use sift::{Activity, SAMPLE_REPEATED, SAMPLE_REPLACED, Sift, WRONG};
+pub use sift::{Activity, SAMPLE_REPEATED, SAMPLE_REPLACED, Sift};
 pub use supervision::{Supervision, TIMED, TIMERS};
 pub use watch::{Channel, Sample, Watch};
 pub use wiring::{Check, Fault, Finding, Named, Response, Wiring, explains, with};

@@ -14,7 +14,7 @@ use specgen::compile::Compiled;
 use specgen::machine;
 use specgen::model::{Mcu, SetpointKind};
 use specgen::target;
-use specgen_runtime::supervisor::{Cause, SAMPLE_REPEATED, SAMPLE_REPLACED};
+use specgen_runtime::supervisor::{CONVERTER, Cause, SAMPLE_REPEATED, SAMPLE_REPLACED};
 use specgen_tests::{Emitted, repository};
 use std::fs;
 use std::time::Duration;
@@ -366,6 +366,43 @@ fn samples_that_are_stale_missing_or_leap_are_counted_and_a_fault_if_it_goes_on(
             });
             print(&format!("a leap in one of {every} samples"), &leaps);
             assert!(leaps.0.is_some_and(|(ticks, cause)| ticks < most && cause == disagree));
+        }
+    }
+}
+
+/// A sample that is missing, out of range, or of a converter that did not answer, time and again.
+#[test]
+fn samples_that_are_missing_in_every_second_tick_are_a_fault() {
+    for (name, spec) in [("supervisor-samples", "reference.toml"), ("supervisor-samples-legs", "legs.toml")] {
+        let emitted = Emitted::new(name, spec, &[]);
+        let mut steady = Loop::new(&emitted, &LegParameters::reference(), 7);
+        steady.run();
+        // 10 ms, `supervisor.gauge_time`.
+        let lasting = 0.01 / steady.period;
+        for cause in [Cause::GaugeNotFinite, Cause::GaugeRange, Cause::Converter] {
+            for (every, times) in [(2, 2.7), (3, 6.0), (4, 16.0), (5, f64::INFINITY)] {
+                let mut machine = steady.fork();
+                let fault = (0..(20.0 * lasting) as u32).find(|tick| {
+                    let wrong = tick % every == 0;
+                    let events = machine.at.request + 1;
+                    machine.input[events] = u64::from(wrong && cause == Cause::Converter) * u64::from(CONVERTER);
+                    let word = machine.spoiled(RUN, |words| match cause {
+                        Cause::GaugeNotFinite if wrong => words[2] = f64::NAN,
+                        Cause::GaugeRange if wrong => words[2] = 1e-3,
+                        _ => {}
+                    });
+                    assert!(word.phase == RUNNING || u64::from(word.cause) == cause.word(), "{word:?}");
+                    word.phase != RUNNING
+                });
+                println!(
+                    "{name}, {cause:?}, one of {every}: {:?} ms",
+                    fault.map(|ticks| f64::from(ticks) * machine.period * 1e3)
+                );
+                match fault {
+                    Some(ticks) => assert!(f64::from(ticks) <= times * lasting + 2.0, "{cause:?}, {every}: {ticks}"),
+                    None => assert!(times.is_infinite(), "{cause:?}, one of {every} is no fault"),
+                }
+            }
         }
     }
 }

@@ -76,7 +76,7 @@ pub(super) fn amplifier_noise(facts: &Facts, found: &mut Found) {
     let (noise, actuator) = (facts.model.amplifier.noise, &facts.model.actuator);
     let [low, high] = actuator.voltage;
     let sensor = &facts.model.sensor;
-    let step = (sensor.range[1] - sensor.range[0]) / libm::exp2(f64::from(sensor.bits));
+    let step = sensor.step();
     // Nothing below its step is seen.
     let seen = if sensor.noise > step { sensor.noise } else { step };
     let (share, beside) = (noise / (high - low), noise * actuator.leg_gain() / seen);

@@ -33,8 +33,7 @@ fn pairs(facts: &Facts) -> Vec<Pair> {
         sound,
     };
     let time = |name, value, default| of(name, value, default, ("ms", 1e3), NEAR_DEFAULT);
-    let [low, high] = model.sensor.range;
-    let step = (high - low) / libm::exp2(f64::from(model.sensor.bits));
+    let step = model.sensor.step();
     let [hold, down] = defaults::HOST_LOST;
     let mut pairs = vec![
         time("arm_time", spec.arm_time, defaults::ARM_TIME),

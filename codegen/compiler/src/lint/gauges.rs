@@ -32,14 +32,9 @@ const PARALLEL: f64 = 0.99;
 /// Farthest target from P_C, in joint radii.
 const DETACHED: f64 = 3.0;
 
-fn step(facts: &Facts) -> f64 {
-    let sensor = &facts.model.sensor;
-    (sensor.range[1] - sensor.range[0]) / libm::exp2(f64::from(sensor.bits))
-}
-
 /// A noise far below the converter's step is a slip of the unit.
 pub(super) fn noise_of_a_step(facts: &Facts, found: &mut Found) {
-    let (noise, step) = (facts.model.sensor.noise, step(facts));
+    let (noise, step) = (facts.model.sensor.noise, facts.model.sensor.step());
     if noise == 0.0 || noise >= QUIETEST * step {
         return;
     }
@@ -58,7 +53,7 @@ pub(super) fn noise_of_a_step(facts: &Facts, found: &mut Found) {
 
 /// A converter of few bits that shows nothing but noise is a slip of the noise's unit, or of the range.
 pub(super) fn noise_of_many_steps(facts: &Facts, found: &mut Found) {
-    let (noise, step, stroke) = (facts.model.sensor.noise, step(facts), facts.model.actuator.stroke);
+    let (noise, step, stroke) = (facts.model.sensor.noise, facts.model.sensor.step(), facts.model.actuator.stroke);
     let [low, high] = facts.model.sensor.range;
     let seen = if stroke < high - low { stroke } else { high - low };
     // What is beyond all gauges is said with the spec (W0303). What is far beyond them is refused, unless it is the range that is
@@ -151,7 +146,7 @@ fn farthest_seen(facts: &Facts) -> f64 {
 
 /// A range of many times what there is to see wastes the converter, where its step is coarser than the gauge's noise.
 fn range_too_wide(facts: &Facts, found: &mut Found) {
-    let (model, step) = (facts.model, step(facts));
+    let (model, step) = (facts.model, facts.model.sensor.step());
     let [low, high] = model.sensor.range;
     let seen = if model.task_space.is_some() { 2.0 * farthest_seen(facts) } else { model.actuator.stroke };
     let noise = model.sensor.noise;
@@ -175,7 +170,7 @@ fn range_too_wide(facts: &Facts, found: &mut Found) {
 /// One code of the gauge against the stroke.
 pub(super) fn step_against_stroke(facts: &Facts, found: &mut Found) {
     range_too_wide(facts, found);
-    let (step, stroke) = (step(facts), facts.model.actuator.stroke);
+    let (step, stroke) = (facts.model.sensor.step(), facts.model.actuator.stroke);
     if step <= COARSEST_STEP * stroke {
         return;
     }

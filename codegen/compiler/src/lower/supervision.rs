@@ -16,6 +16,7 @@ use crate::ir::{Actuation, Hysteresis, Scalar, Sensing, Supervision};
 use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::Model;
 use specgen_numerics::multiply6;
+use specgen_runtime::supervisor::WRONG;
 
 /// Gauges are looked at in turn.
 const CHANNELS: f64 = 6.0;
@@ -59,7 +60,7 @@ pub(super) fn lower(
     let mut findings = Vec::new();
     let mut times = Times { model, findings: &mut findings };
     let arm_ticks = times.ticks("arm_time", spec.arm_time, defaults::ARM_TIME);
-    let gauge = times.ticks("gauge_time", spec.gauge_time, defaults::GAUGE_TIME);
+    let gauge = times.ticks("gauge_time", spec.gauge_time, defaults::GAUGE_TIME).saturating_mul(WRONG);
     let voltage = times.ticks("voltage_time", spec.voltage_time, defaults::VOLTAGE_TIME);
     let slew = times.ticks("slew_time", spec.slew_time, defaults::SLEW_TIME);
     let stuck_samples = times.samples("stuck_time", spec.stuck_time, defaults::STUCK_TIME);
@@ -95,7 +96,7 @@ pub(super) fn lower(
         host_ticks,
         stall_ticks: spec.missed_in_a_row,
         timeout: [gauge, gauge, voltage, slew, missed, gauge, host_gone],
-        weight: [1, 1, 1, 1, window, 1, 1],
+        weight: [WRONG, WRONG, 1, 1, window, WRONG, 1],
         stuck_motion: round(stuck_motion),
         stuck_samples,
         disagreement: round(disagreement),
@@ -194,8 +195,7 @@ impl Times<'_> {
 /// `supervisor.stuck_motion` and `supervisor.disagreement`, m.
 fn gauge_bounds(model: &Model, findings: &mut Vec<Diagnostic>) -> (f64, f64) {
     let spec = &model.supervisor;
-    let [low, high] = model.sensor.range;
-    let step = (high - low) / libm::exp2(f64::from(model.sensor.bits));
+    let step = model.sensor.step();
     let noise = model.sensor.noise;
     let stuck_motion = spec.stuck_motion.unwrap_or_else(|| defaults::stuck_motion(model, step));
     let least = FEWEST_STEPS * step;

@@ -98,3 +98,12 @@ section! {
         calibration = CALIBRATION, Rule("the gauge words are metres"), "", ["-2 um", "5 um/V"];
     }
 }
+
+impl Sensor {
+    /// A step of its converter, m.
+    #[must_use]
+    pub fn step(&self) -> f64 {
+        let [low, high] = self.range;
+        (high - low) / libm::exp2(f64::from(self.bits))
+    }
+}

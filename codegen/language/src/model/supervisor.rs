@@ -21,7 +21,7 @@ section! {
         arm_time: Option<f64> = TIMEOUT, Rule("100 ms, at least a period"), "", "100 ms";
         /// Rate at which voltages go to rest when they ramp down, at most the slew rate.
         ramp_rate: Option<f64> = one(Dimension::SLEW_RATE, Range::closed(1e-3, 1e12), "V/ms"), Rule("the whole voltage in a second, or `actuator.slew_rate` if that is less"), "", "0.1 V/ms";
-        /// Time after which a gauge that is not finite or out of range, or a converter that does not answer, is a fault.
+        /// Time after which a gauge that is not finite or out of range, or a converter that does not answer, is a fault. Where every second sample is missing it is one after 2.7 times that.
         gauge_time: Option<f64> = TIMEOUT, Rule("10 ms, at least a period"), "", "10 ms";
         /// Motion along a gauge that the voltages sent must have caused before an unchanged reading shows that the gauge is stuck.
         stuck_motion: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-2), "nm"), Rule("10 steps of the gauge's converter or 10 times `sensor.noise`, whichever is more"), "", "100 nm";

@@ -306,7 +306,7 @@
     if (!verdict) return;
     const line = html("div", box, "", "row");
     line.innerHTML = '<svg class="mark"><use href="#m-' + (verdict.good ? "ok" : "error") + '"/></svg>';
-    html("span", line, verdict.what.charAt(0).toUpperCase() + verdict.what.slice(1) + (verdict.mend ? " Do: " + verdict.mend : ""));
+    html("span", line, verdict.what.charAt(0).toUpperCase() + verdict.what.slice(1) + (verdict.advice ? " Do: " + verdict.advice : ""));
   }
 
   // ── What is pressed ──

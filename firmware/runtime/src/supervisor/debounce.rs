@@ -3,6 +3,10 @@
 use super::kinds::Cause;
 use super::supervision::{Supervision, TIMED, TIMERS};
 
+/// What a tick with a wrong sample, or with a converter that failed, adds to a count that falls by 1 in every other tick: more than one in
+/// five adds up to a fault.
+pub const WRONG: u32 = 4;
+
 /// Causes that act in the tick in which they are seen.
 const AT_ONCE: u32 = Cause::LinkLost.bit()
     | Cause::Integrity.bit()
@@ -19,7 +23,7 @@ const fn condition(cause: Cause) -> u32 {
 }
 
 crate::state! { |words|
-    /// Leaky counts: a condition that comes and goes counts, too, if it is there more often than not.
+    /// Leaky counts: a condition that comes and goes counts, too, if its share of the ticks is above 1 in 1 + its weight.
     #[derive(PartialEq, Eq)]
     pub struct Debounce {
         /// Of each of [`TIMED`].
@@ -49,9 +53,7 @@ impl Debounce {
             if present & condition(*cause) == 0 {
                 *count = count.saturating_sub(1);
             } else {
-                // Held at the timeout, so that it is forgotten as fast as it was learned.
-                let sum = count.saturating_add(supervision.weight[index]);
-                *count = if sum > timeout { timeout } else { sum };
+                rise(count, supervision.weight[index], timeout);
                 if *count >= timeout {
                     lasted |= cause.bit();
                 }
@@ -61,4 +63,11 @@ impl Debounce {
         *busy = any != 0;
         lasted
     }
+}
+
+/// Adds to a leaky count. It is held at its limit, so that it is forgotten as fast as its limit allows.
+#[inline(always)]
+pub(super) fn rise(count: &mut u32, by: u32, limit: u32) {
+    let sum = count.saturating_add(by);
+    *count = if sum > limit { limit } else { sum };
 }

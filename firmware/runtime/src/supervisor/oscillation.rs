@@ -124,7 +124,7 @@ pub struct Motion<T> {
 }
 
 impl<T: Real> Oscillation<T> {
-    /// Takes the motion of an axis or leg (0 to 5) while the law runs. Whether an oscillation of it has lasted.
+    /// Takes the motion of an axis or leg (0 to 5) while the law runs. Whether an oscillation of it is counted.
     #[inline]
     pub fn look(&mut self, limits: &Steadiness<T>, index: usize, motion: &Motion<T>) -> bool {
         let index = if index < 6 { index } else { 0 };
@@ -159,11 +159,11 @@ impl<T: Real> Oscillation<T> {
             && self.count(limits, index, swing < T::ZERO, motion.limited && moved != T::ZERO)
     }
 
-    /// The count of an axis whose power nothing explains, or did not lately.
+    /// The count of an axis whose power nothing explains, or did not lately; whether there is one.
     #[cold]
     #[inline(never)]
     fn count(&mut self, limits: &Steadiness<T>, index: usize, below: bool, kept_back: bool) -> bool {
-        let enough = if self.stage == Fallback::None { limits.first } else { limits.next };
+        let enough = self.enough(limits);
         let of_axis = (self.counts.get_mut(index), self.runs.get_mut(index), self.power.get(index));
         let (Some(count), Some(run), Some(power)) = of_axis else { return false };
         if kept_back {
@@ -183,13 +183,22 @@ impl<T: Real> Oscillation<T> {
         } else {
             *count = count.saturating_sub(1);
         }
-        let lasted = *count >= enough;
-        if lasted {
+        if *count > enough {
             *count = enough;
         }
         let suspected = self.counts.iter().any(|count| *count >= enough / 2);
         self.show(suspected);
-        lasted
+        true
+    }
+
+    /// Samples that lead to the next stage.
+    fn enough(&self, limits: &Steadiness<T>) -> u32 {
+        if self.stage == Fallback::None { limits.first } else { limits.next }
+    }
+
+    /// Whether an oscillation that is counted has lasted.
+    pub(super) fn has_lasted(&self, limits: &Steadiness<T>) -> bool {
+        self.counts.iter().any(|count| *count >= self.enough(limits))
     }
 
     /// Whether the error may be about to oscillate: something is counted, which an oscillation that grows is soon enough; or a stage

@@ -310,7 +310,18 @@ impl<T: Real> Supervisor<T> {
     #[inline]
     pub fn follow(&mut self, supervision: &Supervision<T>, channel: usize, error: T, target: T, given: Option<T>) {
         let limited = self.seen & Cause::VoltageSaturation.bit() != 0;
-        if self.oscillation.look(&supervision.steadiness, channel, &Motion { error, target, given, limited }) {
+        let motion = Motion { error, target, given, limited };
+        if self.oscillation.look(&supervision.steadiness, channel, &motion) {
+            self.suspect(supervision);
+        }
+    }
+
+    /// An oscillation is counted.
+    #[cold]
+    #[inline(never)]
+    fn suspect(&mut self, supervision: &Supervision<T>) {
+        self.sift.look_closely();
+        if self.oscillation.has_lasted(&supervision.steadiness) {
             self.watch.lasted |= Cause::Oscillation.bit();
         }
     }

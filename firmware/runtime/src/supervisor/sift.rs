@@ -2,32 +2,44 @@
 //!
 //! ```text
 //! prediction   2 y(n−1) − y(n−2)            wrong by no more than the legs can accelerate, and noise: the bound `leap`
-//! replaced     |y(n) − prediction| > leap; times 3, 6, … where y(n−1), y(n−2), … were missing or repeated. Not where y(n) is as near to
-//!              y(n−2): then it was y(n−1) that leapt, by less than the bound, and the middle stands for it from here on. Nor while an
-//!              oscillation is suspected, which no straight line predicts
+//! swing        s ← max(15/16 s, |y(n) − prediction|/leap) of the gauge that swings most, of words that were not replaced, while an
+//!              oscillation is suspected, which no straight line predicts; afterwards as long as it is above 1. Else it decays, to
+//!              nothing. Where a prediction is remembered for a word, 3 s: so much may the next one be off a line through it
+//! replaced     |y(n) − prediction| > (1 + 2 s) leap; times 3, 6, … where y(n−1), y(n−2), … were missing or repeated. Not where y(n) is as near
+//!              to y(n−2): then it was y(n−1) that leapt, by less than the bound, and the middle stands for it from here on
 //! repeated     all six words are those of the sample before, or of the one before that
 //! ```
 //! Both are leaky counts: 4 for a tick with it, 1 taken off by one without. Three replaced in a row are a fault, or every fourth over long. Of
 //! repeated ones the spec says how many: none where the noise is below a step of the converter, or where the gauges showed no noise
 //! while the machine armed.
 
+use super::debounce::{WRONG, rise};
 use super::kinds::{Cause, FIRST_CHANNEL};
 use super::supervision::Supervision;
 use crate::linear::each;
 use crate::real::Real;
+use crate::snapshot::LARGEST;
 
 /// Bit 22 of the status: the word of a gauge leapt and was replaced by its prediction.
 pub const SAMPLE_REPLACED: u32 = 0x40_0000;
 /// Bit 23 of the status: six gauges gave the very words of a sample before.
 pub const SAMPLE_REPEATED: u32 = 0x80_0000;
-/// What a tick with a wrong sample counts.
-pub const WRONG: u32 = 4;
 /// Count of replaced samples at which they are a fault.
 const REPLACED_LIMIT: u32 = 3 * WRONG;
 /// Predictions in a row after which a sample is taken as it comes.
 const MOST_PREDICTED: usize = 3;
 /// Conditions name gauges whose words were replaced from this bit on.
 const FIRST_REPLACED: u32 = 22;
+
+/// Times the swing by which the next word may be off its prediction.
+const GROWTH: f64 = 2.0;
+/// What a tick leaves of a swing.
+const DECAY: f64 = 0.9375;
+/// Times the swing by which a word is off the line through a prediction that was off by the swing; up to so large a swing.
+const AFTER_PREDICTED: f64 = 3.0;
+const MOST_WIDENED: f64 = 64.0;
+/// A swing below it is none.
+const NEGLIGIBLE: f64 = 0.0625;
 
 /// What the machine does, as far as its samples tell it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +63,8 @@ crate::state! { |words|
         pub known: usize = 0, place(2);
         /// How many of the last ones, in a row, were missing or repeated.
         pub predicted: usize = 0, place(MOST_PREDICTED);
+        /// By how much words were lately off their predictions, as a multiple of `leap`: what an oscillation makes of them.
+        pub swing: T = T::ZERO, number(LARGEST);
         /// Checksums of the words of the last two samples, the newer one first, where they may not be in `samples`.
         pub sums: [u32; 2] = [0; 2], tallies;
         /// Leaky count of samples with replaced words.
@@ -113,8 +127,9 @@ impl<T: Real> Sift<T> {
         }
         self.replaced = 0;
         let mut smoothed = newer;
-        if believed && self.known == 2 && activity != Activity::Oscillating {
-            smoothed = self.replace(supervision, words, &prediction);
+        self.swing = self.swing * T::from_f64(DECAY);
+        if believed && self.known == 2 {
+            smoothed = self.replace(supervision, words, &prediction, activity == Activity::Oscillating);
         }
         if !believed && (self.known < 2 || self.predicted >= MOST_PREDICTED) {
             self.known = 0;
@@ -129,7 +144,11 @@ impl<T: Real> Sift<T> {
         count(&mut self.leapt, self.replaced != 0, REPLACED_LIMIT);
         count(&mut self.stale, self.repeated, supervision.repeats);
         let undisturbed = self.predicted == 0 && before == 0 && self.leapt | self.stale == 0 && smoothed == newer;
-        self.quiet = self.known == 2 && undisturbed && activity != Activity::Standing;
+        self.quiet =
+            self.known == 2 && undisturbed && activity == Activity::Moving && self.swing <= T::from_f64(NEGLIGIBLE);
+        if self.quiet {
+            self.swing = T::ZERO;
+        }
         let mut lasted = 0;
         if self.replaced != 0 && self.leapt >= REPLACED_LIMIT {
             // From here on it is the gauges that are right: what is predicted from predictions runs away.
@@ -165,14 +184,54 @@ impl<T: Real> Sift<T> {
         same && supervision.repeats != 0 && self.noise.saturating_mul(2) > supervision.arm_ticks
     }
 
+    /// An oscillation is suspected: from here on every sample goes through [`Sift::sift`], which looks at its swing.
+    #[cold]
+    #[inline(never)]
+    pub fn look_closely(&mut self) {
+        if self.quiet {
+            let (newer, older) = self.last_two();
+            self.sums = [sum(&newer), sum(&older)];
+            self.quiet = false;
+        }
+    }
+
+    /// The swing, with the words that are within the bound. A prediction from predictions says less of it.
+    #[cold]
+    #[inline(never)]
+    fn swings(&self, leaps: &[T; 6], words: &[T; 6], prediction: &[T; 6], bound: T, oscillates: bool) -> T {
+        let mut swing = self.swing;
+        if self.predicted != 0 {
+            return swing;
+        }
+        let least = if oscillates { T::ZERO } else { T::ONE };
+        for ((word, predicted), leap) in words.iter().zip(prediction).zip(leaps) {
+            let off = (*word - *predicted).abs();
+            if off <= *leap * bound && off > *leap * swing && off > *leap * least {
+                swing = off / *leap;
+            }
+        }
+        swing
+    }
+
     /// Replaces the words that leapt by their prediction. Returns the sample before, without what turns out to have leapt in it.
-    fn replace(&mut self, supervision: &Supervision<T>, words: &mut [T; 6], prediction: &[T; 6]) -> [T; 6] {
+    fn replace(
+        &mut self,
+        supervision: &Supervision<T>,
+        words: &mut [T; 6],
+        prediction: &[T; 6],
+        oscillates: bool,
+    ) -> [T; 6] {
         let (mut newer, older) = self.last_two();
         let intervals = self.predicted as i32 + 1;
-        let factor = T::from_i32(intervals * (intervals + 1) / 2);
+        let mut bound = T::from_i32(intervals * (intervals + 1) / 2);
+        let swings = oscillates || self.swing != T::ZERO;
+        if swings {
+            bound = (T::ONE + self.swing * T::from_f64(GROWTH)) * bound;
+            self.swing = self.swings(&supervision.leap, words, prediction, bound, oscillates);
+        }
         for (gauge, (word, predicted)) in words.iter_mut().zip(prediction).enumerate() {
             let leap = supervision.leap[gauge];
-            if is_within(*word, *predicted, leap * factor) {
+            if is_within(*word, *predicted, leap * bound) {
                 continue;
             }
             if is_within(*word, older[gauge], leap) {
@@ -181,6 +240,9 @@ impl<T: Real> Sift<T> {
                 self.replaced |= 1 << gauge;
                 *word = *predicted;
             }
+        }
+        if swings && self.replaced != 0 {
+            self.swing = widened(self.swing);
         }
         newer
     }
@@ -201,6 +263,8 @@ impl<T: Real> Sift<T> {
         let begins = is_predicted && (self.known < 2 || self.predicted >= MOST_PREDICTED);
         if begins {
             self.known = 0;
+        } else if is_predicted {
+            self.swing = widened(self.swing);
         }
         self.predicted = if begins || !is_predicted { 0 } else { self.predicted + 1 };
         self.newer = usize::from(self.newer == 0);
@@ -234,6 +298,18 @@ impl<T: Real> Sift<T> {
     }
 }
 
+/// What a swing may be behind a prediction that is remembered for a word.
+fn widened<T: Real>(swing: T) -> T {
+    let (most, widened) = (T::from_f64(MOST_WIDENED), swing * T::from_f64(AFTER_PREDICTED));
+    if swing >= most {
+        swing
+    } else if widened < most {
+        widened
+    } else {
+        most
+    }
+}
+
 /// Where a word goes on in a straight line.
 #[inline(always)]
 fn predict<T: Real>(newer: T, older: T) -> T {
@@ -256,10 +332,9 @@ fn sum<T: Real>(words: &[T; 6]) -> u32 {
 
 /// A leaky count, held at its limit.
 fn count(count: &mut u32, wrong: bool, limit: u32) {
-    if !wrong {
+    if wrong {
+        rise(count, WRONG, limit);
+    } else {
         *count = count.saturating_sub(1);
-        return;
     }
-    let sum = count.saturating_add(WRONG);
-    *count = if sum > limit { limit } else { sum };
 }

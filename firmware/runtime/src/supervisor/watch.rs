@@ -1,6 +1,7 @@
 //! What the gauges show against what was sent. One gauge and one axis a tick, each once in six: faults last longer, and a
 //! sixth of the work is a sixth of the time.
 
+use super::debounce::rise;
 use super::kinds::Cause;
 use super::supervision::Supervision;
 use crate::real::Real;
@@ -157,9 +158,6 @@ fn count(count: &mut u32, seen: bool, timeout: u32, off: u32) -> bool {
         *count = count.saturating_sub(off);
         return false;
     }
-    // Held at the timeout, so that it is forgotten as fast as it was learned.
-    if *count < timeout {
-        *count += 1;
-    }
+    rise(count, 1, timeout);
     *count >= timeout
 }

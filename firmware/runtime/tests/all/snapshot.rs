@@ -184,7 +184,7 @@ fn every_word_of_a_supervisor_counts() {
     }
     let words = words.whole(&[3]).counters(5);
     // Samples, the wiring check, the oscillation, then the approach.
-    let words = words.reals(12).whole(&[1, 2, 1]).counters(6).whole(&[1, 0]);
+    let words = words.reals(12).whole(&[1, 2, 1]).reals(1).counters(6).whole(&[1, 0]);
     let words = words.whole(&[2]).counters(1).reals(4 + 36 + 6 + 1).counters(1).whole(&[1]);
     let words = words.whole(&[1]).reals(18 + 1).counters(14).whole(&[1]).reals(6);
     let fresh = Supervisor::<f64>::new();
@@ -201,7 +201,8 @@ fn every_word_of_a_supervisor_counts() {
     for (place, most) in [(12, 1), (13, 2), (14, 3)] {
         whole_within(&fresh, samples + place, 0, most);
     }
-    let leg = samples + 23;
+    numbers_within(&fresh, [samples + 15], LARGEST);
+    let leg = samples + 24;
     let mut quiet = save(&fresh);
     quiet[leg - 1] = 1;
     assert_eq!(restore(&fresh, &quiet).err(), Some(Invalid { word: leg - 1 }), "quiet without two samples");

@@ -62,6 +62,8 @@ pub struct Machine {
     pub structure: Option<Structure>,
     /// Added to the pose that the gauges see, of each axis, m and rad, by time in s.
     pub vibration: Option<Box<dyn Fn(f64) -> Six>>,
+    /// Added to what the gauges show in the next tick, m.
+    pub wrong: Option<Six>,
     /// Rows of the last tick.
     pub input: Vec<u64>,
     pub output: Vec<u64>,
@@ -120,6 +122,7 @@ impl Machine {
             rows: None,
             structure: None,
             vibration: None,
+            wrong: None,
             input: vec![0; inputs.len()],
             output: vec![0; outputs.len()],
             word: MachineWord::of(0),
@@ -143,6 +146,7 @@ impl Machine {
         other.rig = rig.clone();
         // A structure that is given to it begins at rest where the machine stands.
         (other.legs, other.mounts, other.shown) = (self.legs, self.mounts, self.shown);
+        other.structure = self.structure;
         other
     }
 
@@ -197,6 +201,11 @@ impl Machine {
                 *seen += row.iter().zip(&pose).map(|(a, b)| a * b).sum::<f64>();
             }
         }
+        if let Some(wrong) = self.wrong.take() {
+            for (seen, wrong) in seen.iter_mut().zip(wrong) {
+                *seen += wrong;
+            }
+        }
         seen
     }
 
@@ -231,6 +240,10 @@ impl Machine {
     /// Whether a leg is held back by a limit.
     pub fn is_limited(&self) -> bool {
         self.output[self.places.status] & 0x3f != 0
+    }
+
+    pub fn status(&self) -> u64 {
+        self.output[self.places.status]
     }
 
     pub fn conditions(&self) -> u64 {

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use super::bench::{ACKNOWLEDGE, FAULTED, HOLD, HOLDING, NOTHING, RAMP_DOWN, RAMPING, RUN, RUNNING};
 use machine::{Machine, Six, Structure};
-use specgen_runtime::supervisor::{Cause, Fallback, Finding};
+use specgen_runtime::supervisor::{Cause, Fallback, Finding, SAMPLE_REPLACED};
 
 /// Edit of the reference spec: with active damping of the modes.
 const DAMPED: (&str, &str) = ("notch_damping   = 1.0", "notch_damping   = 1.0\nactive_damping  = true");
@@ -133,14 +133,17 @@ struct Course {
     times: [Option<f64>; 3],
     /// Amplitude of the error that is left, m.
     left: f64,
+    /// Samples that were taken for wrong ones.
+    replaced: u32,
 }
 
 /// Lets it oscillate for `time` (s), then looks at what is left.
 fn observe(machine: &mut Machine, time: f64) -> Course {
     let period = machine.period();
-    let (mut most, mut reached, mut begun, mut times) = (0.0_f64, 0, None, [None; 3]);
+    let (mut most, mut reached, mut begun, mut times, mut replaced) = (0.0_f64, 0, None, [None; 3], 0);
     for _ in 0..(time / period) as u64 {
         machine.tick(NOTHING);
+        replaced += u32::from(machine.status() & u64::from(SAMPLE_REPLACED) != 0);
         let error = largest(&machine.error());
         most = most.max(error);
         if error >= 100e-9 {
@@ -156,7 +159,7 @@ fn observe(machine: &mut Machine, time: f64) -> Course {
             reached = now;
         }
     }
-    Course { largest: most, times, left: machine.amplitude(0.2, ARM_LENGTH) }
+    Course { largest: most, times, left: machine.amplitude(0.2, ARM_LENGTH), replaced }
 }
 
 const LEG: fn(f64, f64) -> Structure = |hertz, damping| Structure::Leg { hertz, damping };
@@ -183,7 +186,8 @@ fn structural_modes_that_the_spec_lacks_end_quiet() {
     ] {
         let mut machine = started.like(&supervised, &rig, &emitted.compiled);
         machine.structure = Some(structure);
-        let Course { largest, times, left } = observe(&mut machine, 3.0);
+        let Course { largest, times, left, replaced } = observe(&mut machine, 3.0);
+        assert_eq!(replaced, 0, "{structure:?}: good samples");
         println!(
             "  {structure:?}: {:.2} um, {}, {:.1} nm: {}",
             largest * 1e6,
@@ -198,6 +202,47 @@ fn structural_modes_that_the_spec_lacks_end_quiet() {
         let held = largest > 50e-6 && (machine.word.phase, machine.word.cause) == (HOLDING, TRACKING);
         let phase = if last == 3 { FAULTED } else { RUNNING };
         assert!(held || (machine.word.phase, machine.word.cause) == (phase, OSCILLATION), "{structure:?}");
+    }
+}
+
+/// A wrong sample while an oscillation is counted, or in a stage, is replaced as at any other time; no sample of the oscillation is.
+#[test]
+fn a_wrong_sample_is_replaced_while_the_error_oscillates() {
+    let emitted = damped();
+    let mut started = Machine::new(&emitted, &LegParameters::reference(), 5);
+    started.start();
+    for structure in [LEG(1200.0, 0.01), LEG(700.0, 0.01), MOUNT(1200.0, 0.01), MOUNT(700.0, 0.03)] {
+        let mut machine = started.like(&started.supervised, &started.rig, &emitted.compiled);
+        machine.structure = Some(structure);
+        // From when it begins until what it led to has ended it.
+        while largest(&machine.error()) < 100e-9 {
+            machine.tick(NOTHING);
+            assert_eq!(machine.status() & u64::from(SAMPLE_REPLACED), 0, "{structure:?}: a good sample");
+        }
+        let (mut moved, mut peak, mut seen) = (0.0_f64, 0.0_f64, 0);
+        for piece in 0..60 {
+            let mut twin = machine.like(&machine.supervised, &machine.rig, &emitted.compiled);
+            let gauge = piece % 6;
+            twin.input.clone_from(&machine.input);
+            twin.wrong = Some(std::array::from_fn(|k| if k == gauge { 20e-6 } else { 0.0 }));
+            for tick in 0..10 {
+                machine.tick(NOTHING);
+                peak = peak.max(largest(&machine.error()));
+                // Well beyond what swings.
+                if peak > 5e-6 {
+                    continue;
+                }
+                twin.tick(NOTHING);
+                let replaced = [&machine, &twin].map(|one| one.conditions() >> 22 & 0x3f);
+                assert_eq!(replaced, [0, u64::from(tick == 0) << gauge], "{structure:?}, {piece}, tick {tick}");
+                let [good, wrong] = [&machine, &twin].map(|one| one.rig.plant().pose());
+                moved = (0..3).map(|axis| (good[axis] - wrong[axis]).abs()).fold(moved, f64::max);
+                seen += u32::from(tick == 0);
+            }
+        }
+        println!("{structure:?}: {seen} wrong samples of 20 um, {:.1} nm at most: {}", moved * 1e9, machine.word);
+        assert!(seen > 5 && moved < 500e-9, "{structure:?}: {seen}, {moved}");
+        assert_ne!(stage(&machine), Fallback::None);
     }
 }
 

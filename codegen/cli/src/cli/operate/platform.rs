@@ -361,7 +361,7 @@ impl<P: Port> Operator<P> {
                 format!("it holds because of {}: when that is mended, `none`, then `run`", cause.name())
             }
             (Phase::RampingDown, _) => "`wait disarmed`, or faulted".to_owned(),
-            (Phase::Faulted, cause) => format!("mend the cause ({}), then `none`, `acknowledge`, `arm`", cause.name()),
+            (Phase::Faulted, cause) => format!("fix the cause ({}), then `none`, `acknowledge`, `arm`", cause.name()),
             (Phase::Running, Cause::Oscillation) => {
                 "it oscillated, and the law has fallen back: when that is mended, `none`, then `acknowledge`".to_owned()
             }

@@ -45,9 +45,7 @@ pub fn poses_per_reading(model: &Model) -> Result<Option<Matrix6>, Vec<Diagnosti
 /// Noise of a reading, quantisation included, and that of the quantisation alone: a step over √12. Rms, m.
 #[must_use]
 pub fn reading_noise(model: &Model) -> [f64; 2] {
-    let [low, high] = model.sensor.range;
-    let step = (high - low) / libm::exp2(f64::from(model.sensor.bits));
-    let quantisation = step / libm::sqrt(12.0);
+    let quantisation = model.sensor.step() / libm::sqrt(12.0);
     [libm::sqrt(model.sensor.noise * model.sensor.noise + quantisation * quantisation), quantisation]
 }
 

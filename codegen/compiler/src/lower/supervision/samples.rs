@@ -59,7 +59,7 @@ pub(super) fn leap(
 
 /// What noise and converter make of three samples, m.
 fn noise(model: &Model) -> f64 {
-    NOISE_MARGIN * SECOND_DIFFERENCE * model.sensor.noise + ROUNDING * step(model)
+    NOISE_MARGIN * SECOND_DIFFERENCE * model.sensor.noise + ROUNDING * model.sensor.step()
 }
 
 /// Without `supervisor.leap`, m, of a gauge that shows the displacement of one leg.
@@ -76,14 +76,9 @@ fn acceleration(model: &Model) -> f64 {
     2.0 * model.actuator.slew_rate * model.actuator.leg_gain() * period * part
 }
 
-fn step(model: &Model) -> f64 {
-    let [low, high] = model.sensor.range;
-    (high - low) / libm::exp2(f64::from(model.sensor.bits))
-}
-
 /// Count at which repeated samples are a fault; 0 where the noise is not above a step of the converter, so that they say nothing.
 pub(super) fn repeats(model: &Model) -> u32 {
-    let noise = model.sensor.noise / step(model);
+    let noise = model.sensor.noise / model.sensor.step();
     if noise <= 1.0 {
         return 0;
     }

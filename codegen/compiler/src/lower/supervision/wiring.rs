@@ -228,8 +228,7 @@ impl Regression {
 
 /// What noise makes of what the least moved gauge or leg shows, rms.
 fn noise(model: &Model, weights: &[f64], pulse: f64, readings: &Response<f64>) -> f64 {
-    let [low, high] = model.sensor.range;
-    let step = (high - low) / libm::exp2(f64::from(model.sensor.bits));
+    let step = model.sensor.step();
     let of_reading = libm::sqrt(model.sensor.noise * model.sensor.noise + step * step / 12.0);
     let of_entry = of_reading / pulse * libm::sqrt(weights.iter().map(|weight| weight * weight).sum());
     let size = |entries: [f64; 6]| libm::sqrt(entries.iter().map(|entry| entry * entry).sum());

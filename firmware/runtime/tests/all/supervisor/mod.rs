@@ -8,15 +8,15 @@ mod sift;
 mod wiring;
 
 use specgen_runtime::GaugeConverter;
-use specgen_runtime::supervisor::{Approach, Cause, Debounce, Reaction, Steadiness, Supervision, TIMED, toward};
+use specgen_runtime::supervisor::{Approach, Cause, Debounce, Reaction, Steadiness, Supervision, TIMED, WRONG, toward};
 
 const SUPERVISION: Supervision<f64> = Supervision {
     arm_ticks: 10,
     rest: 0,
     ramp_step: 5,
     ramp_every: 1,
-    timeout: [5, 5, 10, 5, 201, 3, 40],
-    weight: [1, 1, 1, 1, 100, 1, 1],
+    timeout: [20, 20, 10, 5, 201, 12, 40],
+    weight: [WRONG, WRONG, 1, 1, 100, WRONG, 1],
     stuck_motion: 1e-8,
     stuck_samples: 3,
     disagreement: 1e-6,
@@ -86,10 +86,11 @@ fn lasts(cause: Cause, shows: impl Fn(u32) -> bool) -> Option<u32> {
 
 #[test]
 fn conditions_become_causes_when_they_have_lasted() {
-    for (cause, timeout) in TIMED.into_iter().zip(SUPERVISION.timeout) {
+    let (timeouts, weights) = (SUPERVISION.timeout, SUPERVISION.weight);
+    for ((cause, timeout), weight) in TIMED.into_iter().zip(timeouts).zip(weights) {
         if cause != Cause::MissedTick {
-            assert_eq!(lasts(cause, |_| true), Some(timeout - 1), "{cause:?}");
-            assert_eq!(lasts(cause, |tick| tick % 2 == 0), if timeout == 1 { Some(0) } else { None }, "{cause:?}");
+            assert_eq!(lasts(cause, |_| true), Some(timeout / weight - 1), "{cause:?}");
+            assert_eq!(lasts(cause, |tick| tick % 2 == 0).is_some(), weight == WRONG, "{cause:?}");
             // Two ticks of three: slower, but as sure.
             assert!(lasts(cause, |tick| tick % 3 != 2).is_some(), "{cause:?}");
         }
@@ -99,6 +100,33 @@ fn conditions_become_causes_when_they_have_lasted() {
     assert_eq!(lasts(Cause::MissedTick, |tick| tick % 101 == 0), None);
     for cause in [Cause::LinkLost, Cause::Integrity, Cause::EmergencyStop, Cause::Stalled, Cause::AmplifierFault] {
         assert_eq!(lasts(cause, |_| true), Some(0), "{cause:?}");
+    }
+}
+
+/// Samples that are missing in every second to fourth tick: in 2.7, 6 and 16 times the time in which a fault that stays is one. Rarer ones
+/// never are.
+#[test]
+fn samples_that_are_missing_time_and_again_are_a_fault_and_rare_ones_are_not() {
+    const TICKS: u32 = 100;
+    let mut timeout = [u32::MAX; 7];
+    for index in [0, 1, 5] {
+        timeout[index] = WRONG * TICKS;
+    }
+    let supervision = Supervision { timeout, ..SUPERVISION };
+    for cause in [Cause::GaugeNotFinite, Cause::GaugeRange, Cause::Converter] {
+        let lasts = |every: u32| {
+            let (mut debounce, mut busy) = (Debounce::new(), false);
+            (0..1_000_000).find(|tick| {
+                let present = if tick % every == 0 { cause.bit() } else { 0 };
+                debounce.count(&supervision, present, &mut busy) & cause.bit() != 0
+            })
+        };
+        assert_eq!(lasts(1), Some(TICKS - 1), "{cause:?}");
+        for (every, times) in [(2, 2.7), (3, 6.0), (4, 16.0)] {
+            let ticks = lasts(every).expect("a fault");
+            assert!(f64::from(ticks) <= times * f64::from(TICKS), "{cause:?}, one in {every}: {ticks}");
+        }
+        assert_eq!([lasts(5), lasts(6), lasts(50)], [None; 3], "{cause:?}");
     }
 }
 

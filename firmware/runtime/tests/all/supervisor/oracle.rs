@@ -183,7 +183,8 @@ impl Oracle {
                 6 => (self.bounds.voltage_ticks, 1),
                 7 => (self.bounds.slew_ticks, 1),
                 8 => (self.bounds.ticks_per_second + 1, self.bounds.ticks_per_second),
-                _ => (self.bounds.gauge_ticks, 1),
+                // A sample that is missing, in one tick, takes as long as four without to be forgotten.
+                _ => (4 * self.bounds.gauge_ticks, 4),
             };
             let count = &mut self.counts[usize::from(cause)];
             *count = if present.contains(&shown) { (*count + weight).min(limit) } else { (*count - 1).max(0) };

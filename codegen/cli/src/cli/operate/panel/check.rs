@@ -21,7 +21,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 struct Verdict {
     good: bool,
     what: String,
-    mend: &'static str,
+    advice: &'static str,
 }
 
 /// Arms a machine that is disarmed. It holds where gauges and legs are as the spec says; else it is faulted, and the verdict says why.
@@ -60,12 +60,12 @@ pub(super) fn run<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefC
                         "Gauges and legs are as the spec says: sign and order. Gains of legs are not tested until each has a record."
                     }
                 };
-                break Verdict { good: true, what: what.to_owned(), mend: "" };
+                break Verdict { good: true, what: what.to_owned(), advice: "" };
             }
             Some(Phase::Faulted | Phase::RampingDown) if u64::from(status.cause) == Cause::Wiring.word() => {
                 let finding = Finding::of_word(u32::from(status.finding));
                 let what = format!("{}.", Named(finding, rules.alike()));
-                break Verdict { good: false, what, mend: said::mend(finding) };
+                break Verdict { good: false, what, advice: said::advice(finding) };
             }
             Some(Phase::Faulted) => return Err(Ended::Fault(format!("the machine is {}", operator.stands()))),
             _ if since.elapsed() > limit => return refused(format!("the machine is still {}", operator.stands())),
@@ -74,7 +74,7 @@ pub(super) fn run<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefC
     };
     let kind = if verdict.good { "note" } else { "error" };
     let mut panel = panel.borrow_mut();
-    panel.hall.note(kind, &format!("Wiring check: {}", verdict.what), verdict.mend, None);
+    panel.hall.note(kind, &format!("Wiring check: {}", verdict.what), verdict.advice, None);
     panel.check = json!({ "runs": false, "done": 6, "verdict": verdict });
     Ok(json!(verdict))
 }

@@ -50,9 +50,9 @@ fn cause(cause: Cause) -> (&'static str, &'static str) {
 }
 
 /// What to do about what the wiring check found.
-pub fn mend(finding: Finding) -> &'static str {
+pub fn advice(finding: Finding) -> &'static str {
     match finding {
-        Finding::None => "",
+        Finding::None | Finding::Fallback(_) => "",
         Finding::Gauge(_, Fault::Inverted) => "Exchange the wires of the gauge, or turn its `direction` in the spec.",
         Finding::Gauge(_, Fault::Dead) => "Check cable and supply of the gauge.",
         Finding::Gauge(_, Fault::Swapped(_)) => {
@@ -68,7 +68,6 @@ pub fn mend(finding: Finding) -> &'static str {
         Finding::Nothing => "Check the supplies of amplifiers and gauges, and that stacks are connected.",
         Finding::Unexplained => "Check gauge by gauge and leg by leg, with the others unplugged.",
         Finding::NoRoom => "Widen `code_min` and `code_max`.",
-        Finding::Fallback(_) => cause(Cause::Oscillation).1,
     }
 }
 
@@ -96,13 +95,16 @@ pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
     let finding = Finding::of_word(u32::from(status.finding));
     let phase = Phase::from_word(u64::from(status.phase));
     let of = Cause::from_word(u64::from(status.cause)).unwrap_or(Cause::None);
-    let (what, mend) = match cause(of) {
-        (_, _) if of == Cause::None && matches!(finding, Finding::Fallback(_)) => (String::new(), mend(finding)),
-        (what, mend) if matches!(finding, Finding::Fallback(_)) => (format!("{what} Fallen back: {finding}."), mend),
-        (what, _) if finding != Finding::None => {
-            (format!("{what} The wiring check found: {}.", Named(finding, rules.alike())), mend(finding))
+    let (what, advice) = match (cause(of), finding) {
+        ((what, advice), Finding::None) => (what.to_owned(), advice),
+        ((what, advice), Finding::Fallback(_)) if of != Cause::None => {
+            (format!("{what} Fallen back: {finding}."), advice)
         }
-        (what, mend) => (what.to_owned(), mend),
+        // It was asked to hold, and the stage stays.
+        (_, Finding::Fallback(_)) => (format!("It oscillated; fallen back: {finding}."), cause(Cause::Oscillation).1),
+        ((what, _), _) => {
+            (format!("{what} The wiring check found: {}.", Named(finding, rules.alike())), advice(finding))
+        }
     };
     let what = what.as_str();
     let code = (of != Cause::None).then(|| {
@@ -116,7 +118,7 @@ pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
         Some(Phase::Running) => {
             let bits = status.status & !BUSY;
             let (kind, what, advice) = if of != Cause::None {
-                return said("error", &format!("Running. {what}"), mend);
+                return said("error", &format!("Running. {what}"), advice);
             } else if bits & REFUSED != 0 {
                 ("warning", "Running. The last command is refused.", "Hold, run, and move to where there is reach.")
             } else if bits & STALE != 0 {
@@ -132,14 +134,11 @@ pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
             };
             said(kind, what, advice)
         }
-        Some(Phase::Holding) if of == Cause::None && matches!(finding, Finding::Fallback(_)) => {
-            said("warning", &format!("Holding. It oscillated; fallen back: {finding}."), mend)
-        }
-        Some(Phase::Holding) if of == Cause::None => said("note", "Holding. The law is suspended.", "Run goes on."),
-        Some(Phase::Holding) => said("warning", &format!("Holding. {what}"), mend),
+        Some(Phase::Holding) if what.is_empty() => said("note", "Holding. The law is suspended.", "Run goes on."),
+        Some(Phase::Holding) => said("warning", &format!("Holding. {what}"), advice),
         Some(Phase::RampingDown) if of == Cause::None => said("note", "Ramping down.", ""),
-        Some(Phase::RampingDown) => said("error", &format!("Ramping down. {what}"), mend),
-        Some(Phase::Faulted) => said("error", what, mend),
+        Some(Phase::RampingDown) => said("error", &format!("Ramping down. {what}"), advice),
+        Some(Phase::Faulted) => said("error", what, advice),
         None => said("error", "The machine says a phase that is not known.", "Build panel and controller alike."),
     }
 }
