@@ -2,7 +2,7 @@
 //! none notices are in [`LIST`] with a reason each.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -16,6 +16,8 @@ const INSTALL: &str = "cargo install cargo-mutants --locked";
 /// What is run together.
 struct Group {
     package: &'static str,
+    /// Folder of its workspace, with settings of its own, if that is not the repository's.
+    folder: Option<&'static str>,
     /// Arguments of cargo-mutants beside the package, before and behind its `--`.
     arguments: [&'static [&'static str]; 2],
     /// What one sample is: one in so many.
@@ -24,19 +26,27 @@ struct Group {
     bar: usize,
 }
 
-const GROUPS: [Group; 4] = [
-    Group { package: "specgen-runtime", arguments: [&[], &["--tests"]], one_in: 32, bar: 90 },
+const GROUPS: [Group; 5] = [
+    Group { package: "specgen-runtime", folder: None, arguments: [&[], &["--tests"]], one_in: 32, bar: 90 },
     // Twice: with the reference's controller, and with one that takes a correction and has an input line.
     Group {
         package: "specgen-board",
+        folder: None,
         arguments: [&["--test-package", "specgen-board,specgen-board-passes"], &["--tests"]],
         one_in: 8,
         bar: 90,
     },
     // Without the test that builds it once more, for a proof about its text.
-    Group { package: "specgen-link", arguments: [&[], &["--tests", "--", "--skip", "panic_free"]], one_in: 4, bar: 90 },
+    Group {
+        package: "specgen-link",
+        folder: None,
+        arguments: [&[], &["--tests", "--", "--skip", "panic_free"]],
+        one_in: 4,
+        bar: 90,
+    },
+    Group { package: "specgen-rt-pc", folder: Some("firmware/rt-pc"), arguments: [&[], &[]], one_in: 16, bar: 90 },
     // Only `lower`, `stability` and `lint` of it. Of cargo's own arguments, for the build too: the library alone, not once more for others.
-    Group { package: "specgen-compiler", arguments: [&["--cargo-arg=--lib"], &[]], one_in: 40, bar: 85 },
+    Group { package: "specgen-compiler", folder: None, arguments: [&["--cargo-arg=--lib"], &[]], one_in: 40, bar: 85 },
 ];
 
 /// Which mutants are made.
@@ -99,6 +109,12 @@ fn cargo_mutants(root: &Path, arguments: &[&str]) -> Command {
 }
 
 impl Group {
+    fn cargo_mutants(&self, root: &Path, arguments: &[&str]) -> Command {
+        let mut command = cargo_mutants(root, &["--package", self.package]);
+        command.args(self.folder.iter().flat_map(|folder| ["--dir", *folder])).args(arguments);
+        command
+    }
+
     /// Runs a sample and says what differs from the list. All mutants that there are become `known`.
     fn run(
         &self,
@@ -107,9 +123,8 @@ impl Group {
         listed: &BTreeSet<String>,
         known: &mut BTreeSet<String>,
     ) -> Result<(Vec<String>, String), String> {
-        let package = ["--package", self.package];
-        let output = cargo_mutants(root, &[&["--list"], &package[..]].concat()).output().map_err(|e| e.to_string())?;
-        let names = names(&String::from_utf8_lossy(&output.stdout));
+        let output = self.cargo_mutants(root, &["--list"]).output().map_err(|error| error.to_string())?;
+        let names = names(&String::from_utf8_lossy(&output.stdout), self.folder);
         known.extend(names.values().cloned());
 
         let (mut noticed, mut missed) = (Vec::new(), Vec::new());
@@ -144,21 +159,21 @@ impl Group {
         shard: Option<&str>,
         names: &BTreeMap<String, String>,
     ) -> Result<[Vec<String>; 2], String> {
-        let results = PathBuf::from("target/mutants").join(self.package);
-        let mut command = cargo_mutants(root, &["--package", self.package]);
-        command.args(["--colors", "never", "--no-times", "--output"]).arg(&results).args(self.arguments[0]);
+        let results = root.join("target/mutants").join(self.package);
+        let mut command = self.cargo_mutants(root, &["--colors", "never", "--no-times", "--output"]);
+        command.arg(&results).args(self.arguments[0]);
         if let Some(shard) = shard {
             command.args(["--sharding", "round-robin", "--shard", shard]);
         }
         command.arg("--").args(self.arguments[1]);
-        std::fs::create_dir_all(root.join(&results)).map_err(|error| format!("{}: {error}", results.display()))?;
+        std::fs::create_dir_all(&results).map_err(|error| format!("{}: {error}", results.display()))?;
         let status = command.status().map_err(|error| error.to_string())?;
         // 2 and 3: some were missed, or did not end.
         if !matches!(status.code(), Some(0 | 2 | 3)) {
             return Err(format!("cargo mutants --package {}: {status}; see above", self.package));
         }
         let of = |file: &str| -> Vec<String> {
-            let path = root.join(&results).join("mutants.out").join(file);
+            let path = results.join("mutants.out").join(file);
             let text = std::fs::read_to_string(path).unwrap_or_default();
             text.lines().filter_map(|line| names.get(line).cloned()).collect()
         };
@@ -197,13 +212,13 @@ fn modules<'a>(names: impl Iterator<Item = &'a String>) -> BTreeSet<&'a str> {
 }
 
 /// Names that last, by those of cargo-mutants: without line and column, which every change above moves, but with a number where
-/// a function has several mutants of one kind.
-fn names(list: &str) -> BTreeMap<String, String> {
+/// a function has several mutants of one kind. Files of a workspace of its own are named from its `folder` on.
+fn names(list: &str, folder: Option<&str>) -> BTreeMap<String, String> {
     let mut count: BTreeMap<String, u32> = BTreeMap::new();
     let lines = list.lines().filter_map(|line| {
         let mut parts = line.splitn(4, ':');
         let (file, what) = (parts.next()?, parts.nth(2)?);
-        let name = format!("{file}:{what}");
+        let name = format!("{}{file}:{what}", folder.map(|folder| format!("{folder}/")).unwrap_or_default());
         let number = count.entry(name.clone()).or_default();
         *number += 1;
         Some((line.to_owned(), format!("{name} #{number}")))
@@ -236,13 +251,15 @@ mod tests {
     #[test]
     fn names_do_not_depend_on_lines_and_tell_mutants_of_one_kind_apart() {
         let list = "a/b.rs:7:9: replace + with - in f\na/b.rs:7:30: replace + with - in f\na/b.rs:9:1: replace g -> T with 0: x\n";
-        let found: Vec<String> = names(list).into_values().collect();
+        let found: Vec<String> = names(list, None).into_values().collect();
         assert_eq!(
             found,
             [format!("{PLUS} #2"), format!("{PLUS} #1"), "a/b.rs: replace g -> T with 0: x #1".to_owned()]
         );
         let moved = list.replace(":7:", ":8:");
-        assert_eq!(names(&moved).into_values().collect::<Vec<_>>(), found);
+        assert_eq!(names(&moved, None).into_values().collect::<Vec<_>>(), found);
+        let below = names(list, Some("f"));
+        assert_eq!(below["a/b.rs:7:9: replace + with - in f"], format!("f/{PLUS} #1"));
     }
 
     #[test]
@@ -273,7 +290,7 @@ mod tests {
 
     #[test]
     fn what_is_not_as_listed_is_told() {
-        let group = Group { package: "p", arguments: [&[], &[]], one_in: 1, bar: 50 };
+        let group = Group { package: "p", folder: None, arguments: [&[], &[]], one_in: 1, bar: 50 };
         let strings = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let listed: BTreeSet<String> = strings(&["a", "b"]).into_iter().collect();
         assert!(group.judge(&strings(&["c"]), &strings(&["a"]), &listed).is_empty());

@@ -173,4 +173,86 @@ mod tests {
         }
         std::fs::remove_dir_all(&folder).unwrap();
     }
+
+    /// A recorder that has so many ticks, triggered or only stopped.
+    fn recorded(mut tape: Tape, ticks: u64, triggered: bool) -> Tape {
+        let machine = controller::supervised::Machine::new();
+        let config = controller::Config::new();
+        tape.begin(0);
+        for tick in 0..ticks {
+            controller::snapshot::record_before(&config, &machine, &mut tape);
+            let row = crate::bench::row(tick);
+            tape.push(&row.input.to_words(), &row.output, || 1);
+        }
+        if triggered {
+            tape.trigger();
+            while tape.activity() != Activity::Complete {
+                controller::snapshot::record_before(&config, &machine, &mut tape);
+                let row = crate::bench::row(tape.rows());
+                tape.push(&row.input.to_words(), &row.output, || 1);
+            }
+        } else {
+            tape.stop();
+        }
+        tape
+    }
+
+    #[test]
+    fn all_that_is_promised_is_kept_around_a_trigger() {
+        let (mut capture, tape) = Capture::new(None).unwrap();
+        assert_eq!(capture.settings, settings(CAPACITY / 2));
+        assert_eq!((settings(0).after, settings(1).after, settings(9).after), (1, 1, 9));
+        assert!(settings(9).trigger.fault && settings(9).digest_every == 1 && settings(9).decimation == 1);
+        // But for the block that is about to be given up.
+        assert_eq!(tape.capacity() / BLOCKS * (BLOCKS - 1), CAPACITY as usize);
+        assert!(tape.capacity() > 10_000, "a second at 10 kHz");
+        assert!(capture.image().is_none(), "it is away");
+        assert_eq!(capture.standing(), Standing { running: true, triggered: false, ticks: 0 });
+        capture.update(None, true);
+        assert_eq!(capture.standing(), Standing { running: true, triggered: false, ticks: 0 });
+        capture.update(Some(8), true);
+        assert_eq!(capture.standing(), Standing { running: true, triggered: true, ticks: 8 });
+    }
+
+    #[test]
+    fn what_comes_back_complete_is_written_and_what_was_only_stopped_is_not() {
+        let path = std::env::temp_dir().join(format!("rt-pc-kept-{}", std::process::id()));
+        let (mut capture, tape) = Capture::new(Some(&path)).unwrap();
+        assert!(capture.receive(recorded(tape, 5, false), 0).is_none());
+        assert_eq!(capture.standing(), Standing { running: false, triggered: false, ticks: 5 });
+        assert!(capture.written.is_none() && !path.exists());
+        // What the loop says later is of the time before.
+        capture.update(Some(4), true);
+        assert!(!capture.standing().running);
+        let Order::Tape(mut tape) = capture.arm(7, 1) else { panic!("it was here") };
+        assert_eq!(capture.standing(), Standing { running: true, triggered: false, ticks: 0 });
+        assert!(capture.image().is_none());
+        tape.begin(0);
+        assert!(capture.receive(recorded(tape, 5, true), 1).is_none());
+        let standing = Standing { running: false, triggered: true, ticks: 5 + 7 };
+        assert_eq!(capture.standing(), standing);
+        let file = std::fs::read(&path).unwrap();
+        assert_eq!(capture.image(), Some(file.as_slice()));
+        assert!(matches!(capture.written, Some((written, Ok(12))) if written == path));
+        std::fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn a_recorder_that_came_back_before_it_was_started_anew_goes_again() {
+        // The order to start anew has number 5; the loop had taken so many when it gave the recorder back.
+        for (taken, goes) in [(4, true), (5, false), (6, false)] {
+            let (mut capture, tape) = Capture::new(None).unwrap();
+            assert!(matches!(capture.arm(3, 5), Order::Record(settings) if settings.after == 3));
+            let again = capture.receive(recorded(tape, 2, false), taken);
+            assert_eq!(again.is_some(), goes, "{taken}");
+            if let Some(Order::Tape(tape)) = again {
+                assert_eq!((tape.rows(), capture.standing().running), (0, true));
+            }
+            assert_eq!(capture.image().is_some(), !goes);
+        }
+        // Numbers wrap around.
+        let (mut capture, tape) = Capture::new(None).unwrap();
+        capture.arm(3, 1);
+        assert!(capture.receive(recorded(tape, 2, false), u32::MAX).is_some());
+    }
 }

@@ -292,3 +292,188 @@ impl Console {
         (&mut self.orders, first)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::{row, said};
+    use crate::handover::Wish;
+    use crate::operator::Timeout;
+    use controller::COMMAND_WORDS;
+    use controller::supervised::Request;
+
+    fn console(phase: Phase) -> Console {
+        let operator = Operator::new(true, Timeout { silence: 1, idle: 1 });
+        let mut console = Console::new(operator, Capture::new(None).unwrap().0, Config::new());
+        console.said = Some(said(phase));
+        console
+    }
+
+    /// A machine that runs, shown with so many orders taken.
+    fn show(console: &mut Console, orders: u32, change: impl Fn(&mut Row, &mut Said)) {
+        let (mut row, mut said) = (row(1), Said { orders, ..said(Phase::Running) });
+        change(&mut row, &mut said);
+        console.update(&row, said, 5);
+    }
+
+    #[test]
+    fn a_tick_shows_events_until_they_are_taken_and_when_gauges_were_believed() {
+        let mut console = console(Phase::Holding);
+        for (number, (events, status)) in (0..).zip([(1 | EDGE, 0), (8, GAUGE_FAULT), (0, GAUGE_FAULT), (0, 1)]) {
+            let mut row = row(number);
+            (row.input.events, row.place[3]) = (events, number);
+            (row.recorded, row.triggered) = (Some(number), number > 1);
+            console.update(&row, Said { status, tick: number, ..said(Phase::Holding) }, number * 10);
+            assert_eq!((console.place[3], console.ticked), (number, Some(number * 10)));
+            assert_eq!(console.measured, Some(if number < 3 { 0 } else { 30 }));
+            assert_eq!(console.said.unwrap().tick, number);
+        }
+        assert_eq!((console.take_events(), console.take_events()), (9, 0));
+        let standing = console.capture.standing();
+        assert_eq!((standing.running, standing.triggered, standing.ticks), (true, true, 3));
+        assert!(!console.runs());
+        console.said = None;
+        assert!(!console.runs());
+    }
+
+    #[test]
+    fn a_stop_takes_back_what_would_move_and_leaves_the_numbers() {
+        let mut console = console(Phase::Running);
+        console.operator.wish();
+        console.order(Order::Trigger);
+        console.order(Order::Wish(Wish { command: Some([7; COMMAND_WORDS]), request: Request::Run }));
+        console.start_wave(&Settings::still(), true).unwrap();
+        console.start_wave(&Settings::still(), false).unwrap();
+        assert_eq!(console.command_on_edge([1; COMMAND_WORDS]), Err(No::State), "under a wave");
+        let numbers = (console.outgoing().0.len(), console.outgoing().1);
+        assert!(console.is_engaged());
+        console.stop();
+        assert_eq!((console.stops, console.is_engaged()), (1, false));
+        assert_eq!((console.outgoing().0.len(), console.outgoing().1), numbers);
+        for order in console.outgoing().0.iter() {
+            let moves = match order {
+                Order::Wish(wish) => wish.command.is_some(),
+                Order::Wave(_) | Order::Await(_) => true,
+                _ => false,
+            };
+            assert!(!moves, "{order:?}");
+        }
+        assert!(matches!(console.outgoing().0.front(), Some(Order::Trigger)));
+        console.stop();
+        assert_eq!(console.stops, 2);
+    }
+
+    #[test]
+    fn a_stop_leaves_what_the_loop_already_has() {
+        let mut console = console(Phase::Running);
+        console.start_wave(&Settings::still(), false).unwrap();
+        console.outgoing().0.clear();
+        // Numbers go on behind what was sent.
+        assert_eq!(console.outgoing().1, 3);
+        console.order(Order::Trigger);
+        console.stop();
+        assert!(console.is_engaged(), "the wave is under way until a tick shows that it is not");
+        show(&mut console, 1, |_, _| {});
+        assert!(console.is_engaged(), "that tick ran before the order");
+        show(&mut console, 2, |_, said| said.waving = true);
+        assert!(console.is_engaged());
+        show(&mut console, 2, |_, _| {});
+        assert!(!console.is_engaged());
+    }
+
+    #[test]
+    fn a_wave_or_a_command_begins_from_a_machine_that_runs_at_rest() {
+        let still = Settings::still();
+        assert_eq!(console(Phase::Holding).start_wave(&still, false), Err(No::State));
+        assert_eq!(console(Phase::Holding).command_on_edge([0; COMMAND_WORDS]), Err(No::State));
+        let mut console = console(Phase::Running);
+        console.said = Some(Said { status: specgen_runtime::setpoint::BUSY, ..said(Phase::Running) });
+        assert_eq!(console.start_wave(&still, false), Err(No::State));
+        assert_eq!(console.command_on_edge([0; COMMAND_WORDS]), Err(No::State));
+        console.said = Some(said(Phase::Running));
+        let mut far = still;
+        far.center[1] = 1.0;
+        assert!(matches!(console.start_wave(&far, false), Err(No::Word(_))));
+        assert!(console.outgoing().0.is_empty());
+        console.operator.set_by_link([1; COMMAND_WORDS]);
+        console.start_wave(&still, false).unwrap();
+        // What is wanted once it is over goes first: to hold.
+        let orders = console.outgoing().0;
+        assert!(matches!(orders[0], Order::Wish(Wish { command: Some(command), .. }) if command[0] == 0));
+        assert!(matches!(orders[1], Order::Wave(_)));
+        console.stop_wave();
+        assert!(matches!(console.outgoing().0.back(), Some(Order::StopWave)));
+    }
+
+    #[test]
+    fn what_waits_for_the_edge_is_followed_once_it_has_begun() {
+        let edge = |stage: pending::Stage| EdgeStatus { stage: stage.word() as u8, ..EdgeStatus::NONE };
+        for (stage, begun) in [(pending::Stage::Begun, true), (pending::Stage::Refused, false)] {
+            let mut console = console(Phase::Running);
+            console.command_on_edge([6; COMMAND_WORDS]).unwrap();
+            let number = console.number;
+            show(&mut console, number - 1, |row, _| row.edge = edge(pending::Stage::Begun));
+            assert_eq!(console.operator.command()[5], 0, "of an order before it");
+            show(&mut console, number, |row, _| row.edge = edge(pending::Stage::Waiting));
+            assert!(console.awaited.is_some() && console.operator.command()[5] == 0);
+            show(&mut console, number, |row, _| row.edge = edge(stage));
+            assert_eq!((console.awaited.is_some(), console.operator.command()[5]), (false, if begun { 6 } else { 0 }));
+            assert_eq!(console.edge.stage, stage.word() as u8);
+
+            let mut console = self::console(Phase::Running);
+            console.start_wave(&Settings::still(), true).unwrap();
+            assert!(!console.is_engaged());
+            let number = console.number;
+            show(&mut console, number, |row, said| (row.edge, said.waving) = (edge(stage), true));
+            assert_eq!(console.is_engaged(), begun);
+        }
+        let mut console = console(Phase::Running);
+        console.stop_waiting();
+        assert!(matches!(console.outgoing().0.back(), Some(Order::StopWaiting)));
+    }
+
+    #[test]
+    fn a_pass_takes_the_player_along_and_what_it_began_is_commanded() {
+        let mut console = console(Phase::Running);
+        assert_eq!(console.put_knots(0, [[1; 6]].into_iter()), Err(No::Word(0)), "there is no player");
+        console.passes = Passes::with(8);
+        assert_eq!(console.put_knots(0, [[1; 6]].into_iter()), Ok(()));
+        assert_eq!(console.put_knots(9, [[1; 6]].into_iter()), Err(No::Word(0)));
+        let course = Course { spacing: 1, before: 0, ticks: 2, trajectory: 3 };
+        // This controller takes no correction, and so makes no pass.
+        assert_eq!(console.begin_pass(course), Err(No::State));
+        console.abort_pass();
+        assert!(matches!(console.outgoing().0.back(), Some(Order::AbortPass)));
+        for (phase, expected) in [(Phase::Holding, 0), (Phase::Running, 3)] {
+            let mut player = console.passes.begin(course).unwrap();
+            let _ = player.give();
+            player.abort();
+            console.said = Some(said(phase));
+            console.receive_player(player);
+            assert_eq!(console.operator.command()[1], expected);
+        }
+    }
+
+    #[test]
+    fn there_is_room_for_so_many_orders_and_for_so_many_ticks() {
+        let mut console = console(Phase::Holding);
+        assert_eq!(console.arm_recorder(CAPACITY + 1), Err(No::Word(0)));
+        assert_eq!(console.arm_recorder(CAPACITY), Ok(()));
+        console.trigger_recorder();
+        console.stop_recorder();
+        let orders: Vec<_> = console.outgoing().0.iter().collect();
+        assert!(matches!(orders[..], [Order::Record(_), Order::Trigger, Order::StopRecorder]));
+        for number in 4..=MOST_ORDERS as u32 {
+            assert!(!console.is_full());
+            assert_eq!(console.order(Order::Trigger), number);
+        }
+        assert!(console.is_full());
+        console.outgoing().0.clear();
+        console.wish();
+        console.wish();
+        assert!(matches!(console.outgoing(), (orders, 65) if orders.len() == 1));
+        let config = Config::new();
+        console.configure(config);
+        assert!(matches!(console.outgoing().0.back(), Some(Order::Configure(_))) && *console.config() == config);
+    }
+}

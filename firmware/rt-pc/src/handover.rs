@@ -225,3 +225,49 @@ pub fn rings(records: bool) -> (Inner, Outer) {
         Outer { rows: rows_out, snapshots: snapshots_out, tapes: tapes_out, orders, players: players_out },
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_ticks_are_the_last_and_the_longest_and_none_before_the_first() {
+        let shared = Shared::default();
+        assert_eq!(shared.health(), Health { overruns: None, clock: 1_000_000_000, ..Health::default() });
+        // Planned, woken, read, written, done; the second one ends when the next one is due, the third one later.
+        shared.took([100, 103, 110, 130, 150], 100, false);
+        shared.took([200, 207, 210, 240, 300], 100, false);
+        assert_eq!(shared.health().overruns, Some(0));
+        shared.took([300, 301, 310, 320, 401], 100, false);
+        shared.device_faults.store(1 << 40, Ordering::Relaxed);
+        shared.gauge_faults.store(4, Ordering::Relaxed);
+        let health = shared.health();
+        assert_eq!((health.tick, health.output), (Some([100, 100]), Some([10, 30])));
+        assert_eq!((health.latest, health.overruns), (Some(7), Some(1)));
+        assert_eq!((health.converter_faults, health.gauge_faults), (u32::MAX, 4));
+        let times = LastAndLongest::default();
+        assert_eq!(times.get(), None);
+        for (time, expected) in [(5, [5, 5]), (9, [9, 9]), (0, [0, 9])] {
+            times.add(time);
+            assert_eq!(times.get(), Some(expected));
+        }
+    }
+
+    #[test]
+    fn where_time_waits_nothing_is_late() {
+        let shared = Shared::default();
+        shared.took([100, 150, 160, 170, 900], 100, true);
+        let health = shared.health();
+        assert_eq!((health.latest, health.overruns, health.tick), (None, None, Some([750; 2])));
+        assert_eq!(shared.overruns.load(Ordering::Relaxed), 0);
+    }
+
+    #[test]
+    fn only_a_run_that_is_recorded_hands_states_over() {
+        for records in [true, false] {
+            let (inner, outer) = rings(records);
+            assert_eq!(inner.outlets.snapshots.is_some(), records);
+            assert!(inner.outlets.rows.slots() >= SNAPSHOT_EVERY as usize && outer.orders.slots() > 0);
+        }
+    }
+}

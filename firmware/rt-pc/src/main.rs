@@ -9,6 +9,8 @@
 //! The machine outside is a data acquisition card or a simulated one (devices/). What is late is entered in a book and
 //! has a cause; the summary shows it.
 
+#[cfg(test)]
+mod bench;
 mod capture;
 mod console;
 mod control;
@@ -87,7 +89,7 @@ fn open(options: &Options) -> Result<(), Failure> {
             let path = exchange::path_of(name).map_err(|text| Failure::Usage(format!("--sim: {text}")))?;
             let edges = options.sim_edge_every.zip(words::period()).map(|(every, period)| every.div_ceil(period));
             let device = Simulated::open(&path, options.sim_timeout, edges);
-            run(options, &mut device.map_err(Failure::Environment)?)
+            run(options, &mut device.map_err(Failure::Environment)?, signals()?)
         }
         #[cfg(feature = "comedi")]
         options::Hardware::Comedi(input) => {
@@ -101,7 +103,7 @@ fn open(options: &Options) -> Result<(), Failure> {
                 output_volts: options.comedi_ranges[1],
             };
             let device = devices::comedi::Comedi::open(&library, &settings);
-            run(options, &mut device.map_err(Failure::Environment)?)
+            run(options, &mut device.map_err(Failure::Environment)?, signals()?)
         }
         #[cfg(not(feature = "comedi"))]
         options::Hardware::Comedi(_) => {
@@ -123,30 +125,39 @@ fn accept_assumptions(assumed: &[&str], accepted: bool) -> Result<(), String> {
     ))
 }
 
-fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failure> {
+/// What a signal that asks for the end sets.
+fn signals() -> Result<Arc<AtomicBool>, Failure> {
+    let signal = Arc::new(AtomicBool::new(false));
+    for number in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(number, Arc::clone(&signal))
+            .map_err(|error| Failure::Environment(format!("signal {number}: {error}")))?;
+    }
+    Ok(signal)
+}
+
+/// Times of the loop, and of the hosts, by a period in ns.
+fn times(options: &Options, period: u64) -> (Timing, Timeout) {
+    let silence = options.link_silence.map_or(u64::from(HOST_TICKS), |silence| silence.div_ceil(period));
+    let limit = (period as f64 * options.late_after) as u64;
+    (
+        Timing { period, limit, silence, elastic: options.elastic },
+        Timeout { silence: silence * period, idle: options.link_idle },
+    )
+}
+
+fn run<D: Device + Send>(options: &Options, device: &mut D, signal: Arc<AtomicBool>) -> Result<(), Failure> {
     let usage = Failure::Usage;
     let environment = |error: String| Failure::Environment(error);
     let config = configure(&options.config).map_err(usage)?;
     let period = words::period().ok_or_else(|| environment("the controller does not state its period".to_owned()))?;
-    let timing = Timing {
-        period,
-        limit: (period as f64 * options.late_after) as u64,
-        silence: options.link_silence.map_or(u64::from(HOST_TICKS), |silence| silence.div_ceil(period)),
-        elastic: options.elastic,
-    };
+    let (timing, timeout) = times(options, period);
     // A host or a time ends it, not a fault.
     let attended = options.link.is_some() || options.duration.is_some();
-    let timeout = Timeout { silence: timing.silence * period, idle: options.link_idle };
     let mut operator = Operator::new(attended, timeout);
     if options.arm {
         operator.plan(&options.set, clock::now()).map_err(|error| usage(format!("--set: {error}")))?;
     }
 
-    let signal = Arc::new(AtomicBool::new(false));
-    for number in [SIGINT, SIGTERM] {
-        signal_hook::flag::register(number, Arc::clone(&signal))
-            .map_err(|error| environment(format!("signal {number}: {error}")))?;
-    }
     let named = |path: &std::path::Path, error: std::io::Error| environment(format!("{}: {error}", path.display()));
     let link = options.link.as_deref().map(|path| Link::listen(path).map_err(|error| named(path, error)));
     let link = link.transpose()?;
@@ -258,4 +269,163 @@ fn configure(assignments: &[String]) -> Result<Config, String> {
         let name = CONFIG_NAMES.get(error.word).copied().unwrap_or("?");
         format!("--config: `{name}` is out of its range: expected {}", words::range(error.word))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench::{Bench, Call};
+    use std::path::Path;
+    use std::time::{Duration, Instant};
+
+    fn options(line: &str) -> Options {
+        match options::parse(std::iter::once("rt-pc").chain(line.split_whitespace()).map(Into::into)) {
+            Ok(Asked::Run(options)) => *options,
+            other => panic!("{line}: {other:?}"),
+        }
+    }
+
+    /// A run on a made-up machine, to which something happens at the beginning of every tick: why it failed, and how long it took.
+    fn run_on(line: &str, act: impl FnMut(&mut Bench) + Send + 'static) -> (Result<(), (u8, String)>, Duration, Bench) {
+        run_with(line, Arc::default(), act)
+    }
+
+    fn run_with(
+        line: &str,
+        signal: Arc<AtomicBool>,
+        act: impl FnMut(&mut Bench) + Send + 'static,
+    ) -> (Result<(), (u8, String)>, Duration, Bench) {
+        let mut bench = Bench::new(handover::rings(false).1, act);
+        let start = Instant::now();
+        let done = run(&options(line), &mut bench, signal).map_err(|failure| match failure {
+            Failure::Run(text) => (1, text),
+            Failure::Usage(text) => (2, text),
+            Failure::Environment(text) => (3, text),
+        });
+        (done, start.elapsed(), bench)
+    }
+
+    /// One after the other: each locks the memory of the process.
+    #[test]
+    fn a_run_goes_from_its_options_to_its_end() {
+        let folder = std::env::temp_dir().join(format!("rt-pc-run-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let file = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+        let base = "--elastic --allow-no-rt --json --priority 1";
+
+        // A plan that arms and runs, with a record; a time ends it.
+        let line = format!("{base} --arm --seconds 1.5 --record {} --capture {}", file("run.rec"), file("run.cap"));
+        let (done, took, bench) = run_on(&line, |_| {});
+        assert_eq!(done, Ok(()));
+        assert!(took >= Duration::from_millis(1500) && took < Duration::from_secs(20), "{took:?}");
+        let on = bench.calls.iter().filter(|(_, call)| *call == Call::Enable(true)).count();
+        assert_eq!((on, bench.calls.last().unwrap().1), (1, Call::Enable(false)));
+        assert!(
+            bench
+                .calls
+                .iter()
+                .any(|(_, call)| matches!(call, Call::Write(codes) if codes.iter().any(|code| *code > 0)))
+        );
+        assert!(std::fs::metadata(file("run.rec")).unwrap().len() > 10 * bench.tick);
+        assert!(!Path::new(&file("run.cap")).exists(), "nothing happened that the recorder keeps");
+
+        // A fault is the end of a run that nobody attends, and what it failed of.
+        let stops = |bench: &mut Bench| bench.contacts.stop = bench.tick >= 50;
+        let line = format!("{base} --arm --capture {}", file("run.cap"));
+        let (done, took, _) = run_on(&line, stops);
+        assert!(matches!(&done, Err((1, text)) if text.contains("emergency stop")), "{done:?}");
+        assert!(took < Duration::from_secs(20));
+        assert!(std::fs::metadata(file("run.cap")).unwrap().len() > 0);
+        // Where a time is given the run goes on until then.
+        let (done, took, _) = run_on(&format!("{base} --arm --seconds 0.4"), stops);
+        assert!(matches!(done, Err((1, _))) && took >= Duration::from_millis(400));
+
+        // A signal.
+        let signal = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&signal);
+        let (done, _, bench) = run_with(base, signal, move |bench| {
+            flag.fetch_or(bench.tick == 40, Ordering::Relaxed);
+        });
+        assert_eq!(done, Ok(()));
+        assert!(bench.tick >= 40 && bench.calls.iter().all(|(_, call)| *call != Call::Enable(true)));
+
+        // A right that is missing, such as to a processor that there is not, is an error unless it is said to be none.
+        let cpu = "--elastic --json --priority 1 --cpu 4000 --seconds 0.05";
+        let (done, _, bench) = run_on(cpu, |_| {});
+        assert!(matches!(&done, Err((3, text)) if text.contains("may not run in real time")), "{done:?}");
+        assert!(bench.beats.is_empty());
+        let (done, _, bench) = run_on(&format!("{cpu} --allow-no-rt"), |_| {});
+        assert!(done.is_ok() && !bench.beats.is_empty());
+        let rights =
+            prepare_process().0.is_empty() && std::thread::spawn(|| prepare_thread(None, 1)).join().unwrap().is_empty();
+        let (done, _, _) = run_on("--elastic --json --priority 1 --seconds 0.05", |_| {});
+        assert_eq!(done.is_ok(), rights, "{done:?}");
+
+        // What cannot be is refused before anything runs.
+        for (line, code, words) in [
+            ("--config mode", 2, "expected NAME=VALUE"),
+            ("--set setpoint[0]=x", 2, "--set: "),
+            ("--record /nowhere/a", 3, "/nowhere/a"),
+            ("--link /nowhere/a", 3, "/nowhere/a"),
+            ("--record /dev/shm/rt-pc-same --capture /dev/shm/rt-pc-same", 2, "two"),
+        ] {
+            let (done, _, bench) = run_on(&format!("{base} {line}"), |_| {});
+            assert!(matches!(&done, Err((found, text)) if *found == code && text.contains(words)), "{line}: {done:?}");
+            assert!(bench.calls.is_empty());
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn times_are_whole_ticks_of_the_period() {
+        let (timing, timeout) = times(&options("--late-after 0.25 --link-silence 1.01 --link-idle 2"), 50_000);
+        assert_eq!((timing.period, timing.limit, timing.silence, timing.elastic), (50_000, 12_500, 21, false));
+        assert_eq!((timeout.silence, timeout.idle), (21 * 50_000, 2_000_000_000));
+        let (timing, timeout) = times(&options("--elastic"), 100_000);
+        assert_eq!((timing.silence, timing.elastic), (u64::from(HOST_TICKS), true));
+        assert_eq!(timeout.silence, u64::from(HOST_TICKS) * 100_000);
+    }
+
+    #[test]
+    fn settings_of_a_run_are_named_and_in_their_range() {
+        let configured = |text: &str| configure(&[text.to_owned()]);
+        let mode = |config: Config| config.to_words()[CONFIG_NAMES.iter().position(|name| *name == "mode").unwrap()];
+        assert_eq!(mode(configured("mode=6").unwrap()), 6);
+        let words = controller::integrity::config().to_words();
+        assert_eq!(configure(&[]).unwrap().to_words(), words);
+        let changed = configured("kp[0]=0").unwrap().to_words();
+        let gain = CONFIG_NAMES.iter().position(|name| *name == "kp[0]").unwrap();
+        for (place, (new, old)) in changed.iter().zip(words).enumerate() {
+            assert_eq!(*new, if place == gain { words::word(0.0) } else { old }, "{place}");
+        }
+        for (text, expected) in [
+            ("mode", "expected NAME=VALUE, found `mode`"),
+            ("speed=1", "no setting `speed`; there are mode, "),
+            ("mode=x", "expected a number, found `x`"),
+            ("mode=0.5", "a whole one from 0"),
+            ("kp[0]=inf", "expected a finite number"),
+            ("mode=99", "`mode` is out of its range: expected a whole number from 0 to"),
+        ] {
+            let error = configured(text).unwrap_err();
+            assert!(error.starts_with("--config: ") && error.contains(expected), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_machine_that_is_not_there_is_said_to_be_missing() {
+        for (line, code, words) in [
+            ("--sim ../a", 2, "--sim: expected a name"),
+            ("--sim rt-pc-nobody-serves-this", 3, "no simulated machine there"),
+            #[cfg(not(feature = "comedi"))]
+            ("--comedi /dev/comedi0", 2, "--features comedi"),
+        ] {
+            let (found, text) = match open(&options(line)) {
+                Err(Failure::Run(text)) => (1, text),
+                Err(Failure::Usage(text)) => (2, text),
+                Err(Failure::Environment(text)) => (3, text),
+                Ok(()) => panic!("{line}"),
+            };
+            assert!(found == code && text.contains(words), "{line}: {text}");
+        }
+    }
 }

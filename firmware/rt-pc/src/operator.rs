@@ -557,4 +557,172 @@ mod tests {
         operator.take_for_host(B, IDLE + 1).unwrap();
         assert!(operator.is_evicted(A) && operator.is_hosts(B));
     }
+
+    const ATTENDED: Timeout = Timeout { silence: SILENCE, idle: IDLE };
+
+    #[test]
+    fn a_step_that_is_not_answered_is_given_up_after_its_time_and_not_before() {
+        for (phase, first, limit, asked) in [
+            (Phase::Disarmed, Phase::Disarmed, STEP_LIMIT, Request::Arm),
+            (Phase::Arming, Phase::Arming, STEP_LIMIT, Request::Run),
+        ] {
+            let mut operator = operator();
+            operator.plan(&[], 7).unwrap();
+            operator.update(&said(first, true), 7);
+            operator.update(&said(phase, true), 7 + limit);
+            assert_eq!((operator.wish().unwrap().request, operator.failure.is_some()), (asked, false));
+            operator.update(&said(phase, true), 8 + limit);
+            assert_eq!(operator.wish().unwrap().request, Request::RampDown);
+            let failure = operator.failure.clone().unwrap();
+            assert!(failure.contains(&format!("still {} after 120 s", phase.name())), "{failure}");
+            // On the way down it is waited for as well, for a shorter time.
+            operator.update(&said(Phase::RampingDown, true), 8 + limit + DOWN_LIMIT);
+            assert!(!operator.is_over());
+            operator.update(&said(Phase::RampingDown, true), 9 + limit + DOWN_LIMIT);
+            assert!(operator.is_over() && operator.failure == Some(failure), "the first reason stays");
+        }
+        let mut operator = operator();
+        operator.ramp_down(0);
+        operator.update(&said(Phase::RampingDown, true), DOWN_LIMIT + 1);
+        assert!(operator.failure.unwrap().starts_with("not down after 30 s (ramping down)"));
+        assert_eq!((STEP_LIMIT, DOWN_LIMIT), (120_000_000_000, 30_000_000_000));
+    }
+
+    #[test]
+    fn a_machine_that_is_off_is_down_in_either_phase_and_one_that_is_on_in_none() {
+        for phase in [Phase::Disarmed, Phase::Faulted] {
+            let mut operator = operator();
+            operator.ramp_down(0);
+            assert_eq!(operator.wish().unwrap().request, Request::RampDown);
+            operator.update(&said(phase, true), 1);
+            assert!(!operator.is_over() && operator.is_ending());
+            operator.ramp_down(1);
+            assert!(operator.wish().is_none(), "once");
+            operator.update(&said(phase, false), 1);
+            assert!(operator.is_over());
+            assert_eq!(operator.wish().unwrap().request, Request::None);
+        }
+    }
+
+    #[test]
+    fn a_plan_may_find_the_machine_running_and_is_over_when_a_host_orders() {
+        let mut operator = operator();
+        operator.plan(&["setpoint[0]=1e-6".to_owned()], 0).unwrap();
+        operator.update(&said(Phase::Running, true), 1);
+        let wish = operator.wish().unwrap();
+        assert!(wish.request == Request::None && wish.command.unwrap() != [0; COMMAND_WORDS]);
+        let mut operator = self::operator();
+        operator.plan(&[], 0).unwrap();
+        operator.take_for_host(A, 0).unwrap();
+        operator.ask_by_link(Request::Hold, A);
+        operator.update(&said(Phase::Faulted, true), 1);
+        assert!(operator.failure.is_none() && operator.wish().unwrap().request == Request::Hold);
+    }
+
+    #[test]
+    fn what_a_host_that_has_gone_asked_for_is_not_asked_for_on_behalf_of_the_next() {
+        let connected = |owner: Option<HostId>, now: u64| {
+            let mut operator = Operator::new(true, ATTENDED);
+            if let Some(owner) = owner {
+                operator.take_for_host(owner, 0).unwrap();
+                operator.ask_by_link(Request::Run, owner);
+            } else {
+                operator.plan(&[], 0).unwrap();
+            }
+            operator.wish();
+            operator.connected(B, now);
+            operator.wish().map(|wish| wish.request)
+        };
+        assert_eq!(connected(Some(A), SILENCE), None, "it is still there");
+        assert_eq!(connected(Some(A), SILENCE + 1), Some(Request::None));
+        assert_eq!(connected(Some(B), 0), Some(Request::None), "it comes anew itself");
+        assert_eq!(connected(None, SILENCE + 1), None, "a plan goes on");
+        let mut operator = Operator::new(true, ATTENDED);
+        operator.take_for_host(A, 0).unwrap();
+        operator.ramp_down(1);
+        operator.wish();
+        operator.connected(B, SILENCE + 1);
+        assert!(operator.wish().is_none(), "the way down goes on");
+    }
+
+    #[test]
+    fn only_a_host_that_has_gone_from_a_machine_that_is_off_is_forgotten() {
+        for (who, last, forgotten) in [
+            (A, None, true),
+            (A, Some(said(Phase::Disarmed, false)), true),
+            (A, Some(said(Phase::Disarmed, true)), false),
+            (A, Some(said(Phase::Holding, false)), false),
+            (B, Some(said(Phase::Disarmed, false)), false),
+        ] {
+            let mut operator = operator();
+            operator.take_for_host(A, 0).unwrap();
+            operator.left(who, last.as_ref());
+            assert_eq!(operator.link_number() == 0, forgotten, "{last:?}");
+            assert_eq!(operator.linked(1), who == B);
+            assert_eq!(operator.is_hosts(A), !forgotten);
+        }
+    }
+
+    #[test]
+    fn a_number_comes_with_every_request_of_the_owner() {
+        let mut operator = operator();
+        operator.take_for_host(A, 0).unwrap();
+        let first = operator.link_number();
+        operator.seen(A, 1);
+        operator.seen(A, 2);
+        assert_eq!(operator.link_number(), first + 2);
+        operator.take_for_host(A, 3).unwrap();
+        assert_eq!(operator.link_number(), first + 2);
+        operator.left(A, Some(&said(Phase::Running, true)));
+        operator.take_for_host(B, 4).unwrap();
+        assert_eq!(operator.link_number(), first + 3);
+    }
+
+    #[test]
+    fn only_a_stop_of_another_host_under_a_rise_is_told() {
+        for (phase, request, who, told) in [
+            (Phase::Arming, Request::Arm, B, true),
+            (Phase::Disarmed, Request::Run, B, true),
+            (Phase::Arming, Request::None, B, false),
+            (Phase::Holding, Request::Run, B, false),
+            (Phase::Arming, Request::Arm, A, false),
+        ] {
+            let mut operator = operator();
+            operator.take_for_host(A, 0).unwrap();
+            operator.ask_by_link(request, A);
+            operator.update(&said(phase, true), 1);
+            operator.ask_by_link(Request::Hold, who);
+            assert_eq!(operator.take_for_host(A, 2).is_err(), told, "{phase:?} {request:?}");
+        }
+        // Under a plan there is no host to be told.
+        let mut operator = operator();
+        operator.plan(&[], 0).unwrap();
+        operator.ask_by_link(Request::Hold, B);
+        assert!(!operator.is_overruled);
+    }
+
+    #[test]
+    fn a_command_goes_out_with_a_wish_once() {
+        let mut operator = operator();
+        assert!(operator.wish().unwrap().command.is_some() && operator.wish().is_none());
+        operator.ask(Request::Arm);
+        assert!(operator.wish().is_some_and(|wish| wish.command.is_none() && wish.request == Request::Arm));
+        operator.set_by_link([4; COMMAND_WORDS]);
+        assert_eq!((operator.command()[7], operator.wish().unwrap().command), (4, Some([4; COMMAND_WORDS])));
+        operator.has_begun(9);
+        assert_eq!(operator.wish().unwrap().command.unwrap()[..2], [3, 9]);
+        operator.rest_at(&[0.0; 6]);
+        assert_eq!(operator.wish().unwrap().command.unwrap()[0], 0);
+        operator.has_begun_at_edge(&[6; COMMAND_WORDS]);
+        assert!(operator.command()[2] == 6 && operator.wish().is_none(), "the loop has it");
+    }
+
+    #[test]
+    fn a_cause_is_named_with_what_was_found() {
+        assert_eq!(why(Cause::EmergencyStop, Finding::None), "emergency stop");
+        let finding =
+            (0..1 << 15).map(Finding::of_word).find(|finding| matches!(finding, Finding::Fallback(_))).unwrap();
+        let text = why(Cause::Oscillation, finding);
+        assert!(text.starts_with("oscillation, ") && text.len() > "oscillation, ".len(), "{text}");
+    }
 }

@@ -237,4 +237,79 @@ mod tests {
         }
         assert!(matches!(parsed("--help"), Ok(Asked::Text(text)) if text == HELP));
     }
+
+    fn run(line: &str) -> Options {
+        match parsed(line) {
+            Ok(Asked::Run(options)) => *options,
+            other => panic!("{line}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn without_options_a_simulated_machine_waits_for_a_signal() {
+        let Options {
+            hardware,
+            comedi_outputs,
+            comedi_ranges,
+            comedi_library,
+            assumed_ok,
+            sim_timeout,
+            sim_edge_every,
+            duration,
+            late_after,
+            elastic,
+            priority,
+            cpu,
+            allow_no_rt,
+            arm,
+            set,
+            config,
+            link,
+            link_silence,
+            link_idle,
+            record,
+            capture,
+            json,
+        } = run("");
+        assert_eq!(hardware, Hardware::Simulated("plant".to_owned()));
+        assert!(comedi_outputs.is_empty() && comedi_library.is_none() && !assumed_ok);
+        assert_eq!(comedi_ranges, [[-10.0, 10.0]; 2]);
+        assert_eq!((sim_timeout, sim_edge_every, duration), (20_000_000, None, None));
+        assert_eq!((late_after, elastic, priority, cpu, allow_no_rt), (0.5, false, 80, None, false));
+        assert!(!arm && set.is_empty() && config.is_empty() && !json);
+        assert_eq!((link, link_silence, link_idle, record, capture), (None, None, 60_000_000_000, None, None));
+    }
+
+    #[test]
+    fn every_option_says_what_its_name_says() {
+        let options = run(
+            "--comedi /dev/a --comedi-out b --comedi-out c --comedi-range -1:2 --comedi-out-range 0:100 --comedi-library l --assumed-ok",
+        );
+        assert_eq!(options.hardware, Hardware::Comedi("/dev/a".into()));
+        assert_eq!(options.comedi_outputs, [PathBuf::from("b"), PathBuf::from("c")]);
+        assert_eq!(options.comedi_ranges, [[-1.0, 2.0], [0.0, 100.0]]);
+        assert!(options.assumed_ok && options.comedi_library == Some("l".into()));
+        let options = run(
+            "--sim-timeout 1.5 --sim-edge-every 0.25 --seconds 3 --late-after 0.75 --priority 7 --elastic --cpu 2 --allow-no-rt",
+        );
+        assert_eq!((options.sim_timeout, options.sim_edge_every), (1_500_000, Some(250_000_000)));
+        assert_eq!((options.duration, options.late_after), (Some(3_000_000_000), 0.75));
+        assert!(options.elastic && options.allow_no_rt && !options.arm);
+        assert_eq!((options.priority, options.cpu), (7, Some(2)));
+        let options = run(
+            "--arm --config mode=6 --config kp[0]=1 --link p --link-silence 1.5 --link-idle 2 --record r --capture c --json",
+        );
+        assert!(options.arm && options.json && options.set.is_empty());
+        assert_eq!(options.config, ["mode=6", "kp[0]=1"]);
+        assert_eq!((options.link_silence, options.link_idle), (Some(1_500_000), 2_000_000_000));
+        let paths = [options.link, options.record, options.capture];
+        assert_eq!(paths, ["p", "r", "c"].map(|path| Some(path.into())));
+        let options = run("--set command=3 --set setpoint[0]=1");
+        assert!(options.arm && options.set == ["command=3", "setpoint[0]=1"]);
+        let Ok(Asked::Text(version)) = parsed("--version") else { panic!("no version") };
+        assert!(version.contains(controller::SPEC_DIGEST) && version.starts_with("rt-pc "));
+        for (range, good) in [("1:1", false), ("-100:100", true), ("-101:100", false), ("0:101", false), ("1", false)] {
+            assert_eq!(parsed(&format!("--comedi-range {range}")).is_ok(), good, "{range}");
+        }
+    }
 }

@@ -71,7 +71,10 @@ pub fn create(path: &Path) -> io::Result<File> {
 /// # Errors
 /// In words, unless the reader has read enough.
 pub fn print(text: &str) -> Result<(), String> {
-    let mut out = io::stdout();
+    put(&mut io::stdout(), text)
+}
+
+fn put(out: &mut impl Write, text: &str) -> Result<(), String> {
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(format!("could not write to standard output: {error}"))
@@ -84,6 +87,30 @@ pub fn print(text: &str) -> Result<(), String> {
 mod tests {
     use super::*;
     use std::os::unix::fs::PermissionsExt;
+
+    /// Takes so many bytes, then fails.
+    struct Out(usize, io::ErrorKind);
+
+    impl Write for Out {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let count = bytes.len().min(self.0);
+            self.0 -= count;
+            if count > 0 { Ok(count) } else { Err(self.1.into()) }
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_reader_may_have_read_enough_but_a_disk_may_not_be_full() {
+        let mut all = Vec::new();
+        assert_eq!(put(&mut all, "text"), Ok(()));
+        assert_eq!(all, b"text");
+        assert_eq!(put(&mut Out(2, io::ErrorKind::BrokenPipe), "text"), Ok(()));
+        assert!(put(&mut Out(2, io::ErrorKind::StorageFull), "text").unwrap_err().contains("standard output"));
+    }
 
     #[test]
     fn outputs_that_would_lose_something_are_refused() {

@@ -89,3 +89,74 @@ fn standing(player: &Player) -> PassStatus {
         capacity: player.capacity() as u32,
     }
 }
+
+#[cfg(test)]
+impl Passes {
+    /// With a player of so many knots, even where the controller takes no correction.
+    pub fn with(knots: usize) -> Self {
+        Self { here: Some(Box::new(pass::Player::new(vec![[0; 6]; knots].leak()))) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COURSE: Course = Course { spacing: 1, before: 1, ticks: 3, trajectory: 5 };
+
+    #[test]
+    fn a_player_is_away_for_its_pass_and_comes_back_with_what_it_kept() {
+        let mut passes = Passes::with(8);
+        let knots = [[1; 6], [2; 6], [3; 6]];
+        assert!(passes.put(0, knots.into_iter()) && !passes.put(2, knots.into_iter()));
+        assert!(!passes.learn(Settings { reach: 0, fade: [0, 0] }), "there was no pass");
+        assert!(passes.begin(Course { ticks: 0, ..COURSE }).is_none());
+        let mut player = passes.begin(COURSE).unwrap();
+        assert!(passes.begin(COURSE).is_none() && !passes.put(0, knots.into_iter()));
+        assert_eq!((passes.errors(), passes.correction()), (None, None));
+        assert_eq!((passes.is_running(), passes.is_busy()), (passes::POSSIBLE, passes::POSSIBLE));
+        for _ in 0..4 {
+            let _ = player.give();
+            player.keep(&[1e-9; 6], &[0.0; 6], 4);
+        }
+        let found = standing(&player);
+        assert_eq!((found.stage, found.status, found.knots, found.capacity), (Stage::Complete.word(), 4, 3, 4));
+        assert_eq!(passes.receive(player), Some(5));
+        assert_eq!(passes.errors(), Some([[1000; 6]; 3].as_slice()));
+        assert_eq!(passes.correction(), Some(knots.as_slice()));
+        assert!(!passes.is_running() && !passes.is_busy());
+        // An aborted one had begun nothing.
+        let mut player = passes.begin(COURSE).unwrap();
+        player.abort();
+        assert_eq!(passes.receive(player), None);
+        assert_eq!(passes.status().is_some(), passes::POSSIBLE);
+        assert_eq!(Passes::new().here.is_some(), passes::POSSIBLE);
+    }
+
+    #[test]
+    fn a_pass_that_came_to_its_end_is_learned_from_with_the_plan_behind_its_knots() {
+        let mut passes = Passes::with(64);
+        let mut plan = [[0.0_f32; 6]; 14];
+        for (place, row) in plan.iter_mut().enumerate() {
+            match place {
+                // Modes that are the axes; half of the error; all of the correction.
+                0..12 => row[place % 6] = 1.0,
+                12 => *row = [0.5; 6],
+                _ => row[0] = 1.0,
+            }
+        }
+        let rows = plan.map(|row| row.map(|number| number.to_bits().cast_signed()));
+        assert!(passes.put(0, [[1; 6], [2; 6], [3; 6]].into_iter()) && passes.put(3, rows.into_iter()));
+        let mut player = passes.begin(COURSE).unwrap();
+        for _ in 0..4 {
+            let _ = player.give();
+            player.keep(&[1e-9; 6], &[0.0; 6], 0);
+        }
+        passes.receive(player);
+        assert!(passes.learn(Settings { reach: 0, fade: [0, 0] }));
+        assert!(!passes.put(0, [[0; 6]].into_iter()), "while it learns");
+        passes.work();
+        assert_eq!(passes.correction(), Some([[501; 6], [502; 6], [503; 6]].as_slice()));
+        assert!(passes.begin(COURSE).is_some());
+    }
+}

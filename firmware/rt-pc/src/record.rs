@@ -128,3 +128,56 @@ impl Writer {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use controller::snapshot::MACHINE_STATE_WORDS;
+    use controller::supervised::{MACHINE_INPUT_WORDS, MachineInput};
+    use rtrb::RingBuffer;
+
+    /// Blocks of a file: rows, and words of each.
+    fn blocks(bytes: &[u8]) -> Vec<[u64; 2]> {
+        let word = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+        let mut at = 16 + (word(8) >> 32) as usize + 8;
+        let mut blocks = Vec::new();
+        while at < bytes.len() {
+            blocks.push([word(at + 16), word(at + 8)]);
+            at += (word(at + 8) as usize + 1) * 8;
+        }
+        blocks
+    }
+
+    #[test]
+    fn a_block_has_room_for_rows_in_which_every_word_is_another_one() {
+        let path = std::env::temp_dir().join(format!("rt-pc-longest-{}", std::process::id()));
+        let mut writer = Writer::create(&path, &Config::new()).unwrap();
+        let (mut states, mut snapshots) = RingBuffer::new(2);
+        for block in 0..2 {
+            let count = block * u64::from(SNAPSHOT_EVERY);
+            states.push(Snapshot { count, digest: 1, state: [0; MACHINE_STATE_WORDS] }).unwrap();
+            for tick in count..count + u64::from(SNAPSHOT_EVERY) {
+                let words = [(tick % 5 + 1) | 1 << 40; MACHINE_INPUT_WORDS];
+                let input = MachineInput::from_words(&words);
+                writer.add(&Row { opens: tick == count, input, ..crate::bench::row(tick) }, &mut snapshots).unwrap();
+            }
+        }
+        assert_eq!(writer.finish().unwrap(), 2 * u64::from(SNAPSHOT_EVERY));
+        let blocks = blocks(&std::fs::read(&path).unwrap());
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(blocks.iter().map(|block| block[0]).collect::<Vec<_>>(), [u64::from(SNAPSHOT_EVERY); 2]);
+        // No more memory than that takes.
+        assert!(
+            blocks.iter().all(|block| block[1] <= BLOCK as u64 && block[1] > BLOCK as u64 / 2),
+            "{blocks:?} {BLOCK}"
+        );
+    }
+
+    #[test]
+    fn a_device_need_not_be_synchronised_and_a_full_one_is_known_at_once() {
+        let null = Writer::create(Path::new("/dev/null"), &Config::new()).unwrap();
+        assert_eq!(null.finish().unwrap(), 0);
+        let full = Writer::create(Path::new("/dev/full"), &Config::new()).err().unwrap();
+        assert!(full.starts_with("/dev/full: "), "{full}");
+    }
+}

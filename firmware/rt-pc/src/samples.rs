@@ -69,3 +69,56 @@ fn sample(row: &Row) -> Sample {
         volts: rounded(six(3 * AXES)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::row;
+    use specgen_link::samples::rows;
+
+    fn shown(tick: u64) -> Row {
+        let mut row = row(tick);
+        row.place = core::array::from_fn(|k| crate::words::word(tick as Real + k as Real / 32.0));
+        row.output.supervisor = 0x10302;
+        row.output.status = 9;
+        row
+    }
+
+    #[test]
+    fn a_row_shows_pose_target_error_and_volts_of_its_axes() {
+        let Sample { tick, status, phase, pose, target, error, volts } = sample(&shown(4));
+        assert_eq!((tick, status, phase), (4, 9, 2));
+        let of = |first: usize| -> [f32; AXES] { core::array::from_fn(|axis| 4.0 + (first + axis) as f32 / 32.0) };
+        assert_eq!((pose, target, volts), (of(0), of(6), of(18)));
+        assert_eq!(error, [6.0 / 32.0; AXES]);
+    }
+
+    #[test]
+    fn rows_begin_when_they_are_asked_for_and_come_in_blocks() {
+        let mut stream = Stream::default();
+        stream.add(&shown(0));
+        let none = Reply::Samples { number: 0, tick: 0, every: 0, more: false, rows: Bytes(&[]) };
+        assert_eq!(stream.take(), none);
+        assert_eq!(stream.start(MOST_EVERY + 1), Err(Refusal::Word { index: 0 }));
+        assert_eq!(stream.start(MOST_EVERY), Ok(()));
+        assert_eq!(stream.start(1), Ok(()));
+        for tick in 1..=100 {
+            stream.add(&shown(tick));
+        }
+        // All of them, in blocks; that another whole one waits is said with each but the last two.
+        let (mut next, mut told) = (1, Vec::new());
+        while next <= 100 {
+            let Reply::Samples { number, tick, every: 1, more, rows: bytes } = stream.take() else { panic!("samples") };
+            assert_eq!((number as usize, tick), (told.len(), next));
+            next += rows(1, bytes.0).unwrap().len() as u64;
+            told.push(more);
+        }
+        // Behind the last but one there is only what is being filled.
+        let others = told.len() - 2;
+        assert!(next == 101 && others > 0, "{told:?}");
+        assert_eq!(told, [vec![true; others], vec![false; 2]].concat());
+        stream.add(&shown(101));
+        assert_eq!(stream.start(0), Ok(()));
+        assert_eq!(stream.take(), none);
+    }
+}

@@ -202,3 +202,233 @@ fn said(row: &Row) -> Said {
         late: row.late,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::row;
+    use crate::capture::Capture;
+    use crate::handover::{Inner, SNAPSHOT_EVERY, Snapshot, rings};
+    use crate::operator::{Operator, Timeout};
+    use controller::Config;
+    use controller::snapshot::MACHINE_STATE_WORDS;
+    use controller::supervised::Request;
+    use specgen_rt::clock::SECOND;
+    use std::time::Duration;
+
+    const HOLDING: u32 = Phase::Holding.word() as u32;
+    const FAULTED: u32 = Phase::Faulted.word() as u32;
+
+    fn service<'a>(
+        shared: &'a Shared,
+        record: Option<&str>,
+        until: Option<u64>,
+    ) -> (Service<'a>, Inner, Option<PathBuf>) {
+        let (inner, rings) = rings(record.is_some());
+        let operator = Operator::new(true, Timeout { silence: SECOND, idle: SECOND });
+        let console = Console::new(operator, Capture::new(None).unwrap().0, Config::new());
+        let path = record.map(|name| std::env::temp_dir().join(format!("rt-pc-{name}-{}", std::process::id())));
+        let record = path.clone().map(|path| {
+            let writer = record::Writer::create(&path, &Config::new()).unwrap();
+            (path, writer)
+        });
+        let signal = Arc::new(AtomicBool::new(false));
+        (Service { rings, shared, console, record, link: None, signal, signals: 0, until }, inner, path)
+    }
+
+    fn word(phase: u32, cause: Cause, on: bool, finding: u32) -> u32 {
+        phase | (cause.word() as u32) << 8 | u32::from(on) << 16 | finding << 17
+    }
+
+    #[test]
+    fn a_word_says_phase_cause_finding_and_whether_the_amplifiers_are_on() {
+        let mut row = row(9);
+        for (phase, cause, on) in [(Phase::Holding, Cause::AmplifierFault, true), (Phase::Faulted, Cause::None, false)]
+        {
+            for finding in [0, 5] {
+                row.output.supervisor = word(phase.word() as u32, cause, on, finding);
+                (row.orders, row.waving, row.late, row.output.status) = (4, on, 3, 77);
+                let found = said(&row);
+                assert_eq!((found.phase, found.cause, found.on), (phase, cause, on));
+                assert_eq!(found.finding, Finding::of_word(finding));
+                assert_eq!((found.tick, found.orders, found.waving, found.late, found.status), (9, 4, on, 3, 77));
+            }
+        }
+        row.output.supervisor = 0xff;
+        assert_eq!(said(&row).phase, Phase::Faulted, "what cannot be understood");
+    }
+
+    #[test]
+    fn faults_holds_for_a_cause_and_fall_backs_are_incidents_once() {
+        let shared = Shared::default();
+        let (mut service, mut inner, _) = service(&shared, None, None);
+        let fallback = (0..1 << 15).find(|word| matches!(Finding::of_word(*word), Finding::Fallback(_))).unwrap();
+        let running = Phase::Running.word() as u32;
+        let words = [
+            word(HOLDING, Cause::None, true, 0),
+            word(HOLDING, Cause::LinkLost, true, 0),
+            word(HOLDING, Cause::LinkLost, true, 0),
+            word(HOLDING, Cause::TrackingError, true, 0),
+            word(running, Cause::None, true, 0),
+            word(running, Cause::Oscillation, true, fallback),
+            word(running, Cause::Oscillation, true, fallback),
+            word(FAULTED, Cause::Converter, false, 0),
+            word(FAULTED, Cause::Converter, false, 0),
+            word(Phase::Disarmed.word() as u32, Cause::None, false, 0),
+            word(HOLDING, Cause::None, true, 0),
+        ];
+        for (tick, supervisor) in (0..).zip(words) {
+            let mut row = row(tick);
+            row.output.supervisor = supervisor;
+            inner.outlets.rows.push(row).unwrap();
+        }
+        let mut outcome = Outcome::default();
+        service.drain(&mut outcome, 3);
+        let found: Vec<_> = outcome.incidents.iter().map(|one| (one.tick, one.phase, one.cause)).collect();
+        assert_eq!(
+            found,
+            [
+                (1, Phase::Holding, Cause::LinkLost),
+                (3, Phase::Holding, Cause::TrackingError),
+                (5, Phase::Running, Cause::Oscillation),
+                (7, Phase::Faulted, Cause::Converter),
+            ]
+        );
+        assert_eq!(outcome.rows, words.len() as u64);
+        assert_eq!(service.console.ticked, Some(3));
+    }
+
+    #[test]
+    fn the_loop_learns_whose_silence_matters_and_a_round_takes_its_time() {
+        let shared = Shared::default();
+        let (mut service, _inner, _) = service(&shared, None, None);
+        service.serve(0);
+        assert_eq!(shared.link.load(Ordering::Relaxed), 0);
+        service.console.operator.take_for_host(crate::operator::HostId(1), 0).unwrap();
+        service.serve(0);
+        let number = shared.link.load(Ordering::Relaxed);
+        assert!(number > 0 && number == service.console.operator.link_number());
+        let start = clock::now();
+        service.wait();
+        assert!(clock::now() - start >= ROUND.tv_nsec as u64 / 2);
+    }
+
+    #[test]
+    fn orders_go_out_in_their_order_as_far_as_there_is_room() {
+        let shared = Shared::default();
+        let (mut service, mut inner, _) = service(&shared, None, None);
+        let room = service.rings.orders.slots();
+        for _ in 0..room - 1 {
+            service.console.order(Order::Trigger);
+        }
+        service.console.configure(Config::new());
+        service.console.operator.ramp_down(0);
+        service.send();
+        // The wish came last, and finds no room.
+        assert_eq!((inner.orders.slots(), service.console.outgoing().0.len()), (room, 1));
+        assert!(matches!(inner.orders.pop(), Ok(Order::Trigger)));
+        service.send();
+        let orders: Vec<_> = std::iter::from_fn(|| inner.orders.pop().ok()).collect();
+        assert!(
+            matches!(orders[room - 2..], [Order::Configure(_), Order::Wish(wish)] if wish.request == Request::RampDown)
+        );
+        assert!(service.console.outgoing().0.is_empty());
+    }
+
+    #[test]
+    fn a_record_has_the_settings_of_its_rows_and_ends_where_a_state_is_missing() {
+        let shared = Shared::default();
+        let (mut service, mut inner, path) = service(&shared, Some("settings"), None);
+        let path = path.unwrap();
+        let mut words = Config::new().to_words();
+        let gain = controller::CONFIG_NAMES.iter().position(|name| *name == "kp[0]").unwrap();
+        words[gain] = crate::words::word(0.0);
+        service.console.operator.wish();
+        service.console.configure(Config::from_words(&words).unwrap());
+        service.send();
+        let state = [0; MACHINE_STATE_WORDS];
+        let mut outcome = Outcome::default();
+        // The order was taken before the second of three blocks.
+        for (block, orders) in [(0, 0), (1, 1), (2, 1)] {
+            let count = block * u64::from(SNAPSHOT_EVERY);
+            inner.outlets.snapshots.as_mut().unwrap().push(Snapshot { count, digest: 1, state }).unwrap();
+            for tick in count..count + u64::from(SNAPSHOT_EVERY) {
+                let mut row = row(tick);
+                (row.opens, row.orders) = (tick == count, orders);
+                inner.outlets.rows.push(row).unwrap();
+            }
+            service.drain(&mut outcome, 0);
+        }
+        assert!(outcome.record.is_none() && service.record.is_some());
+        let (_, writer) = service.record.take().unwrap();
+        assert_eq!(writer.finish().unwrap(), 3 * u64::from(SNAPSHOT_EVERY));
+        let bytes = std::fs::read(&path).unwrap();
+        let (old, new) = (Config::new().to_words(), words);
+        let of = |words: [u64; controller::CONFIG_WORDS]| words.map(u64::to_le_bytes).concat();
+        let count = |part: Vec<u8>| bytes.windows(part.len()).filter(|window| *window == part).count();
+        assert_eq!((count(of(old)), count(of(new))), (1, 2));
+
+        let writer = record::Writer::create(&path, &Config::new()).unwrap();
+        service.record = Some((path.clone(), writer));
+        inner.outlets.snapshots.as_mut().unwrap().push(Snapshot { count: 8, digest: 1, state }).unwrap();
+        for count in [9, 10] {
+            let mut row = row(count);
+            row.opens = true;
+            inner.outlets.rows.push(row).unwrap();
+        }
+        inner.outlets.snapshots.as_mut().unwrap().push(Snapshot { count: 10, digest: 1, state }).unwrap();
+        service.drain(&mut outcome, 0);
+        assert!(matches!(&outcome.record, Some((found, Err(_))) if *found == path));
+        assert!(service.record.is_none() && service.console.operator.failure.is_some());
+        assert_eq!(service.rings.snapshots.slots(), 0, "what comes behind it blocks nothing");
+        std::fs::remove_file(&path).unwrap();
+    }
+
+    /// Runs it beside a machine that ramps down, or stays on for ever; what the outcome says, and how long it took, ns.
+    fn served(until: Option<u64>, signals: &'static [u64], goes_down: bool) -> (Outcome, u64, bool) {
+        let shared: &'static Shared = Box::leak(Box::default());
+        let (service, mut inner, _) = service(shared, None, until);
+        let signal = Arc::clone(&service.signal);
+        let start = clock::now();
+        let machine = std::thread::spawn(move || {
+            let (mut asked, mut tick) = (Request::None, 0);
+            while !shared.stop.load(Ordering::Relaxed) && clock::now() < start + 5 * SECOND {
+                while let Ok(order) = inner.orders.pop() {
+                    if let Order::Wish(wish) = order {
+                        asked = wish.request;
+                    }
+                }
+                if signals.contains(&tick) {
+                    signal.store(true, Ordering::Relaxed);
+                }
+                let mut row = row(tick);
+                let down = goes_down && asked == Request::RampDown;
+                row.output.supervisor = if down { 0 } else { word(HOLDING, Cause::None, true, 0) };
+                inner.outlets.rows.push(row).unwrap();
+                tick += 1;
+                std::thread::sleep(Duration::from_millis(2));
+            }
+            shared.ended.store(true, Ordering::Release);
+            asked == Request::RampDown
+        });
+        let outcome = service.run();
+        let took = clock::now() - start;
+        let ramped = machine.join().unwrap();
+        assert!(shared.stop.load(Ordering::Relaxed) && outcome.rows > 0);
+        assert!(clock::now() - shared.service_alive.load(Ordering::Relaxed) < SECOND);
+        (outcome, took, ramped)
+    }
+
+    #[test]
+    fn a_time_or_a_signal_ramps_down_and_a_second_signal_ends_at_once() {
+        let (outcome, took, ramped) = served(Some(clock::now() + SECOND / 10), &[], true);
+        assert!(ramped && (SECOND / 10..4 * SECOND).contains(&took), "{took}");
+        assert_eq!((outcome.last.unwrap().phase, outcome.failure), (Phase::Disarmed, None));
+        let (outcome, took, ramped) = served(None, &[10], true);
+        assert!(ramped && (20_000_000..4 * SECOND).contains(&took), "{took}");
+        assert_eq!(outcome.last.unwrap().phase, Phase::Disarmed);
+        let (outcome, took, ramped) = served(None, &[10, 60], false);
+        assert!(ramped && (120_000_000..4 * SECOND).contains(&took), "{took}");
+        assert_eq!(outcome.last.unwrap().phase, Phase::Holding);
+    }
+}

@@ -255,3 +255,150 @@ impl Display for Json {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::said;
+    use controller::supervised::{Cause, Finding};
+    use specgen_rt::account::Stamps;
+    use specgen_rt::clock::Usage;
+    use std::io;
+    use std::path::PathBuf;
+
+    const INCIDENT: Incident =
+        Incident { tick: 41, phase: Phase::Faulted, cause: Cause::EmergencyStop, finding: Finding::None };
+
+    /// A book of three ticks, of which one is late, behind two that were skipped.
+    fn account() -> Account {
+        let mut account = Account::new(100, 50);
+        let at = |planned: u64, written: u64| Stamps {
+            planned,
+            woken: planned + 1,
+            read: planned + 2,
+            computed: planned + 3,
+            written,
+            done: written,
+        };
+        for stamps in [at(100, 110), at(200, 290)] {
+            account.tick(&stamps, &Usage::default(), false);
+        }
+        assert_eq!(account.arrive(300, 510, false), 2);
+        account.tick(&at(500, 530), &Usage { voluntary_switches: 1, ..Usage::default() }, false);
+        account
+    }
+
+    fn summary<'a>(account: &'a Account, outcome: &'a Outcome) -> Summary<'a> {
+        Summary {
+            account,
+            outcome,
+            lost_rows: 0,
+            device_faults: 6,
+            device: "made-up \"machine\"".to_owned(),
+            period: 100_000,
+            missing_rights: vec!["a\tright".to_owned()],
+        }
+    }
+
+    fn failure(change: impl FnOnce(&mut Outcome, &mut u64)) -> Option<String> {
+        let account = account();
+        let (mut outcome, mut lost) = (Outcome { rows: 3, ..Outcome::default() }, 0);
+        change(&mut outcome, &mut lost);
+        Summary { lost_rows: lost, ..summary(&account, &outcome) }.failure()
+    }
+
+    #[test]
+    fn a_run_fails_for_its_first_reason() {
+        let file = || PathBuf::from("/some/file");
+        let full = || Err(io::Error::other("full"));
+        let found = |text: &str, change: &dyn Fn(&mut Outcome, &mut u64)| {
+            let found = failure(|outcome, lost| change(outcome, lost));
+            assert!(found.as_ref().is_some_and(|found| found.contains(text)), "{text}: {found:?}");
+        };
+        assert_eq!(failure(|_, _| {}), None);
+        found("3 ticks were run, but 2 rows came and 0 were lost", &|outcome, _| outcome.rows = 2);
+        found("but 3 rows came and 1 were lost", &|_, lost| *lost = 1);
+        // Rows may be lost where nothing is recorded.
+        assert_eq!(failure(|outcome, lost| (outcome.rows, *lost) = (2, 1)), None);
+        found("the record lacks 1 ticks", &|outcome, lost| {
+            (outcome.rows, *lost, outcome.record) = (2, 1, Some((file(), Ok(2))));
+        });
+        assert_eq!(failure(|outcome, _| outcome.record = Some((file(), Ok(3)))), None);
+        found("/some/file: the record is not whole: full", &|outcome, _| {
+            (outcome.record, outcome.failure) = (Some((file(), full())), Some("other".to_owned()));
+        });
+        found("other", &|outcome, _| {
+            (outcome.capture, outcome.failure) = (Some((file(), full())), Some("other".to_owned()));
+        });
+        found("what the recorder kept could not be written: full", &|outcome, _| {
+            (outcome.capture, outcome.incidents) = (Some((file(), full())), vec![INCIDENT]);
+        });
+        found("the machine faulted at tick 41: emergency stop", &|outcome, _| {
+            outcome.incidents = vec![INCIDENT, Incident { tick: 50, ..INCIDENT }];
+        });
+        found("the machine held at tick 41", &|outcome, _| {
+            outcome.incidents = vec![Incident { phase: Phase::Holding, ..INCIDENT }];
+        });
+    }
+
+    #[test]
+    fn a_summary_says_the_same_to_people_and_to_programs() {
+        let account = account();
+        let outcome = Outcome {
+            last: Some(said(Phase::Holding)),
+            incidents: vec![INCIDENT],
+            record: Some((PathBuf::from("/r\\x"), Ok(3))),
+            capture: Some((PathBuf::from("/c"), Err(io::Error::other("full")))),
+            link: Some(Traffic { hosts: 2, requests: 30, errors: 4, closed: 5 }),
+            rows: 3,
+            failure: None,
+        };
+        let summary = summary(&account, &outcome);
+        let (text, json) = (summary.to_text(), summary.to_json());
+        for part in [
+            &format!("{} at 10000 Hz on made-up \"machine\"\n", controller::SPEC_NAME),
+            "without a\tright\n",
+            "ticks  planned 5 = on time 2 + late 1 + skipped 2",
+            "0 rows lost, 6 device faults\n",
+            "1 ticks that waited in their work",
+            "the machine faulted at tick 41: emergency stop\n",
+            "record: 3 ticks in /r\\x\n",
+            "recorder: /c is not whole: full\n",
+            "link: 30 requests of 2 hosts, 4 frames not believed, 5 hosts closed",
+        ] {
+            assert!(text.contains(part), "{part}\n{text}");
+        }
+        assert!(json.starts_with("{\n  \"name\": ") && json.ends_with("\n}\n"));
+        for part in [
+            r#""device": "made-up \"machine\"","#,
+            r#""period_ns": 100000,"#,
+            r#""missing_rights": ["a\u0009right"],"#,
+            r#""planned": 5,"#,
+            r#""on_time": 2,"#,
+            r#""late": 1,"#,
+            r#""skipped": 2,"#,
+            r#""balances": true,"#,
+            r#""waiting_ticks": 1,"#,
+            r#""lost_rows": 0,"#,
+            r#""device_faults": 6,"#,
+            r#""incidents": [{ "tick": 41, "phase": "Faulted", "cause": "EmergencyStop", "why": "emergency stop" }],"#,
+            r#""record": { "file": "/r\\x", "ticks": 3 },"#,
+            r#""recorder": null,"#,
+            r#""link": { "hosts": 2, "requests": 30, "errors": 4, "closed_hosts": 5 },"#,
+            r#""last_phase": "Holding","#,
+            r#""failure": "/c: what the recorder kept could not be written: full""#,
+            r#""max_ns": 90,"#,
+        ] {
+            assert!(json.contains(part), "{part}\n{json}");
+        }
+        // A cause with late ticks, and one with skipped ones; none of those without any.
+        let causes = json.lines().find(|line| line.contains("\"causes\"")).unwrap();
+        assert_eq!(causes.matches("\"cause\"").count(), 2, "{causes}");
+        for part in [r#""late": 1, "skipped": 0, "longest_ns": 90"#, r#""late": 0, "skipped": 2, "longest_ns": 210"#] {
+            assert!(causes.contains(part), "{part} {causes}");
+        }
+        assert_eq!(hertz(3_000_000), 333.333);
+        assert_eq!(Json::from(" a\u{1f}b".to_owned()).to_string(), "\" a\\u001fb\"");
+        assert_eq!(Json::from(None::<u64>).to_string(), "null");
+    }
+}

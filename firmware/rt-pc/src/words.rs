@@ -104,4 +104,20 @@ mod tests {
         assert_eq!(word_of(place("setpoint[2]").unwrap(), 1e-6), Some(word(1e-6)));
         assert!(place("setpoint[6]").unwrap_err().to_string().contains("no input word `setpoint[6]`"));
     }
+
+    #[test]
+    fn a_setting_is_whole_where_it_is_a_choice_and_has_a_range() {
+        let place = |name: &str| controller::CONFIG_NAMES.iter().position(|known| *known == name).unwrap();
+        let (mode, gain) = (place("mode"), place("kp[0]"));
+        assert_eq!([3.0, 0.5, f64::INFINITY].map(|value| setting(mode, value)), [Some(3), None, None]);
+        assert_eq!(
+            [3.0, 0.5, f64::INFINITY].map(|value| setting(gain, value)),
+            [Some(word(3.0)), Some(word(0.5)), None]
+        );
+        assert_eq!(setting(controller::CONFIG_WORDS, 1.0), None);
+        assert!(range(mode).contains("a whole number from 0 to") && range(gain).contains("a number from"));
+        assert!(range(controller::CONFIG_WORDS).contains("a setting of this controller"));
+        assert_eq!(word_of(MACHINE_INPUT_NAMES.len(), 1.0), None);
+        assert_eq!(period(), Some(100_000));
+    }
 }

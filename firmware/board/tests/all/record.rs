@@ -153,6 +153,8 @@ fn a_fault_ends_a_record_that_nobody_armed() {
     line.parts(|parts| parts.fails = true);
     wait(&line, &mut client, "fault", |line| line.phase() == Phase::Faulted);
     assert!(act(&mut client, RecorderAction::Look).triggered);
+    line.tick(capacity / 4);
+    assert!(act(&mut client, RecorderAction::Look).running, "half of the room is for what follows");
     line.tick(capacity);
     let status = act(&mut client, RecorderAction::Look);
     assert!(!status.running && status.triggered, "{status:?}");

@@ -96,6 +96,7 @@ fn a_board_shows_every_tick_and_what_it_could_not() {
     line.tick(10 * 5 * LEAST);
     let late: Vec<Block> = (0..2).map(|_| take(&mut client)).collect();
     assert!(late[0].number >= blocks[blocks.len() - 1].number + 8 && late[0].more, "{}", late[0].number);
+    assert!(!late[1].more, "the second is the last");
     assert_eq!(check(&line, &late), 10);
 
     // A background without time: 32 ticks wait for it, the others are missing between two blocks, and no row is of less than it says.

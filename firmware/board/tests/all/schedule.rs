@@ -4,9 +4,12 @@
 
 use std::num::NonZeroU32;
 
+use controller::limits::CODES;
+use controller::supervision::SUPERVISION;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen_board::{BACKGROUND_SILENCE, Due, Health, RAMPED_DOWN, Schedule};
+use specgen_runtime::supervisor::toward;
 
 /// Against a counter that never wraps: the grid of due times is never left, and every grid point is a tick or is counted.
 #[test]
@@ -64,8 +67,14 @@ fn a_tick_that_comes_long_after_its_time_is_not_one_before_it() {
 
 #[test]
 fn a_dead_background_ramps_down_and_then_starves_the_watchdog() {
-    // Seconds of 100 µs, then the codes of 16 bits, four at a time.
-    const { assert!(BACKGROUND_SILENCE == 10_001 && RAMPED_DOWN > 2 * 10_001 && RAMPED_DOWN < 2 * 10_001 + 17_000) };
+    // Two seconds of 100 µs, then the way of the codes from the highest to rest.
+    let (mut code, mut ramp) = (CODES[1], 0);
+    while code != CODES[0] {
+        code = toward(code, CODES[0], SUPERVISION.ramp_step);
+        ramp += SUPERVISION.ramp_every;
+    }
+    assert!(ramp > 10_000);
+    assert_eq!((BACKGROUND_SILENCE, RAMPED_DOWN), (10_001, 2 * 10_001 + ramp));
     let mut health = Health::new();
     for beat in 0..3 * BACKGROUND_SILENCE {
         assert!(health.tick(1 + beat / 100, 0, false));

@@ -14,7 +14,7 @@ use specgen_runtime::pass::Stage;
 use specgen_runtime::playback::{self, Knot};
 
 use crate::ask;
-use crate::board_support::{KNOTS_OF_A_PASS, Line, bytes, done, refused, running, wait, wave};
+use crate::board_support::{KNOTS_OF_A_PASS, Line, Rig, bytes, done, refused, running, wait, wave};
 
 const SPACING: u32 = 10;
 const BEFORE: u32 = 30;
@@ -227,6 +227,17 @@ fn in_the_background(exchange: &mut Exchange, machine: &mut Machine) {
     }
 }
 
+/// A player with nothing to learn, or in its pass, stays where the tick finds it.
+fn looks_only(rig: &mut Rig) {
+    let mut looks = 0;
+    learn(&mut |action| {
+        action(&mut rig.exchange, rig.board.machine_mut());
+        assert!(rig.exchange.player.is_some());
+        looks += 1;
+    });
+    assert_eq!(looks, 1);
+}
+
 /// A plan that adds the error of each knot to its correction, axis by axis.
 fn plan() -> Vec<Knot> {
     let bits = |value: f32| value.to_bits() as i32;
@@ -246,6 +257,7 @@ fn the_background_learns_between_passes_and_says_so_meanwhile() {
     pass(&mut client, BEGIN);
     let learning = PassAction::Learn { reach: 0, fade: [1, 2] };
     assert_eq!(refused(&mut client, &Request::Pass { action: learning }), Refusal::State, "it is under way");
+    line.with(looks_only);
     wait(&line, &mut client, "the end of the pass", |line| stage(line) == Stage::Complete);
     let errors = line.with(|rig| rig.exchange.player.as_ref().unwrap().errors().to_vec());
     line.with(|rig| (rig.pace, rig.busy) = (0, true));
@@ -282,10 +294,7 @@ fn the_background_learns_between_passes_and_says_so_meanwhile() {
         }
     }
     // Nothing is left to do.
-    line.with(|rig| {
-        learn(&mut |action| action(&mut rig.exchange, rig.board.machine_mut()));
-        assert!(rig.exchange.player.is_some());
-    });
+    line.with(looks_only);
     // What it learned from is gone.
     assert_eq!(refused(&mut client, &Request::Pass { action: learning }), Refusal::State);
 }

@@ -203,4 +203,83 @@ mod tests {
         }
         assert_eq!(blocks, [[4, 0, 0], [3, 11, 0]]);
     }
+
+    type Ends = (rtrb::Consumer<Row>, rtrb::Consumer<Snapshot>, rtrb::Consumer<(Tape, u32)>);
+
+    /// A keeper with rings of this room, and their other ends.
+    fn keeper(room: usize, records: bool, shared: &Shared) -> (Keeper<'_>, Ends) {
+        let (rows, rows_out) = RingBuffer::new(room);
+        let (snapshots, snapshots_out) = RingBuffer::new(room);
+        let (tapes, tapes_out) = RingBuffer::new(1);
+        let outlets = Outlets { rows, snapshots: records.then_some(snapshots), tapes };
+        let keeper = Keeper::new(outlets, None, shared, (&Machine::new(), &Config::new()));
+        (keeper, (rows_out, snapshots_out, tapes_out))
+    }
+
+    #[test]
+    fn a_block_begins_with_a_state_after_so_many_rows_and_with_other_settings() {
+        let (machine, config, shared) = (Machine::new(), Config::new(), Shared::default());
+        let (mut keeper, (mut rows, mut snapshots, _)) = keeper(8, true, &shared);
+        assert!(keeper.wants_digest());
+        let mut opened = Vec::new();
+        let last = 2 * u64::from(SNAPSHOT_EVERY) + 50;
+        for count in 0..last {
+            keeper.keep(row(count, 1));
+            keeper.ordered();
+            keeper.prepare(&machine, &config, count + 1, count == 99);
+            let row = rows.pop().unwrap();
+            assert_eq!(u64::from(row.orders), count);
+            assert_eq!((row.recorded, row.triggered), (None, false));
+            if row.opens {
+                let snapshot = snapshots.pop().unwrap();
+                assert_eq!((snapshot.count, snapshot.digest), (row.count, machine.digest()));
+                opened.push(row.count);
+            }
+        }
+        let every = u64::from(SNAPSHOT_EVERY);
+        assert_eq!(opened, [0, 100, 100 + every]);
+        assert_eq!(shared.lost_rows.load(Ordering::Relaxed), 0);
+    }
+
+    #[test]
+    fn a_run_that_is_not_recorded_hands_rows_alone() {
+        let (machine, config, shared) = (Machine::new(), Config::new(), Shared::default());
+        let (mut keeper, (mut rows, mut snapshots, mut tapes)) = keeper(4, false, &shared);
+        assert!(!keeper.wants_digest());
+        keeper.trigger();
+        keeper.stop();
+        for count in 0..6 {
+            keeper.keep(row(count, 0));
+            keeper.prepare(&machine, &config, count + 1, true);
+        }
+        assert_eq!(shared.lost_rows.load(Ordering::Relaxed), 2);
+        assert!(rows.pop().is_ok_and(|row| !row.opens) && snapshots.pop().is_err() && tapes.pop().is_err());
+        let (_, tape) = crate::capture::Capture::new(None).unwrap();
+        keeper.take(tape, 6);
+        assert!(keeper.wants_digest());
+        keeper.prepare(&machine, &config, 6, false);
+        keeper.keep(row(6, 5));
+        assert!(tapes.pop().is_err(), "it records");
+        keeper.trigger();
+        keeper.stop();
+        keeper.prepare(&machine, &config, 7, false);
+        assert!(!keeper.wants_digest());
+        assert!(tapes.pop().is_ok_and(|(tape, taken)| tape.rows() == 1 && taken == 0));
+    }
+
+    #[test]
+    fn a_recorder_that_finds_no_room_is_kept_and_given_back_at_the_end() {
+        let (machine, config, shared) = (Machine::new(), Config::new(), Shared::default());
+        let (mut keeper, (_rows, _snapshots, mut tapes)) = keeper(4, true, &shared);
+        for expected in [false, true] {
+            let (_, tape) = crate::capture::Capture::new(None).unwrap();
+            keeper.take(tape, 0);
+            keeper.stop();
+            keeper.prepare(&machine, &config, 1, false);
+            assert_eq!(keeper.tape.is_some(), expected);
+        }
+        assert!(tapes.pop().is_ok());
+        keeper.finish();
+        assert!(tapes.pop().is_ok_and(|(tape, _)| tape.activity() == Activity::Stopped));
+    }
 }

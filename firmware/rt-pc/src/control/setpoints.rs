@@ -181,3 +181,198 @@ impl Setpoints {
         command
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use specgen_runtime::pass::{self, Course};
+    use specgen_runtime::pending;
+    use specgen_runtime::playback::Knot;
+
+    const LOW: Result<bool, ()> = Ok(false);
+    const HIGH: Result<bool, ()> = Ok(true);
+    const COURSE: Course = Course { spacing: 1, before: 2, ticks: 5, trajectory: 9 };
+
+    fn wave(ticks: i32) -> Settings<Real> {
+        Settings { ticks, ..Settings::still() }
+    }
+
+    fn setpoints() -> (Setpoints, Config) {
+        let config = Config::new();
+        let mut setpoints = Setpoints::new(&config);
+        setpoints.wish(Wish { command: Some([5; COMMAND_WORDS]), request: Request::Run });
+        (setpoints, config)
+    }
+
+    fn player() -> Player {
+        let memory: &'static mut [Knot] = vec![[0; 6]; 16].leak();
+        let mut player = Box::new(pass::Player::new(memory));
+        assert!(player.begin(COURSE));
+        player
+    }
+
+    fn stage(setpoints: &Setpoints) -> Option<pending::Stage> {
+        pending::Stage::from_word(setpoints.edge().stage.into())
+    }
+
+    /// A tick of a machine that runs, in which the line is high or low.
+    fn tick(setpoints: &mut Setpoints, number: u64, line: Result<bool, ()>, status: u32) -> bool {
+        let rose = setpoints.sense(line);
+        setpoints.begin_awaited(number, Phase::Running, status, &Config::new());
+        rose
+    }
+
+    #[test]
+    fn a_wave_gives_numbered_setpoints_and_then_the_command_again() {
+        let (mut setpoints, config) = setpoints();
+        assert_eq!(setpoints.request(), Request::Run);
+        assert_eq!(setpoints.next(Phase::Running, &config), [5; COMMAND_WORDS]);
+        assert!(!setpoints.waving());
+        for first in [1, 11] {
+            setpoints.start(&wave(10), &config);
+            // Not in place of the one under way.
+            setpoints.start(&wave(4), &config);
+            for number in first..first + 10 {
+                let command = setpoints.next(Phase::Running, &config);
+                assert!(setpoints.waving());
+                assert_eq!(command[..3], [1, 0, number], "a stream that goes on counting");
+            }
+            assert_eq!(setpoints.next(Phase::Running, &config), [5; COMMAND_WORDS]);
+            assert!(!setpoints.waving());
+        }
+        setpoints.start(&wave(0), &config);
+        assert_eq!(setpoints.next(Phase::Running, &config)[0], 1);
+        setpoints.stop();
+        let more = (0..100).take_while(|_| setpoints.next(Phase::Running, &config)[0] == 1).count();
+        assert!(more < 10, "{more}");
+        setpoints.start(&wave(0), &config);
+        assert_eq!(setpoints.next(Phase::Holding, &config), [5; COMMAND_WORDS]);
+        assert_eq!(setpoints.next(Phase::Running, &config), [5; COMMAND_WORDS], "it does not go on later");
+    }
+
+    #[test]
+    fn a_wish_keeps_what_it_does_not_name() {
+        let (mut setpoints, config) = setpoints();
+        setpoints.wish(Wish { command: None, request: Request::Hold });
+        assert_eq!((setpoints.request(), setpoints.next(Phase::Running, &config)), (Request::Hold, [5; COMMAND_WORDS]));
+    }
+
+    #[test]
+    fn a_command_begins_behind_the_tick_in_which_the_line_rises() {
+        let (mut setpoints, config) = setpoints();
+        assert_eq!(stage(&setpoints), Some(pending::Stage::None));
+        setpoints.wait_for_edge(Awaited::Command([8; COMMAND_WORDS]));
+        assert_eq!([HIGH, LOW, LOW].map(|line| tick(&mut setpoints, 1, line, 0)), [false; 3]);
+        assert_eq!(stage(&setpoints), Some(pending::Stage::Waiting));
+        assert_eq!(setpoints.next(Phase::Running, &config), [5; COMMAND_WORDS]);
+        assert!(tick(&mut setpoints, 44, HIGH, 0));
+        assert_eq!(setpoints.next(Phase::Running, &config), [8; COMMAND_WORDS]);
+        let edge = setpoints.edge();
+        assert_eq!((stage(&setpoints), edge.edges, edge.tick), (Some(pending::Stage::Begun), 1, 44));
+    }
+
+    #[test]
+    fn what_waits_is_refused_where_something_moves_and_dropped_by_other_orders() {
+        let waits = || {
+            let (mut setpoints, config) = setpoints();
+            assert!(!setpoints.sense(LOW));
+            (setpoints, config)
+        };
+        let await_it = |setpoints: &mut Setpoints| {
+            setpoints.wait_for_edge(Awaited::Command([8; COMMAND_WORDS]));
+        };
+        // A motion, a wave, a pass.
+        let (mut setpoints, config) = waits();
+        await_it(&mut setpoints);
+        tick(&mut setpoints, 1, HIGH, BUSY);
+        assert_eq!(stage(&setpoints), Some(pending::Stage::Refused));
+        let (mut setpoints, _) = waits();
+        setpoints.start(&wave(0), &config);
+        await_it(&mut setpoints);
+        tick(&mut setpoints, 1, HIGH, 0);
+        assert_eq!(stage(&setpoints), Some(pending::Stage::Refused));
+        let (mut setpoints, _) = waits();
+        setpoints.pass(player());
+        await_it(&mut setpoints);
+        tick(&mut setpoints, 1, HIGH, 0);
+        assert_eq!(stage(&setpoints), Some(pending::Stage::Refused));
+        // Other orders, and a machine that does not run.
+        let orders: [fn(&mut Setpoints); 6] = [
+            |setpoints| setpoints.stop_waiting(),
+            |setpoints| setpoints.wish(Wish { command: Some([1; COMMAND_WORDS]), request: Request::None }),
+            |setpoints| setpoints.start(&wave(9), &Config::new()),
+            |setpoints| setpoints.stop(),
+            |setpoints| setpoints.pass(player()),
+            |setpoints| setpoints.begin_awaited(3, Phase::Holding, 0, &Config::new()),
+        ];
+        for order in orders {
+            let (mut setpoints, _) = waits();
+            await_it(&mut setpoints);
+            order(&mut setpoints);
+            assert_eq!(stage(&setpoints), Some(pending::Stage::Dropped));
+            tick(&mut setpoints, 1, HIGH, 0);
+            assert_eq!(stage(&setpoints), Some(pending::Stage::Dropped));
+        }
+    }
+
+    #[test]
+    fn a_wave_begins_behind_the_edge_if_it_may() {
+        for (command, settings, stage_then) in [
+            (0, wave(10), pending::Stage::Begun),
+            // Under a trajectory, and far beyond the workspace.
+            (3, wave(10), pending::Stage::Refused),
+            (0, Settings { center: [1.0; 6], ..wave(10) }, pending::Stage::Refused),
+        ] {
+            let (mut setpoints, config) = setpoints();
+            setpoints.wish(Wish { command: Some([command; COMMAND_WORDS]), request: Request::None });
+            setpoints.wait_for_edge(Awaited::Wave(settings));
+            tick(&mut setpoints, 1, LOW, 0);
+            tick(&mut setpoints, 2, HIGH, 0);
+            assert_eq!(stage(&setpoints), Some(stage_then));
+            setpoints.next(Phase::Running, &config);
+            assert_eq!(setpoints.waving(), stage_then == pending::Stage::Begun);
+        }
+    }
+
+    #[test]
+    fn a_pass_commands_alone_and_its_player_comes_back() {
+        let (mut setpoints, config) = setpoints();
+        setpoints.pass(player());
+        assert!(setpoints.take_player().is_none(), "under way");
+        setpoints.wish(Wish { command: Some([7; COMMAND_WORDS]), request: Request::Hold });
+        assert_eq!(setpoints.request(), Request::Hold);
+        let state = State::new();
+        for number in 0..6 {
+            let command = setpoints.next(Phase::Running, &config);
+            assert_eq!((command[0], command[1]), if number < 2 { (5, 5) } else { (3, 9) }, "{number}");
+            setpoints.keep(&state, 64);
+        }
+        let player = setpoints.take_player().unwrap();
+        assert_eq!((player.stage(), player.status(), player.errors().len()), (pass::Stage::Complete, 64, 5));
+        setpoints.put_player(player);
+        assert!(setpoints.take_player().is_some_and(|player| player.begun() == Some(9)));
+        assert!(setpoints.take_player().is_none());
+    }
+
+    #[test]
+    fn a_pass_ends_when_told_with_the_machine_and_under_a_wave() {
+        let ends: [fn(&mut Setpoints); 2] = [
+            |setpoints| setpoints.abort_pass(),
+            |setpoints| {
+                setpoints.next(Phase::Holding, &Config::new());
+            },
+        ];
+        for end in ends {
+            let (mut setpoints, config) = setpoints();
+            setpoints.pass(player());
+            setpoints.next(Phase::Running, &config);
+            assert!(setpoints.take_player().is_none());
+            end(&mut setpoints);
+            assert!(setpoints.take_player().is_some_and(|player| player.stage() == pass::Stage::Aborted));
+        }
+        let (mut setpoints, config) = setpoints();
+        setpoints.start(&wave(0), &config);
+        setpoints.pass(player());
+        assert!(setpoints.take_player().is_some_and(|player| player.stage() == pass::Stage::Aborted));
+    }
+}

@@ -131,3 +131,152 @@ impl Device for Simulated {
         format!("simulated machine {}", self.path)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+    use specgen_rt::exchange::{Actuation, Sensing, Server};
+    use std::path::PathBuf;
+    use std::sync::{Arc, Mutex};
+    use std::thread::JoinHandle;
+
+    const TIMEOUT: u64 = 50_000_000;
+
+    /// The machine's side: answers with what is asked for until it is told to be silent.
+    struct Machine {
+        path: PathBuf,
+        silent_from: Arc<AtomicU64>,
+        ends: Arc<AtomicBool>,
+        seen: Arc<Mutex<Vec<Actuation>>>,
+        thread: Option<JoinHandle<()>>,
+    }
+
+    impl Machine {
+        /// It answers after `delay`, ns.
+        fn new(name: &str, delay: u64) -> Self {
+            let path = std::env::temp_dir().join(format!("rt-pc-machine-{name}-{}", std::process::id()));
+            let server = Server::create(&path, controller::SPEC_DIGEST).unwrap();
+            let (silent_from, ends, seen) = (Arc::new(AtomicU64::new(u64::MAX)), Arc::default(), Arc::default());
+            let (silence, end, log) = (Arc::clone(&silent_from), Arc::clone(&ends), Arc::<Mutex<Vec<_>>>::clone(&seen));
+            let start = clock::now();
+            let thread = std::thread::spawn(move || {
+                let mut count = 0;
+                while !AtomicBool::load(&end, Ordering::Relaxed) {
+                    let Some((actuation, [session, tick])) = server.wait(&mut count, 0, 5_000_000) else { continue };
+                    log.lock().unwrap().push(actuation);
+                    clock::sleep_until(start + delay);
+                    if tick < silence.load(Ordering::Relaxed) {
+                        let codes = [1, 2, 3, 4, 5, tick as i32];
+                        server.publish(&Sensing { session, tick, codes, wrench: [0.5_f64.to_bits(); 6] });
+                    }
+                }
+            });
+            Self { path, silent_from, ends, seen, thread: Some(thread) }
+        }
+
+        fn acts(&self) -> Vec<(u64, bool, [i32; CHANNELS])> {
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            let seen = self.seen.lock().unwrap();
+            let mut acts: Vec<_> = seen.iter().map(|act| (act.tick, act.enable, act.codes)).collect();
+            acts.dedup();
+            acts
+        }
+    }
+
+    impl Drop for Machine {
+        fn drop(&mut self) {
+            self.ends.store(true, Ordering::Relaxed);
+            if let Some(thread) = self.thread.take() {
+                let _ = thread.join();
+            }
+        }
+    }
+
+    #[test]
+    fn readings_are_those_of_their_tick_and_a_silent_machine_is_not_waited_for_twice() {
+        let machine = Machine::new("read", 700_000_000);
+        // Its first reading may take long.
+        let mut device = Simulated::open(&machine.path, TIMEOUT, None).unwrap();
+        assert_eq!((device.wrench(), device.beat()), ([0.0; CHANNELS], Ok(Contacts::default())));
+        for tick in [0, 1, 5] {
+            device.tick(tick);
+            assert_eq!(device.read(), Ok([1, 2, 3, 4, 5, tick as i32]));
+            assert_eq!(device.wrench(), [0.5; CHANNELS]);
+        }
+        machine.silent_from.store(6, Ordering::Relaxed);
+        for (tick, waits) in [(6, true), (7, false)] {
+            device.tick(tick);
+            let start = clock::now();
+            assert_eq!(device.read(), Err(Fault::NotEnded));
+            assert_eq!(clock::now() - start >= TIMEOUT, waits);
+        }
+        machine.silent_from.store(u64::MAX, Ordering::Relaxed);
+        device.tick(8);
+        let answered = (0..1000).any(|_| {
+            clock::sleep_until(clock::now() + 1_000_000);
+            device.read().is_ok()
+        });
+        assert!(answered, "it answers again");
+        machine.silent_from.store(0, Ordering::Relaxed);
+        let start = clock::now();
+        device.tick(9);
+        assert!(device.read().is_err() && clock::now() - start >= TIMEOUT, "a machine that answered is waited for");
+        assert_eq!(device.describe(), format!("simulated machine {}", machine.path.display()));
+        assert_eq!(<Simulated as Gauges>::BITS, 17);
+    }
+
+    #[test]
+    fn codes_and_the_enable_line_go_out_with_their_tick() {
+        let machine = Machine::new("write", 0);
+        let mut device = Simulated::open(&machine.path, TIMEOUT, None).unwrap();
+        let mut expected = Vec::new();
+        device.tick(3);
+        device.write(&[9; CHANNELS]).unwrap();
+        expected.push((3, false, [9; CHANNELS]));
+        assert_eq!(machine.acts().last(), expected.last());
+        device.enable(true).unwrap();
+        assert_eq!(machine.acts().last(), Some(&(3, true, [9; CHANNELS])));
+        device.tick(4);
+        device.write(&[8; CHANNELS]).unwrap();
+        assert_eq!(machine.acts().last(), Some(&(4, true, [8; CHANNELS])));
+        device.enable(false).unwrap();
+        assert_eq!(machine.acts().last(), Some(&(4, false, [8; CHANNELS])));
+        assert_eq!(device.set(1), Ok(()));
+    }
+
+    #[test]
+    fn the_input_line_is_high_for_half_of_the_time_behind_the_first_edge() {
+        let machine = Machine::new("edges", 0);
+        for (edges, high) in
+            [(None, &[][..]), (Some(4), &[4, 5, 8, 9, 12, 13][..]), (Some(5), &[5, 6, 7, 10, 11, 12][..])]
+        {
+            let mut device = Simulated::open(&machine.path, TIMEOUT, edges).unwrap();
+            let found: Vec<u64> = (0..14)
+                .filter(|tick| {
+                    device.tick(*tick);
+                    device.input().unwrap()
+                })
+                .collect();
+            assert_eq!(found, high, "{edges:?}");
+        }
+    }
+
+    #[test]
+    fn a_machine_of_another_spec_or_of_nobody_is_refused() {
+        let path = std::env::temp_dir().join(format!("rt-pc-machine-other-{}", std::process::id()));
+        let open = |path: &Path| Simulated::open(path, TIMEOUT, None).err().unwrap();
+        assert!(open(&path).contains("no simulated machine there"));
+        let other = Server::create(&path, "0123456789abcdef0123456789abcdef").unwrap();
+        assert!(open(&path).contains("the machine of another spec"));
+        drop(other);
+        // What is left of a machine that has ended.
+        let left = path.with_extension("left");
+        let _ = std::fs::remove_file(&left);
+        let server = Server::create(&path, controller::SPEC_DIGEST).unwrap();
+        std::fs::hard_link(&path, &left).unwrap();
+        drop(server);
+        assert!(open(&left).contains("has ended; start `specgen plant` again"));
+        std::fs::remove_file(&left).unwrap();
+    }
+}

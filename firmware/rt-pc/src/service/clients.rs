@@ -111,3 +111,102 @@ impl<T> Client<T> {
 pub const fn room() -> [u8; ROUND] {
     [0; ROUND]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+    use std::path::PathBuf;
+
+    /// A listener, and clients that come at times 0, 1, 2 …, each with its number as state.
+    struct Hall {
+        clients: Clients<usize>,
+        path: PathBuf,
+        lines: Vec<UnixStream>,
+    }
+
+    impl Hall {
+        fn new(name: &str) -> Self {
+            let path = std::env::temp_dir().join(format!("rt-pc-clients-{name}-{}", std::process::id()));
+            Self { clients: Clients::new(Listener::open(&path).unwrap()), path, lines: Vec::new() }
+        }
+
+        /// One more client; those that had to go.
+        fn come(&mut self, keeps: impl Fn(&usize) -> bool) -> Vec<usize> {
+            let number = self.lines.len();
+            self.lines.push(UnixStream::connect(&self.path).unwrap());
+            self.clients.accept(number as u64, || number, keeps)
+        }
+
+        fn numbers(&self) -> Vec<usize> {
+            self.clients.iter().map(|client| client.state).collect()
+        }
+
+        fn read(&mut self, now: u64) -> (Vec<Vec<u8>>, Vec<usize>) {
+            let mut all = Vec::new();
+            let gone = self.clients.serve(|client| {
+                all.push(client.read(&mut room(), now)?.to_vec());
+                Ok(())
+            });
+            (all, gone)
+        }
+    }
+
+    #[test]
+    fn the_client_that_was_silent_for_longest_makes_room_unless_it_keeps_its_place() {
+        let mut hall = Hall::new("silent");
+        for number in 0..MOST {
+            assert_eq!(hall.come(|_| false), [] as [usize; 0]);
+            assert_eq!(hall.clients.descriptors().count(), number + 2);
+        }
+        assert!(hall.clients.iter().all(|client| client.process == std::process::id().cast_signed()));
+        // The first two say something, and the third has the orders.
+        for number in [0, 1] {
+            hall.lines[number].write_all(b"here").unwrap();
+        }
+        let (said, gone) = hall.read(100);
+        assert_eq!(said.iter().filter(|said| *said == b"here").count(), 2);
+        assert!(said[2..].iter().all(Vec::is_empty) && gone.is_empty());
+        assert_eq!(hall.come(|number| *number == 2), [3]);
+        assert_eq!(hall.numbers(), [0, 1, 2, 4, 5, 6, 7, 8]);
+        assert_eq!(hall.clients.iter_mut().count(), MOST);
+        // The process with the most connections loses one first, however silent the others are.
+        for client in hall.clients.iter_mut().filter(|client| client.state <= 5) {
+            client.process = client.state as i32 + 1_000_000;
+        }
+        assert_eq!(hall.come(|_| false), [6]);
+        // Where all the others keep theirs, nobody goes: not the new one either.
+        assert_eq!(hall.come(|_| true), [] as [usize; 0]);
+        assert_eq!(hall.numbers().len(), MOST + 1);
+    }
+
+    #[test]
+    fn a_client_that_hangs_up_is_given_back_and_one_that_floods_is_read_in_pieces() {
+        let mut hall = Hall::new("gone");
+        for _ in 0..3 {
+            hall.come(|_| false);
+        }
+        hall.lines[1] = UnixStream::connect(&hall.path).unwrap();
+        hall.lines[2].write_all(&vec![7; 3 * ROUND / 2]).unwrap();
+        let (said, gone) = hall.read(9);
+        assert_eq!(said.iter().map(Vec::len).collect::<Vec<_>>(), [0, ROUND]);
+        assert_eq!((gone, hall.numbers()), (vec![1], vec![0, 2]));
+        // One that leaves without having read what it was sent ends with an error of its own.
+        hall.clients.iter_mut().next().unwrap().stream.write_all(b"answer").unwrap();
+        hall.lines.remove(0);
+        let (said, gone) = hall.read(10);
+        assert_eq!((said.len(), gone, hall.numbers()), (1, vec![0], vec![2]));
+        assert!(said[0].len() == ROUND / 2 && said[0].iter().all(|byte| *byte == 7));
+        assert_eq!(room(), [0; ROUND]);
+    }
+
+    #[test]
+    fn no_more_come_in_a_round_than_can_be_served() {
+        let mut hall = Hall::new("many");
+        let path = hall.path.clone();
+        hall.lines.extend((0..TAKEN + 4).map(|_| UnixStream::connect(&path).unwrap()));
+        assert_eq!(hall.clients.accept(0, || 0, |_| false).len(), TAKEN - MOST);
+        assert_eq!(hall.clients.accept(0, || 0, |_| false).len(), 4);
+        assert_eq!(hall.numbers().len(), MOST);
+    }
+}

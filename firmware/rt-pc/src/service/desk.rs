@@ -332,3 +332,316 @@ impl Device for Desk<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::{row, said};
+    use crate::capture::Capture;
+    use crate::handover::Order;
+    use crate::operator::{Operator, Timeout};
+    use controller::CONFIG_NAMES;
+
+    const A: HostId = HostId(1);
+    const B: HostId = HostId(2);
+    const NOW: u64 = 5_000_000;
+
+    fn console(phase: Phase) -> Console {
+        let operator = Operator::new(true, Timeout { silence: 1 << 40, idle: 1 << 40 });
+        let mut console = Console::new(operator, Capture::new(None).unwrap().0, Config::new());
+        console.update(&row(7), said(phase), NOW - 3_000_000);
+        console
+    }
+
+    /// What a host is answered, as text; a piece of something longer as its bytes.
+    fn ask_as(console: &mut Console, host: HostId, is_late: bool, request: &Request<'_>) -> String {
+        let (mut events, mut stream) = (0, Stream::default());
+        let mut desk = Desk::new(console, host, is_late, &mut events, &mut stream, NOW);
+        format!("{:?}", desk.execute(request))
+    }
+
+    fn ask(console: &mut Console, request: &Request<'_>) -> String {
+        ask_as(console, A, false, request)
+    }
+
+    fn refused(refusal: Refusal) -> String {
+        format!("{:?}", Reply::Refused(refusal))
+    }
+
+    fn bytes(words: &[u64]) -> Vec<u8> {
+        words.iter().flat_map(|word| word.to_le_bytes()).collect()
+    }
+
+    fn whole(console: &mut Console, request: impl Fn(u32) -> Request<'static>) -> Vec<u8> {
+        let mut all = Vec::new();
+        loop {
+            let (mut events, mut stream) = (0, Stream::default());
+            let mut desk = Desk::new(console, A, false, &mut events, &mut stream, NOW);
+            let Reply::Chunk { offset, total, bytes } = desk.execute(&request(all.len() as u32)) else {
+                panic!("no piece")
+            };
+            assert_eq!(offset as usize, all.len());
+            if bytes.0.is_empty() {
+                assert_eq!(total as usize, all.len());
+                return all;
+            }
+            all.extend_from_slice(bytes.0);
+        }
+    }
+
+    const DONE: &str = "Done";
+
+    #[test]
+    fn a_host_learns_who_is_there_and_how_it_stands() {
+        let mut console = console(Phase::Holding);
+        let hello = ask(&mut console, &Request::Hello);
+        let words = format!("config_words: {CONFIG_WORDS}, input_words: {MACHINE_INPUT_WORDS}");
+        assert!(hello.contains(&words) && hello.contains(&format!("description: {}", DESCRIPTION.len())), "{hello}");
+        assert_eq!(whole(&mut console, |offset| Request::Describe { offset }), DESCRIPTION.as_bytes());
+        let status = ask(&mut console, &Request::Status);
+        for part in ["tick: 8,", "phase: 3,", "cause: 0,", "amplifier_on: true", "age: Some(3000)"] {
+            assert!(status.contains(part), "{part} {status}");
+        }
+        console.said = None;
+        console.ticked = None;
+        let status = ask(&mut console, &Request::Status);
+        for part in ["tick: 0,", "phase: 0,", "amplifier_on: false", "age: None"] {
+            assert!(status.contains(part), "{part} {status}");
+        }
+    }
+
+    #[test]
+    fn the_place_is_that_of_the_last_tick_with_its_age() {
+        let mut console = console(Phase::Running);
+        let mut shown = row(9);
+        shown.place = core::array::from_fn(|k| k as u64 + 70);
+        let blind = crate::operator::Said { status: controller::GAUGE_FAULT, ..said(Phase::Running) };
+        console.update(&shown, blind, NOW);
+        let (mut events, mut stream) = (0, Stream::default());
+        let mut desk = Desk::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let Reply::Place { tick, phase, status, measured, words } = desk.execute(&Request::Place) else {
+            panic!("no place")
+        };
+        assert_eq!((tick, phase, status, measured), (8, 2, controller::GAUGE_FAULT, Some(3000)));
+        let mut found = [0; PLACE_WORDS];
+        assert!(words.read_words(&mut found) && found == shown.place);
+    }
+
+    #[test]
+    fn health_gives_events_once_and_leaves_the_rest() {
+        let mut console = console(Phase::Holding);
+        console.health.overruns = Some(5);
+        let (mut events, mut stream) = (6, Stream::default());
+        let mut desk = Desk::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        for expected in [6, 0] {
+            let Reply::Health(health) = desk.execute(&Request::Health) else { panic!("no health") };
+            assert_eq!((health.events, health.overruns), (expected, Some(5)));
+        }
+    }
+
+    #[test]
+    fn one_host_has_the_orders_and_every_host_may_stop() {
+        let mut console = console(Phase::Running);
+        let supervise = |request| Request::Supervise { request };
+        assert_eq!(ask(&mut console, &supervise(9)), refused(Refusal::Word { index: 0 }));
+        assert_eq!(ask(&mut console, &supervise(0)), DONE);
+        assert_eq!(console.stops, 0);
+        assert_eq!(ask_as(&mut console, B, false, &supervise(2)), refused(Refusal::Busy));
+        for (stops, request) in [(1, 3), (2, 4)] {
+            assert_eq!(ask_as(&mut console, B, false, &supervise(request)), DONE);
+            assert_eq!(console.stops, stops);
+            assert_eq!(console.operator.wish().unwrap().request.word(), u64::from(request));
+        }
+        // What was sent before another host's stop moves nothing.
+        assert_eq!(ask_as(&mut console, A, true, &supervise(2)), refused(Refusal::Busy));
+        assert_eq!(ask_as(&mut console, A, true, &supervise(3)), DONE);
+        // At the end nothing but the way down is obeyed.
+        assert_eq!(ask_as(&mut console, B, false, &Request::Stop), DONE);
+        assert_eq!(ask(&mut console, &supervise(2)), refused(Refusal::State));
+        assert_eq!(ask(&mut console, &supervise(3)), refused(Refusal::State));
+        assert_eq!(ask(&mut console, &supervise(4)), DONE);
+        assert!(console.operator.is_ending());
+    }
+
+    #[test]
+    fn a_command_is_whole_and_of_a_machine_that_runs() {
+        let words = bytes(&[3; COMMAND_WORDS]);
+        let setpoint = Request::Setpoint { words: Bytes(&words) };
+        let short = Request::Setpoint { words: Bytes(&words[8..]) };
+        assert_eq!(ask(&mut console(Phase::Holding), &setpoint), refused(Refusal::State));
+        let mut console = console(Phase::Running);
+        console.operator.wish();
+        assert_eq!(ask(&mut console, &short), refused(Refusal::Length { expected: COMMAND_WORDS as u16 }));
+        assert!(console.operator.wish().is_none());
+        assert_eq!(ask(&mut console, &setpoint), DONE);
+        assert_eq!(console.operator.wish().unwrap().command, Some([3; COMMAND_WORDS]));
+        // A wave commands in its place.
+        assert_eq!(console.start_wave(&Settings::still(), false), Err(No::State), "under a trajectory");
+        console.operator.set_by_link([0; COMMAND_WORDS]);
+        console.start_wave(&Settings::still(), false).unwrap();
+        assert_eq!(ask(&mut console, &setpoint), refused(Refusal::State));
+    }
+
+    #[test]
+    fn settings_are_taken_whole_or_not_at_all() {
+        let mut console = console(Phase::Holding);
+        let mut words = Config::new().to_words();
+        let write =
+            |console: &mut Console, words: &[u64]| ask(console, &Request::WriteConfig { words: Bytes(&bytes(words)) });
+        let expected = CONFIG_WORDS as u16;
+        assert_eq!(write(&mut console, &words[1..]), refused(Refusal::Length { expected }));
+        let place = CONFIG_NAMES.iter().position(|name| *name == "kp[0]").unwrap();
+        words[place] = crate::words::word(Real::NAN);
+        assert_eq!(write(&mut console, &words), refused(Refusal::Word { index: place as u16 }));
+        assert!(console.outgoing().0.is_empty() && *console.config() == Config::new());
+        words[place] = crate::words::word(0.0);
+        assert_eq!(write(&mut console, &words), DONE);
+        assert!(matches!(console.outgoing().0.back(), Some(Order::Configure(config)) if config.to_words() == words));
+        let (mut events, mut stream) = (0, Stream::default());
+        let mut desk = Desk::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let Reply::Config { words: found } = desk.execute(&Request::ReadConfig) else { panic!("no settings") };
+        assert_eq!(found.0, bytes(&words));
+    }
+
+    #[test]
+    fn orders_beyond_what_the_loop_takes_are_refused_but_for_a_stop() {
+        let mut console = console(Phase::Running);
+        let stop = Request::Wave { action: WaveAction::Stop, words: Bytes(&[]) };
+        let mut taken = 0;
+        while ask(&mut console, &stop) == DONE {
+            taken += 1;
+            assert!(taken <= 64);
+        }
+        assert_eq!((taken, console.outgoing().0.len()), (64, 64));
+        assert_eq!(ask(&mut console, &stop), refused(Refusal::Busy));
+        let arm = Request::Recorder { action: RecorderAction::Arm { after: 1 } };
+        assert_eq!(ask(&mut console, &arm), refused(Refusal::Busy));
+        assert_eq!(ask(&mut console, &Request::Supervise { request: 3 }), DONE);
+    }
+
+    #[test]
+    fn the_recorder_obeys_who_has_the_orders_and_is_shown_to_everybody() {
+        let mut console = console(Phase::Holding);
+        assert_eq!(ask(&mut console, &Request::Supervise { request: 0 }), DONE);
+        let recorder = |action| Request::Recorder { action };
+        let look = ask_as(&mut console, B, false, &recorder(RecorderAction::Look));
+        assert!(look.contains("running: true, triggered: false, ticks: 0"), "{look}");
+        assert!(look.contains(&format!("capacity: {CAPACITY}")));
+        for action in [RecorderAction::Arm { after: 1 }, RecorderAction::Trigger, RecorderAction::Stop] {
+            assert_eq!(ask_as(&mut console, B, false, &recorder(action)), refused(Refusal::Busy));
+            assert!(ask(&mut console, &recorder(action)).contains("running: true"));
+        }
+        let orders: Vec<_> = console.outgoing().0.iter().collect();
+        assert!(
+            matches!(orders[..], [Order::Record(settings), Order::Trigger, Order::StopRecorder] if settings.after == 1)
+        );
+        let arm = |after| Request::Recorder { action: RecorderAction::Arm { after } };
+        assert_eq!(ask(&mut console, &arm(CAPACITY + 1)), refused(Refusal::Word { index: 0 }));
+        assert!(ask(&mut console, &arm(CAPACITY)).starts_with("Recorder"));
+        assert_eq!(ask(&mut console, &Request::Download { offset: 0 }), refused(Refusal::State), "it is away");
+        let (_, tape) = Capture::new(None).unwrap();
+        console.capture.receive(tape, 9);
+        let file = whole(&mut console, |offset| Request::Download { offset });
+        assert!(file.len() > CHUNK && file.windows(4).any(|window| window == &DESCRIPTION.as_bytes()[..4]));
+    }
+
+    #[test]
+    fn a_wave_is_whole_and_of_a_machine_that_runs() {
+        let mut settings = Settings::<Real>::still();
+        settings.ticks = 50;
+        let good = settings.to_words();
+        let wave = |console: &mut Console, action, words: &[u64]| {
+            ask(console, &Request::Wave { action, words: Bytes(&bytes(words)) })
+        };
+        let start = WaveAction::Start;
+        assert_eq!(wave(&mut console(Phase::Holding), start, &good), refused(Refusal::State));
+        let mut console = console(Phase::Running);
+        assert_eq!(wave(&mut console, start, &good[1..]), refused(Refusal::Length { expected: wave::WORDS as u16 }));
+        let mut bad = good;
+        bad[0] = crate::words::word(Real::NAN);
+        assert_eq!(wave(&mut console, start, &bad), refused(Refusal::Word { index: 0 }));
+        assert!(!console.is_engaged() && console.outgoing().0.is_empty());
+        assert_eq!(wave(&mut console, start, &good), DONE);
+        assert!(console.is_engaged());
+        let orders: Vec<_> = console.outgoing().0.iter().collect();
+        assert!(matches!(orders[..], [Order::Wish(_), Order::Wave(wave)] if wave.ticks == 50));
+        assert_eq!(wave(&mut console, start, &good), refused(Refusal::State));
+        assert_eq!(wave(&mut console, WaveAction::Stop, &[]), DONE);
+        assert!(matches!(console.outgoing().0.back(), Some(Order::StopWave)));
+    }
+
+    #[test]
+    fn what_this_controller_does_not_do_is_refused() {
+        let mut console = console(Phase::Running);
+        let none = Bytes(&[]);
+        let requests = [
+            Request::SetpointOnEdge { words: none },
+            Request::Edge { drop: false },
+            Request::Wave { action: WaveAction::StartOnEdge, words: none },
+            Request::Knots { first: 0, knots: none },
+            Request::Pass { action: PassAction::Look },
+            Request::Errors { offset: 0 },
+            Request::Correction { offset: 0 },
+            Request::LockstepReset { config: none },
+            Request::LockstepStep { input: none },
+            Request::LockstepStage { index: 0 },
+        ];
+        for request in &requests {
+            assert_eq!(ask(&mut console, request), refused(Refusal::Unsupported), "{request:?}");
+        }
+        assert!(console.outgoing().0.is_empty());
+    }
+
+    #[test]
+    fn orders_for_the_edge_of_an_input_line_wait_for_a_machine_at_rest() {
+        let mut console = console(Phase::Running);
+        console.operator.wish();
+        let (mut events, mut stream) = (0, Stream::default());
+        let words = bytes(&[1; COMMAND_WORDS]);
+        let mut desk = Desk::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let expected = COMMAND_WORDS as u16;
+        assert_eq!(desk.command_on_edge(Bytes(&words[8..])), Err(Refusal::Length { expected }));
+        assert_eq!(desk.command_on_edge(Bytes(&words)), Ok(()));
+        assert!(matches!(desk.edge(false), Reply::Edge(_)));
+        assert_eq!(desk.console.outgoing().0.len(), 1);
+        assert!(matches!(desk.edge(true), Reply::Edge(_)));
+        assert!(matches!(desk.console.outgoing().0.back(), Some(Order::StopWaiting)));
+        desk.is_late = true;
+        assert_eq!(desk.edge(true), Reply::Refused(Refusal::Busy));
+        let mut resting = self::console(Phase::Holding);
+        let mut desk = Desk::new(&mut resting, A, false, &mut events, &mut stream, NOW);
+        assert_eq!(desk.command_on_edge(Bytes(&words)), Err(Refusal::State));
+    }
+
+    #[test]
+    fn passes_are_made_by_who_has_the_orders() {
+        let mut console = console(Phase::Running);
+        console.passes = Passes::with(8);
+        let (mut events, mut stream) = (0, Stream::default());
+        let mut desk = Desk::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let whole = (KNOTS * KNOT / size_of::<u64>()) as u16;
+        let knots: Vec<u8> = (1..=12_i32).flat_map(i32::to_le_bytes).collect();
+        assert_eq!(desk.knots(0, Bytes(&knots[1..])), Err(Refusal::Length { expected: whole }));
+        assert_eq!(desk.knots(0, Bytes(&knots)), Ok(()));
+        assert_eq!(desk.knots(4, Bytes(&knots)), Err(Refusal::Word { index: 0 }));
+        // Of a course of one knot, as long as there was no other.
+        for (offset, piece) in [(0, &knots[..KNOT]), (KNOT, &[])] {
+            let piece = Reply::Chunk { offset: offset as u32, total: KNOT as u32, bytes: Bytes(piece) };
+            assert_eq!(desk.fetched(offset as u32, Passes::correction), piece);
+        }
+        // This controller has no correction: what is done otherwise ends with that.
+        let done = Reply::Refused(Refusal::Unsupported);
+        assert_eq!(desk.pass(PassAction::Look), done);
+        assert_eq!(desk.pass(PassAction::Abort), done);
+        assert!(matches!(desk.console.outgoing().0.back(), Some(Order::AbortPass)));
+        assert_eq!(desk.pass(PassAction::Learn { reach: 1, fade: [0, 0] }), Reply::Refused(Refusal::State));
+        let begin = PassAction::Begin { spacing: 1, before: 0, ticks: 2, trajectory: 0 };
+        assert_eq!(desk.pass(begin), Reply::Refused(Refusal::State));
+        desk.host = B;
+        assert_eq!(desk.pass(PassAction::Abort), Reply::Refused(Refusal::Busy));
+        assert_eq!(desk.pass(PassAction::Look), done);
+        let mut away = self::console(Phase::Running);
+        let mut desk = Desk::new(&mut away, A, false, &mut events, &mut stream, NOW);
+        assert_eq!(desk.fetched(0, Passes::errors), Reply::Refused(Refusal::State));
+    }
+}

@@ -68,3 +68,36 @@ impl Drop for Listener {
         let _ = std::fs::remove_file(&self.path);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{ErrorKind, Read, Write};
+
+    #[test]
+    fn a_socket_is_this_users_alone_and_gone_with_its_listener() {
+        let path = std::env::temp_dir().join(format!("rt-pc-listener-{}", std::process::id()));
+        let _ = std::fs::remove_file(&path);
+        let listener = Listener::open(&path).unwrap();
+        assert_eq!(std::fs::symlink_metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        assert!(listener.accept().is_none(), "nobody came, and nobody is waited for");
+        let mut client = UnixStream::connect(&path).unwrap();
+        let mut stream = listener.accept().unwrap();
+        let mut byte = [0];
+        assert_eq!(stream.read(&mut byte).unwrap_err().kind(), ErrorKind::WouldBlock);
+        client.write_all(b"a").unwrap();
+        assert_eq!(stream.read(&mut byte).unwrap(), 1);
+        assert_eq!(Listener::open(&path).err().unwrap().kind(), ErrorKind::AddrInUse);
+        assert!(UnixStream::connect(&path).is_ok(), "what is served is not replaced");
+        drop(listener);
+        assert!(!path.exists());
+        // What a killed run left is replaced; a file that is no socket is not.
+        drop(std::os::unix::net::UnixListener::bind(&path).unwrap());
+        assert!(path.exists());
+        drop(Listener::open(&path).unwrap());
+        std::fs::write(&path, "mine").unwrap();
+        assert!(Listener::open(&path).is_err());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
+        std::fs::remove_file(&path).unwrap();
+    }
+}

@@ -11,6 +11,7 @@ pub static PART: Part = Part {
     files: files! { "rt-pc":
         "Cargo.lock",
         "Cargo.toml",
+        "src/bench.rs",
         "src/capture.rs",
         "src/console.rs",
         "src/control.rs",

@@ -1,0 +1,271 @@
+//! A made-up machine for tests: legs that follow their codes, gauges that see the legs, and the faults that a test injects. The loop runs on
+//! it as fast as it can, in the thread of the test.
+
+use core::sync::atomic::Ordering;
+
+use controller::hysteresis::{Memory, TABLES};
+use controller::limits::DAC;
+use controller::sensing::CONVERTER;
+use controller::snapshot::recorder;
+use controller::supervised::{Cause, Finding, MACHINE_INPUT_WORDS, MachineInput, Phase, Request};
+use controller::supervision::READINGS_PER_LEG;
+use controller::{Config, PLACE_WORDS, Real};
+use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges, Lines};
+use specgen_link::EdgeStatus;
+use specgen_rt::account::Account;
+use specgen_rt::{allocation, clock};
+
+use crate::control::{Loop, Timing};
+use crate::devices::{Contacts, Device};
+use crate::handover::{Order, Outer, Row, Shared, Wish, rings};
+use crate::operator::Said;
+
+/// Gauges in the middle of their range.
+const MIDDLE: i32 = 1 << 16;
+/// Rows and calls that find room without an allocation.
+const ROOM: usize = 1 << 16;
+/// Time waits for the loop, which never sleeps.
+pub const FAST: Timing = Timing { period: 1, limit: 1_000_000_000, silence: 1 << 40, elastic: true };
+
+/// What the loop did to the amplifiers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Call {
+    Write([i32; CHANNELS]),
+    Enable(bool),
+}
+
+/// Calls that fail from now on.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Broken {
+    pub read: bool,
+    pub beat: bool,
+    pub write: bool,
+    pub enable: bool,
+    pub disable: bool,
+}
+
+/// What a test does at the beginning of every tick.
+type Script = Box<dyn FnMut(&mut Bench) + Send>;
+
+pub struct Bench {
+    legs: [Memory; CHANNELS],
+    gauges: [i32; CHANNELS],
+    pub broken: Broken,
+    pub contacts: Contacts,
+    pub tick: u64,
+    /// Tick of the first row that shows it running.
+    ran: Option<u64>,
+    /// Ticks in which the loop gave its sign of life.
+    pub beats: Vec<u64>,
+    /// How often the output lines were set.
+    pub sets: usize,
+    /// In order, with the tick of each.
+    pub calls: Vec<(u64, Call)>,
+    /// What the loop handed over, in order.
+    pub rows: Vec<Row>,
+    pub outer: Outer,
+    pub shared: &'static Shared,
+    script: Option<Script>,
+}
+
+impl Bench {
+    /// With a script that is called at the beginning of every tick; it has to stop the loop.
+    pub fn new(outer: Outer, script: impl FnMut(&mut Self) + Send + 'static) -> Self {
+        let shared: &'static Shared = Box::leak(Box::default());
+        shared.service_alive.store(clock::now(), Ordering::Relaxed);
+        Self {
+            legs: [Memory::new(); CHANNELS],
+            gauges: [MIDDLE; CHANNELS],
+            broken: Broken::default(),
+            contacts: Contacts::default(),
+            tick: 0,
+            ran: None,
+            beats: Vec::with_capacity(ROOM),
+            sets: 0,
+            calls: Vec::with_capacity(ROOM),
+            rows: Vec::with_capacity(ROOM / 4),
+            outer,
+            shared,
+            script: Some(Box::new(script)),
+        }
+    }
+
+    pub fn stop(&self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// An order for the loop, which takes it after this tick.
+    pub fn order(&mut self, order: Order) {
+        self.outer.orders.push(order).expect("room for an order");
+    }
+
+    pub fn ask(&mut self, request: Request) {
+        self.order(Order::Wish(Wish { command: None, request }));
+    }
+
+    /// Phase after the last tick.
+    pub fn phase(&self) -> Phase {
+        self.rows.last().map_or(Phase::Disarmed, phase)
+    }
+
+    /// Arms and runs, and runs again when it holds; ticks since it ran first, none before.
+    pub fn arm_and_run(&mut self) -> Option<u64> {
+        match (self.tick, self.phase()) {
+            (1, _) => self.ask(Request::Arm),
+            (_, Phase::Holding) if self.since(Phase::Holding) == 1 => self.ask(Request::Run),
+            (5500, _) if self.ran.is_none() => panic!("it never runs: {:?}", self.rows.last()),
+            (tick, Phase::Running) => self.ran = self.ran.or(Some(tick - 1)),
+            _ => {}
+        }
+        self.ran.map(|ran| self.tick - ran)
+    }
+
+    /// Ticks that it has been in a phase.
+    fn since(&self, wanted: Phase) -> usize {
+        self.rows.iter().rev().take_while(|row| phase(row) == wanted).count()
+    }
+
+    fn call(&mut self, call: Call, fails: bool, fault: Fault) -> Result<(), Fault> {
+        self.calls.push((self.tick, call));
+        if fails { Err(fault) } else { Ok(()) }
+    }
+}
+
+/// What a tick of a machine that does nothing hands over.
+pub fn row(tick: u64) -> Row {
+    Row {
+        tick,
+        count: tick,
+        input: MachineInput::from_words(&[0; MACHINE_INPUT_WORDS]),
+        output: recorder::Row { codes: [0; 6], status: 0, supervisor: 0 },
+        place: [0; PLACE_WORDS],
+        digest: 0,
+        late: 0,
+        orders: 0,
+        opens: false,
+        waving: false,
+        edge: EdgeStatus::NONE,
+        recorded: None,
+        triggered: false,
+    }
+}
+
+/// What the supervisor said in tick 7.
+pub fn said(phase: Phase) -> Said {
+    Said {
+        phase,
+        cause: Cause::None,
+        finding: Finding::None,
+        on: phase.is_powered(),
+        status: 0,
+        tick: 7,
+        orders: 0,
+        waving: false,
+        late: 0,
+    }
+}
+
+pub fn phase(row: &Row) -> Phase {
+    Phase::from_word(u64::from(row.output.supervisor & 0xff)).expect("a phase")
+}
+
+pub fn is_on(row: &Row) -> bool {
+    row.output.supervisor >> 16 & 1 == 1
+}
+
+/// The loop on a machine, until the script stops it.
+pub fn run(timing: Timing, script: impl FnMut(&mut Bench) + Send + 'static) -> (Bench, Account) {
+    let (inner, outer) = rings(false);
+    let mut bench = Bench::new(outer, script);
+    let mut account = Account::new(timing.period, timing.limit);
+    let shared = bench.shared;
+    let control = Loop {
+        device: &mut bench,
+        config: Config::new(),
+        standing_events: 0,
+        rings: inner,
+        tape: None,
+        shared,
+        timing,
+    };
+    control.run(&mut account);
+    bench.collect();
+    (bench, account)
+}
+
+impl Bench {
+    fn collect(&mut self) {
+        while let Ok(row) = self.outer.rows.pop() {
+            self.rows.push(row);
+        }
+    }
+}
+
+impl Gauges for Bench {
+    const BITS: u32 = 17;
+
+    fn read(&mut self) -> Result<[i32; CHANNELS], Fault> {
+        if self.broken.read { Err(Fault::Bus) } else { Ok(self.gauges) }
+    }
+}
+
+impl Amplifiers for Bench {
+    const BITS: u32 = 16;
+
+    fn write(&mut self, codes: &[i32; CHANNELS]) -> Result<(), Fault> {
+        for ((leg, table), code) in self.legs.iter_mut().zip(&TABLES).zip(codes) {
+            leg.apply(table, DAC.drive(*code));
+        }
+        self.gauges = READINGS_PER_LEG.map(|row| {
+            let moved: Real = row.iter().zip(&self.legs).map(|(part, leg)| part * leg.displacement()).sum();
+            MIDDLE + (moved / CONVERTER.per_code).round() as i32
+        });
+        self.call(Call::Write(*codes), self.broken.write, Fault::Bus)
+    }
+
+    fn enable(&mut self, on: bool) -> Result<(), Fault> {
+        let fails = if on { self.broken.enable } else { self.broken.disable };
+        self.call(Call::Enable(on), fails, Fault::Pin)
+    }
+}
+
+impl Lines for Bench {
+    const COUNT: usize = 0;
+    const INPUT: bool = true;
+
+    fn set(&mut self, _high: u32) -> Result<(), Fault> {
+        self.sets += 1;
+        Ok(())
+    }
+
+    fn input(&mut self) -> Result<bool, Fault> {
+        Ok(false)
+    }
+}
+
+impl Device for Bench {
+    fn tick(&mut self, tick: u64) {
+        // The script is none of the loop's own work.
+        allocation::leave();
+        self.tick = tick;
+        self.collect();
+        if let Some(mut script) = self.script.take() {
+            script(self);
+            self.script = Some(script);
+        }
+        allocation::enter();
+    }
+
+    fn beat(&mut self) -> Result<Contacts, Fault> {
+        self.beats.push(self.tick);
+        if self.broken.beat { Err(Fault::Pin) } else { Ok(self.contacts) }
+    }
+
+    fn wrench(&self) -> [f64; CHANNELS] {
+        [0.0; CHANNELS]
+    }
+
+    fn describe(&self) -> String {
+        "made-up machine".to_owned()
+    }
+}
