@@ -4,10 +4,10 @@
 
 use crate::config::Environment;
 use crate::defaults::LINES;
-use crate::hysteresis::{GRID, Memory};
+use crate::hysteresis::Memory;
 use crate::supervision::{code_at_rest, displacement_at_rest, memory_at_rest};
 use crate::task_space::{CORRECTED, DAMPED};
-use crate::{LEGS, Real, limits};
+use crate::{LEGS, Real};
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::snapshot::Snapshot;
 use specgen_runtime::supervisor::Fallback;
@@ -20,11 +20,11 @@ specgen_runtime::state! { |words|
     /// State of one leg.
     pub struct LegState(leg: usize) {
         /// Reversal memory of the drive that was really applied.
-        pub memory: Memory = memory_at_rest(leg), part if memory.highest() <= GRID as Real;
+        pub memory: Memory = memory_at_rest(leg), part;
         /// Where on its table the leg was found last.
         pub last: LastLine<Real> = LastLine::new(), derived;
         /// Converter code now held at the output.
-        pub code: i32 = code_at_rest(), ticks(limits::CODES[1]) if *code >= limits::CODES[0];
+        pub code: i32 = code_at_rest(), ticks(words.sizes().codes[1]) if *code >= words.sizes().codes[0];
         /// q̂ = ρ̂X: displacement really requested by the code held, in the model of the mode it was asked in, m.
         pub requested: Real = displacement_at_rest(leg), number(words.sizes().leg);
         /// Part of the last request that a limit withheld, m; zero for a leg that was free.

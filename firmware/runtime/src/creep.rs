@@ -12,7 +12,7 @@
 //! Each state is a mean of past f with positive weights, so it stays within the reach of the table whatever is demanded.
 
 use crate::crc::Crc32;
-use crate::everett::{Everett, LastLine};
+use crate::everett::{Grid, LastLine};
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
 
@@ -41,11 +41,11 @@ impl<T: Real, const K: usize> Creep<T, K> {
 
 /// Everett function of one leg with creep behind it.
 #[derive(Debug, Clone, Copy)]
-pub struct CreepEverett<T: 'static, const N: usize, const NODES: usize, const K: usize> {
+pub struct CreepEverett<'a, T, G, const K: usize> {
     /// The static model.
-    pub still: Everett<T, N, NODES>,
+    pub still: G,
     /// What follows it.
-    pub creep: &'static Creep<T, K>,
+    pub creep: &'a Creep<T, K>,
 }
 
 crate::state! { |words|
@@ -76,12 +76,6 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
         self.memory.drive()
     }
 
-    /// The highest drive in memory, cells.
-    #[must_use]
-    pub fn highest(&self) -> T {
-        self.memory.highest()
-    }
-
     /// The displacement that the model gives at the end of the tick over which the last drive is held, m.
     #[inline]
     #[must_use]
@@ -97,7 +91,7 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
 
     /// One tick with `drive` (cells, finite, held within 0..=N); returns the displacement at its end, m.
     #[inline]
-    pub fn apply<const N: usize, const NODES: usize>(&mut self, table: &CreepEverett<T, N, NODES, K>, drive: T) -> T {
+    pub fn apply<G: Grid<T>>(&mut self, table: &CreepEverett<'_, T, G, K>, drive: T) -> T {
         let still = self.memory.apply(&table.still, drive);
         let full = table.still.full_displacement();
         let mut displacement = still;
@@ -112,22 +106,14 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
     /// The drive (cells) with which the next tick ends at `displacement` (m, finite), as near as the table reaches.
     #[inline]
     #[must_use]
-    pub fn solve<const N: usize, const NODES: usize>(
-        &self,
-        table: &CreepEverett<T, N, NODES, K>,
-        displacement: T,
-    ) -> T {
+    pub fn solve<G: Grid<T>>(&self, table: &CreepEverett<'_, T, G, K>, displacement: T) -> T {
         self.memory.solve(&table.still, self.still_part(table, displacement))
     }
 
     /// Whether the table reaches `displacement` (m) from here.
     #[inline]
     #[must_use]
-    pub fn reaches<const N: usize, const NODES: usize>(
-        &self,
-        table: &CreepEverett<T, N, NODES, K>,
-        displacement: T,
-    ) -> bool {
+    pub fn reaches<G: Grid<T>>(&self, table: &CreepEverett<'_, T, G, K>, displacement: T) -> bool {
         let still = self.still_part(table, displacement);
         still >= T::ZERO && still <= table.still.full_displacement()
     }
@@ -141,9 +127,9 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
 
     /// The short way of [`ReversalMemory::track`](crate::ReversalMemory::track): there is none, and nothing has changed.
     #[inline]
-    pub fn track<const N: usize, const NODES: usize>(
+    pub fn track<G: Grid<T>>(
         &mut self,
-        _table: &CreepEverett<T, N, NODES, K>,
+        _table: &CreepEverett<'_, T, G, K>,
         _last: &mut LastLine<T>,
         _displacement: T,
         _permitted: impl FnOnce(T) -> Option<T>,
@@ -153,9 +139,9 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
 
     /// One tick that ends as near to `displacement` (m, finite) as `permitted` lets its drive; returns whether it is out of reach.
     #[inline]
-    pub fn follow_within<const N: usize, const NODES: usize>(
+    pub fn follow_within<G: Grid<T>>(
         &mut self,
-        table: &CreepEverett<T, N, NODES, K>,
+        table: &CreepEverett<'_, T, G, K>,
         displacement: T,
         permitted: impl FnOnce(T) -> T,
     ) -> bool {
@@ -167,11 +153,7 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
 
     /// f: what the static model must give for `displacement` at the end of the next tick, m; not limited.
     #[inline]
-    fn still_part<const N: usize, const NODES: usize>(
-        &self,
-        table: &CreepEverett<T, N, NODES, K>,
-        displacement: T,
-    ) -> T {
+    fn still_part<G: Grid<T>>(&self, table: &CreepEverett<'_, T, G, K>, displacement: T) -> T {
         let mut rest = displacement;
         for (state, carried) in self.states.iter().zip(&table.creep.carried) {
             rest = rest - *carried * *state;

@@ -13,17 +13,17 @@
 //! - the rate term takes away more than half of what Γ₀ gains since the last tick. On a straight branch of slope f' the inverse
 //!   is u ← (q + Γ₁ u_last)/(f' + Γ₁), and grows from tick to tick if Γ₁ < −f'/2.
 
-use crate::everett::{Everett, LastLine};
+use crate::everett::{Grid, LastLine};
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
 
 /// The two Everett functions of one leg.
 #[derive(Debug, Clone, Copy)]
-pub struct DynamicEverett<T: 'static, const N: usize, const NODES: usize> {
+pub struct DynamicEverett<T, G> {
     /// Of μ₀, m.
-    pub still: Everett<T, N, NODES>,
+    pub still: G,
     /// Of μ₁, m per cell a tick; of either sign, not monotone. Only its values are looked up.
-    pub rate: Everett<T, N, NODES>,
+    pub rate: G,
     /// How far h may be from the demand for the inverse to count as found, m.
     pub tolerance: T,
 }
@@ -74,12 +74,6 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         self.memory.drive()
     }
 
-    /// The highest drive in memory, cells.
-    #[must_use]
-    pub fn highest(&self) -> T {
-        self.memory.highest()
-    }
-
     /// What the last tick requested, see [`DynamicMemory::apply`], m.
     #[inline]
     #[must_use]
@@ -97,11 +91,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
     /// Whether the tables reach `displacement` (m) at rest.
     #[inline]
     #[must_use]
-    pub fn reaches<const N: usize, const NODES: usize>(
-        &self,
-        table: &DynamicEverett<T, N, NODES>,
-        displacement: T,
-    ) -> bool {
+    pub fn reaches<G: Grid<T>>(&self, table: &DynamicEverett<T, G>, displacement: T) -> bool {
         displacement >= T::ZERO && displacement <= table.still.full_displacement()
     }
 
@@ -109,7 +99,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
     /// last inverse was the static one. Whoever compares a gauge with it must see the model that was inverted: a rate term too
     /// large to be inverted would come back through the adaptation.
     #[inline]
-    pub fn apply<const N: usize, const NODES: usize>(&mut self, table: &DynamicEverett<T, N, NODES>, drive: T) -> T {
+    pub fn apply<G: Grid<T>>(&mut self, table: &DynamicEverett<T, G>, drive: T) -> T {
         let drive = saturate(drive, T::ZERO, table.still.full_scale());
         let last = self.memory.drive();
         if drive != last {
@@ -134,11 +124,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
     /// The drive (cells) with which the next tick ends at `displacement` (m, finite): of (6), or of the static model where
     /// [`DynamicMemory::fell_back`] then says so.
     #[inline]
-    pub fn solve<const N: usize, const NODES: usize>(
-        &mut self,
-        table: &DynamicEverett<T, N, NODES>,
-        displacement: T,
-    ) -> T {
+    pub fn solve<G: Grid<T>>(&mut self, table: &DynamicEverett<T, G>, displacement: T) -> T {
         let wanted = saturate(displacement, T::ZERO, table.still.full_displacement());
         let still = self.memory.solve(&table.still, wanted);
         let found = self.invert(table, wanted - self.memory.displacement(), still);
@@ -148,9 +134,9 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
 
     /// The short way of [`ReversalMemory::track`](crate::ReversalMemory::track): there is none, and nothing has changed.
     #[inline]
-    pub fn track<const N: usize, const NODES: usize>(
+    pub fn track<G: Grid<T>>(
         &mut self,
-        _table: &DynamicEverett<T, N, NODES>,
+        _table: &DynamicEverett<T, G>,
         _last: &mut LastLine<T>,
         _displacement: T,
         _permitted: impl FnOnce(T) -> Option<T>,
@@ -160,9 +146,9 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
 
     /// One tick that ends as near to `displacement` (m, finite) as `permitted` lets its drive; returns whether it is out of reach.
     #[inline]
-    pub fn follow_within<const N: usize, const NODES: usize>(
+    pub fn follow_within<G: Grid<T>>(
         &mut self,
-        table: &DynamicEverett<T, N, NODES>,
+        table: &DynamicEverett<T, G>,
         displacement: T,
         permitted: impl FnOnce(T) -> T,
     ) -> bool {
@@ -173,12 +159,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
     }
 
     /// The drive at which h exceeds Γ₀ at the last drive by `wanted` (m); `still` is that of the static model.
-    fn invert<const N: usize, const NODES: usize>(
-        &self,
-        table: &DynamicEverett<T, N, NODES>,
-        wanted: T,
-        still: T,
-    ) -> Option<T> {
+    fn invert<G: Grid<T>>(&self, table: &DynamicEverett<T, G>, wanted: T, still: T) -> Option<T> {
         let last = self.memory.drive();
         let step = still - last;
         if step == T::ZERO {
@@ -241,7 +222,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
     }
 
     /// h and its parts at `drive`, reached from here.
-    fn point<const N: usize, const NODES: usize>(&self, table: &DynamicEverett<T, N, NODES>, drive: T) -> Point<T> {
+    fn point<G: Grid<T>>(&self, table: &DynamicEverett<T, G>, drive: T) -> Point<T> {
         let last = self.memory.drive();
         if drive == last {
             return Point { drive, gain: T::ZERO, rate_term: T::ZERO };
@@ -259,7 +240,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
     /// Γ₁ at every extremum anew: the memory was full and has given up a pair of them.
     #[cold]
     #[inline(never)]
-    fn restore<const N: usize, const NODES: usize>(&mut self, table: &DynamicEverett<T, N, NODES>) {
+    fn restore<G: Grid<T>>(&mut self, table: &DynamicEverett<T, G>) {
         let depth = self.memory.depth();
         let mut at = T::ZERO;
         for k in 0..CAP {
@@ -284,11 +265,6 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
 
 /// The value at `drive` on the branch from `start`, where it is `at_start`.
 #[inline]
-fn along<T: Real, const N: usize, const NODES: usize>(
-    table: &Everett<T, N, NODES>,
-    start: T,
-    at_start: T,
-    drive: T,
-) -> T {
+fn along<T: Real, G: Grid<T>>(table: &G, start: T, at_start: T, drive: T) -> T {
     if drive > start { at_start + table.value(drive, start) } else { at_start - table.value(start, drive) }
 }

@@ -6,6 +6,9 @@
 //!
 //! Drives are counted in *cells* above the lowest threshold: 0 ≤ x ≤ N. Between nodes E is bilinear in square cells
 //! (uniform weight) and linear in the triangles on the diagonal (their weight is reversible).
+//!
+//! The algorithms are those of [`Grid`]. A table that a compiler wrote is an [`Everett`], whose size is part of its type; one that was
+//! read at run time is [`Nodes`]. The same numbers give the same bits in either.
 
 use crate::field::Field;
 use crate::real::{Real, saturate};
@@ -81,20 +84,15 @@ impl<T: Real> LastLine<T> {
         Self { start: T::ZERO, rising: false, line: Line::END }
     }
 
-    /// [`Everett::rising`] or [`Everett::falling`] from `start` within `cell`.
+    /// [`Grid::rising`] or [`Grid::falling`] from `start` within `cell`.
     #[inline(always)]
-    pub(crate) fn of<const RISING: bool, const N: usize, const NODES: usize>(
-        &mut self,
-        table: &Everett<T, N, NODES>,
-        start: T,
-        cell: usize,
-    ) -> Line<T> {
+    pub(crate) fn of<const RISING: bool, G: Grid<T>>(&mut self, table: &G, start: T, cell: usize) -> Line<T> {
         if self.line.cell == cell && self.start == start && self.rising == RISING {
             return self.line;
         }
         let line = if RISING { table.rising(start, cell) } else { table.falling(start, cell) };
         // Within the cell where it starts a branch is found faster than it is kept.
-        if Everett::<T, N, NODES>::cell(start) != cell {
+        if table.cell(start) != cell {
             *self = Self { start, rising: RISING, line };
         }
         line
@@ -111,50 +109,70 @@ impl<T> Field for LastLine<T> {
     const WORDS: usize = 0;
 }
 
-/// A drive, taken apart: cell number 0..N and the place in it, 0..=1.
-#[derive(Clone, Copy)]
-struct Place<T> {
-    cell: usize,
-    part: T,
-}
+/// A table of the Everett function of one leg: N × N cells.
+pub trait Grid<T: Real>: Sized {
+    /// N ≥ 1.
+    fn cells(&self) -> usize;
 
-impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
-    /// Bisection steps that separate N nodes: ⌈log₂ N⌉.
-    const SEARCH_STEPS: u32 = N.next_power_of_two().trailing_zeros();
+    /// How many extrema a reversal memory with room for `room` keeps on this table: 4 to `room`.
+    #[inline(always)]
+    fn capacity(&self, room: usize) -> usize {
+        room
+    }
+
+    /// E at the nodes `up` and `down`, `down` ≤ `up` ≤ N.
+    fn node(&self, up: usize, down: usize) -> T;
+
+    /// E over a diagonal cell: that at `up` node `cell` + 1 and `down` node `cell`.
+    fn diagonal(&self, cell: usize) -> T;
+
+    /// The nodes about a cell off the diagonal: those at its lower `up` threshold and those at its upper one, each from the
+    /// lower `down` threshold.
+    fn corners(&self, up: usize, down: usize) -> [[T; 2]; 2];
+
+    /// The cell that a drive lies in, 0..N; full drive in the last.
+    #[inline]
+    fn cell(&self, drive: T) -> usize {
+        let whole = drive.truncate();
+        let last = self.cells() as i32 - 1;
+        let whole = if whole > last { last } else { whole };
+        let whole = if whole < 0 { 0 } else { whole };
+        whole as usize
+    }
 
     /// Largest drive, N cells.
     #[inline]
     #[must_use]
-    pub fn full_scale(&self) -> T {
-        T::from_i32(N as i32)
+    fn full_scale(&self) -> T {
+        T::from_i32(self.cells() as i32)
     }
 
     /// Displacement at full drive after saturation, E(N, 0), m.
     #[inline]
     #[must_use]
-    pub fn full_displacement(&self) -> T {
-        self.node(N, 0)
+    fn full_displacement(&self) -> T {
+        self.node(self.cells(), 0)
     }
 
     /// A displacement held within 0..=E(N, 0), m.
     #[inline]
     #[must_use]
-    pub fn within_reach(&self, displacement: T) -> T {
+    fn within_reach(&self, displacement: T) -> T {
         saturate(displacement, T::ZERO, self.full_displacement())
     }
 
     /// E(`up`, `down`) in m, for 0 ≤ `down` ≤ `up` ≤ N cells.
     #[inline]
     #[must_use]
-    pub fn value(&self, up: T, down: T) -> T {
-        self.rising(down, Self::cell(up)).at::<true>(up)
+    fn value(&self, up: T, down: T) -> T {
+        self.rising(down, self.cell(up)).at::<true>(up)
     }
 
     /// The branch that rises from a reversal at `down`, within `cell`, not below that of `down`: E(x, `down`).
     #[inline(always)]
     #[must_use]
-    pub fn rising(&self, down: T, cell: usize) -> Line<T> {
-        let d = Self::place(down);
+    fn rising(&self, down: T, cell: usize) -> Line<T> {
+        let d = Place::on(self, down);
         if cell == d.cell {
             return Line { cell, origin: down, base: T::ZERO, slope: self.diagonal(cell) };
         }
@@ -166,8 +184,8 @@ impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
     /// The branch that falls from a reversal at `up`, within `cell`, not above that of `up`: E(`up`, x).
     #[inline(always)]
     #[must_use]
-    pub fn falling(&self, up: T, cell: usize) -> Line<T> {
-        let u = Self::place(up);
+    fn falling(&self, up: T, cell: usize) -> Line<T> {
+        let u = Place::on(self, up);
         if cell == u.cell {
             return Line { cell, origin: up, base: T::ZERO, slope: self.diagonal(cell) };
         }
@@ -184,41 +202,12 @@ impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
     /// solution not below the cell of `least`.
     #[inline(always)]
     #[must_use]
-    pub fn rise(&self, down: T, least: T, gain: T) -> (T, Line<T>) {
-        let line = self.rising(down, Self::cell(least));
+    fn rise(&self, down: T, least: T, gain: T) -> (T, Line<T>) {
+        let line = self.rising(down, self.cell(least));
         match line.within::<true>(gain) {
             Some(drive) => (drive, line),
-            None => self.rise_beyond(down, line, gain),
+            None => rise_beyond(self, down, line, gain),
         }
-    }
-
-    /// The same where the solution is no drive within the cell of `first`: at the end of a stretch, flat, or beyond.
-    #[cold]
-    #[inline(never)]
-    fn rise_beyond(&self, down: T, first: Line<T>, gain: T) -> (T, Line<T>) {
-        if gain - first.base <= first.slope * (T::from_i32(first.cell as i32 + 1) - first.origin) {
-            return (first.solve::<true>(gain), first);
-        }
-        let d = Self::place(down);
-        let (mut low, mut high) = (first.cell + 1, N);
-        let at_full = self.along_row(N, d);
-        if gain >= at_full || low >= N {
-            return (self.full_scale(), Line::END);
-        }
-        // The solution lies between these nodes.
-        for _ in 0..Self::SEARCH_STEPS {
-            if high - low <= 1 {
-                break;
-            }
-            let middle = (low + high) / 2;
-            if self.along_row(middle, d) < gain {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        let line = self.rising(down, low);
-        (line.solve::<true>(gain), line)
     }
 
     /// The drive below `up` at which a fall from `up` has taken away `loss` (m): solves E(`up`, x) = `loss`. With it the
@@ -229,94 +218,200 @@ impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
     /// `most`.
     #[inline(always)]
     #[must_use]
-    pub fn fall(&self, up: T, most: T, loss: T) -> (T, Line<T>) {
-        let line = self.falling(up, Self::cell(most));
+    fn fall(&self, up: T, most: T, loss: T) -> (T, Line<T>) {
+        let line = self.falling(up, self.cell(most));
         match line.within::<false>(loss) {
             Some(drive) => (drive, line),
-            None => self.fall_beyond(up, line, loss),
+            None => fall_beyond(self, up, line, loss),
         }
     }
+}
 
-    /// The same where the solution is no drive within the cell of `first`.
-    #[cold]
-    #[inline(never)]
-    fn fall_beyond(&self, up: T, first: Line<T>, loss: T) -> (T, Line<T>) {
-        if loss - first.base <= first.slope * (first.origin - T::from_i32(first.cell as i32)) {
-            return (first.solve::<false>(loss), first);
-        }
-        let u = Self::place(up);
-        let (mut low, mut high) = (0, first.cell);
-        if loss >= self.along_column(u, 0) || high == 0 {
-            return (T::ZERO, Line::END);
-        }
-        for _ in 0..Self::SEARCH_STEPS {
-            if high - low <= 1 {
-                break;
-            }
-            let middle = (low + high) / 2;
-            if self.along_column(u, middle) < loss {
-                high = middle;
-            } else {
-                low = middle;
-            }
-        }
-        let line = self.falling(up, low);
-        (line.solve::<false>(loss), line)
+/// [`Grid::rise`] where the solution is no drive within the cell of `first`: at the end of a stretch, flat, or beyond.
+#[cold]
+#[inline(never)]
+fn rise_beyond<T: Real, G: Grid<T>>(table: &G, down: T, first: Line<T>, gain: T) -> (T, Line<T>) {
+    if gain - first.base <= first.slope * (T::from_i32(first.cell as i32 + 1) - first.origin) {
+        return (first.solve::<true>(gain), first);
     }
+    let d = Place::on(table, down);
+    let (mut low, mut high) = (first.cell + 1, table.cells());
+    let at_full = along_row(table, high, d);
+    if gain >= at_full || low >= high {
+        return (table.full_scale(), Line::END);
+    }
+    // The solution lies between these nodes.
+    for _ in 0..search_steps(table) {
+        if high - low <= 1 {
+            break;
+        }
+        let middle = (low + high) / 2;
+        if along_row(table, middle, d) < gain {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let line = table.rising(down, low);
+    (line.solve::<true>(gain), line)
+}
 
-    /// E at `up` node `row` and any `down`.
+/// [`Grid::fall`] where the solution is no drive within the cell of `first`.
+#[cold]
+#[inline(never)]
+fn fall_beyond<T: Real, G: Grid<T>>(table: &G, up: T, first: Line<T>, loss: T) -> (T, Line<T>) {
+    if loss - first.base <= first.slope * (first.origin - T::from_i32(first.cell as i32)) {
+        return (first.solve::<false>(loss), first);
+    }
+    let u = Place::on(table, up);
+    let (mut low, mut high) = (0, first.cell);
+    if loss >= along_column(table, u, 0) || high == 0 {
+        return (T::ZERO, Line::END);
+    }
+    for _ in 0..search_steps(table) {
+        if high - low <= 1 {
+            break;
+        }
+        let middle = (low + high) / 2;
+        if along_column(table, u, middle) < loss {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    let line = table.falling(up, low);
+    (line.solve::<false>(loss), line)
+}
+
+/// Bisection steps that separate N nodes: ⌈log₂ N⌉.
+#[inline(always)]
+fn search_steps<T: Real, G: Grid<T>>(table: &G) -> u32 {
+    table.cells().next_power_of_two().trailing_zeros()
+}
+
+/// E at `up` node `row` and any `down`.
+#[inline]
+fn along_row<T: Real, G: Grid<T>>(table: &G, row: usize, down: Place<T>) -> T {
+    between([table.node(row, down.cell), table.node(row, down.cell + 1)], down.part)
+}
+
+/// E at any `up` and `down` node `column`.
+#[inline]
+fn along_column<T: Real, G: Grid<T>>(table: &G, up: Place<T>, column: usize) -> T {
+    between([table.node(up.cell, column), table.node(up.cell + 1, column)], up.part)
+}
+
+/// A drive, taken apart: cell number 0..N and the place in it, 0..=1.
+#[derive(Clone, Copy)]
+struct Place<T> {
+    cell: usize,
+    part: T,
+}
+
+impl<T: Real> Place<T> {
     #[inline]
-    fn along_row(&self, row: usize, down: Place<T>) -> T {
-        between([self.node(row, down.cell), self.node(row, down.cell + 1)], down.part)
+    fn on<G: Grid<T>>(table: &G, drive: T) -> Self {
+        let cell = table.cell(drive);
+        Self { cell, part: drive - T::from_i32(cell as i32) }
     }
+}
 
-    /// E at any `up` and `down` node `column`.
-    #[inline]
-    fn along_column(&self, up: Place<T>, column: usize) -> T {
-        between([self.node(up.cell, column), self.node(up.cell + 1, column)], up.part)
-    }
-
-    /// The nodes about a cell off the diagonal: those at its lower `up` threshold and those at its upper one, each from the
-    /// lower `down` threshold.
+impl<T: Real, const N: usize, const NODES: usize> Grid<T> for Everett<T, N, NODES> {
     #[inline(always)]
-    fn corners(&self, up: usize, down: usize) -> [[T; 2]; 2] {
-        // Neighbours in a row: one bound, for the compiler, serves both.
-        let bounded = |index: usize| if index < NODES - 1 { index } else { NODES - 2 };
-        let low = up * (up + 1) / 2 + down;
-        let (low, high) = (bounded(low), bounded(low + up + 1));
-        [[self.nodes[low], self.nodes[low + 1]], [self.nodes[high], self.nodes[high + 1]]]
-    }
-
-    #[inline]
-    fn place(drive: T) -> Place<T> {
-        let cell = Self::cell(drive);
-        Place { cell, part: drive - T::from_i32(cell as i32) }
-    }
-
-    /// The cell that a drive lies in, 0..N; full drive in the last.
-    #[inline]
-    pub(crate) fn cell(drive: T) -> usize {
-        let whole = drive.truncate();
-        let last = N as i32 - 1;
-        let whole = if whole > last { last } else { whole };
-        let whole = if whole < 0 { 0 } else { whole };
-        whole as usize
-    }
-
-    /// E over a diagonal cell: that at `up` node `cell` + 1 and `down` node `cell`.
-    #[inline(always)]
-    fn diagonal(&self, cell: usize) -> T {
-        // (cell + 1)(cell + 2)/2 + cell
-        let index = cell * (cell + 5) / 2 + 1;
-        self.nodes[if index < NODES { index } else { NODES - 1 }]
+    fn cells(&self) -> usize {
+        N
     }
 
     #[inline]
     fn node(&self, up: usize, down: usize) -> T {
         // The callers keep down ≤ up ≤ N; the bound is for the compiler, which then sees no panic path.
-        let index = up * (up + 1) / 2 + down;
-        self.nodes[if index < NODES { index } else { NODES - 1 }]
+        let node = index(up, down);
+        self.nodes[if node < NODES { node } else { NODES - 1 }]
     }
+
+    #[inline(always)]
+    fn diagonal(&self, cell: usize) -> T {
+        let node = index_on_diagonal(cell);
+        self.nodes[if node < NODES { node } else { NODES - 1 }]
+    }
+
+    #[inline(always)]
+    fn corners(&self, up: usize, down: usize) -> [[T; 2]; 2] {
+        // Neighbours in a row: one bound, for the compiler, serves both.
+        let bounded = |index: usize| if index < NODES - 1 { index } else { NODES - 2 };
+        let low = index(up, down);
+        let (low, high) = (bounded(low), bounded(low + up + 1));
+        [[self.nodes[low], self.nodes[low + 1]], [self.nodes[high], self.nodes[high + 1]]]
+    }
+}
+
+/// Everett function of one leg in a table of a size that is known at run time.
+#[derive(Debug, Clone, Copy)]
+pub struct Nodes<'a, T> {
+    nodes: &'a [T],
+    cells: usize,
+    capacity: usize,
+}
+
+impl<'a, T> Nodes<'a, T> {
+    /// `nodes` as in [`Everett`], for `cells` × `cells` cells. A reversal memory keeps `capacity` extrema on it.
+    ///
+    /// `None` if the number of nodes is another one, or a memory of that capacity has no room for a loop within a loop.
+    #[must_use]
+    pub const fn new(nodes: &'a [T], cells: usize, capacity: usize) -> Option<Self> {
+        // Up to here no product overflows.
+        let fits = cells >= 1 && cells < 1 << 15 && nodes.len() == index(cells + 1, 0) && capacity >= 4;
+        if fits { Some(Self { nodes, cells, capacity }) } else { None }
+    }
+}
+
+impl<T: Real> Nodes<'_, T> {
+    #[inline(always)]
+    fn at(&self, index: usize) -> T {
+        // Always in the table, see above; without a panic path.
+        self.nodes.get(index).copied().unwrap_or(T::ZERO)
+    }
+}
+
+impl<T: Real> Grid<T> for Nodes<'_, T> {
+    #[inline(always)]
+    fn cells(&self) -> usize {
+        self.cells
+    }
+
+    #[inline(always)]
+    fn capacity(&self, room: usize) -> usize {
+        if self.capacity < room { self.capacity } else { room }
+    }
+
+    #[inline]
+    fn node(&self, up: usize, down: usize) -> T {
+        self.at(index(up, down))
+    }
+
+    #[inline(always)]
+    fn diagonal(&self, cell: usize) -> T {
+        self.at(index_on_diagonal(cell))
+    }
+
+    #[inline(always)]
+    fn corners(&self, up: usize, down: usize) -> [[T; 2]; 2] {
+        let low = index(up, down);
+        let high = low + up + 1;
+        [[self.at(low), self.at(low + 1)], [self.at(high), self.at(high + 1)]]
+    }
+}
+
+/// Of a node.
+#[inline(always)]
+const fn index(up: usize, down: usize) -> usize {
+    up * (up + 1) / 2 + down
+}
+
+/// Of the node at `up` = `cell` + 1 and `down` = `cell`: (cell + 1)(cell + 2)/2 + cell.
+#[inline(always)]
+const fn index_on_diagonal(cell: usize) -> usize {
+    cell * (cell + 5) / 2 + 1
 }
 
 /// Between two values, the first at `part` 0.

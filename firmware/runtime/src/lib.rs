@@ -92,7 +92,7 @@ pub use damping::{Damping, Resonator};
 pub use digest::Digest;
 pub use dynamic::{DynamicEverett, DynamicMemory};
 pub use dynamics::{Affine, Load, Platform};
-pub use everett::{Everett, LastLine};
+pub use everett::{Everett, Grid, LastLine, Nodes};
 pub use feedback::{Gains, Integral};
 pub use kinematics::Legs;
 pub use memory::ReversalMemory;

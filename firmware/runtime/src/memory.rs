@@ -7,10 +7,12 @@
 //! rising  from a minimum p_k:  f(x) = f_k + E(x, p_k)     until x ≥ p_{k−1}, which wipes p_{k−1} and p_k out
 //! falling from a maximum p_k:  f(x) = f_k − E(p_k, x)     until x ≤ p_{k−1}, likewise
 //! ```
-//! The inverse walks the same staircase by displacement, then solves one branch ([`Everett::rise`], [`Everett::fall`]). Within
-//! a cell of the table a branch is a straight line ([`Line`]), which inverse and forward model share.
+//! The inverse walks the same staircase by displacement, then solves one branch ([`Grid::rise`], [`Grid::fall`]). Within a
+//! cell of the table a branch is a straight line ([`Line`]), which inverse and forward model share.
+//!
+//! How many extrema are kept the table says ([`Grid::capacity`]): as many as there is room for, or fewer at run time.
 
-use crate::everett::{Everett, LastLine, Line};
+use crate::everett::{Grid, LastLine, Line};
 use crate::real::{Real, saturate};
 use crate::snapshot::LARGEST;
 
@@ -21,23 +23,23 @@ crate::state! { |words|
     /// upper voltage limit and back.
     pub struct ReversalMemory<T, CAP>[T: Real, const CAP: usize] {
         /// Stored extrema, 1..=CAP. Only they count: the room behind them is zero in the words of a state.
-        len: usize = { let () = Self::FITS; 1 }, place(CAP) if *len > 0;
+        len: usize = { let () = Self::FITS; 1 }, place(words.sizes().memory.min(CAP)) if *len > 0;
         /// Pairs dropped because the memory was full.
         dropped: u32 = 0, tally;
         drive: T = T::ZERO, number(LARGEST);
         displacement: T = T::ZERO, number(words.sizes().leg);
         /// p_k; even k are minima, odd k maxima; p₀ = 0.
         extrema: [T; CAP] = [T::ZERO; CAP], stored(*len, LARGEST)
-            if is_staircase(extrema.get(..*len).unwrap_or_default(), *drive);
+            if is_staircase(extrema.get(..*len).unwrap_or_default(), *drive, T::from_f64(words.sizes().grid));
         /// f_k.
         displacements: [T; CAP] = [T::ZERO; CAP], stored(*len, words.sizes().leg);
     }
 }
 
-/// Minima rise, maxima fall, all of them nested, the first at negative saturation, the drive within the innermost.
-fn is_staircase<T: Real>(extrema: &[T], drive: T) -> bool {
+/// Minima rise, maxima fall from `grid` at most, all of them nested, the first at negative saturation, the drive within the innermost.
+fn is_staircase<T: Real>(extrema: &[T], drive: T, grid: T) -> bool {
     let mut low = T::ZERO;
-    let mut high = T::from_f64(LARGEST);
+    let mut high = grid;
     let mut nested = extrema.first() == Some(&T::ZERO);
     for (k, extremum) in extrema.iter().enumerate() {
         nested &= low <= *extremum && *extremum <= high;
@@ -105,18 +107,11 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         self.dropped
     }
 
-    /// The highest drive in memory, cells.
-    #[must_use]
-    pub fn highest(&self) -> T {
-        // Maxima fall, and the drive is below the last of them.
-        if self.len >= 2 { self.extremum(1) } else { self.drive }
-    }
-
     /// Γ: applies `drive` (cells, held within 0..=N) and returns the displacement, m.
     ///
     /// `drive` must be finite.
     #[inline]
-    pub fn apply<const N: usize, const NODES: usize>(&mut self, table: &Everett<T, N, NODES>, drive: T) -> T {
+    pub fn apply<G: Grid<T>>(&mut self, table: &G, drive: T) -> T {
         let drive = saturate(drive, T::ZERO, table.full_scale());
         if drive == self.drive {
             return self.displacement;
@@ -130,7 +125,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
                 self.len -= 2;
             }
             let top = self.len - 1;
-            let line = table.rising(self.extremum(top), Everett::<T, N, NODES>::cell(drive));
+            let line = table.rising(self.extremum(top), table.cell(drive));
             self.displacement_at(top) + line.at::<true>(drive)
         } else {
             while self.len >= 4 && drive <= self.extremum(self.len - 2) {
@@ -141,7 +136,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
                 self.len = 1;
                 T::ZERO
             } else {
-                let line = table.falling(self.extremum(top), Everett::<T, N, NODES>::cell(drive));
+                let line = table.falling(self.extremum(top), table.cell(drive));
                 self.displacement_at(top) - line.at::<false>(drive)
             }
         };
@@ -155,22 +150,22 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     /// `displacement` must be finite.
     #[inline]
     #[must_use]
-    pub fn solve<const N: usize, const NODES: usize>(&self, table: &Everett<T, N, NODES>, displacement: T) -> T {
+    pub fn solve<G: Grid<T>>(&self, table: &G, displacement: T) -> T {
         let wanted = table.within_reach(displacement);
         if wanted == self.displacement {
             return self.drive;
         }
         if wanted > self.displacement {
-            self.find::<true, N, NODES>(table, wanted).0
+            self.find::<true, G>(table, wanted).0
         } else {
-            self.find::<false, N, NODES>(table, wanted).0
+            self.find::<false, G>(table, wanted).0
         }
     }
 
     /// Whether the table reaches `displacement` (m).
     #[inline]
     #[must_use]
-    pub fn reaches<const N: usize, const NODES: usize>(&self, table: &Everett<T, N, NODES>, displacement: T) -> bool {
+    pub fn reaches<G: Grid<T>>(&self, table: &G, displacement: T) -> bool {
         displacement >= T::ZERO && displacement <= table.full_displacement()
     }
 
@@ -183,12 +178,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
 
     /// [`ReversalMemory::follow`] for a displacement (m, finite) that the table may not reach; returns whether it did not.
     #[inline(always)]
-    pub fn follow_within<const N: usize, const NODES: usize>(
-        &mut self,
-        table: &Everett<T, N, NODES>,
-        displacement: T,
-        permitted: impl FnOnce(T) -> T,
-    ) -> bool {
+    pub fn follow_within<G: Grid<T>>(&mut self, table: &G, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
         let reached = self.reaches(table, displacement);
         self.follow(table, if reached { displacement } else { table.within_reach(displacement) }, permitted);
         !reached
@@ -198,9 +188,9 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     /// cell of the present drive, and `permitted` lets it through. Then that has been done; else nothing has changed. Returns which.
     /// `last` is of this table and no other.
     #[inline(always)]
-    pub fn track<const N: usize, const NODES: usize>(
+    pub fn track<G: Grid<T>>(
         &mut self,
-        table: &Everett<T, N, NODES>,
+        table: &G,
         last: &mut LastLine<T>,
         displacement: T,
         permitted: impl FnOnce(T) -> Option<T>,
@@ -208,22 +198,22 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         if !self.reaches(table, displacement) {
             return false;
         }
-        let cell = Everett::<T, N, NODES>::cell(self.drive);
+        let cell = table.cell(self.drive);
         if displacement > self.displacement {
             let (start, at_start, top) = self.start::<true>(displacement);
-            let branch = Branch { top, at_start, line: last.of::<true, N, NODES>(table, start, cell) };
+            let branch = Branch { top, at_start, line: last.of::<true, G>(table, start, cell) };
             match branch.line.within::<true>(displacement - at_start) {
                 Some(drive) => {
-                    permitted(drive).is_some_and(|drive| self.take_or_apply::<true, N, NODES>(table, &branch, drive))
+                    permitted(drive).is_some_and(|drive| self.take_or_apply::<true, G>(table, &branch, drive))
                 }
                 None => false,
             }
         } else if displacement < self.displacement {
             let (start, at_start, top) = self.start::<false>(displacement);
-            let branch = Branch { top, at_start, line: last.of::<false, N, NODES>(table, start, cell) };
+            let branch = Branch { top, at_start, line: last.of::<false, G>(table, start, cell) };
             match branch.line.within::<false>(at_start - displacement) {
                 Some(drive) => {
-                    permitted(drive).is_some_and(|drive| self.take_or_apply::<false, N, NODES>(table, &branch, drive))
+                    permitted(drive).is_some_and(|drive| self.take_or_apply::<false, G>(table, &branch, drive))
                 }
                 None => false,
             }
@@ -239,23 +229,18 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     /// the solution by a fraction of a cell: mostly it lies on the stretch of the branch that the solution was found on, and
     /// then nothing is looked up twice.
     #[inline(always)]
-    pub fn follow<const N: usize, const NODES: usize>(
-        &mut self,
-        table: &Everett<T, N, NODES>,
-        displacement: T,
-        permitted: impl FnOnce(T) -> T,
-    ) {
+    pub fn follow<G: Grid<T>>(&mut self, table: &G, displacement: T, permitted: impl FnOnce(T) -> T) {
         let drive = if displacement > self.displacement {
-            let (solution, branch) = self.find::<true, N, NODES>(table, displacement);
+            let (solution, branch) = self.find::<true, G>(table, displacement);
             let drive = permitted(solution);
-            if self.take::<true>(&branch, drive) {
+            if self.take::<true, G>(table, &branch, drive) {
                 return;
             }
             drive
         } else if displacement < self.displacement {
-            let (solution, branch) = self.find::<false, N, NODES>(table, displacement);
+            let (solution, branch) = self.find::<false, G>(table, displacement);
             let drive = permitted(solution);
-            if self.take::<false>(&branch, drive) {
+            if self.take::<false, G>(table, &branch, drive) {
                 return;
             }
             drive
@@ -267,13 +252,8 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
 
     /// Applies a drive, which mostly lies on the branch; true.
     #[inline(always)]
-    fn take_or_apply<const RISING: bool, const N: usize, const NODES: usize>(
-        &mut self,
-        table: &Everett<T, N, NODES>,
-        branch: &Branch<T>,
-        drive: T,
-    ) -> bool {
-        if !self.take::<RISING>(branch, drive) {
+    fn take_or_apply<const RISING: bool, G: Grid<T>>(&mut self, table: &G, branch: &Branch<T>, drive: T) -> bool {
+        if !self.take::<RISING, G>(table, branch, drive) {
             self.apply_anew(table, drive);
         }
         true
@@ -282,18 +262,18 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     /// [`ReversalMemory::apply`], out of the way.
     #[cold]
     #[inline(never)]
-    fn apply_anew<const N: usize, const NODES: usize>(&mut self, table: &Everett<T, N, NODES>, drive: T) {
+    fn apply_anew<G: Grid<T>>(&mut self, table: &G, drive: T) {
         self.apply(table, drive);
     }
 
     /// Applies a drive if it lies on the stretch of a branch that [`ReversalMemory::find`] gave, and wipes out what the solution does;
     /// returns whether it does.
     #[inline(always)]
-    fn take<const RISING: bool>(&mut self, branch: &Branch<T>, drive: T) -> bool {
+    fn take<const RISING: bool, G: Grid<T>>(&mut self, table: &G, branch: &Branch<T>, drive: T) -> bool {
         let Branch { top, at_start, line } = *branch;
         let onward = if RISING { drive > self.drive } else { drive < self.drive };
         // Full, a new extremum may cost another.
-        if !onward || !line.holds(drive) || self.len >= CAP {
+        if !onward || !line.holds(drive) || self.len >= table.capacity(CAP) {
             return drive == self.drive;
         }
         // Loops that the solution leaves are wiped out if the drive leaves them, too: the outermost of them tells.
@@ -350,11 +330,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
 
     /// The drive for a displacement above the present one, or below it, and the branch that leads there.
     #[inline(always)]
-    fn find<const RISING: bool, const N: usize, const NODES: usize>(
-        &self,
-        table: &Everett<T, N, NODES>,
-        wanted: T,
-    ) -> (T, Branch<T>) {
+    fn find<const RISING: bool, G: Grid<T>>(&self, table: &G, wanted: T) -> (T, Branch<T>) {
         let (start, at_start, top) = self.start::<RISING>(wanted);
         let (drive, line) = if RISING {
             table.rise(start, self.drive, wanted - at_start)
@@ -423,11 +399,12 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
 
     /// Makes the present point the newest extremum.
     #[inline]
-    fn push<const N: usize, const NODES: usize>(&mut self, table: &Everett<T, N, NODES>) {
-        if self.len >= CAP {
+    fn push<G: Grid<T>>(&mut self, table: &G) {
+        let capacity = table.capacity(CAP);
+        if self.len >= capacity {
             self.drop_least(table);
         }
-        let k = if self.len < CAP { self.len } else { CAP - 1 };
+        let k = Self::bounded(if self.len < capacity { self.len } else { capacity - 1 });
         self.extrema[k] = self.drive;
         self.displacements[k] = self.displacement;
         self.len = k + 1;
@@ -441,13 +418,14 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     /// differences of stored displacements.
     #[cold]
     #[inline(never)]
-    fn drop_least<const N: usize, const NODES: usize>(&mut self, table: &Everett<T, N, NODES>) {
+    fn drop_least<G: Grid<T>>(&mut self, table: &G) {
+        let capacity = table.capacity(CAP);
         let mut least = T::ZERO;
         let mut shift = T::ZERO;
         let mut at = 0;
-        for i in 1..CAP - 1 {
+        for i in 1..capacity - 1 {
             let (outer, at_outer) = (self.extremum(i - 1), self.displacement_at(i - 1));
-            let (inner, at_inner) = if i + 2 < CAP {
+            let (inner, at_inner) = if i + 2 < capacity {
                 (self.extremum(i + 2), self.displacement_at(i + 2))
             } else {
                 (self.drive, self.displacement)
@@ -459,14 +437,14 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
                 (least, shift, at) = (change.abs(), change, i);
             }
         }
-        for k in 1..CAP - 2 {
+        for k in 1..capacity - 2 {
             if k >= at {
-                self.extrema[k] = self.extrema[k + 2];
-                self.displacements[k] = self.displacements[k + 2] + shift;
+                self.extrema[Self::bounded(k)] = self.extremum(k + 2);
+                self.displacements[Self::bounded(k)] = self.displacement_at(k + 2) + shift;
             }
         }
         self.displacement = self.displacement + shift;
-        self.len = CAP - 2;
+        self.len = capacity - 2;
         self.dropped = self.dropped.saturating_add(1);
     }
 }

@@ -13,7 +13,7 @@ mod walk;
 
 pub use crate::choice::Choice;
 pub use crate::field::Field;
-pub use walk::Words;
+pub use walk::{Within, Words};
 
 /// Largest |place| that is loaded, m and rad: poses, set-points, displacements.
 pub const LARGEST_PLACE: f64 = 16.0;
@@ -55,6 +55,12 @@ pub struct Sizes {
     pub reading: f64,
     /// Stiffness of the environment, N/m and N m/rad.
     pub stiffness: f64,
+    /// Lowest and highest code.
+    pub codes: [i32; 2],
+    /// Drive of a leg: cells of its table.
+    pub grid: f64,
+    /// Extrema that a reversal memory has words for, if it has room for more than it keeps ([`crate::Grid::capacity`]).
+    pub memory: usize,
 }
 
 impl Sizes {
@@ -75,6 +81,9 @@ impl Sizes {
         request: LARGEST_PLACE,
         reading: LARGEST_PLACE,
         stiffness: LARGEST,
+        codes: [i32::MIN, i32::MAX],
+        grid: LARGEST,
+        memory: usize::MAX,
     };
 }
 
@@ -97,6 +106,13 @@ pub trait Snapshot: Field {
     #[inline]
     fn save(&self, words: &mut Writer<'_>) {
         let Ok(()) = self.show(words);
+    }
+
+    /// Words of the state where sizes are known at run time. Of one whose memories keep all they have room for: [`Field::WORDS`].
+    fn word_count(&self, sizes: Sizes) -> usize {
+        let mut words = Writer::new(&mut []);
+        let Ok(()) = self.show(&mut words.within(sizes));
+        words.count()
     }
 
     /// Adds the state to a digest.

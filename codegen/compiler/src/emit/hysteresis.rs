@@ -83,7 +83,10 @@ fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
             });
             Rate {
                 imports: quote! { {DynamicEverett, DynamicMemory, Everett} },
-                types: [quote! { DynamicEverett<Real, GRID, NODES> }, quote! { DynamicMemory<Real, MEMORY> }],
+                types: [
+                    quote! { DynamicEverett<Real, Everett<Real, GRID, NODES>> },
+                    quote! { DynamicMemory<Real, MEMORY> },
+                ],
                 entries: entries.collect(),
                 constants: quote! {
                     /// Miss of the demand at which the inverse is found, m: an eighth of a converter code.
@@ -99,7 +102,10 @@ fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
             let direct = literal::real(ir.scalar, *direct);
             Rate {
                 imports: quote! { {Creep, CreepEverett, CreepMemory, Everett} },
-                types: [quote! { CreepEverett<Real, GRID, NODES, CREEP> }, quote! { CreepMemory<Real, MEMORY, CREEP> }],
+                types: [
+                    quote! { CreepEverett<'static, Real, Everett<Real, GRID, NODES>, CREEP> },
+                    quote! { CreepMemory<Real, MEMORY, CREEP> },
+                ],
                 entries: still.map(|still| quote! { CreepEverett { still: #still, creep: &CREEP_OF_LEGS } }).collect(),
                 constants: quote! {
                     /// Creep operators; from `hysteresis.creep_times`.

@@ -44,7 +44,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         use specgen_runtime::Permitted;
         use specgen_runtime::snapshot::Sizes;
 
-        use crate::Real;
+        use crate::{Real, hysteresis, limits};
 
         /// Words of the settings.
         pub(crate) const WORDS: usize = #words;
@@ -57,6 +57,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const STATE: Sizes = Sizes {
             place: #place, user: #user, rate: #rate, acceleration: #acceleration, pose: #pose, pose_rate: #pose_rate, error: #error,
             apart: #apart, wrench: #wrench, leg: #leg, leg_rate: #leg_rate, line: #line, request: #request, reading: #reading, stiffness: #stiffness,
+            codes: limits::CODES, grid: hysteresis::GRID as f64, memory: hysteresis::MEMORY,
         };
     }
 }

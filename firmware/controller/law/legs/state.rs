@@ -1,8 +1,8 @@
 //! What the controller remembers from tick to tick. No NaN or infinity is ever stored here.
 
-use crate::hysteresis::{GRID, LED, Memory};
+use crate::hysteresis::{LED, Memory};
 use crate::supervision::{code_at_rest, memory_at_rest};
-use crate::{LEGS, Real, limits};
+use crate::{LEGS, Real};
 use specgen_runtime::snapshot::Snapshot;
 use specgen_runtime::{Digest, Estimate};
 
@@ -10,9 +10,9 @@ specgen_runtime::state! { |words|
     /// State of one leg.
     pub struct LegState(leg: usize) {
         /// Reversal memory; its displacement is q̂ = ρ̂X, what was really requested, m.
-        pub memory: Memory = memory_at_rest(leg), part if memory.highest() <= GRID as Real;
+        pub memory: Memory = memory_at_rest(leg), part;
         /// Converter code now held at the output.
-        pub code: i32 = code_at_rest(), ticks(limits::CODES[1]) if *code >= limits::CODES[0];
+        pub code: i32 = code_at_rest(), ticks(words.sizes().codes[1]) if *code >= words.sizes().codes[0];
         /// δ̂ and φ̂, m.
         pub estimate: Estimate<Real> = Estimate::new(), part;
         /// What the leg is asked for beyond the demand, so that it arrives in time, m; none without `hysteresis.dead_time`.

@@ -91,6 +91,11 @@ pub trait Words: Sized {
         Sizes::ANY
     }
 
+    /// The same for a state of these sizes, known at run time: what [`Reader::within`] reads.
+    fn within(&mut self, sizes: Sizes) -> Within<'_, Self> {
+        Within { words: self, sizes }
+    }
+
     /// A number within ±`largest`.
     #[inline]
     fn number<T: Real>(&mut self, value: &T, _largest: f64) -> Result<(), Infallible> {
@@ -116,7 +121,7 @@ pub trait Words: Sized {
         rows.iter().try_for_each(|row| self.numbers(row, largest))
     }
 
-    /// Numbers within ±`largest`, of which the first `count` are stored; the others are zeros, which a digest leaves out.
+    /// Numbers of a memory within ±`largest`, of which the first `count` are stored; the others are zeros, which a digest leaves out.
     #[inline]
     fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
         for value in values.iter().take(count) {
@@ -196,6 +201,27 @@ pub trait Words: Sized {
     #[inline]
     fn check(&self, _fits: impl FnOnce() -> bool) -> Result<(), Infallible> {
         Ok(())
+    }
+}
+
+/// A walk over a state of sizes that are known at run time: a memory has words for the extrema that it keeps, not for its room.
+#[derive(Debug)]
+pub struct Within<'a, W> {
+    words: &'a mut W,
+    sizes: Sizes,
+}
+
+impl<W: Words> Words for Within<'_, W> {
+    fn put(&mut self, word: u64) {
+        self.words.put(word);
+    }
+
+    fn numbers<T: Real>(&mut self, values: &[T], largest: f64) -> Result<(), Infallible> {
+        self.words.numbers(values, largest)
+    }
+
+    fn stored<T: Real>(&mut self, values: &[T], count: usize, largest: f64) -> Result<(), Infallible> {
+        self.words.stored(values.get(..self.sizes.memory).unwrap_or(values), count, largest)
     }
 }
 
@@ -287,7 +313,8 @@ impl Reader<'_> {
     /// # Errors
     /// No state holds the word.
     pub fn stored<T: Real>(&mut self, values: &mut [T], _count: usize, largest: f64) -> Result<(), Invalid> {
-        self.reals(values, largest)
+        let kept = self.sizes().memory.min(values.len());
+        self.reals(values.get_mut(..kept).unwrap_or_default(), largest)
     }
 
     /// [`Words::ticks`], restored.

@@ -9,6 +9,7 @@ mod dac;
 mod dac_exact;
 mod dynamics;
 mod geometry;
+mod grid;
 mod learning;
 mod owing;
 mod preisach;

@@ -26,6 +26,9 @@ const SIZES: Sizes = Sizes {
     request: 32.0,
     reading: 12.0,
     stiffness: 2.0,
+    codes: [-7, 7],
+    grid: 100.0,
+    memory: usize::MAX,
 };
 const GARBAGE: u64 = 0x5555_5555_5555_5555;
 
@@ -329,9 +332,7 @@ fn every_word_of_the_reversal_memories_counts() {
     let all: Vec<usize> = used(&plain()).into_iter().chain(Plain::WORDS..Plain::WORDS + 4).collect();
     check(&CreepMemory::<f64, CAP, 3>::new(), creep(), &all, CreepMemory::digest);
     let restored = restore(&Plain::new(), &plain().0).unwrap();
-    assert_eq!((restored.highest(), restored.drive(), restored.depth(), restored.dropped()), (20.0, 10.0, USED, 3));
-    assert_eq!(restore(&CreepMemory::<f64, CAP, 3>::new(), &creep().0).unwrap().highest(), 20.0);
-    assert_eq!(restore(&DynamicMemory::<f64, CAP>::new(), &dynamic().0).unwrap().highest(), 20.0);
+    assert_eq!((restored.drive(), restored.depth(), restored.dropped()), (10.0, USED, 3));
     whole_within(&restored, 1, 0, u32::MAX.into());
     numbers_within(&restored, [3].into_iter().chain(4 + CAP..Plain::WORDS), SIZES.leg);
     let creeping = restore(&CreepMemory::<f64, CAP, 3>::new(), &creep().0).unwrap();
@@ -358,7 +359,7 @@ fn only_a_staircase_is_taken_for_one() {
         (6.0, [0.0, 6.0, 6.0, 6.0, 6.0]),
     ] {
         let memory = taken(5, drive, &extrema).unwrap();
-        assert_eq!((memory.drive(), memory.highest()), (drive, extrema[1]), "{extrema:?}");
+        assert_eq!(memory.drive(), drive, "{extrema:?}");
     }
     for (drive, extrema) in [
         (5.9, STAIRS),
@@ -374,9 +375,12 @@ fn only_a_staircase_is_taken_for_one() {
     ] {
         assert_eq!(taken(5, drive, &extrema).err(), Some(refused), "{drive} {extrema:?}");
     }
-    // Alone, the drive is all there is; with a maximum, that is the highest.
-    assert_eq!(taken(1, 10.0, &[0.0]).unwrap().highest(), 10.0);
-    assert_eq!(taken(2, 10.0, &[0.0, 12.0]).unwrap().highest(), 12.0);
+    // Alone, the drive is all there is; with a maximum, that is the highest. Neither is beyond the table.
+    let [full, beyond] = [SIZES.grid, SIZES.grid.next_up()];
+    assert_eq!(taken(1, full, &[0.0]).unwrap().depth(), 1);
+    assert_eq!(taken(2, 10.0, &[0.0, full]).unwrap().depth(), 2);
+    assert_eq!(taken(1, beyond, &[0.0]).err(), Some(refused));
+    assert_eq!(taken(2, 10.0, &[0.0, beyond]).err(), Some(refused));
     assert_eq!(taken(1, -0.1, &[0.0]).err(), Some(refused));
     // From none to more than there is room for.
     let full: Vec<f64> = (0..CAP).map(|k| if k % 2 == 0 { k as f64 } else { 100.0 - k as f64 }).collect();

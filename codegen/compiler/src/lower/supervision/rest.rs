@@ -47,7 +47,7 @@ pub(super) fn risen(code: i32, hysteresis: &Hysteresis, actuation: &Actuation, s
     Some(Rest { drive, displacement: of_legs(&hysteresis.tables, &hysteresis.table_of_leg), rate })
 }
 
-/// E(`drive`, 0), with the roundings of `specgen_runtime::Everett::rising`. `nodes` as in [`Hysteresis::tables`].
+/// E(`drive`, 0), with the roundings of `specgen_runtime::Grid::rising`. `nodes` as in [`Hysteresis::tables`].
 pub(super) fn first_rise(nodes: &[f64], grid: usize, drive: f64, scalar: Scalar) -> f64 {
     let cell = (drive as usize).min(grid - 1);
     let node = |up: usize| nodes[up * (up + 1) / 2];

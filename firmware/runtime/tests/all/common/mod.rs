@@ -5,6 +5,7 @@ mod space;
 
 pub use space::*;
 use specgen_runtime::Everett;
+pub use specgen_runtime::Grid;
 
 /// The larger of two errors. Unlike `f64::max` it keeps a NaN, which no bound admits.
 pub fn worse(a: f64, b: f64) -> f64 {
