@@ -14,6 +14,8 @@ use specgen_tests::{Emitted, host_trace};
 const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
 /// Way to the bias pose, then tracking of the first on-board trajectory in closed loop, with noise, P/F with PCC.
 const TICKS: u32 = 20_000;
+/// The stage whose code is held against [`DYNAMICS_BYTES`].
+const DYNAMICS: &str = "specgen_law::platform::stages::dynamics::<controller::constants::Constants>";
 /// Bytes of stack of a tick.
 const STACK: u64 = 2048;
 /// Bytes of code and constants that the six leg forces take.
@@ -48,7 +50,7 @@ fn a_tick_keeps_its_promises_and_grows_no_stage() {
         let m = verify::measure(&image, &controller.default_config(), &host).unwrap();
         assert_eq!(m.first_difference, None, "{name}");
         print(name, &m);
-        let code = stack::bound(&image.elf, "controller::stages::dynamics").unwrap().code_bytes;
+        let code = stack::bound(&image.elf, DYNAMICS).unwrap().code_bytes;
         let constants = 6 * NUMBERS_OF_A_LEG * u64::from(emitted.compiled.ir.scalar.bits() / 8);
         let bound = stack::bound(&image.elf, stack::STEP_SYMBOL).unwrap();
         let dynamics_bytes = code + constants;

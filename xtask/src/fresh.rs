@@ -187,7 +187,13 @@ fn go(scenario: &Scenario, caller: &Caller, repository: &Path, job_only: bool, l
     if !job.printed.contains("host library: ") || (scenario.offline && !job.printed.contains("left out: ")) {
         return Err("the main job does not say that the host library was built, or what was left out".to_owned());
     }
-    for file in ["controller/src/step.rs", "runtime/Cargo.toml", "host/Cargo.toml", "qemu/Cargo.toml"] {
+    for file in [
+        "controller/src/lib.rs",
+        "law/src/platform/step.rs",
+        "runtime/Cargo.toml",
+        "host/Cargo.toml",
+        "qemu/Cargo.toml",
+    ] {
         home.expect_file(&format!("out/reference/{file}"))?;
     }
     // Offline, tests that need the emulator cannot pass.

@@ -215,7 +215,7 @@ fn is_a_verdict(text: &str, start: &str) {
 fn the_output_folder_is_named_after_the_platform_if_not_given() {
     let folder = Folder::new();
     assert_eq!(folder.run(&["legs.toml", "--no-build"]).code, 0);
-    assert!(folder.path("legs-controller/controller/src/step.rs").is_file());
+    assert!(folder.path("legs-controller/law/src/legs/step.rs").is_file());
 }
 
 /// Builds the emitted controller, as `sim` does for a user.

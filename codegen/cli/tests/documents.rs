@@ -176,7 +176,7 @@ fn the_example_in_c_runs() {
 #[test]
 fn status_bits_are_those_that_are_emitted() {
     let page = read("docs/control-law.md");
-    let step = read("firmware/controller/src/tick.rs") + &read("firmware/runtime/src/supervisor/sift.rs");
+    let step = read("firmware/law/src/status.rs") + &read("firmware/runtime/src/supervisor/sift.rs");
     for (rows, constant, value) in [
         ("0–5", "LEG_LIMITED", 0x3f_u32),
         ("8–13", "GAUGE_FAULT", 0x3f00),

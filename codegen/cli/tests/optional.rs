@@ -41,7 +41,7 @@ fn without_tools_everything_else_is_done_and_one_line_says_what_was_left_out() {
         assert!(lines[0].contains(words), "no `{words}` in: {}", lines[0]);
     }
     assert!(run.stderr.contains("host library: "), "{}", run.stderr);
-    for file in ["controller/src/step.rs", "host/Cargo.toml", "qemu/Cargo.toml", "runtime/Cargo.toml"] {
+    for file in ["controller/src/lib.rs", "law/src/platform/step.rs", "host/Cargo.toml", "qemu/Cargo.toml", "runtime/Cargo.toml"] {
         assert!(folder.path("out").join(file).is_file(), "{file}");
     }
 
@@ -67,7 +67,7 @@ fn set_up_that_fails_says_what_was_tried_and_the_job_goes_on() {
     run.says(0, &["there is no rustup", "there is no apt-get", "going on without"]);
     assert!(run.stderr.contains("left out: the image for the microcontroller"), "{}", run.stderr);
     assert!(run.stderr.contains("could not be set up: rustup target add: there is no rustup"), "{}", run.stderr);
-    assert!(folder.path("out/controller/src/step.rs").is_file());
+    assert!(folder.path("out/law/src/platform/step.rs").is_file());
     Run::of(&mut main_job(&folder, nothing.path(), &["--setup", "--require-target"])).says(3, &["could not be set up"]);
 }
 

@@ -34,7 +34,7 @@ fn the_manifest_lists_every_file_with_its_digest() {
     let present: Vec<(String, String)> = files.iter().map(|(path, bytes)| (path.clone(), digest(bytes))).collect();
     assert_eq!(listed, present);
     for path in
-        ["Cargo.toml", "ir.json", "controller/src/step.rs", "runtime/src/lib.rs", "host/build.rs", "qemu/link.x"]
+        ["Cargo.toml", "ir.json", "controller/src/lib.rs", "law/src/platform/step.rs", "runtime/src/lib.rs", "host/build.rs", "qemu/link.x"]
     {
         assert!(files.contains_key(path), "{path}");
     }
@@ -216,8 +216,8 @@ fn a_file_of_the_user_is_not_overwritten() {
     refused(&folder, "out", 1, &["`out` holds files", "notes.txt", "nothing was written", "-o"]);
     fs::remove_file(folder.path("out/notes.txt")).unwrap();
 
-    folder.write("out/controller/src/step.rs", folder.read("out/controller/src/step.rs") + "// tuned by hand\n");
-    refused(&folder, "out", 1, &["changed since: controller/src/step.rs;"]);
+    folder.write("out/law/src/platform/step.rs", folder.read("out/law/src/platform/step.rs") + "// tuned by hand\n");
+    refused(&folder, "out", 1, &["changed since: law/src/platform/step.rs;"]);
 
     // A folder without a manifest, with a name like one of ours.
     fs::create_dir_all(folder.path("theirs/controller/src")).unwrap();

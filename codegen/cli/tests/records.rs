@@ -117,7 +117,7 @@ fn the_unchanged_record_is_accepted_both_ways() {
         assert_eq!(document.code, 0, "{:#}", document.value);
         assert!(document.findings().is_empty(), "{:#}", document.value);
     }
-    assert!(folder.path("out/controller/src/step.rs").is_file() && folder.path("table.csv").is_file());
+    assert!(folder.path("out/law/src/platform/step.rs").is_file() && folder.path("table.csv").is_file());
 }
 
 #[test]

@@ -166,9 +166,7 @@ fn another_user_makes_the_same_bytes() {
 fn the_committed_controller_is_the_reference_output() {
     let folder = Folder::new();
     let files = baseline(&folder, "reference.toml");
-    let mut committed = contents(&repository().join("firmware/controller"));
-    // Where the law lies that is carried over.
-    committed.retain(|path, _| !path.starts_with("law/"));
+    let committed = contents(&repository().join("firmware/controller"));
     let emitted: Files = files
         .into_iter()
         .filter_map(|(path, bytes)| Some((path.strip_prefix("controller/")?.to_owned(), bytes)))

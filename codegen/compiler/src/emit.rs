@@ -2,11 +2,12 @@
 //!
 //! One emitter per emitted file. Emitters are infallible and do no arithmetic: whatever can fail failed in lowering.
 //!
-//! The law itself is carried over as it stands (`law`); emitted are constants, tables, types and words. What differs between six legs
-//! with their own gauges and a platform in task space lies in `legs` and `platform`.
+//! The law itself is the crate `specgen-law`, which the workspace contains; emitted are constants, tables and types. What differs
+//! between six legs with their own gauges and a platform in task space lies in `legs` and `platform`.
 
 mod body;
 mod checked;
+mod constants;
 mod crate_root;
 mod defaults;
 mod format;
@@ -14,7 +15,6 @@ mod gauge_converter;
 mod geometry;
 mod hysteresis;
 mod identity;
-mod law;
 mod legs;
 mod limits;
 mod literal;
@@ -39,6 +39,7 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
     let mut sources = vec![
         ("src/body.rs", body::emit(ir)),
         ("src/checked.rs", checked::emit(ir)),
+        ("src/constants.rs", constants::emit(ir)),
         ("src/defaults.rs", defaults::emit(ir)),
         ("src/geometry.rs", geometry::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),
@@ -47,30 +48,17 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
         ("src/permitted.rs", permitted::emit(ir)),
         ("src/supervision.rs", supervision::emit(ir)),
     ];
-    let (law, page) = match &ir.task_space {
-        None => {
-            sources.push(("src/gauges.rs", legs::gauges::emit(ir)));
-            (law::LEGS, law::LEGS_PAGE)
-        }
-        Some(task) => {
-            sources.extend(of_platform(ir, task));
-            (law::PLATFORM, law::PLATFORM_PAGE)
-        }
-    };
+    match &ir.task_space {
+        None => sources.push(("src/gauges.rs", legs::gauges::emit(ir))),
+        Some(task) => sources.extend(of_platform(ir, task)),
+    }
     let header = format::header(ir);
     let mut files: EmittedCrate =
         sources.into_iter().map(|(path, tokens)| (path.to_owned(), format::source(&header, tokens))).collect();
-    files.extend(law.iter().map(|(path, text)| ((*path).to_owned(), law::carried_over(ir, text))));
-    let root = crate_root::emit(ir, &header, page, files.keys().map(String::as_str));
+    let root = crate_root::emit(ir, &header, files.keys().map(String::as_str));
     files.insert("src/lib.rs".to_owned(), root);
     files.insert("Cargo.toml".to_owned(), manifest::emit(ir));
     files
-}
-
-/// Whether a file of the emitted crate is the same for every spec of a kind.
-#[must_use]
-pub fn is_carried_over(path: &str) -> bool {
-    [law::LEGS, law::PLATFORM].into_iter().flatten().any(|(law, _)| *law == path)
 }
 
 fn of_platform(ir: &Ir, task: &TaskSpace) -> [(&'static str, TokenStream); 3] {

@@ -203,6 +203,7 @@ fn constants(file: &object::File<'_>, start: u64, end: u64, owners: &mut BTreeMa
 fn crate_of_symbol(name: &str) -> &str {
     let name = name.trim_start_matches(['<', '&']);
     match name.split_once("::") {
+        Some(("specgen_law", _)) => "law",
         Some(("specgen_runtime", _)) => "runtime",
         Some((krate, _)) if !krate.is_empty() && !krate.contains(' ') => krate,
         _ => UNNAMED,
@@ -233,7 +234,7 @@ mod tests {
     #[test]
     fn files_and_symbols_are_told_by_their_crate() {
         for (path, expected) in [
-            ("/home/me/out/controller/src/step.rs", "controller"),
+            ("/home/me/out/controller/src/gauges.rs", "controller"),
             ("controller/src/setpoint/x.rs", "controller"),
             ("/x/registry/src/index-0123/cortex-m-rt-0.7.7/src/lib.rs", "cortex-m-rt"),
             ("/x/registry/src/index-0123/embassy-stm32-0.6.0/src/spi/mod.rs", "embassy-stm32"),
@@ -243,9 +244,10 @@ mod tests {
             ("asm.S", NO_LINES),
             // Wherever a user builds.
             ("/home/runtime/controller/out/board/src/cycle.rs", "board"),
-            ("/home/me/library/core/controller/src/step.rs", "controller"),
+            ("/home/me/library/core/controller/src/gauges.rs", "controller"),
             ("/rustc/0123abcd/library/alloc/src/vec/mod.rs", "alloc"),
             ("/home/me/registry/src/work/out/runtime/src/memory.rs", "runtime"),
+            ("/home/me/out/law/src/platform/step.rs", "law"),
             ("/home/me/src/controller/out/hal/src/lib.rs", "hal"),
             ("/home/controller/.rustup/toolchains/x/lib/rustlib/src/rust/library/core/src/num/f64.rs", "core"),
             ("/home/runtime/.cargo/registry/src/index-0123/crc-3.4.0/src/lib.rs", "crc"),

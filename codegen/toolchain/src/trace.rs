@@ -262,7 +262,7 @@ fn who(debug: &DebugInfo<'_>, address: u64) -> (Who, bool) {
 /// For whom a line of a file was written, by its crate and its place there, never by the folders above; none if its callers say.
 fn of_file(path: &str) -> Option<(Who, bool)> {
     let (owner, file) = owner::source_of(path);
-    let is_law = matches!(owner.as_str(), "controller" | "runtime");
+    let is_law = matches!(owner.as_str(), "controller" | "law" | "runtime");
     if !is_law && owner != "board" {
         return None;
     }
@@ -372,8 +372,8 @@ mod tests {
             ["", "/tmp/out/", "/home/me/runtime/out/", "/home/controller/src/wave/snapshot/", "/w/library/core/"]
         {
             for (file, expected) in [
-                ("controller/src/step.rs", law),
-                ("controller/src/state.rs", law),
+                ("law/src/platform/step.rs", law),
+                ("controller/src/constants.rs", law),
                 ("runtime/src/memory.rs", law),
                 ("runtime/src/setpoint/trajectory.rs", law),
                 ("board/src/cycle.rs", board),
@@ -383,11 +383,11 @@ mod tests {
                 ("runtime/src/recorder.rs", recorder),
                 ("board/src/recording.rs", recorder),
                 ("runtime/src/digest.rs", recorder),
-                ("controller/src/snapshot.rs", far),
+                ("law/src/snapshot.rs", far),
                 ("runtime/src/snapshot/walk.rs", far),
                 ("runtime/src/recorder/ring.rs", far),
                 ("runtime/src/wave/shape.rs", wave),
-                ("controller/src/waves.rs", wave),
+                ("law/src/platform/waves.rs", wave),
             ] {
                 assert_eq!(of_file(&format!("{folder}{file}")), expected, "{folder}{file}");
             }

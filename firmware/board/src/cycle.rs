@@ -3,6 +3,7 @@
 use controller::snapshot::record_after;
 use controller::supervised::{
     AMPLIFIER, CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, Request, STALLED, STOP,
+    measured_input,
 };
 use controller::supervision::STALL_TICKS;
 use controller::{GAUGE_FAULT, Real, passes, sensing, triggers};
@@ -285,5 +286,5 @@ fn take<'a>(
     request: Request,
     events: u32,
 ) -> &'a MachineInput {
-    slot.insert(MachineInput::measured(&orders.command, readings, &[Real::NAN; CHANNELS], request, events))
+    slot.insert(measured_input(&orders.command, readings, &[Real::NAN; CHANNELS], request, events))
 }

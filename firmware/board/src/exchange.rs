@@ -1,7 +1,7 @@
 //! What lies between the tick and the background.
 
 use controller::snapshot::recorder::Recorder;
-use controller::supervised::{Machine, MachineInput, MachineOutput, Phase, Request, supervise};
+use controller::supervised::{Machine, MachineInput, MachineOutput, Phase, Request, machine_at_reset, supervise};
 use controller::supervision::HOST_TICKS;
 use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, Config, Real, passes, triggers};
@@ -353,7 +353,7 @@ impl Exchange {
 }
 
 /// The machine at power-up, in flash: made at run time it would first lie on the stack, which has no room for it.
-static AT_RESET: Machine = Machine::new();
+static AT_RESET: Machine = machine_at_reset();
 
 /// As at power-up.
 #[inline(never)]

@@ -1,8 +1,8 @@
 //! The recorder of a board: how its memory is cut, and what it does from power-up on.
 
-use controller::snapshot::RECORD_LAYOUT;
 use controller::snapshot::recorder::{Activity, Recorder, Settings, Trigger};
-use controller::supervised::Machine;
+use controller::snapshot::{RECORD_LAYOUT, digest, save_piece};
+use controller::supervised::{Machine, machine_at_reset};
 use controller::{CONFIG_WORDS, Config};
 use specgen_link::{RecorderAction, RecorderStatus};
 
@@ -74,7 +74,7 @@ impl Kept {
     /// Nothing in it yet.
     #[must_use]
     pub const fn new() -> Self {
-        Self { config: Config::new(), machine: Machine::new() }
+        Self { config: Config::new(), machine: machine_at_reset() }
     }
 
     /// Of this machine, under the settings of the spec.
@@ -91,7 +91,7 @@ impl Kept {
 
     /// Digest of the machine as it was.
     pub(crate) fn digest(&self) -> u64 {
-        self.machine.digest()
+        digest(&self.machine)
     }
 
     /// Words of what a block begins with, settings and state, from the `first`-th on.
@@ -106,7 +106,7 @@ impl Kept {
             }
             return if from.len() < PIECE { from.len() } else { PIECE };
         }
-        self.machine.save_piece(first - CONFIG_WORDS, words);
+        save_piece(&self.machine, first - CONFIG_WORDS, words);
         if left < PIECE { left } else { PIECE }
     }
 }

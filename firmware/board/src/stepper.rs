@@ -1,5 +1,6 @@
 //! The machine of a board as one that a host steps, and what a tick costs.
 
+use controller::snapshot::digest;
 use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, MachineInput, machine_output_words};
 use controller::{CONFIG_WORDS, Config, DESCRIPTION};
 use specgen_link::{Counted, Stage, lockstep};
@@ -106,7 +107,7 @@ impl lockstep::Machine for Stepper<'_, '_> {
             for (slot, word) in output.iter_mut().zip(machine_output_words(&result, machine)) {
                 *slot = word;
             }
-            done = (machine.digest(), cost);
+            done = (digest(machine), cost);
         });
         self.costs.add(done.1);
         done

@@ -62,7 +62,10 @@ pub const GAUGES: Gauges<'static, Real> = Gauges {
 };
 
 /// Words in V to readings in m, lowest power first; from `gauge.calibration`. Without one a word is a reading.
-pub const CALIBRATION: Option<Calibration<Real, 1>> = None;
+pub const CALIBRATION: Option<Meaning> = None;
+
+/// What the gauges' words mean, with so many coefficients each.
+pub type Meaning = Calibration<Real, 1>;
 
 /// Lowest and highest word of each gauge that is believed, m: readings within `sensor.range`, where the gauge means one reading by one word.
 pub const RAW_LIMITS: [[Real; 2]; 6] = [

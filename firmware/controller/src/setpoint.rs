@@ -11,7 +11,7 @@ use crate::Real;
 
 /// What the generator of set-points needs to know; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
 /// and `trajectory`.
-pub const SETPOINTS: Setpoints<Real, Parallel> = Setpoints {
+pub const SETPOINTS: Setpoints<Real, UserFrames> = Setpoints {
     period: 0.0001,
     rate: 10000.0,
     square_rate: 100000000.0,
@@ -54,6 +54,9 @@ pub const SETPOINTS: Setpoints<Real, Parallel> = Setpoints {
     frames: Parallel,
     trajectories: &TRAJECTORIES,
 };
+
+/// The user's frames; from `control.frames`.
+pub type UserFrames = Parallel;
 
 /// Names of the trajectories, by the word `selector`.
 pub const TRAJECTORY_NAMES: [&str; 3] = ["case-1", "case-2", "machining"];

@@ -14,10 +14,8 @@ use core::mem::{align_of, size_of};
 #[cfg(feature = "dynamics")]
 use controller::dynamics::{Motion, PLATFORM};
 use controller::snapshot::MACHINE_STATE_WORDS;
-use controller::supervised::{
-    MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_output_words, supervise,
-};
-use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput};
+use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_at_reset, machine_output_words, supervise};
+use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, state_at_reset};
 use specgen_runtime::Real;
 
 /// Version of this interface.
@@ -155,7 +153,7 @@ pub unsafe extern "C" fn specgen_config_load(config: *mut u8, words: *const u64)
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_state_reset(state: *mut u8) {
     // SAFETY: the caller's duty.
-    unsafe { state.cast::<State>().write(State::new()) }
+    unsafe { state.cast::<State>().write(state_at_reset()) }
 }
 
 /// One control tick.
@@ -197,7 +195,7 @@ pub extern "C" fn specgen_machine_bytes() -> usize {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_machine_reset(machine: *mut u8) {
     // SAFETY: the caller's duty.
-    unsafe { machine.cast::<Machine>().write(Machine::new()) }
+    unsafe { machine.cast::<Machine>().write(machine_at_reset()) }
 }
 
 /// One supervised tick: what the other targets run.

@@ -7,9 +7,7 @@ use crate::instructions::{InstructionCounter, SelfTest};
 use crate::semihosting::{Exit, File};
 use crate::stats::{self, Stage};
 use crate::{is_due, specgen_step, stack};
-use controller::supervised::{
-    MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, Phase, machine_output_words,
-};
+use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, Phase, machine_at_reset, machine_output_words};
 use controller::{CONFIG_WORDS, Config, State, TickInput, TickOutput};
 
 /// Ticks per file access.
@@ -29,7 +27,7 @@ pub fn replay(
     input: &File,
 ) -> Result<(), Exit> {
     let output = File::create(b"output.bin\0").ok_or(Exit::CannotWrite)?;
-    let mut machine = Machine::new();
+    let mut machine = machine_at_reset();
     let mut stages = [Stage::new("supervise"), Stage::new("law"), Stage::new("other phases")];
     let mut rows = [[0; MACHINE_INPUT_WORDS]; BATCH];
     let mut results = [[0; MACHINE_OUTPUT_WORDS + 1]; BATCH];

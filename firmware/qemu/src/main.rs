@@ -18,7 +18,7 @@ mod stages;
 mod start;
 mod stats;
 
-use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, TickOutput, output_words, step};
+use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, TickOutput, output_words, state_at_reset, step};
 use instructions::InstructionCounter;
 use semihosting::{Exit, File, exit};
 use stages::Stages;
@@ -49,7 +49,7 @@ fn replay() -> Result<(), Exit> {
     let input = File::open(b"input.bin\0").ok_or(Exit::NoInput)?;
     let output = File::create(b"output.bin\0").ok_or(Exit::CannotWrite)?;
 
-    let mut state = State::new();
+    let mut state = state_at_reset();
     let mut stages = Stages::new();
     let mut rows = [[0; INPUT_WORDS]; BATCH];
     let mut results = [[0; OUTPUT_WORDS + 1]; BATCH];

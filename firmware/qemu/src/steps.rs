@@ -1,6 +1,6 @@
 //! The supervised controller as a machine that a host steps, with what each tick costs.
 
-use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_output_words};
+use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_at_reset, machine_output_words};
 use controller::{CONFIG_WORDS, Config, DESCRIPTION};
 use specgen_link::{Counted, Stage, WORDS, lockstep};
 
@@ -34,7 +34,7 @@ impl Steps {
             counter,
             exact,
             config: Config::new(),
-            machine: Machine::new(),
+            machine: machine_at_reset(),
             stages: Stages::new(),
             ticks: 0,
             deepest: 0,
@@ -66,7 +66,7 @@ impl lockstep::Machine for Steps {
     }
 
     fn reset(&mut self) {
-        self.machine = Machine::new();
+        self.machine = machine_at_reset();
         self.ticks = 0;
     }
 

@@ -11,8 +11,8 @@ use core::sync::atomic::Ordering;
 use controller::sensing;
 use controller::snapshot::recorder;
 use controller::supervised::{
-    AMPLIFIER, CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, STALLED,
-    STOP, supervise,
+    AMPLIFIER, CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, MachineOutput, Phase, STALLED, STOP, machine_at_reset,
+    measured_input, supervise,
 };
 use controller::supervision::STALL_TICKS;
 use controller::{Config, LEGS, Real, place_words, triggers};
@@ -63,7 +63,7 @@ impl<D: Device> Loop<'_, D> {
     /// Runs until [`Shared::stop`]; then the amplifiers are off. `account` is the book of the run.
     pub fn run(mut self, account: &mut Account) {
         scheduling::touch_stack();
-        let mut machine = Machine::new();
+        let mut machine = machine_at_reset();
         let mut setpoints = Setpoints::new(&self.config);
         let Inner { outlets, mut orders, mut players } = self.rings;
         let mut keeper = Keeper::new(outlets, self.tape.take(), self.shared, (&machine, &self.config));
@@ -136,7 +136,7 @@ impl<D: Device> Loop<'_, D> {
             };
             // None of the supervisor's business, and in every record.
             let seen = if rose { events | EDGE } else { events };
-            let input = MachineInput::measured(&command, &gauge, &wrench, setpoints.request(), seen);
+            let input = measured_input(&command, &gauge, &wrench, setpoints.request(), seen);
             let output = supervise(&self.config, &mut machine, &input);
             let computed = clock::now();
 

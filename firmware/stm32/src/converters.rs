@@ -2,7 +2,7 @@
 
 use core::mem::MaybeUninit;
 
-use controller::supervised::Machine;
+use controller::supervised::{Machine, machine_at_reset};
 use controller::triggers::{INPUT, LINES, MOST};
 use embedded_hal::spi::{MODE_1, MODE_2, Mode};
 use specgen_board::{Board, GAUGE_BITS, Kept};
@@ -72,7 +72,7 @@ pub fn trigger_pins(outputs: [Pin; MOST], input: Pin) -> TriggerPins {
 /// of it on the stack; `tests/tests/boards.rs` adds up the stack.
 #[inline(never)]
 pub fn at_reset(memory: &'static mut MaybeUninit<Machine>) -> &'static mut Machine {
-    memory.write(Machine::new())
+    memory.write(machine_at_reset())
 }
 
 /// What the recorder's background copies the machine into, made where it stays.

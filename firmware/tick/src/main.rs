@@ -21,7 +21,7 @@ mod semihosting;
 mod start;
 
 use controller::sensing::CONVERTER;
-use controller::supervised::{Machine, Phase, Request};
+use controller::supervised::{Phase, Request, machine_at_reset};
 use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, Config, INPUT_WORDS, Real, passes, triggers};
 use parts::{ADC_BITS, Bench, Bus, Delay, Line, Pin, REFERENCE, Rates, Role};
@@ -72,7 +72,7 @@ extern "C" fn main() -> ! {
 fn run() -> Result<(), Exit> {
     let input = File::open(b"input.bin\0").ok_or(Exit::NoInput)?;
     let output = File::create(b"counts.bin\0").ok_or(Exit::CannotWrite)?;
-    let mut machine = Machine::new();
+    let mut machine = machine_at_reset();
     // It begins to run with the first tick, as after arming.
     machine.supervisor.phase = Phase::Holding;
     let mut exchange = Exchange::new();

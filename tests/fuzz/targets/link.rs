@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use controller::limits::CODES;
 use controller::sensing::CONVERTER;
-use controller::supervised::Machine;
+use controller::supervised::{Machine, machine_at_reset};
 use controller::supervision::READINGS_PER_LEG;
 use controller::{Config, LEGS, LegState};
 use specgen::operate::Session;
@@ -147,7 +147,7 @@ impl Drop for Tape {
 fn device(mut script: &[u8]) {
     let parts = Parts::default();
     let tape = Tape::new();
-    let mut machine = Box::new(Machine::new());
+    let mut machine = Box::new(machine_at_reset());
     let mut board = Board::new(parts.clone(), parts.clone(), &mut machine, true);
     let mut exchange = Exchange::new();
     let (words, kept, samples) = tape.memories();

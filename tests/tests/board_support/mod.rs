@@ -11,7 +11,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use controller::sensing::CONVERTER;
-use controller::supervised::{Machine, Phase};
+use controller::supervised::{Machine, Phase, machine_at_reset};
 use controller::supervision::READINGS_PER_LEG;
 use controller::{PLACE_WORDS, Real, place_words};
 use rand_chacha::ChaCha8Rng;
@@ -120,7 +120,7 @@ impl Line {
     /// At power-up, with a recorder of so many words.
     pub fn new(record: usize) -> Self {
         let parts = Parts::default();
-        let machine = Box::leak(Box::new(Machine::new()));
+        let machine = Box::leak(Box::new(machine_at_reset()));
         let mut board = Board::with_lines(parts.clone(), parts.clone(), parts.clone(), machine, true);
         let mut exchange = Exchange::new();
         exchange.record(Box::leak(vec![0; record].into_boxed_slice()), Box::leak(Box::new(Kept::new())));

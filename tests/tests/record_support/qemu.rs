@@ -13,9 +13,7 @@ mod stats;
 
 use controller::snapshot::recorder::{Recorder, Settings};
 use controller::snapshot::{MACHINE_STATE_WORDS, RECORD_LAYOUT, supervise_recorded};
-use controller::supervised::{
-    MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, MachineOutput, machine_output_words, supervise,
-};
+use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, MachineOutput, machine_at_reset, machine_output_words, supervise};
 use controller::{CONFIG_WORDS, Config};
 use core::mem::MaybeUninit;
 use instructions::InstructionCounter;
@@ -44,7 +42,7 @@ fn replay() -> Result<(), Exit> {
     let mut recorder = Recorder::new(&mut memory, 2, RECORD_LAYOUT).map_err(|_| Exit::ConfigSize)?;
     recorder.start(Settings::STREAM);
     let mut words = [0; MACHINE_STATE_WORDS];
-    let mut machine = Machine::new();
+    let mut machine = machine_at_reset();
     let mut stages = [Stage::new("step"), Stage::new("recorded"), Stage::new("opening"), Stage::new("save"), Stage::new("digest")];
     let mut rows = [[0; MACHINE_INPUT_WORDS]; BATCH];
     let mut results = [[0; MACHINE_OUTPUT_WORDS + 3]; BATCH];

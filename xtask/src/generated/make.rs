@@ -100,16 +100,13 @@ pub fn controller_with_passes(root: &Path) -> Result<Files, String> {
     Ok(files)
 }
 
-/// IR and emitted crate of small specs, without what is carried over from `firmware/controller/law`.
+/// IR and emitted crate of small specs.
 pub fn goldens(root: &Path) -> Result<Files, String> {
     let mut files = Files::new();
     for name in GOLDENS {
         let compiled = compiled(&root.join(format!("specs/features/{name}.toml")))?;
         files.insert(format!("{name}/ir.json"), workspace::ir_text(&compiled.ir));
         for (path, text) in emit::emit(&compiled.ir) {
-            if emit::is_carried_over(&path) {
-                continue;
-            }
             // Cargo would take a manifest here for a package of this repository.
             let path = path.replace("Cargo.toml", "Cargo.toml.golden");
             files.insert(format!("{name}/{path}"), text);

@@ -17,7 +17,7 @@ use specgen_language::spec;
 
 /// Hand-written code and its tests.
 const SOURCES: [&str; 6] =
-    ["firmware/runtime", "firmware/controller/law", "codegen", "host-sim/src", "host-sim/oracle", "tests/tests"];
+    ["firmware/runtime", "firmware/law", "codegen", "host-sim/src", "host-sim/oracle", "tests/tests"];
 /// Emitted controllers: of the platform kind and of the kind of six legs.
 const EMITTED: [&str; 2] = ["firmware/controller/src", "tests/golden/six-records/src"];
 /// The emitters' texts are the emitted lines over again.

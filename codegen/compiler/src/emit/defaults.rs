@@ -9,11 +9,6 @@ use crate::ir::{self, Gains, Interaction, Ir, Law, Mode, PlatformDefaults, Setpo
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let leg_gain = literal::real(ir.scalar, ir.scalar.round(ir.defaults.leg_gain));
-    let max_step = literal::integer(ir.defaults.max_step);
-    let step_doc = format!(
-        " Most converter codes that a leg moves in a tick: `actuator.slew_rate` over a `timing.period` of {} s.",
-        ir.defaults.period
-    );
     let (imports, of_kind) = match &ir.task_space {
         None => legs(ir),
         Some(task) => platform(ir, &task.defaults),
@@ -22,14 +17,19 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![doc = " The spec's settings: what `Config::new` holds."]
 
         #imports
-        use crate::Real;
+        use crate::constants::Constants;
+        use crate::{Real, limits};
 
         /// ρ̂ of a leg, m/V; from `actuator`. X = q̂/ρ̂ is the virtual drive of (AII.1); mode P takes the leg as linear: u = q/ρ̂.
         pub const LEG_GAIN: Real = #leg_gain;
-        #[doc = #step_doc]
-        pub(crate) const MAX_STEP: i32 = #max_step;
         #of_kind
     }
+}
+
+/// What the converter and the amplifiers let through.
+fn code_limits(ir: &Ir) -> TokenStream {
+    let max_step = literal::integer(ir.defaults.max_step);
+    quote! { CodeLimits { min: limits::CODES[0], max: limits::CODES[1], max_step: #max_step } }
 }
 
 fn law(law: Law) -> TokenStream {
@@ -50,19 +50,23 @@ fn legs(ir: &Ir) -> (TokenStream, TokenStream) {
     };
     let (level_weight, drift_weight) = (real(d.level_weight), real(d.drift_weight));
     let run_interval = literal::count(d.run_interval as usize);
+    let code_limits = code_limits(ir);
     let constants = quote! {
-        /// From `adaptation.mode`.
-        pub(crate) const LAW: Law = #law;
-        /// From `controller.setpoint`.
-        pub(crate) const SETPOINT: SetpointKind = #setpoint;
-        /// From `adaptation.level_weight`.
-        pub(crate) const LEVEL_WEIGHT: Real = #level_weight;
-        /// From `adaptation.drift_weight`.
-        pub(crate) const DRIFT_WEIGHT: Real = #drift_weight;
-        /// Ticks of a run; from `adaptation.run_interval`.
-        pub(crate) const RUN_INTERVAL: u32 = #run_interval;
+        /// What `Config::new` holds.
+        pub(crate) const DEFAULTS: Settings<Constants> = Settings {
+            law: #law,
+            setpoint: #setpoint,
+            level_weight: #level_weight,
+            drift_weight: #drift_weight,
+            run_interval: #run_interval,
+            code_limits: #code_limits,
+        };
     };
-    (quote! { use specgen_runtime::{Law, SetpointKind}; }, constants)
+    let imports = quote! {
+        use specgen_law::legs::Settings;
+        use specgen_runtime::{CodeLimits, Law, SetpointKind};
+    };
+    (imports, constants)
 }
 
 fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
@@ -90,23 +94,23 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
     let (level_weight, drift_weight) = (real(d.level_weight), real(d.drift_weight));
     let (lines, triggers) = (literal::count(d.triggers.len()), d.triggers.iter().map(|line| of_line(ir, line)));
     let input = d.input;
+    let code_limits = code_limits(ir);
+    let [damps, position_damps] =
+        [&d.gains, &d.position_gains].map(|gains| gains.derivative.iter().any(|gain| ir.scalar.round(*gain) != 0.0));
     let constants = quote! {
-        /// From `control.mode` and `adaptation.mode`.
-        pub(crate) const MODE: ControlMode = #mode;
-        /// From `control.interaction`.
-        pub(crate) const INTERACTION: Interaction = #interaction;
-        /// From `adaptation`.
-        pub(crate) const LEVEL_WEIGHT: Real = #level_weight;
-        /// From `adaptation`.
-        pub(crate) const DRIFT_WEIGHT: Real = #drift_weight;
-        /// Of P/F; from `gains` or the start rule.
-        pub(crate) const GAINS: Gains<Real> = #combined;
-        /// Of P; from `gains` or the start rule.
-        pub(crate) const POSITION_GAINS: Gains<Real> = #position;
-        /// K_e; from `environment`.
-        pub(crate) const ENVIRONMENT_STIFFNESS: [Real; 6] = [#stiffness];
-        /// h_e; from `environment`.
-        pub(crate) const ENVIRONMENT_REST: [Real; 6] = [#rest];
+        /// What `Config::new` holds.
+        pub(crate) const DEFAULTS: Settings<Constants> = Settings {
+            mode: #mode,
+            interaction: #interaction,
+            level_weight: #level_weight,
+            drift_weight: #drift_weight,
+            code_limits: #code_limits,
+            gains: #combined,
+            position_gains: #position,
+            environment: Environment { stiffness: [#stiffness], rest: [#rest] },
+            damps: [#damps, #position_damps],
+            triggers: TRIGGERS,
+        };
         /// Output lines; from `trigger`.
         pub const LINES: usize = #lines;
         /// Whether there is an input line; from `trigger`.
@@ -115,8 +119,9 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
         pub(crate) const TRIGGERS: [Line<Real>; LINES] = [#(#triggers),*];
     };
     let imports = quote! {
+        use specgen_law::platform::{Environment, Settings};
         use specgen_runtime::trigger::Line;
-        use specgen_runtime::{ControlMode, Gains, Interaction #import_law};
+        use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction #import_law};
     };
     (imports, constants)
 }

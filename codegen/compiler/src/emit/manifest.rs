@@ -18,6 +18,7 @@ publish = false
 stages = []
 
 [dependencies]
+specgen-law = {{ path = \"../law\" }}
 specgen-runtime = {{ path = \"../runtime\" }}
 ",
         version = ir.specgen_version,

@@ -54,7 +54,7 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
 
         /// What the generator of set-points needs to know; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
         /// and `trajectory`.
-        pub const SETPOINTS: Setpoints<Real, #frames_type> = Setpoints {
+        pub const SETPOINTS: Setpoints<Real, UserFrames> = Setpoints {
             period: #period,
             rate: #rate,
             square_rate: #square_rate,
@@ -79,6 +79,8 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
             trajectories: &TRAJECTORIES,
         };
 
+        /// The user's frames; from `control.frames`.
+        pub type UserFrames = #frames_type;
         /// Names of the trajectories, by the word `selector`.
         pub const TRAJECTORY_NAMES: [&str; #count] = [#(#names),*];
         /// Trajectories by the word `selector`.

@@ -66,8 +66,10 @@ pub fn emit(ir: &Ir) -> TokenStream {
     quote! {
         #![doc = " What the supervisor takes for a fault; from `supervisor`."]
 
+        use specgen_law::Reset;
         use specgen_runtime::supervisor::{Reaction, Steadiness, Supervision #uses};
 
+        use crate::constants::Constants;
         use crate::hysteresis::Memory;
         use crate::{Real #limits};
 
@@ -154,8 +156,13 @@ fn wiring(ir: &Ir) -> TokenStream {
 /// forgotten.
 fn at_rest(ir: &Ir) -> TokenStream {
     let real = |value| literal::real(ir.scalar, value);
-    let (memory, displacement, code) = match &ir.supervision.risen {
-        None => (quote! { Memory::new() }, quote! { 0.0 }, quote! { limits::CODES[0] }),
+    let (doc, memory, displacement, code) = match &ir.supervision.risen {
+        None => (
+            " Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there.",
+            quote! { [Memory::new(); 6] },
+            quote! { [0.0; 6] },
+            quote! { limits::CODES[0] },
+        ),
         Some(rest) => {
             let drive = real(rest.drive);
             let memories = (0..6).map(|leg| {
@@ -167,36 +174,18 @@ fn at_rest(ir: &Ir) -> TokenStream {
                 quote! { Memory::risen(#drive, #displacement #rate) }
             });
             let displacements = rest.displacement.map(real);
-            let code = literal::integer(ir.supervision.rest);
-            (quote! { [#(#memories),*][leg] }, quote! { [#(#displacements),*][leg] }, code)
+            (
+                " Reset: at `supervisor.rest_voltage`, risen to it from the lowest voltage after a sweep to the highest and back, gauges zeroed at the lowest.",
+                quote! { [#(#memories),*] },
+                quote! { [#(#displacements),*] },
+                literal::integer(ir.supervision.rest),
+            )
         }
     };
-    let alike = ir.supervision.risen.is_none();
-    let (doc, leg) = if alike {
-        (" Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there.", quote! { _leg })
-    } else {
-        (
-            " Reset: at `supervisor.rest_voltage`, risen to it from the lowest voltage after a sweep to the highest and back, gauges zeroed at the lowest.",
-            quote! { leg },
-        )
-    };
-    let of_platform = ir.task_space.is_some().then(|| {
-        quote! {
-            /// Displacement that the model gives a leg at reset, m.
-            pub(crate) const fn displacement_at_rest(#leg: usize) -> Real {
-                #displacement
-            }
-        }
-    });
     quote! {
         #[doc = #doc]
-        pub(crate) const fn memory_at_rest(#leg: usize) -> Memory {
-            #memory
-        }
-        #of_platform
-        /// Converter code of every leg at reset.
-        pub(crate) const fn code_at_rest() -> i32 {
-            #code
+        pub(crate) const fn at_rest() -> Reset<Constants> {
+            Reset { memory: #memory, displacement: #displacement, code: #code }
         }
     }
 }

@@ -4,6 +4,7 @@
 mod board;
 mod hal;
 mod host;
+mod law;
 mod link;
 mod qemu;
 mod rt;
@@ -27,7 +28,7 @@ pub struct Part {
     pub what: &'static str,
     /// What building it takes, for the README.
     pub needs: &'static str,
-    /// Folders that it depends on, beside `controller` and `runtime`.
+    /// Folders that it depends on, beside `controller`, `law` and `runtime`.
     pub with: &'static [&'static str],
     /// Path below the workspace, text.
     pub files: &'static [(&'static str, &'static str)],
@@ -46,6 +47,7 @@ use files;
 
 /// Every folder there is. Not a constant, of which each crate that names it has a copy.
 pub static PARTS: &[&Part] = &[
+    &law::PART,
     &runtime::PART,
     &host::PART,
     &qemu::PART,
@@ -61,7 +63,7 @@ pub static PARTS: &[&Part] = &[
 ];
 
 /// Folders of every workspace: with these the bits of host and emulated machine can be compared.
-pub const ALWAYS: &[&str] = &["runtime", "host", "qemu"];
+pub const ALWAYS: &[&str] = &["law", "runtime", "host", "qemu"];
 
 /// [`ALWAYS`], `targets` and all that these depend on, in the order of [`PARTS`].
 #[must_use]

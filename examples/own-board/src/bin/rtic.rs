@@ -7,7 +7,7 @@ use own_board::machine::stop;
 
 #[rtic::app(device = embassy_stm32, peripherals = false)]
 mod app {
-    use controller::supervised::Machine;
+    use controller::supervised::machine_at_reset;
     use embassy_stm32::interrupt::{self, InterruptExt, Priority};
     use own_board::machine::{Link, RECORD, Running, start, stop};
     use specgen_board::Kept;
@@ -23,7 +23,7 @@ mod app {
     }
 
     #[init(local = [
-        machine: Machine = Machine::new(),
+        machine: Machine = machine_at_reset(),
         record: [u64; RECORD] = [0; RECORD],
         kept: Kept = Kept::new(),
         buffers: [[u8; 512]; 2] = [[0; 512]; 2],

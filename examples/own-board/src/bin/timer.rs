@@ -4,7 +4,7 @@
 
 use core::cell::RefCell;
 
-use controller::supervised::Machine;
+use controller::supervised::machine_at_reset;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use critical_section::Mutex;
 use embassy_stm32::interrupt;
@@ -27,7 +27,7 @@ fn with(action: impl FnOnce(&mut Running)) {
 
 #[entry]
 fn main() -> ! {
-    static mut MACHINE: Machine = Machine::new();
+    static mut MACHINE: Machine = machine_at_reset();
     static mut RECORDED: [u64; RECORD] = [0; RECORD];
     static mut KEPT: Kept = Kept::new();
     static mut BUFFERS: [[u8; 512]; 2] = [[0; 512]; 2];

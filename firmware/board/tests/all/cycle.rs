@@ -10,7 +10,7 @@ use controller::limits::DAC;
 use controller::sensing;
 use controller::supervised::{
     AMPLIFIER, CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase,
-    Request, STALLED, STOP, supervise,
+    Request, STALLED, STOP, machine_at_reset, supervise,
 };
 use controller::supervision::READINGS_PER_LEG;
 use controller::{Command, CommandKind, Config, INPUT_WORDS, Real, Target, TickInput};
@@ -95,7 +95,7 @@ impl Amplifiers for Parts {
 
 /// For the rest of the test, as on a board.
 fn at_reset() -> &'static mut Machine {
-    Box::leak(Box::new(Machine::new()))
+    Box::leak(Box::new(machine_at_reset()))
 }
 
 fn started(intact: bool) -> (Parts, Board<'static, Parts, Parts>, Exchange) {
@@ -124,7 +124,7 @@ struct ByHand {
 
 impl ByHand {
     fn new() -> Self {
-        Self { config: Config::new(), machine: Machine::new() }
+        Self { config: Config::new(), machine: machine_at_reset() }
     }
 
     fn tick(

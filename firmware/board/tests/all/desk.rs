@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use controller::supervised::{Machine, Phase, Request as Wanted};
+use controller::supervised::{Machine, Phase, Request as Wanted, machine_at_reset};
 use controller::{CONFIG_WORDS, Config, DESCRIPTION};
 use specgen_board::{COMMAND_WORDS, Desk, Exchange, Stopwatch, Visit};
 use specgen_link::{Bytes, Counted, Device, RecorderAction, Refusal, Reply, Request};
@@ -20,7 +20,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        Self { exchange: Exchange::new(), machine: Box::new(Machine::new()), desk: Desk::new(Stopwatch::NONE) }
+        Self { exchange: Exchange::new(), machine: Box::new(machine_at_reset()), desk: Desk::new(Stopwatch::NONE) }
     }
 
     /// Asks, and looks at the answer.

@@ -4,7 +4,9 @@
 #![allow(clippy::unwrap_used)] // A panic is a failed test.
 
 use crate::board_support::{Line, bytes, done, refused, running, wave};
-use controller::supervised::{MACHINE_INPUT_WORDS, Machine, MachineInput, Phase, machine_output_words, supervise};
+use controller::supervised::{
+    MACHINE_INPUT_WORDS, MachineInput, Phase, machine_at_reset, machine_output_words, supervise,
+};
 use controller::{CONFIG_WORDS, Config, ControlMode};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -73,7 +75,7 @@ fn a_lock_step_computes_what_the_host_computes_and_moves_nothing() {
     assert_eq!(words.len(), CONFIG_WORDS * 8);
     done(&mut client, &Request::LockstepReset { config: Bytes(&words) });
     let mut random = ChaCha8Rng::seed_from_u64(9);
-    let (mut machine, mut moved) = (Machine::new(), 0);
+    let (mut machine, mut moved) = (machine_at_reset(), 0);
     for tick in 0..2500 {
         let input = inputs(&mut random, tick);
         let output = supervise(&config, &mut machine, &MachineInput::from_words(&input));

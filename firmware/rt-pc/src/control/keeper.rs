@@ -8,7 +8,7 @@ use core::sync::atomic::Ordering;
 use controller::Config;
 use controller::snapshot::recorder::{Activity, Settings};
 use controller::snapshot::{MACHINE_STATE_WORDS, record_before};
-use controller::supervised::Machine;
+use controller::supervised::{Machine, machine_at_reset};
 
 use crate::handover::{Outlets, Row, SNAPSHOT_EVERY, Shared, Snapshot, Tape};
 
@@ -168,7 +168,7 @@ mod tests {
 
     #[test]
     fn rows_that_find_no_room_are_counted_and_the_record_goes_on_behind_them_with_a_state() {
-        let (machine, config, shared) = (Machine::new(), Config::new(), Shared::default());
+        let (machine, config, shared) = (machine_at_reset(), Config::new(), Shared::default());
         let (rows, mut taken) = RingBuffer::new(4);
         let (snapshots, mut states) = RingBuffer::new(2);
         let (tapes, _tapes) = RingBuffer::new(1);

@@ -3,26 +3,24 @@
 
 //! The spec's settings: what `Config::new` holds.
 
-use specgen_runtime::{Law, SetpointKind};
-use crate::Real;
+use specgen_law::legs::Settings;
+use specgen_runtime::{CodeLimits, Law, SetpointKind};
+use crate::constants::Constants;
+use crate::{Real, limits};
 
 /// ρ̂ of a leg, m/V; from `actuator`. X = q̂/ρ̂ is the virtual drive of (AII.1); mode P takes the leg as linear: u = q/ρ̂.
 pub const LEG_GAIN: Real = 6.31e-7;
 
-/// Most converter codes that a leg moves in a tick: `actuator.slew_rate` over a `timing.period` of 0.0002 s.
-pub(crate) const MAX_STEP: i32 = 3495;
-
-/// From `adaptation.mode`.
-pub(crate) const LAW: Law = Law::Pcc;
-
-/// From `controller.setpoint`.
-pub(crate) const SETPOINT: SetpointKind = SetpointKind::Pose;
-
-/// From `adaptation.level_weight`.
-pub(crate) const LEVEL_WEIGHT: Real = 0.252;
-
-/// From `adaptation.drift_weight`.
-pub(crate) const DRIFT_WEIGHT: Real = 0.011;
-
-/// Ticks of a run; from `adaptation.run_interval`.
-pub(crate) const RUN_INTERVAL: u32 = 1;
+/// What `Config::new` holds.
+pub(crate) const DEFAULTS: Settings<Constants> = Settings {
+    law: Law::Pcc,
+    setpoint: SetpointKind::Pose,
+    level_weight: 0.252,
+    drift_weight: 0.011,
+    run_interval: 1,
+    code_limits: CodeLimits {
+        min: limits::CODES[0],
+        max: limits::CODES[1],
+        max_step: 3495,
+    },
+};

@@ -22,37 +22,16 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
-mod api;
 mod body;
 mod checked;
-mod config;
+mod constants;
 mod defaults;
-mod description;
-pub mod dynamics;
 mod gauges;
 mod geometry;
 pub mod hysteresis;
 mod identity;
-pub mod integrity;
-pub mod kinematics;
 pub mod limits;
-mod machine;
-pub mod passes;
 pub mod permitted;
-pub mod sensing;
-pub mod snapshot;
-#[cfg(feature = "stages")]
-mod stage;
-#[cfg(feature = "stages")]
-pub mod stages;
-mod standing;
-mod state;
-mod step;
-pub mod supervised;
 pub mod supervision;
-mod tick;
-pub mod triggers;
-pub mod waves;
-mod words;
 
-pub use api::*;
+specgen_law::controller!(legs);

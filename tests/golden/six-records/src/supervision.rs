@@ -3,7 +3,9 @@
 
 //! What the supervisor takes for a fault; from `supervisor`.
 
+use specgen_law::Reset;
 use specgen_runtime::supervisor::{Reaction, Steadiness, Supervision, Wiring};
+use crate::constants::Constants;
 use crate::hysteresis::Memory;
 use crate::{Real, limits};
 
@@ -118,11 +120,10 @@ pub const APPROACH_KEEP: Real = 0.998002;
 pub const APPROACH_NEGLIGIBLE: Real = 1e-13;
 
 /// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there.
-pub(crate) const fn memory_at_rest(_leg: usize) -> Memory {
-    Memory::new()
-}
-
-/// Converter code of every leg at reset.
-pub(crate) const fn code_at_rest() -> i32 {
-    limits::CODES[0]
+pub(crate) const fn at_rest() -> Reset<Constants> {
+    Reset {
+        memory: [Memory::new(); 6],
+        displacement: [0.0; 6],
+        code: limits::CODES[0],
+    }
 }

@@ -57,7 +57,9 @@ pub fn emit(ir: &Ir, s: &Sensing) -> TokenStream {
             arc_tangent: &[#arc_tangent],
         };
         /// Words in V to readings in m, lowest power first; from `gauge.calibration`. Without one a word is a reading.
-        pub const CALIBRATION: Option<Calibration<Real, #coefficients>> = #calibration;
+        pub const CALIBRATION: Option<Meaning> = #calibration;
+        /// What the gauges' words mean, with so many coefficients each.
+        pub type Meaning = Calibration<Real, #coefficients>;
         #[doc = #raw_doc]
         pub const RAW_LIMITS: [[Real; 2]; 6] = [#([#limits]),*];
         /// First-order filter of the pose's rate; from `velocity_cutoff` and `timing.period`.

@@ -25,18 +25,12 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
-#[path = "../../../../../controller/src/api.rs"]
-mod api;
 #[path = "../../../../../controller/src/body.rs"]
 mod body;
 mod checked;
-#[path = "../../../../../controller/src/config.rs"]
-mod config;
+#[path = "../../../../../controller/src/constants.rs"]
+mod constants;
 mod defaults;
-#[path = "../../../../../controller/src/description.rs"]
-mod description;
-#[path = "../../../../../controller/src/dynamics.rs"]
-pub mod dynamics;
 #[path = "../../../../../controller/src/gauges.rs"]
 mod gauges;
 #[path = "../../../../../controller/src/geometry.rs"]
@@ -44,49 +38,13 @@ mod geometry;
 #[path = "../../../../../controller/src/hysteresis.rs"]
 pub mod hysteresis;
 mod identity;
-#[path = "../../../../../controller/src/integrity.rs"]
-pub mod integrity;
-#[path = "../../../../../controller/src/kinematics.rs"]
-pub mod kinematics;
 #[path = "../../../../../controller/src/limits.rs"]
 pub mod limits;
-#[path = "../../../../../controller/src/machine.rs"]
-mod machine;
-#[path = "../../../../../controller/src/notch.rs"]
-mod notch;
-#[path = "../../../../../controller/src/passes.rs"]
-pub mod passes;
 pub mod permitted;
-#[path = "../../../../../controller/src/sensing.rs"]
-pub mod sensing;
 #[path = "../../../../../controller/src/setpoint.rs"]
 pub mod setpoint;
-#[path = "../../../../../controller/src/snapshot.rs"]
-pub mod snapshot;
-#[cfg(feature = "stages")]
-#[path = "../../../../../controller/src/stage.rs"]
-mod stage;
-#[cfg(feature = "stages")]
-#[path = "../../../../../controller/src/stages.rs"]
-pub mod stages;
-#[path = "../../../../../controller/src/standing.rs"]
-mod standing;
-#[path = "../../../../../controller/src/state.rs"]
-mod state;
-#[path = "../../../../../controller/src/step.rs"]
-mod step;
-#[path = "../../../../../controller/src/supervised.rs"]
-pub mod supervised;
 #[path = "../../../../../controller/src/supervision.rs"]
 pub mod supervision;
 pub mod task_space;
-#[path = "../../../../../controller/src/tick.rs"]
-mod tick;
-#[path = "../../../../../controller/src/triggers.rs"]
-pub mod triggers;
-#[path = "../../../../../controller/src/waves.rs"]
-pub mod waves;
-#[path = "../../../../../controller/src/words.rs"]
-mod words;
 
-pub use api::*;
+specgen_law::controller!(platform);

@@ -1,0 +1,411 @@
+//! The names of an emitted controller, which targets use.
+
+/// Gives an emitted controller the names that targets use: types and sizes of this spec, and functions that call the law with its
+/// constants. It stands at the root of the crate, beside the modules with the constants; `platform` or `legs` says which law it is.
+///
+/// The functions with a tick in them are not generic, so that each is compiled once, in the controller.
+#[macro_export]
+macro_rules! controller {
+    (platform) => {
+        /// Words of a command: they stand before those that are measured.
+        pub const COMMAND_WORDS: usize = $crate::platform::tick::command_words(task_space::CORRECTED);
+        /// Words of a tick's input.
+        pub const INPUT_WORDS: usize = COMMAND_WORDS + 12;
+        /// Words of a tick's output.
+        pub const OUTPUT_WORDS: usize = $crate::platform::tick::output_words_with(defaults::LINES);
+        /// Names of the input words, see `input_names` of the law.
+        pub const INPUT_NAMES: [&str; INPUT_WORDS] = $crate::platform::tick::input_names();
+        /// Names of the output words, see `output_names` of the law.
+        pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] = $crate::platform::tick::output_names();
+        /// Model of what the platform presses on.
+        pub type Environment = $crate::platform::Environment<Real>;
+
+        pub use $crate::specgen_runtime::setpoint::{Command, CommandKind, Target};
+        pub use $crate::specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
+        pub use $crate::status::{
+            CORRECTION_LIMITED, GAUGE_FAULT, GENERATOR_BUSY, LEG_LIMITED, SETPOINT_FAULT, SETPOINT_STALE,
+            STATIC_INVERSE, TRIGGER_HIGH, TRIGGER_MISSED, WRENCH_FAULT,
+        };
+
+        /// Pose from six gauges that see the platform.
+        pub mod sensing {
+            use super::{Constants, Real};
+
+            pub use super::gauges::{CALIBRATION, CONVERTER, GAUGES, RATE, RAW_LIMITS};
+
+            /// Gauges whose word is not finite or out of [`RAW_LIMITS`]: bit k for gauge k.
+            #[inline]
+            #[must_use]
+            pub fn faults(raw: &[Real; 6]) -> u32 {
+                $crate::platform::sensing::faults(Constants, raw)
+            }
+
+            /// Readings of the gauges, m, from their words.
+            #[inline]
+            #[must_use]
+            pub fn readings(raw: &[Real; 6]) -> [Real; 6] {
+                $crate::platform::sensing::readings(Constants, raw)
+            }
+
+            /// Word of each gauge (rows) per displacement of each leg (columns) near these words, per m.
+            #[must_use]
+            pub fn words_per_leg(raw: &[Real; 6]) -> [[Real; 6]; 6] {
+                $crate::platform::sensing::words_per_leg(Constants, raw)
+            }
+
+            /// Pose from rest, m and rad, of gauge words without [`faults`]; finite for these.
+            #[inline]
+            #[must_use]
+            pub fn pose(raw: &[Real; 6]) -> [Real; 6] {
+                $crate::platform::sensing::pose(Constants, raw)
+            }
+        }
+
+        $crate::controller!(@both platform, super::task_space::CORRECTED != 0, [super::defaults::LINES, super::defaults::INPUT]);
+    };
+    (legs) => {
+        pub use $crate::legs::tick::{COMMAND_WORDS, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS};
+        pub use $crate::specgen_runtime::{CodeLimits, Law, SetpointKind};
+        pub use $crate::status::{GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, STATIC_INVERSE};
+
+        /// Readings of the legs' own gauges.
+        pub mod sensing {
+            use super::{Constants, Real};
+
+            pub use super::gauges::{CONVERTER, GAUGE, LEG_SETPOINT};
+
+            /// Word of each gauge (rows) per displacement of each leg (columns).
+            #[must_use]
+            pub fn words_per_leg(raw: &[Real; 6]) -> [[Real; 6]; 6] {
+                $crate::legs::sensing::words_per_leg(Constants, raw)
+            }
+        }
+
+        $crate::controller!(@both legs, false, [0, false]);
+    };
+    (@both $law:ident, $corrects:expr, [$lines:expr, $input:expr]) => {
+        pub use constants::Constants;
+        pub use defaults::LEG_GAIN;
+        pub use identity::{ASSUMED, LEGS, PERIOD_SECONDS, Real, SCALAR_BITS, SPEC_DIGEST, SPEC_NAME, SPECGEN_VERSION};
+        pub use $crate::ConfigError;
+        pub use $crate::$law::tick::PLACE_WORDS;
+
+        /// What may change while running.
+        pub type Config = $crate::$law::Config<Constants>;
+        /// What the controller remembers from tick to tick.
+        pub type State = $crate::$law::State<Constants>;
+        /// State of one leg.
+        pub type LegState = $crate::$law::LegState<Constants>;
+        /// What a tick reads.
+        pub type TickInput = $crate::$law::TickInput<Constants>;
+        /// What a tick yields.
+        pub type TickOutput = $crate::$law::TickOutput<Constants>;
+
+        /// Words of the settings.
+        pub const CONFIG_WORDS: usize = permitted::WORDS;
+        /// Names of the settings.
+        pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = permitted::NAMES;
+
+        /// What this controller is, one `key=value` a line, lists separated by commas: for tools that load it at run time.
+        pub const DESCRIPTION: &str = $crate::description::text(&DESCRIBED);
+        const DESCRIBED: [u8; describe(&mut [])] = {
+            let mut text = [0; describe(&mut [])];
+            describe(&mut text);
+            text
+        };
+        const fn describe(text: &mut [u8]) -> usize {
+            let lists: [(&str, &[&str]); 3] = [
+                ("config_names=", &CONFIG_NAMES),
+                ("input_names=", &INPUT_NAMES),
+                ("output_names=", &OUTPUT_NAMES),
+            ];
+            $crate::description::describe(text, identity::ABOUT, &lists, identity::MOTION)
+        }
+
+        impl $crate::Compiled for Constants {
+            const CONSTANTS: Self = Self;
+            const DEFAULTS: $crate::$law::Settings<Self> = defaults::DEFAULTS;
+            type ConfigWords = [u64; CONFIG_WORDS];
+            type CommandWords = [u64; COMMAND_WORDS];
+            type InputWords = [u64; INPUT_WORDS];
+            type OutputWords = [u64; OUTPUT_WORDS];
+            type MachineInputWords = [u64; supervised::MACHINE_INPUT_WORDS];
+            type MachineOutputWords = [u64; supervised::MACHINE_OUTPUT_WORDS];
+            type MachineWords = [u64; snapshot::MACHINE_STATE_WORDS];
+        }
+
+        /// The state at reset.
+        #[must_use]
+        pub const fn state_at_reset() -> State {
+            State::new(&supervision::at_rest())
+        }
+
+        /// One control tick. See `step` of the law for the timing.
+        pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
+            $crate::$law::step(Constants, config, state, input)
+        }
+
+        /// Words in the order of [`OUTPUT_NAMES`], of a tick and of the state that it left.
+        #[must_use]
+        pub fn output_words(output: &TickOutput, state: &State) -> [u64; OUTPUT_WORDS] {
+            $crate::$law::tick::output_words(output, state)
+        }
+
+        /// Where the platform is, see `place_words` of the law.
+        #[must_use]
+        pub fn place_words(state: &State) -> [u64; PLACE_WORDS] {
+            $crate::$law::tick::place_words(Constants, state)
+        }
+
+        /// The control law under its supervisor: what every target calls.
+        pub mod supervised {
+            use super::{COMMAND_WORDS, Config, Constants, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS, Real};
+
+            pub use $crate::specgen_runtime::supervisor::{
+                AMPLIFIER, CONVERTER, Cause, Fallback, Finding, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request,
+                SAMPLE_REPEATED, SAMPLE_REPLACED, STALLED, STOP,
+            };
+
+            /// State of the supervisor in this controller's arithmetic.
+            pub type Supervisor = $crate::specgen_runtime::supervisor::Supervisor<Real>;
+            /// Everything that is remembered from tick to tick.
+            pub type Machine = $crate::Machine<Constants>;
+            /// What a supervised tick reads.
+            pub type MachineInput = $crate::MachineInput<Constants>;
+            /// What a supervised tick yields.
+            pub type MachineOutput = $crate::MachineOutput<Constants>;
+
+            /// Words of a supervised tick's input.
+            pub const MACHINE_INPUT_WORDS: usize = INPUT_WORDS + 2;
+            /// Words of a supervised tick's output.
+            pub const MACHINE_OUTPUT_WORDS: usize = OUTPUT_WORDS + 2;
+            /// Names of the input words. `request` is 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge; `events` holds bits.
+            pub const MACHINE_INPUT_NAMES: [&str; MACHINE_INPUT_WORDS] =
+                $crate::followed_by(&INPUT_NAMES, ["request", "events"]);
+            /// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16 | finding of the wiring check, or what
+            /// the law has fallen back to << 17; `conditions` has bit 1 << cause for each cause that is present, whether it has lasted or
+            /// not, from bit 16 on the gauges or legs concerned, from bit 22 on the gauges whose words were replaced by predictions;
+            /// bit 28 is cause 16, bits 29 and 30 say how far the law has fallen back, bit 31 is cause 17, see [`Fallback`].
+            pub const MACHINE_OUTPUT_NAMES: [&str; MACHINE_OUTPUT_WORDS] =
+                $crate::followed_by(&OUTPUT_NAMES, ["supervisor", "conditions"]);
+
+            /// The machine at reset: disarmed.
+            #[must_use]
+            pub const fn machine_at_reset() -> Machine {
+                Machine::new(super::state_at_reset())
+            }
+
+            /// The input of a tick, of what a target was asked for and what it measured. One that measures no wrench gives NaN for it.
+            #[must_use]
+            pub fn measured_input(
+                command: &[u64; COMMAND_WORDS],
+                gauge: &[Real; 6],
+                wrench: &[Real; 6],
+                request: Request,
+                events: u32,
+            ) -> MachineInput {
+                MachineInput::measured(command, gauge, wrench, request, events)
+            }
+
+            /// Words in the order of [`MACHINE_OUTPUT_NAMES`], of a tick and of the machine that it left.
+            #[must_use]
+            pub fn machine_output_words(output: &MachineOutput, machine: &Machine) -> [u64; MACHINE_OUTPUT_WORDS] {
+                $crate::machine_output_words(output, machine)
+            }
+
+            /// One supervised tick.
+            ///
+            /// What events and request say acts in this tick; what the readings show acts in the next one, after the law has seen
+            /// them.
+            pub fn supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {
+                $crate::supervise::supervise(Constants, config, machine, input)
+            }
+        }
+
+        /// The machine as 64-bit words and back, and the supervised tick with a recorder.
+        ///
+        /// A record of [`supervise_recorded`](snapshot::supervise_recorded) replays bit for bit wherever it begins: `specgen replay`.
+        pub mod snapshot {
+            use super::supervised::{MACHINE_INPUT_WORDS, Machine, MachineInput, MachineOutput, supervise};
+            use super::{CONFIG_WORDS, Config};
+            use $crate::specgen_runtime::record::Layout;
+            use $crate::specgen_runtime::recorder::Recorder;
+            use $crate::specgen_runtime::snapshot::Field;
+
+            pub use $crate::specgen_runtime::recorder;
+            pub use $crate::specgen_runtime::snapshot::Invalid;
+
+            /// Words of a [`Machine`].
+            pub const MACHINE_STATE_WORDS: usize = Machine::WORDS;
+            /// Words of this controller's records.
+            pub const RECORD_LAYOUT: Layout =
+                Layout { config: CONFIG_WORDS, input: MACHINE_INPUT_WORDS, state: MACHINE_STATE_WORDS };
+
+            /// [`supervise`], and what the recorder is to keep of it.
+            pub fn supervise_recorded(
+                config: &Config,
+                machine: &mut Machine,
+                input: &MachineInput,
+                recorder: &mut Recorder<'_>,
+            ) -> MachineOutput {
+                record_before(config, machine, recorder);
+                let output = supervise(config, machine, input);
+                record_after(machine, input, &output, recorder);
+                output
+            }
+
+            /// What a recorder keeps before a tick under these settings.
+            #[inline]
+            pub fn record_before(config: &Config, machine: &Machine, recorder: &mut Recorder<'_>) {
+                if recorder.opens() {
+                    open_block(config, machine, recorder);
+                }
+            }
+
+            #[inline(never)]
+            fn open_block(config: &Config, machine: &Machine, recorder: &mut Recorder<'_>) {
+                recorder.open_with(&config.to_words(), || digest(machine), |words| machine.save_into(words));
+            }
+
+            /// [`Machine::digest`], compiled here.
+            #[must_use]
+            pub fn digest(machine: &Machine) -> u64 {
+                machine.digest()
+            }
+
+            /// [`Machine::save_piece`], compiled here.
+            pub fn save_piece(machine: &Machine, first: usize, words: &mut [u64]) {
+                machine.save_piece(first, words);
+            }
+
+            /// What it keeps after the tick. Compiled here, for speed, and in a frame of its own, which is done with before the law
+            /// needs the stack.
+            #[inline(never)]
+            pub fn record_after(
+                machine: &Machine,
+                input: &MachineInput,
+                output: &MachineOutput,
+                recorder: &mut Recorder<'_>,
+            ) {
+                $crate::snapshot::record_after(machine, input, output, recorder);
+            }
+        }
+
+        /// Whether tables and settings in memory are still those that the compiler wrote.
+        pub mod integrity {
+            use super::Config;
+            use super::checked::add_tables;
+            use core::hint::black_box;
+
+            pub use super::checked::{CRC, IDENTITY, SETTINGS};
+
+            /// The spec's settings as they lie in memory, which [`intact`] speaks for: what a target starts with. Words that no
+            /// `Config` can hold give `Config::new()`; then [`intact`] is false.
+            #[must_use]
+            pub fn config() -> Config {
+                Config::from_words(black_box(&SETTINGS)).unwrap_or_default()
+            }
+
+            /// CRC-32 of identity, tables, trajectories and settings as they are in memory now.
+            #[must_use]
+            pub fn computed() -> u32 {
+                $crate::integrity::computed(&IDENTITY, add_tables, &SETTINGS)
+            }
+
+            /// Nothing has changed since the compiler wrote it. A target asks once, before it lets the amplifiers on.
+            #[must_use]
+            pub fn intact() -> bool {
+                computed() == black_box(CRC)
+            }
+        }
+
+        /// Leg kinematics in difference form: leg displacements from rest, and the pose that has them.
+        pub mod kinematics {
+            use super::{Constants, LEGS, Real};
+
+            pub use super::geometry::{GEOMETRY, INVERSE_JACOBIAN, SERIES};
+
+            /// Δl of each leg at a pose from rest, m, see `leg_displacements` of the law.
+            #[inline]
+            #[must_use]
+            pub fn leg_displacements(pose: &[Real; 6]) -> [Real; LEGS] {
+                $crate::kinematics::leg_displacements(Constants, pose)
+            }
+
+            /// The pose at which the legs have these displacements, m.
+            #[inline]
+            #[must_use]
+            pub fn pose_from_legs(displacements: &[Real; LEGS]) -> [Real; 6] {
+                $crate::kinematics::pose_from_legs(Constants, displacements)
+            }
+        }
+
+        /// Inverse dynamics: motion of the platform to leg forces and leg displacements.
+        ///
+        /// Poses are from rest, [x y z θx θy θz] in m and rad; rates and accelerations are their time derivatives. The model and its range
+        /// are in `specgen_runtime::dynamics`: angles up to π/4 and leg lengths within ±30 %; the controller accepts poses of the declared
+        /// workspace only.
+        pub mod dynamics {
+            pub use super::body::PLATFORM;
+            pub use $crate::specgen_runtime::{Load, Motion};
+        }
+
+        /// A wave in place of the host's set-points.
+        pub mod waves {
+            pub use $crate::$law::waves::{limits, may_begin, rest, write};
+
+            /// The wave generator of this controller.
+            pub type Wave = $crate::specgen_runtime::wave::Wave<super::Real>;
+        }
+
+        /// A pass of a motion that repeats.
+        pub mod passes {
+            use super::{COMMAND_WORDS, Real};
+
+            pub use $crate::$law::passes::{begin, shown, write};
+
+            /// Whether this controller takes a correction, which passes are for.
+            pub const POSSIBLE: bool = $corrects;
+
+            /// Whether a pass may begin with the next tick, see `may_begin` of the law.
+            #[must_use]
+            pub fn may_begin(status: u32, words: &[u64]) -> bool {
+                POSSIBLE && $crate::$law::passes::may_begin(status, words)
+            }
+
+            /// Writes that nothing is corrected.
+            pub fn end(words: &mut [u64; COMMAND_WORDS]) {
+                $crate::$law::passes::end::<Real>(words);
+            }
+        }
+
+        /// Digital lines.
+        pub mod triggers {
+            pub use $crate::specgen_runtime::trigger::{Direction, HIGH, Kind, Line, MISSED, MOST, lines};
+
+            /// Output lines of this controller.
+            pub const LINES: usize = $lines;
+            /// Whether it has an input line.
+            pub const INPUT: bool = $input;
+        }
+
+        /// Parts of the tick as functions of their own, for measuring what each costs. The tick does not use them.
+        #[cfg(feature = "stages")]
+        pub mod stages {
+            use super::{Config, Constants, State, TickInput};
+
+            pub use $crate::$law::stages::STAGE_COUNT;
+
+            /// A part of the tick.
+            pub type Stage = $crate::Stage<Constants>;
+
+            /// All stages, in the order of the tick. A static, so that they are compiled here and share what they call with the tick.
+            pub static STAGES: [Stage; STAGE_COUNT] = $crate::$law::stages::stages();
+
+            /// Brings a copy of the state to where the stages find it; not measured.
+            pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
+                $crate::$law::stages::prepare(Constants, config, state, input);
+            }
+        }
+    };
+}

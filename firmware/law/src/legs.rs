@@ -1,0 +1,18 @@
+//! The law of six legs with their own gauges: the hysteresis feed-forward of the paper, fed by the leg kinematics.
+
+mod config;
+mod constants;
+pub mod passes;
+pub mod sensing;
+pub mod stages;
+mod state;
+pub mod step;
+mod supervised;
+pub mod tick;
+pub mod waves;
+
+pub use config::{Config, Settings};
+pub use constants::{LegSpace, SixLegs};
+pub use state::{DeadTimeLead, Lead, LegState, State};
+pub use step::{actuate, step};
+pub use tick::{TickInput, TickOutput};

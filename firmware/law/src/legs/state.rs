@@ -1,0 +1,81 @@
+//! What the controller remembers from tick to tick. No NaN or infinity is ever stored here.
+
+use core::fmt::Debug;
+
+use specgen_runtime::snapshot::Snapshot;
+use specgen_runtime::{Digest, Estimate, Real};
+
+use super::constants::SixLegs;
+use crate::memory::LegMemory as _;
+use crate::spec::{LEGS, Reset};
+
+/// What a leg is asked for beyond the demand, so that it arrives in time; or nothing.
+pub trait DeadTimeLead<T: Real>: Copy + Debug + Snapshot {
+    /// None asked for.
+    const REST: Self;
+    /// Asks for so much, m. `lead` is not called where there is none.
+    fn ask(&mut self, lead: impl FnOnce() -> T);
+    /// What is asked for, m.
+    fn asked(&self) -> Option<T>;
+}
+
+specgen_runtime::state! { |words|
+    /// A lead of one leg, or of none: `N` is 1 or 0.
+    pub struct Lead<T, N>[T: Real, const N: usize] {
+        /// m.
+        asked: [T; N] = [T::ZERO; N], numbers(words.sizes().leg);
+    }
+}
+
+impl<T: Real + Debug, const N: usize> DeadTimeLead<T> for Lead<T, N> {
+    const REST: Self = Self::new();
+    #[inline(always)]
+    fn ask(&mut self, lead: impl FnOnce() -> T) {
+        if let Some(asked) = self.asked.first_mut() {
+            *asked = lead();
+        }
+    }
+    #[inline(always)]
+    fn asked(&self) -> Option<T> {
+        self.asked.first().copied()
+    }
+}
+
+specgen_runtime::state! { |words|
+    /// State of one leg.
+    pub struct LegState<P>[P: SixLegs](reset: &Reset<P>, leg: usize) {
+        /// Reversal memory; its displacement is q̂ = ρ̂X, what was really requested, m.
+        pub memory: P::Memory = reset.memory[leg], part if memory.highest() <= P::Real::from_f64(words.sizes().grid);
+        /// Converter code now held at the output.
+        pub code: i32 = reset.code, ticks(words.sizes().codes[1]) if *code >= words.sizes().codes[0];
+        /// δ̂ and φ̂, m.
+        pub estimate: Estimate<P::Real> = Estimate::new(), part;
+        /// What the leg is asked for beyond the demand, so that it arrives in time, m; none without `hysteresis.dead_time`.
+        pub lead: P::Lead = P::Lead::REST, part;
+    }
+}
+
+specgen_runtime::state! { |words|
+    /// State of the controller. Reset: at rest, as the spec says, no correction.
+    pub struct State<P>[P: SixLegs](reset: &Reset<P>) {
+        /// Legs 0 to 5.
+        pub legs: [LegState<P>; LEGS] = [
+            LegState::new(reset, 0), LegState::new(reset, 1), LegState::new(reset, 2),
+            LegState::new(reset, 3), LegState::new(reset, 4), LegState::new(reset, 5),
+        ], parts;
+        /// T: leg displacements demanded by the last accepted set-point, m.
+        pub demand: [P::Real; LEGS] = [P::Real::ZERO; LEGS], numbers(words.sizes().leg);
+        /// Ticks since the last run ended.
+        pub ticks_in_run: u32 = 0, tally;
+    }
+}
+
+impl<P: SixLegs> State<P> {
+    /// Fingerprint of everything that later ticks depend on, for comparing two machines bit for bit.
+    #[must_use]
+    pub fn digest(&self) -> u64 {
+        let mut digest = Digest::new();
+        Snapshot::digest(self, &mut digest);
+        digest.finish()
+    }
+}

@@ -1,0 +1,127 @@
+//! One control tick.
+//!
+//! At time t_n the interval that voltage u_n was held over has just ended and Y_n is read; the set-point is that of the
+//! END of the interval that begins now, T_{n+1}, and the voltages that come out are held over it.
+
+use specgen_runtime::linear::each;
+use specgen_runtime::real::saturate;
+use specgen_runtime::supervisor::Fallback;
+use specgen_runtime::{Law, SetpointKind};
+
+use super::config::Config;
+use super::constants::SixLegs;
+use super::sensing::{gauge_is_accepted, leg_setpoint_is_accepted};
+use super::state::{DeadTimeLead as _, LegState, State};
+use super::tick::{TickInput, TickOutput};
+use crate::kinematics::{leg_displacements, pose_is_accepted};
+use crate::memory::LegMemory as _;
+use crate::status::SETPOINT_FAULT;
+
+/// One control tick. See the module for the timing.
+pub fn step<P: SixLegs>(p: P, config: &Config<P>, state: &mut State<P>, input: &TickInput<P>) -> TickOutput<P> {
+    let status = advance(p, config, state, Fallback::None, input);
+    outputs(p, state, status)
+}
+
+/// The work of a tick of the law, or of what it has fallen back to; returns its status.
+pub fn advance<P: SixLegs>(
+    p: P,
+    config: &Config<P>,
+    state: &mut State<P>,
+    fallback: Fallback,
+    input: &TickInput<P>,
+) -> u32 {
+    let demand_before = state.demand;
+    let accepted = take_setpoint(p, config, state, input);
+    let run_ends = count_run(config, state);
+    let mut status = if accepted { 0 } else { SETPOINT_FAULT };
+    for (index, (leg, table)) in state.legs.iter_mut().zip(p.tables()).enumerate() {
+        let gauge = input.displacement[index];
+        let gauge_good = gauge_is_accepted(p, gauge);
+        if config.law() == Law::Invhys || (run_ends && gauge_good) {
+            adapt(config, leg, fallback, gauge);
+        }
+        leg.lead
+            .ask(|| saturate((state.demand[index] - demand_before[index]) * p.lead(), -p.lead_limit(), p.lead_limit()));
+        let limited = actuate(p, config, leg, table, state.demand[index]);
+        status |= (limited as u32) << index
+            | (!gauge_good as u32) << (8 + index)
+            | (leg.memory.fell_back() as u32) << (24 + index);
+    }
+    status
+}
+
+/// What goes out, and what the state is that the tick left.
+#[inline]
+pub fn outputs<P: SixLegs>(p: P, state: &State<P>, status: u32) -> TickOutput<P> {
+    let legs = &state.legs;
+    TickOutput {
+        voltage: each(|leg| p.dac().voltage(legs[leg].code)),
+        requested: each(|leg| shown(&legs[leg])),
+        demand: state.demand,
+        level: each(|leg| legs[leg].estimate.level),
+        drift: each(|leg| legs[leg].estimate.drift),
+        dac_code: each(|leg| legs[leg].code),
+        status,
+    }
+}
+
+/// T = Δl(h_d), or T itself. A set-point that is not accepted leaves the last demand standing.
+#[inline]
+pub fn take_setpoint<P: SixLegs>(p: P, config: &Config<P>, state: &mut State<P>, input: &TickInput<P>) -> bool {
+    let accepted = match config.setpoint() {
+        SetpointKind::Pose => pose_is_accepted(p, &input.setpoint),
+        SetpointKind::Leg => leg_setpoint_is_accepted(p, &input.setpoint),
+    };
+    if accepted {
+        state.demand = match config.setpoint() {
+            SetpointKind::Pose => leg_displacements(p, &input.setpoint),
+            SetpointKind::Leg => input.setpoint,
+        };
+    }
+    accepted
+}
+
+/// Whether a run of `run_interval` ticks ends with this reading.
+#[inline]
+fn count_run<P: SixLegs>(config: &Config<P>, state: &mut State<P>) -> bool {
+    let ticks = state.ticks_in_run.saturating_add(1);
+    let ends = ticks >= config.run_interval();
+    state.ticks_in_run = if ends { 0 } else { ticks };
+    ends
+}
+
+/// ρ̂X, m: what the leg is to show. The lead is no part of it: the leg is asked for it so that it arrives in time.
+#[inline]
+fn shown<P: SixLegs>(leg: &LegState<P>) -> P::Real {
+    match leg.lead.asked() {
+        Some(lead) => leg.memory.displacement() - lead,
+        None => leg.memory.displacement(),
+    }
+}
+
+/// m = Y − ρ̂X, then (AII.3) or (AII.5), (AII.6), with what the fallback leaves of the weights.
+#[inline]
+fn adapt<P: SixLegs>(config: &Config<P>, leg: &mut LegState<P>, fallback: Fallback, gauge: P::Real) {
+    let model_error = gauge - shown(leg);
+    let share: P::Real = fallback.share();
+    let (level, drift) = (config.level_weight() * share, config.drift_weight() * share);
+    leg.estimate.update(config.law(), level, drift, model_error);
+}
+
+/// u = Γ⁻¹(T − δ̂ − φ̂) as a permitted code; the memory then holds what that code really requests. Returns whether a
+/// limit of table, voltage or slew rate held the leg back.
+#[inline]
+pub fn actuate<P: SixLegs>(p: P, config: &Config<P>, leg: &mut LegState<P>, table: &P::Table, demand: P::Real) -> bool {
+    let led = match leg.lead.asked() {
+        Some(lead) => demand + lead,
+        None => demand,
+    };
+    let request = led - leg.estimate.correction();
+    let out_of_reach = !leg.memory.reaches(table, request);
+    let drive = leg.memory.solve(table, request);
+    let (code, held_back) = p.dac().code(drive, leg.code, config.code_limits());
+    leg.code = code;
+    leg.memory.apply(table, p.dac().drive(code));
+    out_of_reach || held_back
+}

@@ -1,0 +1,77 @@
+//! A wave in place of the host's set-points: what it has to keep to, and the input words that it writes.
+
+use specgen_runtime::wave::Limits;
+use specgen_runtime::{Motion, Real, SetpointKind};
+
+use super::config::Config;
+use super::constants::SixLegs;
+use crate::kinematics::leg_displacements;
+use crate::spec::Compiled;
+
+/// No limit of the spec: the slew rate of the amplifiers is what a leg has to keep to, m/s².
+const ACCELERATION: f64 = 1e6;
+
+/// Range from `actuator.stroke` or, where set-points are poses, `workspace`; the rate is what the slew limit in force
+/// leaves a leg, shared by the six axes of a pose.
+#[must_use]
+pub fn limits<P: SixLegs + Compiled>(config: &Config<P>) -> Limits<P::Real> {
+    let p = P::CONSTANTS;
+    let ticks_per_second = P::Real::from_f64(1.0 / p.period_seconds());
+    let codes = P::Real::from_i32(config.code_limits().max_step);
+    let rate = codes * p.dac().volts_per_code * p.leg_gain() * ticks_per_second;
+    let mut limits = Limits {
+        low: [p.leg_setpoint()[0]; 6],
+        high: [p.leg_setpoint()[1]; 6],
+        rate: [rate; 6],
+        acceleration: [P::Real::from_f64(ACCELERATION); 6],
+        ticks_per_second,
+    };
+    if config.setpoint() == SetpointKind::Pose {
+        for (axis, bound) in p.pose_bound().iter().enumerate() {
+            let mut pose = [P::Real::ZERO; 6];
+            pose[axis] = *bound;
+            let mut longest: P::Real = P::Real::ZERO;
+            for leg in leg_displacements(p, &pose) {
+                if leg.abs() > longest {
+                    longest = leg.abs();
+                }
+            }
+            limits.low[axis] = -*bound;
+            limits.high[axis] = *bound;
+            limits.rate[axis] = if longest > P::Real::ZERO {
+                rate * *bound / (P::Real::from_f64(6.0) * longest)
+            } else {
+                P::Real::ZERO
+            };
+        }
+    }
+    limits
+}
+
+/// A wave may begin with the next tick: the set-point in force, in `words`, is its center, but for what an axis may move
+/// in a tick. Legs would jump otherwise.
+///
+/// # Errors
+/// The first axis that stands elsewhere.
+pub fn may_begin<T: Real>(_status: u32, words: &[u64], center: &[T; 6], limits: &Limits<T>) -> Result<(), usize> {
+    for (axis, (word, center)) in words.iter().zip(center).enumerate() {
+        let away = (T::from_word(*word) - *center).abs();
+        let near = away * limits.ticks_per_second <= limits.rate[axis];
+        if !near {
+            return Err(axis);
+        }
+    }
+    Ok(())
+}
+
+/// Writes the set-point into the words of a tick's input.
+pub fn write<T: Real>(motion: &Motion<T>, _sequence: u32, words: &mut [u64]) {
+    rest(&motion.pose, words);
+}
+
+/// Writes the command to stay where a wave about `center` has come to rest.
+pub fn rest<T: Real>(center: &[T; 6], words: &mut [u64]) {
+    for (slot, number) in words.iter_mut().zip(center) {
+        *slot = number.to_word();
+    }
+}

@@ -1,0 +1,36 @@
+#![no_std]
+#![forbid(unsafe_code)]
+#![deny(missing_docs)]
+//! The control law, written once, for any platform and in `f32` or `f64`.
+//!
+//! Start reading at [`platform::step`](mod@platform::step): one control tick of a platform in task space. [`legs`] is the law of six
+//! legs with their own gauges. [`supervise`](supervise::supervise) runs either under its supervisor.
+//!
+//! What a law has to know of a spec are the constants and types of a trait: [`Spec`] for both laws, [`platform::Platform`] and
+//! [`legs::SixLegs`] for what only one of them asks for. An emitted controller implements them with constants ([`Compiled`] adds the
+//! sizes of its memory), and [`controller!`] gives it the names that targets use. The constants are handed on by value: a type without
+//! size where a compiler wrote them, a reference where they are read at run time.
+//!
+//! No panic path, no allocation; the rules of `specgen_runtime` hold here, too.
+
+mod controller;
+pub mod description;
+pub mod integrity;
+pub mod kinematics;
+pub mod legs;
+mod machine;
+mod memory;
+pub mod platform;
+pub mod snapshot;
+mod spec;
+mod stage;
+pub mod status;
+pub mod supervise;
+pub mod words;
+
+pub use machine::{Machine, MachineInput, MachineOutput, followed_by, machine_output_words};
+pub use memory::LegMemory;
+pub use spec::{Compiled, ConfigError, ConfigOf, ControlLaw, InputOf, LEGS, OutputOf, Reset, Spec, StateOf};
+#[doc(hidden)]
+pub use specgen_runtime;
+pub use stage::Stage;

@@ -1,0 +1,134 @@
+//! A machine, the control law under its supervisor: what is remembered, read and given out, and inputs and outputs as 64-bit words:
+//! those of the law, and what the supervisor adds.
+
+use specgen_runtime::supervisor::{Cause, Phase, Request, Supervisor};
+use specgen_runtime::{Digest, Snapshot as _};
+
+use crate::spec::{Compiled, ControlLaw as _, InputOf, LEGS, OutputOf, Spec, StateOf};
+use crate::words::{WordArray as _, word};
+
+specgen_runtime::state! { |words|
+    /// Everything that is remembered from tick to tick. No NaN or infinity is ever stored here. Reset: disarmed, and the law at reset.
+    pub struct Machine<P>[P: Spec](state: StateOf<P>) {
+        /// State of the control law.
+        pub state: StateOf<P> = state, part;
+        /// Phase, cause and what the supervisor watches.
+        pub supervisor: Supervisor<P::Real> = Supervisor::new(), part;
+    }
+}
+
+impl<P: Spec> Machine<P> {
+    /// Fingerprint of everything that later ticks depend on.
+    #[must_use]
+    pub fn digest(&self) -> u64 {
+        let mut digest = Digest::new();
+        let mut state = Digest::new();
+        self.state.digest(&mut state);
+        digest.word(state.finish());
+        self.supervisor.digest(&mut digest);
+        digest.finish()
+    }
+}
+
+/// What a tick reads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MachineInput<P: Spec> {
+    /// Command and readings, as the control law takes them.
+    pub tick: InputOf<P>,
+    /// What is wanted of the supervisor; it holds for as long as it is given.
+    pub request: Request,
+    /// What the target noticed since the last tick, as bits: [`MISSED_TICK`](specgen_runtime::supervisor::MISSED_TICK),
+    /// [`LINK_LOST`](specgen_runtime::supervisor::LINK_LOST), [`INTEGRITY`](specgen_runtime::supervisor::INTEGRITY), [`CONVERTER`](specgen_runtime::supervisor::CONVERTER),
+    /// [`STOP`](specgen_runtime::supervisor::STOP), [`AMPLIFIER`](specgen_runtime::supervisor::AMPLIFIER), [`STALLED`](specgen_runtime::supervisor::STALLED).
+    pub events: u32,
+}
+
+/// What a tick yields. Every number is finite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MachineOutput<P: Spec> {
+    /// Codes and voltages that go out, and the status of the control law where it ran.
+    pub tick: OutputOf<P>,
+    /// What the machine does over the coming interval.
+    pub phase: Phase,
+    /// Why, if it was forced upon it.
+    pub cause: Cause,
+    /// Whether the amplifiers are to be on over the coming interval.
+    pub amplifier_on: bool,
+    /// Word of what the wiring check found, or of what the law has fallen back to, a [`Finding`](specgen_runtime::supervisor::Finding);
+    /// 0 is nothing.
+    pub finding: u32,
+}
+
+impl<P: Spec> MachineOutput<P> {
+    /// phase | cause << 8 | amplifier on << 16 | finding << 17.
+    #[inline]
+    #[must_use]
+    pub fn supervisor_word(&self) -> u32 {
+        self.phase.word() as u32
+            | (self.cause.word() as u32) << 8
+            | (self.amplifier_on as u32) << 16
+            | self.finding << 17
+    }
+}
+
+impl<P: Compiled> MachineInput<P> {
+    /// From words in the order of the controller's `MACHINE_INPUT_NAMES`.
+    #[must_use]
+    pub fn from_words(words: &P::MachineInputWords) -> Self {
+        let words = words.as_ref();
+        let law = P::InputWords::ZERO.as_ref().len();
+        Self {
+            tick: P::Law::read_input(P::CONSTANTS, words),
+            request: Request::from_word(word(words, law)),
+            events: word(words, law + 1) as u32,
+        }
+    }
+
+    /// Of what a target was asked for and what it measured. One that measures no wrench gives NaN for it.
+    #[must_use]
+    pub fn measured(
+        command: &P::CommandWords,
+        gauge: &[P::Real; 6],
+        wrench: &[P::Real; 6],
+        request: Request,
+        events: u32,
+    ) -> Self {
+        Self { tick: P::Law::measured(P::CONSTANTS, command.as_ref(), gauge, wrench), request, events }
+    }
+}
+
+/// Words in the order of the controller's `MACHINE_OUTPUT_NAMES`, of a tick and of the machine that it left.
+#[must_use]
+pub fn machine_output_words<P: Compiled>(output: &MachineOutput<P>, machine: &Machine<P>) -> P::MachineOutputWords {
+    let mut words = P::MachineOutputWords::ZERO;
+    if let Some((law, last)) = words.as_mut().split_last_chunk_mut() {
+        P::Law::write_output(P::CONSTANTS, &output.tick, &machine.state, law);
+        *last = [output.supervisor_word() as u64, machine.supervisor.conditions as u64];
+    }
+    words
+}
+
+/// The names of the law's words, and two more.
+#[must_use]
+pub const fn followed_by<const N: usize, const ALL: usize>(
+    law: &[&'static str; N],
+    more: [&'static str; 2],
+) -> [&'static str; ALL] {
+    let mut all = [more[1]; ALL];
+    let mut k = 0;
+    while k < N {
+        all[k] = law[k];
+        k += 1;
+    }
+    all[N] = more[0];
+    all
+}
+
+/// Codes by which each leg moved.
+#[cold]
+pub(crate) fn moved(before: &[i32; LEGS], mut codes: [i32; LEGS]) -> [i32; LEGS] {
+    for (code, before) in codes.iter_mut().zip(before) {
+        *code -= *before;
+    }
+    codes
+}

@@ -1,0 +1,86 @@
+//! The hysteresis models that a leg may have.
+
+use core::fmt::Debug;
+
+use specgen_runtime::{
+    CreepEverett, CreepMemory, DynamicEverett, DynamicMemory, Grid, LastLine, Real, ReversalMemory, Snapshot,
+};
+
+/// What a leg remembers of its drive; forward model and inverse over a table.
+pub trait LegMemory<T: Real, Table>: Copy + Debug + Snapshot {
+    /// Displacement that the model gives for the drive last applied, m.
+    fn displacement(&self) -> T;
+    /// The highest drive in memory, cells.
+    fn highest(&self) -> T;
+    /// Whether the last inverse was the static one for want of a safe one of the rate-dependent model.
+    fn fell_back(&self) -> bool;
+    /// Whether the table reaches `displacement`, m.
+    fn reaches(&self, table: &Table, displacement: T) -> bool;
+    /// Applies a drive, cells; returns the displacement, m.
+    fn apply(&mut self, table: &Table, drive: T) -> T;
+    /// The drive for a displacement, m.
+    fn solve(&mut self, table: &Table, displacement: T) -> T;
+    /// Applies the drive for a displacement that needs no search, if `permitted` lets it through; returns whether it did.
+    fn track(
+        &mut self,
+        table: &Table,
+        last: &mut LastLine<T>,
+        displacement: T,
+        permitted: impl FnOnce(T) -> Option<T>,
+    ) -> bool;
+    /// Applies the drive that comes as near to a displacement as `permitted` lets it; returns whether the table does not reach it.
+    fn follow_within(&mut self, table: &Table, displacement: T, permitted: impl FnOnce(T) -> T) -> bool;
+}
+
+macro_rules! leg_memory {
+    ($([$($declared:tt)+] $table:ty, $memory:ty;)+) => {
+        $(
+            impl<$($declared)+> LegMemory<T, $table> for $memory {
+                #[inline(always)]
+                fn displacement(&self) -> T {
+                    self.displacement()
+                }
+                #[inline(always)]
+                fn highest(&self) -> T {
+                    self.highest()
+                }
+                #[inline(always)]
+                fn fell_back(&self) -> bool {
+                    self.fell_back()
+                }
+                #[inline(always)]
+                fn reaches(&self, table: &$table, displacement: T) -> bool {
+                    self.reaches(table, displacement)
+                }
+                #[inline(always)]
+                fn apply(&mut self, table: &$table, drive: T) -> T {
+                    self.apply(table, drive)
+                }
+                #[inline(always)]
+                fn solve(&mut self, table: &$table, displacement: T) -> T {
+                    Self::solve(self, table, displacement)
+                }
+                #[inline(always)]
+                fn track(
+                    &mut self,
+                    table: &$table,
+                    last: &mut LastLine<T>,
+                    displacement: T,
+                    permitted: impl FnOnce(T) -> Option<T>,
+                ) -> bool {
+                    self.track(table, last, displacement, permitted)
+                }
+                #[inline(always)]
+                fn follow_within(&mut self, table: &$table, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
+                    self.follow_within(table, displacement, permitted)
+                }
+            }
+        )+
+    };
+}
+
+leg_memory! {
+    [T: Real + Debug, G: Grid<T>, const CAP: usize] G, ReversalMemory<T, CAP>;
+    [T: Real + Debug, G: Grid<T>, const CAP: usize] DynamicEverett<T, G>, DynamicMemory<T, CAP>;
+    ['a, T: Real + Debug, G: Grid<T>, const CAP: usize, const K: usize] CreepEverett<'a, T, G, K>, CreepMemory<T, CAP, K>;
+}

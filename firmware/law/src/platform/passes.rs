@@ -1,0 +1,48 @@
+//! A pass of a motion that repeats: what it writes into the words of a command, and what a tick shows of it.
+
+use specgen_runtime::Real;
+use specgen_runtime::pass::Given;
+use specgen_runtime::setpoint::CommandKind;
+
+use super::constants::Platform;
+use super::state::State;
+use super::tick::command_words;
+use crate::status::GENERATOR_BUSY;
+
+/// A pass may begin with the next tick: no motion is under way, and no trajectory is what is asked for. `status` is that of the last tick,
+/// `words` is the command that it ran under.
+#[must_use]
+pub fn may_begin(status: u32, words: &[u64]) -> bool {
+    let plays = words.first().is_some_and(|word| CommandKind::from_word(*word) == CommandKind::Trajectory);
+    status & GENERATOR_BUSY == 0 && !plays
+}
+
+/// Writes the correction into the command's words, and the trajectory that begins.
+pub fn write<T: Real>(given: &Given<T>, words: &mut [u64]) {
+    for (slot, number) in words.iter_mut().skip(command_words(0)).zip(&given.correction) {
+        *slot = number.to_word();
+    }
+    if let Some(trajectory) = given.begins {
+        begin(trajectory, words);
+    }
+}
+
+/// Writes the command that plays a trajectory.
+pub fn begin(trajectory: u32, words: &mut [u64]) {
+    if let Some([kind, selector]) = words.first_chunk_mut() {
+        (*kind, *selector) = (CommandKind::Trajectory.word(), trajectory as u64);
+    }
+}
+
+/// Writes that nothing is corrected.
+pub fn end<T: Real>(words: &mut [u64]) {
+    for slot in words.iter_mut().skip(command_words(0)) {
+        *slot = T::ZERO.to_word();
+    }
+}
+
+/// What a tick shows: h_d for its end, and h at its beginning, m and rad.
+#[must_use]
+pub fn shown<P: Platform>(state: &State<P>) -> Option<[[P::Real; 6]; 2]> {
+    Some([state.generator.target().pose, state.pose])
+}

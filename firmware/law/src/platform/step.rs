@@ -1,0 +1,432 @@
+//! One control tick.
+//!
+//! At time t_n the interval that the voltages u_n were held over has just ended and the gauges are read; the set-point is
+//! that of the END of the interval that begins now, t_{n+1}, and the voltages that come out are held over it.
+//!
+//! ```text
+//! sense      gauges → h                                                      pose from rest
+//! learn      e = N(h_d(t_n) − h) ;  s ← s + T k_I e                          (7), held where it would wind up
+//!            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6), in modal coordinates
+//! setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}
+//! load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G + K_e (h_d − h_e)) − f_rest)/k_a      known deflection of the legs, (7)
+//!            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T                  damping, lead
+//! legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is what was really requested
+//! ```
+//! N is the modal notch. A correction c that was learned or prepared for the motion (`specgen_runtime::correction`) adds J c to q; like damping the innovation does not see it. Active damping D(z) e, where a spec asks for it, is part of p: `specgen_runtime::damping`. p is a load that the legs really carry, so it belongs to the model of the innovation; the feedback
+//! is none and does not.
+//!
+//! Y = Δl(h) is taken to first order about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,
+//! offset b of a change of mode) and w = q − q̂ withheld by limits, the innovation is then w − b − f − J e: no large numbers
+//! are subtracted, and f is small in modal coordinates, too. What is left out is the error times the change of J over the
+//! workspace, a thousandth of it, and the rounding of the converter on a leg that is free.
+//!
+//! δ̂ and φ̂ are kept in modal coordinates, where N works: with the same weights on every leg the law commutes with the map
+//! between them, and one map takes feedback and estimates to the legs, J⁻ᵀF/k_a − δ̂ − φ̂ = J V (V⁻¹K⁻¹F − δ̂ − φ̂).
+
+use specgen_runtime::feedback::{force_of, winds_up};
+use specgen_runtime::linear::{difference, each, transform};
+use specgen_runtime::setpoint::CommandKind;
+use specgen_runtime::supervisor::Fallback;
+use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real};
+
+use super::config::Config;
+use super::constants::Platform;
+use super::notch::{modal_error, notch_error, notch_innovation};
+use super::parts::{ModalDamping as _, RequestCorrection as _};
+use super::sensing;
+use super::state::{LegState, State};
+use super::tick::{TickInput, TickOutput};
+use crate::kinematics::leg_displacements;
+use crate::memory::LegMemory as _;
+use crate::spec::LEGS;
+use crate::status::{CORRECTION_LIMITED, WRENCH_FAULT};
+
+/// One control tick. See the module for the timing.
+pub fn step<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, input: &TickInput<P>) -> TickOutput<P> {
+    let status = advance(p, config, state, Fallback::None, input.command.kind, input);
+    outputs(p, state, status)
+}
+
+/// The work of a tick of the law, or of what it has fallen back to, with `kind` in place of that of the command; returns its status.
+pub fn advance<P: Platform>(
+    p: P,
+    config: &Config<P>,
+    state: &mut State<P>,
+    fallback: Fallback,
+    kind: CommandKind,
+    input: &TickInput<P>,
+) -> u32 {
+    if state.fallback != fallback {
+        fall_back(state, fallback);
+    }
+    let entered = enter_mode(p, config, state);
+    let gauge_faults = sense(p, config, state, &input.gauge);
+    if gauge_faults == 0 {
+        learn(p, config, state);
+    } else {
+        state.damping.act(p.damping(), &[P::Real::ZERO; 6]);
+    }
+    let wrench_good = take_wrench(p, config, state, &input.wrench);
+    let damping = damping(p, config, state);
+    let played = state.generator.plays();
+    let moved = p.hands_over() && state.generator.can_stop();
+    let setpoint_status = state.generator.tick_as(p.setpoints(), kind, &input.command);
+    if moved && !state.generator.can_stop() {
+        rest(p, config, state);
+    }
+    let (demand, load) = known_load(p, config, state);
+    let correction_held = state.correction.follow(p.correction(), &input.correction);
+    let reaction = reaction(p, config, state);
+    if p.lead() == P::Real::ZERO && p.own_leads().is_empty() {
+        state.load = load;
+    } else {
+        let lead = lead(p, played.or(state.generator.plays()));
+        state.load = each(|leg| load[leg] + (demand[leg] - state.demand[leg]) * lead);
+    }
+    state.demand = demand;
+    if let Some(damping) = &damping {
+        state.load = each(|leg| state.load[leg] + damping[leg]);
+    }
+    let mut request = each(|leg| demand[leg] + state.load[leg] + reaction[leg]);
+    if entered {
+        hand_over(p, config, state, &request);
+        request = each(|leg| state.legs[leg].requested);
+    } else {
+        state.transfer.fade(p.transfer_keep(), p.transfer_negligible());
+        if state.transfer.is_active() {
+            let offset = state.transfer.offset();
+            request = each(|leg| request[leg] + offset[leg]);
+        }
+    }
+    let mut limited = 0;
+    for (index, (leg, table)) in state.legs.iter_mut().zip(p.tables()).enumerate() {
+        let held_back = actuate(p, config, leg, table, request[index]);
+        limited |= (held_back as u32) << index;
+    }
+    state.limited = limited != 0;
+    let mut static_inverse = 0;
+    for (index, leg) in state.legs.iter().enumerate() {
+        static_inverse |= ((config.mode().inverts() && leg.memory.fell_back()) as u32) << (24 + index);
+    }
+    let inputs = if wrench_good { 0 } else { WRENCH_FAULT } | if correction_held { CORRECTION_LIMITED } else { 0 };
+    static_inverse | limited | gauge_faults << 8 | setpoint_status | inputs
+}
+
+/// Lead of a trajectory that is played, or of any other motion.
+#[inline]
+fn lead<P: Platform>(p: P, played: Option<u32>) -> P::Real {
+    match played {
+        Some(selector) if !p.own_leads().is_empty() => {
+            p.own_leads().get(selector as usize).copied().unwrap_or(p.lead())
+        }
+        _ => p.lead(),
+    }
+}
+
+/// What goes out, of the state that the tick left.
+#[inline]
+pub fn outputs<P: Platform>(p: P, state: &State<P>, status: u32) -> TickOutput<P> {
+    let legs = &state.legs;
+    TickOutput { voltage: each(|leg| p.dac().voltage(legs[leg].code)), dac_code: each(|leg| legs[leg].code), status }
+}
+
+/// Whether this tick is the first of its mode, or of its source of the interaction force. If so, what the mode does not
+/// use is put at rest; the first request then defines what keeps the voltages where they are.
+#[inline]
+fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bool {
+    let (mode, interaction) = (config.mode(), config.interaction());
+    let same_force = state.interaction == interaction
+        && (interaction != Interaction::Modelled || state.environment == *config.environment());
+    if state.mode == Some(mode) && same_force {
+        return false;
+    }
+    let adapted = match state.mode {
+        Some(before) => before.law() != Law::Invhys,
+        None => false,
+    };
+    if mode.law() != Law::Invhys && !adapted {
+        state.integral = Integral::new();
+        state.deflection = [P::Real::ZERO; 6];
+    }
+    state.mode = Some(mode);
+    state.interaction = interaction;
+    state.environment = *config.environment();
+    for estimate in &mut state.estimates {
+        match mode.law() {
+            Law::Invhys => *estimate = Estimate::new(),
+            Law::Ewma => estimate.drift = P::Real::ZERO,
+            Law::Pcc => {}
+        }
+    }
+    for leg in &mut state.legs {
+        leg.requested = requested(p, mode, leg);
+        leg.excess = P::Real::ZERO;
+    }
+    state.limited = false;
+    if mode.law() == Law::Invhys {
+        state.innovation_notch = NotchState::new();
+    }
+    if !mode.damps_modes() {
+        state.damping = P::Damping::REST;
+    }
+    if !mode.feeds_back() {
+        state.integral = Integral::new();
+        state.error_notch = NotchState::new();
+        state.error = [P::Real::ZERO; 6];
+        state.deflection = [P::Real::ZERO; 6];
+    }
+    true
+}
+
+/// Gives what the first `request` of a mode (m of each leg) lacks to where the legs stand to what the mode would itself
+/// come to hold it with: the estimates, else the integral if every axis has one. Else it becomes an offset that fades.
+#[cold]
+fn hand_over<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, request: &[P::Real; LEGS]) {
+    let held = each(|leg| state.legs[leg].requested - request[leg]);
+    let mode = config.mode();
+    let mut offset = [P::Real::ZERO; LEGS];
+    if mode.law() != Law::Invhys {
+        for (estimate, held) in state.estimates.iter_mut().zip(transform(p.legs_to_modes(), &held)) {
+            estimate.level = estimate.level - held;
+        }
+    } else if mode.feeds_back() && config.active_gains().integral.iter().all(|gain| *gain > P::Real::ZERO) {
+        state.integral.grow(&transform(p.legs_to_wrench(), &held));
+    } else {
+        offset = held;
+    }
+    state.transfer.begin(offset);
+}
+
+/// The law falls back, or has all its parts again. What damping and gains asked for against the oscillation ends at once: to keep
+/// what it happened to be in this tick would put the platform off by as much. Integral and estimates stay.
+#[cold]
+#[inline(never)]
+fn fall_back<P: Platform>(state: &mut State<P>, fallback: Fallback) {
+    state.fallback = fallback;
+    state.damping = P::Damping::REST;
+    if fallback == Fallback::FeedForward {
+        for estimate in &mut state.estimates {
+            // δ̂ would go on with φ̂.
+            *estimate = Estimate { level: estimate.correction(), drift: P::Real::ZERO };
+        }
+    }
+}
+
+/// An error, or an innovation, as far as the fallback lets it count.
+#[cold]
+#[inline(never)]
+fn weaken<T: Real>(fallback: Fallback, values: &mut [T; 6]) {
+    let share: T = fallback.share();
+    for value in values {
+        *value = *value * share;
+    }
+}
+
+/// The set-point has come to rest: the estimates take over what the integral gathered on the way. Nothing else of the request changes. Both
+/// work on one error; the integral would give back at the rate of k_I/(1 + k_p) what the estimates unlearn at theirs.
+#[cold]
+fn rest<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
+    let mode = config.mode();
+    if mode.feeds_back() && mode.law() != Law::Invhys {
+        let held = transform(p.force_to_modes(), &state.integral.force);
+        for (estimate, held) in state.estimates.iter_mut().zip(held) {
+            estimate.level = estimate.level - held;
+        }
+        state.integral = Integral::new();
+    }
+}
+
+/// h and ḣ from the gauges; returns the gauges that are not believed, bit by bit. With any such the last pose is held.
+#[inline]
+pub fn sense<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, gauge: &[P::Real; 6]) -> u32 {
+    let faults = sensing::faults(p, gauge);
+    if faults == 0 {
+        state.pose = sensing::pose(p, gauge);
+    }
+    if !config.damps() {
+        state.rate.rest();
+    } else if faults == 0 {
+        state.rate.update(p.rate_filter(), &state.pose);
+    } else {
+        state.rate.coast(p.rate_filter());
+    }
+    faults
+}
+
+/// What the readings teach: the integral of (7), the run-to-run estimates, and what is asked for against the modes.
+#[inline]
+pub fn learn<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
+    let mode = config.mode();
+    let error = modal_error(p, &difference(&state.generator.target().pose, &state.pose));
+    let fallback = state.fallback;
+    if mode.damps_modes() && fallback == Fallback::None {
+        state.damping.act(p.damping(), &error);
+    }
+    if mode.feeds_back() {
+        state.error = notch_error(p, &mut state.error_notch, &error);
+        if fallback != Fallback::None {
+            weaken(fallback, &mut state.error);
+        }
+        let growth = Integral::growth(&config.active_gains().integral, p.period(), &state.error);
+        if !(state.limited && would_wind_up(p, &state.legs, &growth)) {
+            state.integral.grow(&growth);
+        }
+    }
+    if mode.law() != Law::Invhys {
+        let disturbed = state.limited || state.transfer.is_active();
+        let mut innovation = each(|mode| -error[mode] - state.deflection[mode]);
+        if disturbed {
+            let offset = state.transfer.offset();
+            let withheld = each(|leg| state.legs[leg].excess - offset[leg]);
+            let withheld = transform(p.legs_to_modes(), &withheld);
+            innovation = each(|mode| innovation[mode] + withheld[mode]);
+        }
+        let mut innovation = notch_innovation(p, &mut state.innovation_notch, &innovation);
+        if fallback != Fallback::None {
+            weaken(fallback, &mut innovation);
+        }
+        let (level, drift) = (config.level_weight(), config.drift_weight());
+        Estimate::correct(&mut state.estimates, mode.law(), level, drift, &innovation);
+    }
+}
+
+/// Whether the integral's growth would push a leg further beyond the limit that holds it back.
+#[inline]
+fn would_wind_up<P: Platform>(p: P, legs: &[LegState<P>; LEGS], growth: &[P::Real; 6]) -> bool {
+    let excess = each(|leg| legs[leg].excess);
+    winds_up(&excess, &transform(p.wrench_to_legs(), growth))
+}
+
+/// Takes the measured wrench if it is to be believed; one that nobody asks for is not looked at.
+#[inline]
+fn take_wrench<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, wrench: &[P::Real; 6]) -> bool {
+    if config.interaction() != Interaction::Measured {
+        return true;
+    }
+    let good = wrench.iter().zip(p.wrench_limit()).all(|(value, limit)| (-*limit..=*limit).contains(value));
+    if good {
+        state.wrench = *wrench;
+    }
+    good
+}
+
+/// J⁻ᵀ k_v ė/k_a with ė = ḣ_d(t_n) − ḣ: m of each leg; none without k_v.
+#[inline]
+fn damping<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> Option<[P::Real; LEGS]> {
+    if !config.damps() {
+        return None;
+    }
+    let mut error = difference(&state.generator.target().rate, state.rate.value());
+    if state.fallback != Fallback::None {
+        weaken(state.fallback, &mut error);
+    }
+    Some(transform(p.wrench_to_legs(), &force_of(&config.active_gains().derivative, &error)))
+}
+
+/// Leg displacements at the set-point, and by how much the legs give way to motion, gravity and the work piece there, (7); m.
+#[inline]
+pub fn known_load<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> ([P::Real; LEGS], [P::Real; LEGS]) {
+    let target = state.generator.target();
+    let wrench = match config.interaction() {
+        Interaction::Neglected => {
+            if let Some(affine) = p.affine_load() {
+                return (leg_displacements(p, &target.pose), affine.deflection(target));
+            }
+            None
+        }
+        Interaction::Measured => Some(state.wrench),
+        Interaction::Modelled => {
+            let environment = config.environment();
+            Some(force_of(&environment.stiffness, &difference(&environment.rest, &target.pose)))
+        }
+    };
+    let load = p.body().load(target, wrench.as_ref());
+    (load.displacement, each(|leg| (load.force[leg] - p.rest_force()[leg]) * p.compliance()))
+}
+
+/// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂, what is asked for against the modes, and J c: m of each leg.
+#[inline]
+pub fn reaction<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> [P::Real; LEGS] {
+    if config.mode().feeds_back() {
+        let proportional = force_of(&config.active_gains().proportional, &state.error);
+        let integral = &state.integral.force;
+        let force = each(|axis| proportional[axis] + integral[axis]);
+        state.deflection = transform(p.force_to_modes(), &force);
+    }
+    let wanted = each(|mode| state.deflection[mode] - state.estimates[mode].correction());
+    let mut wanted = state.damping.beside(wanted);
+    if let Some(correction) = state.correction.pose() {
+        let correction = modal_error(p, &correction);
+        wanted = each(|mode| wanted[mode] + correction[mode]);
+    }
+    transform(p.modes_to_legs(), &wanted)
+}
+
+/// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,
+/// voltage or slew rate held the leg back.
+#[inline(never)]
+pub fn actuate<P: Platform>(
+    p: P,
+    config: &Config<P>,
+    leg: &mut LegState<P>,
+    table: &P::Table,
+    request: P::Real,
+) -> bool {
+    if config.mode().inverts() && track(p, config, leg, table, request) {
+        return false;
+    }
+    actuate_limited(p, config, leg, table, request)
+}
+
+/// The short way of a leg that tracks; where it is none, nothing has changed. Returns whether it was one.
+#[inline(always)]
+fn track<P: Platform>(p: P, config: &Config<P>, leg: &mut LegState<P>, table: &P::Table, request: P::Real) -> bool {
+    let previous = leg.code;
+    let mut code = previous;
+    let tracked = leg.memory.track(table, &mut leg.last, request, |drive| {
+        code = p.dac().free_code(drive, previous, config.code_limits())?;
+        Some(p.dac().drive(code))
+    });
+    if tracked {
+        leg.code = code;
+        leg.requested = leg.memory.displacement();
+        leg.excess = P::Real::ZERO;
+    }
+    tracked
+}
+
+/// [`actuate`] whatever the request.
+#[inline(never)]
+fn actuate_limited<P: Platform>(
+    p: P,
+    config: &Config<P>,
+    leg: &mut LegState<P>,
+    table: &P::Table,
+    request: P::Real,
+) -> bool {
+    let LegState { memory, code, .. } = leg;
+    let mut limited = false;
+    let mut permitted = |drive: P::Real| {
+        let (permitted, held_back) = p.dac().code(drive, *code, config.code_limits());
+        *code = permitted;
+        limited |= held_back;
+        p.dac().drive(permitted)
+    };
+    if config.mode().inverts() {
+        let out_of_reach = memory.follow_within(table, request, &mut permitted);
+        limited |= out_of_reach;
+        leg.requested = leg.memory.displacement();
+    } else {
+        let drive = permitted(request * p.cells_per_metre());
+        memory.apply(table, drive);
+        leg.requested = drive * p.metres_per_cell();
+    }
+    leg.excess = if limited { request - leg.requested } else { P::Real::ZERO };
+    limited
+}
+
+/// What the code that is held means in the leg model of a mode, m.
+#[inline]
+fn requested<P: Platform>(p: P, mode: ControlMode, leg: &LegState<P>) -> P::Real {
+    if mode.inverts() { leg.memory.displacement() } else { p.dac().drive(leg.code) * p.metres_per_cell() }
+}

@@ -1,0 +1,40 @@
+//! Output lines at positions, levels, in motion, at set-points and ticks: what a tick under the supervisor gives them to see.
+
+use specgen_runtime::setpoint::CommandKind;
+use specgen_runtime::supervisor::Phase;
+use specgen_runtime::trigger::Seen;
+
+use super::config::Config;
+use super::constants::Platform;
+use super::parts::OutputLines as _;
+use super::state::State;
+use super::tick::TickInput;
+use crate::status::{GENERATOR_BUSY, SETPOINT_FAULT, SETPOINT_STALE};
+
+/// After the law: the bits of the status that say how the lines are over the coming interval, by the pose measured at its beginning. They are
+/// low unless the law runs.
+#[inline]
+pub(crate) fn fire<P: Platform>(
+    config: &Config<P>,
+    state: &mut State<P>,
+    phase: Phase,
+    input: &TickInput<P>,
+    status: u32,
+) -> u32 {
+    if !state.triggers.any() {
+        return 0;
+    }
+    let State { triggers, pose, generator, .. } = state;
+    if phase != Phase::Running {
+        return triggers.rest();
+    }
+    let command = &input.command;
+    let follows = status & (SETPOINT_FAULT | SETPOINT_STALE | GENERATOR_BUSY) == 0;
+    let seen = Seen {
+        pose,
+        moves: status & GENERATOR_BUSY != 0 || generator.can_stop(),
+        streams: command.kind == CommandKind::Stream && follows,
+        sequence: command.sequence,
+    };
+    triggers.tick(config.triggers(), &seen)
+}

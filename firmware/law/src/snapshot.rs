@@ -1,0 +1,65 @@
+//! The machine as 64-bit words and back, and the supervised tick with a recorder.
+
+use specgen_runtime::recorder::{Recorder, Row};
+use specgen_runtime::snapshot::{Invalid, Piece, Reader, Snapshot, Writer};
+
+use crate::machine::{Machine, MachineInput, MachineOutput};
+use crate::spec::{Compiled, ControlLaw as _, Spec};
+use crate::words::WordArray as _;
+
+impl<P: Spec> Machine<P> {
+    /// Everything that later ticks depend on, as words: a slice of the length that a state has.
+    pub fn save_into(&self, words: &mut [u64]) {
+        Snapshot::save(self, &mut Writer::new(words));
+    }
+
+    /// Words of it from the `first`-th on, as many as have room.
+    #[cold]
+    pub fn save_piece(&self, first: usize, words: &mut [u64]) {
+        let Ok(()) = self.show(&mut Piece::new(words, first));
+    }
+}
+
+impl<P: Compiled> Machine<P> {
+    /// Everything that later ticks depend on, as words.
+    pub fn save(&self, words: &mut P::MachineWords) {
+        self.save_into(words.as_mut());
+    }
+
+    /// The machine that [`Machine::save`] wrote.
+    ///
+    /// # Errors
+    /// The first word that no machine holds: not finite, none of its kind, a code out of limits, no staircase of extrema.
+    pub fn load(words: &P::MachineWords) -> Result<Self, Invalid> {
+        let mut reader = Reader::new(words.as_ref()).within(P::CONSTANTS.sizes());
+        let mut machine = Self::new(P::Law::at_reset(&P::CONSTANTS.reset()));
+        machine.restore(&mut reader)?;
+        Ok(machine)
+    }
+}
+
+impl<P: Compiled> MachineInput<P> {
+    /// As words in the order of the controller's `MACHINE_INPUT_NAMES`.
+    #[must_use]
+    pub fn to_words(&self) -> P::MachineInputWords {
+        let mut all = P::MachineInputWords::ZERO;
+        let mut words = Writer::new(all.as_mut());
+        P::Law::save_input(&self.tick, &mut words);
+        words.word(self.request.word());
+        words.word(self.events as u64);
+        all
+    }
+}
+
+/// What a recorder keeps after a tick.
+#[inline]
+pub fn record_after<P: Compiled>(
+    machine: &Machine<P>,
+    input: &MachineInput<P>,
+    output: &MachineOutput<P>,
+    recorder: &mut Recorder<'_>,
+) {
+    let (codes, status) = P::Law::codes_and_status(&output.tick);
+    let row = Row { codes, status, supervisor: output.supervisor_word() };
+    recorder.push(input.to_words().as_ref(), &row, || machine.digest());
+}
