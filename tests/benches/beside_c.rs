@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-use controller::dynamics::leg_forces;
+use controller::dynamics::PLATFORM;
 use specgen::compile::compile;
 use specgen_runtime::snapshot::Field;
 use specgen_runtime::{Motion, Platform, Real};
@@ -217,7 +217,7 @@ fn motions() -> Vec<Motion<f64>> {
 /// The committed controller's, whose constants are in its code as those of the C are.
 #[inline(never)]
 fn rust(motion: &Motion<f64>) -> [f64; 6] {
-    leg_forces(motion)
+    PLATFORM.leg_forces(motion)
 }
 
 /// Least time of a motion, ns.

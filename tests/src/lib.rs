@@ -197,6 +197,15 @@ impl Emitted {
         Controller::load(&self.library()).unwrap_or_else(|error| panic!("{error}"))
     }
 
+    /// The law on the constants of the compiled spec: the bits of [`Emitted::controller`], and nothing is built.
+    ///
+    /// # Panics
+    /// If the compiled spec cannot be run.
+    #[must_use]
+    pub fn at_run_time(&self) -> Controller {
+        specgen::run_time::controller(&self.compiled.ir).unwrap_or_else(|error| panic!("{error}"))
+    }
+
     /// The emitted crate for a microcontroller; none, with a line that says so, where tools are missing and not required.
     ///
     /// # Panics

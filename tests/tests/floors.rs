@@ -9,13 +9,14 @@ mod tokens;
 use specgen_tests::repository;
 
 /// From the lowest.
-const FLOORS: [&str; 11] = [
+const FLOORS: [&str; 12] = [
     "numerics",
     "language",
     "identify",
     "cycles",
     "toolchain",
     "compiler",
+    "run-time",
     "studies",
     "operate",
     "report",
@@ -71,5 +72,5 @@ fn an_arrow_that_goes_up_is_found() {
         "[dependencies]\nspecgen-numerics = { path = \"../numerics\" }\nspecgen-cli = { path = \"../cli\" }\n";
     assert_eq!(upward(1, manifest), ["cli"]);
     assert_eq!(upward(0, manifest), ["numerics", "cli"]);
-    assert!(upward(9, "specgen-report = { path = \"../report\" }").is_empty());
+    assert!(upward(10, "specgen-report = { path = \"../report\" }").is_empty());
 }

@@ -22,7 +22,7 @@ fn poses() -> Vec<[f64; 6]> {
 
 /// Leg displacements that the controller derives from poses; its arithmetic rounds the pose first.
 fn emitted(name: &str, edits: &[(&str, &str)], poses: &[[f64; 6]]) -> (Vec<[f64; 6]>, Vec<[f64; 6]>) {
-    let mut controller = Emitted::new(name, "legs.toml", edits).controller();
+    let mut controller = Emitted::new(name, "legs.toml", edits).at_run_time();
     let description = controller.description().clone();
     let demand = description.output("demand[0]").expect("an output word");
     let mut output = vec![0; description.output_names.len()];

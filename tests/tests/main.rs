@@ -39,6 +39,7 @@ mod promises;
 mod rate_options;
 mod record;
 mod requirements;
+mod run_time;
 mod sensing;
 mod sensing_emitted;
 mod setpoint;

@@ -38,7 +38,7 @@ fn at_most(what: &str, ours: [f64; 3], limit: [f64; 3]) {
 
 #[test]
 fn table_2_on_the_reference_plant() {
-    let mut controller = Emitted::new("paper", "legs.toml", &[]).controller();
+    let mut controller = Emitted::new("paper", "legs.toml", &[]).at_run_time();
     let noise = LegParameters::reference().noise;
     for seed in [SEED, 2, 3] {
         let table = scenario(&noise, seed).tracking(&mut controller, &MODES, &TRACKING_FREQUENCIES).expect("a run");
@@ -57,8 +57,8 @@ fn table_2_on_the_reference_plant() {
 #[test]
 fn table_2_in_f32_differs_by_less_than_the_noise() {
     let edits = [("scalar   = \"f64\"", "scalar   = \"f32\"")];
-    let mut controller = Emitted::new("paper-f32", "legs.toml", &edits).controller();
-    let mut reference = Emitted::new("paper-f64", "legs.toml", &[]).controller();
+    let mut controller = Emitted::new("paper-f32", "legs.toml", &edits).at_run_time();
+    let mut reference = Emitted::new("paper-f64", "legs.toml", &[]).at_run_time();
     let noise = LegParameters::reference().noise;
     let scenario = scenario(&noise, SEED);
     let single = scenario.tracking(&mut controller, &MODES, &TRACKING_FREQUENCIES).expect("a run");
@@ -78,7 +78,7 @@ fn the_study_without_noise_on_a_grid_of_16() {
     let record = ReversalExperiment::reference(16).run(&mut leg, &mut gauge).to_csv();
     let edits = [("grid    = 32", "grid    = 16"), ("records/reference-forc.csv", "records/clean-16.csv")];
     let emitted = Emitted::with_records("clean-16", "legs.toml", &edits, &[("clean-16.csv", record)]);
-    let mut controller = emitted.controller();
+    let mut controller = emitted.at_run_time();
     let table =
         scenario(&NoiseParameters::NONE, SEED).tracking(&mut controller, &MODES, &TRACKING_FREQUENCIES).expect("a run");
     within("Invhys", row(&table, "invhys"), [142.3, 230.0, 495.5], 0.05);
@@ -88,7 +88,7 @@ fn the_study_without_noise_on_a_grid_of_16() {
 
 #[test]
 fn table_1_slope_ratios() {
-    let mut controller = Emitted::new("slopes", "legs.toml", &[]).controller();
+    let mut controller = Emitted::new("slopes", "legs.toml", &[]).at_run_time();
     let noise = LegParameters::reference().noise;
     let table = scenario(&noise, SEED).linearity(&mut controller, &LINEARITY_FREQUENCIES).expect("a run");
     let paper = [1.0, 0.9844, 0.9797, 0.9774, 0.9735, 0.9704];

@@ -15,7 +15,7 @@ const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
 /// Way to the bias pose, then tracking of the first on-board trajectory in closed loop, with noise, P/F with PCC.
 const TICKS: u32 = 20_000;
 /// The stage whose code is held against [`DYNAMICS_BYTES`].
-const DYNAMICS: &str = "specgen_law::platform::stages::dynamics::<controller::constants::Constants>";
+const DYNAMICS: &str = "specgen_law::platform::stages::dynamics::<controller::identity::Constants>";
 /// Bytes of stack of a tick.
 const STACK: u64 = 2048;
 /// Bytes of code and constants that the six leg forces take.

@@ -116,7 +116,7 @@ impl Fuzz {
 
 fn fuzz(name: &str, edits: &[(&str, &str)]) {
     let emitted = Emitted::new(name, "reference.toml", edits);
-    let mut controller = emitted.controller();
+    let mut controller = emitted.at_run_time();
     let description = controller.description().clone();
     let place = |name: &str| description.output(name).expect("an output word");
     let (voltage, code, status) = (place("voltage[0]"), place("dac_code[0]"), place("status"));
@@ -183,7 +183,7 @@ fn f32_outputs_stay_finite_and_within_limits_for_any_input_bits_and_settings() {
 fn every_setting_out_of_range_is_refused_by_its_name() {
     for (folder, edits) in [("platform-config-f64", &[][..]), ("platform-config-f32", &[F32][..])] {
         let emitted = Emitted::new(folder, "reference.toml", edits);
-        let mut controller = emitted.controller();
+        let mut controller = emitted.at_run_time();
         let description = controller.description().clone();
         let good = controller.default_config();
         let table = &emitted.compiled.ir.permitted;
@@ -236,7 +236,7 @@ fn every_setting_out_of_range_is_refused_by_its_name() {
 #[test]
 fn a_refused_configuration_leaves_the_old_one_in_force() {
     let emitted = Emitted::new("platform-refused", "reference.toml", &[]);
-    let mut controller = emitted.controller();
+    let mut controller = emitted.at_run_time();
     let inputs = emitted.platform_stimulus(&controller.description().clone(), 4000, 9);
     let mut output = vec![0; controller.description().output_names.len()];
     let mut bad = controller.default_config();

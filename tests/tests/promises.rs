@@ -29,7 +29,7 @@ fn words(controller: &Controller) -> Words {
 /// Random bits in every input word: half of them raw (NaN, infinite, huge, tiny), half plausible.
 fn fuzz(name: &str, edits: &[(&str, &str)], ticks: u32) {
     let emitted = Emitted::new(name, "legs.toml", edits);
-    let mut controller = emitted.controller();
+    let mut controller = emitted.at_run_time();
     let places = words(&controller);
     let scalar = controller.description().scalar;
     let limits = emitted.compiled.model.actuator.voltage;
@@ -87,7 +87,7 @@ fn f32_outputs_stay_finite_and_within_limits_for_any_input_bits() {
 #[test]
 fn settings_that_would_break_a_promise_are_refused() {
     let emitted = Emitted::new("promises-config", "legs.toml", &[]);
-    let mut controller = emitted.controller();
+    let mut controller = emitted.at_run_time();
     let good = controller.default_config();
     let (min, max) = (emitted.compiled.ir.actuation.code_min, emitted.compiled.ir.actuation.code_max);
     let step = emitted.compiled.ir.defaults.max_step as u64;

@@ -165,12 +165,13 @@ fn emitted_sensing_and_forward_kinematics_are_those_of_the_runtime_bit_for_bit()
 #[test]
 fn a_pose_is_sensed_only_where_gauges_see_the_platform() {
     let mut model = model(three_two_one());
-    assert!(emit(&lowered(&model).unwrap()).contains_key("src/sensing.rs"));
+    let platform = emit(&lowered(&model).unwrap());
+    assert!(platform["src/gauges.rs"].contains("pub const GAUGES"));
     model.task_space = None;
     let ir = lowered(&model).unwrap();
     let files = emit(&ir);
     // Codes of the legs' own gauges, and nothing that finds a pose.
-    let legs = &files["src/sensing.rs"];
-    assert!(legs.contains("pub use crate::gauges::{CONVERTER, ") && !legs.contains("pose"), "{legs}");
+    let legs = &files["src/gauges.rs"];
+    assert!(legs.contains("CONVERTER") && !legs.contains("GAUGES") && !legs.contains("pose"), "{legs}");
     assert!(!workspace::ir_text(&ir).contains("task_space"));
 }

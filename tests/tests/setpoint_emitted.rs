@@ -74,7 +74,7 @@ fn the_emitted_controller_plays_the_papers_paths_and_a_table() {
     {
         let records = [("eight.csv", text.clone()), ("line.csv", line())];
         let emitted = Emitted::with_records(name, "reference.toml", edits, &records);
-        let mut controller = emitted.controller();
+        let mut controller = emitted.at_run_time();
         for (selector, (_, path)) in (0..).zip(PATHS) {
             controller.reset();
             let host = PaperPose::corrected(path, 1.0);
@@ -152,7 +152,7 @@ const BUDGETS: [(&str, f64); 4] = [("hold", 150.0), ("stream", 300.0), ("move", 
 fn set_points_stay_within_their_instructions() {
     let emitted = Emitted::new("setpoint-budget", "reference.toml", &[]);
     let Some(image) = emitted.image(model::Mcu::Mps2An500) else { return };
-    let mut controller = emitted.controller();
+    let mut controller = emitted.at_run_time();
     let description = controller.description().clone();
     let at = |name: &str| description.input(name).unwrap();
     let (command, selector, sequence, x, rate) =

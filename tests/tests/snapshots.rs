@@ -30,7 +30,7 @@ struct Course {
 
 impl Course {
     fn new(emitted: &Emitted) -> Self {
-        let machine = Supervised::new(emitted.controller()).expect("a library with the supervised tick");
+        let machine = Supervised::new(emitted.at_run_time()).expect("a library with the supervised tick");
         let names = machine.input_names();
         let input = vec![0; names.len()];
         Self {

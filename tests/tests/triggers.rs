@@ -57,7 +57,7 @@ fn goes(bench: &mut Bench<'_>, x: f64) {
 
 /// Sweeps under the spec's settings, a stop at a position, a stream of 95 set-points, then sweeps with steps twice as long.
 fn record(emitted: &Emitted) -> Vec<u8> {
-    let controller = emitted.controller();
+    let controller = emitted.at_run_time();
     let (text, description) = (controller.text().to_owned(), controller.description().clone());
     let mut other = controller.default_config();
     description.set_config(&mut other, "trigger_step[0]", 2e-6).unwrap();
@@ -176,7 +176,7 @@ fn difference(recorded: &[usize], computed: &[usize]) -> Option<(Option<usize>, 
 fn triggers_at_1_mm_s_to_and_fro_are_in_the_ticks_that_the_recorded_pose_says() {
     let emitted = Emitted::new("triggers", "features/triggers.toml", &[]);
     let bytes = record(&emitted);
-    let mut machine = Supervised::new(emitted.controller()).unwrap();
+    let mut machine = Supervised::new(emitted.at_run_time()).unwrap();
     let (ticks, rows) = ticks(&bytes, &mut machine);
     let (recorded, computed) = (rises(&ticks, 0), passed(&ticks));
     assert_eq!(difference(&recorded, &computed), None);

@@ -111,7 +111,10 @@ fn cargo_mutants(root: &Path, arguments: &[&str]) -> Command {
 impl Group {
     fn cargo_mutants(&self, root: &Path, arguments: &[&str]) -> Command {
         let mut command = cargo_mutants(root, &["--package", self.package]);
-        command.args(self.folder.iter().flat_map(|folder| ["--dir", *folder])).args(arguments);
+        if let Some(folder) = self.folder {
+            command.args(["--dir", folder, "--config"]).arg(root.join(format!(".cargo/mutants-{}.toml", self.package)));
+        }
+        command.args(arguments);
         command
     }
 

@@ -71,7 +71,7 @@ const FORMATTED_ALONE: [&str; 12] = [
     BOARDS[1],
 ];
 /// Members of the workspace that people write.
-const HAND_WRITTEN: [&str; 22] = [
+const HAND_WRITTEN: [&str; 23] = [
     "specgen",
     "specgen-cycles",
     "specgen-numerics",
@@ -79,6 +79,7 @@ const HAND_WRITTEN: [&str; 22] = [
     "specgen-identify",
     "specgen-toolchain",
     "specgen-compiler",
+    "specgen-run-time",
     "specgen-studies",
     "specgen-operate",
     "specgen-report",

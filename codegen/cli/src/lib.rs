@@ -14,5 +14,6 @@ pub use specgen_identify::{self as identify, everett, waveform};
 pub use specgen_language::{diagnostic, files, interrupt, lock, model, shell, spec};
 pub use specgen_operate::{self as operate, doctor, pil, served};
 pub use specgen_report::{self as report, plot};
+pub use specgen_run_time as run_time;
 pub use specgen_studies::{lead, learning, machine, paper, reproduce, robust, tuning, verify};
 pub use specgen_toolchain::{self as target, budget};

@@ -53,7 +53,7 @@ fn is_empty(folder: &Folder, name: &str) -> bool {
 fn an_interrupt_leaves_nothing_half_done() {
     let folder = with_slow_cargo();
     for (arguments, left) in [
-        (&["sim", "legs.toml", "-o", "a/traces"][..], "a"),
+        (&["sim", "legs.toml", "--emitted", "-o", "a/traces"][..], "a"),
         (&["reproduce", "-o", "rep"], "rep"),
         (&["report", "legs.toml", "-o", "page.html"], "page.html"),
         (&["replay", "legs.toml", "--csv", "rows.csv"], "rows.csv"),
@@ -101,7 +101,7 @@ fn a_folder_in_use_names_the_run_that_has_it() {
 fn an_end_from_outside_is_reported_to_programs() {
     let folder = with_slow_cargo();
     for signal in [Signal::TERM, Signal::HUP] {
-        let run = interrupted(&folder, &["sim", "legs.toml", "--json"], signal);
+        let run = interrupted(&folder, &["sim", "legs.toml", "--emitted", "--json"], signal);
         assert_eq!((run.code, run.stderr.as_str()), (130, ""));
         let document: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
         assert_eq!((&document["exit_code"], &document["result"]), (&130.into(), &serde_json::Value::Null));

@@ -41,7 +41,13 @@ fn without_tools_everything_else_is_done_and_one_line_says_what_was_left_out() {
         assert!(lines[0].contains(words), "no `{words}` in: {}", lines[0]);
     }
     assert!(run.stderr.contains("host library: "), "{}", run.stderr);
-    for file in ["controller/src/lib.rs", "law/src/platform/step.rs", "host/Cargo.toml", "qemu/Cargo.toml", "runtime/Cargo.toml"] {
+    for file in [
+        "controller/src/lib.rs",
+        "law/src/platform/step.rs",
+        "host/Cargo.toml",
+        "qemu/Cargo.toml",
+        "runtime/Cargo.toml",
+    ] {
         assert!(folder.path("out").join(file).is_file(), "{file}");
     }
 

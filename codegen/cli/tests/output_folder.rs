@@ -33,9 +33,15 @@ fn the_manifest_lists_every_file_with_its_digest() {
         .collect();
     let present: Vec<(String, String)> = files.iter().map(|(path, bytes)| (path.clone(), digest(bytes))).collect();
     assert_eq!(listed, present);
-    for path in
-        ["Cargo.toml", "ir.json", "controller/src/lib.rs", "law/src/platform/step.rs", "runtime/src/lib.rs", "host/build.rs", "qemu/link.x"]
-    {
+    for path in [
+        "Cargo.toml",
+        "ir.json",
+        "controller/src/lib.rs",
+        "law/src/platform/step.rs",
+        "runtime/src/lib.rs",
+        "host/build.rs",
+        "qemu/link.x",
+    ] {
         assert!(files.contains_key(path), "{path}");
     }
     for (path, bytes) in &files {

@@ -182,8 +182,13 @@ impl Dynamics {
     /// As the runtime takes it, in numbers of any kind.
     #[must_use]
     pub fn platform<T: Real>(&self) -> Platform<T> {
-        let number = T::from_f64;
-        let vector = |values: [f64; 3]| values.map(number);
+        self.platform_of(T::from_f64)
+    }
+
+    /// The same with numbers that `number` makes.
+    #[must_use]
+    pub fn platform_of<T: Real>(&self, number: impl Fn(f64) -> T) -> Platform<T> {
+        let vector = |values: [f64; 3]| values.map(&number);
         Platform {
             legs: self.legs.each_ref().map(|leg| Leg {
                 base: vector(leg.base),
@@ -203,7 +208,7 @@ impl Dynamics {
             mass: number(self.mass),
             first_moment: vector(self.first_moment),
             pole_moment: vector(self.pole_moment),
-            second_moment: self.second_moment.map(vector),
+            second_moment: self.second_moment.map(&vector),
             extensible_moment: number(self.extensible_moment),
             leg_inertia: number(self.leg_inertia),
             leg_weight_moment: number(self.leg_weight_moment),

@@ -7,6 +7,7 @@
 pub mod assumed;
 pub mod compile;
 pub mod demand;
+pub mod description;
 pub mod emit;
 mod figure;
 #[cfg(test)]

@@ -18,10 +18,7 @@ use crate::{
     supervision, task_space,
 };
 use crate::hysteresis::{Memory, TABLES, Table};
-
-/// The spec, for the law.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Constants;
+use crate::identity::Constants;
 
 impl Spec for Constants {
     type Real = Real;

@@ -5,7 +5,7 @@
 
 use specgen_law::Reset;
 use specgen_runtime::supervisor::{Reaction, Steadiness, Supervision, Wiring};
-use crate::constants::Constants;
+use crate::identity::Constants;
 use crate::hysteresis::Memory;
 use crate::{Real, limits};
 

@@ -14,7 +14,9 @@ use core::mem::{align_of, size_of};
 #[cfg(feature = "dynamics")]
 use controller::dynamics::{Motion, PLATFORM};
 use controller::snapshot::MACHINE_STATE_WORDS;
-use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_at_reset, machine_output_words, supervise};
+use controller::supervised::{
+    MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_at_reset, machine_output_words, supervise,
+};
 use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, state_at_reset};
 use specgen_runtime::Real;
 

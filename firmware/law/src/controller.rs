@@ -84,9 +84,8 @@ macro_rules! controller {
         $crate::controller!(@both legs, false, [0, false]);
     };
     (@both $law:ident, $corrects:expr, [$lines:expr, $input:expr]) => {
-        pub use constants::Constants;
         pub use defaults::LEG_GAIN;
-        pub use identity::{ASSUMED, LEGS, PERIOD_SECONDS, Real, SCALAR_BITS, SPEC_DIGEST, SPEC_NAME, SPECGEN_VERSION};
+        pub use identity::{ASSUMED, Constants, LEGS, PERIOD_SECONDS, Real, SCALAR_BITS, SPEC_DIGEST, SPEC_NAME, SPECGEN_VERSION};
         pub use $crate::ConfigError;
         pub use $crate::$law::tick::PLACE_WORDS;
 

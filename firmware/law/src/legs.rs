@@ -2,6 +2,7 @@
 
 mod config;
 mod constants;
+mod lead;
 pub mod passes;
 pub mod sensing;
 pub mod stages;
@@ -13,6 +14,7 @@ pub mod waves;
 
 pub use config::{Config, Settings};
 pub use constants::{LegSpace, SixLegs};
-pub use state::{DeadTimeLead, Lead, LegState, State};
+pub use lead::{DeadTimeLead, Lead};
+pub use state::{LegState, State};
 pub use step::{actuate, step};
 pub use tick::{TickInput, TickOutput};

@@ -10,8 +10,6 @@ use specgen_runtime::{
 pub trait LegMemory<T: Real, Table>: Copy + Debug + Snapshot {
     /// Displacement that the model gives for the drive last applied, m.
     fn displacement(&self) -> T;
-    /// The highest drive in memory, cells.
-    fn highest(&self) -> T;
     /// Whether the last inverse was the static one for want of a safe one of the rate-dependent model.
     fn fell_back(&self) -> bool;
     /// Whether the table reaches `displacement`, m.
@@ -39,10 +37,6 @@ macro_rules! leg_memory {
                 #[inline(always)]
                 fn displacement(&self) -> T {
                     self.displacement()
-                }
-                #[inline(always)]
-                fn highest(&self) -> T {
-                    self.highest()
                 }
                 #[inline(always)]
                 fn fell_back(&self) -> bool {

@@ -7,7 +7,9 @@ use crate::instructions::{InstructionCounter, SelfTest};
 use crate::semihosting::{Exit, File};
 use crate::stats::{self, Stage};
 use crate::{is_due, specgen_step, stack};
-use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, Phase, machine_at_reset, machine_output_words};
+use controller::supervised::{
+    MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, Phase, machine_at_reset, machine_output_words,
+};
 use controller::{CONFIG_WORDS, Config, State, TickInput, TickOutput};
 
 /// Ticks per file access.

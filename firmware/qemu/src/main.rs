@@ -18,7 +18,9 @@ mod stages;
 mod start;
 mod stats;
 
-use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, TickOutput, output_words, state_at_reset, step};
+use controller::{
+    CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, TickOutput, output_words, state_at_reset, step,
+};
 use instructions::InstructionCounter;
 use semihosting::{Exit, File, exit};
 use stages::Stages;

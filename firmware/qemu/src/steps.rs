@@ -1,6 +1,8 @@
 //! The supervised controller as a machine that a host steps, with what each tick costs.
 
-use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_at_reset, machine_output_words};
+use controller::supervised::{
+    MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_at_reset, machine_output_words,
+};
 use controller::{CONFIG_WORDS, Config, DESCRIPTION};
 use specgen_link::{Counted, Stage, WORDS, lockstep};
 

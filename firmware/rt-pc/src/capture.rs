@@ -176,7 +176,7 @@ mod tests {
 
     /// A recorder that has so many ticks, triggered or only stopped.
     fn recorded(mut tape: Tape, ticks: u64, triggered: bool) -> Tape {
-        let machine = controller::supervised::Machine::new();
+        let machine = controller::supervised::machine_at_reset();
         let config = controller::Config::new();
         tape.begin(0);
         for tick in 0..ticks {

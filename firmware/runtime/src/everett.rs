@@ -236,13 +236,8 @@ fn rise_beyond<T: Real, G: Grid<T>>(table: &G, down: T, first: Line<T>, gain: T)
     }
     let d = Place::on(table, down);
     let (mut low, mut high) = (first.cell + 1, table.cells());
-<<<<<<< tmp1
     let at_full = along_row(table, high, d);
     if gain >= at_full || low >= high {
-=======
-    let at_full = along_row(table, table.cells(), d);
-    if gain >= at_full || low >= table.cells() {
->>>>>>> law
         return (table.full_scale(), Line::END);
     }
     // The solution lies between these nodes.

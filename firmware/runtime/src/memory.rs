@@ -23,7 +23,7 @@ crate::state! { |words|
     /// upper voltage limit and back.
     pub struct ReversalMemory<T, CAP>[T: Real, const CAP: usize] {
         /// Stored extrema, 1..=CAP. Only they count: the room behind them is zero in the words of a state.
-        len: usize = { let () = Self::FITS; 1 }, place(words.sizes().memory.min(CAP)) if *len > 0;
+        len: usize = { let () = Self::FITS; 1 }, place(words.sizes().kept(CAP)) if *len > 0;
         /// Pairs dropped because the memory was full.
         dropped: u32 = 0, tally;
         drive: T = T::ZERO, number(LARGEST);

@@ -64,6 +64,12 @@ pub struct Sizes {
 }
 
 impl Sizes {
+    /// Extrema that a memory with this `room` has words for.
+    #[must_use]
+    pub const fn kept(&self, room: usize) -> usize {
+        if self.memory < room { self.memory } else { room }
+    }
+
     /// Of a state of no particular spec: what any machine has.
     pub const ANY: Self = Self {
         place: [LARGEST_PLACE; 6],

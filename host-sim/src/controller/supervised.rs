@@ -1,14 +1,13 @@
-//! The supervised tick of a controller library: what the other targets run.
+//! The supervised tick of a controller: what the other targets run.
 
 mod snapshot;
 mod standing;
 
 use std::fmt;
 
-use libloading::Symbol;
 use specgen_runtime::supervisor::{Cause, Finding, Named, Phase};
 
-use super::{Buffer, Controller, ControllerError, TickController};
+use super::{Controller, ControllerError, TickController};
 
 pub use snapshot::SnapshotError;
 pub use standing::Standing;
@@ -68,43 +67,19 @@ impl MachineWord {
     }
 }
 
-type Reset = unsafe extern "C" fn(*mut u8);
-type Step = unsafe extern "C" fn(*const u8, *mut u8, *const u64, *mut u64);
-type Digest = unsafe extern "C" fn(*const u8) -> u64;
-
-/// A controller with its supervisor: configuration and library of a [`Controller`], and a machine of its own.
+/// A controller with its supervisor: configuration and constants of a [`Controller`], and a machine of its own.
 pub struct Supervised {
-    machine: Buffer,
-    reset: Reset,
-    step: Step,
-    digest: Digest,
-    /// Last, so that the library is unloaded after everything else.
     controller: Controller,
 }
-
-// SAFETY: as for `Controller`: the machine's memory belongs to this value alone and holds plain values.
-unsafe impl Send for Supervised {}
-// SAFETY: what takes a shared reference only reads the machine and its configuration.
-unsafe impl Sync for Supervised {}
 
 impl Supervised {
     /// Puts a controller under its supervisor, disarmed.
     ///
     /// # Errors
     /// If the library lacks the supervised tick: it is of an older specgen.
-    pub fn new(controller: Controller) -> Result<Self, ControllerError> {
-        let failed = |cause| ControllerError::Load { path: controller.path.clone(), cause };
-        // SAFETY: the types are those of the interface's version, which `Controller::load` asked for. The pointers are used only
-        // while `controller` keeps the library loaded.
-        let (reset, step, digest) = unsafe {
-            let reset: Symbol<'_, Reset> = controller.library.get(b"specgen_machine_reset\0").map_err(failed)?;
-            let step: Symbol<'_, Step> = controller.library.get(b"specgen_machine_step\0").map_err(failed)?;
-            let digest: Symbol<'_, Digest> = controller.library.get(b"specgen_machine_digest\0").map_err(failed)?;
-            (*reset, *step, *digest)
-        };
-        let mut supervised = Self { machine: Buffer::new(controller.machine_layout), reset, step, digest, controller };
-        supervised.reset();
-        Ok(supervised)
+    pub fn new(mut controller: Controller) -> Result<Self, ControllerError> {
+        controller.engine.add_machine()?;
+        Ok(Self { controller })
     }
 
     /// The controller underneath: its description and configuration. Its own state is not that of the machine.
@@ -139,8 +114,7 @@ impl Supervised {
 
     /// As at power-up: disarmed.
     pub fn reset(&mut self) {
-        // SAFETY: the buffer has the size and alignment that the library asks for.
-        unsafe { (self.reset)(self.machine.start()) };
+        self.controller.engine.reset_machine();
     }
 
     /// One supervised tick; returns the supervisor's word of the output.
@@ -151,29 +125,19 @@ impl Supervised {
         let description = &self.controller.description;
         assert_eq!(input.len(), description.input_names.len() + MORE_INPUTS, "input words");
         assert_eq!(output.len(), description.output_names.len() + MORE_OUTPUTS, "output words");
-        // SAFETY: configuration and machine are initialised; the slices have the lengths that the library says, checked above.
-        unsafe {
-            (self.step)(self.controller.config.start(), self.machine.start(), input.as_ptr(), output.as_mut_ptr());
-        }
+        self.controller.engine.step_machine(input, output);
         MachineWord::of(output[description.output_names.len()])
     }
 
     /// Digest of the machine.
     #[must_use]
     pub fn digest(&self) -> u64 {
-        // SAFETY: the machine is initialised.
-        unsafe { (self.digest)(self.machine.start()) }
+        self.controller.engine.machine_digest()
     }
 
     /// Another machine in the same state: to continue from here more than once.
     #[must_use]
     pub fn fork(&self) -> Self {
-        Self {
-            machine: self.machine.copy(),
-            reset: self.reset,
-            step: self.step,
-            digest: self.digest,
-            controller: self.controller.fork(),
-        }
+        Self { controller: self.controller.fork() }
     }
 }

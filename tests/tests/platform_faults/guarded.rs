@@ -1,7 +1,6 @@
 //! The emitted reference controller on the simulated machine, with the promises held against every tick.
 
 use std::cell::RefCell;
-use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::OnceLock;
 
@@ -11,7 +10,6 @@ use host_sim::description::Description;
 use host_sim::platform::rig::{Bench, GaugeFault, Noise, Request, RunOptions, Tick};
 use host_sim::platform::{PlatformRig, PlatformScenario, Specimen};
 use host_sim::trajectory::PoseTarget;
-use specgen::compile::Compiled;
 use specgen_tests::{Emitted, worse};
 
 pub const PERIOD: f64 = 1e-4;
@@ -28,14 +26,10 @@ pub const STALE: u32 = 1 << 17;
 pub const BUSY: u32 = 1 << 18;
 pub const WRENCH: u32 = 1 << 19;
 
-/// The emitted reference controller, built once.
-pub fn emitted() -> &'static (Compiled, PathBuf) {
-    static EMITTED: OnceLock<(Compiled, PathBuf)> = OnceLock::new();
-    EMITTED.get_or_init(|| {
-        let emitted = Emitted::new("platform-faults", "reference.toml", &[]);
-        let library = emitted.library();
-        (emitted.compiled, library)
-    })
+/// The reference, compiled once.
+pub fn emitted() -> &'static Emitted {
+    static EMITTED: OnceLock<Emitted> = OnceLock::new();
+    EMITTED.get_or_init(|| Emitted::new("platform-faults", "reference.toml", &[]))
 }
 
 /// The reference machine with its tolerances and noise, pre-cycled and zeroed once.
@@ -78,7 +72,7 @@ impl Guarded {
     }
 
     fn check(&mut self, output: &[u64]) {
-        let (compiled, _) = emitted();
+        let compiled = &emitted().compiled;
         let [low, high] = compiled.model.actuator.voltage;
         let setpoints = &compiled.ir.task_space.as_ref().expect("in task space").setpoints;
         let code = self.inner.description().output("dac_code[0]").expect("an output word");
@@ -149,8 +143,7 @@ pub struct Run<'a> {
 }
 
 pub fn run(test: impl FnOnce(&mut Run)) {
-    let (_, library) = emitted();
-    let inner = Controller::load(library).unwrap_or_else(|error| panic!("{error}"));
+    let inner = emitted().at_run_time();
     let (description, config) = (inner.description().clone(), inner.default_config());
     let orders = Rc::<RefCell<Orders>>::default();
     let mut guarded = Guarded { inner, orders: Rc::clone(&orders), codes: [0; 6], target: [0.0; 6], tick: 0 };

@@ -111,7 +111,7 @@ fn a_stream_that_dries_up_is_brought_to_rest_and_taken_up_again() {
             "{:x?}",
             all_status(&refused)
         );
-        let bias = emitted().0.model.task_space.as_ref().expect("in task space").setpoint.bias;
+        let bias = emitted().compiled.model.task_space.as_ref().expect("in task space").setpoint.bias;
         let here: [f64; 6] = std::array::from_fn(|k| rest.target[k] - bias[k]);
         let near = Request::stream(PoseTarget { pose: here, ..PoseTarget::default() });
         let taken = run.ticks(1, &near);
@@ -145,7 +145,7 @@ fn a_set_point_that_jumps_is_no_number_or_lies_outside_is_held() {
             // One bad set-point of a stream that moves on: it stops, and as the path comes back the platform is taken along.
             let stopping = run.stream(40);
             let rest = stopping[39];
-            let bias = emitted().0.model.task_space.as_ref().expect("in task space").setpoint.bias;
+            let bias = emitted().compiled.model.task_space.as_ref().expect("in task space").setpoint.bias;
             let mut here =
                 PoseTarget { pose: std::array::from_fn(|k| rest.target[k] - bias[k]), ..PoseTarget::default() };
             // Back to the path at the speed of a stream.
@@ -178,7 +178,7 @@ fn a_set_point_that_jumps_is_no_number_or_lies_outside_is_held() {
 
 #[test]
 fn a_stream_that_leaves_the_workspace_stops_at_its_wall() {
-    let (compiled, _) = emitted();
+    let compiled = &emitted().compiled;
     let bound = compiled.ir.bounds.pose[0];
     run(|run| {
         // 1 mm/s towards a wall: legal steps, up to 50 µm.
@@ -211,7 +211,8 @@ fn a_stream_that_leaves_the_workspace_stops_at_its_wall() {
 fn unknown_commands_and_selectors_and_moves_out_of_reach_are_refused_and_held() {
     run(|run| {
         let bias = run.ticks(1, &Request::default())[0].target;
-        let trajectories = emitted().0.ir.task_space.as_ref().expect("in task space").setpoints.trajectories.len();
+        let trajectories =
+            emitted().compiled.ir.task_space.as_ref().expect("in task space").setpoints.trajectories.len();
         assert_eq!(trajectories, 3);
         for (command, selector) in
             [(4, 0), (u64::MAX, 0), (1 << 32, 0), (3, 3), (3, u64::from(u32::MAX)), (3, 1 << 32), (3, u64::MAX)]
@@ -412,7 +413,7 @@ fn narrower_voltage_limits_are_kept_to_at_the_slew_rate_and_left_without_windup(
             }
         }
         assert!(bits & 0x3f != 0 && bits & !0x3f == 0, "{bits:x}");
-        run.set(&[("code_max", emitted().0.ir.actuation.code_max as f64)]);
+        run.set(&[("code_max", emitted().compiled.ir.actuation.code_max as f64)]);
         let after = run.stream(2 * LAP);
         println!(
             "limits: {:.0} nm on return, {:.1} nm after 0.2 s ({:.1} before)",

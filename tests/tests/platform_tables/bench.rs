@@ -1,7 +1,6 @@
 //! Simulated machines with the emitted controller that was compiled for them.
 
 use std::panic::resume_unwind;
-use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -28,7 +27,6 @@ pub const DAMPED: (&str, &str) = ("notch_damping   = 1.0", "notch_damping   = 1.
 pub struct Bench {
     pub specimen: Specimen,
     pub emitted: Emitted,
-    library: PathBuf,
 }
 
 impl Bench {
@@ -57,12 +55,11 @@ impl Bench {
         all.extend(edits);
         let more: Vec<(&str, String)> = files.iter().map(String::as_str).zip(records.clone()).collect();
         let emitted = Emitted::with_records(name, "reference.toml", &all, &more);
-        let library = emitted.library();
-        Self { specimen, emitted, library }
+        Self { specimen, emitted }
     }
 
     pub fn controller(&self) -> Controller {
-        Controller::load(&self.library).unwrap_or_else(|error| panic!("{error}"))
+        self.emitted.at_run_time()
     }
 
     /// What the analysis decided for it.

@@ -82,7 +82,7 @@ impl Comparison {
             ("bits  = 16\n", "bits  = 24\n"),
         ];
         let emitted = Emitted::new(name, "reference.toml", &edits);
-        let controller = emitted.controller();
+        let controller = emitted.at_run_time();
         let hysteresis = &emitted.compiled.ir.hysteresis;
         let table = record(&hysteresis.tables[0], hysteresis.grid, 100.0 / hysteresis.grid as f64);
 

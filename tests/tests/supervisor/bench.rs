@@ -1,6 +1,6 @@
 //! A supervised controller on a plant that does what the model says, and what may be wrong with it.
 
-use host_sim::controller::{MachineWord, Supervised, TickController};
+use host_sim::controller::{Controller, MachineWord, Supervised, TickController};
 use host_sim::word::Scalar;
 use specgen_tests::Emitted;
 use std::collections::BTreeMap;
@@ -83,7 +83,11 @@ pub struct Bench {
 
 impl Bench {
     pub fn new(kind: Kind, emitted: &Emitted, settings: &[(&str, f64)]) -> Self {
-        let controller = emitted.controller();
+        Self::with(emitted.at_run_time(), kind, emitted, settings)
+    }
+
+    /// With a controller of that spec.
+    pub fn with(controller: Controller, kind: Kind, emitted: &Emitted, settings: &[(&str, f64)]) -> Self {
         let description = controller.description().clone();
         let mut config = controller.default_config();
         for (name, value) in settings {

@@ -20,7 +20,7 @@ struct Recording {
 
 fn record(kind: Kind, emitted: &Emitted, sequences: u32) -> Recording {
     let settings: &[(&str, f64)] = if kind == Kind::Legs { &[("setpoint_kind", 1.0)] } else { &[] };
-    let mut bench = Bench::new(kind, emitted, settings);
+    let mut bench = Bench::with(emitted.controller(), kind, emitted, settings);
     let config = bench.config().to_vec();
     let mut recording = Recording { inputs: Vec::new(), outputs: Vec::new(), digests: Vec::new(), config };
     sequences::run(&mut bench, 9, sequences, |bench, _| {
@@ -101,7 +101,7 @@ const MOST_INSTRUCTIONS: f64 = 385.0;
 fn a_tick_in_which_nothing_is_wrong_costs_little_more_than_the_law() {
     for kind in [Kind::Legs, Kind::Platform] {
         let emitted = emitted(&format!("supervisor-cost-{kind:?}").to_lowercase(), kind.spec(), &[]);
-        let mut bench = Bench::new(kind, &emitted, &[]);
+        let mut bench = Bench::with(emitted.controller(), kind, &emitted, &[]);
         if kind == Kind::Legs {
             bench.setpoint = [1e-6, 2e-6, 9e-6, 0.0, 0.0, 0.0];
         }

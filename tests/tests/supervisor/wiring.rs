@@ -193,7 +193,7 @@ fn finding(word: MachineWord) -> Finding {
 fn every_single_fault_of_a_platform_is_refused_and_named() {
     let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
     let compiled = &emitted.compiled;
-    let mut supervised = Supervised::new(emitted.controller()).unwrap();
+    let mut supervised = Supervised::new(emitted.at_run_time()).unwrap();
     let task = compiled.model.task_space.as_ref().unwrap();
     let specimen = machine::specimen(&compiled.model, task, &LegParameters::reference(), Some(5));
     let scenario = machine::scenario(&compiled.model, task, &specimen, &Noise::of(&specimen), 5);
@@ -221,7 +221,7 @@ fn every_single_fault_of_a_platform_is_refused_and_named() {
 fn every_single_fault_of_six_legs_is_refused_and_named_with_what_looks_like_it() {
     let emitted = Emitted::new("supervisor-wiring-legs", "legs.toml", &[]);
     let compiled = &emitted.compiled;
-    let mut supervised = Supervised::new(emitted.controller()).unwrap();
+    let mut supervised = Supervised::new(emitted.at_run_time()).unwrap();
     let parameters = machine::leg(&compiled.model, &LegParameters::reference());
     let alike = &compiled.ir.supervision.wiring.as_ref().unwrap().alike;
     let run = |supervised: &mut Supervised, mix| {
@@ -326,7 +326,7 @@ fn random(compiled: &Compiled, number: u64) -> Legs {
 fn no_fault_free_machine_is_refused() {
     let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
     let compiled = &emitted.compiled;
-    let mut supervised = Supervised::new(emitted.controller()).unwrap();
+    let mut supervised = Supervised::new(emitted.at_run_time()).unwrap();
     let machines = specgen_tests::length(60, 200);
     let refused: Vec<String> = (0..machines)
         .filter_map(|number| {
@@ -347,7 +347,7 @@ fn a_check_has_the_same_bits_on_the_mcu() {
     ] {
         let emitted = Emitted::new(name, spec, &[]);
         let compiled = &emitted.compiled;
-        let mut supervised = Supervised::new(emitted.controller()).unwrap();
+        let mut supervised = Supervised::new(emitted.at_run_time()).unwrap();
         let Some(image) = emitted.image(mcu) else { return };
         let config = supervised.controller().default_config();
         let parameters = machine::leg(&compiled.model, &LegParameters::reference());

@@ -18,7 +18,7 @@ use super::file::{check_input, check_place, write_file};
 use super::line::Line;
 use super::named::{InputFile, OutputFile};
 use super::operate::{Ended, Operator, motion_name};
-use super::sim::{PlantArguments, emitted, frequency};
+use super::sim::{PlantArguments, at_run_time, frequency};
 use super::spec;
 use super::table::{left, right, row};
 use super::trajectory;
@@ -272,7 +272,7 @@ fn simulated<T, F>(
 ) -> Result<Done<F>, Failure> {
     let (leg, seed) = (arguments.plant.leg()?, arguments.plant.seed);
     let (model, task) = (&compiled.model, takes_correction(compiled)?);
-    let mut controller = emitted(compiled, ui)?;
+    let mut controller = at_run_time(compiled, ui)?;
     let specimen = plant::specimen(model, task, &leg, Some(seed));
     let noise = if arguments.plant.no_noise { Noise::NONE } else { Noise::of(&specimen) };
     let scenario = plant::scenario(model, task, &specimen, &noise, seed);

@@ -15,7 +15,7 @@ use super::file::{check_place, claim, write_folder};
 use super::learn::{NOWHERE, takes_correction};
 use super::named::{InputFile, OutputFolder};
 use super::plot::Plot;
-use super::sim::{PlantArguments, emitted, frequency};
+use super::sim::{PlantArguments, at_run_time, frequency};
 use super::spec;
 use super::trajectory;
 use super::ui::{Failure, Ui};
@@ -168,7 +168,7 @@ fn study(arguments: &StudyArguments, ui: &mut Ui) -> Result<(), Failure> {
         (folder, _) => folder.as_deref().map(claim).transpose()?,
     };
     arguments.plot.wanted()?;
-    let controller = emitted(&compiled, ui)?;
+    let controller = at_run_time(&compiled, ui)?;
     let study = Study {
         compiled: &compiled,
         controller: &controller,

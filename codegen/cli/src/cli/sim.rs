@@ -1,4 +1,4 @@
-//! `specgen sim`: the emitted controller on simulated machines that are not of its model class: the motions of the user's own
+//! `specgen sim`: a spec's controller on simulated machines that are not of its model class: the motions of the user's own
 //! platform, or the paper's experiments.
 
 pub(super) mod legs;
@@ -63,6 +63,10 @@ pub struct Arguments {
     /// `specgen replay`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "plot", "paper", "samples", "frequency", "trajectory"])]
     record: Option<OutputFile>,
+    /// Build the emitted controller and run that, which needs Rust. Without it the same law runs on the constants of the compiled
+    /// spec, with the same bits.
+    #[arg(long)]
+    emitted: bool,
     /// Length of that wave, s.
     #[arg(long, value_name = "S", default_value_t = 1.0, requires = "record", allow_negative_numbers = true)]
     seconds: f64,
@@ -148,7 +152,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     // A place that cannot be is refused before the minutes of the rest, too.
     let _claimed = arguments.output.as_deref().map(claim).transpose()?;
     arguments.record.as_deref().map_or(Ok(()), check_place)?;
-    let controller = emitted(&compiled, ui)?;
+    let controller = if arguments.emitted { emitted(&compiled, ui) } else { at_run_time(&compiled, ui) }?;
     if let Some(path) = &arguments.record {
         return record::run(arguments, path, &compiled, controller, ui);
     }
@@ -184,13 +188,19 @@ impl TickController for Interruptible {
     }
 }
 
+/// The law on the constants of a compiled spec: the bits of the emitted controller, and nothing is built.
+pub(super) fn at_run_time(compiled: &compile::Compiled, ui: &Ui) -> Result<Controller, Failure> {
+    ui.progress("controller: the compiled spec, not built");
+    specgen_run_time::controller(&compiled.ir).map_err(environment)
+}
+
 /// The emitted controller, built for this host from the same files that the main job writes. What it was built in is gone
 /// when this returns; the library stays loaded.
 pub(super) fn emitted(compiled: &compile::Compiled, ui: &Ui) -> Result<Controller, Failure> {
     let scratch = Scratch::new().map_err(environment)?;
     let workspace = scratch.path().join("controller");
     workspace::write_scratch(&workspace, &compiled.files)?;
-    ui.progress("building the emitted controller for this host");
+    ui.progress("controller: the emitted one, built for this host");
     let library = target::host::build_loadable(&workspace, &scratch.path().join("target"))?;
     Controller::load(&library).map_err(environment)
 }

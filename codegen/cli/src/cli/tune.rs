@@ -1,4 +1,4 @@
-//! `specgen tune`: gains and weights from the simulated loop with the emitted controller.
+//! `specgen tune`: gains and weights from the simulated loop with the controller of the spec.
 
 mod evaluate;
 mod report;
@@ -15,7 +15,7 @@ use serde_json::json;
 use super::file::{check_edit, claim, edit_file, write_folder};
 use super::named::{InputFile, OutputFolder};
 use super::plot::Plot;
-use super::sim::{PlantArguments, emitted, frequency};
+use super::sim::{PlantArguments, at_run_time, frequency};
 use super::spec;
 use super::ui::{Failure, Ui};
 use specgen_compiler::compile::{self, Compiled, Refused};
@@ -184,7 +184,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     if arguments.write {
         check_edit(&arguments.spec)?;
     }
-    let controller = emitted(&compiled, ui)?;
+    let controller = at_run_time(&compiled, ui)?;
     let job = Job { arguments, compiled, controller, leg, space, feasibility, threads };
     match asked {
         Some(asked) => evaluate::run(&job, &asked, ui),

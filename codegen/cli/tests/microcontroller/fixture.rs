@@ -201,8 +201,8 @@ pub fn output_words(output: &TickOutput, _state: &State) -> [u64; OUTPUT_WORDS] 
     words
 }
 pub struct State { level: [f64; 6], count: u64 }
+pub fn state_at_reset() -> State { State { level: [0.0; 6], count: 0 } }
 impl State {
-    pub fn new() -> Self { Self { level: [0.0; 6], count: 0 } }
     pub fn digest(&self) -> u64 {
         self.level.iter().fold(self.count, |digest, l| digest.rotate_left(7) ^ l.to_bits())
     }

@@ -114,10 +114,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         use specgen_runtime::supervisor::Supervision;
         #imports
         use crate::hysteresis::{Memory, TABLES, Table};
-
-        /// The spec, for the law.
-        #[derive(Debug, Clone, Copy, PartialEq)]
-        pub struct Constants;
+        use crate::identity::Constants;
 
         impl Spec for Constants {
             type Real = Real;

@@ -17,7 +17,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![doc = " The spec's settings: what `Config::new` holds."]
 
         #imports
-        use crate::constants::Constants;
+        use crate::identity::Constants;
         use crate::{Real, limits};
 
         /// ρ̂ of a leg, m/V; from `actuator`. X = q̂/ρ̂ is the virtual drive of (AII.1); mode P takes the leg as linear: u = q/ρ̂.

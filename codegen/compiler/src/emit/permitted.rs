@@ -22,8 +22,6 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let words = literal::count(ranges.len());
     let of = |most: f64| literal::real(Scalar::F64, most);
     let state = &table.state;
-    let (code_min, code_max) = (literal::integer(ir.actuation.code_min), literal::integer(ir.actuation.code_max));
-    let (grid, memory) = (of(ir.hysteresis.grid as f64), literal::count(ir.hysteresis.memory));
     let axes = [
         state.place,
         state.user,
@@ -59,11 +57,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const STATE: Sizes = Sizes {
             place: #place, user: #user, rate: #rate, acceleration: #acceleration, pose: #pose, pose_rate: #pose_rate, error: #error,
             apart: #apart, wrench: #wrench, leg: #leg, leg_rate: #leg_rate, line: #line, request: #request, reading: #reading, stiffness: #stiffness,
-<<<<<<< tmp1
             codes: limits::CODES, grid: hysteresis::GRID as f64, memory: hysteresis::MEMORY,
-=======
-            codes: [#code_min, #code_max], grid: #grid, memory: #memory,
->>>>>>> law
         };
     }
 }

@@ -69,7 +69,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         use specgen_law::Reset;
         use specgen_runtime::supervisor::{Reaction, Steadiness, Supervision #uses};
 
-        use crate::constants::Constants;
+        use crate::identity::Constants;
         use crate::hysteresis::Memory;
         use crate::{Real #limits};
 

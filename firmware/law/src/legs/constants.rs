@@ -1,6 +1,6 @@
 //! What the law has to know of six legs.
 
-use super::state::DeadTimeLead;
+use super::lead::DeadTimeLead;
 use crate::spec::Spec;
 
 /// The law of six legs with their own gauges.

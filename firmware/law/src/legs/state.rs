@@ -1,51 +1,17 @@
 //! What the controller remembers from tick to tick. No NaN or infinity is ever stored here.
 
-use core::fmt::Debug;
-
 use specgen_runtime::snapshot::Snapshot;
-use specgen_runtime::{Digest, Estimate, Real};
+use specgen_runtime::{Digest, Estimate, Real as _};
 
 use super::constants::SixLegs;
-use crate::memory::LegMemory as _;
+use super::lead::DeadTimeLead as _;
 use crate::spec::{LEGS, Reset};
-
-/// What a leg is asked for beyond the demand, so that it arrives in time; or nothing.
-pub trait DeadTimeLead<T: Real>: Copy + Debug + Snapshot {
-    /// None asked for.
-    const REST: Self;
-    /// Asks for so much, m. `lead` is not called where there is none.
-    fn ask(&mut self, lead: impl FnOnce() -> T);
-    /// What is asked for, m.
-    fn asked(&self) -> Option<T>;
-}
-
-specgen_runtime::state! { |words|
-    /// A lead of one leg, or of none: `N` is 1 or 0.
-    pub struct Lead<T, N>[T: Real, const N: usize] {
-        /// m.
-        asked: [T; N] = [T::ZERO; N], numbers(words.sizes().leg);
-    }
-}
-
-impl<T: Real + Debug, const N: usize> DeadTimeLead<T> for Lead<T, N> {
-    const REST: Self = Self::new();
-    #[inline(always)]
-    fn ask(&mut self, lead: impl FnOnce() -> T) {
-        if let Some(asked) = self.asked.first_mut() {
-            *asked = lead();
-        }
-    }
-    #[inline(always)]
-    fn asked(&self) -> Option<T> {
-        self.asked.first().copied()
-    }
-}
 
 specgen_runtime::state! { |words|
     /// State of one leg.
     pub struct LegState<P>[P: SixLegs](reset: &Reset<P>, leg: usize) {
         /// Reversal memory; its displacement is q̂ = ρ̂X, what was really requested, m.
-        pub memory: P::Memory = reset.memory[leg], part if memory.highest() <= P::Real::from_f64(words.sizes().grid);
+        pub memory: P::Memory = reset.memory[leg], part;
         /// Converter code now held at the output.
         pub code: i32 = reset.code, ticks(words.sizes().codes[1]) if *code >= words.sizes().codes[0];
         /// δ̂ and φ̂, m.

@@ -10,8 +10,9 @@ use specgen_runtime::{Law, SetpointKind};
 
 use super::config::Config;
 use super::constants::SixLegs;
+use super::lead::DeadTimeLead as _;
 use super::sensing::{gauge_is_accepted, leg_setpoint_is_accepted};
-use super::state::{DeadTimeLead as _, LegState, State};
+use super::state::{LegState, State};
 use super::tick::{TickInput, TickOutput};
 use crate::kinematics::{leg_displacements, pose_is_accepted};
 use crate::memory::LegMemory as _;

@@ -7,8 +7,9 @@ use specgen_runtime::{CodeLimits, Estimate, Law, Real as _, SetpointKind};
 
 use super::config::{Config, Settings};
 use super::constants::{LegSpace, SixLegs};
+use super::lead::DeadTimeLead as _;
 use super::sensing::{faults, gauge_is_accepted, leg_setpoint_is_accepted};
-use super::state::{DeadTimeLead as _, LegState, State};
+use super::state::{LegState, State};
 use super::step::{advance, outputs};
 use super::tick::{TickInput, TickOutput, write_output};
 use crate::kinematics::{pose_from_legs, pose_is_accepted};
@@ -81,7 +82,7 @@ impl<P: SixLegs> ControlLaw<P> for LegSpace {
             let adapts = config.law() != Law::Invhys && gauge_is_accepted(p, *reading);
             *demand = if adapts { *reading } else { modelled };
             leg.estimate = Estimate { level: *demand - modelled, drift: P::Real::ZERO };
-            leg.lead = P::Lead::REST;
+            leg.lead.rest();
         }
         supervisor.fresh = false;
         supervisor.approach.begin(match config.setpoint() {
@@ -151,7 +152,7 @@ impl<P: SixLegs> ControlLaw<P> for LegSpace {
         move_codes(p, config.code_limits().max_step, supervisor, legs);
         let faults = faults(p, &input.displacement);
         for leg in &mut state.legs {
-            leg.lead = P::Lead::REST;
+            leg.lead.rest();
         }
         if faults == 0 {
             if compares(p, supervisor) {

@@ -11,6 +11,11 @@ pub trait ModalDamping<T: Real>: Copy + Debug + Snapshot {
     type Sections;
     /// Nothing asked for.
     const REST: Self;
+    /// From now on nothing is asked for.
+    #[inline(always)]
+    fn rest(&mut self) {
+        *self = Self::REST;
+    }
     /// One tick: the error of each mode to what is asked for against it.
     fn act(&mut self, sections: &Self::Sections, error: &[T; 6]);
     /// `wanted` and what is asked for against the modes.
@@ -38,6 +43,11 @@ pub trait RequestCorrection<T: Real>: Copy + Debug + Snapshot {
     type Wanted: Copy + Debug + PartialEq + AsRef<[T]> + AsMut<[T]>;
     /// Nothing corrected.
     const REST: Self;
+    /// From now on nothing is corrected.
+    #[inline(always)]
+    fn rest(&mut self) {
+        *self = Self::REST;
+    }
     /// Nothing wanted of as many axes as have limits.
     fn nothing(limits: &Self::Limits) -> Self::Wanted;
     /// One tick: follows what is wanted as far as the limits let it. Returns whether they held any axis back.

@@ -1,14 +1,5 @@
 //! What the controller remembers from tick to tick. No NaN or infinity is ever stored here.
 
-<<<<<<< tmp1:firmware/controller/law/platform/state.rs
-use crate::config::Environment;
-use crate::defaults::LINES;
-use crate::hysteresis::Memory;
-use crate::supervision::{code_at_rest, displacement_at_rest, memory_at_rest};
-use crate::task_space::{CORRECTED, DAMPED};
-use crate::{LEGS, Real};
-=======
->>>>>>> law:firmware/law/src/platform/state.rs
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::snapshot::Snapshot;
 use specgen_runtime::supervisor::Fallback;
@@ -19,26 +10,17 @@ use specgen_runtime::{
 use super::config::Environment;
 use super::constants::Platform;
 use super::parts::{ModalDamping as _, OutputLines as _, RequestCorrection as _};
-use crate::memory::LegMemory as _;
 use crate::spec::{LEGS, Reset};
 
 specgen_runtime::state! { |words|
     /// State of one leg.
     pub struct LegState<P>[P: Platform](reset: &Reset<P>, leg: usize) {
         /// Reversal memory of the drive that was really applied.
-<<<<<<< tmp1:firmware/controller/law/platform/state.rs
-        pub memory: Memory = memory_at_rest(leg), part;
-=======
-        pub memory: P::Memory = reset.memory[leg], part if memory.highest() <= P::Real::from_f64(words.sizes().grid);
->>>>>>> law:firmware/law/src/platform/state.rs
+        pub memory: P::Memory = reset.memory[leg], part;
         /// Where on its table the leg was found last.
         pub last: LastLine<P::Real> = LastLine::new(), derived;
         /// Converter code now held at the output.
-<<<<<<< tmp1:firmware/controller/law/platform/state.rs
-        pub code: i32 = code_at_rest(), ticks(words.sizes().codes[1]) if *code >= words.sizes().codes[0];
-=======
         pub code: i32 = reset.code, ticks(words.sizes().codes[1]) if *code >= words.sizes().codes[0];
->>>>>>> law:firmware/law/src/platform/state.rs
         /// q̂ = ρ̂X: displacement really requested by the code held, in the model of the mode it was asked in, m.
         pub requested: P::Real = reset.displacement[leg], number(words.sizes().leg);
         /// Part of the last request that a limit withheld, m; zero for a leg that was free.

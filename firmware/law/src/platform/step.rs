@@ -167,7 +167,7 @@ fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bo
         state.innovation_notch = NotchState::new();
     }
     if !mode.damps_modes() {
-        state.damping = P::Damping::REST;
+        state.damping.rest();
     }
     if !mode.feeds_back() {
         state.integral = Integral::new();
@@ -203,7 +203,7 @@ fn hand_over<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, reques
 #[inline(never)]
 fn fall_back<P: Platform>(state: &mut State<P>, fallback: Fallback) {
     state.fallback = fallback;
-    state.damping = P::Damping::REST;
+    state.damping.rest();
     if fallback == Fallback::FeedForward {
         for estimate in &mut state.estimates {
             // δ̂ would go on with φ̂.

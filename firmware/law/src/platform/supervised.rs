@@ -94,8 +94,8 @@ impl<P: Platform> ControlLaw<P> for TaskSpace {
         state.integral = Integral::new();
         state.error_notch = NotchState::new();
         state.innovation_notch = NotchState::new();
-        state.damping = P::Damping::REST;
-        state.correction = P::Correction::REST;
+        state.damping.rest();
+        state.correction.rest();
         state.error = [P::Real::ZERO; 6];
         state.deflection = [P::Real::ZERO; 6];
         state.transfer = Transfer::new();

@@ -8,7 +8,7 @@ use core::sync::atomic::Ordering;
 use controller::Config;
 use controller::snapshot::recorder::{Activity, Settings};
 use controller::snapshot::{MACHINE_STATE_WORDS, record_before};
-use controller::supervised::{Machine, machine_at_reset};
+use controller::supervised::Machine;
 
 use crate::handover::{Outlets, Row, SNAPSHOT_EVERY, Shared, Snapshot, Tape};
 
@@ -140,6 +140,7 @@ mod tests {
     use crate::record::Writer;
     use controller::PLACE_WORDS;
     use controller::snapshot::recorder;
+    use controller::supervised::machine_at_reset;
     use controller::supervised::{MACHINE_INPUT_WORDS, MachineInput};
     use rtrb::RingBuffer;
     use specgen_link::EdgeStatus;
@@ -212,13 +213,13 @@ mod tests {
         let (snapshots, snapshots_out) = RingBuffer::new(room);
         let (tapes, tapes_out) = RingBuffer::new(1);
         let outlets = Outlets { rows, snapshots: records.then_some(snapshots), tapes };
-        let keeper = Keeper::new(outlets, None, shared, (&Machine::new(), &Config::new()));
+        let keeper = Keeper::new(outlets, None, shared, (&machine_at_reset(), &Config::new()));
         (keeper, (rows_out, snapshots_out, tapes_out))
     }
 
     #[test]
     fn a_block_begins_with_a_state_after_so_many_rows_and_with_other_settings() {
-        let (machine, config, shared) = (Machine::new(), Config::new(), Shared::default());
+        let (machine, config, shared) = (machine_at_reset(), Config::new(), Shared::default());
         let (mut keeper, (mut rows, mut snapshots, _)) = keeper(8, true, &shared);
         assert!(keeper.wants_digest());
         let mut opened = Vec::new();
@@ -243,7 +244,7 @@ mod tests {
 
     #[test]
     fn a_run_that_is_not_recorded_hands_rows_alone() {
-        let (machine, config, shared) = (Machine::new(), Config::new(), Shared::default());
+        let (machine, config, shared) = (machine_at_reset(), Config::new(), Shared::default());
         let (mut keeper, (mut rows, mut snapshots, mut tapes)) = keeper(4, false, &shared);
         assert!(!keeper.wants_digest());
         keeper.trigger();
@@ -269,7 +270,7 @@ mod tests {
 
     #[test]
     fn a_recorder_that_finds_no_room_is_kept_and_given_back_at_the_end() {
-        let (machine, config, shared) = (Machine::new(), Config::new(), Shared::default());
+        let (machine, config, shared) = (machine_at_reset(), Config::new(), Shared::default());
         let (mut keeper, (_rows, _snapshots, mut tapes)) = keeper(4, true, &shared);
         for expected in [false, true] {
             let (_, tape) = crate::capture::Capture::new(None).unwrap();

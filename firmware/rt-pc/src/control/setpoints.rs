@@ -341,7 +341,7 @@ mod tests {
         assert!(setpoints.take_player().is_none(), "under way");
         setpoints.wish(Wish { command: Some([7; COMMAND_WORDS]), request: Request::Hold });
         assert_eq!(setpoints.request(), Request::Hold);
-        let state = State::new();
+        let state = controller::state_at_reset();
         for number in 0..6 {
             let command = setpoints.next(Phase::Running, &config);
             assert_eq!((command[0], command[1]), if number < 2 { (5, 5) } else { (3, 9) }, "{number}");

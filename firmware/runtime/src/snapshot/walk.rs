@@ -313,7 +313,7 @@ impl Reader<'_> {
     /// # Errors
     /// No state holds the word.
     pub fn stored<T: Real>(&mut self, values: &mut [T], _count: usize, largest: f64) -> Result<(), Invalid> {
-        let kept = self.sizes().memory.min(values.len());
+        let kept = self.sizes().kept(values.len());
         self.reals(values.get_mut(..kept).unwrap_or_default(), largest)
     }
 

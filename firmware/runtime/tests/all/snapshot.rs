@@ -27,11 +27,7 @@ const SIZES: Sizes = Sizes {
     reading: 12.0,
     stiffness: 2.0,
     codes: [-7, 7],
-<<<<<<< tmp1
     grid: 100.0,
-=======
-    grid: 40.0,
->>>>>>> law
     memory: usize::MAX,
 };
 const GARBAGE: u64 = 0x5555_5555_5555_5555;

@@ -2,13 +2,8 @@
 
 use std::fmt;
 
-use libloading::Symbol;
-
 use super::Supervised;
 use crate::controller::ControllerError;
-
-type Save = unsafe extern "C" fn(*const u8, *mut u64);
-type Load = unsafe extern "C" fn(*mut u8, *const u64) -> i32;
 
 /// Why words are not taken for a machine.
 #[derive(Debug)]
@@ -47,21 +42,16 @@ impl Supervised {
     /// Words of [`Supervised::save`].
     #[must_use]
     pub fn state_words(&self) -> usize {
-        self.controller.machine_words
+        self.controller.engine.machine_words()
     }
 
     /// The machine as words.
     ///
     /// # Errors
-    /// If the library does not offer it.
+    /// If a library does not offer it.
     pub fn save(&self) -> Result<Vec<u64>, ControllerError> {
         let mut words = vec![0; self.state_words()];
-        let failed = |cause| ControllerError::Load { path: self.controller.path.clone(), cause };
-        // SAFETY: the machine is initialised; there are as many words as the library says it writes.
-        unsafe {
-            let save: Symbol<'_, Save> = self.controller.library.get(b"specgen_machine_save\0").map_err(failed)?;
-            save(self.machine.start(), words.as_mut_ptr());
-        }
+        self.controller.engine.save_machine(&mut words)?;
         Ok(words)
     }
 
@@ -74,14 +64,7 @@ impl Supervised {
         if words.len() != expected {
             return Err(SnapshotError::Length { given: words.len(), expected });
         }
-        let failed =
-            |cause| SnapshotError::Library(ControllerError::Load { path: self.controller.path.clone(), cause });
-        // SAFETY: the buffer has the size and alignment that the library asks for; there are as many words as it reads.
-        let bad = unsafe {
-            let load: Symbol<'_, Load> = self.controller.library.get(b"specgen_machine_load\0").map_err(failed)?;
-            load(self.machine.start(), words.as_ptr())
-        };
-        match usize::try_from(bad).ok().and_then(|bad| bad.checked_sub(1)) {
+        match self.controller.engine.load_machine(words).map_err(SnapshotError::Library)? {
             None => Ok(()),
             Some(index) => Err(SnapshotError::Word { index, word: words.get(index).copied().unwrap_or_default() }),
         }

@@ -1,11 +1,7 @@
 //! Gauges of a machine that has no plant yet: what they show while it is armed, when each leg in turn makes a small pulse.
 
-use libloading::Symbol;
-
 use super::Supervised;
 use crate::controller::{ControllerError, TickController};
-
-type WordsPerLeg = unsafe extern "C" fn(*const u64, *mut u64);
 
 /// Readings that stand but for what the legs move by the controller's own model.
 #[derive(Debug, Clone)]
@@ -28,18 +24,11 @@ impl Supervised {
         let description = self.controller.description();
         let gauges = description.input("gauge[0]").or_else(|_| description.input("displacement[0]"))?;
         let [requested, ..] = description.outputs("requested")?;
-        let failed = |cause| ControllerError::Load { path: self.controller.path.clone(), cause };
         let mut bits = [0; 6];
         for (bits, word) in bits.iter_mut().zip(input.iter().skip(gauges)) {
             *bits = *word;
         }
-        let mut rows = [[0; 6]; 6];
-        // SAFETY: the type is that of the interface's version; both arrays have the lengths that it takes, and the library stays loaded.
-        unsafe {
-            let per_leg: Symbol<'_, WordsPerLeg> =
-                self.controller.library.get(b"specgen_words_per_leg\0").map_err(failed)?;
-            per_leg(bits.as_ptr(), rows.as_mut_ptr().cast());
-        }
+        let rows = self.controller.engine.words_per_leg(&bits)?;
         let scalar = description.scalar;
         let per_leg = rows.map(|row| row.map(|word| scalar.decode(word)));
         Ok(Standing { gauges, requested, words: bits.map(|word| scalar.decode(word)), per_leg, rest: None })

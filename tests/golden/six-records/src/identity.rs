@@ -12,6 +12,10 @@ pub const SCALAR_BITS: u32 = 32;
 /// Control period, s; from `timing.period`.
 pub const PERIOD_SECONDS: f64 = 0.0002;
 
+/// The spec, for the law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Constants;
+
 /// Number of legs.
 pub const LEGS: usize = 6;
 

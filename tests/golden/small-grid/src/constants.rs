@@ -14,10 +14,7 @@ use crate::{
     permitted, supervision,
 };
 use crate::hysteresis::{Memory, TABLES, Table};
-
-/// The spec, for the law.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Constants;
+use crate::identity::Constants;
 
 impl Spec for Constants {
     type Real = Real;

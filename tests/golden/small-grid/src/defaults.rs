@@ -5,7 +5,7 @@
 
 use specgen_law::legs::Settings;
 use specgen_runtime::{CodeLimits, Law, SetpointKind};
-use crate::constants::Constants;
+use crate::identity::Constants;
 use crate::{Real, limits};
 
 /// ρ̂ of a leg, m/V; from `actuator`. X = q̂/ρ̂ is the virtual drive of (AII.1); mode P takes the leg as linear: u = q/ρ̂.

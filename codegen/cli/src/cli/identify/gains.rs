@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let dir = arguments.spec.parent().unwrap_or(Path::new(""));
     let tables = declared::records(model, dir).map_err(refused)?;
 
-    let mut machine = Supervised::new(sim::emitted(&compiled, ui)?).map_err(sim::environment)?;
+    let mut machine = Supervised::new(sim::at_run_time(&compiled, ui)?).map_err(sim::environment)?;
     ui.progress("running the record again");
     let names = machine.output_names();
     let mut moves = Moves::new(&compiled, &names)?;
@@ -148,7 +148,7 @@ impl Moves {
             .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
         let place = |name: &str| {
             let found = names.iter().position(|other| other == name);
-            found.ok_or_else(|| Failure::Environment(format!("the emitted controller has no output {name}")))
+            found.ok_or_else(|| Failure::Environment(format!("the controller has no output {name}")))
         };
         let (voltage, pose) = (place("voltage[0]")?, place("pose[0]")?);
         Ok(Self {

@@ -17,6 +17,7 @@ pub static PART: Part = Part {
         "src/legs.rs",
         "src/legs/config.rs",
         "src/legs/constants.rs",
+        "src/legs/lead.rs",
         "src/legs/passes.rs",
         "src/legs/sensing.rs",
         "src/legs/stages.rs",

@@ -18,6 +18,8 @@ pub(super) const SIMULATOR: &[(&str, &str)] = files! { "" as "host-sim":
     "plants/reference-platform.json",
     "src/closed_loop.rs",
     "src/controller.rs",
+    "src/controller/engine.rs",
+    "src/controller/library.rs",
     "src/controller/supervised.rs",
     "src/controller/supervised/snapshot.rs",
     "src/controller/supervised/standing.rs",

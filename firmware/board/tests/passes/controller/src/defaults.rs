@@ -6,7 +6,7 @@
 use specgen_law::platform::{Environment, Settings};
 use specgen_runtime::trigger::Line;
 use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
-use crate::constants::Constants;
+use crate::identity::Constants;
 use crate::{Real, limits};
 
 /// ρ̂ of a leg, m/V; from `actuator`. X = q̂/ρ̂ is the virtual drive of (AII.1); mode P takes the leg as linear: u = q/ρ̂.

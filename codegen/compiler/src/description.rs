@@ -1,0 +1,54 @@
+//! What a controller says of itself: `key=value` lines, lists separated by commas. Between the two parts that are made here stand the
+//! names of its words.
+
+use crate::ir::{Frames, Ir};
+
+/// The lines before the names of words, and those after them.
+#[must_use]
+pub fn description(ir: &Ir) -> [String; 2] {
+    let (name, digest, version) = (&ir.name, &ir.digest, &ir.specgen_version);
+    let about = format!(
+        "name={name}\ndigest={digest}\nversion={version}\nkind={}\nscalar_bits={}\nleg_gain={:?}\nperiod={:?}\ngrid={}\ndrive_range={:?},{:?}\n",
+        if ir.task_space.is_some() { "platform" } else { "legs" },
+        ir.scalar.bits(),
+        ir.defaults.leg_gain,
+        ir.defaults.period,
+        ir.hysteresis.grid,
+        ir.actuation.voltage[0],
+        ir.actuation.voltage[1],
+    );
+    [about, motion(ir)]
+}
+
+/// Where a platform may go, how fast, and in which coordinates: what a host has to know beforehand to say whether a pose can be
+/// reached. Nothing of six legs.
+fn motion(ir: &Ir) -> String {
+    let Some(task) = &ir.task_space else { return String::new() };
+    let setpoints = &task.setpoints;
+    let mut text = String::new();
+    let mut line = |key: &str, values: &[f64]| {
+        let values: Vec<String> = values.iter().map(|value| format!("{value:?}")).collect();
+        text.push_str(&format!("{key}={}\n", values.join(",")));
+    };
+    line("bias", &task.law.bias);
+    line("origin", &setpoints.bias);
+    line("bound", &ir.bounds.pose);
+    line("speed", &setpoints.speed);
+    line("stroke", &[ir.bounds.stroke]);
+    line("rest_leg", ir.kinematics.rest_leg.as_flattened());
+    line("platform_joint", ir.kinematics.platform_joint.as_flattened());
+    match setpoints.frames {
+        Frames::Parallel => {}
+        Frames::Tool { point, largest_angle } => {
+            line("tool", &point);
+            line("largest_angle", &[largest_angle]);
+        }
+        Frames::Work { axes, point, largest_angle } => {
+            line("tool", &point);
+            line("axes", axes.as_flattened());
+            line("largest_angle", &[largest_angle]);
+        }
+    }
+    let names: Vec<&str> = setpoints.trajectories.iter().map(|trajectory| trajectory.name.as_str()).collect();
+    text + "trajectories=" + &names.join(",") + "\n"
+}

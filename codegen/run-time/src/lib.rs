@@ -1,0 +1,72 @@
+//! A compiled spec as a controller, without building it: the law of `specgen-law` over constants that come from the IR.
+//!
+//! ```text
+//! IR ──► constants (numbers rounded as in the emitted text, sizes checked) ──► law ──► host_sim::Controller
+//! ```
+//! Every output, code, digest and snapshot has the bits of the emitted controller. What differs is speed, about 2.4 times, and where
+//! a controller's sizes are: tables are slices, a reversal memory has room for the largest that a spec may ask for and stores as many
+//! extrema as this spec does, parts that a spec may leave out are there and switched off.
+//!
+//! Both laws are compiled here in both scalars, and used through [`host_sim::controller::Engine`]: who simulates compiles none of it.
+
+mod common;
+mod convert;
+mod engine;
+mod legs;
+mod memory;
+mod parts;
+mod platform;
+#[cfg(test)]
+mod tests;
+
+use std::fmt;
+
+use host_sim::controller::{Controller, ControllerError, Engine};
+use specgen_compiler::ir::{Ir, Scalar};
+
+/// The controller of a compiled spec, with the spec's configuration and the power-up state.
+///
+/// Its constants stay in memory to the end of the process: tables and paths of this spec, some 100 kB. [`Controller::fork`] adds none.
+///
+/// # Errors
+/// The IR is none that the compiler makes.
+pub fn controller(ir: &Ir) -> Result<Controller, InvalidIr> {
+    let engine = match ir.scalar {
+        Scalar::F32 => engine::<f32>(ir)?,
+        Scalar::F64 => engine::<f64>(ir)?,
+    };
+    Ok(Controller::of(engine)?)
+}
+
+fn engine<T: engine::Number>(ir: &Ir) -> Result<Box<dyn Engine>, InvalidIr> {
+    Ok(match &ir.task_space {
+        Some(task) => engine::boxed(platform::constants::<T>(ir, task)?)?,
+        None => engine::boxed(legs::constants::<T>(ir)?)?,
+    })
+}
+
+/// Why an IR is not run: it is none that the compiler makes.
+#[derive(Debug)]
+pub enum InvalidIr {
+    /// A part of it is out of range.
+    Part(&'static str),
+    /// It describes or configures itself badly.
+    Controller(ControllerError),
+}
+
+impl fmt::Display for InvalidIr {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Part(part) => write!(f, "the compiled spec cannot be run: {part}"),
+            Self::Controller(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for InvalidIr {}
+
+impl From<ControllerError> for InvalidIr {
+    fn from(error: ControllerError) -> Self {
+        Self::Controller(error)
+    }
+}

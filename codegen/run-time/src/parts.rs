@@ -1,0 +1,254 @@
+//! Parts of the law that a spec may leave out, or have so many of.
+
+use std::convert::Infallible;
+use std::fmt::Debug;
+
+use specgen_law::legs::{DeadTimeLead, Lead};
+use specgen_law::platform::{GaugeCalibration, ModalDamping, OutputLines, RequestCorrection};
+use specgen_runtime::attitude::horner;
+use specgen_runtime::linear::each;
+use specgen_runtime::setpoint::{Frames, Parallel, Target, Tool, Work};
+use specgen_runtime::snapshot::{Field, Invalid, Reader, Words};
+use specgen_runtime::trigger::{Line, MOST, Seen, Triggers};
+use specgen_runtime::{Correction, CorrectionLimit, Damping, Real, Resonator, Snapshot};
+
+/// A part that the spec asks for, or not: it has no words then.
+#[derive(Debug, Clone, Copy)]
+pub struct Optional<S> {
+    /// Whether the spec asks for it.
+    pub given: bool,
+    part: S,
+}
+
+impl<S: Field> Field for Optional<S> {
+    const WORDS: usize = S::WORDS;
+}
+
+impl<S: Snapshot> Snapshot for Optional<S> {
+    fn show(&self, words: &mut impl Words) -> Result<(), Infallible> {
+        if self.given { self.part.show(words) } else { Ok(()) }
+    }
+
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+        if self.given { self.part.restore(words) } else { Ok(()) }
+    }
+}
+
+impl<T: Real + Debug> ModalDamping<T> for Optional<Damping<T, 6>> {
+    type Sections = Option<[Resonator<T>; 6]>;
+    const REST: Self = Self { given: false, part: Damping::new() };
+
+    fn rest(&mut self) {
+        self.part = Damping::new();
+    }
+
+    #[inline]
+    fn act(&mut self, sections: &Self::Sections, error: &[T; 6]) {
+        if let Some(sections) = sections {
+            self.part.act(sections, error);
+        }
+    }
+
+    #[inline]
+    fn beside(&self, wanted: [T; 6]) -> [T; 6] {
+        if self.given { self.part.beside(wanted) } else { wanted }
+    }
+}
+
+/// Six numbers, or none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SixOrNone<T> {
+    given: bool,
+    values: [T; 6],
+}
+
+impl<T> AsRef<[T]> for SixOrNone<T> {
+    fn as_ref(&self) -> &[T] {
+        if self.given { &self.values } else { &[] }
+    }
+}
+
+impl<T> AsMut<[T]> for SixOrNone<T> {
+    fn as_mut(&mut self) -> &mut [T] {
+        if self.given { &mut self.values } else { &mut [] }
+    }
+}
+
+impl<T: Real + Debug> RequestCorrection<T> for Optional<Correction<T, 6>> {
+    type Limits = Option<[CorrectionLimit<T>; 6]>;
+    type Wanted = SixOrNone<T>;
+    const REST: Self = Self { given: false, part: Correction::new() };
+
+    fn rest(&mut self) {
+        self.part = Correction::new();
+    }
+
+    #[inline]
+    fn nothing(limits: &Self::Limits) -> SixOrNone<T> {
+        SixOrNone { given: limits.is_some(), values: [T::ZERO; 6] }
+    }
+
+    #[inline]
+    fn follow(&mut self, limits: &Self::Limits, wanted: &SixOrNone<T>) -> bool {
+        limits.as_ref().is_some_and(|limits| self.part.follow(limits, &wanted.values))
+    }
+
+    #[inline]
+    fn pose(&self) -> Option<[T; 6]> {
+        if self.given { self.part.pose() } else { None }
+    }
+}
+
+impl<T: Real + Debug> DeadTimeLead<T> for Optional<Lead<T, 1>> {
+    const REST: Self = Self { given: false, part: Lead::REST };
+
+    fn rest(&mut self) {
+        self.part = Lead::REST;
+    }
+
+    #[inline]
+    fn ask(&mut self, lead: impl FnOnce() -> T) {
+        if self.given {
+            self.part.ask(lead);
+        }
+    }
+
+    #[inline]
+    fn asked(&self) -> Option<T> {
+        if self.given { self.part.asked() } else { None }
+    }
+}
+
+/// What so many output lines show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineSettings<T: Real> {
+    lines: [Line<T>; MOST],
+    count: usize,
+}
+
+impl<T: Real> LineSettings<T> {
+    /// None for more than there may be.
+    pub fn new(given: &[Line<T>]) -> Option<Self> {
+        let mut lines = [Line::new(); MOST];
+        lines.get_mut(..given.len())?.copy_from_slice(given);
+        Some(Self { lines, count: given.len() })
+    }
+}
+
+impl<T: Real> AsRef<[Line<T>]> for LineSettings<T> {
+    fn as_ref(&self) -> &[Line<T>] {
+        &self.lines[..self.count]
+    }
+}
+
+impl<T: Real> AsMut<[Line<T>]> for LineSettings<T> {
+    fn as_mut(&mut self) -> &mut [Line<T>] {
+        &mut self.lines[..self.count]
+    }
+}
+
+/// Up to four output lines.
+#[derive(Debug, Clone, Copy)]
+pub enum Lines<T: Real> {
+    None,
+    One(Triggers<T, 1>),
+    Two(Triggers<T, 2>),
+    Three(Triggers<T, 3>),
+    Four(Triggers<T, 4>),
+}
+
+impl<T: Real> Lines<T> {
+    /// As many as there are settings for, all low.
+    pub fn low(settings: &LineSettings<T>) -> Self {
+        match settings.count {
+            0 => Self::None,
+            1 => Self::One(Triggers::new()),
+            2 => Self::Two(Triggers::new()),
+            3 => Self::Three(Triggers::new()),
+            _ => Self::Four(Triggers::new()),
+        }
+    }
+}
+
+macro_rules! lines {
+    ($lines:expr, $name:ident => $value:expr, $none:expr) => {
+        match $lines {
+            Lines::None => $none,
+            Lines::One($name) => $value,
+            Lines::Two($name) => $value,
+            Lines::Three($name) => $value,
+            Lines::Four($name) => $value,
+        }
+    };
+}
+
+impl<T: Real> Field for Lines<T> {
+    const WORDS: usize = Triggers::<T, MOST>::WORDS;
+}
+
+impl<T: Real> Snapshot for Lines<T> {
+    fn show(&self, words: &mut impl Words) -> Result<(), Infallible> {
+        lines!(self, lines => lines.show(words), Ok(()))
+    }
+
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+        lines!(self, lines => lines.restore(words), Ok(()))
+    }
+}
+
+impl<T: Real + Debug> OutputLines<T> for Lines<T> {
+    type Settings = LineSettings<T>;
+    const LOW: Self = Self::None;
+
+    fn any(&self) -> bool {
+        !matches!(self, Self::None)
+    }
+
+    fn tick(&mut self, settings: &LineSettings<T>, seen: &Seen<'_, T>) -> u32 {
+        lines!(self, lines => settings.lines.first_chunk().map_or(0, |settings| lines.tick(settings, seen)), 0)
+    }
+
+    fn rest(&mut self) -> u32 {
+        lines!(self, lines => lines.rest(), 0)
+    }
+
+    fn missed(&self) -> u64 {
+        lines!(self, lines => lines.missed(), 0)
+    }
+}
+
+/// Any of the user's frames.
+#[derive(Debug, Clone, Copy)]
+pub enum UserFrames<T> {
+    Parallel,
+    Tool(Tool<T>),
+    Work(Work<T>),
+}
+
+impl<T: Real> Frames<T> for UserFrames<T> {
+    fn to_platform(&self, user: &Target<T>) -> Option<Target<T>> {
+        match self {
+            Self::Parallel => Parallel.to_platform(user),
+            Self::Tool(frames) => frames.to_platform(user),
+            Self::Work(frames) => frames.to_platform(user),
+        }
+    }
+
+    fn admit(&self, user: &Target<T>, bias: &[T; 6], bound: &[T; 6], target: &mut Target<T>) -> bool {
+        match self {
+            Self::Parallel => Parallel.admit(user, bias, bound, target),
+            Self::Tool(frames) => frames.admit(user, bias, bound, target),
+            Self::Work(frames) => frames.admit(user, bias, bound, target),
+        }
+    }
+}
+
+/// A polynomial of each gauge, lowest power first.
+#[derive(Debug, Clone, Copy)]
+pub struct Polynomials<T: 'static>(pub [&'static [T]; 6]);
+
+impl<T: Real> GaugeCalibration<T> for Polynomials<T> {
+    fn readings(&self, words: &[T; 6]) -> [T; 6] {
+        each(|gauge| horner(self.0[gauge], words[gauge]).unwrap_or(T::ZERO))
+    }
+}

@@ -1,0 +1,79 @@
+//! What computes the ticks of a controller.
+
+use std::alloc::Layout;
+use std::any::Any;
+
+use super::ControllerError;
+
+/// Words of an analysis: J, M, C ḣ, G, leg forces, leg displacements.
+pub const ANALYSIS_WORDS: usize = 96;
+
+/// One configuration, one state of the control law, and one machine: the law under its supervisor. All numbers are words, as in the
+/// C interface of emitted libraries.
+///
+/// Callers give slices of the lengths that the description says.
+pub trait Engine: Send + Sync {
+    /// What the controller says of itself, `key=value` lines.
+    fn text(&self) -> String;
+    /// Sizes and alignments of a state, a configuration, and a machine.
+    fn layouts(&self) -> [Layout; 3];
+    /// The same constants and configuration in the same state, law and machine.
+    fn fork(&self) -> Box<dyn Engine>;
+    /// Takes configuration and state of the law.
+    ///
+    /// # Panics
+    /// If `other` has other constants.
+    fn take_over(&mut self, other: &dyn Engine);
+    /// To tell engines from each other.
+    fn as_any(&self) -> &dyn Any;
+
+    /// Configuration of the spec.
+    fn default_config(&self, words: &mut [u64]);
+    /// Takes a configuration.
+    ///
+    /// # Errors
+    /// Index of the first word that is refused; the configuration in force then stays.
+    fn configure(&mut self, words: &[u64]) -> Result<(), usize>;
+    /// The law as at power-up.
+    fn reset(&mut self);
+    /// One tick of the law.
+    fn step(&mut self, input: &[u64], output: &mut [u64]);
+    /// Digest of the law's state.
+    fn digest(&self) -> u64;
+
+    /// Whether there is a machine. It begins at rest.
+    ///
+    /// # Errors
+    /// If a library lacks it: it is of an older specgen.
+    fn add_machine(&mut self) -> Result<(), ControllerError>;
+    /// The machine as at power-up: disarmed.
+    fn reset_machine(&mut self);
+    /// One supervised tick.
+    fn step_machine(&mut self, input: &[u64], output: &mut [u64]);
+    /// Digest of the machine.
+    fn machine_digest(&self) -> u64;
+    /// Words of a snapshot of the machine.
+    fn machine_words(&self) -> usize;
+    /// Snapshot of the machine.
+    ///
+    /// # Errors
+    /// If a library does not offer it.
+    fn save_machine(&self, words: &mut [u64]) -> Result<(), ControllerError>;
+    /// Takes a snapshot.
+    ///
+    /// # Errors
+    /// If a library does not offer it. `Ok` holds the index of the first word that no machine holds, if there is one; the machine
+    /// then stays as it is.
+    fn load_machine(&mut self, words: &[u64]) -> Result<Option<usize>, ControllerError>;
+
+    /// The dynamics at a motion.
+    ///
+    /// # Errors
+    /// If a library does not offer them.
+    fn dynamics(&self, motion: &[[u64; 6]; 3]) -> Result<[u64; ANALYSIS_WORDS], ControllerError>;
+    /// Word of each gauge (rows) per displacement of each leg (columns) near these words.
+    ///
+    /// # Errors
+    /// If a library does not offer it.
+    fn words_per_leg(&self, gauges: &[u64; 6]) -> Result<[[u64; 6]; 6], ControllerError>;
+}

@@ -1,0 +1,372 @@
+//! The shared library of an emitted controller; the only module with unsafe code but for one that picks instructions.
+//!
+//! The library's C interface, version 2: `specgen_abi_version`, `_describe`, `_config_default`, `_config_check`,
+//! `_config_load`, `_state_reset`, `_step`, `_state_digest`, for analysis `_dynamics`, and under the supervisor `_machine_reset`,
+//! `_machine_step`, `_machine_digest`, `_machine_save`, `_machine_load`, `_words_per_leg`.
+#![allow(unsafe_code)]
+
+use std::alloc::{Layout, alloc_zeroed, dealloc, handle_alloc_error};
+use std::any::Any;
+use std::path::{Path, PathBuf};
+use std::ptr::NonNull;
+use std::sync::Arc;
+
+use libloading::{Library, Symbol};
+
+use super::ControllerError;
+use super::engine::{ANALYSIS_WORDS, Engine};
+use crate::description::{DescriptionError, fields};
+
+/// Version of the C interface that this module speaks.
+pub const ABI_VERSION: u32 = 2;
+
+/// The library's functions. Valid while the library is loaded.
+#[derive(Clone, Copy)]
+struct Functions {
+    config_default: unsafe extern "C" fn(*mut u64),
+    config_check: unsafe extern "C" fn(*const u64) -> i32,
+    config_load: unsafe extern "C" fn(*mut u8, *const u64) -> i32,
+    state_reset: unsafe extern "C" fn(*mut u8),
+    step: unsafe extern "C" fn(*const u8, *mut u8, *const u64, *mut u64),
+    state_digest: unsafe extern "C" fn(*const u8) -> u64,
+}
+
+type Reset = unsafe extern "C" fn(*mut u8);
+type Step = unsafe extern "C" fn(*const u8, *mut u8, *const u64, *mut u64);
+type Digest = unsafe extern "C" fn(*const u8) -> u64;
+type Save = unsafe extern "C" fn(*const u8, *mut u64);
+type Load = unsafe extern "C" fn(*mut u8, *const u64) -> i32;
+type Analyse = unsafe extern "C" fn(*const u64, *mut u64);
+type WordsPerLeg = unsafe extern "C" fn(*const u64, *mut u64);
+
+/// A machine: its memory and its functions.
+struct Machine {
+    memory: Buffer,
+    reset: Reset,
+    step: Step,
+    digest: Digest,
+}
+
+/// An emitted controller with one configuration and one state.
+pub(super) struct Emitted {
+    text: String,
+    functions: Functions,
+    config: Buffer,
+    state: Buffer,
+    machine: Option<Machine>,
+    machine_layout: Layout,
+    /// Words of a machine's snapshot.
+    machine_words: usize,
+    /// Where it came from.
+    path: PathBuf,
+    /// Last, so that it is unloaded after everything else.
+    library: Arc<Library>,
+}
+
+// SAFETY: the buffers belong to one controller each and hold plain values without pointers (`Config`, `State` and `Machine` of an
+// emitted crate are `Copy`); the library's functions touch nothing but what they are given, and the library has no state.
+unsafe impl Send for Emitted {}
+// SAFETY: what takes a shared reference only reads configuration, state and machine.
+unsafe impl Sync for Emitted {}
+
+impl Emitted {
+    /// Loads a library. Configuration and state are zeros until [`Engine::configure`] and [`Engine::reset`].
+    pub(super) fn load(path: &Path) -> Result<Self, ControllerError> {
+        let failed = |cause| ControllerError::Load { path: path.to_owned(), cause };
+        // SAFETY: loading runs the library's initialisers. The caller names a controller library; an emitted one has none.
+        let library = unsafe { Library::new(path) }.map_err(failed)?;
+
+        // SAFETY: the types are those of the interface version; the version function itself is the same in every version,
+        // and is asked before any other is called. The pointers are used only while `library` lives, see `Emitted`.
+        let (describe, functions) = unsafe {
+            let abi_version: unsafe extern "C" fn() -> u32 = *library.get(b"specgen_abi_version\0").map_err(failed)?;
+            let found = abi_version();
+            if found != ABI_VERSION {
+                return Err(ControllerError::Abi { path: path.to_owned(), found });
+            }
+            let describe: unsafe extern "C" fn(*mut *const u8, *mut usize) =
+                *library.get(b"specgen_describe\0").map_err(failed)?;
+            let functions = Functions {
+                config_default: *library.get(b"specgen_config_default\0").map_err(failed)?,
+                config_check: *library.get(b"specgen_config_check\0").map_err(failed)?,
+                config_load: *library.get(b"specgen_config_load\0").map_err(failed)?,
+                state_reset: *library.get(b"specgen_state_reset\0").map_err(failed)?,
+                step: *library.get(b"specgen_step\0").map_err(failed)?,
+                state_digest: *library.get(b"specgen_state_digest\0").map_err(failed)?,
+            };
+            (describe, functions)
+        };
+
+        let mut start = std::ptr::null();
+        let mut length = 0;
+        // SAFETY: both pointers are to live locals.
+        unsafe { describe(&raw mut start, &raw mut length) };
+        let text = if start.is_null() {
+            String::new()
+        } else {
+            // SAFETY: the library points to `length` bytes of its own constant data; they are copied here.
+            String::from_utf8_lossy(unsafe { std::slice::from_raw_parts(start, length) }).into_owned()
+        };
+        let state = Buffer::new(layout(&text, "state_bytes", "state_align")?);
+        let config = Buffer::new(layout(&text, "config_bytes", "config_align")?);
+        let machine_layout = layout(&text, "machine_bytes", "machine_align")?;
+        let machine_words = size(&text, "machine_words")?;
+        let (path, library) = (path.to_owned(), Arc::new(library));
+        Ok(Self { text, functions, config, state, machine: None, machine_layout, machine_words, path, library })
+    }
+
+    /// A function that not every library has.
+    ///
+    /// # Safety
+    /// `F` is its type in the interface's version. It is called only while the library is loaded.
+    unsafe fn function<F: Copy>(&self, name: &[u8]) -> Result<F, ControllerError> {
+        // SAFETY: the caller's duty.
+        let function: Result<Symbol<'_, F>, _> = unsafe { self.library.get(name) };
+        match function {
+            Ok(function) => Ok(*function),
+            Err(cause) => Err(ControllerError::Load { path: self.path.clone(), cause }),
+        }
+    }
+
+    fn machine(&self) -> &Machine {
+        match &self.machine {
+            Some(machine) => machine,
+            None => unreachable!("`add_machine` comes before the use of a machine"),
+        }
+    }
+}
+
+impl Engine for Emitted {
+    fn text(&self) -> String {
+        self.text.clone()
+    }
+
+    fn layouts(&self) -> [Layout; 3] {
+        [self.state.layout, self.config.layout, self.machine_layout]
+    }
+
+    fn fork(&self) -> Box<dyn Engine> {
+        let machine = self.machine.as_ref().map(|machine| Machine { memory: machine.memory.copy(), ..*machine });
+        Box::new(Self {
+            text: self.text.clone(),
+            functions: self.functions,
+            config: self.config.copy(),
+            state: self.state.copy(),
+            machine,
+            machine_layout: self.machine_layout,
+            machine_words: self.machine_words,
+            path: self.path.clone(),
+            library: Arc::clone(&self.library),
+        })
+    }
+
+    fn take_over(&mut self, other: &dyn Engine) {
+        match other.as_any().downcast_ref::<Self>() {
+            Some(other) if Arc::ptr_eq(&self.library, &other.library) => {
+                self.config.overwrite(&other.config);
+                self.state.overwrite(&other.state);
+            }
+            _ => unreachable!("controllers of one library"),
+        }
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn default_config(&self, words: &mut [u64]) {
+        // SAFETY: as many words as the library says it writes.
+        unsafe { (self.functions.config_default)(words.as_mut_ptr()) };
+    }
+
+    fn configure(&mut self, words: &[u64]) -> Result<(), usize> {
+        // SAFETY: as many words as the library says it reads.
+        let mut bad = unsafe { (self.functions.config_check)(words.as_ptr()) };
+        if bad == 0 {
+            // SAFETY: the buffer has the size and alignment that the library asks for; the words as above.
+            bad = unsafe { (self.functions.config_load)(self.config.start(), words.as_ptr()) };
+        }
+        refused(bad).map_or(Ok(()), Err)
+    }
+
+    fn reset(&mut self) {
+        // SAFETY: the buffer has the size and alignment that the library asks for.
+        unsafe { (self.functions.state_reset)(self.state.start()) };
+    }
+
+    fn step(&mut self, input: &[u64], output: &mut [u64]) {
+        // SAFETY: `Controller::of` initialised both buffers; the slices have the lengths that the library says, checked by the caller.
+        unsafe {
+            (self.functions.step)(self.config.start(), self.state.start(), input.as_ptr(), output.as_mut_ptr());
+        }
+    }
+
+    fn digest(&self) -> u64 {
+        // SAFETY: `Controller::of` initialised the state.
+        unsafe { (self.functions.state_digest)(self.state.start()) }
+    }
+
+    fn add_machine(&mut self) -> Result<(), ControllerError> {
+        // SAFETY: the types are those of the interface's version, which `load` asked for. The pointers are used only while `self`
+        // keeps the library loaded.
+        let (reset, step, digest) = unsafe {
+            (
+                self.function::<Reset>(b"specgen_machine_reset\0")?,
+                self.function::<Step>(b"specgen_machine_step\0")?,
+                self.function::<Digest>(b"specgen_machine_digest\0")?,
+            )
+        };
+        self.machine = Some(Machine { memory: Buffer::new(self.machine_layout), reset, step, digest });
+        self.reset_machine();
+        Ok(())
+    }
+
+    fn reset_machine(&mut self) {
+        let machine = self.machine();
+        // SAFETY: the buffer has the size and alignment that the library asks for.
+        unsafe { (machine.reset)(machine.memory.start()) };
+    }
+
+    fn step_machine(&mut self, input: &[u64], output: &mut [u64]) {
+        let machine = self.machine();
+        // SAFETY: configuration and machine are initialised; the slices have the lengths that the library says, checked by the caller.
+        unsafe {
+            (machine.step)(self.config.start(), machine.memory.start(), input.as_ptr(), output.as_mut_ptr());
+        }
+    }
+
+    fn machine_digest(&self) -> u64 {
+        let machine = self.machine();
+        // SAFETY: the machine is initialised.
+        unsafe { (machine.digest)(machine.memory.start()) }
+    }
+
+    fn machine_words(&self) -> usize {
+        self.machine_words
+    }
+
+    fn save_machine(&self, words: &mut [u64]) -> Result<(), ControllerError> {
+        // SAFETY: the machine is initialised; there are as many words as the library says it writes, checked by the caller.
+        unsafe { self.function::<Save>(b"specgen_machine_save\0")?(self.machine().memory.start(), words.as_mut_ptr()) };
+        Ok(())
+    }
+
+    fn load_machine(&mut self, words: &[u64]) -> Result<Option<usize>, ControllerError> {
+        // SAFETY: the buffer has the size and alignment that the library asks for; there are as many words as it reads, checked by the
+        // caller.
+        let bad =
+            unsafe { self.function::<Load>(b"specgen_machine_load\0")?(self.machine().memory.start(), words.as_ptr()) };
+        Ok(refused(bad))
+    }
+
+    fn dynamics(&self, motion: &[[u64; 6]; 3]) -> Result<[u64; ANALYSIS_WORDS], ControllerError> {
+        let mut analysis = [0; ANALYSIS_WORDS];
+        // SAFETY: the function reads and writes as many words as there are here.
+        unsafe {
+            self.function::<Analyse>(b"specgen_dynamics\0")?(motion.as_ptr().cast(), analysis.as_mut_ptr());
+        }
+        Ok(analysis)
+    }
+
+    fn words_per_leg(&self, gauges: &[u64; 6]) -> Result<[[u64; 6]; 6], ControllerError> {
+        let mut rows = [[0; 6]; 6];
+        // SAFETY: both arrays have the lengths that the function takes.
+        unsafe {
+            self.function::<WordsPerLeg>(b"specgen_words_per_leg\0")?(gauges.as_ptr(), rows.as_mut_ptr().cast());
+        }
+        Ok(rows)
+    }
+}
+
+/// The index of a refused word, of what the library returns: one more, or 0.
+fn refused(bad: i32) -> Option<usize> {
+    usize::try_from(bad).unwrap_or(usize::MAX).checked_sub(1)
+}
+
+/// Zeroed memory of a given size and alignment.
+struct Buffer {
+    start: NonNull<u8>,
+    layout: Layout,
+}
+
+impl Buffer {
+    /// `layout` has a size above 0, see [`layout`].
+    fn new(layout: Layout) -> Self {
+        // SAFETY: the size is above 0.
+        let start = unsafe { alloc_zeroed(layout) };
+        match NonNull::new(start) {
+            Some(start) => Self { start, layout },
+            None => handle_alloc_error(layout),
+        }
+    }
+
+    fn start(&self) -> *mut u8 {
+        self.start.as_ptr()
+    }
+
+    fn copy(&self) -> Self {
+        let copy = Self::new(self.layout);
+        copy.overwrite(self);
+        copy
+    }
+
+    /// `other` has the same layout.
+    fn overwrite(&self, other: &Self) {
+        assert_eq!(self.layout, other.layout, "buffers of one library");
+        // SAFETY: both have as many bytes, and are two allocations.
+        unsafe { std::ptr::copy_nonoverlapping(other.start(), self.start(), self.layout.size()) };
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        // SAFETY: allocated in `new` with this layout, and freed once.
+        unsafe { dealloc(self.start.as_ptr(), self.layout) };
+    }
+}
+
+/// A size under a key of a description.
+fn size(text: &str, key: &'static str) -> Result<usize, DescriptionError> {
+    let fields = fields(text);
+    let value = fields.get(key).ok_or(DescriptionError::Missing(key))?;
+    // A gigabyte is far beyond any controller, and an allocation that would abort the process.
+    value.parse().ok().filter(|size| *size <= 1 << 30).ok_or_else(|| DescriptionError::Bad {
+        key,
+        value: (*value).to_owned(),
+        expected: "a number of bytes up to 2^30",
+    })
+}
+
+/// Size and alignment under two keys of a description; a size of 0 becomes 1.
+fn layout(text: &str, size_key: &'static str, align_key: &'static str) -> Result<Layout, DescriptionError> {
+    let (size, align) = (size(text, size_key)?, size(text, align_key)?);
+    Layout::from_size_align(size.max(1), align).map_err(|_| DescriptionError::Bad {
+        key: align_key,
+        value: align.to_string(),
+        expected: "a power of two",
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_buffer_has_the_alignment_asked_for_and_starts_zeroed() {
+        for align in [1, 8, 64, 4096] {
+            let buffer = Buffer::new(Layout::from_size_align(100, align).unwrap());
+            assert_eq!(buffer.start() as usize % align, 0);
+            // SAFETY: the first of 100 bytes.
+            assert_eq!(unsafe { *buffer.start() }, 0);
+        }
+    }
+
+    #[test]
+    fn a_bad_layout_is_refused_by_key() {
+        let refused = |text: &str| layout(text, "state_bytes", "state_align").unwrap_err().to_string();
+        assert!(refused("state_bytes=8\n").contains("lacks `state_align`"));
+        assert!(refused("state_bytes=8\nstate_align=3\n").contains("`state_align=3`; expected a power of two"));
+        assert!(refused("state_bytes=99999999999\nstate_align=8\n").contains("up to 2^30"));
+        assert!(refused("state_bytes=-1\nstate_align=8\n").contains("`state_bytes=-1`"));
+    }
+}
