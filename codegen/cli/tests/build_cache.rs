@@ -129,7 +129,8 @@ fn an_unchanged_spec_is_built_once_and_everything_else_anew() {
 #[ignore = "long: a controller built beside itself"]
 fn two_at_once_build_once() {
     let counted = Counted::new();
-    let commands = ["a.rec", "b.rec"].map(|file| ["sim", "legs.toml", "--emitted", "--record", file, "--seconds", "0.1"]);
+    let commands =
+        ["a.rec", "b.rec"].map(|file| ["sim", "legs.toml", "--emitted", "--record", file, "--seconds", "0.1"]);
     let started = commands
         .map(|arguments| counted.command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap());
     for child in started {

@@ -89,7 +89,8 @@ impl Programs {
             // Fat link-time optimisation costs the test more than all the rest.
             command.env("CARGO_PROFILE_RELEASE_LTO", "off").env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "16");
             let output = command.output().unwrap();
-            assert!(output.status.success(), "cargo {verb:?}: {}", String::from_utf8_lossy(&output.stderr));
+            let printed = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
+            assert!(output.status.success(), "cargo {verb:?}: {}", printed.join("\n"));
         };
         // Its own tests are those of the emitted copy, which differs little from spec to spec.
         if crate::support::length(name == "reference.toml", true) {
