@@ -13,7 +13,7 @@ use specgen_runtime::{Digest, Motion, Real};
 
 use crate::common::Common;
 
-/// What numbers of a controller are here.
+/// A scalar that a controller can be run in.
 pub trait Number: Real + Debug + Send + Sync {}
 impl<T: Real + Debug + Send + Sync> Number for T {}
 

@@ -3,9 +3,9 @@
 //! ```text
 //! IR ──► constants (numbers rounded as in the emitted text, sizes checked) ──► law ──► host_sim::Controller
 //! ```
-//! Every output, code, digest and snapshot has the bits of the emitted controller. What differs is speed, about 2.4 times, and where
-//! a controller's sizes are: tables are slices, a reversal memory has room for the largest that a spec may ask for and stores as many
-//! extrema as this spec does, parts that a spec may leave out are there and switched off.
+//! Every output, code, digest and snapshot has the bits of the emitted controller. A tick takes longer, and sizes are data: tables are
+//! slices, a reversal memory has room for the largest that a spec may ask for and stores as many extrema as this spec does, and
+//! parts that a spec may leave out are there and switched off.
 //!
 //! Both laws are compiled here in both scalars, and used through [`host_sim::controller::Engine`]: who simulates compiles none of it.
 
@@ -26,7 +26,7 @@ use specgen_compiler::ir::{Ir, Scalar};
 
 /// The controller of a compiled spec, with the spec's configuration and the power-up state.
 ///
-/// Its constants stay in memory to the end of the process: tables and paths of this spec, some 100 kB. [`Controller::fork`] adds none.
+/// Its constants, with the tables and paths of this spec, stay in memory to the end of the process. [`Controller::fork`] adds none.
 ///
 /// # Errors
 /// The IR is none that the compiler makes.

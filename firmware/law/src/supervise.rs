@@ -52,7 +52,7 @@ pub fn supervise<P: Spec>(
     MachineOutput { tick: P::Law::outputs(p, state, status), phase, cause, amplifier_on: phase.is_powered(), finding }
 }
 
-/// The input with predictions for the words that leapt.
+/// The input with predictions in place of the words that are not believed.
 #[cold]
 #[inline(never)]
 fn sift<P: Spec>(p: P, supervisor: &mut Supervisor<P::Real>, input: &MachineInput<P>) -> MachineInput<P> {
