@@ -1,5 +1,5 @@
-// The program of an STM32 board, included by the `main.rs` of each: what is its own are `clocks`, `pins`, `spi`, `RECORD`,
-// `PASSES`, `prepare` and `memory_intact`.
+// The program of an STM32 board, included by the `main.rs` of each: what is its own are `clocks`, `pins`, `spi`, `BOARD`,
+// `RECORD`, `PASSES`, `prepare` and `memory_intact`.
 
 use specgen_board::{Exchange, Noticed, SampleMemory};
 use specgen_stm32::{converters, timer};
@@ -80,7 +80,7 @@ mod app {
         let core = &mut context.core;
         prepare(core);
         // Or the linker leaves it out.
-        core::hint::black_box(&raw const crate::SPECGEN_TIMES);
+        core::hint::black_box((&raw const crate::SPECGEN_TIMES, &raw const crate::BOARD));
         cycles::start(&mut core.DCB, &mut core.DWT);
         let hertz = clocks::start();
         let wiring = pins::take(hertz);

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use crate::description::{Description, DescriptionError};
 
-pub use engine::{ANALYSIS_WORDS, Engine};
+pub use engine::Engine;
 pub use library::ABI_VERSION;
 pub use supervised::{MachineWord, SnapshotError, Standing, Supervised};
 
@@ -169,23 +169,6 @@ impl From<DescriptionError> for ControllerError {
     }
 }
 
-/// The dynamics of a controller at a motion, in its own arithmetic.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Dynamics {
-    /// ∂l/∂h, a row per leg: m/m, m/rad.
-    pub jacobian: [[f64; 6]; 6],
-    /// M(h).
-    pub mass: [[f64; 6]; 6],
-    /// C(h, ḣ) ḣ: N, N m.
-    pub coriolis: [f64; 6],
-    /// G(h): N, N m.
-    pub gravity: [f64; 6],
-    /// N, > 0 pushes the platform.
-    pub leg_forces: [f64; 6],
-    /// Δl from rest, m.
-    pub displacements: [f64; 6],
-}
-
 /// A controller with one configuration and one state.
 pub struct Controller {
     /// What it says of itself, in its own words and parsed.
@@ -242,32 +225,6 @@ impl Controller {
     /// If `other` has others.
     pub fn take_over(&mut self, other: &Self) {
         self.engine.take_over(&*other.engine);
-    }
-
-    /// The dynamics of the platform at a pose from rest (m, rad) with its first and second time derivatives, rounded to the
-    /// controller's arithmetic.
-    ///
-    /// # Errors
-    /// If an emitted library does not offer them.
-    pub fn dynamics(
-        &self,
-        pose: &[f64; 6],
-        rate: &[f64; 6],
-        acceleration: &[f64; 6],
-    ) -> Result<Dynamics, ControllerError> {
-        let scalar = self.description.scalar;
-        let motion = [pose, rate, acceleration].map(|six| six.map(|value| scalar.encode(value)));
-        let analysis = self.engine.dynamics(&motion)?;
-        let mut values = analysis.iter().map(|word| scalar.decode(*word));
-        let mut six = || std::array::from_fn(|_| values.next().unwrap_or(f64::NAN));
-        Ok(Dynamics {
-            jacobian: [six(), six(), six(), six(), six(), six()],
-            mass: [six(), six(), six(), six(), six(), six()],
-            coriolis: six(),
-            gravity: six(),
-            leg_forces: six(),
-            displacements: six(),
-        })
     }
 }
 

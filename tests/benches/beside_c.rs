@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-use controller::dynamics::PLATFORM;
+use controller::body::PLATFORM;
 use specgen::compile::compile;
 use specgen_runtime::snapshot::Field;
 use specgen_runtime::{Motion, Platform, Real};

@@ -161,7 +161,12 @@ impl Emitted {
         Self::of(name, compile(&path).unwrap_or_else(|refused| panic!("{name} is refused: {:#?}", refused.findings)))
     }
 
-    fn of(name: &str, compiled: Compiled) -> Self {
+    /// A spec that was compiled, with its workspace on disk.
+    ///
+    /// # Panics
+    /// If it cannot be written.
+    #[must_use]
+    pub fn of(name: &str, compiled: Compiled) -> Self {
         let dir = scratch(name);
         workspace::write_scratch(&dir, &compiled.files).expect("an empty folder");
         Self { compiled, dir }
@@ -175,17 +180,6 @@ impl Emitted {
     pub fn library(&self) -> PathBuf {
         let stage = Stage::of(&self.dir);
         target::host::build_library(&stage.folder, &image_target()).unwrap_or_else(|error| panic!("{error}"))
-    }
-
-    /// The emitted crate, loaded, with the analysis of its dynamics.
-    ///
-    /// # Panics
-    /// If it does not build or load.
-    #[must_use]
-    pub fn analysis(&self) -> Controller {
-        let stage = Stage::of(&self.dir);
-        let library = target::host::build_analysis(&stage.folder, &image_target());
-        Controller::load(&library.unwrap_or_else(|error| panic!("{error}"))).unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// The emitted crate, loaded.

@@ -37,7 +37,7 @@ fn download(client: &mut Client<Line>) -> Vec<u8> {
 #[test]
 fn what_a_board_recorded_is_downloaded_and_replays_bit_for_bit() {
     let emitted = Emitted::reference("board-link");
-    let mut machine = Supervised::new(emitted.controller()).unwrap();
+    let mut machine = Supervised::new(emitted.at_run_time()).unwrap();
     let line = Line::new(RECORD);
     let mut client = line.client(1);
     // From power-up on it waits for a fault.
@@ -56,7 +56,7 @@ fn what_a_board_recorded_is_downloaded_and_replays_bit_for_bit() {
         Refusal::State
     );
     // Other settings in the middle.
-    let mode = Config::new().with_mode(ControlMode::from_word(5).unwrap()).to_words();
+    let mode = Config::new().with(|settings| settings.mode = ControlMode::from_word(5).unwrap()).unwrap().to_words();
     done(&mut client, &Request::WriteConfig { words: Bytes(&bytes(&mode)) });
     line.tick(100);
     assert_eq!(refused(&mut client, &Request::Download { offset: 0 }), Refusal::State);

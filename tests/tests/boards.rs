@@ -10,15 +10,17 @@ use std::fs;
 use std::process::Command;
 use std::sync::Mutex;
 
+use specgen::budget::group;
 use specgen::emit;
 use specgen::model::Mcu;
 use specgen::target::callgraph::CallGraph;
 use specgen::target::checks::{self, Rule, Rules};
 use specgen::target::toolchain::CoreLibrary;
-use specgen::target::{self, build, image, stack, toolchain};
+use specgen::target::{self, Image, build, image, size, stack, toolchain};
 use specgen::workspace;
 use specgen_tests::{compile_edited, image_target, kept, repository, scratch};
 
+use crate::figures;
 use crate::porting::own_board_builds;
 
 struct Board {
@@ -71,11 +73,16 @@ const F446: Board = Board {
     ],
 };
 
+/// What is measured of an image.
+const FLASH: &str = "bytes of flash";
+const RAM: &str = "bytes of RAM";
+const STACK: &str = "bytes of stack";
+
 /// One build at a time.
 static BUILD: Mutex<()> = Mutex::new(());
 
 /// The image; none, and a line that says so, without a cross compiler where that is permitted.
-fn image_of(board: &Board) -> Option<Vec<u8>> {
+fn image_of(board: &Board) -> Option<Image> {
     let _one = BUILD.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let toolchain = target::found_or_skipped(toolchain::find()).unwrap_or_else(|missing| panic!("{missing}"))?;
     let compiled = compile_edited(board.name, "reference.toml", board.edits, &[]);
@@ -83,9 +90,9 @@ fn image_of(board: &Board) -> Option<Vec<u8>> {
     let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[board.folder]);
     workspace::write_scratch(&dir, &files).unwrap();
     let built = build::build_folder(&toolchain, &dir, board.folder, board.mcu, &image_target(), false);
-    let elf = built.unwrap_or_else(|error| panic!("{error}")).elf;
-    keep(board, &elf);
-    Some(elf)
+    let image = built.unwrap_or_else(|error| panic!("{error}"));
+    keep(board, &image.elf);
+    Some(image)
 }
 
 /// Image and spec for `cargo xtask test --full`, which then runs them on an emulated board.
@@ -103,7 +110,8 @@ fn keep(board: &Board, elf: &[u8]) {
 }
 
 fn check(board: &Board) {
-    let Some(elf) = image_of(board) else { return };
+    let Some(Image { elf, compiler, .. }) = image_of(board) else { return };
+    assert_eq!(size::size(&elf).unwrap().target, Some(board.folder), "what `specgen flash` goes by");
     let single = board.mcu == Mcu::Stm32F446Re;
     let rules = Rules { single, whole_image: false };
 
@@ -121,6 +129,9 @@ fn check(board: &Board) {
          {tick} B of stack; stack at startup {} B, running {running} B",
         board.name, footprint.flash, footprint.recorder, checked.functions, checked.code, startup
     );
+    let taken = [(FLASH, footprint.flash), (RAM, ram), (STACK, tick)];
+    let taken = taken.map(|(what, bytes)| (what.to_owned(), bytes as f64)).into();
+    assert_eq!(figures::held("boards.json", board.name, &compiler, taken), Vec::<String>::new());
     assert!(ram <= board.ram, "{}: {ram} B of RAM", board.name);
     assert_eq!(reserved, reserve, "{}", board.name);
     assert!(startup <= reserve, "{}: {startup} B of stack", board.name);
@@ -239,6 +250,27 @@ fn a_folder_of_a_board_is_built_by_hand() {
 #[ignore = "long: images of real boards"]
 fn the_stm32f446_image_fits_and_its_tick_cannot_fail_nor_compute_doubles() {
     check(&F446);
+}
+
+/// The sizes and limits in docs/bring-up.md are those of the images above.
+#[test]
+fn the_page_says_what_the_images_take() {
+    let row = |Board { name, mcu, flash, ram, stack, .. }: &Board| {
+        let taken = [FLASH, RAM, STACK].map(|what| figures::figure("boards.json", name, what));
+        let most = [*flash, *ram, *stack].map(group);
+        let columns = taken.iter().zip(most).map(|(taken, most)| format!("{taken} of {most} bytes"));
+        format!("| {} | {} |", mcu.part().board, columns.collect::<Vec<_>>().join(" | "))
+    };
+    figures::shown("bring-up.md", &[row(&H743), row(&F446)]);
+    for (board, signs) in [(&H743, "48 µs on the H743"), (&F446, "95 µs on the F446")] {
+        let source = repository().join("firmware").join(board.folder).join("src/clocks.rs");
+        let nanoseconds = signs.split(' ').next().unwrap().to_owned() + "_000";
+        assert!(fs::read_to_string(source).unwrap().contains(&format!("const OUTPUT: u32 = {nanoseconds};")));
+        for page in ["bring-up.md", "porting.md"] {
+            let text = fs::read_to_string(repository().join("docs").join(page)).unwrap();
+            assert!(text.contains(signs), "docs/{page}: {signs}");
+        }
+    }
 }
 
 /// Names of pins of an STM32 (`PA5`) in a text, in order.

@@ -1,6 +1,7 @@
 //! What a tick costs on the emulated microcontrollers, against the figures the project promises.
 //! `cargo test --release -p specgen-tests budgets -- --nocapture` prints them.
 
+use crate::figures;
 use host_sim::controller::TickController;
 use host_sim::description::Description;
 use host_sim::stimulus::InputRecording;
@@ -13,6 +14,11 @@ const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
 const TICKS: u32 = 20_000;
 /// Instructions of the inverse Preisach model of one leg on the M7: mean, worst.
 const INVERSE: (f64, u64) = (250.0, 450);
+
+/// Figures of that model, and of the longest tick.
+const INVERSE_MEAN: &str = "instructions, inverse";
+const INVERSE_MOST: &str = "instructions, inverse at most";
+const LONGEST: &str = "instructions, step at most";
 
 struct Budget {
     name: &'static str,
@@ -35,13 +41,14 @@ fn a_tick_of_six_legs_stays_within_its_instructions_and_its_stack() {
         let folder = format!("budget-{}", budget.name.replace(' ', "-"));
         let emitted = Emitted::new(&folder, "legs.toml", budget.edits);
         let Some(image) = emitted.image(budget.mcu) else { continue };
-        let mut controller = emitted.controller();
+        let mut controller = emitted.at_run_time();
         let host = verify::exercise(&mut controller, &emitted.compiled.model, &emitted.compiled.ir, TICKS).unwrap();
         let config = controller.default_config();
         let m = verify::measure(&image, &config, &host).unwrap();
         assert_eq!(m.first_difference, None, "{}", budget.name);
         print(budget.name, &m);
 
+        held(budget.name, &m);
         let tick = m.stage("step").unwrap();
         assert_eq!(tick.calls, u64::from(TICKS));
         assert!(tick.mean <= budget.tick, "{}: {} instructions", budget.name, tick.mean);
@@ -63,13 +70,59 @@ fn a_tick_of_six_legs_stays_within_its_instructions_and_its_stack() {
     }
 }
 
+/// Holds what a tick costs, and the inverse of a leg in it, against the committed figures.
+fn held(name: &str, m: &Measurement) {
+    let inverse = m.stage("inverse").unwrap();
+    let longest = m.stage("step").unwrap().max as f64;
+    let more = [(INVERSE_MEAN, inverse.mean.ceil()), (INVERSE_MOST, inverse.max as f64), (LONGEST, longest)];
+    let found = figures::cost(m).into_iter().chain(more.map(|(what, value)| (what.to_owned(), value)));
+    assert_eq!(figures::held("legs.json", name, &m.compiler, found.collect()), Vec::<String>::new());
+}
+
+/// The rows in docs/figures.md have the committed figures.
+#[test]
+fn the_page_says_what_a_tick_of_six_legs_costs() {
+    let [step, leg, longest_leg] = ["instructions, step", "instructions, actuate", "instructions, actuate at most"];
+    let figure = |name: &str, what: &str| figures::figure("legs.json", name, what);
+    let of_each = |what: &str| BUDGETS.each_ref().map(|budget| figure(budget.name, what));
+    let [[m7, m7_single, m4f], [stack, stack_single, stack_m4f]] = [step, "bytes of stack"].map(of_each);
+    let tracking = |what: &str| figure("M7 f64", what);
+    let hostile = |what: &str| figure("M7 f64, hostile, invhys", what);
+    figures::shown(
+        "figures.md",
+        &[
+            format!(
+                "| inverse Preisach, one leg, N = 32, M7 f64 | tracking {} instructions mean, {} worst; with converter and memory update {} and {}; \
+             hostile record {} and {} at worst | `… budgets -- --nocapture` |",
+                tracking(INVERSE_MEAN),
+                tracking(INVERSE_MOST),
+                tracking(leg),
+                tracking(longest_leg),
+                hostile(INVERSE_MOST),
+                hostile(longest_leg)
+            ),
+            format!(
+                "| leg feed-forward, whole tick, pose to six voltages, PCC (rustc 1.95) | M7 f64 {m7} instructions mean; M7 f32 {m7_single}; \
+             M4F f32 {m4f}; stack, static bound, {stack}, {stack_single}, {stack_m4f} bytes | `… budgets -- --nocapture` |"
+            ),
+            format!(
+                "| the same, worst tick, M7 f64, rustc 1.95 | tracking {}; hostile record {}; all six reversal memories overflowing in one tick {} \
+             (65 nested loops on every leg) | same |",
+                tracking(LONGEST),
+                hostile(LONGEST),
+                figure("M7 f64, overflow", LONGEST)
+            ),
+        ],
+    );
+}
+
 /// The hostile record of the bit comparison, and nested loops that overfill the memory of all six legs in the same tick:
 /// no promise, but stated and bounded.
 #[test]
 fn the_worst_tick_is_bounded_even_when_every_memory_overflows() {
     let emitted = Emitted::new("budget-hostile", "legs.toml", &[]);
     let Some(image) = emitted.image(Mcu::Mps2An500) else { return };
-    let mut controller = emitted.controller();
+    let mut controller = emitted.at_run_time();
     let description = controller.description().clone();
     let hostile = emitted.stimulus(&description, false, 20_000, 3);
     let nested = nested_loops(&description);
@@ -80,6 +133,7 @@ fn the_worst_tick_is_bounded_even_when_every_memory_overflows() {
         let m = verify::measure(&image, &config, &host).unwrap();
         assert_eq!(m.first_difference, None, "{what}");
         print(&format!("M7 f64, {what}"), &m);
+        held(&format!("M7 f64, {what}"), &m);
         let leg = m.stage("actuate").unwrap();
         // A full memory drops one pair: a look-up for each of 62 pairs, and two moves of 62 entries.
         assert!(leg.max <= 6000, "{} instructions", leg.max);

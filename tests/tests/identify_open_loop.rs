@@ -80,7 +80,8 @@ fn feed_forward(hysteresis: &ir::Hysteresis, frequency: f64, ticks: usize) -> Ve
             let demand = demand(frequency, n as f64 * PERIOD);
             let lead = ((demand - before) * ticks_ahead).clamp(-limit, limit);
             before = demand;
-            let _ = memory.follow_within(&table, demand + lead, |drive| drive.clamp(0.0, GRID as f64));
+            let drive = memory.solve(&table, demand + lead).clamp(0.0, GRID as f64);
+            memory.apply(&table, drive);
             memory.drive() * (RANGE[1] - RANGE[0]) / GRID as f64
         })
         .collect()

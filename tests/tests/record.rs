@@ -4,6 +4,7 @@
 use std::fs;
 use std::io::Cursor;
 
+use crate::figures;
 use host_sim::controller::{Supervised, TickController};
 use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{BUSY, Bench, Noise, Request};
@@ -34,7 +35,7 @@ fn layout(machine: &Supervised) -> Layout {
 
 /// A closed loop of the reference platform under the supervisor, recorded; with a change of settings in the middle.
 fn closed_loop(emitted: &Emitted) -> Vec<u8> {
-    let controller = emitted.controller();
+    let controller = emitted.at_run_time();
     let text = controller.text().to_owned();
     let mut other = controller.default_config();
     controller.description().set_config(&mut other, "mode", 5.0).unwrap();
@@ -137,7 +138,7 @@ fn rows(bytes: &[u8]) -> Vec<Row> {
 fn a_record_replays_from_wherever_it_begins_and_a_changed_bit_is_found_and_named() {
     let emitted = Emitted::new("record", "reference.toml", &[]);
     let bytes = closed_loop(&emitted);
-    let mut machine = Supervised::new(emitted.controller()).unwrap();
+    let mut machine = Supervised::new(emitted.at_run_time()).unwrap();
     let whole = run(&bytes, &mut machine);
     let blocks = blocks(&bytes);
     println!("{} ticks in {} blocks, {} bytes", whole.ticks, blocks.len(), bytes.len());
@@ -226,7 +227,7 @@ fn on_the_microcontroller(emitted: &Emitted, bytes: &[u8]) {
     let main = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/record_support/qemu.rs");
     fs::copy(main, emitted.dir.join("qemu/src/main.rs")).unwrap();
     let Some(image) = emitted.image(Mcu::Mps2An500) else { return };
-    let mut machine = Supervised::new(emitted.controller()).unwrap();
+    let mut machine = Supervised::new(emitted.at_run_time()).unwrap();
     let config = machine.controller().default_config();
     let inputs: Vec<Vec<u64>> = rows(bytes).into_iter().map(|row| row.input).collect();
     let target = target::replay(&image, &config, &inputs, std::time::Duration::from_secs(300))
@@ -272,9 +273,29 @@ fn on_the_microcontroller(emitted: &Emitted, bytes: &[u8]) {
     }
     println!("{} words of a machine", machine.state_words());
     let most = |name: &str| target.stats.stage(name).unwrap().largest;
+    let mean = |name: &str| target.stats.stage(name).unwrap().mean();
+    let row = mean("recorded") - mean("step");
+    let found = [row, row - mean("digest"), mean("digest"), mean("save"), mean("opening") - mean("step")];
+    let found = COST.map(|(what, _)| what.to_owned()).into_iter().zip(found.map(f64::ceil)).collect();
+    assert_eq!(figures::held("recorder.json", "M7 f64", &image.compiler, found), Vec::<String>::new());
     // What a snapshot costs grows with its words alone: 8.5 instructions each, measured.
     let words = machine.state_words() as u64;
     assert!(most("save") < 10 * words, "a snapshot of {words} words costs {} instructions", most("save"));
+}
+
+/// What is counted, and its row in docs/recorder.md.
+const COST: [(&str, &str); 5] = [
+    ("row with a digest", "a row with a digest, on top of the supervised tick"),
+    ("row without a digest", "a row without"),
+    ("digest", "a digest alone"),
+    ("snapshot", "a snapshot"),
+    ("opening", "a block that begins, on top of the supervised tick"),
+];
+
+#[test]
+fn the_page_says_what_the_recorder_costs() {
+    let row = |(what, row)| format!("| {row} | {} |", figures::figure("recorder.json", "M7 f64", what));
+    figures::shown("recorder.md", &COST.map(row));
 }
 
 /// Random ticks of every kind on a machine: commands, readings, requests, events.
@@ -342,7 +363,7 @@ fn bring_to_run(machine: &mut Supervised, names: &[String], rng: &mut ChaCha8Rng
 /// `load(save(m))` has the digest of m and its future; words that are none are refused, and what is taken keeps the promises.
 fn same_future(name: &str, spec: &str, edits: &[(&str, &str)], seed: u64) {
     let emitted = Emitted::new(name, spec, edits);
-    let mut machine = Supervised::new(emitted.controller()).unwrap();
+    let mut machine = Supervised::new(emitted.at_run_time()).unwrap();
     let description = machine.controller().description().clone();
     let single = description.scalar.bits() == 32;
     let names = machine.input_names();

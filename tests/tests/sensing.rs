@@ -10,10 +10,12 @@ use specgen::ir::{Ir, Scalar as IrScalar};
 use specgen::lower::pose_noise;
 use specgen::model::{Model, Probe, Scalar};
 use specgen_numerics::Double;
-use specgen_runtime::{Calibration, Gauges, Real};
+use specgen_runtime::{Calibration, GaugeCalibration as _, Gauges, Real};
 use specgen_tests::worse;
 
-const POSES: usize = 2000;
+fn poses() -> usize {
+    specgen_tests::length(400, 2000)
+}
 
 /// Where the line of a gauge meets its plane, from its point, along its direction, less the same at rest: by the rotated plane
 /// itself, in 106 bits.
@@ -57,7 +59,7 @@ fn pose_from_gauges_is_exact_to_1e_12_in_f64_and_to_a_tenth_of_a_nanometre_in_f3
     for (name, layout) in [("3-2-1", three_two_one()), ("tilted", tilted())] {
         let model = with_scalar(model(layout), Scalar::F64);
         let ir = lowered(&model).unwrap();
-        let [shift, turn] = pose_error::<f64>(&model, &ir, 1, POSES);
+        let [shift, turn] = pose_error::<f64>(&model, &ir, 1, poses());
         println!("{name}: {} passes, f64 {shift:.1e} m, {turn:.1e} rad", sensing(&ir).passes);
         assert!(shift <= 1e-12 && turn <= 1e-12, "{name}: {shift:e} m, {turn:e} rad");
         // The promise of the IR holds, and is not an idle one.
@@ -66,7 +68,7 @@ fn pose_from_gauges_is_exact_to_1e_12_in_f64_and_to_a_tenth_of_a_nanometre_in_f3
 
         let single = with_scalar(model, Scalar::F32);
         let ir = lowered(&single).unwrap();
-        let [shift, turn] = pose_error::<f32>(&single, &ir, 1, POSES);
+        let [shift, turn] = pose_error::<f32>(&single, &ir, 1, poses());
         println!("{name}: {} passes, f32 {:.4} nm, {:.4} nrad", sensing(&ir).passes, shift * 1e9, turn * 1e9);
         // A turn counts by what it moves at the gauges, 0.1 m away.
         assert!(shift <= 0.1e-9 && 0.1 * turn <= 0.1e-9, "{name}: {shift:e} m, {turn:e} rad");
@@ -90,7 +92,7 @@ fn random_layouts_that_are_accepted_are_exact_too() {
     let mut random = Random::new(11);
     let (mut accepted, mut refused) = (0, 0);
     let mut worst = [0.0_f64; 2];
-    while accepted < specgen_tests::length(20, 60) {
+    while accepted < specgen_tests::length(8, 60) {
         let mut model = model(random.layout());
         // These may look anywhere, so their readings may be large.
         model.sensor.range = [-500e-6, 500e-6];
@@ -130,7 +132,7 @@ fn readings_of_a_pose_are_those_of_the_rotated_planes() {
         let (gauges, series) = (runtime::<f64>(&ir), series::<f64>(&ir));
         let mut random = Random::new(2);
         let mut worst = 0.0_f64;
-        for _ in 0..POSES {
+        for _ in 0..poses() {
             let pose = random.pose(&model);
             let found = gauges.readings(&series, &pose);
             for (found, exact) in found.iter().zip(exact_readings(&model, &pose)) {
@@ -187,7 +189,7 @@ fn forward_kinematics_undoes_the_inverse_over_the_workspace() {
     let ((legs64, inverse64), (legs32, inverse32)) = (legs::<f64>(&ir), legs::<f32>(&single));
     let mut random = Random::new(6);
     let (mut worst, mut worst32) = ([0.0_f64; 2], [0.0_f64; 2]);
-    for _ in 0..POSES {
+    for _ in 0..poses() {
         let pose = random.pose(&model);
         let lengths = exact::displacements(&model.geometry, &pose);
         let found = legs64.pose(&inverse64, ir.kinematics.corrections as usize, &lengths);
@@ -212,7 +214,7 @@ fn forward_kinematics_undoes_the_inverse_over_the_workspace() {
 /// Independent gauges of the declared noise behind a converter of the declared step, through the whole solution.
 #[test]
 fn predicted_pose_noise_is_what_noisy_gauges_give() {
-    const DRAWS: usize = 40_000;
+    let draws = specgen_tests::length(8_000, 40_000);
     for layout in [three_two_one(), tilted()] {
         let mut model = model(layout);
         // A coarse converter, so that its part counts.
@@ -225,7 +227,7 @@ fn predicted_pose_noise_is_what_noisy_gauges_give() {
         let mut random = Random::new(8);
         let mut noise: Vec<Gaussian> = (0..6).map(|k| Gaussian::new(model.sensor.noise, 9, k)).collect();
         let (mut of_pose, mut of_leg) = ([0.0_f64; 6], [0.0_f64; 6]);
-        for _ in 0..DRAWS {
+        for _ in 0..draws {
             let pose = random.pose(&model);
             let mut readings = exact_readings(&model, &pose);
             for (reading, noise) in readings.iter_mut().zip(&mut noise) {
@@ -239,7 +241,7 @@ fn predicted_pose_noise_is_what_noisy_gauges_give() {
             }
         }
         for (seen, predicted) in of_pose.iter().chain(&of_leg).zip(predicted.pose.iter().chain(&predicted.leg)) {
-            let ratio = (seen / DRAWS as f64).sqrt() / predicted;
+            let ratio = (seen / f64::from(draws)).sqrt() / predicted;
             assert!((0.97..=1.03).contains(&ratio), "{ratio}");
         }
     }
@@ -366,7 +368,7 @@ fn every_accepted_reading_gives_a_finite_pose() {
         let ir = lowered(&model).unwrap();
         let [low, high] = model.sensor.range;
         let mut random = Random::new(12);
-        for _ in 0..20_000 {
+        for _ in 0..specgen_tests::length(4_000, 20_000) {
             let readings: [f64; 6] = std::array::from_fn(|_| {
                 let u = random.unit();
                 if u > 0.7 {

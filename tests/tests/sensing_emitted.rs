@@ -1,4 +1,4 @@
-//! The emitted `controller::sensing` and forward kinematics against the runtime with the constants of the IR, bit for bit: the
+//! The law's sensing and forward kinematics on emitted constants against the runtime with the constants of the IR, bit for bit: the
 //! emitter puts every constant where it belongs.
 
 use std::fmt::Write as _;
@@ -14,24 +14,27 @@ use specgen::ir::Ir;
 use specgen::model::{Model, Scalar};
 use specgen::workspace;
 use specgen_runtime::sensing::faults;
-use specgen_runtime::{Calibration, Real};
+use specgen_runtime::{Calibration, GaugeCalibration as _, Real};
 use specgen_tests::scratch;
 
 const ROWS: usize = 500;
 
 /// A program that reads rows of six words and prints, in hex: faults, pose from gauges if there are none, pose from legs.
 const PROGRAM: &str = r#"
-use controller::{Real, kinematics, sensing};
+use controller::{Constants, Real};
+use specgen_law::platform::sensing::pose;
+use specgen_law::{Spec as _, kinematics};
 use specgen_runtime::Real as _;
+use specgen_runtime::sensing::faults;
 fn main() {
     for line in std::io::stdin().lines() {
         let words: Vec<u64> = line.unwrap().split(' ').map(|w| u64::from_str_radix(w, 16).unwrap()).collect();
         let input: [Real; 6] = std::array::from_fn(|k| Real::from_word(words[k]));
         let legs: [Real; 6] = std::array::from_fn(|k| Real::from_word(words[6 + k]));
-        let faults = sensing::faults(&input);
-        let pose = if faults == 0 { sensing::pose(&input) } else { [0.0; 6] };
+        let faults = faults(&input, Constants.raw_limits());
+        let pose = if faults == 0 { pose(Constants, &input) } else { [0.0; 6] };
         print!("{faults:x}");
-        for value in pose.iter().chain(&kinematics::pose_from_legs(&legs)) {
+        for value in pose.iter().chain(&kinematics::pose_from_legs(Constants, &legs)) {
             print!(" {:x}", value.to_word());
         }
         println!();
@@ -46,6 +49,7 @@ version = "0.1.0"
 edition = "2024"
 [dependencies]
 controller = { path = "../controller" }
+specgen-law = { path = "../law" }
 specgen-runtime = { path = "../runtime" }
 [workspace]
 "#;

@@ -172,7 +172,7 @@ fn assert_sound(finding: &Diagnostic, text: &str) {
 
 #[test]
 fn mutated_specs_are_read_without_a_panic() {
-    let count = specgen_tests::length(5_000, 200_000);
+    let count = specgen_tests::length(2_000, 200_000);
     let folder = folder_with_records();
     let mut corpus: Vec<Vec<u8>> = spec_files().iter().map(|path| fs::read(path).expect("readable")).collect();
     corpus.push(every_key().into_bytes());

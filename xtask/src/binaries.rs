@@ -7,8 +7,9 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
+use crate::builds::{Builds, MOST};
 use crate::progress::{Durations, Progress};
 use crate::run::{Outcome, cargo};
 use crate::skips;
@@ -25,6 +26,11 @@ pub struct Mode {
 /// Modules whose tests mostly wait: for time that passes, or for another process.
 const WAITING: [&str; 1] = ["cli all::rt_pc"];
 
+/// Packages without a test, whose libraries would be compiled a second time for none.
+const WITHOUT_TESTS: [&str; 3] = ["controller", "controller-with-passes", "specgen-law"];
+/// Packages whose few tests take seconds, and half a minute each to compile: in the full run only.
+const LONG_TO_COMPILE: [&str; 2] = ["specgen-numerics", "specgen-run-time"];
+
 /// The variable of the environment that asks tests for their long form.
 const FULL: &str = "SPECGEN_FULL";
 
@@ -37,10 +43,16 @@ pub struct Ran {
     pub skipped: Vec<(String, String)>,
 }
 
-/// Compiles every test binary of the workspace without running it; errors are printed by cargo.
-pub fn compile(root: &Path) -> Result<Vec<Binary>, String> {
+/// Compiles every test binary of the workspace without running it, those that take long only for a `full` run; errors are printed by cargo.
+pub fn compile(root: &Path, full: bool) -> Result<Vec<Binary>, String> {
     let arguments = ["test", "--release", "--workspace", "--no-run", "--message-format=json-render-diagnostics"];
+    let left_out = WITHOUT_TESTS.iter().chain(LONG_TO_COMPILE.iter().filter(|_| !full));
+    let without = left_out.flat_map(|package| ["--exclude", package]);
+    let lengthy = ["--config", "profile.release.package.specgen-tests.opt-level=1"];
     let output = cargo(root, &arguments)
+        .args(without)
+        // Millions of ticks are judged by the tests' own code.
+        .args(lengthy.into_iter().filter(|_| full))
         .stderr(Stdio::inherit())
         .output()
         .map_err(|error| format!("cargo cannot be run: {error}"))?;
@@ -67,7 +79,9 @@ pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut Ran) -> Outc
     // What earlier runs left; a folder that cannot be removed is nobody's matter, as names are not used twice.
     let _ = std::fs::remove_dir_all(kept.join("scratch"));
     println!("{} modules of {} test binaries, {workers} at a time", jobs.len(), binaries.len());
+    let begun = SystemTime::now();
     let done = run(&jobs, workers, &kept, &durations, mode);
+    let builds = Builds::since(&kept.join("cache/builds"), begun);
     Durations::of(done.iter().map(|ended| (ended.name.clone(), ended.took))).write(&kept.join("durations.json"));
     let mut failed = Vec::new();
     for ended in done {
@@ -82,6 +96,16 @@ pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut Ran) -> Outc
     let skipped = skips::judge(root, &ran.skipped);
     let good = ran.tests.iter().filter(|(_, good)| *good).count();
     println!("\ntests: {good} passed, {} failed, {} skipped", ran.tests.len() - good, ran.skipped.len());
+    println!(
+        "controllers built or taken from the cache: {} host libraries, {} images",
+        builds.libraries, builds.images
+    );
+    if failed.is_empty() && !mode.full && builds.libraries > MOST {
+        return Outcome::Failed(format!(
+            "{} host libraries, at most {MOST} are to be: let a test run the law on the compiled spec (`at_run_time`)",
+            builds.libraries
+        ));
+    }
     if failed.is_empty() {
         return skipped;
     }
@@ -283,6 +307,25 @@ mod tests {
     #[ignore = "long: it is there for the test above, and fails wherever a run that is not full takes it"]
     fn a_long_test() {
         assert!(std::env::var_os(FULL).is_some(), "{FULL} is not set");
+    }
+
+    #[test]
+    fn packages_without_tests_have_none() {
+        let root = crate::root();
+        let mut open = ["firmware/controller", "firmware/board/tests/passes/controller", "firmware/law"]
+            .map(|path| root.join(path))
+            .to_vec();
+        assert_eq!(open.len(), WITHOUT_TESTS.len());
+        let mut files = 0;
+        while let Some(path) = open.pop() {
+            if path.is_dir() {
+                open.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                files += 1;
+                assert!(!std::fs::read_to_string(&path).unwrap().contains("#[test]"), "{}", path.display());
+            }
+        }
+        assert!(files > 50, "{files}");
     }
 
     #[test]

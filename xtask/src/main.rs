@@ -2,6 +2,7 @@
 
 mod binaries;
 mod board;
+mod builds;
 mod changelog;
 mod fresh;
 mod fuzz;

@@ -116,9 +116,9 @@ pub fn test(root: &Path) -> ExitCode {
     let mode = Mode { tools_missing: !report.is_whole(), ..Mode::default() };
     report.step("the last full run", || results::judge(root));
     report.step("formatting", || formatting(root));
-    let binaries = compiled(root, &mut report);
+    let binaries = compiled(root, false, &mut report);
     report.step("tests", || binaries::test(root, &binaries, mode, &mut Ran::default()));
-    report.step("lints", || lints(root));
+    report.step("lints", || lints(root, false));
     report.step("published schema", || PUBLISHED_SCHEMA.unless_unchanged(root));
     report.step("orders of shared memory", || SHARED_MEMORY.unless_unchanged(root));
     report.step("generated files are fresh", || generated::check(root));
@@ -132,11 +132,11 @@ pub fn test(root: &Path) -> ExitCode {
 /// `cargo xtask test --full`
 pub fn full(root: &Path) -> ExitCode {
     let start = Instant::now();
-    let mut report = Report::new(12);
+    let mut report = Report::new(13);
     report.step("cross compiler and QEMU", setup::microcontroller);
     let mode = Mode { full: true, tools_missing: !report.is_whole() };
     report.step("known defects of packages", || packages::advisories(root, &LOCKED));
-    let binaries = compiled(root, &mut report);
+    let binaries = compiled(root, true, &mut report);
     let mut ran = Ran::default();
     report.step("tests at full length", || binaries::test(root, &binaries, mode, &mut ran));
     report.step("images on the emulated board, and faults", || board::long(root));
@@ -148,6 +148,7 @@ pub fn full(root: &Path) -> ExitCode {
         }
     });
     report.step("tests with every check", || checked(root));
+    report.step("lints of all packages", || lints(root, true));
     report.step("examples in the documentation", || binaries::examples(root));
     report.step("documentation", || {
         let mut doc = cargo(root, &["doc", "--release", "--workspace", "--no-deps", "--quiet"]);
@@ -189,9 +190,9 @@ fn checked(root: &Path) -> Outcome {
 }
 
 /// Every test binary; none where they do not compile, which fails.
-fn compiled(root: &Path, report: &mut Report) -> Vec<Binary> {
+fn compiled(root: &Path, full: bool, report: &mut Report) -> Vec<Binary> {
     let mut binaries = Vec::new();
-    report.step("compiling the tests", || match binaries::compile(root) {
+    report.step("compiling the tests", || match binaries::compile(root, full) {
         Ok(made) => {
             binaries = made;
             Outcome::Passed
@@ -254,18 +255,22 @@ fn rust_files(folder: &Path, files: &mut Vec<String>) -> std::io::Result<()> {
     Ok(())
 }
 
-fn lints(root: &Path) -> Outcome {
+/// Of the workspace; `all`: of its benchmarks and of packages that are none of its members, too.
+fn lints(root: &Path, all: bool) -> Outcome {
     if let Err(outcome) = setup::component("clippy", "clippy") {
         return outcome;
     }
     // In release, so that build scripts and macros are those of the tests. Boards are built from an emitted workspace by their
     // tests.
-    let own: &[&str] = &["--workspace", "--all-targets"];
+    let own: &[&str] = if all { &["--workspace", "--all-targets"] } else { &["--workspace", "--bins", "--tests"] };
     // Into the same folder: most of its dependencies are those of the workspace.
     let alone = |manifest| ["--manifest-path", manifest, "--all-targets", "--locked", "--target-dir", "target"];
-    let mut scopes = vec![own.to_vec(), alone(REAL_TIME).to_vec(), alone(board::MANIFEST).to_vec()];
+    let mut scopes = vec![own.to_vec()];
+    scopes.extend([REAL_TIME, board::MANIFEST].map(alone).iter().filter(|_| all).map(|scope| scope.to_vec()));
     // Their lints forbid what the optimiser cannot prove away.
-    if setup::has_target() {
+    if !all {
+        println!("members of the workspace; the others in the full run");
+    } else if setup::has_target() {
         scopes.extend([FIRMWARE, TICK].map(|manifest| [&alone(manifest)[..], &["--target", TRIPLE]].concat()));
     } else {
         println!("not looked at: {FIRMWARE} and {TICK}, as rustc here has no {TRIPLE}");

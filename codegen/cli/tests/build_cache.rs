@@ -64,7 +64,7 @@ impl Counted {
 }
 
 const SIM: [&str; 7] = ["sim", "legs.toml", "--emitted", "--record", "run.rec", "--seconds", "0.1"];
-const REPLAY: [&str; 4] = ["replay", "run.rec", "--spec", "legs.toml"];
+const REPLAY: [&str; 5] = ["replay", "run.rec", "--spec", "legs.toml", "--emitted"];
 
 fn edit(path: &Path, edit: impl FnOnce(&mut Vec<u8>)) {
     let mut bytes = fs::read(path).unwrap();

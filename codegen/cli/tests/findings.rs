@@ -167,8 +167,10 @@ fn judged(code: Code, known: &Known) -> Result<bool, String> {
 #[test]
 fn every_example_gives_its_finding_and_every_fix_removes_it() {
     let (next, known) = (AtomicUsize::new(0), Known::default());
+    // Every sixth in the short run.
+    let codes: Vec<Code> = codes::REGISTRY.iter().copied().step_by(crate::support::length(6, 1)).collect();
     let judge = || {
-        let next = || codes::REGISTRY.get(next.fetch_add(1, Ordering::Relaxed));
+        let next = || codes.get(next.fetch_add(1, Ordering::Relaxed));
         std::iter::from_fn(next).map(|code| judged(*code, &known)).collect::<Vec<_>>()
     };
     let workers = std::thread::available_parallelism().map_or(1, usize::from);
@@ -180,7 +182,7 @@ fn every_example_gives_its_finding_and_every_fix_removes_it() {
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), judged.len(), wrong.join("\n"));
     let not_run = judged.iter().filter(|one| **one == Ok(false)).count();
     println!("{} findings; the examples of {not_run} are not run", judged.len());
-    assert_eq!(judged.len(), codes::REGISTRY.len());
+    assert_eq!(judged.len(), codes.len());
     assert!(100 * not_run <= 15 * judged.len(), "{not_run} examples are not run");
 }
 

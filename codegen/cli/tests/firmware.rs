@@ -89,13 +89,26 @@ fn an_image_is_built_checked_weighed_and_only_flashed_if_it_passes() {
     flashing(&folder, image);
 }
 
-/// The emulated machine's image stands in for a board's: to probe-rs it is a file.
-fn flashing(folder: &Folder, image: &str) {
+/// The image with another text in the place of one that it has once.
+fn edited(folder: &Folder, image: &str, name: &str, from: &[u8], to: &[u8]) {
+    let mut bytes = fs::read(folder.path(image)).unwrap();
+    let places: Vec<usize> = bytes.windows(from.len()).enumerate().filter(|at| at.1 == from).map(|at| at.0).collect();
+    assert_eq!((places.len(), from.len()), (1, to.len()), "{}", String::from_utf8_lossy(from));
+    bytes[places[0]..][..to.len()].copy_from_slice(to);
+    folder.write(name, bytes);
+}
+
+/// The emulated machine's image stands in for a board's, under a board's name: to probe-rs it is a file.
+fn flashing(folder: &Folder, emulated: &str) {
+    let image = "board.elf";
+    let own = b"specgen-board: qemu     \n";
+    edited(folder, emulated, image, own, b"specgen-board: stm32h743\n");
+    edited(folder, emulated, "nameless.elf", own, b"specgen-board: esp32    \n");
     let flash = |path: &OsString, arguments: &[&str]| {
         Run::of(folder.command().env("PATH", path).args(["flash", image]).args(arguments))
     };
-    let unasked = ["--target", "stm32h743", "--yes"];
-    let board = ["--target", "stm32h743", "--yes", "--assumed-ok"];
+    let unasked = ["--yes"];
+    let board = ["--yes", "--assumed-ok"];
     let commands = [format!("download --chip STM32H743ZITx --verify {image}"), "reset --chip STM32H743ZITx".to_owned()];
     // Nothing to flash with: what is missing, and the exact commands.
     let bare = without_probe_rs();
@@ -104,37 +117,41 @@ fn flashing(folder: &Folder, image: &str) {
 
     let path = fake_probe_rs(folder, 0);
     let asked = || fs::read_to_string(folder.path("asked.txt")).unwrap_or_default();
-    // Nobody says that the amplifiers are off; no board is named; the emulated machine is none.
-    flash(&path, &["--target", "stm32h743", "--assumed-ok"]).says(2, &["switch the amplifiers off", "--yes"]);
+    // Nobody says that the amplifiers are off.
+    flash(&path, &["--assumed-ok"]).says(2, &["switch the amplifiers off", "--yes"]);
     // The image knows what its spec assumed, and that its record was simulated.
     let known = ["E0348", "geometry.base_radius, ", "records/reference-forc.csv (simulated)", "nothing was flashed"];
     flash(&path, &unasked).says(1, &known);
-    flash(&path, &["--yes"]).says(2, &["name it by --target"]);
-    flash(&path, &["--yes", "--target", "qemu"]).says(2, &["name it by --target"]);
-    // A core without double precision: the image computes in f64 with an FPU that the board does not have, which the
-    // checks do not see; an image that fails a check is not flashed.
+    // Its board is the one that it names, whatever an argument says; the emulated machine is none.
+    let other =
+        ["nothing was flashed: board.elf is for stm32h743, not for stm32f4", "specgen build SPEC --target stm32f4"];
+    flash(&path, &[&board[..], &["--target", "stm32f4"]].concat()).says(2, &other);
+    flash(&path, &[&board[..], &["--target", "qemu"]].concat()).says(2, &["is for stm32h743, not for qemu"]);
+    for (image, words) in [(emulated, "qemu is no board"), ("nameless.elf", "does not say which board it is for")] {
+        let refused = Run::of(folder.command().env("PATH", &path).args(["flash", image]).args(board));
+        refused.says(2, &["nothing was flashed", words]);
+    }
+    let size = folder.run(&["size", image]);
+    assert!(size.stdout.contains(", for stm32h743\n"), "{}", size.stdout);
     assert_eq!(asked(), "", "nothing may have been flashed so far");
-    let mut spoilt = fs::read(folder.path(image)).unwrap();
-    let mark = b"specgen-identity: ";
-    let place = spoilt.windows(mark.len()).position(|window| window == mark).unwrap();
-    spoilt[place] ^= 1;
-    folder.write("spoilt.elf", &spoilt);
+    // An image that fails a check is not flashed.
+    edited(folder, image, "spoilt.elf", b"specgen-identity: ", b"specgen-identitx: ");
     let refused = Run::of(folder.command().env("PATH", &path).args(["flash", "spoilt.elf"]).args(board));
     refused.says(1, &["holds no identity", "nothing was flashed"]);
     assert_eq!(asked(), "");
 
-    let done = flash(&path, &board);
+    let done = flash(&path, &[&board[..], &["--target", "stm32h743"]].concat());
     assert_eq!(done.code, 0, "{done:#?}");
     assert!(done.stdout.contains("verified and restarted"), "{}", done.stdout);
     assert_eq!(asked(), format!("{}\n{}\n", commands[0], commands[1]));
     let probe = flash(&path, &[&board[..], &["--probe", "0483:374e:1"]].concat());
     assert_eq!(probe.code, 0, "{probe:#?}");
-    assert!(asked().contains("--verify --probe 0483:374e:1 out/target/qemu.elf"), "{}", asked());
+    assert!(asked().contains("--verify --probe 0483:374e:1 board.elf"), "{}", asked());
     let chosen = ["--speed", "500", "--connect-under-reset"];
     let slow = flash(&path, &[&board[..], &chosen].concat());
     assert_eq!(slow.code, 0, "{slow:#?}");
     let both = [
-        "download --chip STM32H743ZITx --verify --speed 500 --connect-under-reset out/target/qemu.elf",
+        "download --chip STM32H743ZITx --verify --speed 500 --connect-under-reset board.elf",
         "reset --chip STM32H743ZITx --speed 500 --connect-under-reset",
     ];
     assert!(asked().ends_with(&format!("{}\n", both.join("\n"))), "{}", asked());

@@ -72,6 +72,7 @@ fn the_guide_can_be_walked() {
 
 /// docs/porting.md: what is generated, and the drivers of the example beside it. Its programs are built by `tests/tests/porting.rs`.
 #[test]
+#[ignore = "long: packages of a board built and tested"]
 fn the_page_about_porting_can_be_walked() {
     let folder = tempfile::tempdir().unwrap();
     let text = fs::read_to_string(repository().join("docs/porting.md")).unwrap();

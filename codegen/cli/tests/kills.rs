@@ -112,7 +112,7 @@ fn aimed(way: Way, rounds: usize, random: &mut ChaCha8Rng) -> usize {
         );
         let mut child = start(&mut output.command(SPECS[new], way));
         while !aim.exists() && child.try_wait().unwrap().is_none() {
-            std::hint::spin_loop();
+            std::thread::sleep(Duration::from_micros(50));
         }
         std::thread::sleep(Duration::from_secs_f64(4e-3 * part(random)));
         hits += usize::from(kill(child) && output.work().join("new").exists());

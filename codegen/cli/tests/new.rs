@@ -5,7 +5,7 @@ use std::fs;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use crate::support::{Folder, Run, repository};
+use crate::support::{Folder, Run, length, repository};
 
 /// Platforms of the kind that are built: strokes, sizes, masses and rates over the ranges of catalogues, each physically whole.
 fn plausible(rng: &mut ChaCha8Rng) -> Vec<String> {
@@ -85,7 +85,7 @@ fn a_platform_from_its_data_sheet_passes_check_in_the_first_round() {
 fn plausible_platforms_pass_check_in_the_first_round() {
     let folder = Folder::new();
     let mut rng = ChaCha8Rng::seed_from_u64(16);
-    let count = if std::env::var_os("SPECGEN_FULL").is_some() { 200 } else { 20 };
+    let count = length(6, 200);
     let mut refused = Vec::new();
     for number in 0..count {
         for like in ["reference", "legs"] {

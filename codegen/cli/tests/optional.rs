@@ -141,14 +141,16 @@ fn the_main_job_answers_in_ten_lines() {
     let Some(tools) = crate::support::tools() else { return };
     let folder = Folder::new();
     folder.spec("small.toml", &[("instructions = 3000", "instructions = 300")]);
-    for (spec, code, words) in [
+    let jobs = [
         (
             "reference.toml",
             0,
             ["reference is ready on 13 assumed values: ", "agree in every bit over 20,000 ticks", "≤ 4,500"],
         ),
         ("small.toml", 1, ["legs is NOT ready: instructions 2,", "> 300", "  next     specgen size small.toml"]),
-    ] {
+    ];
+    // One of them is not ready, which takes another controller: in the full run.
+    for (spec, code, words) in jobs.into_iter().take(crate::support::length(1, 2)) {
         let run = folder.run(&[spec, "-o", "out/made"]);
         assert_eq!(run.code, code, "{run:?}");
         let lines: Vec<&str> = run.stdout.lines().collect();

@@ -134,6 +134,22 @@ fn messages_say_what_the_rows_say(bytes: &[u8], names: &str, rows: &str, spec: &
 }
 
 #[test]
+fn what_one_controller_records_the_other_replays() {
+    let folder = Folder::new();
+    let forms: [(&str, &[&str]); 2] = [("run-time", &[]), ("emitted", &["--emitted"])];
+    for ((recorder, sim), (player, replay)) in [(forms[0], forms[1]), (forms[1], forms[0])] {
+        let record = ["sim", "legs.toml", "--record", "run.rec", "--seconds", "0.5"];
+        let recorded = folder.json(&[&record[..], sim].concat());
+        let replayed = folder.json(&[&["replay", "run.rec", "--spec", "legs.toml"][..], replay].concat());
+        assert_eq!([&recorded.value["controller"], &replayed.value["controller"]], [recorder, player]);
+        let result = &replayed.value["result"];
+        assert_eq!((replayed.code, &result["bit_equal"]), (0, &true.into()), "{recorder}: {result}");
+        assert_eq!(result["ticks"], recorded.value["result"]["ticks"]);
+        assert!(result["ticks"].as_u64() > Some(1000), "{result}");
+    }
+}
+
+#[test]
 fn what_sim_records_replays_bit_for_bit_and_a_changed_bit_does_not() {
     let folder = Folder::new();
     for spec in ["legs.toml", "reference.toml"] {

@@ -11,7 +11,7 @@ use std::io::Write;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use host_sim::controller::{Controller, Supervised, TickController};
@@ -74,34 +74,73 @@ impl Programs {
         let name = spec.file_name().unwrap().to_str().unwrap();
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc-of").join(name);
         let _ = fs::remove_dir_all(&folder);
-        let compiled = compile::compile(spec).unwrap_or_else(|_| panic!("{name} compiles"));
-        let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &["rt-pc"]);
-        let root = folder.join("controller");
-        workspace::write_scratch(&root, &files).unwrap();
-        let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc");
-        let cargo = |verb: &[&str]| {
-            let mut command = Command::new("cargo");
-            command.args(verb).args(["--release", "--locked", "--quiet", "--features", "comedi"]);
-            command.arg("--target-dir").arg(&kept).current_dir(root.join("rt-pc"));
-            for leak in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "CARGO_TARGET_DIR"] {
-                command.env_remove(leak);
-            }
-            // Fat link-time optimisation costs the test more than all the rest.
-            command.env("CARGO_PROFILE_RELEASE_LTO", "off").env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "16");
-            let output = command.output().unwrap();
-            let printed = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
-            assert!(output.status.success(), "cargo {verb:?}: {}", printed.join("\n"));
-        };
+        fs::create_dir_all(&folder).unwrap();
+        let (root, _one) = staged(spec);
         // Its own tests are those of the emitted copy, which differs little from spec to spec.
-        if crate::support::length(name == "reference.toml", true) {
-            cargo(&["test"]);
+        if crate::support::length(false, true) {
+            cargo(&root, "test");
         }
-        cargo(&["build"]);
         let binary = folder.join("rt-pc");
-        fs::copy(kept.join("release/rt-pc"), &binary).unwrap();
+        fs::copy(cargo(&root, "build").join("release/rt-pc"), &binary).unwrap();
         let library = target::host::build_library(&root, &root.join("target")).unwrap();
         Self { binary, library }
     }
+}
+
+/// Has cargo build or test the program of a workspace; its target folder, which all share.
+fn cargo(workspace: &Path, verb: &str) -> PathBuf {
+    let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc");
+    let mut command = Command::new("cargo");
+    command.args([verb, "--release", "--locked", "--quiet", "--features", "comedi"]);
+    command.arg("--target-dir").arg(&kept).current_dir(workspace.join("rt-pc"));
+    for leak in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "CARGO_TARGET_DIR"] {
+        command.env_remove(leak);
+    }
+    // Fat link-time optimisation costs the test more than all the rest.
+    command.env("CARGO_PROFILE_RELEASE_LTO", "off").env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "16");
+    command.env("CARGO_PROFILE_RELEASE_DEBUG", "0");
+    let output = command.output().unwrap();
+    let printed = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
+    assert!(output.status.success(), "cargo {verb}: {}", printed.join("\n"));
+    kept
+}
+
+/// The workspace of a spec, at one place for all: cargo names crates by their place, and compiles those anew whose files became others.
+/// No other spec's is put there while the second lives.
+fn staged(spec: &Path) -> (PathBuf, MutexGuard<'static, ()>) {
+    static ONE: Mutex<()> = Mutex::new(());
+    let one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let compiled = compile::compile(spec).unwrap_or_else(|_| panic!("{} compiles", spec.display()));
+    let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &["rt-pc"]);
+    let root = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc-of/workspace");
+    let mut open = vec![root.clone()];
+    while let Some(folder) = open.pop() {
+        for entry in fs::read_dir(folder).into_iter().flatten().map(Result::unwrap) {
+            let path = entry.path();
+            let name = path.strip_prefix(&root).unwrap().to_str().unwrap();
+            if path.is_dir() {
+                open.extend((name != "target").then_some(path));
+            } else if !files.contains_key(name) {
+                fs::remove_file(&path).unwrap();
+            }
+        }
+    }
+    for (name, text) in files {
+        let path = root.join(name);
+        if fs::read_to_string(&path).is_ok_and(|there| there == text) {
+            continue;
+        }
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+    (root, one)
+}
+
+/// In the full run those of every other spec's, too, where it is built.
+#[test]
+fn the_tests_of_the_program_itself_pass() {
+    let (root, _one) = staged(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/reference.toml"));
+    cargo(&root, "test");
 }
 
 /// Programs of a spec and a running machine, with a folder of their own.

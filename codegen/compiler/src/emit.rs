@@ -37,7 +37,6 @@ pub type EmittedCrate = BTreeMap<String, String>;
 #[must_use]
 pub fn emit(ir: &Ir) -> EmittedCrate {
     let mut sources = vec![
-        ("src/body.rs", body::emit(ir)),
         ("src/checked.rs", checked::emit(ir)),
         ("src/constants.rs", constants::emit(ir)),
         ("src/defaults.rs", defaults::emit(ir)),
@@ -61,8 +60,9 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
     files
 }
 
-fn of_platform(ir: &Ir, task: &TaskSpace) -> [(&'static str, TokenStream); 3] {
+fn of_platform(ir: &Ir, task: &TaskSpace) -> [(&'static str, TokenStream); 4] {
     [
+        ("src/body.rs", body::emit(ir)),
         ("src/gauges.rs", platform::gauges::emit(ir, &task.sensing)),
         ("src/setpoint.rs", setpoint::emit(ir, &task.setpoints)),
         ("src/task_space.rs", platform::task_space::emit(ir, task)),

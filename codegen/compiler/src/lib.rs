@@ -6,6 +6,7 @@
 
 pub mod assumed;
 pub mod compile;
+pub mod constants;
 pub mod demand;
 pub mod description;
 pub mod emit;

@@ -11,6 +11,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 use tempfile::TempDir;
 
 use crate::lock;
@@ -50,26 +52,33 @@ impl Passing {
 /// that `end` gives.
 pub fn catch(end: impl Fn() -> u8 + Send + 'static) {
     // Without a handler an interrupt ends the process all the same, and leaves what lies in temporary folders.
-    let _ = ctrlc::set_handler(move || {
-        PRESSED.store(true, Ordering::SeqCst);
-        if HEEDED.load(Ordering::SeqCst) {
-            return;
-        }
-        let _whole = whole();
-        let passing = locked(&PASSING);
-        for one in passing.iter().rev() {
-            // A compiler that was interrupted with us may write its last file just now.
-            let grows =
-                |error: &io::Error| error.kind() == io::ErrorKind::DirectoryNotEmpty && matches!(one, Passing::Tree(_));
-            for _ in 0..20 {
-                match one.remove() {
-                    Err(error) if grows(&error) => std::thread::sleep(Duration::from_millis(20)),
-                    _ => break,
-                }
+    let Ok(mut signals) = Signals::new([SIGHUP, SIGINT, SIGTERM]) else { return };
+    std::thread::spawn(move || {
+        for _ in signals.forever() {
+            PRESSED.store(true, Ordering::SeqCst);
+            if !HEEDED.load(Ordering::SeqCst) {
+                leave(&end);
             }
         }
-        std::process::exit(i32::from(end()));
     });
+}
+
+/// Takes away what is on the way, and ends the process.
+fn leave(end: &impl Fn() -> u8) -> ! {
+    let _whole = whole();
+    let passing = locked(&PASSING);
+    for one in passing.iter().rev() {
+        // A compiler that was interrupted with us may write its last file just now.
+        let grows =
+            |error: &io::Error| error.kind() == io::ErrorKind::DirectoryNotEmpty && matches!(one, Passing::Tree(_));
+        for _ in 0..20 {
+            match one.remove() {
+                Err(error) if grows(&error) => std::thread::sleep(Duration::from_millis(20)),
+                _ => break,
+            }
+        }
+    }
+    std::process::exit(i32::from(end()));
 }
 
 /// From now on an interrupt does nothing but set what is returned: the command looks at it and ends by itself. A second one

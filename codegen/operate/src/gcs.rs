@@ -12,6 +12,8 @@ mod commands;
 mod input;
 mod server;
 mod stage;
+#[cfg(test)]
+mod tests;
 
 pub use axes::Axes;
 pub use server::Bridge;

@@ -6,7 +6,7 @@
 >>> rows = law.run(numpy.zeros(1000, law.inputs))
 >>> specgen.simulate("platform.toml", frequency=10)["motions"]
 
-Building a controller needs ``cargo``; an exported library, records and recordings do not.
+Only exports and ``controller(…, emitted=True)`` need ``cargo``: everything else builds nothing.
 """
 
 from ._commands import (

@@ -1,4 +1,4 @@
-"""An emitted controller on numpy arrays."""
+"""A controller on numpy arrays."""
 
 from __future__ import annotations
 
@@ -24,17 +24,27 @@ def _dtype(words: Iterable[tuple[str, bool]]) -> np.dtype[np.void]:
 
 
 class Controller:
-    """The very controller that the other targets run, built for this computer: the same inputs give the same bits.
+    """The very controller that the other targets run, on this computer: the same inputs give the same bits.
 
-    ``Controller(library)`` loads a library that `export_c` or an emitted workspace has; `controller` builds one of a spec. With
-    ``supervised`` a tick is that of the whole machine with its phases; without, the law alone, which nothing watches over.
+    `controller` makes one of a spec, without building anything; ``Controller(library)`` loads a library that `export_c` or an emitted
+    workspace has. With ``supervised`` a tick is that of the whole machine with its phases; without, the law alone, which nothing
+    watches over.
 
     Values are in m, rad, N, V, s. Fields are named as the words are: ``inputs.names``, ``outputs.names``. One controller is run by
     one thread at a time; others of the same library are independent of it.
     """
 
     def __init__(self, library: str | PathLike[str], *, supervised: bool = False) -> None:
-        self._library = _native.Library(library, supervised)
+        self._take(_native.Library(library, supervised), supervised)
+
+    @classmethod
+    def _of_spec(cls, spec: str | PathLike[str], supervised: bool) -> Controller:
+        made = cls.__new__(cls)
+        made._take(_native.Library.of_spec(spec, supervised), supervised)
+        return made
+
+    def _take(self, library: _native.Library, supervised: bool) -> None:
+        self._library = library
         self.name, self.digest, self.version, self.scalar_bits = self._library.about()
         self.supervised = supervised
         self.inputs = _dtype(self._library.inputs())

@@ -81,8 +81,8 @@ class UsageError(Error, ValueError):
 
 
 class Unavailable(Error):
-    """A tool is missing or fails, or a file cannot be written. Without ``cargo`` nothing can be built: `compile`, `identify`, `predict`
-    and ``Controller`` of a library that was built elsewhere need none."""
+    """A tool is missing or fails, or a file cannot be written. ``cargo`` is needed only by what is built: exports, and `controller` with
+    ``emitted``."""
 
 
 class EndedEarly(Error):

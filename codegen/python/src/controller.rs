@@ -1,4 +1,4 @@
-//! An emitted controller on rows of words that Python holds.
+//! A controller, emitted or of a compiled spec, on rows of words that Python holds.
 #![allow(unsafe_code)]
 
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use host_sim::word::{Scalar, WordKind};
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
 use pyo3::{PyErr, PyResult, Python, pyclass, pymethods};
-use specgen::files;
+use specgen::{compile, files, run_time};
 
 use crate::Error;
 
@@ -45,7 +45,7 @@ struct Rounded {
     rows: [Vec<u64>; 2],
 }
 
-/// A host library that is loaded, with one configuration and one state. A row is a word of 64 bits for each name: reals as f64, which
+/// A controller with one configuration and one state: a host library, or the law on the constants of a compiled spec. A row is a word of 64 bits for each name: reals as f64, which
 /// are rounded to the controller's scalar, and whole numbers.
 #[pyclass(module = "specgen._native")]
 pub struct Library {
@@ -76,21 +76,17 @@ impl Library {
     fn new(path: PathBuf, supervised: bool) -> PyResult<Self> {
         // A pipe in its place would be waited for.
         drop(files::open_file(&path).map_err(|unread| refused(format!("{}: {unread}", path.display())))?);
-        let controller = Controller::load(&path).map_err(refused)?;
-        let tick = if supervised {
-            Tick::Supervised(Box::new(Supervised::new(controller).map_err(refused)?))
-        } else {
-            Tick::Law(Box::new(controller))
-        };
-        let (inputs, outputs) = match &tick {
-            Tick::Law(law) => (law.description().input_names.clone(), law.description().output_names.clone()),
-            Tick::Supervised(supervised) => (supervised.input_names(), supervised.output_names()),
-        };
-        let rounded = (tick.controller().description().scalar != Scalar::F64).then(|| Rounded {
-            reals: [reals(&inputs), reals(&outputs)],
-            rows: [vec![0; inputs.len()], vec![0; outputs.len()]],
+        Self::of(Controller::load(&path).map_err(refused)?, supervised)
+    }
+
+    /// Compiles a spec, and runs the law on its constants: nothing is built. With its supervisor if `supervised`.
+    #[staticmethod]
+    fn of_spec(py: Python<'_>, spec: PathBuf, supervised: bool) -> PyResult<Self> {
+        let controller = py.detach(|| {
+            let compiled = compile::compile(&spec).map_err(|_| format!("{} is refused", spec.display()))?;
+            run_time::controller(&compiled.ir).map_err(|error| error.to_string())
         });
-        Ok(Self { tick, rounded, inputs, outputs, bound: None })
+        Self::of(controller.map_err(refused)?, supervised)
     }
 
     /// Name of the spec, its digest, version of specgen, bits of the scalar.
@@ -199,6 +195,23 @@ impl Library {
 }
 
 impl Library {
+    fn of(controller: Controller, supervised: bool) -> PyResult<Self> {
+        let tick = if supervised {
+            Tick::Supervised(Box::new(Supervised::new(controller).map_err(refused)?))
+        } else {
+            Tick::Law(Box::new(controller))
+        };
+        let (inputs, outputs) = match &tick {
+            Tick::Law(law) => (law.description().input_names.clone(), law.description().output_names.clone()),
+            Tick::Supervised(supervised) => (supervised.input_names(), supervised.output_names()),
+        };
+        let rounded = (tick.controller().description().scalar != Scalar::F64).then(|| Rounded {
+            reals: [reals(&inputs), reals(&outputs)],
+            rows: [vec![0; inputs.len()], vec![0; outputs.len()]],
+        });
+        Ok(Self { tick, rounded, inputs, outputs, bound: None })
+    }
+
     /// # Safety
     /// The pointers are to a row of inputs and one of outputs, which do not overlap.
     unsafe fn tick(&mut self, input: *const u64, output: *mut u64) {

@@ -1,5 +1,5 @@
-//! The part of the Python package `specgen` that is not Python: commands as functions, and an emitted controller on memory that
-//! Python holds. `specgen/*.py` gives both their names, types and documentation.
+//! The part of the Python package `specgen` that is not Python: commands as functions, and a controller on memory that Python
+//! holds. `specgen/*.py` gives both their names, types and documentation.
 
 mod call;
 mod controller;

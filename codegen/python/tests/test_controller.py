@@ -1,4 +1,4 @@
-"""An emitted controller on numpy arrays."""
+"""A controller on numpy arrays."""
 
 import threading
 from pathlib import Path
@@ -47,6 +47,39 @@ def test_rows_at_once_are_ticks_one_by_one(library: Path) -> None:
     single.step(gauge=np.full(6, 1e-7))
     together.step(gauge=np.full(6, np.nextafter(1e-7, 1)))
     assert single.state_digest != together.state_digest
+
+
+@pytest.mark.parametrize("supervised", [False, True])
+def test_what_is_not_built_has_the_bits_of_the_library(library: Path, supervised: bool) -> None:
+    emitted = specgen.Controller(library, supervised=supervised)
+    made = specgen.controller(REFERENCE, supervised=supervised)
+    assert (made.name, made.digest, made.inputs, made.outputs) == (
+        emitted.name,
+        emitted.digest,
+        emitted.inputs,
+        emitted.outputs,
+    )
+    assert made.settings == emitted.settings
+    given = rows(emitted, 3000)
+    if supervised:
+        given["request"] = 1
+    else:
+        given["gauge"] *= 3
+    assert made.run(given).tobytes() == emitted.run(given).tobytes()
+    assert made.state_digest == emitted.state_digest
+    # A comparison that can fail.
+    given["gauge"][-1] = np.nextafter(given["gauge"][-1], 1)
+    made.reset()
+    made.run(given)
+    assert made.state_digest != emitted.state_digest
+
+
+def test_a_spec_that_is_refused_makes_no_controller(tmp_path: Path) -> None:
+    spec = tmp_path / "platform.toml"
+    spec.write_text((REPOSITORY / "specs/minimal.toml").read_text().replace("[", "\n[unknown]\nkey = 1\n[", 1))
+    with pytest.raises(specgen.Refused) as raised:
+        specgen.controller(spec)
+    assert raised.value.code and raised.value.line
 
 
 def test_nothing_is_copied(library: Path) -> None:

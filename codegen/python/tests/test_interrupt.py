@@ -85,11 +85,15 @@ print(len(specgen.compile({str(REFERENCE)!r}).digest))
 def test_without_a_toolchain_all_but_building_works(library: Path, tmp_path: Path) -> None:
     body = f"""
 compiled = specgen.compile({str(REFERENCE)!r})
-law = specgen.Controller({str(library)!r})
-assert law.digest == compiled.digest
-law.step()
+for law in specgen.Controller({str(library)!r}), compiled.controller():
+    assert law.digest == compiled.digest
+    law.step()
+specgen.simulate({str(REFERENCE)!r}, trajectory="case-1")
+recording = {str(tmp_path / "run.rec")!r}
+specgen.record({str(REFERENCE)!r}, recording, seconds=0.1)
+assert specgen.replay(recording, {str(REFERENCE)!r}).passed
 try:
-    compiled.controller()
+    specgen.controller({str(REFERENCE)!r}, emitted=True)
 except specgen.Unavailable as error:
     print(error)
 """
@@ -105,5 +109,5 @@ def test_what_progress_raises_is_raised() -> None:
     def progress(line: str) -> None:
         raise LookupError(line)
 
-    with pytest.raises(LookupError, match="building"):
+    with pytest.raises(LookupError, match="controller: the compiled spec"):
         specgen.simulate(REFERENCE, progress=progress)

@@ -22,7 +22,11 @@ mod tests;
 use std::fmt;
 
 use host_sim::controller::{Controller, ControllerError, Engine};
+use specgen_compiler::constants::{self, Numbers as _};
 use specgen_compiler::ir::{Ir, Scalar};
+use specgen_runtime::Motion;
+
+use convert::Convert;
 
 /// The controller of a compiled spec, with the spec's configuration and the power-up state.
 ///
@@ -38,11 +42,54 @@ pub fn controller(ir: &Ir) -> Result<Controller, InvalidIr> {
     Ok(Controller::of(engine)?)
 }
 
-fn engine<T: engine::Number>(ir: &Ir) -> Result<Box<dyn Engine>, InvalidIr> {
+fn engine<T: common::Number>(ir: &Ir) -> Result<Box<dyn Engine>, InvalidIr> {
     Ok(match &ir.task_space {
         Some(task) => engine::boxed(platform::constants::<T>(ir, task)?)?,
         None => engine::boxed(legs::constants::<T>(ir)?)?,
     })
+}
+
+/// The inverse dynamics of a controller at a motion, in its own arithmetic.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dynamics {
+    /// ∂l/∂h, a row per leg: m/m, m/rad.
+    pub jacobian: [[f64; 6]; 6],
+    /// M(h).
+    pub mass: [[f64; 6]; 6],
+    /// C(h, ḣ) ḣ: N, N m.
+    pub coriolis: [f64; 6],
+    /// G(h): N, N m.
+    pub gravity: [f64; 6],
+    /// N, > 0 pushes the platform.
+    pub leg_forces: [f64; 6],
+    /// Δl from rest, m.
+    pub displacements: [f64; 6],
+}
+
+/// The inverse dynamics of a compiled spec at a pose from rest (m, rad) with its first and second time derivatives, rounded to the
+/// controller's arithmetic.
+#[must_use]
+pub fn dynamics(ir: &Ir, motion: &Motion<f64>) -> Dynamics {
+    match ir.scalar {
+        Scalar::F32 => dynamics_in::<f32>(ir, motion),
+        Scalar::F64 => dynamics_in::<f64>(ir, motion),
+    }
+}
+
+fn dynamics_in<T: common::Number + Into<f64>>(ir: &Ir, motion: &Motion<f64>) -> Dynamics {
+    let convert = &Convert::<T>::new();
+    let body = constants::body(convert, &ir.dynamics);
+    let [pose, rate, acceleration] = [motion.pose, motion.rate, motion.acceleration].map(|six| convert.vector(&six));
+    let motion = Motion { pose, rate, acceleration };
+    let six = |numbers: [T; 6]| numbers.map(Into::into);
+    Dynamics {
+        jacobian: body.jacobian(&pose).map(six),
+        mass: body.mass_matrix(&pose).map(six),
+        coriolis: six(body.coriolis(&pose, &rate)),
+        gravity: six(body.gravity(&pose)),
+        leg_forces: six(body.leg_forces(&motion)),
+        displacements: six(body.load(&motion, None).displacement),
+    }
 }
 
 /// Why an IR is not run: it is none that the compiler makes.

@@ -3,6 +3,7 @@
 use std::convert::Infallible;
 use std::fmt::Debug;
 
+use specgen_compiler::constants::Numbers as _;
 use specgen_compiler::ir::{Hysteresis, LEGS, RateModel};
 use specgen_law::LegMemory;
 use specgen_runtime::snapshot::{Field, Invalid, Reader, Words};
@@ -133,7 +134,7 @@ impl<T: Real + Debug> LegMemory<T, Table<T>> for Memory<T> {
 
     #[inline(always)]
     fn fell_back(&self) -> bool {
-        each!(self, memory => memory.fell_back())
+        matches!(self, Self::Dynamic(memory) if memory.fell_back())
     }
 
     #[inline(always)]
@@ -165,7 +166,7 @@ impl<T: Real + Debug> LegMemory<T, Table<T>> for Memory<T> {
     }
 
     fn follow_within(&mut self, table: &Table<T>, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
-        with_table!(self, table, (memory, table) => memory.follow_within(table, displacement, permitted))
+        with_table!(self, table, (memory, table) => LegMemory::follow_within(memory, table, displacement, permitted))
     }
 }
 

@@ -4,13 +4,14 @@ use std::convert::Infallible;
 use std::fmt::Debug;
 
 use specgen_law::legs::{DeadTimeLead, Lead};
-use specgen_law::platform::{GaugeCalibration, ModalDamping, OutputLines, RequestCorrection};
 use specgen_runtime::attitude::horner;
 use specgen_runtime::linear::each;
 use specgen_runtime::setpoint::{Frames, Parallel, Target, Tool, Work};
 use specgen_runtime::snapshot::{Field, Invalid, Reader, Words};
-use specgen_runtime::trigger::{Line, MOST, Seen, Triggers};
-use specgen_runtime::{Correction, CorrectionLimit, Damping, Real, Resonator, Snapshot};
+use specgen_runtime::trigger::{Line, MOST, OutputLines, Seen, Triggers};
+use specgen_runtime::{
+    Correction, CorrectionLimit, Damping, GaugeCalibration, ModalDamping, Real, RequestCorrection, Resonator, Snapshot,
+};
 
 /// A part that the spec asks for, or not: it has no words then.
 #[derive(Debug, Clone, Copy)]
@@ -55,28 +56,40 @@ impl<T: Real + Debug> ModalDamping<T> for Optional<Damping<T, 6>> {
     }
 }
 
-/// Six numbers, or none.
+/// So many values, up to `N`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SixOrNone<T> {
-    given: bool,
-    values: [T; 6],
+pub struct UpTo<X, const N: usize> {
+    values: [X; N],
+    count: usize,
 }
 
-impl<T> AsRef<[T]> for SixOrNone<T> {
-    fn as_ref(&self) -> &[T] {
-        if self.given { &self.values } else { &[] }
+impl<X, const N: usize> AsRef<[X]> for UpTo<X, N> {
+    fn as_ref(&self) -> &[X] {
+        &self.values[..self.count]
     }
 }
 
-impl<T> AsMut<[T]> for SixOrNone<T> {
-    fn as_mut(&mut self) -> &mut [T] {
-        if self.given { &mut self.values } else { &mut [] }
+impl<X, const N: usize> AsMut<[X]> for UpTo<X, N> {
+    fn as_mut(&mut self) -> &mut [X] {
+        &mut self.values[..self.count]
+    }
+}
+
+/// What so many output lines show.
+pub type LineSettings<T> = UpTo<Line<T>, MOST>;
+
+impl<T: Real> LineSettings<T> {
+    /// None for more than there may be.
+    pub fn new(given: &[Line<T>]) -> Option<Self> {
+        let mut values = [Line::new(); MOST];
+        values.get_mut(..given.len())?.copy_from_slice(given);
+        Some(Self { values, count: given.len() })
     }
 }
 
 impl<T: Real + Debug> RequestCorrection<T> for Optional<Correction<T, 6>> {
     type Limits = Option<[CorrectionLimit<T>; 6]>;
-    type Wanted = SixOrNone<T>;
+    type Wanted = UpTo<T, 6>;
     const REST: Self = Self { given: false, part: Correction::new() };
 
     fn rest(&mut self) {
@@ -84,12 +97,12 @@ impl<T: Real + Debug> RequestCorrection<T> for Optional<Correction<T, 6>> {
     }
 
     #[inline]
-    fn nothing(limits: &Self::Limits) -> SixOrNone<T> {
-        SixOrNone { given: limits.is_some(), values: [T::ZERO; 6] }
+    fn nothing(limits: &Self::Limits) -> UpTo<T, 6> {
+        UpTo { values: [T::ZERO; 6], count: if limits.is_some() { 6 } else { 0 } }
     }
 
     #[inline]
-    fn follow(&mut self, limits: &Self::Limits, wanted: &SixOrNone<T>) -> bool {
+    fn follow(&mut self, limits: &Self::Limits, wanted: &UpTo<T, 6>) -> bool {
         limits.as_ref().is_some_and(|limits| self.part.follow(limits, &wanted.values))
     }
 
@@ -116,34 +129,6 @@ impl<T: Real + Debug> DeadTimeLead<T> for Optional<Lead<T, 1>> {
     #[inline]
     fn asked(&self) -> Option<T> {
         if self.given { self.part.asked() } else { None }
-    }
-}
-
-/// What so many output lines show.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LineSettings<T: Real> {
-    lines: [Line<T>; MOST],
-    count: usize,
-}
-
-impl<T: Real> LineSettings<T> {
-    /// None for more than there may be.
-    pub fn new(given: &[Line<T>]) -> Option<Self> {
-        let mut lines = [Line::new(); MOST];
-        lines.get_mut(..given.len())?.copy_from_slice(given);
-        Some(Self { lines, count: given.len() })
-    }
-}
-
-impl<T: Real> AsRef<[Line<T>]> for LineSettings<T> {
-    fn as_ref(&self) -> &[Line<T>] {
-        &self.lines[..self.count]
-    }
-}
-
-impl<T: Real> AsMut<[Line<T>]> for LineSettings<T> {
-    fn as_mut(&mut self) -> &mut [Line<T>] {
-        &mut self.lines[..self.count]
     }
 }
 
@@ -205,7 +190,7 @@ impl<T: Real + Debug> OutputLines<T> for Lines<T> {
     }
 
     fn tick(&mut self, settings: &LineSettings<T>, seen: &Seen<'_, T>) -> u32 {
-        lines!(self, lines => settings.lines.first_chunk().map_or(0, |settings| lines.tick(settings, seen)), 0)
+        lines!(self, lines => settings.values.first_chunk().map_or(0, |settings| lines.tick(settings, seen)), 0)
     }
 
     fn rest(&mut self) -> u32 {

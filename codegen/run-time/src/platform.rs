@@ -1,25 +1,14 @@
 //! A platform in task space whose constants are read at run time.
 
-use std::fmt::Debug;
-
+use specgen_compiler::constants::{self, Numbers as _, kept};
 use specgen_compiler::ir::{self, Frames, Ir, LEGS, Path, TaskSpace as Task};
-use specgen_law::platform::{self, Config, Platform, TaskSpace, TickInput, TickOutput};
-use specgen_law::{ConfigError, Reset, Spec, StateOf};
-use specgen_runtime::setpoint::{
-    Axis, MoveLimits, Row, Segment, Setpoints, StopLimits, Table as Rows, Tool, Trajectory, Work,
-};
-use specgen_runtime::snapshot::Sizes;
-use specgen_runtime::supervisor::Supervision;
-use specgen_runtime::trigger::Line;
-use specgen_runtime::{
-    Affine, Correction, CorrectionLimit, Dac, Damping, Gauges, Notch, Permitted, RateFilter, Real, Resonator, Section,
-};
+use specgen_law::platform::{self, Platform, State, TaskSpace};
+use specgen_runtime::setpoint::{Setpoints, Table as Rows, Tool, Trajectory, Work};
+use specgen_runtime::{Affine, Correction, CorrectionLimit, Damping, Gauges, Notch, RateFilter, Real, Resonator};
 
 use crate::InvalidIr;
-use crate::common::{self, Common};
-use crate::convert::{Convert, kept};
-use crate::engine::Constants;
-use crate::memory::{Memory, Table};
+use crate::common::{AtRunTime, Common, Constants, Number, accessors};
+use crate::convert::Convert;
 use crate::parts::{LineSettings, Lines, Optional, Polynomials, UserFrames};
 
 /// Input words of a controller without a correction, and with one.
@@ -41,6 +30,7 @@ pub struct PlatformConstants<T: Real> {
     force_to_modes: [[T; 6]; 6],
     legs_to_modes: [[T; LEGS]; 6],
     modes_to_legs: [[T; 6]; LEGS],
+    body: specgen_runtime::Platform<T>,
     affine_load: Option<Affine<T>>,
     rest_force: [T; LEGS],
     wrench_limit: [T; 6],
@@ -58,266 +48,72 @@ pub struct PlatformConstants<T: Real> {
     setpoints: Setpoints<T, UserFrames<T>>,
     gauges: Gauges<'static, T>,
     calibration: Option<Polynomials<T>>,
-    raw_limits: [[T; 2]; 6],
     rate_filter: RateFilter<T>,
 }
 
-/// Them, for the law.
-#[derive(Debug)]
-pub struct PlatformSpec<T: Real>(&'static PlatformConstants<T>);
-
-impl<T: Real> Clone for PlatformSpec<T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<T: Real> Copy for PlatformSpec<T> {}
-
-impl<T: Real> PartialEq for PlatformSpec<T> {
-    fn eq(&self, other: &Self) -> bool {
-        std::ptr::eq(self.0, other.0)
-    }
-}
-
-impl<T: Real + Debug> Spec for PlatformSpec<T> {
-    type Real = T;
-    type Law = TaskSpace;
-    type Table = Table<T>;
-    type Memory = Memory<T>;
-
-    #[inline(always)]
-    fn tables(&self) -> &[Table<T>; LEGS] {
-        &self.0.common.tables
-    }
-
-    #[inline(always)]
-    fn dac(&self) -> &Dac<T> {
-        &self.0.common.dac
-    }
-
-    #[inline(always)]
-    fn supervision(&self) -> &Supervision<T> {
-        &self.0.common.supervision
-    }
-
-    #[inline(always)]
-    fn readings_per_leg(&self) -> &[[T; LEGS]; 6] {
-        &self.0.common.readings_per_leg
-    }
-
-    #[inline(always)]
-    fn geometry(&self) -> &specgen_runtime::Legs<'_, T> {
-        &self.0.common.geometry
-    }
-
-    #[inline(always)]
-    fn inverse_jacobian(&self) -> &[[T; LEGS]; 6] {
-        &self.0.common.inverse_jacobian
-    }
-
-    #[inline(always)]
-    fn corrections(&self) -> usize {
-        self.0.common.corrections
-    }
-
-    #[inline(always)]
-    fn pose_bound(&self) -> &[T; 6] {
-        &self.0.common.pose_bound
-    }
-
-    #[inline(always)]
-    fn permitted(&self) -> &[(Permitted<T>, usize)] {
-        &self.0.common.permitted
-    }
-
-    #[inline(always)]
-    fn sizes(&self) -> Sizes {
-        self.0.common.sizes
-    }
-
-    fn reset(&self) -> Reset<Self> {
-        let common = &self.0.common;
-        Reset { memory: *common.memory, displacement: common.displacement, code: common.code }
-    }
-}
-
-impl<T: Real + Debug> Platform for PlatformSpec<T> {
+impl<T: Number> Platform for AtRunTime<PlatformConstants<T>> {
     type Damping = Optional<Damping<T, 6>>;
     type Correction = Optional<Correction<T, 6>>;
     type Lines = Lines<T>;
     type Frames = UserFrames<T>;
     type Calibration = Polynomials<T>;
 
-    #[inline(always)]
-    fn period(&self) -> T {
-        self.0.period
-    }
-
-    #[inline(always)]
-    fn compliance(&self) -> T {
-        self.0.compliance
-    }
-
-    #[inline(always)]
-    fn wrench_to_legs(&self) -> &[[T; 6]; 6] {
-        &self.0.wrench_to_legs
-    }
-
-    #[inline(always)]
-    fn legs_to_wrench(&self) -> &[[T; 6]; 6] {
-        &self.0.legs_to_wrench
-    }
-
-    #[inline(always)]
-    fn force_to_modes(&self) -> &[[T; 6]; 6] {
-        &self.0.force_to_modes
-    }
-
-    #[inline(always)]
-    fn legs_to_modes(&self) -> &[[T; 6]; 6] {
-        &self.0.legs_to_modes
-    }
-
-    #[inline(always)]
-    fn modes_to_legs(&self) -> &[[T; 6]; 6] {
-        &self.0.modes_to_legs
-    }
-
-    #[inline(always)]
-    fn body(&self) -> &specgen_runtime::Platform<T> {
-        &self.0.common.body
-    }
-
-    #[inline(always)]
-    fn affine_load(&self) -> Option<&Affine<T>> {
-        self.0.affine_load.as_ref()
-    }
-
-    #[inline(always)]
-    fn rest_force(&self) -> &[T; LEGS] {
-        &self.0.rest_force
-    }
-
-    #[inline(always)]
-    fn wrench_limit(&self) -> &[T; 6] {
-        &self.0.wrench_limit
-    }
-
-    #[inline(always)]
-    fn lead(&self) -> T {
-        self.0.lead
-    }
-
-    #[inline(always)]
-    fn own_leads(&self) -> &[T] {
-        &self.0.own_leads
-    }
-
-    #[inline(always)]
-    fn transfer_keep(&self) -> T {
-        self.0.transfer_keep
-    }
-
-    #[inline(always)]
-    fn transfer_negligible(&self) -> T {
-        self.0.transfer_negligible
-    }
-
-    #[inline(always)]
-    fn cells_per_metre(&self) -> T {
-        self.0.cells_per_metre
-    }
-
-    #[inline(always)]
-    fn metres_per_cell(&self) -> T {
-        self.0.metres_per_cell
-    }
-
-    #[inline(always)]
-    fn notch(&self) -> Option<&Notch<T>> {
-        self.0.notch.as_ref()
-    }
-
-    #[inline(always)]
-    fn damping(&self) -> &Option<[Resonator<T>; 6]> {
-        &self.0.damping
-    }
-
-    #[inline(always)]
-    fn hands_over(&self) -> bool {
-        self.0.hands_over
-    }
-
-    #[inline(always)]
-    fn correction(&self) -> &Option<[CorrectionLimit<T>; 6]> {
-        &self.0.correction
-    }
-
-    #[inline(always)]
-    fn lines(&self) -> &LineSettings<T> {
-        &self.0.lines
-    }
-
-    #[inline(always)]
-    fn setpoints(&self) -> &Setpoints<T, UserFrames<T>> {
-        &self.0.setpoints
-    }
-
-    #[inline(always)]
-    fn gauges(&self) -> &Gauges<'_, T> {
-        &self.0.gauges
-    }
-
-    #[inline(always)]
-    fn calibration(&self) -> Option<&Polynomials<T>> {
-        self.0.calibration.as_ref()
-    }
-
-    #[inline(always)]
-    fn raw_limits(&self) -> &[[T; 2]; 6] {
-        &self.0.raw_limits
-    }
-
-    #[inline(always)]
-    fn rate_filter(&self) -> &RateFilter<T> {
-        &self.0.rate_filter
+    accessors! { constants =>
+        period -> T = constants.period;
+        compliance -> T = constants.compliance;
+        wrench_to_legs -> &[[T; 6]; 6] = &constants.wrench_to_legs;
+        legs_to_wrench -> &[[T; 6]; 6] = &constants.legs_to_wrench;
+        force_to_modes -> &[[T; 6]; 6] = &constants.force_to_modes;
+        legs_to_modes -> &[[T; 6]; 6] = &constants.legs_to_modes;
+        modes_to_legs -> &[[T; 6]; 6] = &constants.modes_to_legs;
+        body -> &specgen_runtime::Platform<T> = &constants.body;
+        affine_load -> Option<&Affine<T>> = constants.affine_load.as_ref();
+        rest_force -> &[T; LEGS] = &constants.rest_force;
+        wrench_limit -> &[T; 6] = &constants.wrench_limit;
+        lead -> T = constants.lead;
+        own_leads -> &[T] = &constants.own_leads;
+        transfer_keep -> T = constants.transfer_keep;
+        transfer_negligible -> T = constants.transfer_negligible;
+        cells_per_metre -> T = constants.cells_per_metre;
+        metres_per_cell -> T = constants.metres_per_cell;
+        notch -> Option<&Notch<T>> = constants.notch.as_ref();
+        damping -> &Option<[Resonator<T>; 6]> = &constants.damping;
+        hands_over -> bool = constants.hands_over;
+        correction -> &Option<[CorrectionLimit<T>; 6]> = &constants.correction;
+        lines -> &LineSettings<T> = &constants.lines;
+        setpoints -> &Setpoints<T, UserFrames<T>> = &constants.setpoints;
+        gauges -> &Gauges<'_, T> = &constants.gauges;
+        calibration -> Option<&Polynomials<T>> = constants.calibration.as_ref();
+        rate_filter -> &RateFilter<T> = &constants.rate_filter;
     }
 }
 
-impl<T: Real + Debug + Send + Sync> Constants for PlatformSpec<T> {
-    fn common(&self) -> &'static Common<T> {
-        &self.0.common
+impl<T: Number> Constants for PlatformConstants<T> {
+    type Real = T;
+    type Law = TaskSpace;
+
+    fn common(&self) -> &Common<T> {
+        &self.common
     }
 
-    fn read_config(self, words: &[u64]) -> Result<Config<Self>, ConfigError> {
-        Config::read(self, words)
-    }
-
-    fn state_at_reset(self) -> StateOf<Self> {
-        let mut state = platform::State::new(&self.reset());
-        state.damping.given = self.0.damping.is_some();
-        state.correction.given = self.0.correction.is_some();
-        state.triggers = Lines::low(&self.0.lines);
-        state
-    }
-
-    fn step(self, config: &Config<Self>, state: &mut StateOf<Self>, input: &TickInput<Self>) -> TickOutput<Self> {
-        platform::step(self, config, state, input)
-    }
-
-    fn words_per_leg(self, gauges: &[T; 6]) -> [[T; 6]; 6] {
-        platform::sensing::words_per_leg(self, gauges)
+    fn complete(&self, state: &mut State<AtRunTime<Self>>) {
+        state.damping.given = self.damping.is_some();
+        state.correction.given = self.correction.is_some();
+        state.triggers = Lines::low(&self.lines);
     }
 }
 
 /// The constants of a compiled spec.
-pub fn constants<T: Real + Debug>(ir: &Ir, task: &Task) -> Result<PlatformSpec<T>, InvalidIr> {
+pub fn constants<T: Number>(ir: &Ir, task: &Task) -> Result<PlatformConstants<T>, InvalidIr> {
     let convert = &Convert::new();
     let (law, sensing) = (&task.law, &task.sensing);
-    let lines: Vec<Line<T>> = task.defaults.triggers.iter().map(|line| of_line(convert, line)).collect();
+    let lines = constants::lines(convert, &task.defaults);
     let names = [INPUT_NAMES[usize::from(law.correction.is_some())], OUTPUT_NAMES[usize::from(!lines.is_empty())]];
-    let constants = PlatformConstants {
+    let body = constants::body(convert, &ir.dynamics);
+    if body.places.iter().chain(&body.rows).any(|place| *place >= LEGS) {
+        return Err(InvalidIr::Part("the order of elimination"));
+    }
+    let made = PlatformConstants {
         common: Common::new(ir, convert, names)?,
         period: convert.real(law.period),
         compliance: convert.real(law.compliance),
@@ -326,10 +122,8 @@ pub fn constants<T: Real + Debug>(ir: &Ir, task: &Task) -> Result<PlatformSpec<T
         force_to_modes: convert.matrix(&law.force_to_modes),
         legs_to_modes: convert.matrix(&law.legs_to_modes),
         modes_to_legs: convert.matrix(&law.modes_to_legs),
-        affine_load: task.load.affine.as_ref().map(|affine| Affine {
-            pose: convert.matrix(&affine.pose),
-            acceleration: convert.matrix(&affine.acceleration),
-        }),
+        body,
+        affine_load: constants::affine(convert, &task.load),
         rest_force: convert.vector(&law.rest_force),
         wrench_limit: convert.vector(&law.wrench_limit),
         lead: convert.real(law.lead),
@@ -338,58 +132,21 @@ pub fn constants<T: Real + Debug>(ir: &Ir, task: &Task) -> Result<PlatformSpec<T
         transfer_negligible: convert.real(law.transfer_negligible),
         cells_per_metre: convert.real(law.cells_per_metre),
         metres_per_cell: convert.real(law.metres_per_cell),
-        notch: law.notch.as_ref().map(|notch| Notch {
-            sections: notch
-                .sections
-                .map(|section| Section { depth: convert.real(section.depth), a: convert.vector(&section.a) }),
-            pose_to_modes: convert.matrix(&notch.pose_to_modes),
-            modes_to_pose: convert.matrix(&notch.modes_to_pose),
-        }),
-        damping: law.damping.map(|sections| {
-            sections.map(|section| Resonator { b: convert.vector(&section.b), a: convert.vector(&section.a) })
-        }),
+        notch: constants::notch(convert, law),
+        damping: law.damping.map(|sections| constants::damping(convert, &sections)),
         hands_over: law.hands_over,
-        correction: law.correction.map(|limits| {
-            limits.map(|limit| CorrectionLimit { most: convert.real(limit.most), step: convert.real(limit.step) })
-        }),
+        correction: law.correction.map(|limits| constants::correction(convert, &limits)),
         lines: LineSettings::new(&lines).ok_or(InvalidIr::Part("the number of output lines"))?,
         setpoints: setpoints(convert, ir, &task.setpoints)?,
-        gauges: Gauges {
-            direction: convert.matrix(&sensing.direction),
-            normal: convert.matrix(&sensing.normal),
-            skew: convert.matrix(&sensing.skew),
-            pierced: convert.matrix(&sensing.pierced),
-            inverse: convert.matrix(&sensing.inverse),
-            curvature: convert.matrix(&sensing.curvature),
-            passes: sensing.passes as usize,
-            arc_sine: convert.slice(&sensing.arc_sine),
-            arc_tangent: convert.slice(&sensing.arc_tangent),
-        },
+        gauges: constants::gauges(convert, sensing),
         calibration: sensing
             .calibration
             .as_ref()
             .map(|gauges| Polynomials(gauges.each_ref().map(|coefficients| convert.slice(coefficients)))),
-        raw_limits: convert.matrix(&sensing.raw_limits),
-        rate_filter: RateFilter { keep: convert.real(sensing.rate_keep), gain: convert.real(sensing.rate_gain) },
+        rate_filter: constants::rate_filter(convert, sensing),
     };
     convert.finish()?;
-    Ok(PlatformSpec(common::constants(constants)))
-}
-
-fn of_line<T: Real>(convert: &Convert<T>, line: &ir::Line) -> Line<T> {
-    Line {
-        kind: line.kind,
-        axis: line.axis,
-        direction: line.direction,
-        start: convert.real(line.start),
-        stop: convert.real(line.stop),
-        step: convert.real(line.step),
-        hysteresis: convert.real(line.hysteresis),
-        first: line.first,
-        every: line.every,
-        last: line.last,
-        width: line.width,
-    }
+    Ok(made)
 }
 
 fn setpoints<T: Real>(
@@ -397,42 +154,20 @@ fn setpoints<T: Real>(
     ir: &Ir,
     s: &ir::Setpoints,
 ) -> Result<Setpoints<T, UserFrames<T>>, InvalidIr> {
-    let trajectories: Option<Vec<_>> =
-        s.trajectories.iter().map(|trajectory| of_path(convert, &trajectory.path)).collect();
-    Ok(Setpoints {
-        period: convert.real(s.period),
-        rate: convert.real(s.rate),
-        square_rate: convert.real(s.square_rate),
-        bias: convert.vector(&s.bias),
-        home: convert.vector(&s.home),
-        bound: convert.vector(&ir.bounds.pose),
-        limits: MoveLimits {
-            speed: convert.vector(&s.speed_limit),
-            acceleration: convert.vector(&s.acceleration_limit),
-            jerk: convert.vector(&s.jerk_limit),
-        },
-        stop: StopLimits {
-            acceleration: convert.vector(&s.stop_acceleration_limit),
-            jerk: convert.vector(&s.stop_jerk_limit),
-            shortest: s.shortest_stop,
-        },
-        stream_step: convert.vector(&s.stream_step),
-        stream_rate: convert.vector(&s.stream_rate),
-        stream_acceleration: convert.vector(&s.stream_acceleration),
-        stale_ticks: s.stale_ticks,
-        frames: match &s.frames {
-            Frames::Parallel => UserFrames::Parallel,
-            Frames::Tool { point, largest_angle } => {
-                UserFrames::Tool(Tool { point: convert.vector(point), largest_angle: convert.real(*largest_angle) })
-            }
-            Frames::Work { axes, point, largest_angle } => UserFrames::Work(Work {
-                axes: convert.matrix(axes),
-                point: convert.vector(point),
-                largest_angle: convert.real(*largest_angle),
-            }),
-        },
-        trajectories: kept(trajectories.ok_or(InvalidIr::Part("the length of a trajectory"))?),
-    })
+    let frames = match &s.frames {
+        Frames::Parallel => UserFrames::Parallel,
+        Frames::Tool { point, largest_angle } => {
+            UserFrames::Tool(Tool { point: convert.vector(point), largest_angle: convert.real(*largest_angle) })
+        }
+        Frames::Work { axes, point, largest_angle } => UserFrames::Work(Work {
+            axes: convert.matrix(axes),
+            point: convert.vector(point),
+            largest_angle: convert.real(*largest_angle),
+        }),
+    };
+    let paths: Option<Vec<_>> = s.trajectories.iter().map(|trajectory| of_path(convert, &trajectory.path)).collect();
+    let paths = kept(paths.ok_or(InvalidIr::Part("the length of a trajectory"))?);
+    Ok(constants::setpoints(convert, &ir.bounds.pose, s, frames, paths))
 }
 
 /// A trajectory; none if it has more ticks than there may be, or too few parts.
@@ -440,15 +175,13 @@ fn of_path<T: Real>(convert: &Convert<T>, path: &Path) -> Option<Trajectory<T>> 
     Some(match path {
         Path::Segments { start, segments, ticks, end } => Trajectory::Segments {
             start: convert.vector(start),
-            segments: kept(segments.iter().map(|part| of_segment(convert, part)).collect::<Option<Vec<_>>>()?),
+            segments: kept(segments.iter().map(|part| constants::segment(convert, part))),
             ticks: i32::try_from(*ticks).ok()?,
             end: convert.vector(end),
         },
         Path::Table { rows, row_ticks, per_tick, per_second, bend_rate, repeat } if rows.len() >= 2 => {
             Trajectory::Table(Rows {
-                rows: kept(
-                    rows.iter().map(|row| Row { pose: convert.vector(&row.pose), bend: convert.vector(&row.bend) }),
-                ),
+                rows: kept(rows.iter().map(|row| constants::row(convert, row))),
                 row_ticks: i32::try_from(*row_ticks).ok().filter(|ticks| *ticks > 0)?,
                 per_tick: convert.real(*per_tick),
                 per_second: convert.real(*per_second),
@@ -457,22 +190,5 @@ fn of_path<T: Real>(convert: &Convert<T>, path: &Path) -> Option<Trajectory<T>> 
             })
         }
         Path::Table { .. } => return None,
-    })
-}
-
-fn of_segment<T: Real>(convert: &Convert<T>, segment: &ir::Segment) -> Option<Segment<T>> {
-    Some(Segment {
-        first: i32::try_from(segment.first).ok()?,
-        per_tick: convert.real(segment.per_tick),
-        per_second: convert.real(segment.per_second),
-        phase: segment.phase,
-        phase_step: segment.phase_step,
-        angular: convert.real(segment.angular),
-        axes: segment.axes.map(|axis| Axis {
-            place: convert.real(axis.place),
-            slope: convert.real(axis.slope),
-            sine: convert.vector(&axis.sine),
-            cosine: convert.vector(&axis.cosine),
-        }),
     })
 }

@@ -24,25 +24,12 @@ const PROFILE: [(&str, &str); 2] = [("CARGO_PROFILE_RELEASE_LTO", "off"), ("CARG
 /// [`TargetError::MissingTool`] without cargo, [`TargetError::PanicPath`] if the controller can panic,
 /// [`TargetError::BuildFailed`] for everything else that cargo says.
 pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
-    build_with(&[], dir, target_dir)
-}
-
-/// [`build_loadable`] with the function that analyses the dynamics, `specgen_dynamics`.
-///
-/// # Errors
-/// As [`build_loadable`].
-pub fn build_analysis(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
-    refuse_static()?;
-    build_with(&["--features", "dynamics"], dir, target_dir)
-}
-
-fn build_with(features: &[&str], dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
     let cargo = cargo()?;
     let package = dir.join("host");
     let target_dir = target_dir.join("host");
     let mut command = clean_command(cargo);
     // `cargo rustc`, so that the link flags below reach this crate alone.
-    command.envs(PROFILE).args(["rustc", "--release", "--lib"]).args(features);
+    command.envs(PROFILE).args(["rustc", "--release", "--lib"]);
     let request = BuildRequest { package: &package, target_dir: &target_dir, rustc_args: &LINK, locked: false };
     let library = cargo_artifact(&mut command, &request, &package.display().to_string(), |message| {
         let is_library = message["target"]["kind"].as_array()?.iter().any(|kind| kind == "cdylib");

@@ -8,6 +8,7 @@ use super::error::TargetError;
 use super::image::RECORDER;
 use super::owner::{NO_LINES, crate_of_file};
 use super::panics::{self, DebugInfo};
+use super::targets::Target;
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -18,6 +19,8 @@ pub const IDENTITY_MARK: &str = "specgen-identity: ";
 pub const ASSUMED_MARK: &str = "assumed: ";
 /// What stands between the names.
 pub const ASSUMED_SEPARATOR: &str = ", ";
+/// What the line begins with by which an image names the target that it is built for.
+const BOARD_MARK: &str = "specgen-board: ";
 /// Longest such line that is believed, bytes.
 const LONGEST_ASSUMED: usize = 1 << 16;
 /// Longest identity that is believed, bytes.
@@ -30,6 +33,8 @@ const UNNAMED: &str = "unnamed constants";
 pub struct Size {
     /// Compiler, platform and spec, as the image says; none if it was made by something else.
     pub identity: Option<String>,
+    /// The target that it is built for, as the image says; none if it says none, as images for boards of one's own.
+    pub target: Option<&'static str>,
     /// What its controller rests on that nobody measured, as the image says.
     pub assumed: Vec<String>,
     /// In the order of the image.
@@ -109,7 +114,7 @@ pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
     let mut sections = Vec::new();
     let mut owners: BTreeMap<String, Owner> = BTreeMap::new();
     let mut variables: BTreeMap<String, u64> = BTreeMap::new();
-    let mut found = None;
+    let (mut found, mut target) = (None, None);
     for section in file.sections() {
         let SectionFlags::Elf { sh_flags, .. } = section.flags() else { continue };
         if sh_flags.0 & object::elf::SHF_ALLOC.0 == 0 || section.size() == 0 {
@@ -127,7 +132,9 @@ pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
             code(&debug, section.address(), end, &mut owners)?;
             continue;
         }
-        found = found.or(find_identity(section.data().map_err(malformed)?));
+        let bytes = section.data().map_err(malformed)?;
+        found = found.or_else(|| find_identity(bytes));
+        target = target.or_else(|| find_target(bytes));
         constants(&file, section.address(), end, &mut owners);
     }
     for symbol in file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Data && symbol.size() > 0) {
@@ -142,7 +149,7 @@ pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
     let mut variables: Vec<(String, u64)> = variables.into_iter().collect();
     variables.sort_by(|a, b| (b.1, &a.0).cmp(&(a.1, &b.0)));
     let (identity, assumed) = found.map_or((None, Vec::new()), |(identity, assumed)| (Some(identity), assumed));
-    Ok(Size { identity, assumed, sections, owners, variables })
+    Ok(Size { identity, target, assumed, sections, owners, variables })
 }
 
 /// The tick of an image, if it has one that is known: see [`checks::check`].
@@ -212,13 +219,23 @@ fn crate_of_symbol(name: &str) -> &str {
 
 /// The identity line in the bytes of a section, and what the line behind it names as assumed.
 fn find_identity(bytes: &[u8]) -> Option<(String, Vec<String>)> {
-    let mark = IDENTITY_MARK.as_bytes();
-    let start = bytes.windows(mark.len()).position(|window| window == mark)? + mark.len();
-    let identity = line(bytes.get(start..)?, LONGEST_IDENTITY)?;
-    let behind = bytes.get(start + identity.len() + 1..).and_then(|bytes| line(bytes, LONGEST_ASSUMED));
+    let bytes = behind(bytes, IDENTITY_MARK)?;
+    let identity = line(bytes, LONGEST_IDENTITY)?;
+    let behind = bytes.get(identity.len() + 1..).and_then(|bytes| line(bytes, LONGEST_ASSUMED));
     let list = behind.as_deref().and_then(|line| line.strip_prefix(ASSUMED_MARK)).map(str::to_owned);
     let assumed = list.map_or_else(Vec::new, |list| list.split(ASSUMED_SEPARATOR).map(str::to_owned).collect());
     identity.starts_with("specgen ").then_some((identity, assumed))
+}
+
+/// The target in the bytes of a section.
+fn find_target(bytes: &[u8]) -> Option<&'static str> {
+    Target::named(line(behind(bytes, BOARD_MARK)?, LONGEST_IDENTITY)?.trim_end()).map(|target| target.name)
+}
+
+/// What stands behind a mark.
+fn behind<'a>(bytes: &'a [u8], mark: &str) -> Option<&'a [u8]> {
+    let start = bytes.windows(mark.len()).position(|window| window == mark.as_bytes())?;
+    bytes.get(start + mark.len()..)
 }
 
 /// The line that `bytes` begin with, if it is text.
@@ -269,6 +286,9 @@ mod tests {
         let assumed = ["sensor.noise", "gauge"].map(str::to_owned).to_vec();
         assert_eq!(find_identity(line.as_bytes()), Some((identity, assumed)));
         assert_eq!(find_identity(b"specgen-identity"), None);
+        for (line, target) in [("stm32f4\n", Some("stm32f4")), ("qemu     \n", Some("qemu")), ("stm32f407\n", None)] {
+            assert_eq!(find_target(format!("\0{BOARD_MARK}{line}").as_bytes()), target, "{line}");
+        }
         assert_eq!(find_identity(IDENTITY_MARK.as_bytes()), None);
     }
 }

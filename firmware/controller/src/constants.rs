@@ -41,6 +41,11 @@ impl Spec for Constants {
     }
 
     #[inline(always)]
+    fn raw_limits(&self) -> &[[Real; 2]; 6] {
+        &gauges::RAW_LIMITS
+    }
+
+    #[inline(always)]
     fn readings_per_leg(&self) -> &[[Real; LEGS]; 6] {
         &supervision::READINGS_PER_LEG
     }
@@ -210,11 +215,6 @@ impl Platform for Constants {
     #[inline(always)]
     fn calibration(&self) -> Option<&gauges::Meaning> {
         const { gauges::CALIBRATION.as_ref() }
-    }
-
-    #[inline(always)]
-    fn raw_limits(&self) -> &[[Real; 2]; 6] {
-        &gauges::RAW_LIMITS
     }
 
     #[inline(always)]

@@ -25,7 +25,7 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
-mod body;
+pub mod body;
 mod checked;
 mod constants;
 mod defaults;

@@ -11,8 +11,6 @@
 
 use core::mem::{align_of, size_of};
 
-#[cfg(feature = "dynamics")]
-use controller::dynamics::{Motion, PLATFORM};
 use controller::snapshot::MACHINE_STATE_WORDS;
 use controller::supervised::{
     MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_at_reset, machine_output_words, supervise,
@@ -230,7 +228,7 @@ pub unsafe extern "C" fn specgen_machine_step(
 pub unsafe extern "C" fn specgen_words_per_leg(gauges: *const u64, rows: *mut u64) {
     // SAFETY: the caller's duty.
     let gauges = unsafe { &*gauges.cast::<[u64; 6]>() }.map(Real::from_word);
-    let words = controller::sensing::words_per_leg(&gauges).map(|row| row.map(Real::to_word));
+    let words = controller::words_per_leg(&gauges).map(|row| row.map(Real::to_word));
     // SAFETY: the caller's duty.
     unsafe { rows.cast::<[[u64; 6]; 6]>().write(words) }
 }
@@ -271,32 +269,5 @@ pub unsafe extern "C" fn specgen_machine_load(machine: *mut u8, words: *const u6
             0
         }
         Err(invalid) => invalid.word as i32 + 1,
-    }
-}
-
-/// The dynamics at a motion (words of pose, rate and acceleration): words of J and M row by row, C ḣ, G, leg forces, leg
-/// displacements.
-///
-/// # Safety
-/// `motion` points to 18 words, `analysis` to 96 writable words.
-#[cfg(feature = "dynamics")]
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn specgen_dynamics(motion: *const u64, analysis: *mut u64) {
-    // SAFETY: the caller's duty.
-    let [pose, rate, acceleration] = unsafe { &*motion.cast::<[[u64; 6]; 3]>() }.map(|six| six.map(Real::from_word));
-    let motion = Motion { pose, rate, acceleration };
-    let words = |six: [controller::Real; 6]| six.map(Real::to_word);
-    let last = [
-        PLATFORM.coriolis(&pose, &rate),
-        PLATFORM.gravity(&pose),
-        PLATFORM.leg_forces(&motion),
-        PLATFORM.load(&motion, None).displacement,
-    ];
-    // SAFETY: the caller's duty.
-    unsafe {
-        let matrices = analysis.cast::<[[u64; 6]; 6]>();
-        matrices.write(PLATFORM.jacobian(&pose).map(words));
-        matrices.add(1).write(PLATFORM.mass_matrix(&pose).map(words));
-        matrices.add(2).cast::<[[u64; 6]; 4]>().write(last.map(words));
     }
 }

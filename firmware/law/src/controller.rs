@@ -27,38 +27,9 @@ macro_rules! controller {
             STATIC_INVERSE, TRIGGER_HIGH, TRIGGER_MISSED, WRENCH_FAULT,
         };
 
-        /// Pose from six gauges that see the platform.
+        /// Six gauges that see the platform: constants of `platform::sensing` of the law.
         pub mod sensing {
-            use super::{Constants, Real};
-
             pub use super::gauges::{CALIBRATION, CONVERTER, GAUGES, RATE, RAW_LIMITS};
-
-            /// Gauges whose word is not finite or out of [`RAW_LIMITS`]: bit k for gauge k.
-            #[inline]
-            #[must_use]
-            pub fn faults(raw: &[Real; 6]) -> u32 {
-                $crate::platform::sensing::faults(Constants, raw)
-            }
-
-            /// Readings of the gauges, m, from their words.
-            #[inline]
-            #[must_use]
-            pub fn readings(raw: &[Real; 6]) -> [Real; 6] {
-                $crate::platform::sensing::readings(Constants, raw)
-            }
-
-            /// Word of each gauge (rows) per displacement of each leg (columns) near these words, per m.
-            #[must_use]
-            pub fn words_per_leg(raw: &[Real; 6]) -> [[Real; 6]; 6] {
-                $crate::platform::sensing::words_per_leg(Constants, raw)
-            }
-
-            /// Pose from rest, m and rad, of gauge words without [`faults`]; finite for these.
-            #[inline]
-            #[must_use]
-            pub fn pose(raw: &[Real; 6]) -> [Real; 6] {
-                $crate::platform::sensing::pose(Constants, raw)
-            }
         }
 
         $crate::controller!(@both platform, super::task_space::CORRECTED != 0, [super::defaults::LINES, super::defaults::INPUT]);
@@ -70,15 +41,7 @@ macro_rules! controller {
 
         /// Readings of the legs' own gauges.
         pub mod sensing {
-            use super::{Constants, Real};
-
-            pub use super::gauges::{CONVERTER, GAUGE, LEG_SETPOINT};
-
-            /// Word of each gauge (rows) per displacement of each leg (columns).
-            #[must_use]
-            pub fn words_per_leg(raw: &[Real; 6]) -> [[Real; 6]; 6] {
-                $crate::legs::sensing::words_per_leg(Constants, raw)
-            }
+            pub use super::gauges::{CONVERTER, LEG_SETPOINT, RAW_LIMITS};
         }
 
         $crate::controller!(@both legs, false, [0, false]);
@@ -90,7 +53,7 @@ macro_rules! controller {
         pub use $crate::$law::tick::PLACE_WORDS;
 
         /// What may change while running.
-        pub type Config = $crate::$law::Config<Constants>;
+        pub type Config = $crate::Config<Constants>;
         /// What the controller remembers from tick to tick.
         pub type State = $crate::$law::State<Constants>;
         /// State of one leg.
@@ -98,7 +61,7 @@ macro_rules! controller {
         /// What a tick reads.
         pub type TickInput = $crate::$law::TickInput<Constants>;
         /// What a tick yields.
-        pub type TickOutput = $crate::$law::TickOutput<Constants>;
+        pub type TickOutput = $crate::TickOutput<Constants>;
 
         /// Words of the settings.
         pub const CONFIG_WORDS: usize = permitted::WORDS;
@@ -127,9 +90,7 @@ macro_rules! controller {
             type ConfigWords = [u64; CONFIG_WORDS];
             type CommandWords = [u64; COMMAND_WORDS];
             type InputWords = [u64; INPUT_WORDS];
-            type OutputWords = [u64; OUTPUT_WORDS];
             type MachineInputWords = [u64; supervised::MACHINE_INPUT_WORDS];
-            type MachineOutputWords = [u64; supervised::MACHINE_OUTPUT_WORDS];
             type MachineWords = [u64; snapshot::MACHINE_STATE_WORDS];
         }
 
@@ -141,13 +102,21 @@ macro_rules! controller {
 
         /// One control tick. See `step` of the law for the timing.
         pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
-            $crate::$law::step(Constants, config, state, input)
+            $crate::supervise::step(Constants, config, state, input)
         }
 
         /// Words in the order of [`OUTPUT_NAMES`], of a tick and of the state that it left.
         #[must_use]
         pub fn output_words(output: &TickOutput, state: &State) -> [u64; OUTPUT_WORDS] {
-            $crate::$law::tick::output_words(output, state)
+            let mut words = [0; OUTPUT_WORDS];
+            $crate::$law::tick::write_output(Constants, output, state, &mut words);
+            words
+        }
+
+        /// Word of each gauge (rows) per displacement of each leg (columns) near these words, per m.
+        #[must_use]
+        pub fn words_per_leg(gauges: &[Real; 6]) -> [[Real; 6]; 6] {
+            <<Constants as $crate::Spec>::Law as $crate::ControlLaw<Constants>>::words_per_leg(Constants, gauges)
         }
 
         /// Where the platform is, see `place_words` of the law.
@@ -209,7 +178,9 @@ macro_rules! controller {
             /// Words in the order of [`MACHINE_OUTPUT_NAMES`], of a tick and of the machine that it left.
             #[must_use]
             pub fn machine_output_words(output: &MachineOutput, machine: &Machine) -> [u64; MACHINE_OUTPUT_WORDS] {
-                $crate::machine_output_words(output, machine)
+                let mut words = [0; MACHINE_OUTPUT_WORDS];
+                $crate::write_machine_output(Constants, output, machine, &mut words);
+                words
             }
 
             /// One supervised tick.
@@ -318,37 +289,6 @@ macro_rules! controller {
             }
         }
 
-        /// Leg kinematics in difference form: leg displacements from rest, and the pose that has them.
-        pub mod kinematics {
-            use super::{Constants, LEGS, Real};
-
-            pub use super::geometry::{GEOMETRY, INVERSE_JACOBIAN, SERIES};
-
-            /// Δl of each leg at a pose from rest, m, see `leg_displacements` of the law.
-            #[inline]
-            #[must_use]
-            pub fn leg_displacements(pose: &[Real; 6]) -> [Real; LEGS] {
-                $crate::kinematics::leg_displacements(Constants, pose)
-            }
-
-            /// The pose at which the legs have these displacements, m.
-            #[inline]
-            #[must_use]
-            pub fn pose_from_legs(displacements: &[Real; LEGS]) -> [Real; 6] {
-                $crate::kinematics::pose_from_legs(Constants, displacements)
-            }
-        }
-
-        /// Inverse dynamics: motion of the platform to leg forces and leg displacements.
-        ///
-        /// Poses are from rest, [x y z θx θy θz] in m and rad; rates and accelerations are their time derivatives. The model and its range
-        /// are in `specgen_runtime::dynamics`: angles up to π/4 and leg lengths within ±30 %; the controller accepts poses of the declared
-        /// workspace only.
-        pub mod dynamics {
-            pub use super::body::PLATFORM;
-            pub use $crate::specgen_runtime::{Load, Motion};
-        }
-
         /// A wave in place of the host's set-points.
         pub mod waves {
             pub use $crate::$law::waves::{limits, may_begin, rest, write};
@@ -359,9 +299,10 @@ macro_rules! controller {
 
         /// A pass of a motion that repeats.
         pub mod passes {
-            use super::{COMMAND_WORDS, Real};
+            use super::{COMMAND_WORDS, Constants, Real, State};
+            use $crate::ControlLaw as _;
 
-            pub use $crate::$law::passes::{begin, shown, write};
+            pub use $crate::platform::passes::{begin, write};
 
             /// Whether this controller takes a correction, which passes are for.
             pub const POSSIBLE: bool = $corrects;
@@ -369,12 +310,18 @@ macro_rules! controller {
             /// Whether a pass may begin with the next tick, see `may_begin` of the law.
             #[must_use]
             pub fn may_begin(status: u32, words: &[u64]) -> bool {
-                POSSIBLE && $crate::$law::passes::may_begin(status, words)
+                POSSIBLE && $crate::platform::passes::may_begin(status, words)
+            }
+
+            /// What a tick shows: h_d for its end, and h at its beginning, m and rad.
+            #[must_use]
+            pub fn shown(state: &State) -> Option<[[Real; 6]; 2]> {
+                <Constants as $crate::Spec>::Law::shown(state)
             }
 
             /// Writes that nothing is corrected.
             pub fn end(words: &mut [u64; COMMAND_WORDS]) {
-                $crate::$law::passes::end::<Real>(words);
+                $crate::platform::passes::end::<Real>(words);
             }
         }
 

@@ -2,13 +2,6 @@
 
 use crate::spec::{LEGS, Spec};
 
-/// Every component is finite and within the declared workspace.
-#[inline]
-#[must_use]
-pub fn pose_is_accepted<P: Spec>(p: P, pose: &[P::Real; 6]) -> bool {
-    pose.iter().zip(p.pose_bound()).all(|(value, bound)| (-*bound..=*bound).contains(value))
-}
-
 /// Δl_i = |P₀ + t + R P_i − B_i| − l₀ of each leg, m, positive when it gets longer.
 ///
 /// `pose` is [x y z θx θy θz] from rest: translation t of P_C in {B} (m) and rotation R = Rz(θz) Ry(θy) Rx(θx) about

@@ -3,8 +3,6 @@
 mod config;
 mod constants;
 mod lead;
-pub mod passes;
-pub mod sensing;
 pub mod stages;
 mod state;
 pub mod step;
@@ -12,9 +10,9 @@ mod supervised;
 pub mod tick;
 pub mod waves;
 
-pub use config::{Config, Settings};
+pub use config::Settings;
 pub use constants::{LegSpace, SixLegs};
 pub use lead::{DeadTimeLead, Lead};
 pub use state::{LegState, State};
-pub use step::{actuate, step};
-pub use tick::{TickInput, TickOutput};
+pub use step::actuate;
+pub use tick::TickInput;

@@ -28,9 +28,12 @@ pub mod status;
 pub mod supervise;
 pub mod words;
 
-pub use machine::{Machine, MachineInput, MachineOutput, followed_by, machine_output_words};
+pub use machine::{MachineInput, MachineOutput, followed_by, write_machine_output};
 pub use memory::LegMemory;
-pub use spec::{Compiled, ConfigError, ConfigOf, ControlLaw, InputOf, LEGS, OutputOf, Reset, Spec, StateOf};
+pub use spec::{
+    Compiled, Config, ConfigError, ControlLaw, Input, InputOf, LEGS, Machine, Reset, Settings, SettingsOf, Spec,
+    StateOf, TickOutput,
+};
 #[doc(hidden)]
 pub use specgen_runtime;
 pub use stage::Stage;

@@ -1,34 +1,9 @@
-//! A machine, the control law under its supervisor: what is remembered, read and given out, and inputs and outputs as 64-bit words:
-//! those of the law, and what the supervisor adds.
+//! A machine, the control law under its supervisor: what is read and given out, and both as 64-bit words: those of the law, and what the
+//! supervisor adds.
 
-use specgen_runtime::supervisor::{Cause, Phase, Request, Supervisor};
-use specgen_runtime::{Digest, Snapshot as _};
+use specgen_runtime::supervisor::{Cause, Phase, Request};
 
-use crate::spec::{Compiled, ControlLaw as _, InputOf, LEGS, OutputOf, Spec, StateOf};
-use crate::words::{WordArray as _, word};
-
-specgen_runtime::state! { |words|
-    /// Everything that is remembered from tick to tick. No NaN or infinity is ever stored here. Reset: disarmed, and the law at reset.
-    pub struct Machine<P>[P: Spec](state: StateOf<P>) {
-        /// State of the control law.
-        pub state: StateOf<P> = state, part;
-        /// Phase, cause and what the supervisor watches.
-        pub supervisor: Supervisor<P::Real> = Supervisor::new(), part;
-    }
-}
-
-impl<P: Spec> Machine<P> {
-    /// Fingerprint of everything that later ticks depend on.
-    #[must_use]
-    pub fn digest(&self) -> u64 {
-        let mut digest = Digest::new();
-        let mut state = Digest::new();
-        self.state.digest(&mut state);
-        digest.word(state.finish());
-        self.supervisor.digest(&mut digest);
-        digest.finish()
-    }
-}
+use crate::spec::{Compiled, ControlLaw as _, Input as _, InputOf, Machine, Spec, TickOutput};
 
 /// What a tick reads.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,7 +22,7 @@ pub struct MachineInput<P: Spec> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MachineOutput<P: Spec> {
     /// Codes and voltages that go out, and the status of the control law where it ran.
-    pub tick: OutputOf<P>,
+    pub tick: TickOutput<P>,
     /// What the machine does over the coming interval.
     pub phase: Phase,
     /// Why, if it was forced upon it.
@@ -71,17 +46,20 @@ impl<P: Spec> MachineOutput<P> {
     }
 }
 
+impl<P: Spec> MachineInput<P> {
+    /// From words in the order of the controller's `MACHINE_INPUT_NAMES`.
+    #[must_use]
+    pub fn read(p: P, words: &[u64]) -> Self {
+        let (law, [request, events]) = words.split_last_chunk().unwrap_or((words, &[0; 2]));
+        Self { tick: InputOf::<P>::read(p, law), request: Request::from_word(*request), events: *events as u32 }
+    }
+}
+
 impl<P: Compiled> MachineInput<P> {
     /// From words in the order of the controller's `MACHINE_INPUT_NAMES`.
     #[must_use]
     pub fn from_words(words: &P::MachineInputWords) -> Self {
-        let words = words.as_ref();
-        let law = P::InputWords::ZERO.as_ref().len();
-        Self {
-            tick: P::Law::read_input(P::CONSTANTS, words),
-            request: Request::from_word(word(words, law)),
-            events: word(words, law + 1) as u32,
-        }
+        Self::read(P::CONSTANTS, words.as_ref())
     }
 
     /// Of what a target was asked for and what it measured. One that measures no wrench gives NaN for it.
@@ -93,19 +71,16 @@ impl<P: Compiled> MachineInput<P> {
         request: Request,
         events: u32,
     ) -> Self {
-        Self { tick: P::Law::measured(P::CONSTANTS, command.as_ref(), gauge, wrench), request, events }
+        Self { tick: InputOf::<P>::measured(P::CONSTANTS, command.as_ref(), gauge, wrench), request, events }
     }
 }
 
-/// Words in the order of the controller's `MACHINE_OUTPUT_NAMES`, of a tick and of the machine that it left.
-#[must_use]
-pub fn machine_output_words<P: Compiled>(output: &MachineOutput<P>, machine: &Machine<P>) -> P::MachineOutputWords {
-    let mut words = P::MachineOutputWords::ZERO;
-    if let Some((law, last)) = words.as_mut().split_last_chunk_mut() {
-        P::Law::write_output(P::CONSTANTS, &output.tick, &machine.state, law);
+/// Writes words in the order of the controller's `MACHINE_OUTPUT_NAMES`, of a tick and of the machine that it left.
+pub fn write_machine_output<P: Spec>(p: P, output: &MachineOutput<P>, machine: &Machine<P>, words: &mut [u64]) {
+    if let Some((law, last)) = words.split_last_chunk_mut() {
+        P::Law::write_output(p, &output.tick, &machine.state, law);
         *last = [output.supervisor_word() as u64, machine.supervisor.conditions as u64];
     }
-    words
 }
 
 /// The names of the law's words, and two more.
@@ -122,13 +97,4 @@ pub const fn followed_by<const N: usize, const ALL: usize>(
     }
     all[N] = more[0];
     all
-}
-
-/// Codes by which each leg moved.
-#[cold]
-pub(crate) fn moved(before: &[i32; LEGS], mut codes: [i32; LEGS]) -> [i32; LEGS] {
-    for (code, before) in codes.iter_mut().zip(before) {
-        *code -= *before;
-    }
-    codes
 }

@@ -11,7 +11,10 @@ pub trait LegMemory<T: Real, Table>: Copy + Debug + Snapshot {
     /// Displacement that the model gives for the drive last applied, m.
     fn displacement(&self) -> T;
     /// Whether the last inverse was the static one for want of a safe one of the rate-dependent model.
-    fn fell_back(&self) -> bool;
+    #[inline(always)]
+    fn fell_back(&self) -> bool {
+        false
+    }
     /// Whether the table reaches `displacement`, m.
     fn reaches(&self, table: &Table, displacement: T) -> bool;
     /// Applies a drive, cells; returns the displacement, m.
@@ -19,28 +22,33 @@ pub trait LegMemory<T: Real, Table>: Copy + Debug + Snapshot {
     /// The drive for a displacement, m.
     fn solve(&mut self, table: &Table, displacement: T) -> T;
     /// Applies the drive for a displacement that needs no search, if `permitted` lets it through; returns whether it did.
+    #[inline(always)]
     fn track(
         &mut self,
-        table: &Table,
-        last: &mut LastLine<T>,
-        displacement: T,
-        permitted: impl FnOnce(T) -> Option<T>,
-    ) -> bool;
+        _table: &Table,
+        _last: &mut LastLine<T>,
+        _displacement: T,
+        _permitted: impl FnOnce(T) -> Option<T>,
+    ) -> bool {
+        false
+    }
     /// Applies the drive that comes as near to a displacement as `permitted` lets it; returns whether the table does not reach it.
-    fn follow_within(&mut self, table: &Table, displacement: T, permitted: impl FnOnce(T) -> T) -> bool;
+    #[inline(always)]
+    fn follow_within(&mut self, table: &Table, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
+        let within = self.reaches(table, displacement);
+        let drive = permitted(self.solve(table, displacement));
+        self.apply(table, drive);
+        !within
+    }
 }
 
 macro_rules! leg_memory {
-    ($([$($declared:tt)+] $table:ty, $memory:ty;)+) => {
+    ($([$($declared:tt)+] $table:ty, $memory:ty { $($own:tt)* })+) => {
         $(
             impl<$($declared)+> LegMemory<T, $table> for $memory {
                 #[inline(always)]
                 fn displacement(&self) -> T {
                     self.displacement()
-                }
-                #[inline(always)]
-                fn fell_back(&self) -> bool {
-                    self.fell_back()
                 }
                 #[inline(always)]
                 fn reaches(&self, table: &$table, displacement: T) -> bool {
@@ -54,27 +62,34 @@ macro_rules! leg_memory {
                 fn solve(&mut self, table: &$table, displacement: T) -> T {
                     Self::solve(self, table, displacement)
                 }
-                #[inline(always)]
-                fn track(
-                    &mut self,
-                    table: &$table,
-                    last: &mut LastLine<T>,
-                    displacement: T,
-                    permitted: impl FnOnce(T) -> Option<T>,
-                ) -> bool {
-                    self.track(table, last, displacement, permitted)
-                }
-                #[inline(always)]
-                fn follow_within(&mut self, table: &$table, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
-                    self.follow_within(table, displacement, permitted)
-                }
+                $($own)*
             }
         )+
     };
 }
 
 leg_memory! {
-    [T: Real + Debug, G: Grid<T>, const CAP: usize] G, ReversalMemory<T, CAP>;
-    [T: Real + Debug, G: Grid<T>, const CAP: usize] DynamicEverett<T, G>, DynamicMemory<T, CAP>;
-    ['a, T: Real + Debug, G: Grid<T>, const CAP: usize, const K: usize] CreepEverett<'a, T, G, K>, CreepMemory<T, CAP, K>;
+    [T: Real + Debug, G: Grid<T>, const CAP: usize] G, ReversalMemory<T, CAP> {
+        #[inline(always)]
+        fn track(
+            &mut self,
+            table: &G,
+            last: &mut LastLine<T>,
+            displacement: T,
+            permitted: impl FnOnce(T) -> Option<T>,
+        ) -> bool {
+            self.track(table, last, displacement, permitted)
+        }
+        #[inline(always)]
+        fn follow_within(&mut self, table: &G, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
+            self.follow_within(table, displacement, permitted)
+        }
+    }
+    [T: Real + Debug, G: Grid<T>, const CAP: usize] DynamicEverett<T, G>, DynamicMemory<T, CAP> {
+        #[inline(always)]
+        fn fell_back(&self) -> bool {
+            self.fell_back()
+        }
+    }
+    ['a, T: Real + Debug, G: Grid<T>, const CAP: usize, const K: usize] CreepEverett<'a, T, G, K>, CreepMemory<T, CAP, K> {}
 }

@@ -3,7 +3,6 @@
 mod config;
 mod constants;
 mod notch;
-mod parts;
 pub mod passes;
 pub mod sensing;
 pub mod stages;
@@ -14,9 +13,8 @@ pub mod tick;
 pub mod triggers;
 pub mod waves;
 
-pub use config::{Config, Environment, Settings};
+pub use config::{Environment, Settings};
 pub use constants::{Platform, TaskSpace};
-pub use parts::{GaugeCalibration, ModalDamping, OutputLines, RequestCorrection};
 pub use state::{LegState, State};
-pub use step::{actuate, step};
-pub use tick::{TickInput, TickOutput};
+pub use step::actuate;
+pub use tick::TickInput;

@@ -3,8 +3,8 @@
 use specgen_runtime::recorder::{Recorder, Row};
 use specgen_runtime::snapshot::{Invalid, Piece, Reader, Snapshot, Writer};
 
-use crate::machine::{Machine, MachineInput, MachineOutput};
-use crate::spec::{Compiled, ControlLaw as _, Spec};
+use crate::machine::{MachineInput, MachineOutput};
+use crate::spec::{Compiled, ControlLaw as _, Input as _, Machine, Spec, TickOutput};
 use crate::words::WordArray as _;
 
 impl<P: Spec> Machine<P> {
@@ -44,7 +44,7 @@ impl<P: Compiled> MachineInput<P> {
     pub fn to_words(&self) -> P::MachineInputWords {
         let mut all = P::MachineInputWords::ZERO;
         let mut words = Writer::new(all.as_mut());
-        P::Law::save_input(&self.tick, &mut words);
+        self.tick.save(&mut words);
         words.word(self.request.word());
         words.word(self.events as u64);
         all
@@ -59,7 +59,7 @@ pub fn record_after<P: Compiled>(
     output: &MachineOutput<P>,
     recorder: &mut Recorder<'_>,
 ) {
-    let (codes, status) = P::Law::codes_and_status(&output.tick);
+    let TickOutput { dac_code: codes, status, .. } = output.tick;
     let row = Row { codes, status, supervisor: output.supervisor_word() };
     recorder.push(input.to_words().as_ref(), &row, || machine.digest());
 }

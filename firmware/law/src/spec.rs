@@ -1,19 +1,25 @@
 //! What every law has to know of a spec, and what the supervised tick has to know of a law.
 
+mod config;
+mod machine;
+
 use core::fmt::Debug;
 
 use specgen_runtime::snapshot::{Sizes, Writer};
-use specgen_runtime::supervisor::{Phase, Supervision, Supervisor};
+use specgen_runtime::supervisor::{Fallback, Phase, Supervision};
 use specgen_runtime::{CodeLimits, Dac, Legs, Permitted, Real, Snapshot};
 
 use crate::memory::LegMemory;
 use crate::words::WordArray;
 
+pub use config::{Config, ConfigError};
+pub use machine::Machine;
+
 /// Number of legs.
 pub const LEGS: usize = 6;
 
 /// Constants of a spec that both laws ask for, and the types of what has a size of its own.
-pub trait Spec: Copy + Debug + PartialEq {
+pub trait Spec: Copy + Debug + PartialEq + 'static {
     /// `f32` or `f64`.
     type Real: Real + Debug;
     /// The law that it runs: [`TaskSpace`](crate::platform::TaskSpace) or [`LegSpace`](crate::legs::LegSpace).
@@ -29,6 +35,8 @@ pub trait Spec: Copy + Debug + PartialEq {
     fn dac(&self) -> &Dac<Self::Real>;
     /// What the supervisor takes for a fault.
     fn supervision(&self) -> &Supervision<Self::Real>;
+    /// Lowest and highest word of each gauge that is believed.
+    fn raw_limits(&self) -> &[[Self::Real; 2]; 6];
     /// Reading of each gauge (rows) per displacement of each leg (columns) at rest.
     fn readings_per_leg(&self) -> &[[Self::Real; LEGS]; 6];
     /// Leg kinematics.
@@ -52,19 +60,15 @@ pub trait Compiled: Spec {
     /// The constants.
     const CONSTANTS: Self;
     /// The spec's settings.
-    const DEFAULTS: <Self::Law as ControlLaw<Self>>::Settings;
+    const DEFAULTS: SettingsOf<Self>;
     /// Words of the settings.
     type ConfigWords: WordArray;
     /// Words of a command.
     type CommandWords: WordArray;
     /// Words of a tick's input.
     type InputWords: WordArray;
-    /// Words of a tick's output.
-    type OutputWords: WordArray;
     /// Words of a supervised tick's input.
     type MachineInputWords: WordArray;
-    /// Words of a supervised tick's output.
-    type MachineOutputWords: WordArray;
     /// Words of a machine.
     type MachineWords: WordArray;
 }
@@ -80,116 +84,120 @@ pub struct Reset<P: Spec> {
     pub code: i32,
 }
 
+/// What a tick yields. Every number is finite. What else there is to know stands in the state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TickOutput<P: Spec> {
+    /// Voltage of each leg for the coming interval, V: exactly that of [`TickOutput::dac_code`].
+    pub voltage: [P::Real; LEGS],
+    /// Converter code of each leg.
+    pub dac_code: [i32; LEGS],
+    /// Bits of [`crate::status`].
+    pub status: u32,
+}
+
+/// What may change while running, unchecked: as the compiler writes it. [`Config`](crate::Config) holds what was checked.
+pub trait Settings<P: Spec>: Copy + Debug + PartialEq {
+    /// First word of the code limits.
+    const CODES: usize;
+    /// Voltage limits and slew limit in converter codes.
+    fn code_limits(&self) -> CodeLimits;
+    /// From words in the order of the controller's `CONFIG_NAMES`, each within its range.
+    ///
+    /// # Errors
+    /// The first word that does not go with the others.
+    fn read(p: P, words: &[u64]) -> Result<Self, ConfigError>;
+    /// Writes the words in the order of the controller's `CONFIG_NAMES`.
+    fn save(&self, words: &mut Writer<'_>);
+}
+
+/// What a tick reads.
+pub trait Input<P: Spec>: Copy + Debug + PartialEq {
+    /// From words in the order of the controller's `INPUT_NAMES`; zero beyond their end.
+    fn read(p: P, words: &[u64]) -> Self;
+    /// Of the words of a command, and of readings as a target has them. One that measures no wrench gives NaN for it.
+    fn measured(p: P, command: &[u64], gauge: &[P::Real; 6], wrench: &[P::Real; 6]) -> Self;
+    /// As words in the order of the controller's `INPUT_NAMES`.
+    fn save(&self, words: &mut Writer<'_>);
+    /// The gauges' words.
+    fn gauges(&self) -> &[P::Real; 6];
+    /// The same, to be replaced.
+    fn gauges_mut(&mut self) -> &mut [P::Real; 6];
+}
+
 /// A law that a supervisor can begin, run and suspend.
 ///
-/// Every method takes the constants, the settings, the state, the supervisor and the input of the tick, as far as it needs them, in this
+/// Every method takes the constants, the settings, the state or the machine, and the input of the tick, as far as it needs them, in this
 /// order.
-pub trait ControlLaw<P: Spec>: Sized {
+pub trait ControlLaw<P: Spec<Law = Self>>: Sized {
     /// What may change while running.
-    type Config: Copy + Debug + PartialEq;
-    /// The same, unchecked.
-    type Settings;
+    type Settings: Settings<P>;
     /// What is remembered from tick to tick.
     type State: Copy + Debug + Snapshot;
     /// What a tick reads.
-    type Input: Copy + Debug + PartialEq;
-    /// What a tick yields.
-    type Output: Copy + Debug + PartialEq;
+    type Input: Input<P>;
 
     /// The state at reset.
     fn at_reset(reset: &Reset<P>) -> Self::State;
-    /// Voltage limits and slew limit in converter codes.
-    fn code_limits(config: &Self::Config) -> CodeLimits;
     /// Codes held at the outputs.
     fn codes(state: &Self::State) -> [i32; LEGS];
-    /// The gauges' words.
-    fn readings(input: &Self::Input) -> &[P::Real; 6];
-    /// The same, to be replaced.
-    fn readings_mut(input: &mut Self::Input) -> &mut [P::Real; 6];
-    /// Gauges whose word is not believed: bit k for gauge k.
-    fn faults(p: P, readings: &[P::Real; 6]) -> u32;
+    /// Code and memory of each leg.
+    fn drives(state: &mut Self::State) -> impl Iterator<Item = (&mut i32, &mut P::Memory)>;
+    /// Readings of the gauges, m, from their words.
+    #[inline]
+    fn readings(_p: P, words: &[P::Real; 6]) -> [P::Real; 6] {
+        *words
+    }
+    /// Word of each gauge (rows) per displacement of each leg (columns) near these words, per m: for a host that stands in for gauges.
+    #[must_use]
+    fn words_per_leg(p: P, _words: &[P::Real; 6]) -> [[P::Real; 6]; 6] {
+        *p.readings_per_leg()
+    }
     /// What a gauge ought to read by the codes sent over the interval that has ended, and the set-point of the axis or leg of that number.
     fn expected_reading(p: P, state: &Self::State, channel: usize) -> (P::Real, P::Real);
+    /// Where the axis or leg of that number is, m or rad, and the correction at work on it, if it has one. `reading` is that of its gauge.
+    fn reached(state: &Self::State, channel: usize, reading: P::Real) -> (P::Real, Option<P::Real>);
 
+    /// A tick of the law, or of what it has fallen back to; its status.
+    fn advance(p: P, config: &Config<P>, state: &mut Self::State, fallback: Fallback, input: &Self::Input) -> u32;
     /// Puts the law where the machine is. No leg moves in the first tick.
-    fn enter_running(
-        p: P,
-        config: &Self::Config,
-        state: &mut Self::State,
-        supervisor: &mut Supervisor<P::Real>,
-        input: &Self::Input,
-    );
-    /// A tick of the law; its status.
-    fn run(
-        p: P,
-        config: &Self::Config,
-        state: &mut Self::State,
-        supervisor: &mut Supervisor<P::Real>,
-        input: &Self::Input,
-    ) -> u32;
-    /// The channel whose turn it is, after the law has seen the readings. Of it: what is `expected`, and its `target`.
-    fn check_tracking(
-        p: P,
-        state: &Self::State,
-        supervisor: &mut Supervisor<P::Real>,
-        input: &Self::Input,
-        channel: usize,
-        expected: [P::Real; 2],
-    );
+    fn enter_running(p: P, config: &Config<P>, machine: &mut Machine<P>, input: &Self::Input);
+    /// A tick of the law under its supervisor; its status.
+    #[inline]
+    fn run(p: P, config: &Config<P>, machine: &mut Machine<P>, input: &Self::Input) -> u32 {
+        let Machine { state, supervisor } = machine;
+        Self::advance(p, config, state, supervisor.oscillation.stage, input)
+    }
     /// Brings a motion that was under way to rest where the law is to be suspended: the status; none where nothing moves.
-    fn decelerate(
-        p: P,
-        config: &Self::Config,
-        state: &mut Self::State,
-        supervisor: &mut Supervisor<P::Real>,
-        input: &Self::Input,
-    ) -> Option<u32>;
-    /// Codes held or on their way to rest, the law suspended. Returns the status.
-    fn hold(
-        p: P,
-        config: &Self::Config,
-        state: &mut Self::State,
-        supervisor: &mut Supervisor<P::Real>,
-        input: &Self::Input,
-        channel: usize,
-        expected: P::Real,
-    ) -> u32;
+    #[inline]
+    fn decelerate(_p: P, _config: &Config<P>, _machine: &mut Machine<P>, _input: &Self::Input) -> Option<u32> {
+        None
+    }
+    /// What is still measured while codes are held or on their way to rest, the law suspended. Returns the gauges that are not believed,
+    /// bit by bit.
+    fn hold(p: P, config: &Config<P>, machine: &mut Machine<P>, input: &Self::Input) -> u32;
     /// Output lines over the coming interval, as bits of the status. They are low unless the law runs.
+    #[inline]
     fn fire_triggers(
-        p: P,
-        config: &Self::Config,
-        state: &mut Self::State,
-        phase: Phase,
-        input: &Self::Input,
-        status: u32,
-    ) -> u32;
-    /// What goes out, of the state that the tick left.
-    fn outputs(p: P, state: &Self::State, status: u32) -> Self::Output;
-
-    /// A tick's input from its words; zero where there are none.
-    fn read_input(p: P, words: &[u64]) -> Self::Input;
-    /// The same of a command's words, and of readings as a target has them. One that measures no wrench gives NaN for it.
-    fn measured(p: P, command: &[u64], gauge: &[P::Real; 6], wrench: &[P::Real; 6]) -> Self::Input;
-    /// A tick's input as words.
-    fn save_input(input: &Self::Input, words: &mut Writer<'_>);
-    /// A tick's output as words, and what of the state that it left is shown.
-    fn write_output(p: P, output: &Self::Output, state: &Self::State, words: &mut [u64]);
-    /// Codes that go out, and the status.
-    fn codes_and_status(output: &Self::Output) -> ([i32; LEGS], u32);
+        _config: &Config<P>,
+        _state: &mut Self::State,
+        _phase: Phase,
+        _input: &Self::Input,
+        _status: u32,
+    ) -> u32 {
+        0
+    }
+    /// h_d for the end of a tick, and h at its beginning, m and rad, where passes of a motion are learned from them.
+    #[must_use]
+    fn shown(_state: &Self::State) -> Option<[[P::Real; 6]; 2]> {
+        None
+    }
+    /// A tick's output as words in the order of the controller's `OUTPUT_NAMES`, and what of the state that it left is shown.
+    fn write_output(p: P, output: &TickOutput<P>, state: &Self::State, words: &mut [u64]);
 }
 
 /// Settings of a spec's law.
-pub type ConfigOf<P> = <<P as Spec>::Law as ControlLaw<P>>::Config;
+pub type SettingsOf<P> = <<P as Spec>::Law as ControlLaw<P>>::Settings;
 /// State of a spec's law.
 pub type StateOf<P> = <<P as Spec>::Law as ControlLaw<P>>::State;
 /// What a tick of a spec's law reads.
 pub type InputOf<P> = <<P as Spec>::Law as ControlLaw<P>>::Input;
-/// What a tick of a spec's law yields.
-pub type OutputOf<P> = <<P as Spec>::Law as ControlLaw<P>>::Output;
-
-/// A value that a `Config` cannot hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ConfigError {
-    /// The word that is out of range, of those named by the controller's `CONFIG_NAMES`.
-    pub word: usize,
-}

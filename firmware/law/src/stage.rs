@@ -1,6 +1,6 @@
 //! What a measurable part of the tick is.
 
-use crate::spec::{ConfigOf, InputOf, Spec, StateOf};
+use crate::spec::{Config, InputOf, Spec, StateOf};
 
 /// A part of the tick. `run` gets a copy of the state and leaves its result there.
 #[derive(Debug, Clone, Copy)]
@@ -10,5 +10,34 @@ pub struct Stage<P: Spec> {
     /// How often a tick runs it: once, or once for each leg with the number of the leg.
     pub calls: usize,
     /// The part itself.
-    pub run: extern "C" fn(&ConfigOf<P>, &mut StateOf<P>, &InputOf<P>, usize),
+    pub run: extern "C" fn(&Config<P>, &mut StateOf<P>, &InputOf<P>, usize),
 }
+
+/// The stages of a law, in the order of the tick: name, how often a tick runs it, and what it does, a function of that name.
+macro_rules! stages {
+    ($kind:ident, |$p:ident, $config:ident, $state:ident, $input:ident, $leg:ident|
+     $($(#[$about:meta])* $name:ident, $calls:expr => $run:block)+) => {
+        /// Number of stages.
+        pub const STAGE_COUNT: usize = [$($calls),+].len();
+
+        /// All stages, in the order of the tick.
+        #[must_use]
+        pub const fn stages<P: $kind + Compiled>() -> [Stage<P>; STAGE_COUNT] {
+            [$(Stage { name: stringify!($name), calls: $calls, run: $name::<P> }),+]
+        }
+
+        $(
+            $(#[$about])*
+            extern "C" fn $name<P: $kind + Compiled>(
+                $config: &Config<P>,
+                $state: &mut State<P>,
+                $input: &TickInput<P>,
+                $leg: usize,
+            ) {
+                let ($p, _) = (P::CONSTANTS, ($config, $input, $leg));
+                $run
+            }
+        )+
+    };
+}
+pub(crate) use stages;

@@ -1,11 +1,28 @@
-//! The control law under its supervisor: what every target calls.
+//! A tick of the control law: alone, and under its supervisor, which is what every target calls.
 
-use specgen_runtime::supervisor::{Phase, Supervisor, toward};
+use specgen_runtime::linear::{component, each};
+use specgen_runtime::sensing::faults;
+use specgen_runtime::supervisor::{Fallback, Phase, Sample, Supervisor, toward};
 
-use crate::machine::{Machine, MachineInput, MachineOutput, moved};
+use crate::machine::{MachineInput, MachineOutput};
 use crate::memory::LegMemory as _;
-use crate::spec::{ConfigOf, ControlLaw as _, InputOf, Spec, StateOf};
+use crate::spec::{
+    Config, ControlLaw as _, Input as _, InputOf, LEGS, Machine, Settings as _, Spec, StateOf, TickOutput,
+};
 use crate::status::{GAUGE_FAULT, LEG_LIMITED};
+
+/// One tick of the law alone. See the module of the law's step for the timing.
+pub fn step<P: Spec>(p: P, config: &Config<P>, state: &mut StateOf<P>, input: &InputOf<P>) -> TickOutput<P> {
+    let status = P::Law::advance(p, config, state, Fallback::None, input);
+    outputs(p, state, status)
+}
+
+/// What goes out, of the state that a tick left.
+#[inline]
+fn outputs<P: Spec>(p: P, state: &StateOf<P>, status: u32) -> TickOutput<P> {
+    let dac_code = P::Law::codes(state);
+    TickOutput { voltage: each(|leg| p.dac().voltage(dac_code[leg])), dac_code, status }
+}
 
 /// One supervised tick.
 ///
@@ -14,42 +31,43 @@ use crate::status::{GAUGE_FAULT, LEG_LIMITED};
 #[inline]
 pub fn supervise<P: Spec>(
     p: P,
-    config: &ConfigOf<P>,
+    config: &Config<P>,
     machine: &mut Machine<P>,
     input: &MachineInput<P>,
 ) -> MachineOutput<P> {
-    let Machine { state, supervisor } = machine;
     let sifted;
-    let input = if supervisor.accepts(p.supervision(), P::Law::readings(&input.tick)) {
+    let input = if machine.supervisor.accepts(p.supervision(), input.tick.gauges()) {
         input
     } else {
-        sifted = sift(p, supervisor, input);
+        sifted = sift(p, &mut machine.supervisor, input);
         &sifted
     };
+    let Machine { state, supervisor } = machine;
     let at_rest =
         supervisor.phase != Phase::Running && P::Law::codes(state).iter().all(|code| *code == p.supervision().rest);
     let enters = supervisor.decide(p.supervision(), input.request, input.events, at_rest);
     if enters {
-        P::Law::enter_running(p, config, state, supervisor, &input.tick);
+        P::Law::enter_running(p, config, machine, &input.tick);
     }
-    let channel = supervisor.watch.take_turn();
-    let (expected, target) = P::Law::expected_reading(p, state, channel);
-    let (phase, cause) = (supervisor.phase, supervisor.cause);
+    let channel = machine.supervisor.watch.take_turn();
+    let (expected, target) = P::Law::expected_reading(p, &machine.state, channel);
+    let (phase, cause) = (machine.supervisor.phase, machine.supervisor.cause);
     let status = if phase == Phase::Running {
-        run(p, config, state, supervisor, &input.tick, channel, [expected, target])
-    } else if let Some(status) = P::Law::decelerate(p, config, state, supervisor, &input.tick) {
+        run(p, config, machine, &input.tick, channel, [expected, target])
+    } else if let Some(status) = P::Law::decelerate(p, config, machine, &input.tick) {
         status
     } else {
-        P::Law::hold(p, config, state, supervisor, &input.tick, channel, expected)
+        hold(p, config, machine, &input.tick, channel, expected)
     };
-    let lines = P::Law::fire_triggers(p, config, state, phase, &input.tick, status);
+    let Machine { state, supervisor } = machine;
+    let lines = P::Law::fire_triggers(config, state, phase, &input.tick, status);
     let status = status | lines | supervisor.sift.status();
     if status & GAUGE_FAULT != 0 {
         supervisor.sift.forget();
     }
     // Of the state and at the end: what is as large as an output is slow to move.
     let finding = supervisor.finding();
-    MachineOutput { tick: P::Law::outputs(p, state, status), phase, cause, amplifier_on: phase.is_powered(), finding }
+    MachineOutput { tick: outputs(p, state, status), phase, cause, amplifier_on: phase.is_powered(), finding }
 }
 
 /// The input with predictions in place of the words that are not believed.
@@ -57,7 +75,7 @@ pub fn supervise<P: Spec>(
 #[inline(never)]
 fn sift<P: Spec>(p: P, supervisor: &mut Supervisor<P::Real>, input: &MachineInput<P>) -> MachineInput<P> {
     let mut sifted = *input;
-    supervisor.sift(p.supervision(), P::Law::readings_mut(&mut sifted.tick), |words| P::Law::faults(p, words));
+    supervisor.sift(p.supervision(), sifted.tick.gauges_mut(), |words| faults(words, p.raw_limits()));
     sifted
 }
 
@@ -65,46 +83,81 @@ fn sift<P: Spec>(p: P, supervisor: &mut Supervisor<P::Real>, input: &MachineInpu
 #[inline]
 fn run<P: Spec>(
     p: P,
-    config: &ConfigOf<P>,
-    state: &mut StateOf<P>,
-    supervisor: &mut Supervisor<P::Real>,
+    config: &Config<P>,
+    machine: &mut Machine<P>,
     input: &InputOf<P>,
     channel: usize,
-    expected: [P::Real; 2],
+    [expected, target]: [P::Real; 2],
 ) -> u32 {
-    let before = P::Law::codes(state);
-    let status = P::Law::run(p, config, state, supervisor, input);
+    let before = P::Law::codes(&machine.state);
+    let status = P::Law::run(p, config, machine, input);
+    let Machine { state, supervisor } = machine;
     if status & GAUGE_FAULT == 0 {
-        P::Law::check_tracking(p, state, supervisor, input, channel, expected);
+        let sample = sample(p, input, channel, expected);
+        let (reached, given) = P::Law::reached(state, channel, sample.reading);
+        let error = target - reached;
+        supervisor.look(p.supervision(), channel, &Sample { error: Some(error), ..sample });
+        supervisor.follow(p.supervision(), channel, error, target, given);
     }
     if status & (GAUGE_FAULT | LEG_LIMITED) == 0 {
         supervisor.seen = 0;
     } else {
         let (faults, limited) = ((status & GAUGE_FAULT) >> 8, status & LEG_LIMITED);
         let moved = moved(&before, P::Law::codes(state));
-        supervisor.see(faults, limited, P::Law::readings(input), &moved, P::Law::code_limits(config).max_step);
+        supervisor.see(faults, limited, input.gauges(), &moved, config.code_limits().max_step);
     }
     status
 }
 
-/// Codes held, on their way to rest, or in the pulse of the wiring check; the memories follow what is really sent.
-pub(crate) fn move_codes<'a, P: Spec>(
+/// Codes held or on their way to rest, the law suspended. Returns the status.
+#[cold]
+#[inline(never)]
+fn hold<P: Spec>(
     p: P,
-    max_step: i32,
-    supervisor: &mut Supervisor<P::Real>,
-    legs: impl Iterator<Item = (&'a mut i32, &'a mut P::Memory)>,
-) where
-    P::Memory: 'a,
-{
+    config: &Config<P>,
+    machine: &mut Machine<P>,
+    input: &InputOf<P>,
+    channel: usize,
+    expected: P::Real,
+) -> u32 {
+    move_codes(p, config.code_limits().max_step, machine);
+    let faults = P::Law::hold(p, config, machine, input);
+    let supervisor = &mut machine.supervisor;
+    if faults == 0 {
+        // The codes must stand still for gauges to be compared with the model.
+        let compares = matches!(supervisor.phase, Phase::Arming | Phase::Holding);
+        if compares && !supervisor.is_checking(p.supervision()) {
+            supervisor.look(p.supervision(), channel, &sample(p, input, channel, expected));
+        }
+        let readings = P::Law::readings(p, input.gauges());
+        supervisor.check(p.supervision(), p.readings_per_leg(), &readings, config.code_limits());
+    }
+    supervisor.see(faults, 0, input.gauges(), &[0; LEGS], 1);
+    faults << 8
+}
+
+/// Codes held, on their way to rest, or in the pulse of the wiring check; the memories follow what is really sent.
+fn move_codes<P: Spec>(p: P, max_step: i32, machine: &mut Machine<P>) {
+    let Machine { state, supervisor } = machine;
     let step = supervisor.step_to_rest(p.supervision(), max_step);
-    for ((index, (code, memory)), table) in legs.enumerate().zip(p.tables()) {
+    for ((index, (code, memory)), table) in P::Law::drives(state).enumerate().zip(p.tables()) {
         *code = toward(*code, supervisor.goal(p.supervision(), index), step);
         memory.apply(table, p.dac().drive(*code));
     }
 }
 
-/// Whether gauges are compared with the model although the law does not run: the codes must stand still.
+/// Of a gauge, without an error of the law.
 #[inline]
-pub(crate) fn compares<P: Spec>(p: P, supervisor: &Supervisor<P::Real>) -> bool {
-    matches!(supervisor.phase, Phase::Arming | Phase::Holding) && !supervisor.is_checking(p.supervision())
+fn sample<P: Spec>(p: P, input: &InputOf<P>, channel: usize, expected: P::Real) -> Sample<P::Real> {
+    let reading = component(&P::Law::readings(p, input.gauges()), channel);
+    Sample { word: component(input.gauges(), channel), reading, expected, error: None }
+}
+
+/// Codes by which each leg moved.
+#[cold]
+fn moved(before: &[i32; LEGS], mut codes: [i32; LEGS]) -> [i32; LEGS] {
+    for (code, before) in codes.iter_mut().zip(before) {
+        *code -= *before;
+    }
+    codes
 }

@@ -2,7 +2,8 @@
 
 use core::fmt::Debug;
 
-use specgen_runtime::Real;
+use specgen_runtime::snapshot::Writer;
+use specgen_runtime::{CodeLimits, Real};
 
 /// `[u64; N]` of a length that a spec decides.
 pub trait WordArray: Copy + Debug + PartialEq + AsRef<[u64]> + AsMut<[u64]> {
@@ -51,4 +52,17 @@ pub(crate) fn fill<T: Real>(vector: &mut [T], words: &[u64], first: usize) {
 /// The word of that number; zero beyond the end.
 pub(crate) fn word(words: &[u64], number: usize) -> u64 {
     words.get(number).copied().unwrap_or(0)
+}
+
+/// Voltage limits and slew limit from the word `first` on.
+pub(crate) fn code_limits(words: &[u64], first: usize) -> CodeLimits {
+    let [max_step, min, max] = [0, 1, 2].map(|place| word(words, first + place) as i32);
+    CodeLimits { max_step, min, max }
+}
+
+/// Writes what [`code_limits`] reads.
+pub(crate) fn save_code_limits(&CodeLimits { max_step, min, max }: &CodeLimits, words: &mut Writer<'_>) {
+    for code in [max_step, min, max] {
+        words.word(code as u32 as u64);
+    }
 }

@@ -31,7 +31,7 @@ impl Receiver {
     #[inline]
     pub fn push(&mut self, byte: u8) -> Option<Result<(Header, &[u8]), Damage>> {
         let whole = match self.decoder.feed(byte) {
-            Ok(DecodeResult::NoData | DecodeResult::DataStart) => return None,
+            Ok(DecodeResult::NoData) => return None,
             Ok(DecodeResult::DataContinue(decoded)) => {
                 match self.body.get_mut(self.length) {
                     Some(slot) => {

@@ -11,39 +11,60 @@ Runs the controller in real time on this PC.
 Usage: rt-pc [OPTIONS]
 
 Machine
-  --sim NAME           the machine that `specgen plant SPEC --name NAME` simulates (default: NAME is `plant`)
-  --comedi DEVICE      a data acquisition card such as /dev/comedi0; needs a build with `--features comedi`
-  --comedi-out DEVICE  a card of the amplifiers, once for each in order (default: that of the gauges)
-  --comedi-range LOW:HIGH       voltages that the range of a gauge's input must hold (default -10:10)
-  --comedi-out-range LOW:HIGH   voltages that the range of an amplifier's output must hold (default -10:10)
-  --assumed-ok         with --comedi: the machine may rest on what nobody measured: assumed values of the spec, simulated records
-  --comedi-library FILE         another libcomedi than the system's
-  --sim-timeout MS     how long a reading of the simulated machine may take before it counts as broken (default 20)
-  --sim-edge-every S   the input line of the simulated machine rises every S seconds (default: never)
+  --sim NAME           the machine that `specgen plant SPEC --name NAME`
+                       simulates (default: NAME is `plant`)
+  --comedi DEVICE      a data acquisition card such as /dev/comedi0; needs a
+                       build with `--features comedi`
+  --comedi-out DEVICE  a card of the amplifiers, once for each in order
+                       (default: that of the gauges)
+  --comedi-range LOW:HIGH
+                       voltages that the range of a gauge's input must hold
+                       (default -10:10)
+  --comedi-out-range LOW:HIGH
+                       voltages that the range of an amplifier's output must
+                       hold (default -10:10)
+  --assumed-ok         with --comedi: the machine may rest on what nobody
+                       measured: assumed values of the spec, simulated records
+  --comedi-library FILE
+                       another libcomedi than the system's
+  --sim-timeout MS     how long a reading of the simulated machine may take
+                       before it counts as broken (default 20)
+  --sim-edge-every S   the input line of the simulated machine rises every S
+                       seconds (default: never)
 
 Time
   --seconds S          ramp down and end after S seconds (default: at a signal)
-  --late-after SHARE   outputs later than this share of the period count as late (default 0.5)
+  --late-after SHARE   outputs later than this share of the period count as late
+                       (default 0.5)
   --priority P         SCHED_FIFO priority, 1 to 99 (default 80)
-  --elastic            with --sim: a late tick moves the next ones, none is skipped, for PCs that cannot keep the period
+  --elastic            with --sim: a late tick moves the next ones, none is
+                       skipped, for PCs that cannot keep the period
   --cpu N              keep the loop on processor N (default: not pinned)
-  --allow-no-rt        run without the rights for real time, after saying which are missing
+  --allow-no-rt        run without the rights for real time, after saying which
+                       are missing
 
 Operation
   --arm                arm and run at once; else wait for a host over the link
-  --set NAME=VALUE     once running, set an input word, such as command=3 or setpoint[2]=1e-6; implies --arm
+  --set NAME=VALUE     once running, set an input word, such as command=3 or
+                       setpoint[2]=1e-6; implies --arm
   --config NAME=VALUE  a setting for this run, such as mode=6
-  --link PATH          answer the link protocol of boards, for `specgen operate --socket PATH`
-  --link-silence MS    a host that ordered something over the link and is silent for so long is lost (default: host_lost of the spec)
-  --link-idle S        a host that ordered nothing for so long loses the orders to the next that does (default 60)
+  --link PATH          answer the link protocol of boards, for
+                       `specgen operate --socket PATH`
+  --link-silence MS    a host that ordered something over the link and is silent
+                       for so long is lost (default: host_lost of the spec)
+  --link-idle S        a host that ordered nothing for so long loses the orders
+                       to the next that does (default 60)
   --record FILE        write every tick of the run to FILE, for `specgen replay`
-  --capture FILE       write what the recorder kept around a fault, or a trigger over the link, to FILE
+  --capture FILE       write what the recorder kept around a fault, or a trigger
+                       over the link, to FILE
   --json               print the summary as JSON
   --help, --version
 
-SIGINT or SIGTERM ramps down and ends; a second one ends at once with the amplifiers off.
-Exit codes: 0 good, 1 the machine faulted or held for a cause, a record is not whole, the book does not balance or a card would be
-driven on assumptions, 2 usage, 3 environment.
+SIGINT or SIGTERM ramps down and ends; a second one ends at once with the
+amplifiers off.
+Exit codes: 0 good, 1 the machine faulted or held for a cause, a record is not
+whole, the book does not balance or a card would be driven on assumptions,
+2 usage, 3 environment.
 ";
 
 /// What the controller runs on.
@@ -236,6 +257,8 @@ mod tests {
             assert!(error.contains(expected) && error.ends_with("see rt-pc --help"), "{line}: {error}");
         }
         assert!(matches!(parsed("--help"), Ok(Asked::Text(text)) if text == HELP));
+        let wide: Vec<&str> = HELP.lines().filter(|line| line.chars().count() > 80).collect();
+        assert!(wide.is_empty(), "{wide:#?}");
     }
 
     fn run(line: &str) -> Options {

@@ -213,7 +213,7 @@ impl Server {
         self.mapping.words().wait(seen, look, timeout)
     }
 
-    /// Whether the memory was taken away: somebody made the file shorter. Nothing is heard of a controller any more.
+    /// Whether the memory is lost: the file was made shorter, or its mark overwritten. Nothing is heard of a controller any more.
     #[must_use]
     pub fn is_lost(&self) -> bool {
         self.mapping.words().magic.load(Ordering::Acquire) != MAGIC

@@ -7,7 +7,10 @@
 //! It is no set-point: the error (7) is still that of h_d, and the innovation does not see it. What is not a number asks for none; what is
 //! larger or faster than it may be is followed as far as the limits let it, so that it fades in and out without a bump.
 
+use core::fmt::Debug;
+
 use crate::real::{Real, saturate};
+use crate::snapshot::Snapshot;
 
 /// How far and how fast the correction of an axis goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,10 +30,40 @@ crate::state! { |words|
     }
 }
 
-impl<T: Real, const N: usize> Correction<T, N> {
-    /// One tick: follows what is `wanted` as far as the limits let it. Returns whether they held any axis back.
+/// Correction of the request on six axes, or on none.
+pub trait RequestCorrection<T: Real>: Copy + Debug + Snapshot {
+    /// How far and how fast that of each axis goes.
+    type Limits;
+    /// What is wanted of each axis.
+    type Wanted: Copy + Debug + PartialEq + AsRef<[T]> + AsMut<[T]>;
+    /// Nothing corrected.
+    const REST: Self;
+    /// From now on nothing is corrected.
+    #[inline(always)]
+    fn rest(&mut self) {
+        *self = Self::REST;
+    }
+    /// Nothing wanted of as many axes as have limits.
+    fn nothing(limits: &Self::Limits) -> Self::Wanted;
+    /// One tick: follows what is wanted as far as the limits let it. Returns whether they held any axis back.
+    fn follow(&mut self, limits: &Self::Limits, wanted: &Self::Wanted) -> bool;
+    /// c as a pose; none where there is none.
+    #[must_use]
+    fn pose(&self) -> Option<[T; 6]>;
+}
+
+impl<T: Real + Debug, const N: usize> RequestCorrection<T> for Correction<T, N> {
+    type Limits = [CorrectionLimit<T>; N];
+    type Wanted = [T; N];
+    const REST: Self = Self::new();
+
+    #[inline(always)]
+    fn nothing(_limits: &Self::Limits) -> [T; N] {
+        [T::ZERO; N]
+    }
+
     #[inline]
-    pub fn follow(&mut self, limits: &[CorrectionLimit<T>; N], wanted: &[T; N]) -> bool {
+    fn follow(&mut self, limits: &[CorrectionLimit<T>; N], wanted: &[T; N]) -> bool {
         let mut held_back = false;
         for ((limit, wanted), given) in limits.iter().zip(wanted).zip(&mut self.given) {
             let (low, high) = (*given - limit.step, *given + limit.step);
@@ -50,10 +83,8 @@ impl<T: Real, const N: usize> Correction<T, N> {
         held_back
     }
 
-    /// c as a pose; none where there is none.
     #[inline]
-    #[must_use]
-    pub fn pose(&self) -> Option<[T; 6]> {
+    fn pose(&self) -> Option<[T; 6]> {
         self.given.first_chunk().copied()
     }
 }

@@ -12,7 +12,7 @@
 //! Each state is a mean of past f with positive weights, so it stays within the reach of the table whatever is demanded.
 
 use crate::crc::Crc32;
-use crate::everett::{Grid, LastLine};
+use crate::everett::Grid;
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
 
@@ -116,39 +116,6 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
     pub fn reaches<G: Grid<T>>(&self, table: &CreepEverett<'_, T, G, K>, displacement: T) -> bool {
         let still = self.still_part(table, displacement);
         still >= T::ZERO && still <= table.still.full_displacement()
-    }
-
-    /// Whether another inverse was used than the one asked for: never, there is only one.
-    #[inline]
-    #[must_use]
-    pub const fn fell_back(&self) -> bool {
-        false
-    }
-
-    /// The short way of [`ReversalMemory::track`](crate::ReversalMemory::track): there is none, and nothing has changed.
-    #[inline]
-    pub fn track<G: Grid<T>>(
-        &mut self,
-        _table: &CreepEverett<'_, T, G, K>,
-        _last: &mut LastLine<T>,
-        _displacement: T,
-        _permitted: impl FnOnce(T) -> Option<T>,
-    ) -> bool {
-        false
-    }
-
-    /// One tick that ends as near to `displacement` (m, finite) as `permitted` lets its drive; returns whether it is out of reach.
-    #[inline]
-    pub fn follow_within<G: Grid<T>>(
-        &mut self,
-        table: &CreepEverett<'_, T, G, K>,
-        displacement: T,
-        permitted: impl FnOnce(T) -> T,
-    ) -> bool {
-        let within = self.reaches(table, displacement);
-        let drive = permitted(self.solve(table, displacement));
-        self.apply(table, drive);
-        !within
     }
 
     /// f: what the static model must give for `displacement` at the end of the next tick, m; not limited.

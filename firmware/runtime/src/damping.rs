@@ -7,7 +7,10 @@
 //! feedback of (7), as V⁻¹J⁻¹ of it. Near the mode D turns the phase that amplifier and sampling take, so that d is against the
 //! velocity of the platform. Like k_v it is known to the model of the innovation, which does not see it.
 
+use core::fmt::Debug;
+
 use crate::real::Real;
+use crate::snapshot::Snapshot;
 
 /// D of a mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,10 +31,30 @@ crate::state! { |words|
     }
 }
 
-impl<T: Real, const N: usize> Damping<T, N> {
+/// Active damping of six modes, or of none: what it remembers.
+pub trait ModalDamping<T: Real>: Copy + Debug + Snapshot {
+    /// A section for each mode.
+    type Sections;
+    /// Nothing asked for.
+    const REST: Self;
+    /// From now on nothing is asked for.
+    #[inline(always)]
+    fn rest(&mut self) {
+        *self = Self::REST;
+    }
     /// One tick: the error of each mode to what is asked for against it.
+    fn act(&mut self, sections: &Self::Sections, error: &[T; 6]);
+    /// `wanted` and what is asked for against the modes.
+    #[must_use]
+    fn beside(&self, wanted: [T; 6]) -> [T; 6];
+}
+
+impl<T: Real + Debug, const N: usize> ModalDamping<T> for Damping<T, N> {
+    type Sections = [Resonator<T>; N];
+    const REST: Self = Self::new();
+
     #[inline]
-    pub fn act(&mut self, sections: &[Resonator<T>; N], error: &[T; 6]) {
+    fn act(&mut self, sections: &[Resonator<T>; N], error: &[T; 6]) {
         let states = self.asked.iter_mut().zip(&mut self.delays);
         for ((section, error), (asked, [first, second])) in sections.iter().zip(error).zip(states) {
             // Transposed direct form II.
@@ -42,10 +65,8 @@ impl<T: Real, const N: usize> Damping<T, N> {
         }
     }
 
-    /// `wanted` and what is asked for against the modes.
     #[inline]
-    #[must_use]
-    pub fn beside(&self, wanted: [T; 6]) -> [T; 6] {
+    fn beside(&self, wanted: [T; 6]) -> [T; 6] {
         let mut sum = wanted;
         for (sum, asked) in sum.iter_mut().zip(&self.asked) {
             *sum = *sum + *asked;

@@ -13,7 +13,7 @@
 //! - the rate term takes away more than half of what Γ₀ gains since the last tick. On a straight branch of slope f' the inverse
 //!   is u ← (q + Γ₁ u_last)/(f' + Γ₁), and grows from tick to tick if Γ₁ < −f'/2.
 
-use crate::everett::{Grid, LastLine};
+use crate::everett::Grid;
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
 
@@ -130,32 +130,6 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         let found = self.invert(table, wanted - self.memory.displacement(), still);
         self.fell_back = found.is_none();
         found.unwrap_or(still)
-    }
-
-    /// The short way of [`ReversalMemory::track`](crate::ReversalMemory::track): there is none, and nothing has changed.
-    #[inline]
-    pub fn track<G: Grid<T>>(
-        &mut self,
-        _table: &DynamicEverett<T, G>,
-        _last: &mut LastLine<T>,
-        _displacement: T,
-        _permitted: impl FnOnce(T) -> Option<T>,
-    ) -> bool {
-        false
-    }
-
-    /// One tick that ends as near to `displacement` (m, finite) as `permitted` lets its drive; returns whether it is out of reach.
-    #[inline]
-    pub fn follow_within<G: Grid<T>>(
-        &mut self,
-        table: &DynamicEverett<T, G>,
-        displacement: T,
-        permitted: impl FnOnce(T) -> T,
-    ) -> bool {
-        let within = self.reaches(table, displacement);
-        let drive = permitted(self.solve(table, displacement));
-        self.apply(table, drive);
-        !within
     }
 
     /// The drive at which h exceeds Γ₀ at the last drive by `wanted` (m); `still` is that of the static model.

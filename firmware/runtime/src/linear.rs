@@ -40,3 +40,10 @@ pub fn component<T: Real>(vector: &[T; 6], index: usize) -> T {
         None => T::ZERO,
     }
 }
+
+/// Every value is finite and of a magnitude up to its bound.
+#[inline]
+#[must_use]
+pub fn is_within<T: Real>(values: &[T; 6], bounds: &[T; 6]) -> bool {
+    values.iter().zip(bounds).all(|(value, bound)| (-*bound..=*bound).contains(value))
+}

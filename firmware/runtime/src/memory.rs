@@ -169,13 +169,6 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         displacement >= T::ZERO && displacement <= table.full_displacement()
     }
 
-    /// Whether another inverse than the static one was asked for and not used: never, there is no other.
-    #[inline]
-    #[must_use]
-    pub const fn fell_back(&self) -> bool {
-        false
-    }
-
     /// [`ReversalMemory::follow`] for a displacement (m, finite) that the table may not reach; returns whether it did not.
     #[inline(always)]
     pub fn follow_within<G: Grid<T>>(&mut self, table: &G, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {

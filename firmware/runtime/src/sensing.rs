@@ -167,11 +167,16 @@ pub struct Calibration<T, const N: usize> {
     pub coefficients: [[T; N]; 6],
 }
 
-impl<T: Real, const N: usize> Calibration<T, N> {
-    /// Readings, m.
-    #[inline]
+/// What the gauges' words mean.
+pub trait GaugeCalibration<T: Real> {
+    /// Readings, m, of words.
     #[must_use]
-    pub fn readings(&self, raw: &[T; 6]) -> [T; 6] {
+    fn readings(&self, raw: &[T; 6]) -> [T; 6];
+}
+
+impl<T: Real, const N: usize> GaugeCalibration<T> for Calibration<T, N> {
+    #[inline]
+    fn readings(&self, raw: &[T; 6]) -> [T; 6] {
         each(|k| match horner(&self.coefficients[k], raw[k]) {
             Some(reading) => reading,
             None => T::ZERO,

@@ -19,6 +19,7 @@ mod stop;
 mod trajectory;
 
 use crate::choice::choice;
+use crate::linear::is_within;
 use crate::real::Real;
 
 pub use crate::motion::Motion as Target;
@@ -94,7 +95,7 @@ impl<T: Real, F> Setpoints<T, F> {
     /// Whether a pose of the platform, with the bias, is finite and within the workspace.
     #[must_use]
     pub fn reaches(&self, pose: &[T; 6]) -> bool {
-        pose.iter().zip(&self.bound).all(|(value, bound)| (-*bound..=*bound).contains(value))
+        is_within(pose, &self.bound)
     }
 }
 

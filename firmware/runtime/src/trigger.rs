@@ -18,10 +18,12 @@
 //! while it is not low, and all but one of those that are passed within a tick, give none and are counted as missed. A tick is the
 //! resolution: a position is passed in the tick whose pose is the first at or beyond it.
 
+use core::fmt::Debug;
+
 use crate::choice::choice;
 use crate::linear::component;
 use crate::real::Real;
-use crate::snapshot::LARGEST_PLACE;
+use crate::snapshot::{LARGEST_PLACE, Snapshot};
 
 /// Most output lines.
 pub const MOST: usize = 4;
@@ -306,10 +308,34 @@ impl<T: Real> Watch<T> {
     }
 }
 
-impl<T: Real, const N: usize> Triggers<T, N> {
+/// Output lines.
+pub trait OutputLines<T: Real>: Copy + Debug + Snapshot {
+    /// What each line shows.
+    type Settings: Copy + Debug + PartialEq + AsRef<[Line<T>]> + AsMut<[Line<T>]>;
+    /// All lines low.
+    const LOW: Self;
+    /// Whether there is any line.
+    fn any(&self) -> bool;
     /// One tick of a run under these settings; the lines as bits of the status: [`HIGH`], [`MISSED`].
+    fn tick(&mut self, lines: &Self::Settings, seen: &Seen<'_, T>) -> u32;
+    /// One tick outside a run: all lines are low. What was missed stays: [`MISSED`].
+    fn rest(&mut self) -> u32;
+    /// Pulses that each line has missed since its settings were given, up to [`MOST_MISSED`]: 15 bits a line, the first lowest.
+    #[must_use]
+    fn missed(&self) -> u64;
+}
+
+impl<T: Real + Debug, const N: usize> OutputLines<T> for Triggers<T, N> {
+    type Settings = [Line<T>; N];
+    const LOW: Self = Self::new();
+
+    #[inline(always)]
+    fn any(&self) -> bool {
+        N != 0
+    }
+
     #[inline]
-    pub fn tick(&mut self, lines: &[Line<T>; N], seen: &Seen<'_, T>) -> u32 {
+    fn tick(&mut self, lines: &[Line<T>; N], seen: &Seen<'_, T>) -> u32 {
         let mut status = 0;
         for (((watch, last), line), bit) in self.lines.iter_mut().zip(&mut self.sequence).zip(lines).zip(HIGH) {
             let fresh = seen.sequence != *last;
@@ -324,9 +350,8 @@ impl<T: Real, const N: usize> Triggers<T, N> {
         status
     }
 
-    /// One tick outside a run: all lines are low. What was missed stays: [`MISSED`].
     #[inline]
-    pub fn rest(&mut self) -> u32 {
+    fn rest(&mut self) -> u32 {
         let mut status = 0;
         for watch in &mut self.lines {
             watch.rest();
@@ -337,9 +362,7 @@ impl<T: Real, const N: usize> Triggers<T, N> {
         status
     }
 
-    /// Pulses that each line has missed since its settings were given, up to [`MOST_MISSED`]: 15 bits a line, the first lowest.
-    #[must_use]
-    pub fn missed(&self) -> u64 {
+    fn missed(&self) -> u64 {
         let mut word = 0;
         for (line, watch) in self.lines.iter().enumerate() {
             word |= (watch.missed as u64) << (15 * line);

@@ -15,6 +15,9 @@ mod clocks;
 mod pins;
 mod spi;
 
+/// The target that this is built for, which `specgen flash` takes from the image.
+static BOARD: [u8; 23] = *b"specgen-board: stm32f4\n";
+
 /// Words of the recorder: what the 128 KiB of RAM have besides the 24 KiB of the rest and some in reserve, 80 KiB with the knots and
 /// samples.
 const RECORD: usize = (80 * 1024 - size_of::<[[i32; 6]; PASSES]>() - size_of::<SampleMemory>()) / size_of::<u64>();

@@ -19,6 +19,9 @@ mod tightly;
 
 use tightly::is_intact as memory_intact;
 
+/// The target that this is built for, which `specgen flash` takes from the image.
+static BOARD: [u8; 25] = *b"specgen-board: stm32h743\n";
+
 /// Words of the recorder, in the AXI SRAM (512 KiB) that has only the buffers of the DMA besides: 448 KiB with the knots
 /// and samples.
 const RECORD: usize = (448 * 1024 - size_of::<[[i32; 6]; PASSES]>() - size_of::<SampleMemory>()) / size_of::<u64>();

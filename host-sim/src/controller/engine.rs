@@ -5,9 +5,6 @@ use std::any::Any;
 
 use super::ControllerError;
 
-/// Words of an analysis: J, M, C ḣ, G, leg forces, leg displacements.
-pub const ANALYSIS_WORDS: usize = 96;
-
 /// One configuration, one state of the control law, and one machine: the law under its supervisor. All numbers are words, as in the
 /// C interface of emitted libraries.
 ///
@@ -66,11 +63,6 @@ pub trait Engine: Send + Sync {
     /// then stays as it is.
     fn load_machine(&mut self, words: &[u64]) -> Result<Option<usize>, ControllerError>;
 
-    /// The dynamics at a motion.
-    ///
-    /// # Errors
-    /// If a library does not offer them.
-    fn dynamics(&self, motion: &[[u64; 6]; 3]) -> Result<[u64; ANALYSIS_WORDS], ControllerError>;
     /// Word of each gauge (rows) per displacement of each leg (columns) near these words.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! The shared library of an emitted controller; the only module with unsafe code but for one that picks instructions.
 //!
 //! The library's C interface, version 2: `specgen_abi_version`, `_describe`, `_config_default`, `_config_check`,
-//! `_config_load`, `_state_reset`, `_step`, `_state_digest`, for analysis `_dynamics`, and under the supervisor `_machine_reset`,
+//! `_config_load`, `_state_reset`, `_step`, `_state_digest`, and under the supervisor `_machine_reset`,
 //! `_machine_step`, `_machine_digest`, `_machine_save`, `_machine_load`, `_words_per_leg`.
 #![allow(unsafe_code)]
 
@@ -14,7 +14,7 @@ use std::sync::Arc;
 use libloading::{Library, Symbol};
 
 use super::ControllerError;
-use super::engine::{ANALYSIS_WORDS, Engine};
+use super::engine::Engine;
 use crate::description::{DescriptionError, fields};
 
 /// Version of the C interface that this module speaks.
@@ -36,7 +36,6 @@ type Step = unsafe extern "C" fn(*const u8, *mut u8, *const u64, *mut u64);
 type Digest = unsafe extern "C" fn(*const u8) -> u64;
 type Save = unsafe extern "C" fn(*const u8, *mut u64);
 type Load = unsafe extern "C" fn(*mut u8, *const u64) -> i32;
-type Analyse = unsafe extern "C" fn(*const u64, *mut u64);
 type WordsPerLeg = unsafe extern "C" fn(*const u64, *mut u64);
 
 /// A machine: its memory and its functions.
@@ -257,15 +256,6 @@ impl Engine for Emitted {
         let bad =
             unsafe { self.function::<Load>(b"specgen_machine_load\0")?(self.machine().memory.start(), words.as_ptr()) };
         Ok(refused(bad))
-    }
-
-    fn dynamics(&self, motion: &[[u64; 6]; 3]) -> Result<[u64; ANALYSIS_WORDS], ControllerError> {
-        let mut analysis = [0; ANALYSIS_WORDS];
-        // SAFETY: the function reads and writes as many words as there are here.
-        unsafe {
-            self.function::<Analyse>(b"specgen_dynamics\0")?(motion.as_ptr().cast(), analysis.as_mut_ptr());
-        }
-        Ok(analysis)
     }
 
     fn words_per_leg(&self, gauges: &[u64; 6]) -> Result<[[u64; 6]; 6], ControllerError> {

@@ -102,7 +102,7 @@ impl Amplifiers for Parts {
         let mut state = self.0.borrow_mut();
         assert!(codes.iter().all(|code| (CODES[0]..=CODES[1]).contains(code)), "voltage: {codes:?}");
         if let (true, Some(last)) = (state.enabled, state.written) {
-            let most = Config::new().code_limits().max_step;
+            let most = Config::new().code_limits.max_step;
             assert!(
                 codes.iter().zip(last).all(|(code, last)| (code - last).abs() <= most),
                 "slew: {last:?} to {codes:?}"

@@ -6,12 +6,26 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
+use specgen::budget::group;
+use specgen::verify::Measurement;
 use specgen_tests::{repository, skipped};
 
 /// A figure may grow by this share of the committed one, and by as much, before it is a regression.
 const GROWTH: (f64, f64) = (0.03, 2.0);
 /// Tests of one binary run at the same time.
 static FILE: Mutex<()> = Mutex::new(());
+
+/// Version of the cross compiler whose figures the pages of `docs` show.
+const SHOWN: &str = "1.95";
+
+/// What [`cost`] has.
+const COST: [&str; 5] = [
+    "instructions, step",
+    "instructions, actuate",
+    "instructions, actuate at most",
+    "bytes of State",
+    "bytes of stack",
+];
 
 /// Figures by their names, such as `instructions, step`.
 pub type Figures = BTreeMap<String, f64>;
@@ -25,6 +39,55 @@ fn path(file: &str) -> PathBuf {
 pub fn table(file: &str) -> Table {
     let text = fs::read_to_string(path(file)).unwrap_or_else(|_| "{}".to_owned());
     serde_json::from_str(&text).expect("committed figures")
+}
+
+/// A committed figure, rounded up, in words of the pages.
+pub fn figure(file: &str, name: &str, what: &str) -> String {
+    let table = table(file);
+    let figures = table.get(name).and_then(|versions| versions.get(SHOWN));
+    let value = figures.and_then(|figures| figures.get(what));
+    group(value.unwrap_or_else(|| panic!("{file}: no {what} of {name} for {SHOWN}")).ceil() as u64)
+}
+
+/// What a tick costs: mean instructions, those of a leg, mean and most; bytes of state and stack.
+pub fn cost(m: &Measurement) -> Figures {
+    let [step, leg] = ["step", "actuate"].map(|name| m.stage(name).unwrap_or_else(|| panic!("no stage {name}")));
+    let stack = m.checks.stack.expect("a bound") as f64;
+    let values = [step.mean.ceil(), leg.mean.ceil(), leg.max as f64, m.state as f64, stack];
+    COST.into_iter().map(str::to_owned).zip(values).collect()
+}
+
+/// Columns of a table of such costs.
+pub fn cost_columns(file: &str, name: &str) -> String {
+    let [step, leg, longest_leg, state, stack] = COST.map(|what| figure(file, name, what));
+    format!("{step} | {leg}, {longest_leg} | {state} | {stack}")
+}
+
+/// A page of `docs` has these rows of tables, by their first cell; with `SPECGEN_BLESS=1` in the environment they are written into it.
+pub fn shown(page: &str, rows: &[String]) {
+    let _one = FILE.lock().unwrap_or_else(PoisonError::into_inner);
+    let path = repository().join("docs").join(page);
+    let text = fs::read_to_string(&path).expect("the page");
+    let first = |line: &str| line.split('|').nth(1).map(str::to_owned);
+    let line = |line: &str| {
+        let row = rows.iter().find(|row| line.starts_with('|') && first(row) == first(line));
+        row.map_or(line, String::as_str).to_owned()
+    };
+    let lines: Vec<String> = text.lines().map(line).collect();
+    for row in rows {
+        assert_eq!(lines.iter().filter(|line| *line == row).count(), 1, "docs/{page}: no place for {row}");
+    }
+    let expected = lines.join("\n") + "\n";
+    if is_to_bless() {
+        fs::write(&path, expected).expect("the repository is writable");
+    } else {
+        let stale: Vec<_> = expected.lines().zip(text.lines()).filter(|(new, old)| new != old).collect();
+        assert!(stale.is_empty(), "docs/{page}; SPECGEN_BLESS=1 writes what is committed: {stale:#?}");
+    }
+}
+
+fn is_to_bless() -> bool {
+    std::env::var_os("SPECGEN_BLESS").is_some_and(|value| value == "1")
 }
 
 /// `1.96` of `rustc 1.96.0 (… …)`: a patch changes no code generation.
@@ -55,7 +118,7 @@ pub fn held(file: &str, name: &str, compiler: &str, found: Figures) -> Vec<Strin
     let _one = FILE.lock().unwrap_or_else(PoisonError::into_inner);
     let version = minor_version(compiler);
     let mut committed = table(file);
-    if std::env::var_os("SPECGEN_BLESS").is_some_and(|value| value == "1") {
+    if is_to_bless() {
         committed.entry(name.to_owned()).or_default().insert(version, found);
         let text = serde_json::to_string_pretty(&committed).expect("plain data") + "\n";
         fs::write(path(file), text).expect("the repository is writable");

@@ -77,7 +77,7 @@ fn broken(rule: &Rule, dir: &Path, bases: &mut Known) -> Option<String> {
 fn every_rule_has_its_boundary() {
     let dir = specgen_tests::repository().join("specs");
     let mut bases = Known::new();
-    let rules = RULES.iter().step_by(specgen_tests::length(3, 1));
+    let rules = RULES.iter().step_by(specgen_tests::length(8, 1));
     let broken: Vec<String> = rules.filter_map(|rule| broken(rule, &dir, &mut bases)).collect();
     assert!(broken.is_empty(), "{} of {}:\n{}", broken.len(), RULES.len(), broken.join("\n"));
     // No rule is left out; that of steps in a table of poses has a test of its own.

@@ -50,7 +50,7 @@ fn share_of_first(kind: &str) -> usize {
 fn slips_are_found_at_their_key() {
     let dir = specgen_tests::repository().join("specs");
     let bases: Vec<Base> =
-        BASES.iter().take(length(2, BASES.len())).map(|name| Base::of(name, spec(name), &dir)).collect();
+        BASES.iter().take(length(1, BASES.len())).map(|name| Base::of(name, spec(name), &dir)).collect();
     let tally = hit_rate(&bases, mutants::all, 20_261_121, share_of_first);
     assert!(tally.of_all() >= LEAST, "{tally:?}");
 }
@@ -126,16 +126,17 @@ fn the_comparison_knows_a_wrong_key() {
 fn plausible_platforms_are_not_refused() {
     // The second seed was never looked at while rules were made.
     for seed in [20_261_122, 7].into_iter().take(length(1, 2)) {
-        fifty_platforms(seed);
+        are_accepted(seed);
     }
 }
 
-fn fifty_platforms(seed: u64) {
+fn are_accepted(seed: u64) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut refused = String::new();
     let mut warnings: BTreeMap<String, usize> = BTreeMap::new();
-    for index in 0..50 {
+    let platforms = length(20, 50);
+    for index in 0..platforms {
         let platform = plausible::platform(&mut random, folder.path(), index);
         let (accepted, findings) = verdict(&platform, folder.path());
         let (errors, rest): (Vec<_>, Vec<_>) = findings.into_iter().partition(|one| one.severity == Severity::Error);
@@ -148,10 +149,10 @@ fn fifty_platforms(seed: u64) {
             }
         }
     }
-    println!("warnings on 50 plausible platforms of seed {seed}: {warnings:?}");
+    println!("warnings on {platforms} plausible platforms of seed {seed}: {warnings:?}");
     assert!(refused.is_empty(), "{refused}");
     // Warnings are no errors, but a lint that cries wolf is not read: at most one platform in ten for any rule of it.
     for (code, count) in warnings {
-        assert!(!code.starts_with("W08") || count <= 5, "{code}: {count} of 50");
+        assert!(!code.starts_with("W08") || 10 * count <= platforms, "{code}: {count} of {platforms}");
     }
 }

@@ -113,6 +113,7 @@ fn a_device_learns_in_its_background() {
 }
 
 #[test]
+#[ignore = "long: the proof over every machine within the intervals; an example of `specgen learn` makes it in the short run"]
 fn a_path_with_corners_is_learned_to_nanometres_in_five_passes() {
     let learned = passes(plays(), &plays().scenario(), 0, &case_1(10.0), &design(plays()), 5);
     let [first, best] = [0, learned.best].map(|pass| learned.passes[pass]);

@@ -127,18 +127,19 @@ fn predicted_limits_are_those_of_the_machine() {
     let count = length(1, 4);
     let cases = [
         ("weights, F ewma", EWMA, 0),
+        ("one more tick, P/F pcc", COMBINED, 1),
         ("weights, F pcc", PCC, 0),
         ("weights and gains, P/F pcc", COMBINED, 0),
         ("one more tick, F ewma", EWMA, 1),
-        ("one more tick, P/F pcc", COMBINED, 1),
     ];
+    let cases = &cases[..length(2, cases.len())];
     let found = in_parallel(count, |number| {
         let pair = &machines[number as usize];
         let mut rows = Vec::new();
         let benches = [("notch", (|pair| &pair.notched) as fn(&Pair) -> &Bench), ("no notch", Pair::plain)];
         for (base, of) in benches.into_iter().take(length(1, 2)) {
             let bench = of(pair);
-            for (what, law, latency) in cases {
+            for &(what, law, latency) in cases {
                 rows.push((what, base, limit(bench, law, &bench.design().combined, latency)));
             }
         }

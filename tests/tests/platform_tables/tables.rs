@@ -101,12 +101,14 @@ fn one_record_for_six_legs_gives_the_figure_of_sim() {
 #[test]
 fn tables_5_to_8_on_random_machines() {
     let machines = random_machines();
-    let tables = in_parallel(plants(), |number| free_motion(&machines[number as usize].notched, &[1.0, 10.0]));
+    // At 1 Hz on the reference machine alone in the short run.
+    let frequencies = length(&[10.0][..], &[1.0, 10.0]);
+    let tables = in_parallel(plants(), |number| free_motion(&machines[number as usize].notched, frequencies));
     let mut closest: f64 = 0.0;
     for (table, machine) in tables.iter().zip(machines) {
         let nominal = &machine.notched.specimen.nominal;
         print!("k_a {:.2e} ζ {:.3}:", nominal.axial_stiffness_n_per_m, nominal.modal_damping);
-        for (case, frequency) in [("case-1", 1.0), ("case-1", 10.0), ("case-2", 1.0), ("case-2", 10.0)] {
+        for (case, frequency) in CASES.iter().flat_map(|(case, _)| frequencies.iter().map(move |one| (case, *one))) {
             let [a, b, c] = FREE_MODES.map(|(mode, _)| translation(table, case, mode, frequency));
             print!(" {case} {frequency} Hz {a:.1} {b:.1} {c:.1} |");
         }
@@ -122,7 +124,7 @@ fn tables_5_to_8_on_random_machines() {
         println!("{case} {frequency} Hz {over}/{under}: {low:.3} to {high:.3}, median {:.3}", median(ratios.clone()));
         ratios
     };
-    for frequency in [1.0, 10.0] {
+    for &frequency in frequencies {
         let gained = ratios("case-1", frequency, "pf-invhys", "pf-ewma");
         assert!(extremes(&gained).0 >= 1.3);
         // A few machines have no median.
@@ -135,7 +137,8 @@ fn tables_5_to_8_on_random_machines() {
         ratios("case-2", frequency, "pf-invhys", "pf-ewma");
         assert!(extremes(&ratios("case-1", frequency, "f-pcc", "f-ewma")).1 < 1.0);
     }
-    for (frequency, limit) in [(1.0, 8.0), (10.0, 60.0)] {
+    for &frequency in frequencies {
+        let limit = if frequency == 1.0 { 8.0 } else { 60.0 };
         let found: Vec<f64> = tables.iter().map(|table| translation(table, "case-1", "pf-pcc", frequency)).collect();
         let (low, high) = extremes(&found);
         println!("P+PCC, case 1 at {frequency} Hz: {low:.2} to {high:.2} nm (at most {limit})");
@@ -144,6 +147,7 @@ fn tables_5_to_8_on_random_machines() {
 }
 
 #[test]
+#[ignore = "long: machining on random machines; the reference machine's is in the short run"]
 fn table_9_on_random_machines() {
     let machines = random_machines();
     let tables = in_parallel(plants(), |number| machining(&machines[number as usize].notched));

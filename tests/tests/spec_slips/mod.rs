@@ -7,6 +7,7 @@ mod set;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
+use std::sync::OnceLock;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -95,6 +96,18 @@ fn bases() -> BTreeMap<Of, Base> {
     which.into_iter().map(|of| (of, Base::of(of))).collect()
 }
 
+/// Slips, each with its text and what is found; every third of them in the short run. Two tests look at them.
+type Tried = Vec<(&'static Slip, (String, Vec<Diagnostic>))>;
+
+fn caught() -> &'static Tried {
+    static TRIED: OnceLock<Tried> = OnceLock::new();
+    TRIED.get_or_init(|| {
+        let bases = bases();
+        let some = SET.iter().step_by(specgen_tests::length(3, 1));
+        some.map(|slip| (slip, bases[&slip.of].with(slip))).collect()
+    })
+}
+
 /// Whether the finding is about one of the keys of the slip.
 fn is_at(found: &Diagnostic, slip: &Slip) -> bool {
     // A finding about a file is about the record, whatever else the spec calls it.
@@ -105,13 +118,11 @@ fn is_at(found: &Diagnostic, slip: &Slip) -> bool {
 #[test]
 fn slips_of_the_first_hour_are_found_at_the_right_key_with_a_help_that_leads_out() {
     assert!(SET.len() >= 120);
-    let bases = bases();
     let keys = SECTIONS.iter().flat_map(|section| section.keys);
     let examples: Vec<String> = keys.flat_map(help::values).filter(|value| value.starts_with('"')).collect();
     let mut counts: BTreeMap<&str, [usize; 4]> = BTreeMap::new();
     let mut missed = String::new();
-    for slip in SET {
-        let (text, found) = bases[&slip.of].with(slip);
+    for (slip, (text, found)) in caught() {
         for one in found.iter().filter(|_| matches!(slip.of, Of::Own | Of::Small)) {
             // Some follow from what is written; the reference is the other machine.
             let known = |value: &str| {
@@ -146,7 +157,8 @@ fn slips_of_the_first_hour_are_found_at_the_right_key_with_a_help_that_leads_out
     }
     println!("{:<24}{:>5}{:>8}{:>16}{:>12}\nnot right:\n{missed}", "all", sum[0], sum[1], sum[2], sum[3]);
     for (good, bar) in sum[1..].iter().zip(BARS) {
-        assert!(*good as f64 >= bar * sum[0] as f64, "{sum:?} against {BARS:?}");
+        // No more misses than all of the set may have.
+        assert!((sum[0] - good) as f64 <= (1.0 - bar) * SET.len() as f64, "{sum:?} against {BARS:?}");
     }
 }
 
@@ -226,15 +238,16 @@ fn every_fix_that_is_offered_is_accepted_by_the_next_check() {
                 }
             }
         };
-    for slip in SET {
+    for (slip, (text, found)) in caught().iter().step_by(specgen_tests::length(4, 1)) {
         let base = &bases[&slip.of];
-        let (text, found) = base.with(slip);
         let next = |text: &str| verdict(text, base.folder.path()).1;
-        (0..found.len()).for_each(|at| try_fix(&format!("{:?}", slip.edit), &found, at, &text, &next));
+        (0..found.len()).for_each(|at| try_fix(&format!("{:?}", slip.edit), found, at, text, &next));
     }
     let specs = specgen_tests::repository().join("specs");
-    for entry in fs::read_dir(specgen_tests::repository().join("tests/corpus")).unwrap() {
-        let path = entry.unwrap().path();
+    let corpus = fs::read_dir(specgen_tests::repository().join("tests/corpus")).unwrap();
+    let mut paths: Vec<_> = corpus.map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    for path in paths.into_iter().step_by(specgen_tests::length(4, 1)) {
         if path.extension().is_none_or(|extension| extension != "toml") {
             continue;
         }
@@ -245,7 +258,7 @@ fn every_fix_that_is_offered_is_accepted_by_the_next_check() {
         (0..found.len()).for_each(|at| try_fix(&name, &found, at, &text, &next));
     }
     println!("{tried} fixes tried");
-    assert!(tried > 100, "{tried}");
+    assert!(tried > specgen_tests::length(5, 100), "{tried}");
     assert!(refused.is_empty(), "{refused}");
 }
 
@@ -268,7 +281,7 @@ fn a_hundred_plausible_platforms_are_not_refused() {
     let mut refused = String::new();
     let folder = tempfile::tempdir().unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(20_261_123);
-    for index in 0..100 {
+    for index in 0..specgen_tests::length(20, 100) {
         let text = plausible::platform(&mut random, folder.path(), index);
         let (accepted, found) = verdict(&text, folder.path());
         if !accepted {

@@ -19,7 +19,7 @@ fn begins(kind: Kind, mode: f64, more: &[(&str, &str)]) -> i64 {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let mut most = 0;
     let (mut lowest, mut highest) = (i64::MAX, 0);
-    for round in 0..60 {
+    for round in 0..specgen_tests::length(20, 60) {
         let mut draw = |span: f64| (rng.next_u64() % 1_000_001) as f64 * 1e-6 * span;
         // Below the bounds of disagreement and of tracking, so that nothing is a fault.
         let offset = if kind == Kind::Legs { 2e-6 } else { 0.2e-6 };

@@ -54,6 +54,18 @@ impl Kind {
     }
 }
 
+/// Where words of a row of output are.
+#[derive(Clone, Copy)]
+struct Places {
+    requested: usize,
+    voltage: usize,
+    code: usize,
+    status: usize,
+    /// Of a platform.
+    load: Option<usize>,
+    target: Option<usize>,
+}
+
 /// One controller and its plant.
 pub struct Bench {
     pub kind: Kind,
@@ -76,6 +88,9 @@ pub struct Bench {
     max_step: i64,
     inputs: BTreeMap<String, usize>,
     outputs: BTreeMap<String, usize>,
+    /// First words of the gauges and of what every tick looks at.
+    gauges: usize,
+    at: Places,
     /// Code at rest.
     pub rest: i64,
     config: Vec<u64>,
@@ -102,6 +117,18 @@ impl Bench {
         let (inputs, outputs): (_, BTreeMap<String, usize>) =
             (places(machine.input_names()), places(machine.output_names()));
         output[outputs["dac_code[0]"]..][..6].fill(rest as u64);
+        let at = Places {
+            requested: outputs["requested[0]"],
+            voltage: outputs["voltage[0]"],
+            code: outputs["dac_code[0]"],
+            status: outputs["status"],
+            load: outputs.get("load[0]").copied(),
+            target: (kind == Kind::Platform).then(|| outputs["target[0]"]),
+        };
+        let gauges = match kind {
+            Kind::Legs => inputs["displacement[0]"],
+            Kind::Platform => inputs["gauge[0]"],
+        };
         Self {
             kind,
             scalar: description.scalar,
@@ -123,6 +150,21 @@ impl Bench {
             config,
             inputs,
             outputs,
+            gauges,
+            at,
+        }
+    }
+
+    /// Another that goes on from where this one is.
+    pub fn fork(&self) -> Self {
+        Self {
+            machine: self.machine.fork(),
+            input: self.input.clone(),
+            output: self.output.clone(),
+            config: self.config.clone(),
+            inputs: self.inputs.clone(),
+            outputs: self.outputs.clone(),
+            ..*self
         }
     }
 
@@ -144,8 +186,15 @@ impl Bench {
 
     /// Six numbers of a row of output.
     pub fn six_of(&self, row: &[u64], name: &str) -> [f64; 6] {
-        let first = self.at(&format!("{name}[0]"));
+        self.six_from(row, self.at(&format!("{name}[0]")))
+    }
+
+    fn six_from(&self, row: &[u64], first: usize) -> [f64; 6] {
         std::array::from_fn(|leg| self.scalar.decode(row[first + leg]))
+    }
+
+    fn target(&self) -> Option<[f64; 6]> {
+        self.at.target.map(|first| self.six_from(&self.output, first))
     }
 
     pub fn codes(&self) -> [i64; 6] {
@@ -154,25 +203,22 @@ impl Bench {
 
     /// Codes of a row of output.
     pub fn codes_of(&self, row: &[u64]) -> [i64; 6] {
-        let first = self.at("dac_code[0]");
-        std::array::from_fn(|leg| row[first + leg] as i64)
+        std::array::from_fn(|leg| row[self.at.code + leg] as i64)
     }
 
     /// First word of the gauges.
     pub fn gauges(&self) -> usize {
-        self.input_at(match self.kind {
-            Kind::Legs => "displacement[0]",
-            Kind::Platform => "gauge[0]",
-        })
+        self.gauges
     }
 
     /// What the gauges read of the codes last sent, by the model, with a nanometre that changes from tick to tick.
     pub fn readings(&self) -> [f64; 6] {
-        let requested = self.six("requested");
+        let requested = self.six_from(&self.output, self.at.requested);
         let plain = match &self.readings_per_leg {
             None => requested,
             Some(rows) => {
-                let load = if self.tick == 0 { [0.0; 6] } else { self.six("load") };
+                let load = self.at.load.filter(|_| self.tick > 0);
+                let load = load.map_or([0.0; 6], |first| self.six_from(&self.output, first));
                 rows.map(|row| row.iter().zip(&requested).zip(&load).map(|((g, q), p)| g * (q - p)).sum())
             }
         };
@@ -205,19 +251,17 @@ impl Bench {
     /// Steps the row as it stands and checks what must always hold.
     pub fn step(&mut self) -> MachineWord {
         let before = self.codes();
-        let target_before = (self.kind == Kind::Platform).then(|| self.six("target"));
+        let target_before = self.target();
         self.word = self.machine.step(&self.input, &mut self.output);
         self.tick += 1;
-        let codes_at = self.at("dac_code[0]")..=self.at("dac_code[5]");
-        let status = self.at("status");
-        for (place, word) in self.output.iter().enumerate().take(status) {
-            if !codes_at.contains(&place) {
+        for (place, word) in self.output.iter().enumerate().take(self.at.status) {
+            if !(self.at.code..self.at.code + 6).contains(&place) {
                 let value = self.scalar.decode(*word);
                 assert!(value.is_finite(), "tick {}: output word {place} is {value}", self.tick);
             }
         }
         for (leg, (voltage, (code, before))) in
-            self.six("voltage").iter().zip(self.codes().iter().zip(&before)).enumerate()
+            self.six_from(&self.output, self.at.voltage).iter().zip(self.codes().iter().zip(&before)).enumerate()
         {
             let [low, high] = self.limits;
             assert!((low..=high).contains(voltage), "tick {}: {voltage} V on leg {leg}", self.tick);
@@ -233,7 +277,7 @@ impl Bench {
         let powered = matches!(self.word.phase, ARMING | RUNNING | HOLDING | RAMPING);
         assert_eq!(self.word.amplifier_on, powered, "tick {}: amplifiers", self.tick);
         // A platform in motion is first brought to rest.
-        let stands = target_before.is_none_or(|before| before == self.six("target"));
+        let stands = target_before == self.target();
         if self.word.phase == ARMING || self.word.phase == HOLDING && stands {
             assert_eq!(self.codes(), before, "tick {}: codes are held", self.tick);
         }

@@ -69,7 +69,7 @@ fn lost(kind: Kind) {
     // Never back, whatever was asked for last; also where it was held by request.
     for request in [RUN, NOTHING, HOLD, 7] {
         bench.tick(request, 0);
-        away(&mut bench, 3000, request);
+        away(&mut bench, specgen_tests::length(600, 3000), request);
         assert_eq!((bench.word.phase, bench.word.amplifier_on), (FAULTED, false), "request {request}");
         assert_eq!(bench.codes(), [bench.rest; 6]);
         // Not acknowledged by what stays from before.

@@ -1,12 +1,12 @@
 //! What cannot work in `[supervisor]` is refused with its line, and the fix is accepted.
 
 use specgen::compile::compile;
-use specgen::diagnostic::Place;
+use specgen::diagnostic::{Diagnostic, Place};
 use specgen_tests::repository;
 use std::fs;
 
-/// Compiles a spec with a line in `[supervisor]`: code and help of the one finding.
-fn verdict(spec: &str, line: &str) -> Result<(), (String, String)> {
+/// Errors of a spec with a line in `[supervisor]`, each on that line.
+fn errors(spec: &str, line: &str) -> Vec<Diagnostic> {
     let folder = tempfile::tempdir().expect("a folder");
     let specs = repository().join("specs");
     let text = fs::read_to_string(specs.join(spec)).expect("a spec");
@@ -17,15 +17,24 @@ fn verdict(spec: &str, line: &str) -> Result<(), (String, String)> {
     fs::copy(specs.join(record), folder.path().join(record)).expect("copied");
     let path = folder.path().join("platform.toml");
     fs::write(&path, &text).expect("written");
-    let refused = match compile(&path) {
-        Ok(_) => return Ok(()),
-        Err(refused) => refused,
+    let mut errors = match compile(&path) {
+        Ok(_) => return Vec::new(),
+        Err(refused) => refused.findings,
     };
-    let errors: Vec<_> = refused.findings.iter().filter(|found| found.code.starts_with('E')).collect();
-    assert_eq!(errors.len(), 1, "{errors:?}");
-    let Place::Spec(span) = &errors[0].place else { panic!("no place: {errors:?}") };
-    assert!((at..at + line.len()).contains(&span.start), "not on the line: {errors:?}");
-    Err((errors[0].code.to_owned(), errors[0].help.clone()))
+    errors.retain(|found| found.code.starts_with('E'));
+    for error in &errors {
+        let Place::Spec(span) = &error.place else { panic!("no place: {errors:?}") };
+        assert!((at..at + line.len()).contains(&span.start), "not on the line: {errors:?}");
+    }
+    assert!(!errors.is_empty());
+    errors
+}
+
+/// Compiles a spec with a line in `[supervisor]`: code and help of the one finding.
+fn verdict(spec: &str, line: &str) -> Result<(), (String, String)> {
+    let errors = errors(spec, line);
+    assert!(errors.len() <= 1, "{errors:?}");
+    errors.first().map_or(Ok(()), |error| Err((error.code.to_owned(), error.help.clone())))
 }
 
 #[test]
@@ -44,11 +53,17 @@ fn what_cannot_work_is_refused_with_a_fix_that_works() {
         ("reference.toml", "host_lost = [\"0.05 ms\", \"5 s\"]", "E0470"),
         ("legs.toml", "wiring_check.time = \"3 ms\"", "E0470"),
         ("reference.toml", "wiring_check = { amplitude = 0.0003, time = \"50 ms\" }", "E0471"),
+        ("reference.toml", "wiring_check.amplitude = 1e-9", "E0471"),
+        ("reference.toml", "wiring_check.amplitude = 1e-6", "E0471"),
+        ("legs.toml", "wiring_check.amplitude = 1e-5", "E0471"),
+        ("reference.toml", "wiring_check = { amplitude = 1e-4, time = \"20 ms\" }", "E0471"),
+        ("reference.toml", "wiring_check.leg_gain = [0.8, 1.4]", "E0476"),
+        ("legs.toml", "wiring_check.leg_gain = [0.7, 1.2]", "E0476"),
         ("legs.toml", "ramp_rate = \"41 V/ms\"", "E0472"),
         ("legs.toml", "rest_voltage = \"101 V\"", "E0473"),
         ("reference.toml", "rest_voltage = \"-1 V\"", "E0473"),
     ];
-    for (spec, line, code) in cases {
+    for (spec, line, code) in cases.into_iter().step_by(specgen_tests::length(3, 1)) {
         let (found, help) = verdict(spec, line).expect_err(line);
         assert_eq!(found, code, "{line}: {help}");
         println!("{line}: {help}");
@@ -61,13 +76,56 @@ fn what_cannot_work_is_refused_with_a_fix_that_works() {
         }
         // "write key = value or more; …"
         let fix = help.strip_prefix("write ").expect("a fix");
-        let end = [" or more", " or less", " or a voltage"]
+        let end = [" or more", " or less", " or wider", " or a voltage"]
             .iter()
             .filter_map(|word| fix.find(word))
             .min()
             .expect("an amount");
         assert_eq!(verdict(spec, &fix[..end]), Ok(()), "{line}: fixed by {}", &fix[..end]);
+        // "…, or wiring_check.time = value or more", beside the line as it stands.
+        if let Some((_, longer)) = fix.split_once(", or wiring_check.time = ")
+            && line.starts_with("wiring_check.")
+        {
+            let longer = longer.split(" or more").next().expect("a time");
+            let both = format!("{line}\nwiring_check.time = {longer}");
+            assert_eq!(verdict(spec, &both), Ok(()), "{line}: fixed by {longer}");
+        }
     }
+}
+
+/// Bounds of the wiring check that are reversed, empty, refuse every machine or let a fault pass.
+#[test]
+fn the_wiring_check_is_not_weakened_by_a_number() {
+    for line in [
+        "gauge_gain = [1.33, 0.75]",
+        "gauge_gain = [10, 10]",
+        "gauge_gain = [0.0001, 1.33]",
+        "gauge_gain = [0.75, 10]",
+        "gauge_gain = [0.5, 1.33]",
+        "gauge_gain = [0.95, 1.33]",
+        "leg_gain = [0.0001, 10]",
+        "leg_gain = [1.43, 0.7]",
+        "leg_gain = [0.7, 2]",
+        "leg_gain = [0.8, 1.2]",
+        "residual = 1e-9",
+        "residual = 0.29",
+    ] {
+        for spec in ["reference.toml", "legs.toml"] {
+            let errors = errors(spec, &format!("wiring_check.{line}"));
+            assert!(!errors.is_empty(), "{spec}: {line}");
+            for Diagnostic { code, message, help, .. } in errors {
+                assert!(code == "E0301" || code == "E0476", "{line}: {code} {message}");
+                assert!(message.contains("expected ") || message.contains(" pass"), "{message}");
+                assert!(help.contains(" range: ") || help.starts_with("write "), "{help}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_number_just_out_of_range_is_shown_with_its_digits() {
+    let errors = errors("legs.toml", "wiring_check.amplitude = 0.0200001");
+    assert!(errors[0].message.contains(" is 0.0200001, expected "), "{errors:?}");
 }
 
 /// Between −20 V and 80 V legs rest at 0 V; where 0 V is not permitted, at the limit nearest to it; else where the spec says.

@@ -264,7 +264,7 @@ fn one_wrong_sample_moves_the_platform_by_less_than_20_nm_from_bit_15_on() {
     let (before, _) = steady("supervisor-samples-wide", &[BITS, WIDE], 0.0);
     println!("bit of 18, its leap: nm of true motion with the sift (of 12 samples replaced, out of range), without it");
     let mut of_bit_15 = [0.0; 2];
-    for bit in (6..18).rev() {
+    for bit in (6..18).rev().step_by(specgen_tests::length(4, 1)).chain(specgen_tests::length(vec![15, 16], vec![])) {
         let (sifted, replaced, out) = moved_by(&now, bit, high - low);
         let (wide, none, _) = moved_by(&before, bit, high - low);
         let leap = (high - low) / 2f64.powi(18 - bit);
@@ -575,10 +575,11 @@ fn no_sample_of_a_machine_without_a_fault_is_replaced() {
 /// Host and emulated MCU: the same bits where samples are stale, missing and leap, in f64 and in f32.
 #[test]
 fn spoiled_samples_have_the_same_bits_on_the_mcu() {
-    for (name, spec, mcu) in [
-        ("supervisor-samples", "reference.toml", Mcu::Mps2An500),
+    let machines = [
         ("supervisor-samples-features-platform-f32", "features/platform-f32.toml", Mcu::Mps2An386),
-    ] {
+        ("supervisor-samples", "reference.toml", Mcu::Mps2An500),
+    ];
+    for &(name, spec, mcu) in &machines[..specgen_tests::length(1, 2)] {
         let emitted = Emitted::new(name, spec, &[]);
         let Some(image) = emitted.image(mcu) else { return };
         let mut machine = Loop::new(&emitted, &LegParameters::reference(), 3);

@@ -11,7 +11,7 @@ use super::check::describe;
 use super::firmware::{self, late};
 use super::named::{InputFile, OutputFolder};
 use super::spec;
-use super::ui::{Failure, Outcome, Ui};
+use super::ui::{ControllerForm, Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::workspace;
 use specgen_language::model;
@@ -74,7 +74,7 @@ struct Summary {
     /// Cells per axis of its tables.
     #[serde(skip)]
     grid: usize,
-    /// What identification and the stability check found.
+    /// What identification and the stability check found, where it is to be shown: the best lead of each trajectory takes a second.
     #[serde(skip)]
     found: String,
     /// Part and budget of the spec.
@@ -151,6 +151,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 /// Host library, image, and the exercise on both.
 fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> Result<(), Failure> {
     let target_dir = output.join("target");
+    ui.runs(ControllerForm::Emitted);
     ui.progress("building the host library");
     let library = target::host::build_loadable(output, &target_dir)?;
     summary.host_library = Some(library.display().to_string());
@@ -197,7 +198,7 @@ impl Summary {
             details,
             bits: compiled.ir.scalar.bits(),
             grid: hysteresis.grid,
-            found: describe(compiled),
+            found: if details { describe(compiled) } else { String::new() },
             limits: compiled.model.target.clone(),
         }
     }

@@ -4,7 +4,6 @@ use std::f64::consts::FRAC_PI_4;
 use std::path::Path;
 
 use clap::Args;
-use host_sim::controller::{Controller, Dynamics};
 use nalgebra::{Rotation3, Vector3};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -14,16 +13,14 @@ use super::file::unread_file;
 use super::file::write_file;
 use super::named::{InputFile, OutputFile};
 use super::spec;
-use super::ui::{Failure, Outcome, Ui};
-use specgen_compiler::compile::{Compiled, Refused};
+use super::ui::{ControllerForm, Failure, Outcome, Ui};
+use specgen_compiler::compile::Refused;
 use specgen_compiler::lower;
-use specgen_compiler::workspace;
 use specgen_identify::states;
 use specgen_language::files;
-use specgen_language::interrupt::Scratch;
 use specgen_language::model::Model;
 use specgen_numerics::{coriolis, displacements, gravity, jacobian, leg_forces, mass_matrix};
-use specgen_toolchain as target;
+use specgen_run_time::Dynamics;
 
 /// Leg lengths over those at rest.
 const LENGTH_RATIOS: std::ops::RangeInclusive<f64> = 0.7..=1.3;
@@ -43,7 +40,7 @@ pub struct Arguments {
     /// Poses are from rest; without it their z counts from the base frame.
     #[arg(long)]
     from_rest: bool,
-    /// Compute with the emitted controller, built for this host, instead of with its model at full precision.
+    /// Compute in the scalar of the controller, with its constants, instead of with its model at full precision.
     #[arg(long)]
     generated: bool,
     /// Write the result (JSON) here instead of printing it.
@@ -62,7 +59,6 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = spec::compiled(&arguments.spec, ui)?;
     let platform = lower::platform(&compiled.model)
         .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
-    let generated = if arguments.generated { Some(Generated::build(&compiled, ui)?) } else { None };
     let height = if arguments.from_rest { 0.0 } else { compiled.model.geometry.height };
     let mut vectors = Vec::with_capacity(states.len());
     for state in &states {
@@ -70,21 +66,18 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         pose[2] -= height;
         within_range(&compiled.model, &pose)
             .map_err(|text| Failure::Gate(format!("{}: state {}: {text}", arguments.states.display(), state.id)))?;
-        let result = match &generated {
-            Some(generated) => generated
-                .controller
-                .dynamics(&pose, &rate, &acceleration)
-                .map_err(|error| Failure::Environment(error.to_string()))?,
-            None => {
-                let motion = Motion { pose, rate, acceleration };
-                Dynamics {
-                    jacobian: jacobian(&platform, &pose),
-                    mass: mass_matrix(&platform, &pose),
-                    coriolis: coriolis(&platform, &pose, &rate),
-                    gravity: gravity(&platform, &pose),
-                    leg_forces: leg_forces(&platform, &motion),
-                    displacements: displacements(&platform, &pose),
-                }
+        let motion = Motion { pose, rate, acceleration };
+        let result = if arguments.generated {
+            ui.runs(ControllerForm::RunTime);
+            specgen_run_time::dynamics(&compiled.ir, &motion)
+        } else {
+            Dynamics {
+                jacobian: jacobian(&platform, &pose),
+                mass: mass_matrix(&platform, &pose),
+                coriolis: coriolis(&platform, &pose, &rate),
+                gravity: gravity(&platform, &pose),
+                leg_forces: leg_forces(&platform, &motion),
+                displacements: displacements(&platform, &pose),
             }
         };
         vectors.push(vector(state, &result, &platform.rest_lengths()));
@@ -92,7 +85,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let document = json!({
         "units": "SI",
         "pose": if arguments.from_rest { "from rest" } else { "absolute" },
-        "computed_by": if arguments.generated { "emitted controller" } else { "model, f64" },
+        "computed_by": if arguments.generated { "controller" } else { "model, f64" },
         "vectors": vectors,
     });
     match &arguments.output {
@@ -147,26 +140,6 @@ fn within_range(model: &Model, pose: &[f64; 6]) -> Result<(), String> {
         }
     }
     Ok(())
-}
-
-/// The emitted controller, loaded.
-struct Generated {
-    controller: Controller,
-    /// Holds the library while it is loaded.
-    _scratch: Scratch,
-}
-
-impl Generated {
-    fn build(compiled: &Compiled, ui: &mut Ui) -> Result<Self, Failure> {
-        let environment = |error: &dyn std::fmt::Display| Failure::Environment(error.to_string());
-        let scratch = Scratch::new().map_err(|error| environment(&error))?;
-        let folder = scratch.path().join("controller");
-        workspace::write_scratch(&folder, &compiled.files)?;
-        ui.progress("building the emitted controller for this host");
-        let library = target::host::build_analysis(&folder, &scratch.path().join("target"))?;
-        let controller = Controller::load(&library).map_err(|error| environment(&error))?;
-        Ok(Self { controller, _scratch: scratch })
-    }
 }
 
 /// One state in the layout of the reference vectors.

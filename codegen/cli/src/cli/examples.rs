@@ -205,6 +205,8 @@ pub const REPLAY: &str = "\
 Examples:
   specgen replay run.rec --spec platform.toml
       bit-equal, or the first tick that differs
+  specgen replay run.rec --spec platform.toml --emitted  # (minutes)
+      the same on the emitted controller, which is built
   specgen replay run.rec --csv run.csv  # time, inputs with units, what came out
   specgen replay run.rec --spec platform.toml --mcap run.mcap
       for viewers of logs";

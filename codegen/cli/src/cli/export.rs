@@ -20,7 +20,7 @@ use super::file::{claim, write_folder};
 use super::named::{InputFile, OutputFolder};
 use super::sim::environment;
 use super::spec;
-use super::ui::{Failure, Outcome, Ui};
+use super::ui::{ControllerForm, Failure, Outcome, Ui};
 use specgen_compiler::workspace;
 
 /// Requests to the supervisor, by their words.
@@ -110,6 +110,7 @@ fn export(
     let scratch = Scratch::new().map_err(environment)?;
     let folder = scratch.path().join("controller");
     workspace::write_scratch(&folder, &compiled.files)?;
+    ui.runs(ControllerForm::Emitted);
     ui.progress("building the emitted controller for this host");
     let library = build_loadable(&folder, &scratch.path().join("target"))?;
     let bytes = fs::read(&library).map_err(environment)?;

@@ -19,7 +19,7 @@ use super::named::{Endpoint, InputFile, OutputFolder};
 use super::plot::Plot;
 use super::sim::{PlantArguments, environment, frequency};
 use super::spec;
-use super::ui::{Failure, Outcome, Ui};
+use super::ui::{ControllerForm, Failure, Outcome, Ui};
 use report::Report;
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::workspace;
@@ -96,6 +96,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let output = arguments.output.as_deref().unwrap_or(&own).to_owned();
     let hold = workspace::write(&output, &compiled.files)?;
     let target_dir = output.join("target");
+    ui.runs(ControllerForm::Emitted);
     ui.progress(&format!("building the host library in {}", output.display()));
     let library = target::host::build_loadable(&output, &target_dir)?;
     let host = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;

@@ -132,7 +132,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         let heard = server.wait(&mut seen, look, TIMEOUT);
         if server.is_lost() {
             return Err(Failure::Environment(format!(
-                "{}: somebody made the file shorter, and with it the memory that machine and controller share; start both again",
+                "{}: the memory that machine and controller share has lost its mark: the file was made shorter, or overwritten; start both again",
                 path.display()
             )));
         }

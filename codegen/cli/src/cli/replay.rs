@@ -45,6 +45,10 @@ pub struct Arguments {
     /// also what --csv has.
     #[arg(long, value_name = "FILE")]
     mcap: Option<OutputFile>,
+    /// With --spec: build the emitted controller and replay on that, which needs Rust. Without it the same law runs on the constants
+    /// of the compiled spec, with the same bits.
+    #[arg(long, requires = "spec")]
+    emitted: bool,
     /// With --spec: target less pose, or demand less gauge of the legs.
     #[command(flatten)]
     plot: Plot,
@@ -69,9 +73,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         return ui.judged(&exported, failed);
     };
     let compiled = spec::looked_up(spec, ui)?;
-    // Before the library is built: a wrong spec is refused at once.
+    // Before a library is built: a wrong spec is refused at once.
     same_build(&arguments.recording, spec, &reader.header().description, &compiled)?;
-    let controller = sim::emitted(&compiled, ui)?;
+    let controller = sim::controller(&compiled, arguments.emitted, ui)?;
     let mut machine = Supervised::new(controller).map_err(sim::environment)?;
     ui.progress("running the record again");
     let names = machine.output_names();

@@ -15,8 +15,8 @@ use serde::Serialize;
 use super::check::describe;
 use super::file::{check_place, write_file};
 use super::named::{InputFile, OutputFile};
-use super::sim::{emitted, environment};
-use super::ui::{Failure, Outcome, Ui};
+use super::sim::{at_run_time, environment};
+use super::ui::{ControllerForm, Failure, Outcome, Ui};
 use crate::{precision, target, workspace};
 use specgen_compiler::compile::{self, Compiled, Refused};
 use specgen_language::diagnostic::{Diagnostic, Severity};
@@ -52,7 +52,7 @@ pub struct Arguments {
     /// A page about this run of the machine instead: beside the simulation of the same commands.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["paper", "no_target"])]
     record: Option<InputFile>,
-    /// Without the emulated microcontroller: no time, memory and comparison of bits.
+    /// Without the emulated microcontroller: no time, memory and comparison of bits, and nothing is built.
     #[arg(long)]
     no_target: bool,
 }
@@ -110,7 +110,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut built = build(&compiled, arguments.no_target, ui)?;
     let name = file_name(&arguments.spec);
     let command = again(arguments, &name).to_string();
-    let mut fine = fine(&compiled, ui)?;
+    let mut fine = fine(&compiled)?;
     let simulated = simulated::of(&compiled, [&mut built.controller, &mut fine], &name, ui)?;
 
     let measured = built.measured.as_ref().map_err(String::as_str);
@@ -263,7 +263,7 @@ fn evidence_of(compiled: &Compiled, built: &Built, name: &str) -> Result<Vec<Sec
 }
 
 /// The controller of the spec with a drive converter as fine as there is, for the error budget.
-fn fine(compiled: &Compiled, ui: &Ui) -> Result<Controller, Failure> {
+fn fine(compiled: &Compiled) -> Result<Controller, Failure> {
     let lost = |why: String| {
         Failure::Environment(format!(
             "the spec with dac.bits = {FINE_BITS} does not compile: {why}; report this as a defect of specgen with the spec"
@@ -277,7 +277,7 @@ fn fine(compiled: &Compiled, ui: &Ui) -> Result<Controller, Failure> {
     let fine = compile::compile_source(source).map_err(|refused| {
         lost(refused.findings.into_iter().map(|finding| finding.message).collect::<Vec<_>>().join("; "))
     })?;
-    emitted(&fine, ui)
+    specgen_run_time::controller(&fine.ir).map_err(environment)
 }
 
 fn place(arguments: &Arguments, name: &str) -> PathBuf {
@@ -309,15 +309,19 @@ fn file_name(path: &Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
-/// Host library, image, and the exercise on both.
+/// Host library, image, and the exercise on both; without a target the compiled spec, of which nothing is built.
 fn build(compiled: &Compiled, no_target: bool, ui: &Ui) -> Result<Built, Failure> {
     let scratch = Scratch::new().map_err(environment)?;
     let folder = scratch.path().join("controller");
     let cache = scratch.path().join("target");
-    workspace::write_scratch(&folder, &compiled.files)?;
-    ui.progress("building the emitted controller for this host");
-    let library = target::host::build_loadable(&folder, &cache)?;
-    let mut controller = Controller::load(&library).map_err(environment)?;
+    let mut controller = if no_target {
+        at_run_time(compiled, ui)?
+    } else {
+        workspace::write_scratch(&folder, &compiled.files)?;
+        ui.runs(ControllerForm::Emitted);
+        ui.progress("building the emitted controller for this host");
+        Controller::load(&target::host::build_loadable(&folder, &cache)?).map_err(environment)?
+    };
     let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, verify::TICKS).map_err(environment)?;
     let measured = if no_target {
         Err("left out by --no-target".to_owned())

@@ -12,7 +12,7 @@ use host_sim::platform::table::{MachiningTable, PoseTable};
 use super::file::{claim, write_folder};
 use super::named::OutputFolder;
 use super::plot::Plot;
-use super::sim::{emitted, environment};
+use super::sim::{at_run_time, environment};
 use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::{self, Compiled};
 use specgen_language::interrupt::Scratch;
@@ -25,7 +25,6 @@ use specgen_studies::reproduce::{embedded, legs, platform};
 /// Seed of machine, noise and strings.
 const SEED: u64 = 1;
 /// Rough times of the parts on one machine, s: only their proportion counts, for the time left.
-const BUILD: f64 = 8.0;
 const LEGS: f64 = 2.0;
 const REGION: f64 = 1.0;
 const CASE: f64 = 1.2;
@@ -90,7 +89,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let (legs, reference) = (legs?, reference?);
     let generations = arguments.generations as usize;
     let cases = (platform::CASES.len() * platform::FREQUENCIES.len()) as f64;
-    let all = 2.0 * BUILD + 2.0 * LEGS + REGION + cases * CASE + 2.0 * MACHINING + generations as f64 * GENERATION;
+    let all = 2.0 * LEGS + REGION + cases * CASE + 2.0 * MACHINING + generations as f64 * GENERATION;
     let mut steps = Steps { ui, begun: Instant::now(), all, done: 0.0, underway: 0.0 };
 
     let mut tables = section_3(&legs, &mut steps)?;
@@ -121,8 +120,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 
 /// Tables 1 and 2, and Fig. 29 last.
 fn section_3(compiled: &Compiled, steps: &mut Steps) -> Result<Vec<Table>, Failure> {
-    steps.next("the emitted controller of six legs, built for this host", BUILD);
-    let mut controller = emitted(compiled, steps.ui)?;
+    let mut controller = at_run_time(compiled, steps.ui)?;
     let scenario = legs::scenario(SEED);
     let actuator = &compiled.model.actuator;
     steps.next("Table 1: straight lines at six frequencies", LEGS);
@@ -136,8 +134,7 @@ fn section_3(compiled: &Compiled, steps: &mut Steps) -> Result<Vec<Table>, Failu
 
 /// Tables 5 to 9.
 fn section_4(compiled: &Compiled, steps: &mut Steps) -> Result<(Vec<Table>, Controller), Failure> {
-    steps.next("the emitted controller of the platform, built for this host", BUILD);
-    let mut controller = emitted(compiled, steps.ui)?;
+    let mut controller = at_run_time(compiled, steps.ui)?;
     let scenario = machine_of(compiled)?;
     let mut free = PoseTable::default();
     for case in platform::CASES {

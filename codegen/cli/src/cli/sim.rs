@@ -16,7 +16,7 @@ use super::file::{check_place, claim, write_folder};
 use super::named::{InputFile, OutputFile, OutputFolder};
 use super::plot::Plot;
 use super::spec;
-use super::ui::{Failure, Ui};
+use super::ui::{ControllerForm, Failure, Ui};
 use specgen_compiler::compile;
 use specgen_compiler::workspace;
 use specgen_language::files;
@@ -152,7 +152,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     // A place that cannot be is refused before the minutes of the rest, too.
     let _claimed = arguments.output.as_deref().map(claim).transpose()?;
     arguments.record.as_deref().map_or(Ok(()), check_place)?;
-    let controller = if arguments.emitted { emitted(&compiled, ui) } else { at_run_time(&compiled, ui) }?;
+    let controller = controller(&compiled, arguments.emitted, ui)?;
     if let Some(path) = &arguments.record {
         return record::run(arguments, path, &compiled, controller, ui);
     }
@@ -188,18 +188,25 @@ impl TickController for Interruptible {
     }
 }
 
+/// The controller that a command runs: the emitted one if the user asks for it.
+pub(super) fn controller(compiled: &compile::Compiled, is_emitted: bool, ui: &Ui) -> Result<Controller, Failure> {
+    if is_emitted { emitted(compiled, ui) } else { at_run_time(compiled, ui) }
+}
+
 /// The law on the constants of a compiled spec: the bits of the emitted controller, and nothing is built.
 pub(super) fn at_run_time(compiled: &compile::Compiled, ui: &Ui) -> Result<Controller, Failure> {
+    ui.runs(ControllerForm::RunTime);
     ui.progress("controller: the compiled spec, not built");
     specgen_run_time::controller(&compiled.ir).map_err(environment)
 }
 
 /// The emitted controller, built for this host from the same files that the main job writes. What it was built in is gone
 /// when this returns; the library stays loaded.
-pub(super) fn emitted(compiled: &compile::Compiled, ui: &Ui) -> Result<Controller, Failure> {
+fn emitted(compiled: &compile::Compiled, ui: &Ui) -> Result<Controller, Failure> {
     let scratch = Scratch::new().map_err(environment)?;
     let workspace = scratch.path().join("controller");
     workspace::write_scratch(&workspace, &compiled.files)?;
+    ui.runs(ControllerForm::Emitted);
     ui.progress("controller: the emitted one, built for this host");
     let library = target::host::build_loadable(&workspace, &scratch.path().join("target"))?;
     Controller::load(&library).map_err(environment)

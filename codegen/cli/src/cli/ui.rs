@@ -1,6 +1,6 @@
 //! What the user sees: results on standard output, findings and progress on standard error.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
@@ -111,9 +111,20 @@ pub trait Outcome: Serialize {
     fn text(&self) -> String;
 }
 
+/// Which controller a command runs on this computer: both have the same bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ControllerForm {
+    /// The law on the constants of the compiled spec; nothing is built.
+    RunTime,
+    /// The emitted crate, built as a library.
+    Emitted,
+}
+
 /// Output in one of two forms.
 pub struct Ui {
     json: bool,
+    controller: Cell<Option<ControllerForm>>,
     findings: Vec<Value>,
     /// Why standard output is not whole.
     lost: RefCell<Option<io::Error>>,
@@ -149,7 +160,7 @@ macro_rules! say {
 impl Ui {
     /// Text, or one JSON document at the end.
     pub fn new(json: bool) -> Self {
-        Self { json, findings: Vec::new(), lost: RefCell::new(None), called: None }
+        Self { json, controller: Cell::new(None), findings: Vec::new(), lost: RefCell::new(None), called: None }
     }
 
     /// One document, which is kept for [`Ui::taken`]; `hear` is told of the progress. Nothing is printed.
@@ -183,6 +194,11 @@ impl Ui {
         } else if !self.json {
             say!("{line}\n");
         }
+    }
+
+    /// Notes for the document which controller runs.
+    pub fn runs(&self, controller: ControllerForm) {
+        self.controller.set(Some(controller));
     }
 
     /// Does `work`; at a terminal a line says what it is and for how long, once it takes longer than a glance.
@@ -373,6 +389,7 @@ impl Ui {
             "specgen": env!("CARGO_PKG_VERSION"),
             "exit_code": exit_code,
             "error": error,
+            "controller": self.controller.get(),
             "findings": self.findings,
             "result": result,
         });

@@ -26,7 +26,9 @@ const MOVE: u64 = 2;
 /// What a stop may take, on a loaded computer whose machine waits for it.
 const RAMP: Duration = Duration::from_millis(500);
 /// How long it then has to stand.
-const STANDS: Duration = Duration::from_millis(1500);
+fn stands() -> Duration {
+    Duration::from_millis(crate::support::length(500, 1500))
+}
 /// How far a platform comes while it stops, m: a stop at full speed, many times over.
 const STOPPING: f64 = 3e-6;
 
@@ -55,7 +57,7 @@ impl Look {
         let way =
             |a: &Place, b: &Place| a.target.iter().zip(&b.target).fold(0.0, |way: f64, (a, b)| way.max((a - b).abs()));
         assert!(way(&begun, &rest) < STOPPING, "{what}: {begun:?} {rest:?}");
-        while start.elapsed() < RAMP + STANDS {
+        while start.elapsed() < RAMP + stands() {
             let now = self.now();
             assert!(
                 way(&rest, &now) < 1e-12,
@@ -147,11 +149,10 @@ fn hosts_of_the_link(link: &Path, look: &mut Look) {
     }
     other.done(&Request::Supervise { request: HOLD });
     assert_eq!(host.refused(&Request::Supervise { request: RUN }), Refusal::Busy, "it is to hear of the stop");
-    host.wait("armed", |status| status.phase == HOLDING);
-    look.stands("held while it armed");
-    assert_eq!(look.now().phase, HOLDING);
-    host.done(&Request::Supervise { request: RAMP_DOWN });
+    // The wiring check is broken off, and a machine that is not checked does not hold.
     host.wait("the way down", |status| status.phase == DISARMED);
+    look.stands("held while it armed");
+    assert_eq!(look.now().phase, DISARMED);
     host.done(&Request::Supervise { request: NONE });
     drop(host);
 
@@ -409,11 +410,9 @@ fn pages(bench: &Bench, link: &Path, look: &mut Look) {
     }
     look.wait("arming", |place| place.phase == ARMING);
     second.say(&json!({ "do": "hold" }));
-    look.wait("armed", |place| place.phase == HOLDING);
-    look.stands("held from another page");
-    assert_eq!(look.now().phase, HOLDING);
-    second.say(&json!({ "do": "ramp-down" }));
     look.wait("the way down", |place| place.phase == DISARMED);
+    look.stands("held from another page");
+    assert_eq!(look.now().phase, DISARMED);
 
     // A hundred that are slow with their heads, for ever.
     let over = Arc::new(AtomicBool::new(false));

@@ -4,6 +4,7 @@
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
+use super::literal::parsed;
 use crate::ir::Ir;
 
 /// Accessor, its type, its value.
@@ -14,6 +15,7 @@ const SPEC: &[Row] = &[
     ("tables", "&[Table; LEGS]", "&TABLES"),
     ("dac", "&Dac<Real>", "&limits::DAC"),
     ("supervision", "&Supervision<Real>", "&supervision::SUPERVISION"),
+    ("raw_limits", "&[[Real; 2]; 6]", "&gauges::RAW_LIMITS"),
     ("readings_per_leg", "&[[Real; LEGS]; 6]", "&supervision::READINGS_PER_LEG"),
     ("geometry", "&Legs<'_, Real>", "&geometry::GEOMETRY"),
     ("inverse_jacobian", "&[[Real; LEGS]; 6]", "&geometry::INVERSE_JACOBIAN"),
@@ -51,7 +53,6 @@ const PLATFORM: &[Row] = &[
     ("setpoints", "&Setpoints<Real, setpoint::UserFrames>", "&setpoint::SETPOINTS"),
     ("gauges", "&Gauges<'_, Real>", "&gauges::GAUGES"),
     ("calibration", "Option<&gauges::Meaning>", "const { gauges::CALIBRATION.as_ref() }"),
-    ("raw_limits", "&[[Real; 2]; 6]", "&gauges::RAW_LIMITS"),
     ("rate_filter", "&RateFilter<Real>", "&gauges::RATE"),
 ];
 
@@ -68,7 +69,6 @@ const PLATFORM_TYPES: &[(&str, &str)] = &[
 const LEGS: &[Row] = &[
     ("lead", "Real", "hysteresis::LEAD"),
     ("lead_limit", "Real", "hysteresis::LEAD_LIMIT"),
-    ("gauge", "&[Real; 2]", "&gauges::GAUGE"),
     ("leg_setpoint", "&[Real; 2]", "&gauges::LEG_SETPOINT"),
     ("leg_gain", "Real", "defaults::LEG_GAIN"),
     ("period_seconds", "f64", "PERIOD_SECONDS"),
@@ -84,11 +84,11 @@ pub fn emit(ir: &Ir) -> TokenStream {
     };
     let [module, kind, law] = [module, kind, law].map(|name| format_ident!("{name}"));
     let types = types.iter().map(|(name, is)| {
-        let (name, is) = (format_ident!("{name}"), tokens(is));
+        let (name, is) = (format_ident!("{name}"), parsed(is));
         quote! { type #name = #is; }
     });
     let of_kind = accessors(rows);
-    let imports = tokens(match ir.task_space {
+    let imports = parsed(match ir.task_space {
         Some(_) => {
             "use specgen_runtime::setpoint::Setpoints;
             use specgen_runtime::trigger::{Line, Triggers};
@@ -133,7 +133,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
 
 fn accessors(rows: &[Row]) -> TokenStream {
     let accessors = rows.iter().map(|(name, result, value)| {
-        let (name, result, value) = (format_ident!("{name}"), tokens(result), tokens(value));
+        let (name, result, value) = (format_ident!("{name}"), parsed(result), parsed(value));
         quote! {
             #[inline(always)]
             fn #name(&self) -> #result {
@@ -142,12 +142,4 @@ fn accessors(rows: &[Row]) -> TokenStream {
         }
     });
     quote! { #(#accessors)* }
-}
-
-/// Rust, as it stands in this file.
-fn tokens(text: &str) -> TokenStream {
-    match text.parse() {
-        Ok(tokens) => tokens,
-        Err(error) => unreachable!("{text} is no Rust: {error}"),
-    }
 }

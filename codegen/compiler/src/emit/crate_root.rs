@@ -3,7 +3,7 @@
 use crate::ir::Ir;
 
 /// Modules that a user of the crate sees. The law's `controller!` adds those that are no constants.
-const PUBLIC: [&str; 6] = ["hysteresis", "limits", "permitted", "setpoint", "supervision", "task_space"];
+const PUBLIC: [&str; 7] = ["body", "hysteresis", "limits", "permitted", "setpoint", "supervision", "task_space"];
 
 /// Its documentation, of a platform and of six legs.
 const PLATFORM_PAGE: &str = include_str!("pages/platform.md");

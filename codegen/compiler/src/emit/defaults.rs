@@ -1,11 +1,13 @@
 //! `src/defaults.rs`: the spec's settings, which `Config::new` of the law begins with. Reads [`ir::Defaults`](crate::ir::Defaults)
 //! and, of a platform, [`ir::PlatformDefaults`](crate::ir::PlatformDefaults).
 
-use proc_macro2::TokenStream;
+use std::fmt::Debug;
+
+use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
 use super::literal;
-use crate::ir::{self, Gains, Interaction, Ir, Law, Mode, PlatformDefaults, Setpoint};
+use crate::ir::{Gains, Ir, Mode, PlatformDefaults};
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let leg_gain = literal::real(ir.scalar, ir.scalar.round(ir.defaults.leg_gain));
@@ -32,30 +34,18 @@ fn code_limits(ir: &Ir) -> TokenStream {
     quote! { CodeLimits { min: limits::CODES[0], max: limits::CODES[1], max_step: #max_step } }
 }
 
-fn law(law: Law) -> TokenStream {
-    match law {
-        Law::Invhys => quote! { Law::Invhys },
-        Law::Ewma => quote! { Law::Ewma },
-        Law::Pcc => quote! { Law::Pcc },
-    }
-}
-
 fn legs(ir: &Ir) -> (TokenStream, TokenStream) {
     let d = &ir.defaults;
     let real = |value| literal::real(ir.scalar, value);
-    let law = law(d.law);
-    let setpoint = match d.setpoint {
-        Setpoint::Pose => quote! { SetpointKind::Pose },
-        Setpoint::Leg => quote! { SetpointKind::Leg },
-    };
+    let (law, setpoint) = (variant(&d.law), variant(&d.setpoint));
     let (level_weight, drift_weight) = (real(d.level_weight), real(d.drift_weight));
     let run_interval = literal::count(d.run_interval as usize);
     let code_limits = code_limits(ir);
     let constants = quote! {
         /// What `Config::new` holds.
         pub(crate) const DEFAULTS: Settings<Constants> = Settings {
-            law: #law,
-            setpoint: #setpoint,
+            law: Law::#law,
+            setpoint: SetpointKind::#setpoint,
             level_weight: #level_weight,
             drift_weight: #drift_weight,
             run_interval: #run_interval,
@@ -72,27 +62,14 @@ fn legs(ir: &Ir) -> (TokenStream, TokenStream) {
 fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
     let real = |value| literal::real(ir.scalar, value);
     let six = |values: &[f64; 6]| literal::reals(ir.scalar, values);
-    let law = law(d.law);
-    let mode = match d.mode {
-        Mode::P => quote! { ControlMode::P },
-        Mode::F => quote! { ControlMode::F(#law) },
-        Mode::PF => quote! { ControlMode::PF(#law) },
-    };
+    let (law, mode, interaction) = (variant(&d.law), variant(&d.mode), variant(&d.interaction));
+    let with_law = (d.mode != Mode::P).then(|| quote! { (Law::#law) });
     let import_law = (d.mode != Mode::P).then(|| quote! { , Law });
-    let interaction = match d.interaction {
-        Interaction::Neglected => quote! { Interaction::Neglected },
-        Interaction::Modelled => quote! { Interaction::Modelled },
-        Interaction::Measured => quote! { Interaction::Measured },
-    };
-    let gains = |gains: &Gains| {
-        let (proportional, integral, derivative) =
-            (six(&gains.proportional), six(&gains.integral), six(&gains.derivative));
-        quote! { Gains { proportional: [#proportional], integral: [#integral], derivative: [#derivative] } }
-    };
+    let gains = |of: &Gains| literal::constant!(ir.scalar, gains, of);
     let (combined, position) = (gains(&d.gains), gains(&d.position_gains));
     let (stiffness, rest) = (six(&d.environment_stiffness), six(&d.environment_rest));
     let (level_weight, drift_weight) = (real(d.level_weight), real(d.drift_weight));
-    let (lines, triggers) = (literal::count(d.triggers.len()), d.triggers.iter().map(|line| of_line(ir, line)));
+    let (lines, triggers) = (literal::count(d.triggers.len()), literal::constant!(ir.scalar, lines, d));
     let input = d.input;
     let code_limits = code_limits(ir);
     let [damps, position_damps] =
@@ -100,8 +77,8 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
     let constants = quote! {
         /// What `Config::new` holds.
         pub(crate) const DEFAULTS: Settings<Constants> = Settings {
-            mode: #mode,
-            interaction: #interaction,
+            mode: ControlMode::#mode #with_law,
+            interaction: Interaction::#interaction,
             level_weight: #level_weight,
             drift_weight: #drift_weight,
             code_limits: #code_limits,
@@ -116,7 +93,7 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
         /// Whether there is an input line; from `trigger`.
         pub const INPUT: bool = #input;
         /// What each output shows.
-        pub(crate) const TRIGGERS: [Line<Real>; LINES] = [#(#triggers),*];
+        pub(crate) const TRIGGERS: [Line<Real>; LINES] = #triggers;
     };
     let imports = quote! {
         use specgen_law::platform::{Environment, Settings};
@@ -126,28 +103,7 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
     (imports, constants)
 }
 
-fn of_line(ir: &Ir, line: &ir::Line) -> TokenStream {
-    let real = |value| literal::real(ir.scalar, value);
-    let whole = |value| literal::count(value as usize);
-    let (kind, direction) =
-        (format_ident!("{}", format!("{:?}", line.kind)), format_ident!("{}", format!("{:?}", line.direction)));
-    let axis = literal::count(line.axis);
-    let [start, stop, step, hysteresis] = [line.start, line.stop, line.step, line.hysteresis].map(real);
-    let [first, every, last] = [line.first, line.every, line.last].map(whole);
-    let width = literal::integer(line.width);
-    quote! {
-        Line {
-            kind: specgen_runtime::trigger::Kind::#kind,
-            axis: #axis,
-            direction: specgen_runtime::trigger::Direction::#direction,
-            start: #start,
-            stop: #stop,
-            step: #step,
-            hysteresis: #hysteresis,
-            first: #first,
-            every: #every,
-            last: #last,
-            width: #width,
-        }
-    }
+/// The name of a variant, which is that of the runtime.
+fn variant(value: &impl Debug) -> Ident {
+    format_ident!("{}", format!("{value:?}"))
 }

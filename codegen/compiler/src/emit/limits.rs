@@ -7,11 +7,8 @@ use super::literal;
 use crate::ir::Ir;
 
 pub fn emit(ir: &Ir) -> TokenStream {
-    let real = |value| literal::real(ir.scalar, value);
     let a = &ir.actuation;
-    let (volts_at_zero, volts_per_code) = (real(a.volts_at_zero), real(a.volts_per_code));
-    let (cells_at_zero, cells_per_code, codes_per_cell) =
-        (real(a.cells_at_zero), real(a.cells_per_code), real(a.codes_per_cell));
+    let dac = literal::constant!(ir.scalar, dac, a);
     let (code_min, code_max) = (literal::integer(a.code_min), literal::integer(a.code_max));
     let dac_bits = literal::integer(a.bits.cast_signed());
     let codes_doc = format!(
@@ -26,13 +23,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         use crate::Real;
 
         /// Converter codes in volts and in cells of the Everett grid; from `dac` and `actuator.voltage`.
-        pub const DAC: Dac<Real> = Dac {
-            volts_at_zero: #volts_at_zero,
-            volts_per_code: #volts_per_code,
-            cells_at_zero: #cells_at_zero,
-            cells_per_code: #cells_per_code,
-            codes_per_cell: #codes_per_cell,
-        };
+        pub const DAC: Dac<Real> = #dac;
         /// Bits of a code; from `dac.bits`.
         pub const DAC_BITS: u32 = #dac_bits;
         #[doc = #codes_doc]

@@ -1,5 +1,7 @@
 //! Numbers as source text: shortest decimal that reads back to the same bits.
 
+use std::fmt::{self, Debug};
+
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
@@ -21,6 +23,58 @@ pub fn real(scalar: Scalar, value: f64) -> TokenStream {
         quote! { -#literal }
     } else {
         quote! { #literal }
+    }
+}
+
+/// A constant of the runtime in this scalar: `$make` of [`constants`](crate::constants) from parts of the IR.
+macro_rules! constant {
+    ($scalar:expr, $make:ident $(, $part:expr)+) => {{
+        use std::marker::PhantomData;
+        use $crate::constants::{Rounding, $make};
+        use $crate::emit::literal::printed;
+        match $scalar {
+            $crate::ir::Scalar::F32 => printed(&$make(&Rounding::<f32>(PhantomData) $(, $part)+)),
+            $crate::ir::Scalar::F64 => printed(&$make(&Rounding::<f64>(PhantomData) $(, $part)+)),
+        }
+    }};
+}
+pub(crate) use constant;
+
+/// What `{:?}` prints, and the Rust that is meant: paths of variants, references to slices, a name.
+const MEANT: [(&str, &str); 11] = [
+    ("amplifier_fault: ", "amplifier_fault: specgen_runtime::supervisor::Reaction::"),
+    (" kind: ", " kind: specgen_runtime::trigger::Kind::"),
+    (", direction: ", ", direction: specgen_runtime::trigger::Direction::"),
+    ("(Whole", "(Permitted::Whole"),
+    ("(Number", "(Permitted::Number"),
+    ("Series { sine: [", "Series { sine: &["),
+    (" versine: [", " versine: &["),
+    (" root: [", " root: &["),
+    (" arc_sine: [", " arc_sine: &["),
+    (" arc_tangent: [", " arc_tangent: &["),
+    (" trajectories: []", " trajectories: &TRAJECTORIES"),
+];
+
+/// A constant as Rust.
+pub fn printed(constant: &impl Debug) -> TokenStream {
+    let text = MEANT.iter().fold(format!("{constant:?}"), |text, (printed, meant)| text.replace(printed, meant));
+    parsed(&text)
+}
+
+/// Rust within a constant, in place of a value.
+pub struct Within<'a>(pub &'a TokenStream);
+
+impl Debug for Within<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self.0, f)
+    }
+}
+
+/// Rust that is known to be Rust.
+pub fn parsed(text: &str) -> TokenStream {
+    match text.parse() {
+        Ok(tokens) => tokens,
+        Err(error) => unreachable!("{text} is no Rust: {error}"),
     }
 }
 

@@ -5,21 +5,12 @@ use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
 
 use super::literal;
-use crate::ir::{Frames, Ir, Path, Row, Scalar, Segment, SegmentAxis, Setpoints};
+use crate::ir::{Frames, Ir, Path, Scalar, Setpoints};
 
 pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
     let scalar = ir.scalar;
-    let real = |value| literal::real(scalar, value);
-    let six = |values: &[f64; 6]| literal::reals(scalar, values);
-    let (period, rate, square_rate) = (real(s.period), real(s.rate), real(s.square_rate));
-    let (bias, home, bound) = (six(&s.bias), six(&s.home), six(&ir.bounds.pose));
-    let (speed, acceleration, jerk) = (six(&s.speed_limit), six(&s.acceleration_limit), six(&s.jerk_limit));
-    let (stop_acceleration, stop_jerk) = (six(&s.stop_acceleration_limit), six(&s.stop_jerk_limit));
-    let (stream_step, stream_rate) = (six(&s.stream_step), six(&s.stream_rate));
-    let stream_acceleration = six(&s.stream_acceleration);
-    let shortest_stop = Literal::i32_unsuffixed(s.shortest_stop);
-    let stale_ticks = Literal::u32_unsuffixed(s.stale_ticks);
     let (frames_type, frames) = frames(scalar, &s.frames);
+    let setpoints = literal::constant!(scalar, setpoints, &ir.bounds.pose, s, literal::Within(&frames), &[]);
     let count = literal::count(s.trajectories.len());
     let names = s.trajectories.iter().map(|trajectory| &trajectory.name);
     let (constants, entries): (Vec<_>, Vec<_>) = s
@@ -54,30 +45,7 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
 
         /// What the generator of set-points needs to know; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
         /// and `trajectory`.
-        pub const SETPOINTS: Setpoints<Real, UserFrames> = Setpoints {
-            period: #period,
-            rate: #rate,
-            square_rate: #square_rate,
-            bias: [#bias],
-            home: [#home],
-            bound: [#bound],
-            limits: MoveLimits {
-                speed: [#speed],
-                acceleration: [#acceleration],
-                jerk: [#jerk],
-            },
-            stop: StopLimits {
-                acceleration: [#stop_acceleration],
-                jerk: [#stop_jerk],
-                shortest: #shortest_stop,
-            },
-            stream_step: [#stream_step],
-            stream_rate: [#stream_rate],
-            stream_acceleration: [#stream_acceleration],
-            stale_ticks: #stale_ticks,
-            frames: #frames,
-            trajectories: &TRAJECTORIES,
-        };
+        pub const SETPOINTS: Setpoints<Real, UserFrames> = #setpoints;
 
         /// The user's frames; from `control.frames`.
         pub type UserFrames = #frames_type;
@@ -117,7 +85,7 @@ fn path(scalar: Scalar, index: usize, name: &str, path: &Path) -> (TokenStream, 
             let count = literal::count(segments.len());
             let (start, end) = (six(start), six(end));
             let ticks = Literal::u32_unsuffixed(*ticks);
-            let segments = segments.iter().map(|part| segment(scalar, part));
+            let segments = segments.iter().map(|part| literal::constant!(scalar, segment, part));
             (
                 quote! {
                     #[doc = #doc]
@@ -134,10 +102,7 @@ fn path(scalar: Scalar, index: usize, name: &str, path: &Path) -> (TokenStream, 
             let count = literal::count(rows.len());
             let row_ticks = Literal::u32_unsuffixed(*row_ticks);
             let (per_tick, per_second, bend_rate) = (real(*per_tick), real(*per_second), real(*bend_rate));
-            let rows = rows.iter().map(|Row { pose, bend }| {
-                let (pose, bend) = (six(pose), six(bend));
-                quote! { Row { pose: [#pose], bend: [#bend] } }
-            });
+            let rows = rows.iter().map(|part| literal::constant!(scalar, row, part));
             (
                 quote! {
                     #[doc = #doc]
@@ -154,30 +119,6 @@ fn path(scalar: Scalar, index: usize, name: &str, path: &Path) -> (TokenStream, 
                     })
                 },
             )
-        }
-    }
-}
-
-fn segment(scalar: Scalar, segment: &Segment) -> TokenStream {
-    let real = |value| literal::real(scalar, value);
-    let first = Literal::u32_unsuffixed(segment.first);
-    let (per_tick, per_second, angular) = (real(segment.per_tick), real(segment.per_second), real(segment.angular));
-    let phase = Literal::u64_unsuffixed(segment.phase);
-    let phase_step = Literal::u64_unsuffixed(segment.phase_step);
-    let axes = segment.axes.iter().map(|SegmentAxis { place, slope, sine, cosine }| {
-        let (place, slope) = (real(*place), real(*slope));
-        let (sine, cosine) = (literal::reals(scalar, sine), literal::reals(scalar, cosine));
-        quote! { Axis { place: #place, slope: #slope, sine: [#sine], cosine: [#cosine] } }
-    });
-    quote! {
-        Segment {
-            first: #first,
-            per_tick: #per_tick,
-            per_second: #per_second,
-            phase: #phase,
-            phase_step: #phase_step,
-            angular: #angular,
-            axes: [#(#axes),*],
         }
     }
 }

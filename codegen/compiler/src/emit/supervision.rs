@@ -2,7 +2,6 @@
 
 use proc_macro2::TokenStream;
 use quote::quote;
-use specgen_language::model::FaultAction;
 
 use super::literal;
 use crate::ir::{Ir, RateModel};
@@ -11,23 +10,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let s = &ir.supervision;
     let real = |value| literal::real(ir.scalar, value);
     let count = |value: u32| literal::count(value as usize);
-    let counts = |values: &[u32]| {
-        let values = counts_in(values);
-        quote! { [#values] }
-    };
-    let (arm_ticks, rest) = (count(s.arm_ticks), literal::integer(s.rest));
-    let (ramp_step, ramp_every) = (literal::integer(s.ramp_step), count(s.ramp_every));
     let (host_ticks, stall_ticks) = (count(s.host_ticks), count(s.stall_ticks));
-    let (timeout, weight) = (counts(&s.timeout), counts(&s.weight));
-    let (stuck_motion, stuck_samples) = (real(s.stuck_motion), count(s.stuck_samples));
-    let (disagreement, disagreement_samples) = (real(s.disagreement), count(s.disagreement_samples));
-    let (tracking, tracking_samples) = (literal::reals(ir.scalar, &s.tracking), count(s.tracking_samples));
-    let (leap, repeats) = (literal::reals(ir.scalar, &s.leap), count(s.repeats));
-    let steadiness = &s.steadiness;
-    let per_limit = literal::reals(ir.scalar, &steadiness.per_limit);
-    let [follow, motion] = [steadiness.follow, steadiness.motion].map(real);
-    let [keep_explained, keep_fallen] = [steadiness.keep, steadiness.keep_fallen].map(real);
-    let [one_way, first, next] = [steadiness.one_way, steadiness.first, steadiness.next].map(count);
+    let supervision = literal::constant!(ir.scalar, supervision, s);
     let of_kind = match &s.readings_per_leg {
         Some(rows) => {
             let rows = literal::matrix(ir.scalar, rows);
@@ -53,13 +37,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
             }
         }
     };
-    let amplifier_fault = match s.amplifier_fault {
-        FaultAction::Off => quote! { Off },
-        FaultAction::RampDown => quote! { RampDown },
-        FaultAction::Hold => quote! { Hold },
-    };
     let at_rest = at_rest(ir);
-    let wiring = wiring(ir);
     let alike = s.wiring.iter().flat_map(|wiring| &wiring.alike).map(|set| counts_in(set));
     let uses = s.wiring.is_some().then(|| quote! { , Wiring });
     let limits = s.risen.is_none().then(|| quote! { , limits });
@@ -67,41 +45,14 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![doc = " What the supervisor takes for a fault; from `supervisor`."]
 
         use specgen_law::Reset;
-        use specgen_runtime::supervisor::{Reaction, Steadiness, Supervision #uses};
+        use specgen_runtime::supervisor::{Steadiness, Supervision #uses};
 
         use crate::identity::Constants;
         use crate::hysteresis::Memory;
         use crate::{Real #limits};
 
         /// Bounds and times, these in ticks, or in samples of six ticks.
-        pub const SUPERVISION: Supervision<Real> = Supervision {
-            arm_ticks: #arm_ticks,
-            rest: #rest,
-            ramp_step: #ramp_step,
-            ramp_every: #ramp_every,
-            timeout: #timeout,
-            weight: #weight,
-            stuck_motion: #stuck_motion,
-            stuck_samples: #stuck_samples,
-            disagreement: #disagreement,
-            disagreement_samples: #disagreement_samples,
-            tracking: [#tracking],
-            tracking_samples: #tracking_samples,
-            leap: [#leap],
-            repeats: #repeats,
-            steadiness: Steadiness {
-                per_limit: [#per_limit],
-                follow: #follow,
-                motion: #motion,
-                keep: #keep_explained,
-                keep_fallen: #keep_fallen,
-                one_way: #one_way,
-                first: #first,
-                next: #next,
-            },
-            amplifier_fault: Reaction::#amplifier_fault,
-            wiring: #wiring,
-        };
+        pub const SUPERVISION: Supervision<Real> = #supervision;
         /// Sets of single faults that look alike to the wiring check, as words of `Finding`.
         pub const LOOK_ALIKE: &[&[u32]] = &[#(&[#alike]),*];
         /// Ticks without a request over a link after which its host is lost; from `supervisor.host_lost`.
@@ -117,39 +68,6 @@ pub fn emit(ir: &Ir) -> TokenStream {
 fn counts_in(words: &[u32]) -> TokenStream {
     let words = words.iter().map(|word| literal::count(*word as usize));
     quote! { #(#words),* }
-}
-
-/// The wiring check.
-fn wiring(ir: &Ir) -> TokenStream {
-    let Some(wiring) = &ir.supervision.wiring else { return quote! { None } };
-    let reals = |values: &[f64]| {
-        let values = literal::reals(ir.scalar, values);
-        quote! { [#values] }
-    };
-    let (ticks, height) = (literal::count(wiring.ticks as usize), literal::integer(wiring.height));
-    let [pulse, mains] = wiring.turn.map(|turn| reals(&turn));
-    let (lag, weights, per_metre) = (reals(&wiring.lag), reals(&wiring.weights), reals(&wiring.per_metre));
-    let (gauge_gain, residual) = (reals(&wiring.gauge_gain), literal::real(ir.scalar, wiring.residual));
-    let leg_gain = match &wiring.leg_gain {
-        Some(range) => {
-            let range = reals(range);
-            quote! { Some(#range) }
-        }
-        None => quote! { None },
-    };
-    quote! {
-        Some(Wiring {
-            ticks: #ticks,
-            height: #height,
-            turn: [#pulse, #mains],
-            lag: #lag,
-            weights: #weights,
-            per_metre: #per_metre,
-            gauge_gain: #gauge_gain,
-            leg_gain: #leg_gain,
-            residual: #residual,
-        })
-    }
 }
 
 /// How legs stand at reset, which is at rest. One for all where they rest at the lowest voltage, at which every history is

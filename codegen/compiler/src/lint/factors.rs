@@ -3,7 +3,7 @@
 use core::ops::RangeInclusive;
 
 use super::{Facts, Found, figure, times_beyond};
-use crate::lower::supervision::{defaults, samples};
+use crate::lower::supervision::{defaults, samples, steadiness};
 use specgen_language::diagnostic::{Diagnostic, Severity, codes};
 
 /// A value over its default: a slip of a thousand lies far outside, whatever has its reason well inside.
@@ -49,6 +49,7 @@ fn pairs(facts: &Facts) -> Vec<Pair> {
         of("stuck_motion", spec.stuck_motion, defaults::stuck_motion(model, step), ("nm", 1e9), NEAR_DEFAULT),
         of("disagreement", spec.disagreement, defaults::disagreement(model), ("um", 1e6), PART_OF_WHOLE),
         of("leap", spec.leap, samples::of_one_leg(model), ("um", 1e6), NEAR_DEFAULT),
+        of("disturbance", spec.disturbance, steadiness::usual(model), ("nm", 1e9), NEAR_DEFAULT),
         of("missed_ticks", Some(f64::from(spec.missed_ticks)), 3.0, ("ticks", 1.0), NEAR_DEFAULT),
         of("missed_in_a_row", Some(f64::from(spec.missed_in_a_row)), 100.0, ("ticks", 1.0), NEAR_DEFAULT),
         of("tracking_error", Some(spec.tracking_error), 0.2, ("", 1.0), PART_OF_WHOLE),

@@ -3,7 +3,7 @@
 pub(crate) mod defaults;
 mod rest;
 pub(crate) mod samples;
-mod steadiness;
+pub(crate) mod steadiness;
 mod wiring;
 
 pub(crate) use steadiness::LOWEST as LOWEST_SWING;

@@ -185,6 +185,7 @@ codes! {
     SUPERVISOR_REST = "E0473";
     GAUGE_INPUT = "E0474";
     INPUT_WITHOUT_CALIBRATION = "E0475";
+    WIRING_BOUNDS = "E0476";
 
     // Records.
     RECORD_IO = "E0501";

@@ -9,6 +9,10 @@ pub const LARGEST_PULSE: f64 = 0.02;
 const TIMEOUT: Shape = one(Dimension::TIME, Range::closed(1e-6, LONGEST_TIMEOUT), "ms");
 const SILENCE: Item = item(Dimension::TIME, Range::closed(1e-6, 3600.0), "ms");
 const FACTORS: Shape = Shape::List(&[RATIO; 2]);
+/// A fault-free machine shows 0.9 to 1.11, a gauge of half or twice its gain 0.61 or 1.5 at the nearest.
+const GAUGE_GAIN: &[Item] = &[Item::Number(Range::closed(0.62, 0.9)), Item::Number(Range::closed(1.11, 1.5))];
+/// Alike legs show 0.74 to 1.35, those with records of their own 0.85 to 1.15, a leg of half or twice its gain 0.68 or 1.48 at the nearest.
+const LEG_GAIN: &[Item] = &[Item::Number(Range::closed(0.68, 0.85)), Item::Number(Range::closed(1.15, 1.48))];
 
 section! {
     /// What the supervisor in the controller takes for a fault, and for how long it must last; docs/supervisor.md. Gauges are looked at in turn, one a tick.
@@ -92,13 +96,13 @@ section! {
         /// Time of a pulse, one leg after the other.
         time: Option<f64> = TIMEOUT, Rule("50 ms, at least 40 periods and what the slew rate takes, up to 200 ms where the noise of the gauges asks for it"), "" ["duration"], "50 ms";
         /// Smallest and largest gain of a gauge over the median of all six.
-        gauge_gain: [f64; 2] = list(&[RATIO; 2]), Default([0.75, 1.33]), "", [0.75, 1.33];
-        /// Smallest and largest gain of a leg over the mean of the five others. With six records each is held against its own.
-        leg_gain: [f64; 2] = list(&[RATIO; 2]), Default([0.7, 1.43]), "", [0.7, 1.43];
+        gauge_gain: [f64; 2] = list(GAUGE_GAIN), Default([0.75, 1.33]), "", [0.75, 1.33];
+        /// Smallest and largest gain of a leg over the mean of the five others. With six records each is held against its own; with one the range must contain 0.74 to 1.35, as legs of one make differ by 15 %.
+        leg_gain: [f64; 2] = list(LEG_GAIN), Default([0.7, 1.43]), "", [0.7, 1.43];
         /// Whether legs are of one make. The gains of legs of different makes are not tested while one record stands for all.
         legs: LegMakes = one_of(LegMakes::WORDS), Default("alike"), "" ["makes"], "alike";
-        /// Largest part of what the gauges show that no gains of gauges and legs explain.
-        residual: f64 = number(Range::open(0.0, 0.3)), Default(0.1), "", 0.1;
+        /// Largest part of what the gauges show that no gains of gauges and legs explain; a fault-free machine leaves 0.04.
+        residual: f64 = number(Range::closed(0.05, 0.2)), Default(0.1), "", 0.1;
     }
 }
 

@@ -162,7 +162,11 @@ impl ValueReader<'_> {
             Item::Quantity { .. } => self.quantity(item, path, value).map(Scalar::Number),
             Item::Number(range) => {
                 let number = self.plain_number(path, value)?;
-                self.in_range(range.contains(number), item, path, value, &text::number(number))?;
+                // With all its digits where a rounded one would be in range.
+                let short = text::number(number);
+                let misleads = short.parse().is_ok_and(|short| range.contains(short));
+                let shown = if misleads { number.to_string() } else { short };
+                self.in_range(range.contains(number), item, path, value, &shown)?;
                 Some(Scalar::Number(number))
             }
             Item::Integer(min, max) => {

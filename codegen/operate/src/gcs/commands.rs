@@ -125,7 +125,6 @@ fn mask(count: usize) -> String {
 }
 
 fn stop<P: Port>(stage: &mut Stage<P>) -> Outcome {
-    stage.refresh()?;
     stage.stop()?;
     Err(Code::Stopped.into())
 }

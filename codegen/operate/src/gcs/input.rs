@@ -8,6 +8,8 @@ const LONGEST: usize = 512;
 const ROOM: usize = 1 << 22;
 /// What a command takes beside its letters, bytes.
 const PIECE: usize = 32;
+/// Moves that are passed over at once.
+const SKIPPED: usize = 1 << 10;
 /// Bytes that are commands by themselves: position, status, motion, ready, macros, wave generator, stop.
 const SINGLE: [u8; 7] = [3, 4, 5, 7, 8, 9, STOP];
 /// Stops all axes.
@@ -67,10 +69,14 @@ pub(super) struct Input {
     skips: bool,
     /// The line began before a stop of another client.
     is_late: bool,
+    /// The last stop, and the last time that the servo was switched off: they come first.
+    stops: Vec<Piece>,
     pieces: VecDeque<Piece>,
+    /// So many of the first pieces were sent before a stop: those of them that would move are taken away when their turn comes.
+    before_stop: usize,
     /// Something that would move was taken away.
     has_dropped: bool,
-    /// What they take, as [`ROOM`] counts.
+    /// What the pieces take, as [`ROOM`] counts.
     size: usize,
 }
 
@@ -112,27 +118,42 @@ impl Input {
     fn add(&mut self, piece: Piece, may_order: bool) -> bool {
         if piece.is_stop() || may_order && piece.is_off() {
             self.drop_moves();
-            self.pieces.retain(|piece| !piece.is_stop());
-            self.pieces.push_front(piece);
-            self.size = self.pieces.iter().map(Piece::size).sum();
+            self.stops.retain(|before| before.is_stop() != piece.is_stop());
+            self.stops.insert(0, piece);
             return true;
         }
         if self.size < ROOM {
             self.size += piece.size();
             self.pieces.push_back(piece);
         } else if let Some(last) = self.pieces.back_mut() {
+            self.size -= last.size() - PIECE;
             *last = Piece::TooLong;
         }
         false
     }
 
-    /// Takes away what would move, the line that is coming in, too.
+    /// Takes away what would move, the line that is coming in, too. However much waits, this takes no time: see [`Input::skip`].
     pub(super) fn drop_moves(&mut self) {
-        let before = self.pieces.len();
-        self.pieces.retain(|piece| !piece.is_move());
-        self.size = self.pieces.iter().map(Piece::size).sum();
+        self.before_stop = self.pieces.len();
         self.is_late = !self.line.is_empty();
-        self.has_dropped |= self.pieces.len() < before;
+    }
+
+    /// Passes over moves that a stop has taken away, so many at once; whether the command whose turn it is may be carried out.
+    pub(super) fn skip(&mut self) -> bool {
+        for _ in 0..SKIPPED {
+            let is_dropped = self.stops.is_empty() && self.before_stop > 0 && self.first().is_some_and(Piece::is_move);
+            if !is_dropped {
+                return true;
+            }
+            self.done();
+            self.has_dropped = true;
+        }
+        false
+    }
+
+    /// Whether a stop waits, or the servo is to be switched off.
+    pub(super) fn has_stop(&self) -> bool {
+        !self.stops.is_empty()
     }
 
     /// Whether anything was taken away since this was called last.
@@ -142,13 +163,16 @@ impl Input {
 
     /// The command whose turn it is.
     pub(super) fn first(&self) -> Option<&Piece> {
-        self.pieces.front()
+        self.stops.first().or(self.pieces.front())
     }
 
     /// It is done with.
     pub(super) fn done(&mut self) {
-        if let Some(piece) = self.pieces.pop_front() {
+        if !self.stops.is_empty() {
+            self.stops.remove(0);
+        } else if let Some(piece) = self.pieces.pop_front() {
             self.size -= piece.size();
+            self.before_stop = self.before_stop.saturating_sub(1);
         }
     }
 }
@@ -157,10 +181,15 @@ impl Input {
 mod tests {
     use super::*;
 
+    fn first(input: &mut Input) -> Option<Piece> {
+        while !input.skip() {}
+        input.first().cloned()
+    }
+
     fn all(mut input: Input) -> Vec<Piece> {
         let mut found = Vec::new();
-        while let Some(piece) = input.first() {
-            found.push(piece.clone());
+        while let Some(piece) = first(&mut input) {
+            found.push(piece);
             input.done();
         }
         assert_eq!(input.size, 0);

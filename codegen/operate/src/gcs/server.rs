@@ -1,6 +1,10 @@
 //! Clients over TCP: many may ask, one has the orders, any may stop the machine, and none keeps it waiting.
 //!
-//! Before an order is carried out everything that has come in is read, of every client: a stop among it overtakes all of it.
+//! ```text
+//! round: look at the machine, if it is due ─► read a part from each client ─► stops ─► commands, one of each client in turn
+//! ```
+//! A round takes milliseconds, whatever clients send. A stop is carried out in the round in which it is read. An order waits until
+//! everything that its client has sent was read: a stop among it overtakes all of it.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -25,14 +29,15 @@ const MOST: usize = 16;
 /// Clients beyond that may only stop the machine, until one of the others leaves or has to make room.
 const RESERVED: usize = 4;
 /// Connections that are taken in a round.
-const TAKEN: usize = 16;
-/// Bytes that are read from a client at once, and in a round.
-const PART: usize = 1 << 14;
-const ROUND: usize = 1 << 20;
-/// Bytes that are read from a client to find the end of what it sent before a stop.
-const DRAINED: usize = 1 << 26;
-/// Commands of a client that are carried out in a round.
+const TAKEN: usize = 4;
+/// Bytes that are read in a round from all clients together, and from each of them if they are many.
+const ROUND: usize = 1 << 15;
+const PART: usize = 1 << 12;
+/// Commands of a client that are carried out in a round, and how long those of all clients may take.
 const TURN: usize = 32;
+const SLICE: Duration = Duration::from_millis(2);
+/// So long before it is due the machine is looked at: a round may be under way.
+const EARLY: Duration = Duration::from_millis(5);
 /// Bytes that a client may leave unread before its commands wait.
 const UNREAD: usize = 1 << 16;
 /// How long a command may wait for a machine that comes up or to rest.
@@ -44,7 +49,7 @@ const SILENT: Duration = Duration::from_secs(5);
 /// A connection without a sign of life for so long is looked after, and closed if it stays so for as long again.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// What comes from a client after a stop of another was sent before it, until the client pauses for so long or has been told, and for so
-/// long at most.
+/// long at most once everything that it has sent was read.
 const PAUSE: Duration = Duration::from_millis(50);
 const LATE: Duration = Duration::from_secs(1);
 /// How long one that has closed its side may take to read.
@@ -56,6 +61,8 @@ struct Client {
     number: u64,
     stream: TcpStream,
     input: Input,
+    /// Everything that had come from it was read.
+    is_dry: bool,
     unsent: Vec<u8>,
     error: Option<Code>,
     /// When it last sent something.
@@ -83,6 +90,10 @@ pub struct Bridge<P> {
     owner: Option<Owner>,
     /// Clients so far.
     count: u64,
+    /// The client that was served last.
+    turn: usize,
+    /// Clients were heard since the last order.
+    has_heard: bool,
 }
 
 impl<P: Port> Bridge<P> {
@@ -92,7 +103,7 @@ impl<P: Port> Bridge<P> {
     /// What the system says.
     pub fn new(stage: Stage<P>, axes: Axes, listener: TcpListener) -> io::Result<Self> {
         listener.set_nonblocking(true)?;
-        Ok(Self { stage, axes, listener, clients: Vec::new(), owner: None, count: 0 })
+        Ok(Self { stage, axes, listener, clients: Vec::new(), owner: None, count: 0, turn: 0, has_heard: false })
     }
 
     /// Serves until `stop`. The machine is looked at in between, and told to `look` at.
@@ -103,17 +114,27 @@ impl<P: Port> Bridge<P> {
         while !stop.load(Ordering::Relaxed) {
             self.wait();
             self.accept()?;
-            if self.is_pressed() || self.stage.due().is_zero() {
-                self.stage.look()?;
-                look(self.stage.session());
-            }
-            self.hear()?;
+            self.look(&mut look)?;
+            self.hear();
             self.part();
-            for index in 0..self.clients.len() {
-                self.serve(index)?;
-            }
+            self.look(&mut look)?;
+            self.serve()?;
         }
         Ok(())
+    }
+
+    /// Looks at the machine if it is due, or something is under way.
+    fn look(&mut self, look: &mut impl FnMut(&Session<P>)) -> Result<(), ClientError> {
+        if self.due().is_zero() || self.is_pressed() && self.stage.age() >= SOON {
+            self.stage.look()?;
+        }
+        look(self.stage.session());
+        Ok(())
+    }
+
+    /// Time until the machine has to be looked at.
+    fn due(&self) -> Duration {
+        self.stage.due().saturating_sub(EARLY)
     }
 
     /// The machine as it is left.
@@ -128,20 +149,18 @@ impl<P: Port> Bridge<P> {
 
     /// Until a client sends something or takes what it is sent, or the machine has to be looked at.
     fn wait(&self) {
-        let due = self.stage.due();
-        let is_pressed = self.is_pressed();
+        let is_soon = self.is_pressed() || self.clients.iter().any(|client| !client.is_dry);
         let has_work = self.clients.iter().any(|client| client.waits.is_none() && client.is_ready());
-        let limit = if has_work {
-            Duration::ZERO
-        } else if is_pressed && due > SOON {
-            SOON
-        } else {
-            due
+        let limit = match self.due() {
+            _ if has_work => Duration::ZERO,
+            due if is_soon && due > SOON => SOON,
+            due => due,
         };
         let mut files = vec![PollFd::new(&self.listener, PollFlags::IN)];
         for client in &self.clients {
             let mut flags = PollFlags::empty();
-            if client.left.is_none() {
+            // One that sends more than is read in a round does not hurry the rounds.
+            if client.left.is_none() && client.is_dry {
                 flags |= PollFlags::IN;
             }
             if !client.unsent.is_empty() {
@@ -170,14 +189,18 @@ impl<P: Port> Bridge<P> {
             }
             if self.clients.len() >= MOST + RESERVED {
                 // It may have said what it came for.
-                self.hear()?;
-                self.clients.remove(MOST);
+                self.hear_from(MOST);
+                for _ in 0..TURN {
+                    self.carry_out(MOST)?;
+                }
+                self.clients.remove(MOST).write();
             }
             self.count += 1;
             self.clients.push(Client {
                 number: self.count,
                 stream,
                 input: Input::default(),
+                is_dry: false,
                 unsent: Vec::new(),
                 error: None,
                 heard: Instant::now(),
@@ -201,61 +224,83 @@ impl<P: Port> Bridge<P> {
         self.owner.as_ref().is_none_or(|owner| owner.number == number || owner.ordered.elapsed() >= IDLE)
     }
 
-    /// Takes what clients sent. A stop among it is carried out at once.
-    fn hear(&mut self) -> Result<(), ClientError> {
+    /// Takes a part of what each client sent.
+    fn hear(&mut self) {
         for index in 0..self.clients.len() {
-            let Some(client) = self.clients.get_mut(index) else { break };
-            let number = client.number;
-            let may_order = index < MOST && self.may_order(number);
-            if self.clients[index].read(ROUND, may_order) {
-                self.drop_moves(Some(number));
-                self.carry_out(index)?;
-            }
+            self.hear_from(index);
         }
-        Ok(())
+        self.has_heard = true;
+    }
+
+    fn hear_from(&mut self, index: usize) {
+        let number = self.clients[index].number;
+        let may_order = index < MOST && self.may_order(number);
+        let most = (ROUND / self.clients.len()).max(PART);
+        if self.clients[index].read(most, may_order) {
+            self.stage.must_stop();
+            self.drop_moves(Some(number));
+        }
     }
 
     /// What clients sent until now moves nothing any more, in whatever buffer it is; `by` the one who stopped the machine only what it
     /// sent before that.
     fn drop_moves(&mut self, by: Option<u64>) {
-        let mut stopped_again = false;
         for client in self.clients.iter_mut().filter(|client| Some(client.number) != by) {
-            stopped_again |= client.read(DRAINED, false);
-            client.drop_moves();
-            client.late = Some(Instant::now());
-        }
-        if stopped_again {
-            self.clients.iter_mut().for_each(Client::drop_moves);
+            client.input.drop_moves();
+            (client.late, client.is_dry) = (Some(Instant::now()), false);
         }
     }
 
-    /// Carries out some of what a client sent.
-    fn serve(&mut self, index: usize) -> Result<(), ClientError> {
-        for _ in 0..TURN {
-            if self.clients.get(index).and_then(|client| client.input.first()).is_some_and(Piece::is_order) {
-                // It may have been overtaken.
-                self.hear()?;
-                self.stage.refresh()?;
+    /// Whether another than a client has stopped the machine.
+    fn was_stopped(&mut self) -> bool {
+        let was_stopped = self.stage.was_stopped();
+        if was_stopped {
+            self.drop_moves(None);
+        }
+        was_stopped
+    }
+
+    /// Carries out some of what clients sent: stops, then one command of each client in turn until the time is up.
+    fn serve(&mut self) -> Result<(), ClientError> {
+        let (start, count) = (Instant::now(), self.clients.len());
+        self.was_stopped();
+        for index in 0..count {
+            if self.clients[index].input.has_stop() {
+                self.carry_out(index)?;
             }
-            if self.stage.was_stopped() {
-                self.drop_moves(None);
-            }
-            if !self.carry_out(index)? {
+        }
+        let mut idle = 0;
+        for _ in 0..TURN * count {
+            self.turn = (self.turn + 1) % count;
+            idle = if self.carry_out(self.turn)? { 0 } else { idle + 1 };
+            if idle == count || start.elapsed() >= SLICE {
                 break;
             }
         }
-        if let Some(client) = self.clients.get_mut(index) {
-            client.write();
-        }
+        self.clients.iter_mut().for_each(Client::write);
         Ok(())
     }
 
     /// Carries out the command whose turn it is; whether there was one that does not have to wait.
     fn carry_out(&mut self, index: usize) -> Result<bool, ClientError> {
-        let Some(client) = self.clients.get(index).filter(|client| client.is_ready()) else { return Ok(false) };
-        let Some(piece) = client.input.first().cloned() else { return Ok(false) };
+        if !self.clients[index].skip() {
+            return Ok(true);
+        }
+        let client = &self.clients[index];
+        let Some(piece) = client.input.first().filter(|_| client.is_ready()).cloned() else { return Ok(false) };
         let may_order = self.may_order(client.number);
-        let Some(client) = self.clients.get_mut(index) else { return Ok(false) };
+        if may_order && piece.is_order() && !client.input.has_stop() {
+            // It may have been overtaken.
+            if !self.has_heard {
+                return Ok(false);
+            }
+            self.stage.refresh()?;
+            if self.was_stopped() {
+                return Ok(false);
+            }
+            self.has_heard = false;
+        }
+        let client = &mut self.clients[index];
         let is_crowd = index >= MOST && !piece.is_stop() && piece != Piece::Line("ERR?".to_owned());
         let mut asked = Asked { axes: &self.axes, error: &mut client.error, may_order };
         let done = if is_crowd { Err(Code::NotNow.into()) } else { execute(&mut self.stage, &mut asked, &piece) };
@@ -275,7 +320,7 @@ impl<P: Port> Bridge<P> {
         }
         client.waits = None;
         client.input.done();
-        if client.error.is_none() && client.input.first().is_none() {
+        if client.error.is_none() && client.is_dry && client.input.first().is_none() {
             client.late = None;
         }
         Ok(true)
@@ -302,9 +347,10 @@ fn prepare(stream: &TcpStream) -> io::Result<()> {
 }
 
 impl Client {
-    /// Whether a command of it may be carried out: it reads what it is answered.
+    /// Whether a command of it may be carried out: it reads what it is answered, and no stop can be behind an order of it.
     fn is_ready(&self) -> bool {
-        self.input.first().is_some_and(|piece| piece.is_stop() || self.unsent.len() < UNREAD)
+        let may = |piece: &Piece| self.unsent.len() < UNREAD && (self.is_dry || !piece.is_order());
+        self.input.has_stop() || self.input.first().is_some_and(may)
     }
 
     /// Whether there is anything left to do for it. One that only listens gets its answers.
@@ -317,37 +363,38 @@ impl Client {
         self.left.get_or_insert_with(Instant::now);
     }
 
-    /// Takes what it sent, at most about so many bytes; whether a stop is among it.
+    /// Takes at most so many bytes of what it sent; whether a stop is among them.
     fn read(&mut self, most: usize, may_order: bool) -> bool {
-        let (mut bytes, mut taken, mut stops) = ([0; PART], 0, false);
-        while self.left.is_none() && taken < most {
-            match self.stream.read(&mut bytes) {
+        let (mut bytes, mut taken, mut stops) = ([0; ROUND], 0, false);
+        if self.left.is_none() {
+            match self.stream.read(&mut bytes[..most]) {
                 Ok(0) => self.leave(),
                 Ok(count) => {
-                    taken += count;
-                    stops |= self.input.push(&bytes[..count], may_order);
+                    taken = count;
+                    self.heard = Instant::now();
+                    stops = self.input.push(&bytes[..count], may_order);
+                    self.acknowledge();
                 }
-                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
                 Err(_) => self.leave(),
             }
         }
-        if taken > 0 {
-            self.heard = Instant::now();
-            self.acknowledge();
-        }
+        let is_dry = taken < most;
+        self.is_dry = is_dry;
         let has_paused = taken == 0 && self.heard.elapsed() >= PAUSE;
-        self.late.take_if(|since| has_paused || since.elapsed() >= LATE);
+        self.late.take_if(|since| has_paused || is_dry && since.elapsed() >= LATE);
         if self.late.is_some() && !stops {
-            self.drop_moves();
+            self.input.drop_moves();
         }
         self.tell_dropped();
         stops
     }
 
-    fn drop_moves(&mut self) {
-        self.input.drop_moves();
+    /// Passes over what a stop has taken away; false if there is more of it.
+    fn skip(&mut self) -> bool {
+        let is_over = self.input.skip();
         self.tell_dropped();
+        is_over
     }
 
     fn tell_dropped(&mut self) {

@@ -46,6 +46,8 @@ pub struct Stage<P> {
     goes_down: bool,
     /// It runs no more, or comes up no further, and that was not asked for here.
     stopped: bool,
+    /// The last stop that clients sent was carried out.
+    has_halted: bool,
     /// Its tool point is the pivot point of clients: they see it move.
     frame: Frame,
     /// What went wrong after the command that asked for it had been taken.
@@ -105,6 +107,7 @@ impl<P: Port> Stage<P> {
             to_bias: place.status & BUSY != 0,
             goes_down: false,
             stopped: false,
+            has_halted: false,
             frame: Frame::default(),
             mishap: None,
         })
@@ -176,6 +179,11 @@ impl<P: Port> Stage<P> {
             return Ok(());
         }
         self.look()
+    }
+
+    /// Time since it was asked where it is.
+    pub(super) fn age(&self) -> Duration {
+        self.seen.elapsed()
     }
 
     /// Asks where it is, and goes on with what is under way. Keeps the link alive.
@@ -284,8 +292,23 @@ impl<P: Port> Stage<P> {
         Ok(self.ask(Request::RampDown)?)
     }
 
-    /// Stops, within the limits of stops, whoever has the orders. A machine that comes up comes no further, and its servo is off then.
+    /// A client has sent a stop: the next one is carried out.
+    pub(super) fn must_stop(&mut self) {
+        self.has_halted = false;
+    }
+
+    /// Stops, once for all stops that had been sent by then, whoever has the orders.
     pub(super) fn stop(&mut self) -> Result<(), No> {
+        if !self.has_halted {
+            self.refresh()?;
+            self.come_to_rest()?;
+            self.has_halted = true;
+        }
+        Ok(())
+    }
+
+    /// Within the limits of stops. A machine that comes up comes no further, and its servo is off then.
+    fn come_to_rest(&mut self) -> Result<(), No> {
         let rises = self.rising.take().is_some();
         let request = match self.phase() {
             Some(Phase::Running) if !self.to_bias => None,

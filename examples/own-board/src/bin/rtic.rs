@@ -7,7 +7,7 @@ use own_board::machine::stop;
 
 #[rtic::app(device = embassy_stm32, peripherals = false)]
 mod app {
-    use controller::supervised::machine_at_reset;
+    use controller::supervised::{Machine, machine_at_reset};
     use embassy_stm32::interrupt::{self, InterruptExt, Priority};
     use own_board::machine::{Link, RECORD, Running, start, stop};
     use specgen_board::Kept;

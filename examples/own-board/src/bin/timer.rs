@@ -4,7 +4,7 @@
 
 use core::cell::RefCell;
 
-use controller::supervised::machine_at_reset;
+use controller::supervised::{Machine, machine_at_reset};
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use critical_section::Mutex;
 use embassy_stm32::interrupt;

@@ -110,7 +110,10 @@ fn what_is_refused_changes_nothing() {
 #[test]
 fn settings_go_in_and_come_out() {
     let mut bench = Bench::new();
-    let mode = Config::new().with_mode(controller::ControlMode::from_word(0).unwrap()).to_words();
+    let mode = Config::new()
+        .with(|settings| settings.mode = controller::ControlMode::from_word(0).unwrap())
+        .unwrap()
+        .to_words();
     assert_ne!(mode, bench.exchange.settings().to_words());
     bench.expect(&Request::WriteConfig { words: Bytes(&bytes(&mode)) }, Reply::Done);
     assert_eq!(bench.exchange.settings().to_words(), mode);

@@ -70,7 +70,7 @@ fn a_lock_step_computes_what_the_host_computes_and_moves_nothing() {
     line.with(|rig| rig.pace = 1);
     client.ask(&Request::Status).unwrap();
     let at_rest = line.parts(|parts| parts.written).unwrap();
-    let config = Config::new().with_mode(ControlMode::from_word(3).unwrap());
+    let config = Config::new().with(|settings| settings.mode = ControlMode::from_word(3).unwrap()).unwrap();
     let words = bytes(&config.to_words());
     assert_eq!(words.len(), CONFIG_WORDS * 8);
     done(&mut client, &Request::LockstepReset { config: Bytes(&words) });

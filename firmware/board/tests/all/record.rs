@@ -79,7 +79,7 @@ fn a_record_is_downloaded_as_the_bytes_of_its_file() {
     let mut known = Known::new();
     ticks(&line, 600, &mut known);
     // Other settings in the middle.
-    let config = Config::new().with_mode(ControlMode::from_word(5).unwrap()).to_words();
+    let config = Config::new().with(|settings| settings.mode = ControlMode::from_word(5).unwrap()).unwrap().to_words();
     done(&mut client, &Request::WriteConfig { words: Bytes(&bytes(&config)) });
     ticks(&line, 100, &mut known);
     line.with(|rig| assert_eq!(rig.exchange.config.to_words(), config));

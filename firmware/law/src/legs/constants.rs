@@ -16,8 +16,6 @@ pub trait SixLegs: Spec<Law = LegSpace> {
     fn lead(&self) -> Self::Real;
     /// Most that it adds to a demand, m.
     fn lead_limit(&self) -> Self::Real;
-    /// Lowest and highest reading that is believed, m.
-    fn gauge(&self) -> &[Self::Real; 2];
     /// Lowest and highest displacement that is accepted as a set-point, m.
     fn leg_setpoint(&self) -> &[Self::Real; 2];
     /// ρ̂ of a leg, m/V.

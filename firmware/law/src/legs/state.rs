@@ -5,6 +5,7 @@ use specgen_runtime::{Digest, Estimate, Real as _};
 
 use super::constants::SixLegs;
 use super::lead::DeadTimeLead as _;
+use crate::memory::LegMemory as _;
 use crate::spec::{LEGS, Reset};
 
 specgen_runtime::state! { |words|
@@ -33,6 +34,18 @@ specgen_runtime::state! { |words|
         pub demand: [P::Real; LEGS] = [P::Real::ZERO; LEGS], numbers(words.sizes().leg);
         /// Ticks since the last run ended.
         pub ticks_in_run: u32 = 0, tally;
+    }
+}
+
+impl<P: SixLegs> LegState<P> {
+    /// ρ̂X, m: what the leg is to show. The lead is no part of it: the leg is asked for it so that it arrives in time.
+    #[inline]
+    #[must_use]
+    pub fn shown(&self) -> P::Real {
+        match self.lead.asked() {
+            Some(lead) => self.memory.displacement() - lead,
+            None => self.memory.displacement(),
+        }
     }
 }
 

@@ -3,26 +3,20 @@
 //! At time t_n the interval that voltage u_n was held over has just ended and Y_n is read; the set-point is that of the
 //! END of the interval that begins now, T_{n+1}, and the voltages that come out are held over it.
 
-use specgen_runtime::linear::each;
+use specgen_runtime::linear::is_within;
 use specgen_runtime::real::saturate;
+use specgen_runtime::sensing::faults;
 use specgen_runtime::supervisor::Fallback;
 use specgen_runtime::{Law, SetpointKind};
 
-use super::config::Config;
 use super::constants::SixLegs;
 use super::lead::DeadTimeLead as _;
-use super::sensing::{gauge_is_accepted, leg_setpoint_is_accepted};
 use super::state::{LegState, State};
-use super::tick::{TickInput, TickOutput};
-use crate::kinematics::{leg_displacements, pose_is_accepted};
+use super::tick::TickInput;
+use crate::kinematics::leg_displacements;
 use crate::memory::LegMemory as _;
+use crate::spec::{Config, LEGS};
 use crate::status::SETPOINT_FAULT;
-
-/// One control tick. See the module for the timing.
-pub fn step<P: SixLegs>(p: P, config: &Config<P>, state: &mut State<P>, input: &TickInput<P>) -> TickOutput<P> {
-    let status = advance(p, config, state, Fallback::None, input);
-    outputs(p, state, status)
-}
 
 /// The work of a tick of the law, or of what it has fallen back to; returns its status.
 pub fn advance<P: SixLegs>(
@@ -35,47 +29,26 @@ pub fn advance<P: SixLegs>(
     let demand_before = state.demand;
     let accepted = take_setpoint(p, config, state, input);
     let run_ends = count_run(config, state);
-    let mut status = if accepted { 0 } else { SETPOINT_FAULT };
+    let faults = faults(&input.displacement, p.raw_limits());
+    let mut status = faults << 8 | if accepted { 0 } else { SETPOINT_FAULT };
     for (index, (leg, table)) in state.legs.iter_mut().zip(p.tables()).enumerate() {
-        let gauge = input.displacement[index];
-        let gauge_good = gauge_is_accepted(p, gauge);
-        if config.law() == Law::Invhys || (run_ends && gauge_good) {
-            adapt(config, leg, fallback, gauge);
+        if config.law == Law::Invhys || (run_ends && (faults >> index) & 1 == 0) {
+            adapt(config, leg, fallback, input.displacement[index]);
         }
         leg.lead
             .ask(|| saturate((state.demand[index] - demand_before[index]) * p.lead(), -p.lead_limit(), p.lead_limit()));
         let limited = actuate(p, config, leg, table, state.demand[index]);
-        status |= (limited as u32) << index
-            | (!gauge_good as u32) << (8 + index)
-            | (leg.memory.fell_back() as u32) << (24 + index);
+        status |= (limited as u32) << index | (leg.memory.fell_back() as u32) << (24 + index);
     }
     status
-}
-
-/// What goes out, and what the state is that the tick left.
-#[inline]
-pub fn outputs<P: SixLegs>(p: P, state: &State<P>, status: u32) -> TickOutput<P> {
-    let legs = &state.legs;
-    TickOutput {
-        voltage: each(|leg| p.dac().voltage(legs[leg].code)),
-        requested: each(|leg| shown(&legs[leg])),
-        demand: state.demand,
-        level: each(|leg| legs[leg].estimate.level),
-        drift: each(|leg| legs[leg].estimate.drift),
-        dac_code: each(|leg| legs[leg].code),
-        status,
-    }
 }
 
 /// T = Δl(h_d), or T itself. A set-point that is not accepted leaves the last demand standing.
 #[inline]
 pub fn take_setpoint<P: SixLegs>(p: P, config: &Config<P>, state: &mut State<P>, input: &TickInput<P>) -> bool {
-    let accepted = match config.setpoint() {
-        SetpointKind::Pose => pose_is_accepted(p, &input.setpoint),
-        SetpointKind::Leg => leg_setpoint_is_accepted(p, &input.setpoint),
-    };
+    let accepted = is_accepted(p, config, &input.setpoint);
     if accepted {
-        state.demand = match config.setpoint() {
+        state.demand = match config.setpoint {
             SetpointKind::Pose => leg_displacements(p, &input.setpoint),
             SetpointKind::Leg => input.setpoint,
         };
@@ -83,31 +56,31 @@ pub fn take_setpoint<P: SixLegs>(p: P, config: &Config<P>, state: &mut State<P>,
     accepted
 }
 
+/// Every number of a set-point is finite, and within the declared workspace or the legs' range.
+#[inline]
+pub fn is_accepted<P: SixLegs>(p: P, config: &Config<P>, setpoint: &[P::Real; LEGS]) -> bool {
+    match config.setpoint {
+        SetpointKind::Pose => is_within(setpoint, p.pose_bound()),
+        SetpointKind::Leg => setpoint.iter().all(|value| (p.leg_setpoint()[0]..=p.leg_setpoint()[1]).contains(value)),
+    }
+}
+
 /// Whether a run of `run_interval` ticks ends with this reading.
 #[inline]
 fn count_run<P: SixLegs>(config: &Config<P>, state: &mut State<P>) -> bool {
     let ticks = state.ticks_in_run.saturating_add(1);
-    let ends = ticks >= config.run_interval();
+    let ends = ticks >= config.run_interval;
     state.ticks_in_run = if ends { 0 } else { ticks };
     ends
-}
-
-/// ρ̂X, m: what the leg is to show. The lead is no part of it: the leg is asked for it so that it arrives in time.
-#[inline]
-fn shown<P: SixLegs>(leg: &LegState<P>) -> P::Real {
-    match leg.lead.asked() {
-        Some(lead) => leg.memory.displacement() - lead,
-        None => leg.memory.displacement(),
-    }
 }
 
 /// m = Y − ρ̂X, then (AII.3) or (AII.5), (AII.6), with what the fallback leaves of the weights.
 #[inline]
 fn adapt<P: SixLegs>(config: &Config<P>, leg: &mut LegState<P>, fallback: Fallback, gauge: P::Real) {
-    let model_error = gauge - shown(leg);
+    let model_error = gauge - leg.shown();
     let share: P::Real = fallback.share();
-    let (level, drift) = (config.level_weight() * share, config.drift_weight() * share);
-    leg.estimate.update(config.law(), level, drift, model_error);
+    let (level, drift) = (config.level_weight * share, config.drift_weight * share);
+    leg.estimate.update(config.law, level, drift, model_error);
 }
 
 /// u = Γ⁻¹(T − δ̂ − φ̂) as a permitted code; the memory then holds what that code really requests. Returns whether a
@@ -121,7 +94,7 @@ pub fn actuate<P: SixLegs>(p: P, config: &Config<P>, leg: &mut LegState<P>, tabl
     let request = led - leg.estimate.correction();
     let out_of_reach = !leg.memory.reaches(table, request);
     let drive = leg.memory.solve(table, request);
-    let (code, held_back) = p.dac().code(drive, leg.code, config.code_limits());
+    let (code, held_back) = p.dac().code(drive, leg.code, config.code_limits);
     leg.code = code;
     leg.memory.apply(table, p.dac().drive(code));
     out_of_reach || held_back

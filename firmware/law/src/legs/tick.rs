@@ -6,8 +6,8 @@ use specgen_runtime::snapshot::Writer;
 
 use super::constants::SixLegs;
 use super::state::State;
-use crate::spec::{Compiled, LEGS};
-use crate::words::{WordArray as _, names, six};
+use crate::spec::{Compiled, Input, LEGS, TickOutput};
+use crate::words::{names, six};
 
 /// Words of a tick's input.
 pub const INPUT_WORDS: usize = 12;
@@ -32,48 +32,35 @@ pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] =
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TickInput<P: SixLegs> {
     /// Set-point for the end of the coming interval: pose from rest (m, rad) or leg displacements (m), as
-    /// [`Config::setpoint`](super::Config::setpoint) says.
+    /// [`Settings::setpoint`](super::Settings::setpoint) says.
     pub setpoint: [P::Real; 6],
     /// Gauge reading Y of each leg, m, zero at rest.
     pub displacement: [P::Real; LEGS],
 }
 
-/// What a tick yields. Every number is finite.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TickOutput<P: SixLegs> {
-    /// Voltage of each leg for the coming interval, V: exactly that of [`TickOutput::dac_code`].
-    pub voltage: [P::Real; LEGS],
-    /// q̂ = ρ̂X: displacement really requested of each leg, after all limits, m.
-    pub requested: [P::Real; LEGS],
-    /// T: displacement demanded of each leg, m.
-    pub demand: [P::Real; LEGS],
-    /// δ̂ of each leg, m.
-    pub level: [P::Real; LEGS],
-    /// φ̂ of each leg, m.
-    pub drift: [P::Real; LEGS],
-    /// Converter code of each leg.
-    pub dac_code: [i32; LEGS],
-    /// Bits of [`crate::status`].
-    pub status: u32,
-}
-
-impl<P: SixLegs> TickInput<P> {
-    /// From words in the order of [`INPUT_NAMES`]; zero beyond their end.
-    #[must_use]
-    pub fn read(words: &[u64]) -> Self {
+impl<P: SixLegs> Input<P> for TickInput<P> {
+    fn read(_p: P, words: &[u64]) -> Self {
         Self { setpoint: six(words, 0), displacement: six(words, COMMAND_WORDS) }
     }
 
-    /// Of the words of a command, and of readings as a target has them.
-    #[must_use]
-    pub fn of_command(words: &[u64], gauge: &[P::Real; 6]) -> Self {
-        Self { setpoint: six(words, 0), displacement: *gauge }
+    /// No wrench is asked for.
+    fn measured(_p: P, command: &[u64], gauge: &[P::Real; 6], _wrench: &[P::Real; 6]) -> Self {
+        Self { setpoint: six(command, 0), displacement: *gauge }
     }
 
-    /// As words in the order of [`INPUT_NAMES`].
-    pub fn save(&self, words: &mut Writer<'_>) {
+    fn save(&self, words: &mut Writer<'_>) {
         words.reals(&self.setpoint);
         words.reals(&self.displacement);
+    }
+
+    #[inline]
+    fn gauges(&self) -> &[P::Real; 6] {
+        &self.displacement
+    }
+
+    #[inline]
+    fn gauges_mut(&mut self) -> &mut [P::Real; 6] {
+        &mut self.displacement
     }
 }
 
@@ -81,36 +68,23 @@ impl<P: SixLegs + Compiled> TickInput<P> {
     /// From words in the order of [`INPUT_NAMES`].
     #[must_use]
     pub fn from_words(words: &P::InputWords) -> Self {
-        Self::read(words.as_ref())
-    }
-
-    /// See [`TickInput::of_command`]. No wrench is asked for.
-    #[must_use]
-    pub fn measured(words: &P::CommandWords, gauge: &[P::Real; 6], _wrench: &[P::Real; 6]) -> Self {
-        Self::of_command(words.as_ref(), gauge)
+        Self::read(P::CONSTANTS, words.as_ref())
     }
 }
 
-/// Writes the words of a tick's output in the order of [`OUTPUT_NAMES`]; nothing of the state is needed.
-pub fn write_output<P: SixLegs>(output: &TickOutput<P>, all: &mut [u64]) {
+/// Writes the words of a tick's output, of a tick and of the state that it left, in the order of [`OUTPUT_NAMES`]: `requested` is what
+/// was really requested of each leg, after all limits, `level` and `drift` are δ̂ and φ̂; m.
+pub fn write_output<P: SixLegs>(_p: P, output: &TickOutput<P>, state: &State<P>, all: &mut [u64]) {
     let Some(words) = all.first_chunk_mut::<OUTPUT_WORDS>() else { return };
-    for index in 0..LEGS {
+    for (index, leg) in state.legs.iter().enumerate() {
         words[index] = output.voltage[index].to_word();
-        words[LEGS + index] = output.requested[index].to_word();
-        words[2 * LEGS + index] = output.demand[index].to_word();
-        words[3 * LEGS + index] = output.level[index].to_word();
-        words[4 * LEGS + index] = output.drift[index].to_word();
+        words[LEGS + index] = leg.shown().to_word();
+        words[2 * LEGS + index] = state.demand[index].to_word();
+        words[3 * LEGS + index] = leg.estimate.level.to_word();
+        words[4 * LEGS + index] = leg.estimate.drift.to_word();
         words[5 * LEGS + index] = output.dac_code[index] as u32 as u64;
     }
     words[6 * LEGS] = output.status as u64;
-}
-
-/// Words in the order of [`OUTPUT_NAMES`], see [`write_output`].
-#[must_use]
-pub fn output_words<P: SixLegs + Compiled>(output: &TickOutput<P>, _state: &State<P>) -> P::OutputWords {
-    let mut words = P::OutputWords::ZERO;
-    write_output(output, words.as_mut());
-    words
 }
 
 /// Where a platform is: nothing of it is known.

@@ -3,10 +3,9 @@
 use specgen_runtime::wave::Limits;
 use specgen_runtime::{Motion, Real, SetpointKind};
 
-use super::config::Config;
 use super::constants::SixLegs;
 use crate::kinematics::leg_displacements;
-use crate::spec::Compiled;
+use crate::spec::{Compiled, Config};
 
 /// No limit of the spec: the slew rate of the amplifiers is what a leg has to keep to, m/s².
 const ACCELERATION: f64 = 1e6;
@@ -17,7 +16,7 @@ const ACCELERATION: f64 = 1e6;
 pub fn limits<P: SixLegs + Compiled>(config: &Config<P>) -> Limits<P::Real> {
     let p = P::CONSTANTS;
     let ticks_per_second = P::Real::from_f64(1.0 / p.period_seconds());
-    let codes = P::Real::from_i32(config.code_limits().max_step);
+    let codes = P::Real::from_i32(config.code_limits.max_step);
     let rate = codes * p.dac().volts_per_code * p.leg_gain() * ticks_per_second;
     let mut limits = Limits {
         low: [p.leg_setpoint()[0]; 6],
@@ -26,7 +25,7 @@ pub fn limits<P: SixLegs + Compiled>(config: &Config<P>) -> Limits<P::Real> {
         acceleration: [P::Real::from_f64(ACCELERATION); 6],
         ticks_per_second,
     };
-    if config.setpoint() == SetpointKind::Pose {
+    if config.setpoint == SetpointKind::Pose {
         for (axis, bound) in p.pose_bound().iter().enumerate() {
             let mut pose = [P::Real::ZERO; 6];
             pose[axis] = *bound;

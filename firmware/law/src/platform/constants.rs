@@ -2,9 +2,9 @@
 
 use specgen_runtime::dynamics;
 use specgen_runtime::setpoint::{Frames, Setpoints};
-use specgen_runtime::{Affine, Gauges, Notch, RateFilter};
+use specgen_runtime::trigger::OutputLines;
+use specgen_runtime::{Affine, GaugeCalibration, Gauges, ModalDamping, Notch, RateFilter, RequestCorrection};
 
-use super::parts::{GaugeCalibration, ModalDamping, OutputLines, RequestCorrection};
 use crate::spec::{LEGS, Spec};
 
 /// The law of a platform in task space.
@@ -75,8 +75,6 @@ pub trait Platform: Spec<Law = TaskSpace> {
     fn gauges(&self) -> &Gauges<'_, Self::Real>;
     /// Words to readings in m. Without it a word is a reading.
     fn calibration(&self) -> Option<&Self::Calibration>;
-    /// Lowest and highest word of each gauge that is believed.
-    fn raw_limits(&self) -> &[[Self::Real; 2]; 6];
     /// First-order filter of the pose's rate.
     fn rate_filter(&self) -> &RateFilter<Self::Real>;
 }

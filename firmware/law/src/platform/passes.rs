@@ -4,8 +4,6 @@ use specgen_runtime::Real;
 use specgen_runtime::pass::Given;
 use specgen_runtime::setpoint::CommandKind;
 
-use super::constants::Platform;
-use super::state::State;
 use super::tick::command_words;
 use crate::status::GENERATOR_BUSY;
 
@@ -39,10 +37,4 @@ pub fn end<T: Real>(words: &mut [u64]) {
     for slot in words.iter_mut().skip(command_words(0)) {
         *slot = T::ZERO.to_word();
     }
-}
-
-/// What a tick shows: h_d for its end, and h at its beginning, m and rad.
-#[must_use]
-pub fn shown<P: Platform>(state: &State<P>) -> Option<[[P::Real; 6]; 2]> {
-    Some([state.generator.target().pose, state.pose])
 }

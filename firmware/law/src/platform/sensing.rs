@@ -1,17 +1,9 @@
 //! Pose from six gauges that see the platform, and the filter of its rate.
 
 use specgen_runtime::linear::component;
-use specgen_runtime::{Real as _, sensing};
+use specgen_runtime::{GaugeCalibration as _, Real as _};
 
 use super::constants::Platform;
-use super::parts::GaugeCalibration as _;
-
-/// Gauges whose word is not finite or out of its limits: bit k for gauge k.
-#[inline]
-#[must_use]
-pub fn faults<P: Platform>(p: P, raw: &[P::Real; 6]) -> u32 {
-    sensing::faults(raw, p.raw_limits())
-}
 
 /// Readings of the gauges, m, from their words.
 #[inline]
@@ -39,7 +31,7 @@ pub fn words_per_leg<P: Platform>(p: P, raw: &[P::Real; 6]) -> [[P::Real; 6]; 6]
     rows
 }
 
-/// Pose [x y z θx θy θz] from rest (m, rad) of gauge words without [`faults`]; finite for these.
+/// Pose [x y z θx θy θz] from rest (m, rad) of gauge words without faults; finite for these.
 #[inline]
 #[must_use]
 pub fn pose<P: Platform>(p: P, raw: &[P::Real; 6]) -> [P::Real; 6] {

@@ -3,13 +3,14 @@
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::snapshot::Snapshot;
 use specgen_runtime::supervisor::Fallback;
+use specgen_runtime::trigger::OutputLines as _;
 use specgen_runtime::{
-    ControlMode, Digest, Estimate, Integral, Interaction, LastLine, NotchState, Rate, Real, Transfer,
+    ControlMode, Digest, Estimate, Integral, Interaction, LastLine, ModalDamping as _, NotchState, Rate, Real,
+    RequestCorrection as _, Transfer,
 };
 
 use super::config::Environment;
 use super::constants::Platform;
-use super::parts::{ModalDamping as _, OutputLines as _, RequestCorrection as _};
 use crate::spec::{LEGS, Reset};
 
 specgen_runtime::state! { |words|

@@ -24,28 +24,23 @@
 //! between them, and one map takes feedback and estimates to the legs, J⁻ᵀF/k_a − δ̂ − φ̂ = J V (V⁻¹K⁻¹F − δ̂ − φ̂).
 
 use specgen_runtime::feedback::{force_of, winds_up};
-use specgen_runtime::linear::{difference, each, transform};
+use specgen_runtime::linear::{difference, each, is_within, transform};
+use specgen_runtime::sensing::faults;
 use specgen_runtime::setpoint::CommandKind;
 use specgen_runtime::supervisor::Fallback;
-use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real};
+use specgen_runtime::{
+    ControlMode, Estimate, Integral, Interaction, Law, ModalDamping as _, NotchState, Real, RequestCorrection as _,
+};
 
-use super::config::Config;
 use super::constants::Platform;
 use super::notch::{modal_error, notch_error, notch_innovation};
-use super::parts::{ModalDamping as _, RequestCorrection as _};
 use super::sensing;
 use super::state::{LegState, State};
-use super::tick::{TickInput, TickOutput};
+use super::tick::TickInput;
 use crate::kinematics::leg_displacements;
 use crate::memory::LegMemory as _;
-use crate::spec::LEGS;
+use crate::spec::{Config, LEGS};
 use crate::status::{CORRECTION_LIMITED, WRENCH_FAULT};
-
-/// One control tick. See the module for the timing.
-pub fn step<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, input: &TickInput<P>) -> TickOutput<P> {
-    let status = advance(p, config, state, Fallback::None, input.command.kind, input);
-    outputs(p, state, status)
-}
 
 /// The work of a tick of the law, or of what it has fallen back to, with `kind` in place of that of the command; returns its status.
 pub fn advance<P: Platform>(
@@ -106,7 +101,7 @@ pub fn advance<P: Platform>(
     state.limited = limited != 0;
     let mut static_inverse = 0;
     for (index, leg) in state.legs.iter().enumerate() {
-        static_inverse |= ((config.mode().inverts() && leg.memory.fell_back()) as u32) << (24 + index);
+        static_inverse |= ((config.mode.inverts() && leg.memory.fell_back()) as u32) << (24 + index);
     }
     let inputs = if wrench_good { 0 } else { WRENCH_FAULT } | if correction_held { CORRECTION_LIMITED } else { 0 };
     static_inverse | limited | gauge_faults << 8 | setpoint_status | inputs
@@ -123,20 +118,13 @@ fn lead<P: Platform>(p: P, played: Option<u32>) -> P::Real {
     }
 }
 
-/// What goes out, of the state that the tick left.
-#[inline]
-pub fn outputs<P: Platform>(p: P, state: &State<P>, status: u32) -> TickOutput<P> {
-    let legs = &state.legs;
-    TickOutput { voltage: each(|leg| p.dac().voltage(legs[leg].code)), dac_code: each(|leg| legs[leg].code), status }
-}
-
 /// Whether this tick is the first of its mode, or of its source of the interaction force. If so, what the mode does not
 /// use is put at rest; the first request then defines what keeps the voltages where they are.
 #[inline]
 fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bool {
-    let (mode, interaction) = (config.mode(), config.interaction());
+    let (mode, interaction) = (config.mode, config.interaction);
     let same_force = state.interaction == interaction
-        && (interaction != Interaction::Modelled || state.environment == *config.environment());
+        && (interaction != Interaction::Modelled || state.environment == config.environment);
     if state.mode == Some(mode) && same_force {
         return false;
     }
@@ -150,7 +138,7 @@ fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bo
     }
     state.mode = Some(mode);
     state.interaction = interaction;
-    state.environment = *config.environment();
+    state.environment = config.environment;
     for estimate in &mut state.estimates {
         match mode.law() {
             Law::Invhys => *estimate = Estimate::new(),
@@ -183,7 +171,7 @@ fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bo
 #[cold]
 fn hand_over<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, request: &[P::Real; LEGS]) {
     let held = each(|leg| state.legs[leg].requested - request[leg]);
-    let mode = config.mode();
+    let mode = config.mode;
     let mut offset = [P::Real::ZERO; LEGS];
     if mode.law() != Law::Invhys {
         for (estimate, held) in state.estimates.iter_mut().zip(transform(p.legs_to_modes(), &held)) {
@@ -226,7 +214,7 @@ fn weaken<T: Real>(fallback: Fallback, values: &mut [T; 6]) {
 /// work on one error; the integral would give back at the rate of k_I/(1 + k_p) what the estimates unlearn at theirs.
 #[cold]
 fn rest<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
-    let mode = config.mode();
+    let mode = config.mode;
     if mode.feeds_back() && mode.law() != Law::Invhys {
         let held = transform(p.force_to_modes(), &state.integral.force);
         for (estimate, held) in state.estimates.iter_mut().zip(held) {
@@ -239,7 +227,7 @@ fn rest<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
 /// h and ḣ from the gauges; returns the gauges that are not believed, bit by bit. With any such the last pose is held.
 #[inline]
 pub fn sense<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, gauge: &[P::Real; 6]) -> u32 {
-    let faults = sensing::faults(p, gauge);
+    let faults = faults(gauge, p.raw_limits());
     if faults == 0 {
         state.pose = sensing::pose(p, gauge);
     }
@@ -256,7 +244,7 @@ pub fn sense<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, gauge:
 /// What the readings teach: the integral of (7), the run-to-run estimates, and what is asked for against the modes.
 #[inline]
 pub fn learn<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
-    let mode = config.mode();
+    let mode = config.mode;
     let error = modal_error(p, &difference(&state.generator.target().pose, &state.pose));
     let fallback = state.fallback;
     if mode.damps_modes() && fallback == Fallback::None {
@@ -285,7 +273,7 @@ pub fn learn<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
         if fallback != Fallback::None {
             weaken(fallback, &mut innovation);
         }
-        let (level, drift) = (config.level_weight(), config.drift_weight());
+        let (level, drift) = (config.level_weight, config.drift_weight);
         Estimate::correct(&mut state.estimates, mode.law(), level, drift, &innovation);
     }
 }
@@ -300,10 +288,10 @@ fn would_wind_up<P: Platform>(p: P, legs: &[LegState<P>; LEGS], growth: &[P::Rea
 /// Takes the measured wrench if it is to be believed; one that nobody asks for is not looked at.
 #[inline]
 fn take_wrench<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, wrench: &[P::Real; 6]) -> bool {
-    if config.interaction() != Interaction::Measured {
+    if config.interaction != Interaction::Measured {
         return true;
     }
-    let good = wrench.iter().zip(p.wrench_limit()).all(|(value, limit)| (-*limit..=*limit).contains(value));
+    let good = is_within(wrench, p.wrench_limit());
     if good {
         state.wrench = *wrench;
     }
@@ -327,7 +315,7 @@ fn damping<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> Option<[P
 #[inline]
 pub fn known_load<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> ([P::Real; LEGS], [P::Real; LEGS]) {
     let target = state.generator.target();
-    let wrench = match config.interaction() {
+    let wrench = match config.interaction {
         Interaction::Neglected => {
             if let Some(affine) = p.affine_load() {
                 return (leg_displacements(p, &target.pose), affine.deflection(target));
@@ -336,7 +324,7 @@ pub fn known_load<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> ([
         }
         Interaction::Measured => Some(state.wrench),
         Interaction::Modelled => {
-            let environment = config.environment();
+            let environment = &config.environment;
             Some(force_of(&environment.stiffness, &difference(&environment.rest, &target.pose)))
         }
     };
@@ -347,7 +335,7 @@ pub fn known_load<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> ([
 /// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂, what is asked for against the modes, and J c: m of each leg.
 #[inline]
 pub fn reaction<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> [P::Real; LEGS] {
-    if config.mode().feeds_back() {
+    if config.mode.feeds_back() {
         let proportional = force_of(&config.active_gains().proportional, &state.error);
         let integral = &state.integral.force;
         let force = each(|axis| proportional[axis] + integral[axis]);
@@ -372,7 +360,7 @@ pub fn actuate<P: Platform>(
     table: &P::Table,
     request: P::Real,
 ) -> bool {
-    if config.mode().inverts() && track(p, config, leg, table, request) {
+    if config.mode.inverts() && track(p, config, leg, table, request) {
         return false;
     }
     actuate_limited(p, config, leg, table, request)
@@ -384,7 +372,7 @@ fn track<P: Platform>(p: P, config: &Config<P>, leg: &mut LegState<P>, table: &P
     let previous = leg.code;
     let mut code = previous;
     let tracked = leg.memory.track(table, &mut leg.last, request, |drive| {
-        code = p.dac().free_code(drive, previous, config.code_limits())?;
+        code = p.dac().free_code(drive, previous, config.code_limits)?;
         Some(p.dac().drive(code))
     });
     if tracked {
@@ -407,12 +395,12 @@ fn actuate_limited<P: Platform>(
     let LegState { memory, code, .. } = leg;
     let mut limited = false;
     let mut permitted = |drive: P::Real| {
-        let (permitted, held_back) = p.dac().code(drive, *code, config.code_limits());
+        let (permitted, held_back) = p.dac().code(drive, *code, config.code_limits);
         *code = permitted;
         limited |= held_back;
         p.dac().drive(permitted)
     };
-    if config.mode().inverts() {
+    if config.mode.inverts() {
         let out_of_reach = memory.follow_within(table, request, &mut permitted);
         limited |= out_of_reach;
         leg.requested = leg.memory.displacement();

@@ -1,16 +1,16 @@
 //! What a tick reads and yields, and both as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every target
 //! reads and writes these, so that two of them can be compared bit for bit.
 
-use specgen_runtime::Real as _;
 use specgen_runtime::linear::{each, transform};
 use specgen_runtime::setpoint::{Command, CommandKind, Target};
 use specgen_runtime::snapshot::Writer;
+use specgen_runtime::trigger::OutputLines as _;
+use specgen_runtime::{Real as _, RequestCorrection};
 
 use super::constants::Platform;
-use super::parts::{OutputLines as _, RequestCorrection};
 use super::state::State;
-use crate::spec::{Compiled, LEGS};
-use crate::words::{WordArray as _, fill, names, six};
+use crate::spec::{Compiled, Input, LEGS, TickOutput};
+use crate::words::{fill, names, six};
 
 /// Words of a command without a correction.
 const MOTION_WORDS: usize = 21;
@@ -85,34 +85,18 @@ pub struct TickInput<P: Platform> {
     pub wrench: [P::Real; 6],
 }
 
-/// What a tick yields. Every number is finite. What else there is to know stands in the [`State`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TickOutput<P: Platform> {
-    /// Voltage of each leg for the coming interval, V: exactly that of [`TickOutput::dac_code`].
-    pub voltage: [P::Real; LEGS],
-    /// Converter code of each leg.
-    pub dac_code: [i32; LEGS],
-    /// Bits of [`crate::status`].
-    pub status: u32,
-}
-
-impl<P: Platform> TickInput<P> {
-    /// From words in the order of [`input_names`]; zero beyond their end.
-    #[must_use]
-    pub fn read(p: P, words: &[u64]) -> Self {
+impl<P: Platform> Input<P> for TickInput<P> {
+    fn read(p: P, words: &[u64]) -> Self {
         let correction = wanted(p, words);
         let end = MOTION_WORDS + correction.as_ref().len();
         Self { command: command(words), correction, gauge: six(words, end), wrench: six(words, end + 6) }
     }
 
-    /// Of the words of a command, and of readings as a target has them. One that measures no wrench gives NaN for it.
-    #[must_use]
-    pub fn of_command(p: P, words: &[u64], gauge: &[P::Real; 6], wrench: &[P::Real; 6]) -> Self {
+    fn measured(p: P, words: &[u64], gauge: &[P::Real; 6], wrench: &[P::Real; 6]) -> Self {
         Self { command: command(words), correction: wanted(p, words), gauge: *gauge, wrench: *wrench }
     }
 
-    /// As words in the order of [`input_names`].
-    pub fn save(&self, words: &mut Writer<'_>) {
+    fn save(&self, words: &mut Writer<'_>) {
         words.word(self.command.kind.word());
         words.word(self.command.selector as u64);
         words.word(self.command.sequence as u64);
@@ -123,6 +107,16 @@ impl<P: Platform> TickInput<P> {
         words.reals(&self.gauge);
         words.reals(&self.wrench);
     }
+
+    #[inline]
+    fn gauges(&self) -> &[P::Real; 6] {
+        &self.gauge
+    }
+
+    #[inline]
+    fn gauges_mut(&mut self) -> &mut [P::Real; 6] {
+        &mut self.gauge
+    }
 }
 
 impl<P: Platform + Compiled> TickInput<P> {
@@ -130,12 +124,6 @@ impl<P: Platform + Compiled> TickInput<P> {
     #[must_use]
     pub fn from_words(words: &P::InputWords) -> Self {
         Self::read(P::CONSTANTS, words.as_ref())
-    }
-
-    /// See [`TickInput::of_command`].
-    #[must_use]
-    pub fn measured(words: &P::CommandWords, gauge: &[P::Real; 6], wrench: &[P::Real; 6]) -> Self {
-        Self::of_command(P::CONSTANTS, words.as_ref(), gauge, wrench)
     }
 }
 
@@ -179,14 +167,6 @@ pub fn write_output<P: Platform>(p: P, output: &TickOutput<P>, state: &State<P>,
     if let Some(missed) = last.first_mut() {
         *missed = state.triggers.missed();
     }
-}
-
-/// Words in the order of the controller's `OUTPUT_NAMES`, see [`write_output`].
-#[must_use]
-pub fn output_words<P: Platform + Compiled>(output: &TickOutput<P>, state: &State<P>) -> P::OutputWords {
-    let mut words = P::OutputWords::ZERO;
-    write_output(P::CONSTANTS, output, state, words.as_mut());
-    words
 }
 
 /// Where the platform is: the pose measured and the set-point, both from rest and with the bias, then the set-point in the

@@ -2,13 +2,12 @@
 
 use specgen_runtime::setpoint::CommandKind;
 use specgen_runtime::supervisor::Phase;
-use specgen_runtime::trigger::Seen;
+use specgen_runtime::trigger::{OutputLines as _, Seen};
 
-use super::config::Config;
 use super::constants::Platform;
-use super::parts::OutputLines as _;
 use super::state::State;
 use super::tick::TickInput;
+use crate::spec::Config;
 use crate::status::{GENERATOR_BUSY, SETPOINT_FAULT, SETPOINT_STALE};
 
 /// After the law: the bits of the status that say how the lines are over the coming interval, by the pose measured at its beginning. They are
@@ -36,5 +35,5 @@ pub(crate) fn fire<P: Platform>(
         streams: command.kind == CommandKind::Stream && follows,
         sequence: command.sequence,
     };
-    triggers.tick(config.triggers(), &seen)
+    triggers.tick(&config.triggers, &seen)
 }

@@ -4,9 +4,8 @@ use specgen_runtime::setpoint::CommandKind;
 use specgen_runtime::wave::Limits;
 use specgen_runtime::{Motion, Real};
 
-use super::config::Config;
 use super::constants::Platform;
-use crate::spec::Compiled;
+use crate::spec::{Compiled, Config};
 use crate::status::GENERATOR_BUSY;
 
 /// Those of streams; from `control.setpoint` and `workspace`.

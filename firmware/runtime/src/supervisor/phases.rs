@@ -132,7 +132,10 @@ impl<T: Real> Supervisor<T> {
     fn arming(&mut self, supervision: &Supervision<T>, present: u32, lasted: u32) -> bool {
         if lasted != 0 {
             self.enter(Phase::RampingDown, Cause::of_lowest(lasted));
-        } else if self.request == Request::RampDown {
+        } else if self.request == Request::RampDown
+            || self.request == Request::Hold && supervision.wiring.is_some() && !self.check.done
+        {
+            // A machine whose wiring was not checked cannot hold.
             self.enter(Phase::RampingDown, Cause::None);
         } else if present != 0 {
             self.ticks = 0;
@@ -257,11 +260,18 @@ impl<T: Real> Supervisor<T> {
             && let Some(wiring) = &supervision.wiring
         {
             let highest = supervision.rest.saturating_add(wiring.height);
-            if highest < limits.min || highest > limits.max {
+            let refused = if highest < limits.min || highest > limits.max {
+                Finding::NoRoom
+            } else if !wiring.can_follow(limits.max_step) {
+                Finding::TooSlow
+            } else {
+                Finding::None
+            };
+            if refused != Finding::None {
                 self.check.done = true;
-                self.check.finding = Finding::NoRoom.word();
+                self.check.finding = refused.word();
             }
-            self.check.tick(wiring, expected, readings);
+            self.check.tick(wiring, expected, readings, self.ticks.saturating_sub(supervision.arm_ticks));
         }
     }
 

@@ -52,6 +52,8 @@ const GAUGE: [f64; 2] = [0.05, 8.0];
 const ROUNDS: u32 = 8;
 /// What is tried beyond gains: six gauges inverted, fifteen pairs of gauges, fifteen of legs.
 const TRIALS: u32 = 36;
+/// Ticks of all trials.
+const TRIED: u32 = (TRIALS + 1) * ROUNDS;
 
 /// What is wrong with one gauge, or one leg.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,10 +79,16 @@ pub enum Finding {
     Leg(u32, Fault),
     /// No gauge shows any leg.
     Nothing,
-    /// No single fault explains the response.
+    /// All gauges or all legs show or move the wrong way.
+    Inverted,
+    /// All legs move so many hundredths of what they should, or all gauges show that.
+    Common(u32),
+    /// No single fault explains the response, nor that of a check made again.
     Unexplained,
     /// The limits of the codes leave no room for the pulse.
     NoRoom,
+    /// The limit of a tick's step is too small for the pulse.
+    TooSlow,
     /// Nothing of the check: what the law has fallen back to, for an oscillation.
     Fallback(Fallback),
 }
@@ -88,12 +96,21 @@ pub enum Finding {
 const UNEXPLAINED: u32 = 0x7fff;
 const NO_ROOM: u32 = 0x7ffe;
 const NOTHING: u32 = 0x7ffd;
+const INVERTED: u32 = 0x7ffc;
+const TOO_SLOW: u32 = 0x7ffb;
+/// And a gain, hundredths.
+const COMMON: u32 = 0x6000;
 /// And a stage, 0 to 2.
 const FALLBACK: u32 = 0x7ff0;
 const SUBJECTS: u32 = 12;
 const FIRST_GAIN: u32 = 8;
 /// Largest gain that a word has, hundredths.
 const LARGEST_GAIN: u32 = 2000;
+const LARGEST_COMMON: u32 = COMMON + LARGEST_GAIN;
+
+const fn bounded(gain: u32) -> u32 {
+    if gain > LARGEST_GAIN { LARGEST_GAIN } else { gain }
+}
 
 impl Finding {
     /// Bits that a word takes.
@@ -107,6 +124,9 @@ impl Finding {
             Self::Nothing => return NOTHING,
             Self::Unexplained => return UNEXPLAINED,
             Self::NoRoom => return NO_ROOM,
+            Self::TooSlow => return TOO_SLOW,
+            Self::Inverted => return INVERTED,
+            Self::Common(gain) => return COMMON + bounded(gain),
             Self::Fallback(Fallback::None) => return 0,
             Self::Fallback(stage) => return FALLBACK + stage.word() as u32,
             Self::Gauge(gauge, fault) => (gauge, fault),
@@ -116,7 +136,7 @@ impl Finding {
             Fault::Inverted => 0,
             Fault::Dead => 1,
             Fault::Swapped(other) => 2 + other,
-            Fault::Gain(gain) => FIRST_GAIN + if gain > LARGEST_GAIN { LARGEST_GAIN } else { gain },
+            Fault::Gain(gain) => FIRST_GAIN + bounded(gain),
         };
         1 + subject + SUBJECTS * kind
     }
@@ -128,6 +148,9 @@ impl Finding {
             0 => return Self::None,
             NOTHING => return Self::Nothing,
             NO_ROOM => return Self::NoRoom,
+            TOO_SLOW => return Self::TooSlow,
+            INVERTED => return Self::Inverted,
+            COMMON..=LARGEST_COMMON => return Self::Common(word - COMMON),
             _ => {}
         }
         if word > FALLBACK
@@ -166,8 +189,13 @@ impl fmt::Display for Finding {
         let (what, place, fault) = match self {
             Self::None => return Ok(()),
             Self::Nothing => return f.write_str("no gauge shows any leg"),
-            Self::Unexplained => return f.write_str("more than one fault of gauges or legs"),
+            Self::Inverted => return f.write_str("all gauges or all legs inverted"),
+            Self::Common(gain) => {
+                return write!(f, "all legs or all gauges gain × {}.{:02}", gain / 100, gain % 100);
+            }
+            Self::Unexplained => return f.write_str("more than one fault of gauges or legs, or vibration"),
             Self::NoRoom => return f.write_str("the code limits leave no room for the pulse"),
+            Self::TooSlow => return f.write_str("the limit max_step_codes is too small for the pulse"),
             Self::Fallback(stage) => return f.write_str(stage.name()),
             Self::Gauge(gauge, fault) => ("gauge", gauge, fault),
             Self::Leg(leg, fault) => ("leg", leg, fault),
@@ -239,6 +267,15 @@ crate::state! { |words|
     }
 }
 
+impl<T> Wiring<T> {
+    /// Whether codes that change by no more than that in a tick can follow the pulse, whose steepest step is π/ticks of its height.
+    #[must_use]
+    pub(super) fn can_follow(&self, max_step: i32) -> bool {
+        let steepest = (i64::from(self.height).abs() - 1) * 355;
+        steepest <= i64::from(max_step) * i64::from(self.ticks) * 113
+    }
+}
+
 impl<T: Real> Check<T> {
     /// Codes by which a leg is away from rest.
     #[inline]
@@ -251,14 +288,27 @@ impl<T: Real> Check<T> {
         if wiring.height < 0 { (height - T::HALF).truncate() } else { (height + T::HALF).truncate() }
     }
 
-    /// Takes the readings (m, finite) of a tick, or goes on to judge them. `expected`: readings per leg displacement.
+    /// Takes the readings (m, finite) of a tick, or goes on to judge them. `expected`: readings per leg displacement; `since`: ticks since
+    /// the first check began, which is made again while nothing explains the response: vibration may have hidden the pulse.
     #[cold]
     #[inline(never)]
-    pub fn tick(&mut self, wiring: &Wiring<T>, expected: &Response<T>, readings: &[T; 6]) {
+    pub fn tick(&mut self, wiring: &Wiring<T>, expected: &Response<T>, readings: &[T; 6], since: u32) {
+        if self.done {
+            return;
+        }
+        let whole = TRIED.saturating_add(wiring.ticks.saturating_mul(6));
         if self.leg < 6 {
             self.sample(wiring, readings);
-        } else if !self.done {
-            self.judge(wiring, expected);
+        } else if self.tick < TRIED {
+            // The second check ends before this, the third after it.
+            self.judge(wiring, expected, since / 5 >= whole / 2);
+        } else {
+            // No two pauses are alike: each check is to meet another phase of the vibration.
+            let pause = if since / 3 >= whole / 2 { wiring.ticks / 2 } else { wiring.ticks / 4 };
+            self.tick = self.tick.saturating_add(1);
+            if self.tick >= TRIED.saturating_add(pause) {
+                *self = Self::new();
+            }
         }
     }
 
@@ -288,7 +338,7 @@ impl<T: Real> Check<T> {
     }
 
     /// One round of a fit a tick, as a whole fit takes longer than one has: of gains first, then of what may be inverted or swapped.
-    fn judge(&mut self, wiring: &Wiring<T>, expected: &Response<T>) {
+    fn judge(&mut self, wiring: &Wiring<T>, expected: &Response<T>, is_last: bool) {
         let (number, round) = (self.tick / ROUNDS, self.tick % ROUNDS);
         self.tick = self.tick.saturating_add(1);
         let trial = trial(number);
@@ -314,7 +364,7 @@ impl<T: Real> Check<T> {
                 self.least = fit.residual;
                 self.finding = trial.word();
             }
-            self.done = number >= TRIALS;
+            self.done = number >= TRIALS && (is_last || self.finding != UNEXPLAINED);
         }
     }
 }
@@ -438,6 +488,9 @@ impl<T: Real> Fit<T> {
     /// What the gains say.
     fn finding(&self, wiring: &Wiring<T>) -> Finding {
         let dead = T::from_f64(DEAD);
+        if self.legs.iter().all(|gain| *gain <= -dead) {
+            return Finding::Inverted;
+        }
         let mut sum = T::ZERO;
         for (leg, gain) in (0..).zip(self.legs) {
             if gain < dead {
@@ -448,14 +501,19 @@ impl<T: Real> Fit<T> {
         if let Some((gauge, gain)) = furthest(&self.gauges, wiring.gauge_gain) {
             return Finding::Gauge(gauge, if gain < dead { Fault::Dead } else { Fault::Gain(hundredths(gain)) });
         }
-        if let Some(range) = wiring.leg_gain {
+        if let Some([low, high]) = wiring.leg_gain {
             let five = T::from_i32(5);
             let mut relative = self.legs;
             for gain in &mut relative {
                 *gain = *gain * five / (sum - *gain);
             }
-            if let Some((leg, gain)) = furthest(&relative, range) {
+            if let Some((leg, gain)) = furthest(&relative, [low, high]) {
                 return Finding::Leg(leg, Fault::Gain(hundredths(gain)));
+            }
+            // Of all together, small motions explain a half, and creep with hysteresis one and a half.
+            let common = sum / T::from_i32(6);
+            if common < low * T::HALF || common > high + high * T::HALF {
+                return Finding::Common(hundredths(common));
             }
         }
         Finding::None

@@ -6,8 +6,8 @@ use specgen_runtime::feedback::winds_up;
 use specgen_runtime::pass::{Course, MOST_TICKS, Player, Stage};
 use specgen_runtime::playback::{self, Knot};
 use specgen_runtime::{
-    ControlMode, Correction, CorrectionLimit, Damping, Estimate, Integral, Law, NotchState, Resonator, Section,
-    Transfer,
+    ControlMode, Correction, CorrectionLimit, Damping, Estimate, Integral, Law, ModalDamping as _, NotchState,
+    RequestCorrection as _, Resonator, Section, Transfer,
 };
 
 /// The notch of a mode at `frequency` (Hz) by the bilinear transformation with prewarping, sampled at 10 kHz.

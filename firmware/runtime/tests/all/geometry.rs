@@ -2,7 +2,7 @@
 
 use specgen_runtime::linear::{difference, transform};
 use specgen_runtime::sensing::faults;
-use specgen_runtime::{Calibration, Gauges, Legs, Series};
+use specgen_runtime::{Calibration, GaugeCalibration as _, Gauges, Legs, Series};
 
 use crate::common::{Random, cross, dot, inverse, rotation, times, worse};
 

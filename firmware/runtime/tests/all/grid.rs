@@ -14,18 +14,27 @@ const CREEP: Creep<f64, 3> =
     Creep { gains: [0.5, 0.02, 1.0], weights: [0.1, 0.05, 0.02], carried: [0.05, 0.049, 0.0], direct: 1.071 };
 
 /// The three memories under one roof.
-trait Model<T, Table>: Snapshot + Copy {
+trait Model<T: Copy, Table>: Snapshot + Copy {
     fn apply(&mut self, table: &Table, drive: T) -> T;
     fn solve(&mut self, table: &Table, displacement: T) -> T;
-    fn follow(&mut self, table: &Table, displacement: T, permitted: impl FnOnce(T) -> T) -> bool;
-    fn track(&mut self, table: &Table, last: &mut LastLine<T>, displacement: T, permitted: impl FnOnce(T) -> T)
-    -> bool;
+    fn reaches(&self, table: &Table, displacement: T) -> bool;
+    fn follow(&mut self, table: &Table, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
+        let reaches = self.reaches(table, displacement);
+        let drive = permitted(self.solve(table, displacement));
+        self.apply(table, drive);
+        !reaches
+    }
+    fn track(&mut self, _: &Table, _: &mut LastLine<T>, _: T, _: impl FnOnce(T) -> T) -> bool {
+        false
+    }
     fn now(&self) -> [T; 2];
-    fn fell_back(&self) -> bool;
+    fn fell_back(&self) -> bool {
+        false
+    }
 }
 
 macro_rules! model {
-    ([$($generic:tt)*] $memory:ty, $table:ty) => {
+    ([$($generic:tt)*] $memory:ty, $table:ty { $($own:tt)* }) => {
         impl<T: Real, G: Grid<T>, $($generic)*> Model<T, $table> for $memory {
             fn apply(&mut self, table: &$table, drive: T) -> T {
                 self.apply(table, drive)
@@ -33,30 +42,30 @@ macro_rules! model {
             fn solve(&mut self, table: &$table, displacement: T) -> T {
                 <$memory>::solve(self, table, displacement)
             }
-            fn follow(&mut self, table: &$table, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
-                self.follow_within(table, displacement, permitted)
-            }
-            fn track(
-                &mut self,
-                table: &$table,
-                last: &mut LastLine<T>,
-                displacement: T,
-                permitted: impl FnOnce(T) -> T,
-            ) -> bool {
-                self.track(table, last, displacement, |drive| Some(permitted(drive)))
+            fn reaches(&self, table: &$table, displacement: T) -> bool {
+                self.reaches(table, displacement)
             }
             fn now(&self) -> [T; 2] {
                 [self.drive(), self.displacement()]
             }
-            fn fell_back(&self) -> bool {
-                self.fell_back()
-            }
+            $($own)*
         }
     };
 }
-model!([const CAP: usize] ReversalMemory<T, CAP>, G);
-model!([const CAP: usize] DynamicMemory<T, CAP>, DynamicEverett<T, G>);
-model!([const CAP: usize, const K: usize] CreepMemory<T, CAP, K>, CreepEverett<'_, T, G, K>);
+model!([const CAP: usize] ReversalMemory<T, CAP>, G {
+    fn follow(&mut self, table: &G, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
+        self.follow_within(table, displacement, permitted)
+    }
+    fn track(&mut self, table: &G, last: &mut LastLine<T>, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
+        self.track(table, last, displacement, |drive| Some(permitted(drive)))
+    }
+});
+model!([const CAP: usize] DynamicMemory<T, CAP>, DynamicEverett<T, G> {
+    fn fell_back(&self) -> bool {
+        self.fell_back()
+    }
+});
+model!([const CAP: usize, const K: usize] CreepMemory<T, CAP, K>, CreepEverett<'_, T, G, K> {});
 
 /// What a tick leaves behind: a drive solved for, drive and displacement, flags, the digest.
 type Step = [u64; 5];

@@ -2,7 +2,7 @@
 
 use crate::common::Random;
 use specgen_runtime::Real;
-use specgen_runtime::trigger::{Direction, HIGH, Kind, Line, MISSED, Seen, Triggers, lines};
+use specgen_runtime::trigger::{Direction, HIGH, Kind, Line, MISSED, OutputLines as _, Seen, Triggers, lines};
 
 /// Positions of a line, each below or above the pose, armed or not.
 struct Oracle<T: Real> {
@@ -59,7 +59,7 @@ fn position<T: Real>([start, stop, step, hysteresis]: [f64; 4], direction: Direc
 }
 
 /// A pose that goes to and fro with noise, and now and then jumps; pulses given.
-fn walks<T: Real>(seed: u64) -> [i32; 2] {
+fn walks<T: Real + std::fmt::Debug>(seed: u64) -> [i32; 2] {
     let mut random = Random(seed);
     let mut draw = |most: f64| (random.unit() * 2.0 - 1.0) * most;
     let (mut pulses, mut missed) = (0, 0);

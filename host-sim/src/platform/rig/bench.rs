@@ -90,7 +90,7 @@ pub struct Tick {
 
 /// Where a bench stopped: what [`Bench::resume`] needs besides rig and controller.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::platform) struct Paused {
+pub struct Paused {
     sequence: u64,
     ticks: usize,
     underway: VecDeque<Six>,
@@ -129,7 +129,10 @@ impl<'a> Bench<'a> {
     }
 
     /// Goes on from where a bench stopped, with clones of its rig and controller.
-    pub(in crate::platform) fn resume(
+    ///
+    /// # Errors
+    /// As [`Bench::new`].
+    pub fn resume(
         rig: &'a mut PlatformRig,
         controller: &'a mut dyn TickController,
         interval: f64,
@@ -153,7 +156,8 @@ impl<'a> Bench<'a> {
     }
 
     /// Ends it where [`Bench::resume`] can go on.
-    pub(in crate::platform) fn pause(self) -> Paused {
+    #[must_use]
+    pub fn pause(self) -> Paused {
         Paused { sequence: self.sequence, ticks: self.ticks, underway: self.underway }
     }
 

@@ -37,6 +37,11 @@ impl Spec for Constants {
     }
 
     #[inline(always)]
+    fn raw_limits(&self) -> &[[Real; 2]; 6] {
+        &gauges::RAW_LIMITS
+    }
+
+    #[inline(always)]
     fn readings_per_leg(&self) -> &[[Real; LEGS]; 6] {
         &supervision::READINGS_PER_LEG
     }
@@ -87,11 +92,6 @@ impl SixLegs for Constants {
     #[inline(always)]
     fn lead_limit(&self) -> Real {
         hysteresis::LEAD_LIMIT
-    }
-
-    #[inline(always)]
-    fn gauge(&self) -> &[Real; 2] {
-        &gauges::GAUGE
     }
 
     #[inline(always)]

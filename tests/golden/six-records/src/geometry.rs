@@ -27,15 +27,12 @@ pub const GEOMETRY: Legs<'static, Real> = Legs {
     rest_length: [
         0.22120452, 0.22120452, 0.22120452, 0.22120452, 0.22120452, 0.22120452,
     ],
-    series: SERIES,
+    series: Series {
+        sine: &[-0.16666667],
+        versine: &[0.5],
+    },
     root: &[-0.5, 0.5],
     newton_steps: 0,
-};
-
-/// Sine and versine to the last bit over the declared workspace.
-pub const SERIES: Series<'static, Real> = Series {
-    sine: &[-0.16666667],
-    versine: &[0.5],
 };
 
 /// J⁻¹ of the legs at rest: pose coordinates (rows) per leg displacement (columns), m/m and rad/m; J = ∂l/∂h.

@@ -22,7 +22,6 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
-mod body;
 mod checked;
 mod constants;
 mod defaults;

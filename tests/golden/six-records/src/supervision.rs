@@ -4,7 +4,7 @@
 //! What the supervisor takes for a fault; from `supervisor`.
 
 use specgen_law::Reset;
-use specgen_runtime::supervisor::{Reaction, Steadiness, Supervision, Wiring};
+use specgen_runtime::supervisor::{Steadiness, Supervision, Wiring};
 use crate::identity::Constants;
 use crate::hysteresis::Memory;
 use crate::{Real, limits};
@@ -37,7 +37,7 @@ pub const SUPERVISION: Supervision<Real> = Supervision {
         first: 25,
         next: 83,
     },
-    amplifier_fault: Reaction::Off,
+    amplifier_fault: specgen_runtime::supervisor::Reaction::Off,
     wiring: Some(Wiring {
         ticks: 250,
         height: 415,

@@ -28,15 +28,12 @@ pub const GEOMETRY: Legs<'static, Real> = Legs {
         0.22120451677221237, 0.22120451677221237, 0.22120451677221237, 0.22120451677221237,
         0.22120451677221237, 0.22120451677221237,
     ],
-    series: SERIES,
+    series: Series {
+        sine: &[-0.16666666666666666, 0.008333333333333333],
+        versine: &[0.5, -0.041666666666666664, 0.0013888888888888887],
+    },
     root: &[-0.5, 0.5, -0.625, 0.875, -1.3125],
     newton_steps: 0,
-};
-
-/// Sine and versine to the last bit over the declared workspace.
-pub const SERIES: Series<'static, Real> = Series {
-    sine: &[-0.16666666666666666, 0.008333333333333333],
-    versine: &[0.5, -0.041666666666666664, 0.0013888888888888887],
 };
 
 /// J⁻¹ of the legs at rest: pose coordinates (rows) per leg displacement (columns), m/m and rad/m; J = ∂l/∂h.

@@ -5,7 +5,7 @@
 
 use specgen_runtime::Permitted;
 use specgen_runtime::snapshot::Sizes;
-use crate::{Real, hysteresis, limits};
+use crate::Real;
 
 /// Words of the settings.
 pub(crate) const WORDS: usize = 8;
@@ -67,7 +67,7 @@ pub const STATE: Sizes = Sizes {
     request: 0.0013300370391950977,
     reading: 4.8e-5,
     stiffness: 1000000000000000.0,
-    codes: limits::CODES,
-    grid: hysteresis::GRID as f64,
-    memory: hysteresis::MEMORY,
+    codes: [0, 43690],
+    grid: 8.0,
+    memory: 16,
 };

@@ -88,7 +88,8 @@ fn an_oscillation_from_outside_leads_through_every_stage_in_time() {
     let mut steps: Vec<f64> = (0..).map(|k| 60.0 * 1.12_f64.powi(k)).take_while(|hertz| *hertz < 2000.0).collect();
     // Where a channel might see it stand still.
     steps.extend([833.33, 909.09, 1000.0, 1250.0, 1428.57, 1666.67, 1818.18, 1944.44, 2000.0, 2400.0]);
-    for hertz in steps {
+    // Each axis in the short run, too, at every eighth frequency.
+    for hertz in steps.into_iter().step_by(specgen_tests::length(8, 1)) {
         let mut worst = [Some(0.0_f64); 3];
         for axis in 0..6 {
             let mut machine = started.like(&supervised, &rig, &emitted.compiled);
@@ -174,19 +175,21 @@ fn structural_modes_that_the_spec_lacks_end_quiet() {
     started.start();
     let (rig, supervised) = (started.rig.clone(), started.supervised.fork());
     println!("mode: largest error, ms to stage 1 | 2 | ramp down from an error of 100 nm, what is left");
-    for (structure, last) in [
+    // One of each ending comes first.
+    let structures = [
         (LEG(1200.0, 0.01), 1),
+        (LEG(300.0, 0.01), 2),
+        (MOUNT(300.0, 0.01), 3),
         (LEG(1200.0, 0.03), 1),
         (LEG(700.0, 0.01), 1),
         (MOUNT(1200.0, 0.01), 1),
         (MOUNT(700.0, 0.03), 1),
-        (LEG(300.0, 0.01), 2),
         (LEG(300.0, 0.03), 2),
-        (MOUNT(300.0, 0.01), 3),
-    ] {
+    ];
+    for &(structure, last) in &structures[..specgen_tests::length(3, structures.len())] {
         let mut machine = started.like(&supervised, &rig, &emitted.compiled);
         machine.structure = Some(structure);
-        let Course { largest, times, left, replaced } = observe(&mut machine, 3.0);
+        let Course { largest, times, left, replaced } = observe(&mut machine, specgen_tests::length(1.5, 3.0));
         assert_eq!(replaced, 0, "{structure:?}: good samples");
         println!(
             "  {structure:?}: {:.2} um, {}, {:.1} nm: {}",
@@ -211,7 +214,8 @@ fn a_wrong_sample_is_replaced_while_the_error_oscillates() {
     let emitted = damped();
     let mut started = Machine::new(&emitted, &LegParameters::reference(), 5);
     started.start();
-    for structure in [LEG(1200.0, 0.01), LEG(700.0, 0.01), MOUNT(1200.0, 0.01), MOUNT(700.0, 0.03)] {
+    let structures = [LEG(1200.0, 0.01), MOUNT(700.0, 0.03), LEG(700.0, 0.01), MOUNT(1200.0, 0.01)];
+    for &structure in &structures[..specgen_tests::length(1, 4)] {
         let mut machine = started.like(&started.supervised, &started.rig, &emitted.compiled);
         machine.structure = Some(structure);
         // From when it begins until what it led to has ended it.
@@ -310,10 +314,11 @@ fn a_stage_stays_until_it_is_acknowledged_or_armed_anew() {
 /// Host and emulated MCU: the same bits through every stage.
 #[test]
 fn every_stage_has_the_same_bits_on_the_mcu() {
-    for (name, spec, edits, mcu) in [
+    let machines = [
         ("supervisor-oscillation", "reference.toml", &[DAMPED][..], Mcu::Mps2An500),
         ("supervisor-oscillation-f32", "features/platform-damping.toml", &[][..], Mcu::Mps2An386),
-    ] {
+    ];
+    for &(name, spec, edits, mcu) in &machines[..specgen_tests::length(1, 2)] {
         let emitted = Emitted::new(name, spec, edits);
         let Some(image) = emitted.image(mcu) else { return };
         let mut machine = Machine::new(&emitted, &LegParameters::reference(), 5);

@@ -143,15 +143,13 @@ fn of_spec(arguments: &Arguments, ui: &mut Ui) -> Result<Ready, Failure> {
     }
 }
 
-/// The same checks for an image at hand. Which part it is for, it does not say.
+/// The same checks for an image at hand, which says what board it is for.
 fn of_image(arguments: &Arguments, elf: &[u8], ui: &mut Ui) -> Result<Ready, Failure> {
-    let named = arguments.common.target.as_deref().and_then(Target::named).map(|target| target.kind);
-    let Some(Kind::Board(mcu)) = named else {
-        return Err(Failure::Usage("an image does not say which board it is for: name it by --target".to_owned()));
-    };
+    let image = arguments.file.display().to_string();
+    let size = size(elf)?;
+    let mcu = board_of(&image, size.target, arguments.common.target.as_deref())?;
     let part = mcu.part();
     let checked = checks::check(elf, None, Rules { single: !part.double, whole_image: false })?;
-    let size = size(elf)?;
     let limits = model::Target { mcu, budget: model::Budget::NONE };
     let used = budget::Used {
         flash: size.flash(),
@@ -174,7 +172,6 @@ fn of_image(arguments: &Arguments, elf: &[u8], ui: &mut Ui) -> Result<Ready, Fai
             size.assumed.join(", ")
         ));
     }
-    let image = arguments.file.display().to_string();
     let examined = Examined { image, failures, size, checks: checked };
     let result = ui.shown(&examined);
     let Examined { image, failures, .. } = examined;
@@ -184,6 +181,24 @@ fn of_image(arguments: &Arguments, elf: &[u8], ui: &mut Ui) -> Result<Ready, Fai
     let list: String = failures.iter().map(|failure| format!("\n  {failure}")).collect();
     let message = format!("{image} is refused for {}:{list}\nnothing was flashed", part.board);
     Err(Failure::Judged { message, result })
+}
+
+/// The part of the board that an image is built for, unless `--target` names another one.
+fn board_of(image: &str, target: Option<&str>, named: Option<&str>) -> Result<Mcu, Failure> {
+    let Some(target) = target else {
+        return Err(Failure::Usage(format!(
+            "nothing was flashed: {image} does not say which board it is for; build it anew with specgen build SPEC --target NAME"
+        )));
+    };
+    match Target::named(target).map(|target| target.kind) {
+        _ if named.is_some_and(|named| named != target) => Err(Failure::Usage(format!(
+            "nothing was flashed: {image} is for {target}, not for {0}: leave --target out, or make an image for {0} with \
+             specgen build SPEC --target {0}",
+            named.unwrap_or_default()
+        ))),
+        Some(Kind::Board(mcu)) => Ok(mcu),
+        _ => Err(not_a_board(target)),
+    }
 }
 
 pub(super) fn not_a_board(name: &str) -> Failure {

@@ -110,7 +110,8 @@ pub fn owners(size: &Size) -> String {
 pub fn sections(size: &Size) -> String {
     let mut out = String::new();
     if let Some(identity) = &size.identity {
-        let _ = writeln!(out, "  made by {identity}");
+        let target = size.target.map_or(String::new(), |target| format!(", for {target}"));
+        let _ = writeln!(out, "  made by {identity}{target}");
     }
     if !size.assumed.is_empty() {
         let _ = writeln!(out, "  assumed: {}", size.assumed.join(", "));

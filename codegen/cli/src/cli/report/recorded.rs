@@ -11,7 +11,7 @@ use specgen_runtime::record::Reason;
 use super::beside;
 use super::words::Words;
 use crate::cli::replay;
-use crate::cli::sim::{emitted, environment};
+use crate::cli::sim::{at_run_time, environment};
 use crate::cli::ui::{Failure, Ui};
 
 /// Phase of the supervisor.
@@ -28,7 +28,7 @@ pub fn read(path: &Path, compiled: &Compiled, ui: &Ui) -> Result<Run, Failure> {
             recorded.digest, compiled.source.display_name, compiled.ir.digest
         )));
     }
-    let mut machine = Supervised::new(emitted(compiled, ui)?).map_err(environment)?;
+    let mut machine = Supervised::new(at_run_time(compiled, ui)?).map_err(environment)?;
     ui.progress("running the record again");
     let mut blocks: Vec<Block> = Vec::new();
     let header = reader.header().clone();

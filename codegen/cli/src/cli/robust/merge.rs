@@ -7,7 +7,7 @@ use super::work::Part;
 use crate::cli::file::{claim, read_text};
 use crate::cli::named::{InputFile, OutputFolder};
 use crate::cli::plot::Plot;
-use crate::cli::ui::{Failure, Ui};
+use crate::cli::ui::{ControllerForm, Failure, Ui};
 use specgen_studies::robust::shard;
 
 /// Arguments of `robust merge`.
@@ -46,6 +46,8 @@ pub(super) fn run(arguments: &Arguments, ui: &Ui) -> Result<(), Failure> {
     let plan = work.plan();
     let parts: Vec<shard::Part> = read.into_iter().map(|(name, part)| part.named(name)).collect();
     let runs = shard::merged(&plan, &parts).map_err(Failure::Gate)?;
+    // That of the parts: a study has no other.
+    ui.runs(ControllerForm::RunTime);
     let _claimed = arguments.output.as_deref().map(claim).transpose()?;
     let results = Results { output: arguments.output.as_deref(), plot: &arguments.plot };
     results.put(&work, false, plan.members.len(), &runs, ui, || {})

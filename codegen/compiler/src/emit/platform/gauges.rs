@@ -10,16 +10,9 @@ use crate::ir::{Ir, Sensing};
 pub fn emit(ir: &Ir, s: &Sensing) -> TokenStream {
     let scalar = ir.scalar;
     let converter = gauge_converter::emit(ir);
-    let vectors = |rows| literal::vectors(scalar, rows);
-    let (direction, normal) = (vectors(&s.direction), vectors(&s.normal));
-    let (skew, pierced) = (vectors(&s.skew), vectors(&s.pierced));
-    let inverse = literal::matrix(scalar, &s.inverse);
-    let curvature = literal::matrix(scalar, &s.curvature);
-    let passes = literal::count(s.passes as usize);
-    let arc_sine = literal::reals(scalar, &s.arc_sine);
-    let arc_tangent = literal::reals(scalar, &s.arc_tangent);
+    let gauges = literal::constant!(scalar, gauges, s);
     let limits = s.raw_limits.iter().map(|limits| literal::reals(scalar, limits));
-    let (keep, gain) = (literal::real(scalar, s.rate_keep), literal::real(scalar, s.rate_gain));
+    let rate = literal::constant!(scalar, rate_filter, s);
     let passes_doc = format!(
         " Lines and planes at rest; the passes leave {:.1e} m and {:.1e} rad over the declared workspace. From `gauge` and \
          `workspace`.",
@@ -45,17 +38,7 @@ pub fn emit(ir: &Ir, s: &Sensing) -> TokenStream {
         use crate::Real;
 
         #[doc = #passes_doc]
-        pub const GAUGES: Gauges<'static, Real> = Gauges {
-            direction: #direction,
-            normal: #normal,
-            skew: #skew,
-            pierced: #pierced,
-            inverse: #inverse,
-            curvature: #curvature,
-            passes: #passes,
-            arc_sine: &[#arc_sine],
-            arc_tangent: &[#arc_tangent],
-        };
+        pub const GAUGES: Gauges<'static, Real> = #gauges;
         /// Words in V to readings in m, lowest power first; from `gauge.calibration`. Without one a word is a reading.
         pub const CALIBRATION: Option<Meaning> = #calibration;
         /// What the gauges' words mean, with so many coefficients each.
@@ -63,7 +46,7 @@ pub fn emit(ir: &Ir, s: &Sensing) -> TokenStream {
         #[doc = #raw_doc]
         pub const RAW_LIMITS: [[Real; 2]; 6] = [#([#limits]),*];
         /// First-order filter of the pose's rate; from `velocity_cutoff` and `timing.period`.
-        pub const RATE: RateFilter<Real> = RateFilter { keep: #keep, gain: #gain };
+        pub const RATE: RateFilter<Real> = #rate;
 
         #converter
     }

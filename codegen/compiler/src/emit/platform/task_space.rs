@@ -4,23 +4,14 @@ use proc_macro2::TokenStream;
 use quote::quote;
 
 use crate::emit::literal;
-use crate::ir::{self, Ir, TaskSpace};
+use crate::ir::{Ir, TaskSpace};
 
 pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let real = |value| literal::real(ir.scalar, value);
     let six = |values: &[f64; 6]| literal::reals(ir.scalar, values);
-    let matrix = |rows: &[[f64; 6]; 6]| {
-        let rows = rows.iter().map(|row| literal::reals(ir.scalar, row));
-        quote! { [#([#rows]),*] }
-    };
+    let matrix = |rows: &[[f64; 6]; 6]| literal::matrix(ir.scalar, rows);
     let law = &task.law;
-    let load = task.load.affine.as_ref().map_or_else(
-        || quote! { None },
-        |affine| {
-            let (pose, acceleration) = (matrix(&affine.pose), matrix(&affine.acceleration));
-            quote! { Some(Affine { pose: #pose, acceleration: #acceleration }) }
-        },
-    );
+    let load = literal::constant!(ir.scalar, affine, &task.load);
     let load_doc = format!(
         " To first order the legs give way to inertia and gravity by P h + Q ḧ: at most {:.3e} m off in moves and trajectories, {:.1e} in stops; \
          from `control.dynamics`. None: by the whole kernel.",
@@ -37,10 +28,13 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let own_leads: Vec<_> = law.own_leads.iter().map(|lead| real(*lead)).collect();
     let hands_over = law.hands_over;
     let led = proc_macro2::Literal::usize_unsuffixed(own_leads.len());
-    let notch = law.notch.as_ref().map_or_else(|| quote! { None }, |notch| with_sections(ir, notch, &matrix));
+    let notch = literal::constant!(ir.scalar, notch, law);
     let import_section = law.notch.as_ref().map(|_| quote! { , Section });
-    let (damped, damping) = with_damping(ir, law.damping.as_ref());
-    let (corrected, correction) = with_correction(ir, law.correction.as_ref());
+    let [damped, corrected] =
+        [law.damping.is_some(), law.correction.is_some()].map(|given| literal::count(if given { 6 } else { 0 }));
+    let none = quote! { [] };
+    let damping = law.damping.map_or(none.clone(), |sections| literal::constant!(ir.scalar, damping, &sections));
+    let correction = law.correction.map_or(none, |limits| literal::constant!(ir.scalar, correction, &limits));
     quote! {
         #![doc = " Constants of the control law (7) in task space, at rest; from `actuator`, `control` and the dynamics."]
 
@@ -88,49 +82,12 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         /// Modes with active damping; from `control.active_damping`.
         pub const DAMPED: usize = #damped;
         /// Active damping of each.
-        pub const DAMPING: [Resonator<Real>; DAMPED] = [#(#damping),*];
+        pub const DAMPING: [Resonator<Real>; DAMPED] = #damping;
         /// Whether the integral is handed to the estimates when the set-point comes to rest; from `control.hand_over`.
         pub const HANDS_OVER: bool = #hands_over;
         /// Axes with a correction of the request; from `control.correction`.
         pub const CORRECTED: usize = #corrected;
         /// How far and how fast that of each goes.
-        pub const CORRECTION: [CorrectionLimit<Real>; CORRECTED] = [#(#correction),*];
+        pub const CORRECTION: [CorrectionLimit<Real>; CORRECTED] = #correction;
     }
-}
-
-fn with_sections(ir: &Ir, notch: &ir::Notch, matrix: &dyn Fn(&[[f64; 6]; 6]) -> TokenStream) -> TokenStream {
-    let sections = notch.sections.iter().map(|section| {
-        let (depth, a) = (literal::real(ir.scalar, section.depth), literal::reals(ir.scalar, &section.a));
-        quote! { Section { depth: #depth, a: [#a] } }
-    });
-    let (pose_to_modes, modes_to_pose) = (matrix(&notch.pose_to_modes), matrix(&notch.modes_to_pose));
-    quote! {
-        Some(Notch { sections: [#(#sections),*], pose_to_modes: #pose_to_modes, modes_to_pose: #modes_to_pose })
-    }
-}
-
-/// How many modes are damped, and the section of each.
-fn with_damping(ir: &Ir, sections: Option<&[ir::Resonator; 6]>) -> (proc_macro2::Literal, Vec<TokenStream>) {
-    let sections: Vec<TokenStream> = sections
-        .into_iter()
-        .flatten()
-        .map(|section| {
-            let (b, a) = (literal::reals(ir.scalar, &section.b), literal::reals(ir.scalar, &section.a));
-            quote! { Resonator { b: [#b], a: [#a] } }
-        })
-        .collect();
-    (proc_macro2::Literal::usize_unsuffixed(sections.len()), sections)
-}
-
-/// How many axes take a correction, and the limits of each.
-fn with_correction(ir: &Ir, limits: Option<&[ir::CorrectionLimit; 6]>) -> (proc_macro2::Literal, Vec<TokenStream>) {
-    let limits: Vec<TokenStream> = limits
-        .into_iter()
-        .flatten()
-        .map(|limit| {
-            let (most, step) = (literal::real(ir.scalar, limit.most), literal::real(ir.scalar, limit.step));
-            quote! { CorrectionLimit { most: #most, step: #step } }
-        })
-        .collect();
-    (proc_macro2::Literal::usize_unsuffixed(limits.len()), limits)
 }

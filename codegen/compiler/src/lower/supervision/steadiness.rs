@@ -2,7 +2,7 @@
 
 use super::{CHANNELS, above, defaults, finding, whole};
 use crate::ir::{Scalar, Steadiness};
-use crate::lower::sensing::PoseNoise;
+use crate::lower::sensing::{PoseNoise, pose_noise};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
 
@@ -25,6 +25,25 @@ const FEWEST_ONE_WAY: f64 = 3.0;
 /// Fewest samples.
 const FEWEST: f64 = 12.0;
 
+/// What an angle makes at the platform joints, m/rad, and the least amplitude (m) that is above the noise of every axis.
+fn arms_and_least(model: &Model, noise: Option<&PoseNoise>) -> ([f64; 6], f64) {
+    let (arms, noise) = match noise {
+        Some(noise) => {
+            let radius = model.geometry.joint_radius();
+            ([1.0, 1.0, 1.0, radius, radius, radius], noise.pose)
+        }
+        None => ([1.0; 6], [model.sensor.noise; 6]),
+    };
+    let least = arms.iter().zip(noise).map(|(arm, noise)| NOISE_MARGIN * noise * arm).fold(0.0, libm::fmax);
+    (arms, least)
+}
+
+/// Without `supervisor.disturbance`, m.
+pub(crate) fn usual(model: &Model) -> f64 {
+    let noise = pose_noise(model).ok().flatten();
+    libm::fmax(defaults::disturbance(model), arms_and_least(model, noise.as_ref()).1)
+}
+
 pub(super) fn lower(
     model: &Model,
     noise: Option<&PoseNoise>,
@@ -33,19 +52,8 @@ pub(super) fn lower(
     findings: &mut Vec<Diagnostic>,
 ) -> Steadiness {
     let between = CHANNELS * model.timing.period;
-    let (arms, noise) = match noise {
-        Some(noise) => {
-            let radius = model.geometry.joint_radius();
-            ([1.0, 1.0, 1.0, radius, radius, radius], noise.pose)
-        }
-        None => ([1.0; 6], [model.sensor.noise; 6]),
-    };
-    let least = (0..6).fold(0.0, |most: f64, axis| {
-        let of_axis = NOISE_MARGIN * noise[axis] * arms[axis];
-        if of_axis > most { of_axis } else { most }
-    });
-    let usual = defaults::disturbance(model);
-    let disturbance = model.supervisor.disturbance.unwrap_or(if usual > least { usual } else { least });
+    let (arms, least) = arms_and_least(model, noise);
+    let disturbance = model.supervisor.disturbance.unwrap_or(libm::fmax(defaults::disturbance(model), least));
     if disturbance < least {
         findings.push(finding(
             model,

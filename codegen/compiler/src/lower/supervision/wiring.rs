@@ -14,12 +14,20 @@ const FEWEST: f64 = 40.0;
 const MAINS: f64 = 50.0;
 /// A period of the mains takes as many ticks at least, or it is not told from the pulse.
 const MAINS_TICKS: f64 = 4.0;
+/// Periods of the mains in a pulse, at least: one whole period is the pulse itself.
+const MAINS_PERIODS: f64 = 1.5;
 /// Least gain of small motions over that of large ones, stiff joints and legs of little gain included.
 const LEAST_GAIN: f64 = 0.4;
 /// Part of what a gauge or leg shows that its noise may be, rms.
 const NOISE: f64 = 0.03;
 /// Gains of a gauge or leg that is faulty, hundredths.
 const GAINS: [u32; 2] = [50, 200];
+/// Gains that alike legs show over the mean of the others: 15 % to either side.
+const ALIKE: [f64; 2] = [0.74, 1.35];
+/// Without `wiring_check.residual`.
+const RESIDUAL: f64 = 0.1;
+/// Steps towards a bound that is accepted as printed.
+const TRIES: u32 = 200;
 
 /// Constants of the check; none where the spec switches it off. `readings`: of each gauge (rows) per displacement of each leg.
 pub(super) fn lower(
@@ -35,69 +43,53 @@ pub(super) fn lower(
     if spec.off.is_some() {
         return None;
     }
-    let period = model.timing.period;
     let rest = rest::code(model, actuation);
-    let gain = model.actuator.leg_gain();
-    let volts = spec.amplitude * model.actuator.stroke / gain;
     let [above, below] = [actuation.code_max - rest, rest - actuation.code_min];
-    let room = if above >= below { above } else { below };
-    // Saturates.
-    let height = (libm::round(volts / actuation.volts_per_code) as i32).clamp(1, if room > 1 { room } else { 1 });
-    // Ticks that the slew rate asks for where the pulse is steepest.
-    let steepest = libm::ceil(f64::from(height) * core::f64::consts::PI / f64::from(max_step) - 1e-9);
-    let least = period * if steepest > FEWEST { steepest } else { FEWEST };
-    let mut time = spec.time.unwrap_or(if least > defaults::WIRING_TIME { least } else { defaults::WIRING_TIME });
-    if time < least * (1.0 - 1e-9) {
-        findings.push(finding(
-            model,
-            codes::SUPERVISOR_TIME,
-            "wiring_check.time",
-            format!(
-                "a pulse of {:.6} ms is shorter than {FEWEST} periods and what `actuator.slew_rate` permits, {:.6} ms",
-                time * 1e3,
-                least * 1e3
-            ),
-            format!(
-                "leave wiring_check.time out: it is then {} ms; it must be at least {:.6} ms",
-                figure(libm::fmax(least, defaults::WIRING_TIME) * 1e3),
-                least * 1e3
-            ),
-        ));
-        return None;
-    }
-    let pulse = f64::from(height) * actuation.volts_per_code * gain;
-    let in_time = |time: f64| {
-        let ticks = whole(libm::round(time / period));
-        let regression = Regression::new(ticks, period, model.amplifier.lag, model.sensor.lag);
-        let noise = noise(model, &regression.weights(), pulse, readings);
-        (ticks, regression, noise)
+    let up = above >= below;
+    let room = if up { above } else { below };
+    let made =
+        |amplitude: f64, time: Option<f64>| Pulse::new(model, actuation, [room, max_step], readings, amplitude, time);
+    let chosen = match made(spec.amplitude, spec.time) {
+        Ok(pulse) => pulse,
+        Err(TooShort { time, least }) => {
+            findings.push(finding(
+                model,
+                codes::SUPERVISOR_TIME,
+                "wiring_check.time",
+                format!(
+                    "a pulse of {:.6} ms is shorter than {FEWEST} periods and what `actuator.slew_rate` permits, {:.6} ms",
+                    time * 1e3,
+                    least * 1e3
+                ),
+                format!(
+                    "leave wiring_check.time out: it is then {} ms; it must be at least {:.6} ms",
+                    figure(libm::fmax(least, defaults::WIRING_TIME) * 1e3),
+                    least * 1e3
+                ),
+            ));
+            return None;
+        }
     };
-    let (mut ticks, mut regression, mut noise) = in_time(time);
-    if spec.time.is_none() && noise > NOISE {
-        // Noise goes with the root of the time.
-        time =
-            libm::fmax(time, libm::fmin(time * (noise / NOISE) * (noise / NOISE) * 1.1, defaults::LONGEST_WIRING_TIME));
-        (ticks, regression, noise) = in_time(time);
-    }
-    if noise > NOISE {
+    if chosen.noise > NOISE {
         findings.push(Diagnostic::at(
             &model.spans,
             &["supervisor.wiring_check.amplitude", "supervisor.wiring_check", "sensor.noise", "sensor"],
             codes::SUPERVISOR_BOUND,
             format!(
-                "the gauges' noise makes {:.1} % of what a pulse of {:.4} um shows of a leg or gauge, more than {:.0} %",
-                noise * 1e2,
-                pulse * 1e6,
+                "the gauges' noise makes {} % of what a pulse of {} um shows of a leg or gauge, more than {:.0} %",
+                figure(chosen.noise * 1e2),
+                figure(chosen.size * 1e6),
                 NOISE * 1e2
             ),
-            larger_or_longer(spec.amplitude * noise / NOISE, time * (noise / NOISE) * (noise / NOISE)),
+            larger_or_longer(model, &chosen, made),
         ));
         return None;
     }
+    let Pulse { height, ticks, size: pulse, regression, .. } = chosen;
     let identified = hysteresis.tables.len() > 1;
     let compares = identified || spec.legs == LegMakes::Alike;
     let round = |value: f64| scalar.round(value);
-    let signed = if above >= below { height } else { -height };
+    let signed = if up { height } else { -height };
     // Where the pulse goes down the gauges do, too, and u is its depth.
     let per_leg = legs(hysteresis, actuation, [rest, rest + signed]);
     let mut wiring = Wiring {
@@ -117,20 +109,141 @@ pub(super) fn lower(
     let constants = runtime(&wiring);
     (wiring.alike, wiring.unseen) = alike(&constants, readings);
     wiring.turned = turned(&constants, readings);
+    findings.extend(odd_bounds(model, identified, &constants, &wiring.unseen, readings));
     Some(wiring)
 }
 
-/// What makes the noise small enough: an amplitude and a time (s) that just do.
-fn larger_or_longer(amplitude: f64, time: f64) -> String {
-    let (amplitude, time) = (amplitude * 1.05 + 1e-4, time * 1.1e3 + 1.0);
-    let longer = format!("wiring_check.time = \"{time:.0} ms\" or more");
-    if amplitude < LARGEST_PULSE {
-        format!("write wiring_check.amplitude = {} or more, or {longer}, in [supervisor]", figure(amplitude))
-    } else if time < LONGEST_TIMEOUT * 1e3 {
-        format!("write {longer}, in [supervisor]")
-    } else {
-        "write wiring_check = { off = \"the gauges are too noisy\" } in [supervisor]: nothing then proves the signs"
-            .to_owned()
+/// Bounds that a fault-free machine leaves, or that let a fault pass which the usual residual shows.
+fn odd_bounds(
+    model: &Model,
+    identified: bool,
+    constants: &supervisor::Wiring<f64>,
+    unseen: &[u32],
+    readings: &Response<f64>,
+) -> Option<Diagnostic> {
+    let spec = &model.supervisor.wiring_check;
+    let odd = |key: &str, message: String, help: String| {
+        Some(finding(model, codes::WIRING_BOUNDS, &format!("wiring_check.{key}"), message, help))
+    };
+    let [low, high] = spec.leg_gain;
+    if !identified && constants.leg_gain.is_some() && (low > ALIKE[0] || high < ALIKE[1]) {
+        return odd(
+            "leg_gain",
+            format!("legs of one make show gains of {} to {}, but only {low} to {high} pass", ALIKE[0], ALIKE[1]),
+            format!("write wiring_check.leg_gain = {ALIKE:?} or wider, in [supervisor]"),
+        );
+    }
+    let usual = supervisor::Wiring { residual: RESIDUAL * RESIDUAL, ..*constants };
+    let mut missed = unseen.iter().map(|word| Finding::of_word(*word)).filter(|fault| sees(&usual, readings, *fault));
+    let missed = missed.next().filter(|_| spec.residual > RESIDUAL)?;
+    odd(
+        "residual",
+        format!("with a residual of {} the check lets pass: {missed}", spec.residual),
+        format!("write wiring_check.residual = {RESIDUAL} or less, in [supervisor]"),
+    )
+}
+
+/// Whether a fault is seen where small motions have 0.7 of the spec's gain.
+fn sees(wiring: &supervisor::Wiring<f64>, readings: &Response<f64>, fault: Finding) -> bool {
+    !supervisor::explains(wiring, readings, &small(with(readings, fault)))
+}
+
+fn small(response: Response<f64>) -> Response<f64> {
+    response.map(|row| row.map(|entry| 0.7 * entry))
+}
+
+/// The pulse of a leg.
+struct Pulse {
+    /// Codes.
+    height: i32,
+    ticks: u32,
+    /// s.
+    time: f64,
+    /// Displacement of a leg by the spec's gain, m.
+    size: f64,
+    regression: Regression,
+    /// Part of what the least moved gauge or leg shows that noise makes, rms.
+    noise: f64,
+}
+
+/// A pulse that cannot be made in the time (s) that it is given.
+struct TooShort {
+    time: f64,
+    least: f64,
+}
+
+impl Pulse {
+    /// Of a share of the stroke, in a time (s) or in the one that slew rate and noise ask for, with so many codes of room and in a tick.
+    fn new(
+        model: &Model,
+        actuation: &Actuation,
+        [room, max_step]: [i32; 2],
+        readings: &Response<f64>,
+        amplitude: f64,
+        given: Option<f64>,
+    ) -> Result<Self, TooShort> {
+        let period = model.timing.period;
+        let gain = model.actuator.leg_gain();
+        let volts = amplitude * model.actuator.stroke / gain;
+        // Saturates.
+        let height = (libm::round(volts / actuation.volts_per_code) as i32).clamp(1, if room > 1 { room } else { 1 });
+        // Ticks that the slew rate asks for where the pulse is steepest.
+        let steepest = libm::ceil(f64::from(height) * core::f64::consts::PI / f64::from(max_step) - 1e-9);
+        let least = period * if steepest > FEWEST { steepest } else { FEWEST };
+        let time = given.unwrap_or(libm::fmax(least, defaults::WIRING_TIME));
+        if time < least * (1.0 - 1e-9) {
+            return Err(TooShort { time, least });
+        }
+        let size = f64::from(height) * actuation.volts_per_code * gain;
+        let in_time = |time: f64| {
+            let ticks = whole(libm::round(time / period));
+            let regression = Regression::new(ticks, period, model.amplifier.lag, model.sensor.lag);
+            let noise = noise(model, &regression.weights(), size, readings);
+            Self { height, ticks, time, size, regression, noise }
+        };
+        let pulse = in_time(time);
+        if given.is_some() || pulse.noise <= NOISE {
+            return Ok(pulse);
+        }
+        // Noise goes with the root of the time.
+        let longer = time * (pulse.noise / NOISE) * (pulse.noise / NOISE) * 1.1;
+        Ok(in_time(libm::fmax(time, libm::fmin(longer, defaults::LONGEST_WIRING_TIME))))
+    }
+}
+
+/// What makes the noise small enough: an amplitude and a time that are accepted as they are printed.
+fn larger_or_longer(
+    model: &Model,
+    refused: &Pulse,
+    made: impl Fn(f64, Option<f64>) -> Result<Pulse, TooShort>,
+) -> String {
+    let spec = &model.supervisor.wiring_check;
+    let accepted = |amplitude: f64, time: Option<f64>| made(amplitude, time).is_ok_and(|pulse| pulse.noise <= NOISE);
+    let too_much = refused.noise / NOISE;
+    let rises = |first: f64, by: f64| {
+        (0..TRIES).scan(first, move |value, _| {
+            let this = *value;
+            *value *= by;
+            Some(this)
+        })
+    };
+    let larger = rises(refused.size / model.actuator.stroke * too_much, 1.02)
+        .map(figure)
+        .take_while(|text| text.parse().is_ok_and(|share: f64| share < LARGEST_PULSE))
+        .find(|text| text.parse().is_ok_and(|share| accepted(share, spec.time)))
+        .map(|text| format!("wiring_check.amplitude = {text} or more"));
+    let longer = rises(libm::ceil(refused.time * too_much * too_much * 1e3), 1.02)
+        .map(libm::ceil)
+        .take_while(|time| *time < LONGEST_TIMEOUT * 1e3)
+        .find(|time| accepted(spec.amplitude, Some(time * 1e-3)))
+        .map(|time| format!("wiring_check.time = \"{time:.0} ms\" or more"));
+    match (larger, longer) {
+        (Some(larger), Some(longer)) => format!("write {larger}, or {longer}, in [supervisor]"),
+        (Some(fix), None) | (None, Some(fix)) => format!("write {fix}, in [supervisor]"),
+        (None, None) => {
+            "write wiring_check = { off = \"the gauges are too noisy\" } in [supervisor]: nothing then proves the signs"
+                .to_owned()
+        }
     }
 }
 
@@ -184,7 +297,7 @@ impl Regression {
         let steps = if amplifier_lag > 0.0 { 1.0 / (1.0 - libm::exp(-period / amplifier_lag)) } else { 1.0 };
         let delay = steps + sensor_lag / period;
         let share = 1.0 / f64::from(ticks);
-        let has_mains = MAINS * period * MAINS_TICKS <= 1.0;
+        let has_mains = MAINS * period * MAINS_TICKS <= 1.0 && MAINS * period * f64::from(ticks) >= MAINS_PERIODS;
         let mut regression = Self {
             ticks,
             turn: [circle(share), if has_mains { circle(MAINS * period) } else { [1.0, 0.0] }],
@@ -269,11 +382,10 @@ fn turned(wiring: &supervisor::Wiring<f64>, readings: &Response<f64>) -> Vec<[us
 /// Sets of faults that look alike to the check, and those that it does not see, as words.
 fn alike(wiring: &supervisor::Wiring<f64>, readings: &Response<f64>) -> (Vec<Vec<u32>>, Vec<u32>) {
     let faults = single_faults();
-    let small = |response: Response<f64>| response.map(|row| row.map(|entry| 0.7 * entry));
     let (mut sets, mut unseen): (Vec<Vec<u32>>, Vec<u32>) = (Vec::new(), Vec::new());
     for fault in &faults {
         let shown = small(with(readings, *fault));
-        if supervisor::explains(wiring, readings, &shown) {
+        if !sees(wiring, readings, *fault) {
             unseen.push(fault.word());
         }
         // The first that looks like it leads its set.
@@ -323,6 +435,7 @@ pub fn describe(model: &Model, supervision: &Supervision) -> String {
     }
     let alike = match wiring.alike.len() {
         0 => "    no single fault of a gauge or leg looks like another on this geometry\n".to_owned(),
+        1 => "    1 set of faults looks alike on this geometry:\n".to_owned(),
         count => format!("    {count} sets of faults look alike on this geometry:\n"),
     };
     text.push_str(&alike);
@@ -337,6 +450,11 @@ pub fn describe(model: &Model, supervision: &Supervision) -> String {
             "    not seen: the connectors of all gauges turned by {gauges} places, those of all legs by {legs}\n"
         ));
     }
-    text.push_str("    not seen: a common factor of all gauges\n");
+    text.push_str("    not seen: a common factor of all gauges or all legs");
+    if let Some([low, high]) = wiring.leg_gain {
+        // As the controller has it, of small motions.
+        text.push_str(&format!(" that leaves {} to {} of the spec's gain", figure(low * 0.5), figure(high * 1.5)));
+    }
+    text.push('\n');
     text
 }

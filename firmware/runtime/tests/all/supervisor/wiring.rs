@@ -1,6 +1,11 @@
 //! The wiring check by itself: words of findings, the regression of a leg's samples, and what is found in responses.
 
-use specgen_runtime::supervisor::{Check, Fault, Finding, Named, Response, Wiring, explains, with};
+use specgen_runtime::CodeLimits;
+use specgen_runtime::supervisor::{
+    Cause, Check, Fault, Finding, Named, Phase, Request, Response, Supervision, Supervisor, Wiring, explains, with,
+};
+
+use super::SUPERVISION;
 
 /// Readings per leg displacement of a platform of six upright legs and level gauges: no row or column is alone.
 const EXPECTED: Response<f64> = [
@@ -47,12 +52,21 @@ fn faults() -> Vec<Finding> {
     all
 }
 
-/// Six legs one after the other, each of which moves 0.6 µm times its gain at the pulse; what is found, and ticks.
 fn checked(shown: &Response<f64>, wiring: &Wiring<f64>) -> (Finding, u32) {
+    checked_while(shown, wiring, |readings, _| readings)
+}
+
+/// Six legs one after the other, each of which moves 0.6 µm times its gain at the pulse; what is found, and ticks. What is `shaken` changes
+/// the readings of each tick.
+fn checked_while(
+    shown: &Response<f64>,
+    wiring: &Wiring<f64>,
+    shaken: impl Fn([f64; 6], u32) -> [f64; 6],
+) -> (Finding, u32) {
     let mut check = Check::new();
     let (mut ticks, mut most) = (0, 0);
     while !check.done {
-        assert!(ticks < 6 * TICKS + 40 * FIT, "it does not end");
+        assert!(ticks < 3 * (7 * TICKS + 37 * FIT), "it does not end");
         let codes: [i32; 6] = std::array::from_fn(|leg| check.pulse(wiring, leg));
         assert!(codes.iter().filter(|code| **code != 0).count() <= 1, "one leg at a time");
         most = most.max(codes.iter().map(|code| code.abs()).max().unwrap_or(0));
@@ -60,7 +74,7 @@ fn checked(shown: &Response<f64>, wiring: &Wiring<f64>) -> (Finding, u32) {
         let readings = shown.map(|row| {
             row.iter().zip(codes).map(|(part, code)| part * 0.6e-6 * f64::from(code) / 400.0).sum::<f64>() + 3e-6
         });
-        check.tick(wiring, &EXPECTED, &readings);
+        check.tick(wiring, &EXPECTED, &shaken(readings, ticks), ticks);
         ticks += 1;
     }
     assert_eq!(most, wiring.height.abs());
@@ -71,6 +85,8 @@ fn checked(shown: &Response<f64>, wiring: &Wiring<f64>) -> (Finding, u32) {
 fn every_finding_is_its_word_and_says_what_it_is() {
     let mut all = faults();
     all.extend([Finding::None, Finding::Nothing, Finding::Unexplained, Finding::NoRoom]);
+    all.extend([Finding::Inverted, Finding::TooSlow]);
+    all.extend([0, 20, 500, 2000].map(Finding::Common));
     all.extend([0, 48, 99, 1999, 2000].map(|gain| Finding::Leg(5, Fault::Gain(gain))));
     for finding in &all {
         assert!(finding.word() < 1 << Finding::BITS, "{finding}");
@@ -106,7 +122,8 @@ fn a_finding_is_named_with_what_looks_like_it() {
 
 #[test]
 fn a_good_machine_passes_and_the_pulse_may_go_down() {
-    for gain in [0.35, 0.6, 1.0] {
+    // 0.36 to 1.32 of the spec's gain.
+    for gain in [0.6, 1.0, 2.2] {
         let shown = EXPECTED.map(|row| row.map(|entry| gain * entry));
         let (found, ticks) = checked(&shown, &wiring());
         assert_eq!((found, ticks), (Finding::None, 6 * TICKS + FIT), "gain {gain}");
@@ -135,10 +152,79 @@ fn every_single_fault_is_named() {
 #[test]
 fn what_no_single_fault_explains_is_not_explained_away() {
     let exchanged = with(&with(&EXPECTED, Finding::Leg(0, Fault::Swapped(3))), Finding::Gauge(1, Fault::Swapped(4)));
-    assert_eq!(checked(&exchanged, &wiring()).0, Finding::Unexplained);
+    let (found, ticks) = checked(&exchanged, &wiring());
+    assert_eq!(found, Finding::Unexplained);
+    // Three checks, with pauses of a quarter and a half of a pulse between them.
+    assert_eq!(ticks, 3 * (6 * TICKS + 37 * FIT) + TICKS / 4 + TICKS / 2);
     assert_eq!(checked(&[[0.0; 6]; 6], &wiring()).0, Finding::Nothing);
-    let turned = EXPECTED.map(|row| row.map(|entry| -entry));
-    assert_ne!(checked(&turned, &wiring()).0, Finding::None, "all of them inverted");
+}
+
+#[test]
+fn what_all_gauges_or_all_legs_have_in_common_is_named() {
+    // As a gain over that of the spec, where `checked` has legs of 0.6.
+    let scaled = |gain: f64| checked(&EXPECTED.map(|row| row.map(|entry| gain / 0.6 * entry)), &wiring()).0;
+    assert_eq!((scaled(-0.6), scaled(-5.0)), (Finding::Inverted, Finding::Inverted));
+    assert_eq!(Finding::Inverted.to_string(), "all gauges or all legs inverted");
+    assert_eq!((scaled(3.0), scaled(0.3)), (Finding::Common(300), Finding::Common(30)));
+    assert_eq!(Finding::Common(305).to_string(), "all legs or all gauges gain × 3.05");
+}
+
+/// A machine without a fault whose table swings: it is checked again, and no gauge or leg is blamed.
+#[test]
+fn vibration_that_ends_refuses_no_good_machine_and_blames_no_gauge() {
+    let whole = 6 * TICKS + 37 * FIT;
+    for of_pulse in [0.6, 0.8, 1.1, 1.4] {
+        let turn = std::f64::consts::TAU * of_pulse / f64::from(TICKS);
+        let shaken = |until: u32| {
+            checked_while(&EXPECTED, &wiring(), move |readings, tick| {
+                let by = if tick < until { 500e-9 * (turn * f64::from(tick)).sin() } else { 0.0 };
+                std::array::from_fn(|gauge| readings[gauge] + by * [1.0, -1.0, 0.3][gauge % 3])
+            })
+        };
+        assert_eq!(shaken(u32::MAX).0, Finding::Unexplained, "{of_pulse}");
+        let (found, ticks) = shaken(whole);
+        assert_eq!((found, ticks), (Finding::None, whole + TICKS / 4 + 6 * TICKS + FIT), "{of_pulse}");
+    }
+}
+
+/// In the middle of a pulse, or before the first: the machine ramps down, and the leg goes nowhere but to rest.
+#[test]
+fn a_hold_while_arming_ends_the_check_at_once() {
+    let supervision = Supervision { wiring: Some(wiring()), arm_ticks: 10, ..SUPERVISION };
+    let limits = CodeLimits { min: -1000, max: 1000, max_step: 100 };
+    for stop in [Request::Hold, Request::RampDown] {
+        for after in [3, 10 + TICKS / 2, 10 + 5 * TICKS + TICKS / 3] {
+            let mut supervisor = Supervisor::<f64>::new();
+            supervisor.decide(&supervision, Request::Arm, 0, true);
+            for _ in 0..after {
+                assert_eq!(supervisor.phase, Phase::Arming);
+                supervisor.decide(&supervision, Request::Arm, 0, false);
+                supervisor.check(&supervision, &EXPECTED, &[0.0; 6], limits);
+            }
+            supervisor.decide(&supervision, stop, 0, false);
+            assert_eq!((supervisor.phase, supervisor.cause), (Phase::RampingDown, Cause::None), "{stop:?} {after}");
+            assert!((0..6).all(|leg| supervisor.goal(&supervision, leg) == supervision.rest));
+            supervisor.decide(&supervision, stop, 0, true);
+            assert_eq!(supervisor.phase, Phase::Disarmed);
+        }
+    }
+}
+
+/// Codes that may change by 1 a tick cannot follow a pulse of π · 400 / 200 codes a tick.
+#[test]
+fn settings_that_cannot_follow_the_pulse_are_refused_by_name() {
+    let supervision = Supervision { wiring: Some(wiring()), arm_ticks: 1, ..SUPERVISION };
+    for (max_step, max, expected) in
+        [(6, 1000, Finding::TooSlow), (7, 1000, Finding::None), (100, 300, Finding::NoRoom)]
+    {
+        let mut supervisor = Supervisor::<f64>::new();
+        for _ in 0..3 {
+            supervisor.decide(&supervision, Request::Arm, 0, true);
+            supervisor.check(&supervision, &EXPECTED, &[0.0; 6], CodeLimits { min: -1000, max, max_step });
+        }
+        assert_eq!(Finding::of_word(supervisor.check.finding), expected, "{max_step}");
+        assert_eq!(supervisor.phase == Phase::RampingDown, expected != Finding::None);
+    }
 }
 
 #[test]
@@ -179,11 +265,11 @@ fn f32_finds_what_f64_finds() {
         let shown = with(&expected, fault);
         let mut check: Check<f32> = Check { leg: 6, response: shown, ..Check::new() };
         while !check.done {
-            check.tick(&single, &expected, &[0.0; 6]);
+            check.tick(&single, &expected, &[0.0; 6], 0);
         }
         let mut wide: Check<f64> = Check { leg: 6, response: with(&EXPECTED, fault), ..Check::new() };
         while !wide.done {
-            wide.tick(&w, &EXPECTED, &[0.0; 6]);
+            wide.tick(&w, &EXPECTED, &[0.0; 6], 0);
         }
         assert_eq!(check.finding, wide.finding, "{fault}");
     }

@@ -10,7 +10,7 @@ use specgen_toolchain::host::{build_loadable, build_unit};
 use super::{Built, Unit, Variable};
 use crate::cli::export::{fits, header};
 use crate::cli::sim::environment;
-use crate::cli::ui::{Failure, Ui};
+use crate::cli::ui::{ControllerForm, Failure, Ui};
 
 const MODEL: &str = include_str!("controller_model.h");
 
@@ -19,6 +19,7 @@ pub(super) fn built(compiled: &Compiled, ui: &Ui) -> Result<Built, Failure> {
     let sources = scratch.path().join("sources");
     let rust = sources.join("rust");
     workspace::write_scratch(&rust, &compiled.files)?;
+    ui.runs(ControllerForm::Emitted);
     ui.progress("building the emitted controller for this host");
     let target = scratch.path().join("target");
     let library = build_loadable(&rust, &target)?;

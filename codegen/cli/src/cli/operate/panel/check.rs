@@ -44,6 +44,7 @@ pub(super) fn run<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefC
     begin(operator, Request::Arm)?;
     let whole = f64::from(rules.arm_ticks) + 6.0 * f64::from(wiring.ticks);
     let (since, limit) = (Instant::now(), PATIENCE + Duration::from_secs_f64(whole * period));
+    let mut arms = false;
     let verdict = loop {
         operator.look()?;
         if std::mem::take(&mut panel.borrow_mut().hall.ends) {
@@ -68,8 +69,13 @@ pub(super) fn run<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefC
                 break Verdict { good: false, what, advice: said::advice(finding) };
             }
             Some(Phase::Faulted) => return Err(Ended::Fault(format!("the machine is {}", operator.stands()))),
+            // Whoever held it, or ramped it down.
+            Some(Phase::Disarmed | Phase::RampingDown) if arms => return refused("the check was ended".to_owned()),
             _ if since.elapsed() > limit => return refused(format!("the machine is still {}", operator.stands())),
-            _ => std::thread::sleep(Duration::from_millis(2)),
+            now => {
+                arms |= now == Some(Phase::Arming);
+                std::thread::sleep(Duration::from_millis(2));
+            }
         }
     };
     let kind = if verdict.good { "note" } else { "error" };

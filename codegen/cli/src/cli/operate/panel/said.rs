@@ -66,8 +66,17 @@ pub fn advice(finding: Finding) -> &'static str {
         Finding::Leg(_, Fault::Swapped(_)) => "Exchange the amplifier cables of the two legs.",
         Finding::Leg(_, Fault::Gain(_)) => "Check the amplifier's gain, `dac.range` and the record of the leg.",
         Finding::Nothing => "Check the supplies of amplifiers and gauges, and that stacks are connected.",
-        Finding::Unexplained => "Check gauge by gauge and leg by leg, with the others unplugged.",
+        Finding::Inverted => {
+            "Compare the gauges' wires and `direction` with the drawing. Exchange wires of stacks only if their markings show that they are wrong."
+        }
+        Finding::Common(_) => {
+            "Check the amplifiers' gain and `dac.range`, `sensor.range` or its calibration, and `actuator.stroke`."
+        }
+        Finding::Unexplained => {
+            "If something shakes the machine, stop that or raise `wiring_check.amplitude`. Else check gauge by gauge and leg by leg, with the others unplugged."
+        }
         Finding::NoRoom => "Widen `code_min` and `code_max`.",
+        Finding::TooSlow => "Raise `max_step_codes`.",
     }
 }
 

@@ -26,7 +26,7 @@
 #![deny(missing_docs)]
 
 #[path = "../../../../../controller/src/body.rs"]
-mod body;
+pub mod body;
 mod checked;
 #[path = "../../../../../controller/src/constants.rs"]
 mod constants;

@@ -1,5 +1,8 @@
-//! The run-time platform against the emitted library: the same outputs, codes, digests and snapshots in every bit, under inputs that try
-//! everything; what one of them recorded or saved goes on in the other; and one ulp in a constant is seen.
+//! The run-time platform against the emitted library: the same outputs, codes, digests, snapshots and dynamics in every bit, under
+//! inputs that try everything; and what one of them recorded or saved goes on in the other. That one ulp in a constant is seen is a
+//! test of `codegen/run-time`.
+
+mod random;
 
 use std::io::Cursor;
 
@@ -18,10 +21,17 @@ use specgen_tests::{Emitted, host_trace, length};
 /// Bytes of a block of a record.
 const BLOCK: usize = 8192;
 
-/// Ticks of each run of a law alone, and of a machine.
+/// Ticks of each run of a law alone; a machine runs for some times as many.
 fn ticks() -> usize {
     length(4_000, 20_000)
 }
+
+/// Ticks of a machine in a trial of so many ticks of the law.
+const MACHINE: usize = 8;
+/// Ticks that a machine may take to be armed, at most.
+const ARMING: usize = 60_000;
+/// Ticks out of the running phase after which a machine that ran is put back to where it did.
+const AWAY: usize = 60;
 
 fn hostile(emitted: &Emitted, controller: &Controller, rows: usize, seed: u64) -> InputRecording {
     let description = controller.description();
@@ -56,12 +66,12 @@ fn settings(ir: &Ir, draw: &mut ChaCha8Rng) -> Vec<u64> {
 }
 
 /// The law alone, under hostile records in several settings.
-fn laws_alike(name: &str, emitted: &Emitted, library: &mut Controller, at_run_time: &mut Controller) {
+fn laws_alike(name: &str, emitted: &Emitted, library: &mut Controller, at_run_time: &mut Controller, ticks: usize) {
     let ir = &emitted.compiled.ir;
     let mut draw = ChaCha8Rng::seed_from_u64(5);
     let modes = if ir.task_space.is_some() { 7 } else { 3 };
     for mode in 0..modes {
-        let inputs = hostile(emitted, library, ticks(), 30 + mode);
+        let inputs = hostile(emitted, library, ticks, 30 + mode);
         let mode_word = [("mode", mode as f64)];
         let (truth, _) = host_trace(library, &mode_word, &inputs);
         let (found, _) = host_trace(at_run_time, &mode_word, &inputs);
@@ -69,7 +79,7 @@ fn laws_alike(name: &str, emitted: &Emitted, library: &mut Controller, at_run_ti
         assert!(difference.is_none(), "{name}, mode {mode}: {}", difference.unwrap());
     }
     // From here on settings change from stretch to stretch, and the state stays.
-    let inputs = hostile(emitted, library, ticks(), 77);
+    let inputs = hostile(emitted, library, ticks, 77);
     let mut outputs = [vec![0; library.description().output_names.len()], vec![]];
     outputs[1] = outputs[0].clone();
     for (tick, row) in inputs.rows().enumerate() {
@@ -98,8 +108,8 @@ struct Course {
 }
 
 impl Course {
-    fn new(emitted: &Emitted, machine: &Supervised, seed: u64) -> Self {
-        let rows = hostile(emitted, machine.controller(), 12 * ticks(), seed);
+    fn new(emitted: &Emitted, machine: &Supervised, ticks: usize, seed: u64) -> Self {
+        let rows = hostile(emitted, machine.controller(), MACHINE * ticks, seed);
         let names = machine.input_names();
         let gauges = names.iter().position(|name| name == "gauge[0]" || name == "displacement[0]").unwrap();
         // At rest: of gauges with a calibration, the middle of what is believed.
@@ -119,7 +129,7 @@ impl Course {
     /// The next input, for a machine with this last output.
     fn next(&mut self, machine: &Supervised, output: &[u64], input: &mut [u64]) {
         let width = self.rows.width;
-        let row = &self.rows.words[self.tick % (12 * ticks()) * width..][..width];
+        let row = self.rows.rows().nth(self.tick % self.rows.rows().len()).unwrap();
         let phase = output[output.len() - 2] as u8 % 6;
         let last = if self.tick == 0 { &*self.at_rest } else { &*input };
         let held: [u64; 6] = last[self.gauges..][..6].try_into().unwrap();
@@ -168,7 +178,12 @@ fn spoil(words: &mut [u64], draw: &mut ChaCha8Rng, bits: u32) {
     }
 }
 
-fn machines_alike(name: &str, emitted: &Emitted, library: Controller, at_run_time: Controller) {
+/// Ticks of each phase.
+type Phases = [usize; 6];
+
+/// Both machines under one course, from power-up through arming, then for `MACHINE * ticks` ticks. Whatever stops them, they are put back
+/// to where they ran, so that most of the ticks are of the running phase.
+fn machines_alike(name: &str, emitted: &Emitted, library: Controller, at_run_time: Controller, ticks: usize) -> Phases {
     let ir = &emitted.compiled.ir;
     let [mut library, mut at_run_time] = [library, at_run_time].map(|controller| Supervised::new(controller).unwrap());
     for machine in [&mut library, &mut at_run_time] {
@@ -176,13 +191,19 @@ fn machines_alike(name: &str, emitted: &Emitted, library: Controller, at_run_tim
     }
     assert_eq!(library.state_words(), at_run_time.state_words(), "{name}: words of a snapshot");
     let bits = machine_bits(&library);
-    let mut course = Course::new(emitted, &library, 9);
+    let mut course = Course::new(emitted, &library, ticks, 9);
     let mut draw = ChaCha8Rng::seed_from_u64(11);
     let mut input = vec![0; library.input_names().len()];
     let mut outputs = [vec![0; library.output_names().len()], vec![0; library.output_names().len()]];
     let (mut phases, mut refused, mut taken) = ([0; 6], 0, 0);
-    // Long enough to be armed several times.
-    for tick in 0..8 * ticks() + 6 * ir.supervision.arm_ticks as usize {
+    // Where it ran first, and for how long it does not run any more.
+    let (mut ran, mut away) = (None, 0);
+    let (mut tick, mut left) = (0, MACHINE * ticks);
+    while left > 0 {
+        if tick == ARMING && ran.is_none() {
+            // A course that stands at rest does not arm every machine; what it did is compared.
+            break;
+        }
         course.next(&library, &outputs[0], &mut input);
         let [first, second] = &mut outputs;
         let word = library.step(&input, first);
@@ -190,12 +211,14 @@ fn machines_alike(name: &str, emitted: &Emitted, library: Controller, at_run_tim
         assert_eq!(first, second, "{name}, supervised tick {tick}");
         assert_eq!(library.digest(), at_run_time.digest(), "{name}, supervised tick {tick}: digest");
         phases[usize::from(word.phase)] += 1;
-        if tick % 1000 == 999 && word.phase == 2 {
+        tick += 1;
+        left -= usize::from(ran.is_some());
+        if tick % 1000 == 0 && word.phase == 2 {
             let words = settings(ir, &mut draw);
             let results = [&mut library, &mut at_run_time].map(|machine| machine.configure(&words).is_ok());
             assert_eq!(results[0], results[1], "{name}: settings {words:x?}");
         }
-        if tick % 400 == 399 {
+        if tick % 400 == 0 {
             let saved = library.save().unwrap();
             assert_eq!(saved, at_run_time.save().unwrap(), "{name}, supervised tick {tick}: snapshot");
             for _ in 0..20 {
@@ -212,12 +235,29 @@ fn machines_alike(name: &str, emitted: &Emitted, library: Controller, at_run_tim
             library.load(&saved).unwrap();
             at_run_time.load(&saved).unwrap();
         }
+        match (&ran, word.phase) {
+            (None, 2) => ran = Some((library.save().unwrap(), course.standing.clone())),
+            (_, 2) => away = 0,
+            (Some((state, standing)), _) => {
+                away += 1;
+                if away == AWAY {
+                    for machine in [&mut library, &mut at_run_time] {
+                        machine.load(state).unwrap();
+                        machine.configure(&ir.integrity.settings).unwrap();
+                    }
+                    course.standing = standing.clone();
+                    away = 0;
+                }
+            }
+            (None, _) => {}
+        }
     }
     println!("{name}: ticks in each phase {phases:?}; spoilt snapshots {taken} taken, {refused} refused");
-    assert!(phases[2] > 0 && refused > 0, "{name}: {phases:?}");
+    assert!(refused > 0 && (ran.is_none() || phases[2] > MACHINE * ticks / 10), "{name}: {phases:?}");
+    phases
 }
 
-fn record(mut machine: Supervised, emitted: &Emitted) -> Vec<u8> {
+fn record(mut machine: Supervised, emitted: &Emitted, ticks: usize) -> Vec<u8> {
     let mut memory = vec![0; 2 * BLOCK];
     let description = machine.controller().description().clone();
     let config = emitted.compiled.ir.integrity.settings.clone();
@@ -225,12 +265,12 @@ fn record(mut machine: Supervised, emitted: &Emitted) -> Vec<u8> {
     let mut recorder = Recorder::new(&mut memory, 2, layout).unwrap();
     recorder.start(Settings::STREAM);
     let mut writer = Writer::new(Vec::new(), machine.controller().text()).unwrap();
-    let mut course = Course::new(emitted, &machine, 21);
+    let mut course = Course::new(emitted, &machine, ticks, 21);
     let mut input = vec![0; machine.input_names().len()];
     let mut output = vec![0; machine.output_names().len()];
     let codes = description.outputs("dac_code").unwrap();
     let (status, supervisor) = (description.output("status").unwrap(), description.output_names.len());
-    for _ in 0..ticks() {
+    for _ in 0..ticks {
         course.next(&machine, &output, &mut input);
         if recorder.opens() {
             let state = machine.save().unwrap();
@@ -251,14 +291,14 @@ fn record(mut machine: Supervised, emitted: &Emitted) -> Vec<u8> {
 }
 
 /// What one recorded, the other replays.
-fn records_alike(name: &str, emitted: &Emitted, library: &Controller, at_run_time: &Controller) {
+fn records_alike(name: &str, emitted: &Emitted, library: &Controller, at_run_time: &Controller, ticks: usize) {
     for (recorder, player) in [(library, at_run_time), (at_run_time, library)] {
-        let bytes = record(Supervised::new(recorder.fork()).unwrap(), emitted);
+        let bytes = record(Supervised::new(recorder.fork()).unwrap(), emitted, ticks);
         let mut player = Supervised::new(player.fork()).unwrap();
         let mut reader = Reader::new(Cursor::new(&bytes)).unwrap();
         let replayed = replay(&mut reader, &mut player, |_, _, _| ()).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(replayed.divergence, None, "{name}");
-        assert_eq!(replayed.ticks, ticks() as u64, "{name}");
+        assert_eq!(replayed.ticks, ticks as u64, "{name}");
     }
 }
 
@@ -269,22 +309,27 @@ fn without_sizes(text: &str) -> String {
     text.lines().filter(of_memory).collect::<Vec<_>>().join("\n")
 }
 
-fn alike(name: &str, spec: &str, edits: &[(&str, &str)]) {
-    let emitted = Emitted::with_records(&format!("run-time-{name}"), spec, edits, &[("mu1.csv", rate_table())]);
+/// Builds the controller and compares all that it gives, but for the time that it takes.
+fn alike_in_all(name: &str, emitted: &Emitted, ticks: usize) -> Phases {
     let (mut library, mut at_run_time) = (emitted.controller(), emitted.at_run_time());
     assert_eq!(without_sizes(library.text()), without_sizes(at_run_time.text()), "{name}");
     assert_eq!(library.default_config(), at_run_time.default_config(), "{name}");
-    laws_alike(name, &emitted, &mut library, &mut at_run_time);
+    laws_alike(name, emitted, &mut library, &mut at_run_time, ticks);
     let spec_settings = library.default_config();
     for controller in [&mut library, &mut at_run_time] {
         controller.configure(&spec_settings).unwrap();
         controller.reset();
     }
-    records_alike(name, &emitted, &library, &at_run_time);
-    machines_alike(name, &emitted, library, at_run_time);
+    records_alike(name, emitted, &library, &at_run_time, ticks);
+    machines_alike(name, emitted, library, at_run_time, ticks)
 }
 
-const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
+fn alike(name: &str, spec: &str, edits: &[(&str, &str)]) {
+    let emitted = Emitted::with_records(&format!("run-time-{name}"), spec, edits, &[("mu1.csv", rate_table())]);
+    let phases = alike_in_all(name, &emitted, ticks());
+    assert!(phases[2] > 0, "{name}: {phases:?}");
+}
+
 /// Every part of the law that a spec has to ask for.
 const PARTS: (&str, &str) = (
     "interaction     = \"none\"",
@@ -293,12 +338,8 @@ const PARTS: (&str, &str) = (
 
 #[test]
 fn a_platform_with_every_part_of_the_law_has_the_bits_of_the_emitted_one() {
-    alike("parts", "reference.toml", &[PARTS]);
-}
-
-#[test]
-fn output_lines_have_the_bits_of_the_emitted_ones() {
-    alike("triggers", "features/triggers.toml", &[]);
+    let parts = "[control]\nactive_damping = true\nhand_over = true\ncorrection = \"2 um\"";
+    alike("parts-f32", "features/triggers.toml", &[("[control]", parts)]);
 }
 
 #[test]
@@ -328,7 +369,22 @@ fn every_spec_has_the_bits_of_its_emitted_controller() {
     for name in names {
         alike(&name.replace(['/', '.'], "-"), &name, &[]);
     }
-    alike("parts-f32", "reference.toml", &[PARTS, F32]);
+    alike("parts", "reference.toml", &[PARTS]);
+}
+
+/// Platforms as they might be built, with whatever else a spec may ask for drawn at random.
+#[test]
+fn random_specs_have_the_bits_of_their_emitted_controllers() {
+    let (mut kinds, mut ran) = (random::Kinds::default(), 0);
+    for index in (0..length(2, 50)).map(|number| (number + 3) % 50) {
+        let (emitted, parts) = random::emitted(index);
+        println!("random spec {index}: {parts:?}");
+        kinds.add(&emitted.compiled, &parts);
+        ran += usize::from(alike_in_all(&format!("random spec {index}"), &emitted, 3_000)[2] > 0);
+    }
+    println!("{ran} of {} machines ran", length(2, 50));
+    assert!(ran >= length(1, 25), "{ran} ran");
+    kinds.assert_varied(length(2, 50));
 }
 
 /// What a tick of either costs; for the page on speed. Prints, and demands nothing of a machine that others use.

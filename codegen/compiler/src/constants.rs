@@ -1,0 +1,311 @@
+//! Constants of the IR as the runtime takes them, in the scalar of the controller: for the emitted text, and for the law at run time.
+
+use std::marker::PhantomData;
+
+use specgen_language::model::FaultAction;
+use specgen_runtime::setpoint::{Axis, MoveLimits, Row, Segment, Setpoints, StopLimits, Trajectory};
+use specgen_runtime::snapshot::Sizes;
+use specgen_runtime::supervisor::{Reaction, Steadiness, Supervision, Wiring};
+use specgen_runtime::trigger::Line;
+use specgen_runtime::{
+    Affine, CorrectionLimit, Dac, Gains, Gauges, Legs, Notch, Permitted, Platform, RateFilter, Real, Resonator,
+    Section, Series,
+};
+
+use crate::ir::{self, Ir, Range};
+
+/// Makes numbers of a scalar.
+pub trait Numbers<T: Real> {
+    /// The number rounded to the scalar.
+    #[track_caller]
+    fn real(&self, value: f64) -> T;
+
+    /// Each of them.
+    #[track_caller]
+    fn vector<const N: usize>(&self, values: &[f64; N]) -> [T; N] {
+        let mut converted = [T::ZERO; N];
+        for (converted, value) in converted.iter_mut().zip(values) {
+            *converted = self.real(*value);
+        }
+        converted
+    }
+
+    /// Each of them; they stay in memory.
+    #[track_caller]
+    fn slice(&self, values: &[f64]) -> &'static [T] {
+        let mut converted = Vec::with_capacity(values.len());
+        for value in values {
+            converted.push(self.real(*value));
+        }
+        kept(converted)
+    }
+
+    /// Each of each row.
+    #[track_caller]
+    fn matrix<const M: usize, const N: usize>(&self, rows: &[[f64; N]; M]) -> [[T; N]; M] {
+        let mut converted = [[T::ZERO; N]; M];
+        for (converted, row) in converted.iter_mut().zip(rows) {
+            *converted = self.vector(row);
+        }
+        converted
+    }
+}
+
+/// What stays in memory to the end of the process.
+pub fn kept<X>(values: impl IntoIterator<Item = X>) -> &'static [X] {
+    Box::leak(values.into_iter().collect())
+}
+
+/// Rounds.
+pub(crate) struct Rounding<T>(pub PhantomData<T>);
+
+impl<T: Real> Numbers<T> for Rounding<T> {
+    fn real(&self, value: f64) -> T {
+        T::from_f64(value)
+    }
+}
+
+/// The converter.
+pub fn dac<T: Real>(numbers: &impl Numbers<T>, a: &ir::Actuation) -> Dac<T> {
+    Dac {
+        volts_at_zero: numbers.real(a.volts_at_zero),
+        volts_per_code: numbers.real(a.volts_per_code),
+        cells_at_zero: numbers.real(a.cells_at_zero),
+        cells_per_code: numbers.real(a.cells_per_code),
+        codes_per_cell: numbers.real(a.codes_per_cell),
+    }
+}
+
+/// Leg kinematics.
+pub fn legs<T: Real>(numbers: &impl Numbers<T>, k: &ir::Kinematics) -> Legs<'static, T> {
+    Legs {
+        rest_leg: numbers.matrix(&k.rest_leg),
+        platform_joint: numbers.matrix(&k.platform_joint),
+        rest_length: numbers.vector(&k.rest_length),
+        series: Series { sine: numbers.slice(&k.sine), versine: numbers.slice(&k.versine) },
+        root: numbers.slice(&k.root),
+        newton_steps: k.newton_steps as usize,
+    }
+}
+
+/// Where six gauges see the platform.
+pub fn gauges<T: Real>(numbers: &impl Numbers<T>, sensing: &ir::Sensing) -> Gauges<'static, T> {
+    Gauges {
+        direction: numbers.matrix(&sensing.direction),
+        normal: numbers.matrix(&sensing.normal),
+        skew: numbers.matrix(&sensing.skew),
+        pierced: numbers.matrix(&sensing.pierced),
+        inverse: numbers.matrix(&sensing.inverse),
+        curvature: numbers.matrix(&sensing.curvature),
+        passes: sensing.passes as usize,
+        arc_sine: numbers.slice(&sensing.arc_sine),
+        arc_tangent: numbers.slice(&sensing.arc_tangent),
+    }
+}
+
+/// What the generator of set-points needs to know; poses are within ± `bound`.
+pub fn setpoints<T: Real, F>(
+    numbers: &impl Numbers<T>,
+    bound: &[f64; 6],
+    s: &ir::Setpoints,
+    frames: F,
+    trajectories: &'static [Trajectory<T>],
+) -> Setpoints<T, F> {
+    Setpoints {
+        period: numbers.real(s.period),
+        rate: numbers.real(s.rate),
+        square_rate: numbers.real(s.square_rate),
+        bias: numbers.vector(&s.bias),
+        home: numbers.vector(&s.home),
+        bound: numbers.vector(bound),
+        limits: MoveLimits {
+            speed: numbers.vector(&s.speed_limit),
+            acceleration: numbers.vector(&s.acceleration_limit),
+            jerk: numbers.vector(&s.jerk_limit),
+        },
+        stop: StopLimits {
+            acceleration: numbers.vector(&s.stop_acceleration_limit),
+            jerk: numbers.vector(&s.stop_jerk_limit),
+            shortest: s.shortest_stop,
+        },
+        stream_step: numbers.vector(&s.stream_step),
+        stream_rate: numbers.vector(&s.stream_rate),
+        stream_acceleration: numbers.vector(&s.stream_acceleration),
+        stale_ticks: s.stale_ticks,
+        frames,
+        trajectories,
+    }
+}
+
+/// A piece of a trajectory.
+pub fn segment<T: Real>(numbers: &impl Numbers<T>, segment: &ir::Segment) -> Segment<T> {
+    Segment {
+        first: segment.first.cast_signed(),
+        per_tick: numbers.real(segment.per_tick),
+        per_second: numbers.real(segment.per_second),
+        phase: segment.phase,
+        phase_step: segment.phase_step,
+        angular: numbers.real(segment.angular),
+        axes: segment.axes.map(|axis| Axis {
+            place: numbers.real(axis.place),
+            slope: numbers.real(axis.slope),
+            sine: numbers.vector(&axis.sine),
+            cosine: numbers.vector(&axis.cosine),
+        }),
+    }
+}
+
+/// A row of a trajectory.
+pub fn row<T: Real>(numbers: &impl Numbers<T>, row: &ir::Row) -> Row<T> {
+    Row { pose: numbers.vector(&row.pose), bend: numbers.vector(&row.bend) }
+}
+
+/// The inverse dynamics.
+pub fn body<T: Real>(numbers: &impl Numbers<T>, dynamics: &ir::Dynamics) -> Platform<T> {
+    dynamics.platform_of(|value| numbers.real(value))
+}
+
+/// What a platform's legs give way to first order, if they do.
+pub fn affine<T: Real>(numbers: &impl Numbers<T>, load: &ir::Load) -> Option<Affine<T>> {
+    load.affine
+        .as_ref()
+        .map(|affine| Affine { pose: numbers.matrix(&affine.pose), acceleration: numbers.matrix(&affine.acceleration) })
+}
+
+/// The notch of each mode, if there is one.
+pub fn notch<T: Real>(numbers: &impl Numbers<T>, law: &ir::ControlLaw) -> Option<Notch<T>> {
+    law.notch.as_ref().map(|notch| Notch {
+        sections: notch
+            .sections
+            .map(|section| Section { depth: numbers.real(section.depth), a: numbers.vector(&section.a) }),
+        pose_to_modes: numbers.matrix(&notch.pose_to_modes),
+        modes_to_pose: numbers.matrix(&notch.modes_to_pose),
+    })
+}
+
+/// Active damping of each mode.
+pub fn damping<T: Real>(numbers: &impl Numbers<T>, sections: &[ir::Resonator; 6]) -> [Resonator<T>; 6] {
+    sections.map(|section| Resonator { b: numbers.vector(&section.b), a: numbers.vector(&section.a) })
+}
+
+/// Limits of the correction of each axis.
+pub fn correction<T: Real>(numbers: &impl Numbers<T>, limits: &[ir::CorrectionLimit; 6]) -> [CorrectionLimit<T>; 6] {
+    limits.map(|limit| CorrectionLimit { most: numbers.real(limit.most), step: numbers.real(limit.step) })
+}
+
+/// Gains of (7).
+pub fn gains<T: Real>(numbers: &impl Numbers<T>, gains: &ir::Gains) -> Gains<T> {
+    Gains {
+        proportional: numbers.vector(&gains.proportional),
+        integral: numbers.vector(&gains.integral),
+        derivative: numbers.vector(&gains.derivative),
+    }
+}
+
+/// The filter of the pose's rate.
+pub fn rate_filter<T: Real>(numbers: &impl Numbers<T>, sensing: &ir::Sensing) -> RateFilter<T> {
+    RateFilter { keep: numbers.real(sensing.rate_keep), gain: numbers.real(sensing.rate_gain) }
+}
+
+/// What each output line shows.
+pub fn lines<T: Real>(numbers: &impl Numbers<T>, defaults: &ir::PlatformDefaults) -> Vec<Line<T>> {
+    let of_line = |line: &ir::Line| Line {
+        kind: line.kind,
+        axis: line.axis,
+        direction: line.direction,
+        start: numbers.real(line.start),
+        stop: numbers.real(line.stop),
+        step: numbers.real(line.step),
+        hysteresis: numbers.real(line.hysteresis),
+        first: line.first,
+        every: line.every,
+        last: line.last,
+        width: line.width,
+    };
+    defaults.triggers.iter().map(of_line).collect()
+}
+
+/// Ranges of the settings, each for so many words: those that are alike are in one row. Most gains have one range, and a row for each would
+/// take a kilobyte of flash.
+pub fn permitted<T: Real>(numbers: &impl Numbers<T>, table: &ir::Permitted) -> Vec<(Permitted<T>, usize)> {
+    let ranges: Vec<Range> = table.words().map(|(_, range)| range).collect();
+    let of_range = |range| match range {
+        Range::Whole(least, most) => Permitted::Whole(least as u64, most as u64),
+        Range::Number(least, most) => Permitted::Number(numbers.real(least), numbers.real(most)),
+    };
+    let alike = ranges.chunk_by(|a, b| a == b);
+    alike.filter_map(|alike| Some((of_range(*alike.first()?), alike.len()))).collect()
+}
+
+/// How large the numbers of a state may be.
+#[must_use]
+pub fn sizes(ir: &Ir) -> Sizes {
+    let s = &ir.permitted.state;
+    Sizes {
+        place: s.place,
+        user: s.user,
+        rate: s.rate,
+        acceleration: s.acceleration,
+        pose: s.pose,
+        pose_rate: s.pose_rate,
+        error: s.error,
+        apart: s.apart,
+        wrench: s.wrench,
+        leg: s.leg,
+        leg_rate: s.leg_rate,
+        line: s.line,
+        request: s.request,
+        reading: s.reading,
+        stiffness: s.stiffness,
+        codes: [ir.actuation.code_min, ir.actuation.code_max],
+        grid: ir.hysteresis.grid as f64,
+        memory: ir.hysteresis.memory,
+    }
+}
+
+/// What the supervisor takes for a fault.
+pub fn supervision<T: Real>(numbers: &impl Numbers<T>, s: &ir::Supervision) -> Supervision<T> {
+    let steadiness = &s.steadiness;
+    Supervision {
+        arm_ticks: s.arm_ticks,
+        rest: s.rest,
+        ramp_step: s.ramp_step,
+        ramp_every: s.ramp_every,
+        timeout: s.timeout,
+        weight: s.weight,
+        stuck_motion: numbers.real(s.stuck_motion),
+        stuck_samples: s.stuck_samples,
+        disagreement: numbers.real(s.disagreement),
+        disagreement_samples: s.disagreement_samples,
+        tracking: numbers.vector(&s.tracking),
+        tracking_samples: s.tracking_samples,
+        leap: numbers.vector(&s.leap),
+        repeats: s.repeats,
+        steadiness: Steadiness {
+            per_limit: numbers.vector(&steadiness.per_limit),
+            follow: numbers.real(steadiness.follow),
+            motion: numbers.real(steadiness.motion),
+            keep: numbers.real(steadiness.keep),
+            keep_fallen: numbers.real(steadiness.keep_fallen),
+            one_way: steadiness.one_way,
+            first: steadiness.first,
+            next: steadiness.next,
+        },
+        amplifier_fault: match s.amplifier_fault {
+            FaultAction::Off => Reaction::Off,
+            FaultAction::RampDown => Reaction::RampDown,
+            FaultAction::Hold => Reaction::Hold,
+        },
+        wiring: s.wiring.as_ref().map(|wiring| Wiring {
+            ticks: wiring.ticks,
+            height: wiring.height,
+            turn: numbers.matrix(&wiring.turn),
+            lag: numbers.vector(&wiring.lag),
+            weights: numbers.vector(&wiring.weights),
+            per_metre: numbers.vector(&wiring.per_metre),
+            gauge_gain: numbers.vector(&wiring.gauge_gain),
+            leg_gain: wiring.leg_gain.as_ref().map(|range| numbers.vector(range)),
+            residual: numbers.real(wiring.residual),
+        }),
+    }
+}
