@@ -17,6 +17,8 @@ use crate::pil::{self, OpenError, Opened};
 
 /// How often a device gets a request, at least: five times before it takes the link for lost.
 pub const ALIVE: Duration = Duration::from_millis(20);
+/// What a board may take to write the end of a record.
+const RECORD_END: Duration = Duration::from_secs(5);
 
 /// What is older than this is not said to be so now.
 pub const FRESH: Duration = Duration::from_millis(300);
@@ -319,8 +321,20 @@ impl<P: Port> Session<P> {
         self.done(&Request::WriteConfig { words })
     }
 
-    /// Something of the recorder; how it stands then.
+    /// Something of the recorder; how it stands then. A board writes the end of a record in its background: after a stop, how it
+    /// stands when that is done.
     pub fn recorder(&mut self, action: RecorderAction) -> Result<RecorderStatus, ClientError> {
+        let start = Instant::now();
+        let mut status = self.recorder_status(action)?;
+        while action == RecorderAction::Stop && status.running && start.elapsed() < RECORD_END {
+            std::thread::sleep(ALIVE);
+            status = self.recorder_status(RecorderAction::Look)?;
+        }
+        Ok(status)
+    }
+
+    fn recorder_status(&mut self, action: RecorderAction) -> Result<RecorderStatus, ClientError> {
+        self.asked = Instant::now();
         match self.client.ask(&Request::Recorder { action })? {
             Reply::Recorder(status) => Ok(status),
             _ => Err(ClientError::Unexpected),

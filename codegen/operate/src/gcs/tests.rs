@@ -8,7 +8,10 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use specgen_link::client::{Port, Timeout};
-use specgen_link::{Bytes, Counted, Counters, Device, Endpoint, Identity, Refusal, Reply, Request, Status, put_words};
+use specgen_link::{
+    Bytes, Counted, Counters, Device, Endpoint, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request,
+    Status, put_words,
+};
 
 use super::{Axes, Bridge, Stage};
 use crate::session::Session;
@@ -47,6 +50,8 @@ struct Machine {
     tick: u64,
     target: [u64; 6],
     bytes: [u8; 24 * 8],
+    /// How often the recorder, once stopped, says that it still writes.
+    writes: u32,
 }
 
 impl Device for Machine {
@@ -94,6 +99,11 @@ impl Device for Machine {
                 }
                 Reply::Done
             }
+            Request::Recorder { .. } => {
+                let running = self.writes > 0;
+                self.writes = self.writes.saturating_sub(1);
+                Reply::Recorder(RecorderStatus { running, triggered: true, ticks: 1, capacity: 2 })
+            }
             _ => Reply::Refused(Refusal::State),
         }
     }
@@ -104,6 +114,13 @@ struct Line {
     machine: Machine,
     endpoint: Endpoint,
     answer: Vec<u8>,
+}
+
+impl Line {
+    fn new(asks: Asks) -> Self {
+        let machine = Machine { asks, tick: 0, target: [0; 6], bytes: [0; 24 * 8], writes: 3 };
+        Self { machine, endpoint: Endpoint::new(), answer: Vec::new() }
+    }
 }
 
 impl Port for Line {
@@ -140,9 +157,8 @@ impl Bench {
     fn new() -> Self {
         let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let asks = Asks::default();
-        let machine = Machine { asks: asks.clone(), tick: 0, target: [0; 6], bytes: [0; 24 * 8] };
-        let line = Line { machine, endpoint: Endpoint::new(), answer: Vec::new() };
-        let stage = Stage::new(Session::open(line, Timeout::PIPE, None).unwrap()).unwrap();
+        let session = Session::open(Line::new(asks.clone()), Timeout::PIPE, None).unwrap();
+        let stage = Stage::new(session).unwrap();
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
         let mut bridge = Bridge::new(stage, Axes::default(), listener).unwrap();
@@ -275,4 +291,12 @@ fn a_hundred_thousand_moves_at_once() {
     let moves = |asks: &[(Instant, Ask)]| asks.iter().filter(|(_, ask)| *ask == Ask::Move).count();
     assert_eq!(moves(&asks[stop..]), 0);
     assert!(moves(&asks[..stop]) > 0, "they are made until then");
+}
+
+/// The F446 takes some ticks for it, and a script downloads at once.
+#[test]
+fn a_stop_of_the_recorder_waits_until_the_record_is_written() {
+    let mut session = Session::open(Line::new(Asks::default()), Timeout::PIPE, None).unwrap();
+    assert!(session.recorder(RecorderAction::Look).unwrap().running);
+    assert!(!session.recorder(RecorderAction::Stop).unwrap().running);
 }

@@ -48,7 +48,7 @@ crate::state! { |words|
     pub struct Watch<T>[T: Real] {
         /// Channels 0 to 5.
         pub channels: [Channel<T>; 6] = [Channel::new(); 6], parts;
-        /// Which turn comes next, of [`ORDER`].
+        /// Which turn comes next, of `ORDER`.
         pub turn: usize = 0, place(ORDER.len());
         /// Channels that are stuck, disagree, are astray: three sets of bits.
         pub suspects: [u32; 3] = [0; 3], tallies;
