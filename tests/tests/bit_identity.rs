@@ -1,6 +1,7 @@
 //! Host, Cortex-M7 and Cortex-M4F compute the same bits: every output word and the state digest of every tick, from one
 //! recorded input with saturation, reversals on thresholds, ±0, subnormals, NaN and infinities.
 
+use crate::supervisor::bench::SECTION;
 use host_sim::controller::TickController;
 use host_sim::trace::{Trace, first_difference};
 use specgen::ir::Ir;
@@ -10,10 +11,12 @@ use specgen_tests::{Emitted, assert_same_bits, column, host_trace, integers};
 
 /// Ticks of each comparison.
 fn ticks() -> usize {
-    specgen_tests::length(20_000, 100_000)
+    specgen_tests::length(10_000, 100_000)
 }
+/// With the supervisor of its tests, whose image this is, too.
+const SUPERVISED: (&str, &str) = ("[timing]\n", SECTION);
 /// A converter whose codes meet every threshold of the grid: 2.5 mV a code, 1250 codes a cell.
-const ALIGNED: (&str, &str) = ("[\"0 V\", \"150 V\"]", "[\"0 V\", \"163.8375 V\"]");
+pub const ALIGNED: (&str, &str) = ("[\"0 V\", \"150 V\"]", "[\"0 V\", \"163.8375 V\"]");
 const CODES_PER_CELL: i64 = 1250;
 const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
 
@@ -73,7 +76,7 @@ fn covers(trace: &Trace, what: &str, pose: bool) {
 
 #[test]
 fn f64_on_the_host_and_the_m7_is_equal_in_every_bit() {
-    compare("bits-f64", &[ALIGNED], &[Mcu::Mps2An500]);
+    compare("bits-f64", &[SUPERVISED, ALIGNED], &[Mcu::Mps2An500]);
 }
 
 #[test]
@@ -102,7 +105,7 @@ fn an_overflowing_memory_is_equal_in_every_bit() {
 /// The comparison is falsifiable: one flipped ulp of one constant of the controller on one side is found, and named.
 #[test]
 fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
-    let good = Emitted::new("ulp-good", "legs.toml", &[ALIGNED]);
+    let good = Emitted::new("ulp-good", "legs.toml", &[SUPERVISED, ALIGNED]);
     let Some(image) = good.image(Mcu::Mps2An500) else { return };
     // E(N, 0): a saturated leg shows it as it is. Of another node an ulp may be lost in rounding, tick after tick.
     let grid = good.compiled.ir.hysteresis.grid;
@@ -113,7 +116,7 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
         ("volts per code", |ir, _| &mut ir.actuation.volts_per_code, false, "voltage"),
     ];
     for (what, constant, pose, signal) in cases {
-        let mut bad = Emitted::new("ulp-bad", "legs.toml", &[ALIGNED]);
+        let mut bad = Emitted::new("ulp-bad", "legs.toml", &[SUPERVISED, ALIGNED]);
         let value = constant(&mut bad.compiled.ir, grid);
         *value = f64::from_bits(value.to_bits() + 1);
         let mut controller = bad.at_run_time();

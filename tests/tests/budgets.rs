@@ -37,7 +37,8 @@ const BUDGETS: [Budget; 3] = [
 /// Pose set-points to six voltages under PCC, tracking with gauge noise, each tick measured.
 #[test]
 fn a_tick_of_six_legs_stays_within_its_instructions_and_its_stack() {
-    for budget in &BUDGETS {
+    // The first in the short run.
+    for budget in &BUDGETS[..specgen_tests::length(1, BUDGETS.len())] {
         let folder = format!("budget-{}", budget.name.replace(' ', "-"));
         let emitted = Emitted::new(&folder, "legs.toml", budget.edits);
         let Some(image) = emitted.image(budget.mcu) else { continue };
@@ -126,9 +127,8 @@ fn the_worst_tick_is_bounded_even_when_every_memory_overflows() {
     let description = controller.description().clone();
     let hostile = emitted.stimulus(&description, false, 20_000, 3);
     let nested = nested_loops(&description);
-    for (what, mode, inputs) in
-        [("hostile, pcc", 2.0, &hostile), ("hostile, invhys", 0.0, &hostile), ("overflow", 0.0, &nested)]
-    {
+    let cases = [("overflow", 0.0, &nested), ("hostile, pcc", 2.0, &hostile), ("hostile, invhys", 0.0, &hostile)];
+    for (what, mode, inputs) in cases.into_iter().take(specgen_tests::length(1, 3)) {
         let (host, config) = host_trace(&mut controller, &[("mode", mode), ("setpoint_kind", 1.0)], inputs);
         let m = verify::measure(&image, &config, &host).unwrap();
         assert_eq!(m.first_difference, None, "{what}");

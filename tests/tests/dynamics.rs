@@ -14,7 +14,7 @@ use specgen::model::Model;
 use specgen::run_time::dynamics;
 use specgen_runtime::dynamics::Leg;
 use specgen_runtime::{Motion, Platform};
-use specgen_tests::{Emitted, repository, worse};
+use specgen_tests::{Emitted, length, repository, worse};
 
 const FIELDS: [&str; 6] = ["J", "M", "Cv", "G", "F", "leg_forces"];
 
@@ -260,7 +260,7 @@ fn unit(k: usize) -> [f64; 6] {
 fn the_mass_matrix_less_twice_coriolis_is_skew_and_coriolis_is_that_of_christoffel() {
     for (model, seed) in [(reference_model(), 1), (asymmetric().0, 2)] {
         let platform = lower::platform(&model).unwrap();
-        for motion in states(seed, 12, 0.008, 0.09) {
+        for motion in states(seed, length(3, 12), 0.008, 0.09) {
             let slopes: [Matrix6<f64>; 6] = std::array::from_fn(|k| mass_slope(&platform, &motion.pose, &unit(k)));
             let rate = Vector6::from(motion.rate);
             let coriolis = Matrix6::from_fn(|i, j| {
@@ -284,7 +284,7 @@ fn the_mass_matrix_less_twice_coriolis_is_skew_and_coriolis_is_that_of_christoff
 fn the_mass_matrix_is_the_inverse_dynamics_of_unit_accelerations_symmetric_and_positive_definite() {
     for (model, seed) in [(reference_model(), 3), (asymmetric().0, 4)] {
         let platform = lower::platform(&model).unwrap();
-        for motion in states(seed, 20, 0.01, 0.3) {
+        for motion in states(seed, length(6, 20), 0.01, 0.3) {
             let m = matrix(&platform.mass_matrix(&motion.pose));
             assert!((m - m.transpose()).norm() <= 1e-14 * m.norm());
             assert!(m.cholesky().is_some());
@@ -305,7 +305,7 @@ fn the_mass_matrix_is_the_inverse_dynamics_of_unit_accelerations_symmetric_and_p
 fn the_jacobian_is_the_derivative_of_the_leg_displacements() {
     for (model, seed) in [(reference_model(), 5), (asymmetric().0, 6)] {
         let platform = lower::platform(&model).unwrap();
-        for motion in states(seed, 20, 0.01, 0.3) {
+        for motion in states(seed, length(6, 20), 0.01, 0.3) {
             let jacobian = platform.jacobian(&motion.pose);
             #[allow(clippy::needless_range_loop)] // Two arrays by one index.
             for k in 0..6 {
@@ -378,7 +378,7 @@ fn energy_of_free_motion_is_conserved_to_the_order_of_the_integrator() {
 fn a_wrench_on_the_platform_is_taken_off_the_leg_forces() {
     for (model, seed) in [(reference_model(), 7), (asymmetric().0, 8)] {
         let platform = lower::platform(&model).unwrap();
-        for motion in states(seed, 20, 0.01, 0.3) {
+        for motion in states(seed, length(6, 20), 0.01, 0.3) {
             let wrench = [3.0, -5.0, 7.0, 0.2, -0.4, 0.6];
             let load = platform.load(&motion, Some(&wrench));
             let [_, _, _, _, ty, tz] = motion.pose;
@@ -400,7 +400,7 @@ fn displacements_in_f32_are_good_to_50_picometres_for_micrometre_poses() {
         let platform = lower::platform(&model).unwrap();
         let single = single(&platform);
         let mut worst = 0.0_f64;
-        for motion in states(seed, 2000, 40e-6, 0.6e-3) {
+        for motion in states(seed, length(500, 2000), 40e-6, 0.6e-3) {
             let pose = motion.pose.map(|x| x as f32);
             let exact = platform.displacements(&pose.map(f64::from));
             for (found, exact) in single.displacements(&pose).into_iter().zip(exact) {

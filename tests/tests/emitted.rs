@@ -1,6 +1,6 @@
 //! What the emitted text must and must not hold, for every example spec; goldens compile without a warning.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
@@ -58,8 +58,10 @@ fn controller_code_keeps_to_the_invariants() {
         todo! | std:: | alloc:: | unsafe { | unsafe fn | HashMap | f64::EPSILON | NaN | inf, | INFINITY";
     let forbidden: Vec<&str> = forbidden.split(" | ").collect();
     assert_eq!(forbidden.len(), 29);
+    // Law and runtime are the same in most of them.
+    let mut seen = BTreeSet::new();
     for (spec, code) in controller_code() {
-        for (path, text) in code {
+        for (path, text) in code.iter().filter(|(_, text)| seen.insert(text.as_str())) {
             for (line, code) in code_lines(text) {
                 for word in &forbidden {
                     assert!(!code.contains(word), "{spec}: {path}:{line} holds `{word}`: {code}");
@@ -122,16 +124,12 @@ fn every_source_file_says_where_it_comes_from_and_forbids_unsafe_code() {
 fn every_example_spec_builds_without_a_warning_and_without_a_panic_path() {
     for (index, spec) in specs().into_iter().enumerate() {
         let name = format!("example-{}", spec.replace(['/', '.'], "-"));
-        // Every sixth links, in the full run all. Most options are in the controllers of other tests, too.
-        if specgen_tests::length(index % 6 != 0, false) {
+        // Every twelfth, in the full run all. Most options are in the controllers of other tests, too.
+        if specgen_tests::length(index % 12 != 0, false) {
             continue;
         }
         let emitted = Emitted::new(&name, &spec, &[]);
         let _ = emitted.library();
-        // Warnings of every twelfth, in the full run of all: what is emitted differs little.
-        if specgen_tests::length(index % 12 != 0, false) {
-            continue;
-        }
         // The other packages are copied: the same in every output.
         let packages: &[&str] = if index == 0 { &["--workspace"] } else { &["--package", "controller"] };
         let built = Command::new(env!("CARGO"))
@@ -170,6 +168,7 @@ fn the_committed_controller_is_what_the_reference_spec_gives() {
 
 /// The proof is falsifiable: a runtime with a panic path does not link, and the error says so.
 #[test]
+#[ignore = "long: built and searched from nothing; a stand-in with a panic path is refused in the test run"]
 fn a_panic_path_keeps_the_host_library_from_linking() {
     let emitted = Emitted::new("panics", "features/small-grid.toml", &[]);
     let path = emitted.dir.join("runtime/src/memory.rs");

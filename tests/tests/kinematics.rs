@@ -7,7 +7,9 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::lower::joint_positions;
 use specgen_tests::{Emitted, worse};
 
-const POSES: usize = 20_000;
+fn count() -> usize {
+    specgen_tests::length(2_000, 20_000)
+}
 const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
 /// ±55 µm, nearly as far as the identified hysteresis lets each axis go.
 const WIDE: (&str, &str) = ("[\"40 um\", \"40 um\", \"40 um\"]", "[\"55 um\", \"55 um\", \"55 um\"]");
@@ -17,7 +19,7 @@ const STROKE: (&str, &str) = ("stroke          = \"60 um\"", "stroke          = 
 fn poses() -> Vec<[f64; 6]> {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut unit = || rng.next_u64() as f64 / 2f64.powi(63) - 1.0;
-    (0..POSES).map(|_| [55e-6, 55e-6, 55e-6, 0.4e-3, 0.35e-3, 0.5e-3].map(|bound| bound * unit())).collect()
+    (0..count()).map(|_| [55e-6, 55e-6, 55e-6, 0.4e-3, 0.35e-3, 0.5e-3].map(|bound| bound * unit())).collect()
 }
 
 /// Leg displacements that the controller derives from poses; its arithmetic rounds the pose first.
@@ -61,7 +63,7 @@ fn f64_is_exact_to_a_femtometre_and_f32_to_50_picometres() {
     // The comparison sees one displacement that is a little more off, or no number.
     for off in [2e-18, f64::NAN] {
         let mut spoilt = double.clone();
-        spoilt[POSES - 1][4] += off;
+        spoilt[count() - 1][4] += off;
         let found = worst(&spoilt, &exact(&poses));
         assert!(found > 1e-18 || found.is_nan(), "{off:e}");
     }

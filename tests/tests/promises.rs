@@ -26,6 +26,10 @@ fn words(controller: &Controller) -> Words {
     }
 }
 
+fn ticks() -> u32 {
+    specgen_tests::length(120_000, 1_200_000)
+}
+
 /// Random bits in every input word: half of them raw (NaN, infinite, huge, tiny), half plausible.
 fn fuzz(name: &str, edits: &[(&str, &str)], ticks: u32) {
     let emitted = Emitted::new(name, "legs.toml", edits);
@@ -75,12 +79,12 @@ fn fuzz(name: &str, edits: &[(&str, &str)], ticks: u32) {
 
 #[test]
 fn f64_outputs_stay_finite_and_within_limits_for_any_input_bits() {
-    fuzz("promises-f64", &[], 1_200_000);
+    fuzz("promises-f64", &[], ticks());
 }
 
 #[test]
 fn f32_outputs_stay_finite_and_within_limits_for_any_input_bits() {
-    fuzz("promises-f32", &[F32], 1_200_000);
+    fuzz("promises-f32", &[F32], ticks());
 }
 
 /// Settings come from outside as words: those that would break a promise are refused and leave the old ones in force.
@@ -119,7 +123,7 @@ fn settings_that_would_break_a_promise_are_refused() {
         assert!(error.contains(name), "{name} = {word:x}: {error}");
     }
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    for _ in 0..100_000 {
+    for _ in 0..specgen_tests::length(20_000, 100_000) {
         let words: Vec<u64> =
             good.iter().map(|word| if rng.next_u64() % 4 == 0 { rng.next_u64() } else { *word }).collect();
         if controller.configure(&words).is_ok() {

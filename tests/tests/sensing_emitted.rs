@@ -15,7 +15,7 @@ use specgen::model::{Model, Scalar};
 use specgen::workspace;
 use specgen_runtime::sensing::faults;
 use specgen_runtime::{Calibration, GaugeCalibration as _, Real};
-use specgen_tests::scratch;
+use specgen_tests::{length, scratch};
 
 const ROWS: usize = 500;
 
@@ -158,7 +158,9 @@ fn agrees<T: Real>(name: &str, model: &Model) {
 
 #[test]
 fn emitted_sensing_and_forward_kinematics_are_those_of_the_runtime_bit_for_bit() {
-    agrees::<f64>("sensing-aligned", &model(three_two_one()));
+    if length(false, true) {
+        agrees::<f64>("sensing-aligned", &model(three_two_one()));
+    }
     let mut calibrated = with_scalar(model(tilted()), Scalar::F32);
     task(&mut calibrated).calibration =
         Some([0.0, 1.0, 2.0, 3.0, 4.0, 5.0].map(|k| vec![1e-7 * k, -(6.0 + 0.1 * k) * 1e-6, 1e-8 * k]));

@@ -15,7 +15,7 @@ use specgen::target;
 use specgen_runtime::record::Layout;
 use specgen_runtime::recorder::{Recorder, Settings};
 use specgen_runtime::trigger::lines;
-use specgen_tests::Emitted;
+use specgen_tests::{Emitted, length, skipped};
 
 const RUNNING: u32 = 2;
 /// Ends of a sweep, m: beyond the first and the last position.
@@ -217,6 +217,9 @@ fn triggers_at_1_mm_s_to_and_fro_are_in_the_ticks_that_the_recorded_pose_says() 
         assert!(difference(&other, &computed).is_some());
     }
 
+    if length(true, false) {
+        return skipped("only in the full run: the same ticks on the emulated M4F");
+    }
     let Some(image) = emitted.image(Mcu::Mps2An386) else { return };
     let rows = &rows[..changed];
     let inputs: Vec<Vec<u64>> = rows.iter().map(|(_, input, _)| input.clone()).collect();

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::SystemTime;
 
 /// Most host libraries that the short test run may ask for.
-pub const MOST: usize = 25;
+pub const MOST: usize = 10;
 /// Bytes of an entry that hold its digest and where the build was left, see `specgen_toolchain::cache`.
 const HEAD: u64 = 512;
 

@@ -255,21 +255,27 @@ fn rust_files(folder: &Path, files: &mut Vec<String>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Of the workspace; `all`: of its benchmarks and of packages that are none of its members, too.
+/// Of the workspace's libraries and programs, under CI of its tests, too; `all`: of its benchmarks and of packages that are none of its
+/// members, too. What only tests have is checked beside a second copy of each library, which takes as long as all the rest.
 fn lints(root: &Path, all: bool) -> Outcome {
     if let Err(outcome) = setup::component("clippy", "clippy") {
         return outcome;
     }
     // In release, so that build scripts and macros are those of the tests. Boards are built from an emitted workspace by their
     // tests.
-    let own: &[&str] = if all { &["--workspace", "--all-targets"] } else { &["--workspace", "--bins", "--tests"] };
+    let targets: &[&str] = match (all, std::env::var_os("CI")) {
+        (true, _) => &["--all-targets"],
+        (false, Some(_)) => &["--bins", "--tests"],
+        (false, None) => &["--lib", "--bins"],
+    };
+    let own = [&["--workspace"], targets].concat();
     // Into the same folder: most of its dependencies are those of the workspace.
     let alone = |manifest| ["--manifest-path", manifest, "--all-targets", "--locked", "--target-dir", "target"];
-    let mut scopes = vec![own.to_vec()];
+    let mut scopes = vec![own];
     scopes.extend([REAL_TIME, board::MANIFEST].map(alone).iter().filter(|_| all).map(|scope| scope.to_vec()));
     // Their lints forbid what the optimiser cannot prove away.
     if !all {
-        println!("members of the workspace; the others in the full run");
+        println!("members of the workspace, of which tests are looked at under CI; the others in the full run");
     } else if setup::has_target() {
         scopes.extend([FIRMWARE, TICK].map(|manifest| [&alone(manifest)[..], &["--target", TRIPLE]].concat()));
     } else {

@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::support::{Document, Folder, Run};
+use crate::support::{Document, Folder, Run, length, skipped};
 use serde_json::Value;
 
 /// A folder with a `cargo` that counts what it builds, and a cache of its own.
@@ -100,6 +100,23 @@ fn an_unchanged_spec_is_built_once_and_everything_else_anew() {
     assert_eq!(Run::of(counted.command(&SIM).env("SPECGEN_CACHE", "")).code, 3);
     fs::remove_file(folder.path("broken")).unwrap();
 
+    if length(true, false) {
+        // What asks for a build is known by that, without one.
+        folder.write("broken", "");
+        let asks = |arguments: &[&str]| {
+            let _ = fs::remove_file(folder.path("runs"));
+            let run = Run::of(&mut counted.command(arguments));
+            assert_eq!((run.code, counted.runs()), (3, 1), "{arguments:?}: {run:#?}");
+            run.stderr
+        };
+        let [entry] = counted.entries().try_into().unwrap();
+        edit(&entry, |bytes| flip(bytes));
+        assert_eq!(asks(&REPLAY).matches("warning: a kept build was damaged").count(), 1);
+        assert!(counted.entries().is_empty());
+        folder.write("legs.toml", folder.read("legs.toml").replace("name = \"", "name = \"other-"));
+        asks(&SIM);
+        return skipped("only in the full run: what was damaged and another source are built");
+    }
     // Damaged: found, said, removed, built, with the same result.
     // (Every bit and every cut of an entry: the unit tests of the cache.)
     let [entry] = counted.entries().try_into().unwrap();

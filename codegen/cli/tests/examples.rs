@@ -95,8 +95,19 @@ fn prepared() -> Folder {
 fn examples_run_as_they_stand() {
     let folder = prepared();
     let mut lines: Vec<Line> = Vec::new();
-    // What tests of their own run: `export`, `fmu` and, in the full run, `platform_tables`.
-    let elsewhere = support::length(&["specgen export", "learning.toml --from", "learning.toml --prepare"][..], &[]);
+    // What tests of their own run: `export`, `fmu`, `tune`, `robust` and, in the full run, `platform_tables`.
+    let elsewhere = [
+        "specgen export",
+        "learning.toml --from",
+        "learning.toml --prepare",
+        "learning.toml --excite",
+        "learning.toml --response",
+        "tune legs.toml --evaluations",
+        "robust legs.toml --draws",
+        "robust merge",
+        "legs.toml --paper",
+    ];
+    let elsewhere = support::length(&elsewhere[..], &[]);
     for line in examples().into_iter().flat_map(|(_, lines)| lines).filter(|line| !line.is_marked()) {
         if elsewhere.iter().any(|part| line.text.contains(part)) {
             support::skipped(&format!("only in the full run: {}", line.text));

@@ -3,7 +3,7 @@
 
 use std::process::Command;
 
-use crate::support::{Folder, skipped};
+use crate::support::{Folder, length, skipped};
 use host_sim::controller::{Controller, Supervised, TickController};
 
 const TICKS: u64 = 1000;
@@ -34,7 +34,7 @@ fn digest(folder: &Folder, dir: &str, ulps: u64) -> u64 {
 #[test]
 fn a_program_in_c_links_the_controller_and_gets_its_bits() {
     let folder = Folder::new();
-    for (spec, dir) in [("reference.toml", "c"), ("legs.toml", "six/c")] {
+    for (spec, dir) in [("reference.toml", "c"), ("legs.toml", "six/c")].into_iter().take(length(1, 2)) {
         let run = folder.run(&["export", "c", spec, "-o", dir]);
         assert!(run.code == 0 && run.stdout.contains("cc -std=c11"), "{}{}", run.stdout, run.stderr);
         let wanted = format!("digest {:016x}", digest(&folder, dir, 0));
@@ -95,7 +95,8 @@ fn a_module_in_python_steps_the_controller_and_gets_its_bits() {
     let folder = Folder::new();
     let single = folder.read("reference.toml").replace("scalar = \"f64\"", "scalar = \"f32\"");
     folder.write("single.toml", single);
-    for (spec, dir) in [("reference.toml", "python"), ("single.toml", "single"), ("legs.toml", "six/python")] {
+    let all = [("legs.toml", "six/python"), ("reference.toml", "python"), ("single.toml", "single")];
+    for (spec, dir) in all.into_iter().take(length(1, 3)) {
         let run = folder.run(&["export", "python", spec, "-o", dir]);
         assert!(run.code == 0 && run.stdout.contains("controller.py"), "{}{}", run.stdout, run.stderr);
         let python = |script: &str| {

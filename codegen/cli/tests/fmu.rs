@@ -78,7 +78,7 @@ fn an_importer_gets_the_bits_of_the_controller() {
         skipped("the importer of this test is written for Linux");
         return;
     }
-    for (spec, name) in [("reference.toml", "reference"), ("legs.toml", "legs")] {
+    for (spec, name) in [("legs.toml", "legs"), ("reference.toml", "reference")].into_iter().take(length(1, 2)) {
         let folder = Folder::new();
         for output in ["fmu", "again"] {
             let run = folder.run(&["export", "fmu", spec, "-o", output]);
@@ -114,7 +114,7 @@ fn an_importer_gets_the_bits_of_the_controller() {
         let supervisor = expected.chunks(row.len()).map(|row| row[row.len() - 2]);
         assert!(supervisor.collect::<std::collections::BTreeSet<u64>>().len() > 2);
         assert_ne!(found[found.len() / 2..], vec![0; found.len() - found.len() / 2]);
-        if name == "legs" {
+        if name == "legs" && length(false, true) {
             // Built from its own sources it is the same controller.
             let made = Command::new("sh").arg(folder.path("unit/sources/build.sh")).arg("made.so").output().unwrap();
             assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));

@@ -162,7 +162,9 @@ fn a_flipped_bit_in_a_table_of_the_image_is_found_with_its_tick_and_signal() {
 
     let run =
         |file: &Path, code| document(pil(&spec("legs.toml"), &folder, &["--mode", "pcc"]).arg("--elf").arg(file), code);
-    run(&file, 0);
+    if support::length(false, true) {
+        run(&file, 0);
+    }
     let value = run(&flipped, 1);
     let difference = &value["result"]["first_difference"];
     let (signal, tick) = (difference["signal"].as_str().unwrap(), difference["tick"].as_u64().unwrap());

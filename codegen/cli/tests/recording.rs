@@ -5,7 +5,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::support::Folder;
+use crate::support::{Folder, length};
 
 /// A field of a record of MCAP, taken from its front: a number, or what has its length in front.
 fn number(bytes: &mut &[u8], size: usize) -> u64 {
@@ -137,7 +137,8 @@ fn messages_say_what_the_rows_say(bytes: &[u8], names: &str, rows: &str, spec: &
 fn what_one_controller_records_the_other_replays() {
     let folder = Folder::new();
     let forms: [(&str, &[&str]); 2] = [("run-time", &[]), ("emitted", &["--emitted"])];
-    for ((recorder, sim), (player, replay)) in [(forms[0], forms[1]), (forms[1], forms[0])] {
+    let both = [(forms[0], forms[1]), (forms[1], forms[0])];
+    for ((recorder, sim), (player, replay)) in both.into_iter().take(length(1, 2)) {
         let record = ["sim", "legs.toml", "--record", "run.rec", "--seconds", "0.5"];
         let recorded = folder.json(&[&record[..], sim].concat());
         let replayed = folder.json(&[&["replay", "run.rec", "--spec", "legs.toml"][..], replay].concat());
@@ -152,7 +153,7 @@ fn what_one_controller_records_the_other_replays() {
 #[test]
 fn what_sim_records_replays_bit_for_bit_and_a_changed_bit_does_not() {
     let folder = Folder::new();
-    for spec in ["legs.toml", "reference.toml"] {
+    for spec in ["reference.toml", "legs.toml"].into_iter().take(length(1, 2)) {
         let recorded = folder.json(&["sim", spec, "--record", "run.rec", "--seconds", "2"]);
         assert_eq!(recorded.code, 0, "{spec}: {}", recorded.value);
         let replayed = folder.json(&["replay", "run.rec", "--spec", spec]);

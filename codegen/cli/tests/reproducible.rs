@@ -15,6 +15,11 @@ type Files = BTreeMap<String, Vec<u8>>;
 /// Both kinds of controller: task space, legs with their own gauges.
 const KINDS: [&str; 2] = ["reference.toml", "legs.toml"];
 
+/// In the short run of both kinds where each has a source of its own, else of one of them.
+fn some(kind: usize) -> &'static [&'static str] {
+    support::length(&KINDS[kind..][..1], &KINDS)
+}
+
 /// The workspace of a spec, made in the plainest way into `output`.
 fn plain(folder: &Folder, spec: &str, output: &str) -> Files {
     made(folder.command().args([spec, "-o", output, "--no-build"]), &folder.path(output))
@@ -90,7 +95,7 @@ fn a_table_of_poses_is_a_source() {
 
 #[test]
 fn the_folder_and_the_name_of_the_spec_do_not_matter() {
-    for spec in KINDS {
+    for &spec in some(0) {
         let (folder, other) = (Folder::new(), Folder::new());
         let first = baseline(&folder, spec);
         same(&first, &baseline(&other, spec));
@@ -126,7 +131,7 @@ fn the_environment_does_not_matter() {
         ("RAYON_NUM_THREADS", "3"),
     ];
     let folder = Folder::new();
-    for spec in KINDS {
+    for &spec in some(1) {
         let first = baseline(&folder, spec);
         let mut command = folder.command();
         command.envs(odd).args([spec, "-o", "odd", "--no-build"]);
@@ -140,7 +145,7 @@ fn the_environment_does_not_matter() {
 #[test]
 fn line_ends_of_the_spec_do_not_matter() {
     let folder = Folder::new();
-    for spec in KINDS {
+    for &spec in some(0) {
         let first = baseline(&folder, spec);
         let text = folder.read(spec);
         assert!(!text.contains('\r'));
@@ -152,9 +157,9 @@ fn line_ends_of_the_spec_do_not_matter() {
 #[test]
 fn another_user_makes_the_same_bytes() {
     let folder = Folder::new();
-    let first = KINDS.map(|spec| baseline(&folder, spec));
+    let first: Vec<Files> = some(1).iter().map(|spec| baseline(&folder, spec)).collect();
     let Some(user) = Unprivileged::owning(&folder) else { return };
-    for (spec, first) in KINDS.into_iter().zip(&first) {
+    for (&spec, first) in some(1).iter().zip(&first) {
         let mut command = user.command(&folder);
         command.args([spec, "-o", "theirs", "--no-build"]);
         same(first, &made(&mut command, &folder.path("theirs")));

@@ -135,7 +135,7 @@ fn are_accepted(seed: u64) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut refused = String::new();
     let mut warnings: BTreeMap<String, usize> = BTreeMap::new();
-    let platforms = length(20, 50);
+    let platforms = length(10, 50);
     for index in 0..platforms {
         let platform = plausible::platform(&mut random, folder.path(), index);
         let (accepted, findings) = verdict(&platform, folder.path());

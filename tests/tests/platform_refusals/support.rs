@@ -74,7 +74,8 @@ pub fn place_of(text: &str, part: &str) -> (usize, usize) {
 
 pub fn hold(cases: Vec<Case>) {
     let folder = folder();
-    for case in cases {
+    // Every third of a list in the short run.
+    for case in cases.into_iter().step_by(specgen_tests::length(3, 1)) {
         let what = case.what;
         let bad = edited(&reference(), &case.edits);
         let Err(refused) = verdict(folder.path(), &bad, case.table.as_deref()) else { panic!("{what}: accepted") };

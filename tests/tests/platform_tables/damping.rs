@@ -8,7 +8,7 @@ use host_sim::platform::{Specimen, WorkPart};
 use host_sim::trajectory::PoseTarget;
 use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, Tuning};
 use specgen::tuning::relay;
-use specgen_tests::worse;
+use specgen_tests::{length, worse};
 
 use super::bench::{Bench, DAMPED, PERIOD, in_parallel, reference_machine};
 use super::classes::{bouc_wen, errors};
@@ -33,7 +33,7 @@ fn every_mode_is_damped_within_the_bounds_of_the_design() {
     }
     let closed_loop = closed_loop(bench);
     for adapting in [Adapting::Invhys, Adapting::Ewma, Adapting::Pcc] {
-        for step in 0..=20 {
+        for step in (0..=20).step_by(length(5, 1)) {
             let stiffness = 0.6 + 0.05 * f64::from(step);
             let conditions = Conditions { stiffness, ..Conditions::NOMINAL };
             let radius = closed_loop.spectral_radius(Law::Combined(adapting), &design.combined, &conditions);
@@ -128,6 +128,7 @@ fn limit(closed_loop: &ClosedLoop, axis: usize) -> f64 {
 }
 
 #[test]
+#[ignore = "long: two relay tests; that of `tune` is held against the analysis in the short run"]
 fn the_relay_test_of_tune_finds_the_limit_of_the_damped_loop() {
     let bench = damped_machine();
     let damped = closed_loop(bench);

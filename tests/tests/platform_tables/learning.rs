@@ -130,7 +130,7 @@ fn a_path_with_corners_is_learned_to_nanometres_in_five_passes() {
 fn the_channel_of_a_correction_is_that_of_the_time_domain() {
     let closed_loop = closed_loop(plays());
     let law = Law::Feedforward(Adapting::Invhys);
-    for hertz in [20.0, 361.0, 700.0] {
+    for hertz in [361.0, 20.0, 700.0].into_iter().take(length(1, 3)) {
         let angle = TAU * hertz * PERIOD;
         let ticks = 20_000_u32;
         let requests: Vec<[f64; 6]> = (1..=ticks).map(|tick| [(angle * f64::from(tick)).sin(); 6]).collect();

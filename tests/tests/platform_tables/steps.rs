@@ -30,7 +30,8 @@ fn figures(errors: &PoseErrors) -> Vec<f64> {
 fn table(bench: &Bench, scenario: &PlatformScenario) -> Vec<(String, Vec<f64>)> {
     let mut controller = bench.controller();
     let mut rows = Vec::new();
-    for (path, name) in [(PaperPath::Case1, "case 1"), (PaperPath::Case2, "case 2")] {
+    let paths = [(PaperPath::Case1, "case 1"), (PaperPath::Case2, "case 2")];
+    for (path, name) in paths.into_iter().take(length(1, 2)) {
         for frequency in length(&[10.0][..], &[0.1, 1.0, 10.0]) {
             for (mode, word) in FREE_MODES {
                 select(&mut controller, word).expect("a mode");

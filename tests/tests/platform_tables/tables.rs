@@ -32,7 +32,10 @@ fn free_motion(bench: &Bench, frequencies: &[f64]) -> PoseTable {
 fn machining(bench: &Bench) -> MachiningTable {
     let parts = PARTS.map(|(name, part)| (name, part()));
     let path = PaperPose::corrected(PaperPath::Machining, 1.0);
-    bench.scenario().machining(&mut bench.controller(), &MACHINING_MODES, &parts, &path).expect("a run")
+    // In the short run one part with the best of the laws.
+    let best: Vec<_> = MACHINING_MODES.into_iter().filter(|(mode, _)| *mode == "pf-pcc").collect();
+    let (modes, parts) = length((&best[..], &parts[..1]), (&MACHINING_MODES, &parts));
+    bench.scenario().machining(&mut bench.controller(), modes, parts, &path).expect("a run")
 }
 
 /// Every value of Tables 5 to 8 at most the paper's.
@@ -59,15 +62,22 @@ fn translation(table: &PoseTable, case: &str, mode: &str, frequency: f64) -> f64
 #[test]
 fn tables_5_to_9_on_the_reference_machine() {
     let bench = reference_machine();
-    let table = free_motion(bench, length(&[1.0, 10.0], &[0.1, 1.0, 10.0]));
-    println!("{}", table.to_text());
+    let mut table = free_motion(bench, length(&[10.0], &[0.1, 1.0, 10.0]));
     println!("closest to the paper: {:.3} of it", below_the_paper(&table));
+    if length(true, false) {
+        let trajectory = PaperPose::corrected(PaperPath::Case1, 1.0);
+        let named = [NamedTrajectory { name: "case-1", frequency: 1.0, trajectory: &trajectory }];
+        let best: Vec<_> = FREE_MODES.into_iter().filter(|(mode, _)| *mode == "pf-pcc").collect();
+        let run = bench.scenario().free_motion(&mut bench.controller(), &best, &named).expect("a run");
+        table.rows.extend(run.rows);
+    }
+    println!("{}", table.to_text());
     let found = translation(&table, "case-1", "pf-pcc", 1.0);
     println!("P+PCC, case 1 at 1 Hz: {found:.2} nm (at most 4)");
     assert!(found <= 4.0, "{found} nm");
     let table = machining(bench);
     println!("{}", table.to_text());
-    for (part, _) in PARTS {
+    for (part, _) in PARTS.into_iter().take(length(1, 2)) {
         let row = table.row(part, "pf-pcc").expect("the run was made");
         assert!(row.translation_nm <= 3.0 && row.orientation_nrad <= 25.0, "{row:?}");
     }
@@ -99,6 +109,7 @@ fn one_record_for_six_legs_gives_the_figure_of_sim() {
 }
 
 #[test]
+#[ignore = "long: tables of random machines; the reference machine's are in the short run"]
 fn tables_5_to_8_on_random_machines() {
     let machines = random_machines();
     // At 1 Hz on the reference machine alone in the short run.

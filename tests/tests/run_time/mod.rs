@@ -23,7 +23,7 @@ const BLOCK: usize = 8192;
 
 /// Ticks of each run of a law alone; a machine runs for some times as many.
 fn ticks() -> usize {
-    length(4_000, 20_000)
+    length(2_500, 20_000)
 }
 
 /// Ticks of a machine in a trial of so many ticks of the law.
@@ -343,6 +343,7 @@ fn a_platform_with_every_part_of_the_law_has_the_bits_of_the_emitted_one() {
 }
 
 #[test]
+#[ignore = "long: creep; the dynamic model is in the short run"]
 fn six_legs_with_creep_have_the_bits_of_the_emitted_ones() {
     alike("creep", "legs.toml", &[("memory  = 64", CREEP)]);
 }
@@ -376,15 +377,16 @@ fn every_spec_has_the_bits_of_its_emitted_controller() {
 #[test]
 fn random_specs_have_the_bits_of_their_emitted_controllers() {
     let (mut kinds, mut ran) = (random::Kinds::default(), 0);
-    for index in (0..length(2, 50)).map(|number| (number + 3) % 50) {
+    let count = length(1, 50);
+    for index in (0..count).map(|number| (number + 3) % 50) {
         let (emitted, parts) = random::emitted(index);
         println!("random spec {index}: {parts:?}");
         kinds.add(&emitted.compiled, &parts);
         ran += usize::from(alike_in_all(&format!("random spec {index}"), &emitted, 3_000)[2] > 0);
     }
-    println!("{ran} of {} machines ran", length(2, 50));
+    println!("{ran} of {count} machines ran");
     assert!(ran >= length(1, 25), "{ran} ran");
-    kinds.assert_varied(length(2, 50));
+    kinds.assert_varied(count);
 }
 
 /// What a tick of either costs; for the page on speed. Prints, and demands nothing of a machine that others use.

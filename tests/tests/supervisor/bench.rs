@@ -11,7 +11,7 @@ pub use super::oracle::{
 };
 
 /// Short times, so that a sequence gets somewhere; `timing.period` of the two kinds.
-const SECTION: &str = "[supervisor]
+pub const SECTION: &str = "[supervisor]
 arm_time          = \"2 ms\"
 ramp_rate         = \"10 V/ms\"
 gauge_time        = \"1 ms\"

@@ -2,7 +2,7 @@
 //! text, the same bits on the emulated MCU, any input bits at all, and no jump when the law begins.
 
 mod begin;
-mod bench;
+pub mod bench;
 mod bits;
 mod document;
 mod fuzz;

@@ -83,6 +83,7 @@ fn double_precision_in_a_tick_is_a_fault_where_the_core_has_none() {
 }
 
 #[test]
+#[ignore = "long: an image of its own; that owners sum to the flash is a test of `build`"]
 fn every_byte_of_flash_has_one_owner() {
     let Some(tools) = tools() else { return };
     let items = "pub static TABLE: [u32; 3000] = { let mut t = [0; 3000]; let mut i = 0; while i < 3000 { t[i] = (i * i) as u32; i += 1; } t };";

@@ -425,7 +425,9 @@ fn the_wiring_check_names_gauges_that_are_exchanged_or_turned_and_lets_a_good_ma
     let records = bench.spec.with_file_name("records");
     fs::create_dir(bench.path("records")).unwrap();
     fs::copy(records.join("reference-forc.csv"), bench.path("records/reference-forc.csv")).unwrap();
-    for (number, (spec, expected)) in cases.into_iter().enumerate() {
+    // In the short run those that are exchanged.
+    let tried = crate::support::length(1..2, 0..3);
+    for (number, (spec, expected)) in cases.into_iter().enumerate().filter(|(number, _)| tried.contains(number)) {
         assert!(number == 0 || *spec != text, "the spec is another");
         let path = bench.path(&format!("check-{number}.toml"));
         fs::write(&path, spec).unwrap();

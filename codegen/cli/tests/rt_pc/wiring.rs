@@ -14,9 +14,10 @@ use super::{Bench, Running, wait_for};
 const REFUSED: &str = ": faulted: wiring, ";
 
 #[test]
+#[ignore = "long: another session; a page is told of a fault in the short run"]
 fn every_single_fault_of_gauges_and_legs_is_refused_and_named() {
     let bench = Bench::named("reference.toml", "wiring");
-    let faults: Vec<Finding> = single_faults().into_iter().step_by(crate::support::length(11, 1)).collect();
+    let faults: Vec<Finding> = single_faults();
     let name = format!("{}-wrong", bench.name);
     let mut plant = Command::new(env!("CARGO_BIN_EXE_specgen"));
     plant.arg("plant").arg(&bench.spec).args(["--name", &name]).stdout(Stdio::null()).stderr(Stdio::null());
