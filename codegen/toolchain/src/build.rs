@@ -142,13 +142,13 @@ pub(super) fn cargo_artifact(
     let package = request.package;
     let target_dir = std::path::absolute(request.target_dir)
         .map_err(|error| TargetError::io("resolving", request.target_dir, error))?;
-    let mut slot = cache::Slot::of(command, package, request.rustc_args);
+    let slot = cache::Slot::of(command, package, request.rustc_args);
     fs::create_dir_all(&target_dir).map_err(|e| TargetError::io("creating", &target_dir, e))?;
     let lock_path = target_dir.join("specgen.lock");
     let lock = File::create(&lock_path).map_err(|e| TargetError::io("creating", &lock_path, e))?;
     // Cargo's own lock ends with cargo; this one lasts until the artifact is read. Dropping the file frees it.
     lock.lock().map_err(|e| TargetError::io("locking", &lock_path, e))?;
-    if let Some((path, bytes)) = slot.as_mut().map(|slot| slot.fetch(&target_dir)).transpose()?.flatten() {
+    if let Some((path, bytes)) = slot.as_ref().map(|slot| slot.fetch(&target_dir)).transpose()?.flatten() {
         return Ok(Artifact { path, bytes });
     }
     command

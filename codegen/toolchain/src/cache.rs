@@ -77,7 +77,7 @@ struct Entry {
 }
 
 impl Entry {
-    /// Whether it is a whole build, and not a lock or what an ended process left.
+    /// Whether it is a whole build, and not what an ended process left.
     fn is_build(&self) -> bool {
         self.path.extension().is_none()
     }
@@ -177,26 +177,6 @@ impl Cache {
         }
         Ok(())
     }
-
-    /// No other run makes this meanwhile, if the folder can be written and knows locks; it does no harm if one does.
-    fn lock(&self, key: &str) -> Option<Lock> {
-        fs::create_dir_all(&self.folder).ok()?;
-        let path = self.folder.join(key).with_extension("lock");
-        let file = File::create(&path).ok()?;
-        file.lock().ok()?;
-        Some(Lock { path, _file: file })
-    }
-}
-
-struct Lock {
-    path: PathBuf,
-    _file: File,
-}
-
-impl Drop for Lock {
-    fn drop(&mut self) {
-        let _ = remove(&self.path);
-    }
 }
 
 /// Removes a file that another process may have removed before.
@@ -248,7 +228,6 @@ fn unpack(key: &str, content: &[u8]) -> Option<Found> {
 pub(super) struct Slot {
     cache: Cache,
     recipe: Recipe,
-    lock: Option<Lock>,
 }
 
 impl Slot {
@@ -260,24 +239,15 @@ impl Slot {
     }
 
     fn within(cache: Cache, command: &Command, package: &Path, rustc_args: &[&str]) -> Option<Self> {
-        Some(Self { cache, recipe: Recipe::of(command, package, rustc_args)?, lock: None })
+        Some(Self { cache, recipe: Recipe::of(command, package, rustc_args)? })
     }
 
-    /// What was made earlier, if it was, put where cargo would have left it in `target_dir`: path and bytes. If it was not, no
-    /// other process makes it while this lives.
+    /// What was made earlier, if it was, put where cargo would have left it in `target_dir`: path and bytes.
     ///
     /// # Errors
     /// [`TargetError::Io`] if it cannot be put there.
-    pub fn fetch(&mut self, target_dir: &Path) -> Result<Option<(PathBuf, Vec<u8>)>, TargetError> {
-        let key = self.recipe.key();
-        let mut found = self.cache.fetch(&key);
-        if found.is_none() {
-            self.lock = self.cache.lock(&key);
-            // Another run may have made it while this waited.
-            found = self.cache.fetch(&key);
-        }
-        let Some(Found { place, bytes }) = found else { return Ok(None) };
-        self.lock = None;
+    pub fn fetch(&self, target_dir: &Path) -> Result<Option<(PathBuf, Vec<u8>)>, TargetError> {
+        let Some(Found { place, bytes }) = self.cache.fetch(&self.recipe.key()) else { return Ok(None) };
         let path = target_dir.join(place);
         put(&path, &bytes)?;
         Ok(Some((path, bytes)))

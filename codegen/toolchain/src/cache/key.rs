@@ -1,31 +1,16 @@
 //! What decides about the bytes of a build: its sources, its command with all flags, and who carries it out.
 
-use crate::TRIPLE;
 use crate::process::{clean_command, decides_on_link, find_in_path, printed};
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::UNIX_EPOCH;
-use toml::{Table, Value};
+use toml::Value;
 
 /// Changes with the meaning of a key.
-const VERSION: &str = "2";
-/// Tables of cargo's configuration that say where things come from and how they look, not what is built.
-const WITHOUT_EFFECT: [&str; 11] = [
-    "alias",
-    "cache",
-    "cargo-new",
-    "credential-alias",
-    "future-incompat-report",
-    "http",
-    "install",
-    "net",
-    "registries",
-    "registry",
-    "term",
-];
+const VERSION: &str = "3";
 /// Keys of cargo's configuration that bring in what a key does not see: other sources, files, or another compiler.
 const BEYOND: [&[&str]; 4] = [&["paths"], &["patch"], &["include"], &["build", "rustc"]];
 
@@ -55,7 +40,8 @@ impl Recipe {
             context.add(value.as_encoded_bytes());
         }
         rustc_args.iter().for_each(|argument| context.add(argument));
-        let package = plain(&std::path::absolute(package).ok()?);
+        // Cargo sees it so, too: it works there.
+        let package = fs::canonicalize(package).ok()?;
         configuration(&package, &mut context)?;
         tools(command, &package, &mut context)?;
         let sources = sources(&package)?;
@@ -85,25 +71,20 @@ impl Digester {
         self.0.update(bytes.as_ref());
     }
 
-    /// A file by its place, size and time: for those that only an installation changes.
+    /// A file by its place, size and time, or every file below a folder, if it is there: for what only an installation changes.
     fn stamp(&mut self, path: &Path) -> Option<()> {
-        let path = fs::canonicalize(path).ok()?;
+        let Ok(path) = fs::canonicalize(path) else { return Some(()) };
         let metadata = fs::metadata(&path).ok()?;
+        if metadata.is_dir() {
+            let mut paths: Vec<PathBuf> =
+                fs::read_dir(&path).ok()?.map(|entry| Some(entry.ok()?.path())).collect::<Option<_>>()?;
+            paths.sort();
+            return paths.iter().try_for_each(|path| self.stamp(path));
+        }
         let time = metadata.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
         self.add(path.as_os_str().as_encoded_bytes());
         self.add(metadata.len().to_le_bytes());
         self.add(time.as_nanos().to_le_bytes());
-        Some(())
-    }
-
-    /// Every file below a folder, if it is there.
-    fn stamp_below(&mut self, folder: &Path, only: impl Fn(&str) -> bool + Copy) -> Option<()> {
-        let Ok(entries) = fs::read_dir(folder) else { return Some(()) };
-        let mut paths: Vec<PathBuf> = entries.map(|entry| Some(entry.ok()?.path())).collect::<Option<_>>()?;
-        paths.sort();
-        for path in paths.iter().filter(|path| path.file_name().is_some_and(|name| only(&name.to_string_lossy()))) {
-            if path.is_dir() { self.stamp_below(path, only) } else { self.stamp(path) }?;
-        }
         Some(())
     }
 
@@ -119,20 +100,16 @@ fn tools(command: &Command, package: &Path, context: &mut Digester) -> Option<()
     let variable = |name: &str| command.get_envs().find(|(set, _)| *set == name).and_then(|(_, value)| value);
     let compiler = variable("RUSTC").map_or_else(|| PathBuf::from("rustc"), PathBuf::from);
     context.add(ask(Path::new(command.get_program()), &["-vV"])?);
-    let version = ask(&compiler, &["-vV"])?;
-    context.add(&version);
+    context.add(ask(&compiler, &["-vV"])?);
     let sysroot = ask(&compiler, &["--print", "sysroot"])?;
     let sysroot = Path::new(sysroot.trim_end());
     // A compiler of one's own is built again without a new version.
-    context.stamp_below(&sysroot.join("bin"), |name| name == "rustc")?;
-    context.stamp_below(&sysroot.join("lib"), |name| name.starts_with("librustc_driver"))?;
-    let rustlib = sysroot.join("lib/rustlib");
-    for target in version.lines().filter_map(|line| line.strip_prefix("host: ")).chain([TRIPLE]) {
-        context.stamp_below(&rustlib.join(target), |_| true)?;
-    }
-    if command.get_args().any(|argument| argument.as_encoded_bytes().starts_with(b"-Zbuild-std")) {
-        context.stamp_below(&rustlib.join("src/rust/library"), |name| name != "tests" && name != "benches")?;
-    }
+    let libraries = fs::read_dir(sysroot.join("lib")).into_iter().flatten().flatten();
+    let driver = libraries.filter(|entry| entry.file_name().to_string_lossy().starts_with("librustc_driver"));
+    let mut files: Vec<PathBuf> = driver.map(|entry| entry.path()).collect();
+    files.sort();
+    files.extend(["bin/rustc", "lib/rustlib"].map(|path| sysroot.join(path)));
+    files.iter().try_for_each(|path| context.stamp(path))?;
     let flags = variable("CARGO_ENCODED_RUSTFLAGS").map(|flags| flags.to_string_lossy().into_owned());
     let given = flags.iter().flat_map(|flags| flags.split('\u{1f}')).filter_map(|flag| flag.strip_prefix("-Clinker="));
     let on_path = ["cc", "ld"].into_iter().filter_map(find_in_path);
@@ -150,19 +127,16 @@ fn configuration(package: &Path, context: &mut Digester) -> Option<()> {
             if !path.is_file() {
                 continue;
             }
-            let mut table: Table = fs::read_to_string(&path).ok()?.parse().ok()?;
-            table.retain(|name, _| WITHOUT_EFFECT.iter().all(|without| *without != name));
-            let table = Value::Table(table);
+            let text = fs::read_to_string(&path).ok()?;
+            let table = Value::Table(text.parse().ok()?);
             if BEYOND.iter().any(|keys| keys.iter().try_fold(&table, |value, key| value.get(key)).is_some()) {
                 return None;
             }
-            if table.as_table().is_some_and(|table| !table.is_empty()) {
-                // Paths in it are meant from where it is; the package's own has none.
-                if folder != package.join(".cargo") {
-                    context.add(path.as_os_str().as_encoded_bytes());
-                }
-                context.add(format!("{table:?}"));
+            // Paths in it are meant from where it is; the package's own has none.
+            if folder != package.join(".cargo") {
+                context.add(path.as_os_str().as_encoded_bytes());
             }
+            context.add(text);
         }
     }
     Some(())
@@ -173,18 +147,13 @@ fn configuration(package: &Path, context: &mut Digester) -> Option<()> {
 fn sources(package: &Path) -> Option<[u8; 32]> {
     let root = package.parent().unwrap_or(package);
     let mut files = BTreeMap::new();
-    let mut open = vec![package.to_owned()];
-    let manifest = root.join("Cargo.toml");
-    if manifest.is_file() {
-        collect(&manifest, &mut files)?;
-        open.extend(named(root, &files[&manifest]));
-    }
+    let mut open = vec![package.to_owned(), root.join("Cargo.toml")];
     // Cargo makes one if there is none; it says nothing where nothing comes from elsewhere. A package that is a workspace of
     // its own has its own.
     let lock = root.join("Cargo.lock");
-    let says = |text: &str| text.lines().any(|line| line.starts_with("source = "));
-    if lock.is_file() && !package.join("Cargo.lock").is_file() && says(&fs::read_to_string(&lock).ok()?) {
-        collect(&lock, &mut files)?;
+    let says = |text: String| text.lines().any(|line| line.starts_with("source = "));
+    if !package.join("Cargo.lock").is_file() && fs::read_to_string(&lock).is_ok_and(says) {
+        open.push(lock);
     }
     let mut seen = BTreeSet::new();
     while let Some(path) = open.pop() {
@@ -192,8 +161,9 @@ fn sources(package: &Path) -> Option<[u8; 32]> {
             continue;
         }
         collect(&path, &mut files)?;
-        if let Some(manifest) = files.get(&path.join("Cargo.toml")) {
-            open.extend(named(&path, manifest));
+        let folder = if path.ends_with("Cargo.toml") { root } else { &path };
+        if let Some(manifest) = files.get(&folder.join("Cargo.toml")) {
+            open.extend(named(folder, &String::from_utf8_lossy(manifest)));
         }
     }
     let mut digest = Digester::default();
@@ -205,43 +175,15 @@ fn sources(package: &Path) -> Option<[u8; 32]> {
     Some(digest.digest())
 }
 
-/// All that a manifest in `folder` names by a key `path`.
-fn named(folder: &Path, manifest: &[u8]) -> Vec<PathBuf> {
-    fn walk(value: &Value, found: &mut Vec<String>) {
-        match value {
-            Value::Table(table) => {
-                for (key, value) in table {
-                    match value {
-                        Value::String(path) if key == "path" => found.push(path.clone()),
-                        value => walk(value, found),
-                    }
-                }
-            }
-            Value::Array(list) => list.iter().for_each(|value| walk(value, found)),
-            _ => {}
-        }
-    }
-    let mut found = Vec::new();
-    // Cargo has the words for a manifest that is none.
-    if let Ok(table) = String::from_utf8_lossy(manifest).parse::<Table>() {
-        walk(&Value::Table(table), &mut found);
-    }
-    found.iter().map(|path| plain(&folder.join(path))).collect()
-}
-
-/// A path without `..` and `.` in its middle, so that one folder has one name.
-fn plain(path: &Path) -> PathBuf {
-    let mut plain = PathBuf::new();
-    for part in path.components() {
-        let goes_up =
-            part == Component::ParentDir && matches!(plain.components().next_back(), Some(Component::Normal(_)));
-        if goes_up {
-            plain.pop();
-        } else if part != Component::CurDir {
-            plain.push(part);
-        }
-    }
-    plain
+/// All that a manifest in `folder` names by a key `path`, if it is there: cargo has the words for what is not.
+fn named(folder: &Path, manifest: &str) -> Vec<PathBuf> {
+    const KEY: &str = "path";
+    let value = |(at, _)| {
+        let behind = manifest[at + KEY.len()..].trim_start_matches(['"', '\'', ' ', '\t']);
+        behind.strip_prefix('=')?.trim_start().get(1..)?.split(['"', '\'']).next()
+    };
+    let paths = manifest.match_indices(KEY).filter_map(value);
+    paths.filter_map(|path| fs::canonicalize(folder.join(path)).ok()).collect()
 }
 
 /// A file, or all below a folder but what cargo made.
