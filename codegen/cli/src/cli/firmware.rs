@@ -177,10 +177,6 @@ fn make(spec: &Path, common: &Common, purpose: Purpose, ui: &mut Ui) -> Result<M
         let message = format!("--lockstep is for the targets {boards}; {} has it in any case or never", target.name);
         return Err(Failure::Usage(message));
     }
-    let part = workspace::parts::PARTS.iter().find(|part| part.folder == target.folder);
-    if part.is_none_or(|part| part.files.is_empty()) {
-        return Err(Failure::Environment(format!("this specgen was built without the firmware for {}", target.name)));
-    }
     // What is missing is said before anything is written.
     if matches!(target.kind, Kind::Emulated | Kind::Board(_)) {
         target::toolchain::find()?;

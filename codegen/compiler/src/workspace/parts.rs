@@ -1,19 +1,5 @@
-//! The folders that are copied verbatim into a workspace. Each is declared in a file of its own, with its list of files and
-//! what it needs beside it; a new target is one more file here and one more line in [`PARTS`].
-
-mod board;
-mod hal;
-mod host;
-mod law;
-mod link;
-mod qemu;
-mod rt;
-mod rt_pc;
-mod runtime;
-mod stm32;
-mod stm32f4;
-mod stm32h743;
-mod tick;
+//! The folders that are copied verbatim into a workspace, each with what it needs beside it. The build script lists their files: a new
+//! file is in by being there, a new target is one more entry of [`PARTS`] and one more line of the script.
 
 use std::collections::BTreeSet;
 
@@ -34,32 +20,118 @@ pub struct Part {
     pub files: &'static [(&'static str, &'static str)],
 }
 
-/// The files of a folder by their paths in it. A lock file belongs to the list where the folder is a workspace of its own.
-macro_rules! files {
-    ($folder:literal: $($path:literal,)*) => {
-        &[$((
-            concat!($folder, "/", $path),
-            include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../firmware/", $folder, "/", $path)),
-        )),*]
-    };
+/// The files of the folders.
+mod files {
+    include!(concat!(env!("OUT_DIR"), "/files.rs"));
 }
-use files;
+pub use files::{HOST_SIM, UNIT};
 
 /// Every folder there is. Not a constant, of which each crate that names it has a copy.
-pub static PARTS: &[&Part] = &[
-    &law::PART,
-    &runtime::PART,
-    &host::PART,
-    &qemu::PART,
-    &link::PART,
-    &hal::PART,
-    &board::PART,
-    &stm32::PART,
-    &stm32h743::PART,
-    &stm32f4::PART,
-    &tick::PART,
-    &rt::PART,
-    &rt_pc::PART,
+pub static PARTS: [Part; 13] = [
+    Part {
+        folder: "law",
+        member: true,
+        what: "the control law and its supervised tick: start at `src/platform/step.rs`, or `src/legs/step.rs` for six legs",
+        needs: "nothing",
+        with: &[],
+        files: files::LAW,
+    },
+    Part {
+        folder: "runtime",
+        member: true,
+        what: "the kernels it calls",
+        needs: "nothing",
+        with: &[],
+        files: files::RUNTIME,
+    },
+    Part {
+        folder: "host",
+        member: true,
+        what: "the same controller as a shared library: `cargo build --release`",
+        needs: "a host toolchain",
+        with: &[],
+        files: files::HOST,
+    },
+    Part {
+        folder: "qemu",
+        member: false,
+        what: "the same controller on an emulated Cortex-M: see its README",
+        needs: "target `thumbv7em-none-eabihf`, QEMU",
+        with: &["link"],
+        files: files::QEMU,
+    },
+    Part {
+        folder: "link",
+        member: false,
+        what: "the protocol between a board and the host",
+        needs: "nothing",
+        with: &[],
+        files: files::LINK,
+    },
+    Part {
+        folder: "hal",
+        member: false,
+        what: "gauges and amplifiers: traits and drivers",
+        needs: "nothing",
+        with: &[],
+        files: files::HAL,
+    },
+    Part {
+        folder: "board",
+        member: false,
+        what: "what all boards have in common: one tick on real converters, what is said over the link",
+        needs: "nothing",
+        with: &["hal", "link"],
+        files: files::BOARD,
+    },
+    Part {
+        folder: "stm32",
+        member: false,
+        what: "what the STM32 boards have in common",
+        needs: "nothing by itself",
+        with: &["board", "hal", "link"],
+        files: files::STM32,
+    },
+    Part {
+        folder: "stm32h743",
+        member: false,
+        what: "firmware of the NUCLEO-H743ZI2 (Cortex-M7)",
+        needs: "target `thumbv7em-none-eabihf`",
+        with: &["board", "hal", "link", "stm32", "tick"],
+        files: files::STM32H743,
+    },
+    Part {
+        folder: "stm32f4",
+        member: false,
+        what: "firmware of the NUCLEO-F446RE (Cortex-M4F, `f32`)",
+        needs: "target `thumbv7em-none-eabihf`",
+        with: &["board", "hal", "link", "stm32", "tick"],
+        files: files::STM32F4,
+    },
+    Part {
+        folder: "tick",
+        member: false,
+        what: "a board's tick between stand-ins for its converters, on an emulated Cortex-M: what its time is estimated from",
+        needs: "target `thumbv7em-none-eabihf`, QEMU",
+        with: &["board", "hal", "link", "qemu", "stm32"],
+        files: files::TICK,
+    },
+    Part {
+        folder: "rt",
+        member: false,
+        what: "what a control loop needs of Linux: clock, rights, book of late ticks, shared memory",
+        needs: "Linux",
+        with: &[],
+        files: files::RT,
+    },
+    Part {
+        folder: "rt-pc",
+        member: false,
+        what: "the controller on a real-time Linux PC",
+        needs: "a host toolchain, Linux",
+        with: &["hal", "link", "rt"],
+        files: files::RT_PC,
+    },
 ];
 
 /// Folders of every workspace: with these the bits of host and emulated machine can be compared.
@@ -79,5 +151,5 @@ pub fn select(targets: &[&str]) -> Vec<&'static Part> {
         }
         wanted.extend(more);
     }
-    PARTS.iter().copied().filter(|part| wanted.contains(part.folder) && !part.files.is_empty()).collect()
+    PARTS.iter().filter(|part| wanted.contains(part.folder)).collect()
 }

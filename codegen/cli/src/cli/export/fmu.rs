@@ -2,7 +2,6 @@
 
 mod controller;
 mod plant;
-mod sources;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -6,12 +6,12 @@ use host_sim::plant::LegParameters;
 use host_sim::word::{Scalar, WordKind};
 use plant_unit::{Description, Kind, SETTINGS, Settings};
 use specgen_compiler::compile::Compiled;
+use specgen_compiler::workspace::parts::{HOST_SIM, UNIT};
 use specgen_language::interrupt::Scratch;
 use specgen_studies::machine;
 use specgen_toolchain::host::build_unit;
 use toml_edit::{Array, DocumentMut};
 
-use super::sources::{SIMULATOR, UNIT};
 use super::{Built, Unit, Variable};
 use crate::cli::file::write_scratch;
 use crate::cli::sim::environment;
@@ -83,7 +83,7 @@ fn unit<'a>(compiled: &'a Compiled, description: &Description) -> Unit<'a> {
 
 /// A workspace of the plant's crates, with the versions and flags of specgen's own.
 fn rust(compiled: &Compiled) -> Result<BTreeMap<String, String>, Failure> {
-    let ours = SIMULATOR.iter().chain(UNIT).map(|(name, text)| ((*name).to_owned(), (*text).to_owned()));
+    let ours = HOST_SIM.iter().chain(UNIT).map(|(name, text)| ((*name).to_owned(), (*text).to_owned()));
     let mut files: BTreeMap<String, String> = ours.collect();
     if let Some(manifest) = files.get_mut("unit/Cargo.toml") {
         // Beside the simulator, not in it.

@@ -1,0 +1,69 @@
+//! Lists the files that are copied verbatim into outputs: all that lie in these folders, but for tests and for packages of their own.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{env, fs, io};
+
+/// Folders in the repository. In an output each stands beside the others, under its own name.
+const FOLDERS: [&str; 15] = [
+    "firmware/board",
+    "firmware/hal",
+    "firmware/host",
+    "firmware/law",
+    "firmware/link",
+    "firmware/qemu",
+    "firmware/rt",
+    "firmware/rt-pc",
+    "firmware/runtime",
+    "firmware/stm32",
+    "firmware/stm32f4",
+    "firmware/stm32h743",
+    "firmware/tick",
+    "host-sim",
+    "host-sim/unit",
+];
+
+/// What files there are: not those that an editor leaves.
+const KINDS: [&str; 6] = ["json", "lock", "md", "rs", "toml", "x"];
+
+fn main() -> io::Result<()> {
+    let mut text = String::new();
+    for folder in FOLDERS {
+        let folder = Path::new("../..").join(folder).canonicalize()?;
+        let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mut files = Vec::new();
+        collect(&folder, &mut files)?;
+        // A lock file that cargo leaves in a member of some workspace is nobody's.
+        let stands_alone = fs::read_to_string(folder.join("Cargo.toml"))?.contains("[workspace]");
+        files.retain(|file| stands_alone || !file.ends_with("Cargo.lock"));
+        files.sort();
+        let constant = name.to_uppercase().replace('-', "_");
+        let _ = writeln!(text, "/// Of `{name}`: path below the workspace, text.");
+        let _ = writeln!(text, "pub const {constant}: &[(&str, &str)] = &[");
+        for file in &files {
+            let inner = Path::new(&name).join(file.strip_prefix(&folder).unwrap_or(file));
+            let _ = writeln!(text, "({inner:?}, include_str!({file:?})),");
+        }
+        text.push_str("];\n");
+    }
+    let out = env::var_os("OUT_DIR").map(PathBuf::from).unwrap_or_default();
+    fs::write(out.join("files.rs"), text)
+}
+
+/// Files below a folder. Where one comes or goes, this runs again.
+fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() {
+            if path.ends_with("tests") || path.ends_with("target") || path.join("Cargo.toml").is_file() {
+                continue;
+            }
+            println!("cargo:rerun-if-changed={}", path.display());
+            collect(&path, files)?;
+        } else if !path.ends_with("tests.rs") && path.extension().is_some_and(|kind| KINDS.iter().any(|of| kind == *of))
+        {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
