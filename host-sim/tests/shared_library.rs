@@ -25,6 +25,12 @@ state_bytes=32\nstate_align=16\nconfig_bytes=8\nconfig_align=8\nmachine_bytes=48
     *o.add(1) = *s.cast::<u64>();
 } }
 #[unsafe(no_mangle)] unsafe extern "C" fn specgen_state_digest(s: *const u8) -> u64 { unsafe { *s.cast::<u64>() ^ 0xff } }
+#[unsafe(no_mangle)] extern "C" fn specgen_machine_reset(_: *mut u8) {}
+#[unsafe(no_mangle)] extern "C" fn specgen_machine_step(_: *const u8, _: *mut u8, _: *const u64, _: *mut u64) {}
+#[unsafe(no_mangle)] extern "C" fn specgen_machine_digest(_: *const u8) -> u64 { 0 }
+#[unsafe(no_mangle)] extern "C" fn specgen_machine_save(_: *const u8, _: *mut u64) {}
+#[unsafe(no_mangle)] extern "C" fn specgen_machine_load(_: *mut u8, _: *const u64) -> i32 { 0 }
+#[unsafe(no_mangle)] extern "C" fn specgen_words_per_leg(_: *const u64, _: *mut u64) {}
 "#;
 
 /// Compiles `source` as a C shared library called `name`, or `None` where no compiler is at hand.

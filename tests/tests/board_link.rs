@@ -37,7 +37,7 @@ fn download(client: &mut Client<Line>) -> Vec<u8> {
 #[test]
 fn what_a_board_recorded_is_downloaded_and_replays_bit_for_bit() {
     let emitted = Emitted::reference("board-link");
-    let mut machine = Supervised::new(emitted.at_run_time()).unwrap();
+    let mut machine = Supervised::new(emitted.at_run_time());
     let line = Line::new(RECORD);
     let mut client = line.client(1);
     // From power-up on it waits for a fault.

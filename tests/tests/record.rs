@@ -39,7 +39,7 @@ fn closed_loop(emitted: &Emitted) -> Vec<u8> {
     let text = controller.text().to_owned();
     let mut other = controller.default_config();
     controller.description().set_config(&mut other, "mode", 5.0).unwrap();
-    let machine = Supervised::new(controller).unwrap();
+    let machine = Supervised::new(controller);
     let mut memory = vec![0; 2 * BLOCK];
     let mut recorder = Recorder::new(&mut memory, 2, layout(&machine)).unwrap();
     recorder.start(Settings::STREAM);
@@ -138,7 +138,7 @@ fn rows(bytes: &[u8]) -> Vec<Row> {
 fn a_record_replays_from_wherever_it_begins_and_a_changed_bit_is_found_and_named() {
     let emitted = Emitted::new("record", "reference.toml", &[]);
     let bytes = closed_loop(&emitted);
-    let mut machine = Supervised::new(emitted.at_run_time()).unwrap();
+    let mut machine = Supervised::new(emitted.at_run_time());
     let whole = run(&bytes, &mut machine);
     let blocks = blocks(&bytes);
     println!("{} ticks in {} blocks, {} bytes", whole.ticks, blocks.len(), bytes.len());
@@ -231,7 +231,7 @@ fn on_the_microcontroller(emitted: &Emitted, bytes: &[u8]) {
     let main = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/record_support/qemu.rs");
     fs::copy(main, emitted.dir.join("qemu/src/main.rs")).unwrap();
     let Some(image) = emitted.image(Mcu::Mps2An500) else { return };
-    let mut machine = Supervised::new(emitted.at_run_time()).unwrap();
+    let mut machine = Supervised::new(emitted.at_run_time());
     let config = machine.controller().default_config();
     let inputs: Vec<Vec<u64>> = rows(bytes).into_iter().map(|row| row.input).collect();
     let target = target::replay(&image, &config, &inputs, std::time::Duration::from_secs(300))
@@ -246,7 +246,7 @@ fn on_the_microcontroller(emitted: &Emitted, bytes: &[u8]) {
     let mut closed = 0;
     for (tick, input) in inputs.iter().enumerate() {
         if recorder.opens() {
-            let state = machine.save().unwrap();
+            let state = machine.save();
             recorder.open(&config, machine.digest(), |words| words.copy_from_slice(&state));
         }
         let word = machine.step(input, &mut output);
@@ -260,7 +260,7 @@ fn on_the_microcontroller(emitted: &Emitted, bytes: &[u8]) {
         let block = recorder.block(0).map_or(0, hash);
         closed += usize::from(block != 0);
         recorder.release();
-        let expected: Vec<u64> = output.iter().copied().chain([hash(&machine.save().unwrap()), block]).collect();
+        let expected: Vec<u64> = output.iter().copied().chain([hash(&machine.save()), block]).collect();
         assert_eq!(target.outputs[tick], expected, "tick {tick}");
         assert_eq!(target.digests[tick], machine.digest(), "tick {tick}");
     }
@@ -367,7 +367,7 @@ fn bring_to_run(machine: &mut Supervised, names: &[String], rng: &mut ChaCha8Rng
 /// `load(save(m))` has the digest of m and its future; words that are none are refused, and what is taken keeps the promises.
 fn same_future(name: &str, spec: &str, edits: &[(&str, &str)], seed: u64) {
     let emitted = Emitted::new(name, spec, edits);
-    let mut machine = Supervised::new(emitted.at_run_time()).unwrap();
+    let mut machine = Supervised::new(emitted.at_run_time());
     let description = machine.controller().description().clone();
     let single = description.scalar.bits() == 32;
     let names = machine.input_names();
@@ -384,12 +384,12 @@ fn same_future(name: &str, spec: &str, edits: &[(&str, &str)], seed: u64) {
         for _ in 0..rng.next_u32() % 100 {
             machine.step(&hostile(&names, &mut rng, single), &mut ours);
         }
-        let words = machine.save().unwrap();
+        let words = machine.save();
         deepest = deepest.max(words[0]);
         loaded.reset();
         loaded.load(&words).unwrap_or_else(|error| panic!("{name}, round {round}: {error}"));
         assert_eq!(loaded.digest(), machine.digest(), "{name}, round {round}");
-        assert_eq!(loaded.save().unwrap(), words, "{name}, round {round}");
+        assert_eq!(loaded.save(), words, "{name}, round {round}");
         let inputs: Vec<Vec<u64>> = (0..100).map(|_| hostile(&names, &mut rng, single)).collect();
         for (tick, input) in inputs.iter().enumerate() {
             machine.step(input, &mut ours);

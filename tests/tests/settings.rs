@@ -119,7 +119,7 @@ struct Met {
 fn hostile(name: &str, spec: &str, edits: &[(&str, &str)], records: &[(&str, String)]) {
     let emitted = Emitted::with_records(name, spec, edits, records);
     let ir = &emitted.compiled.ir;
-    let load = || Supervised::new(emitted.at_run_time()).expect("a library with the supervised tick");
+    let load = || Supervised::new(emitted.at_run_time());
     let machine = load();
     let (inputs, outputs) = (machine.input_names(), machine.output_names());
     let place = |name: &str| outputs.iter().position(|found| found == name).expect("an output word");
@@ -211,7 +211,7 @@ fn hostile(name: &str, spec: &str, edits: &[(&str, &str)], records: &[(&str, Str
             assert_eq!(bench.machine.digest(), bench.other.digest(), "{name}, tick {tick}");
         }
         if tick % EVERY == 0 {
-            let words = bench.machine.save().expect("a library with snapshots");
+            let words = bench.machine.save();
             bench.other.configure(&config).expect("settings in force");
             bench.other.load(&words).unwrap_or_else(|error| {
                 let index =

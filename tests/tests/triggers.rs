@@ -61,7 +61,7 @@ fn record(emitted: &Emitted) -> Vec<u8> {
     let (text, description) = (controller.text().to_owned(), controller.description().clone());
     let mut other = controller.default_config();
     description.set_config(&mut other, "trigger_step[0]", 2e-6).unwrap();
-    let machine = Supervised::new(controller).unwrap();
+    let machine = Supervised::new(controller);
     let layout = Layout {
         config: description.config_names.len(),
         input: machine.input_names().len(),
@@ -176,7 +176,7 @@ fn difference(recorded: &[usize], computed: &[usize]) -> Option<(Option<usize>, 
 fn triggers_at_1_mm_s_to_and_fro_are_in_the_ticks_that_the_recorded_pose_says() {
     let emitted = Emitted::new("triggers", "features/triggers.toml", &[]);
     let bytes = record(&emitted);
-    let mut machine = Supervised::new(emitted.at_run_time()).unwrap();
+    let mut machine = Supervised::new(emitted.at_run_time());
     let (ticks, rows) = ticks(&bytes, &mut machine);
     let (recorded, computed) = (rises(&ticks, 0), passed(&ticks));
     assert_eq!(difference(&recorded, &computed), None);

@@ -11,7 +11,7 @@ const TICKS: u64 = 1000;
 /// What example.c gives its controller, by Rust; each gauge off by so many ulps.
 fn digest(folder: &Folder, dir: &str, ulps: u64) -> u64 {
     let library = folder.path(dir).join("libcontroller.so");
-    let mut machine = Supervised::new(Controller::load(&library).unwrap()).unwrap();
+    let mut machine = Supervised::new(Controller::load(&library).unwrap());
     let words = machine.controller().description().config_names.len();
     let mut settings = vec![0; words];
     machine.controller().default_config().clone_into(&mut settings);

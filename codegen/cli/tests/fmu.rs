@@ -91,7 +91,7 @@ fn an_importer_gets_the_bits_of_the_controller() {
 
         assert_eq!(folder.run(&["export", "c", spec, "-o", "c"]).code, 0);
         let library = Controller::load(&folder.path("c/libcontroller.so")).unwrap();
-        let mut machine = Supervised::new(library).unwrap();
+        let mut machine = Supervised::new(library);
         let settings = machine.controller().default_config();
         machine.configure(&settings).unwrap();
         let inputs = inputs(&machine);
@@ -171,7 +171,7 @@ fn a_controller_on_the_unit_of_its_plant_gets_the_bits_of_specgen_sim() {
         assert_eq!(folder.run(&["export", "c", spec, "-o", "c"]).code, 0);
         let run = folder.run(&["sim", spec, "--record", "run.rec", "--seconds", seconds]);
         assert_eq!(run.code, 0, "{run:#?}");
-        let mut machine = Supervised::new(Controller::load(&folder.path("c/libcontroller.so")).unwrap()).unwrap();
+        let mut machine = Supervised::new(Controller::load(&folder.path("c/libcontroller.so")).unwrap());
         let (inputs, outputs) = (machine.input_names(), machine.output_names());
         let [given, answers] = recorded(&folder, "run.rec", &mut machine);
 

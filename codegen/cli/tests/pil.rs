@@ -56,7 +56,7 @@ fn legs(folder: &Path) -> (Image, PathBuf, Supervised) {
 
 fn supervised(folder: &Path) -> Supervised {
     let library = target::host::build_library(folder, &folder.join("target")).unwrap();
-    Supervised::new(Controller::load(&library).unwrap()).unwrap()
+    Supervised::new(Controller::load(&library).unwrap())
 }
 
 /// Writes the workspace of six legs; its image, if it is wanted.

@@ -197,7 +197,7 @@ impl Bench {
 
     /// The host's own build of the same controller.
     fn machine(&self) -> Supervised {
-        Supervised::new(Controller::load(&self.programs.library).unwrap()).unwrap()
+        Supervised::new(Controller::load(&self.programs.library).unwrap())
     }
 
     /// Checks what holds of every run, whatever the machine did and however loaded this computer is.

@@ -197,7 +197,7 @@ impl Library {
 impl Library {
     fn of(controller: Controller, supervised: bool) -> PyResult<Self> {
         let tick = if supervised {
-            Tick::Supervised(Box::new(Supervised::new(controller).map_err(refused)?))
+            Tick::Supervised(Box::new(Supervised::new(controller)))
         } else {
             Tick::Law(Box::new(controller))
         };

@@ -19,7 +19,7 @@ struct RunTime<C: Constants> {
     constants: AtRunTime<C>,
     config: Config<AtRunTime<C>>,
     state: Box<StateOf<AtRunTime<C>>>,
-    machine: Option<Box<Machine<AtRunTime<C>>>>,
+    machine: Box<Machine<AtRunTime<C>>>,
 }
 
 /// The controller of these constants, which stay in memory, in the spec's configuration.
@@ -34,7 +34,8 @@ where
         name: format!("number {}", error.word + 1),
         word: settings.get(error.word).copied().unwrap_or_default(),
     })?;
-    Ok(Box::new(RunTime { constants, config, state: Box::new(state_at_reset(constants)), machine: None }))
+    let state = Box::new(state_at_reset(constants));
+    Ok(Box::new(RunTime { constants, config, machine: Box::new(Machine::new(*state)), state }))
 }
 
 fn state_at_reset<C: Constants>(constants: AtRunTime<C>) -> StateOf<AtRunTime<C>> {
@@ -46,13 +47,6 @@ fn state_at_reset<C: Constants>(constants: AtRunTime<C>) -> StateOf<AtRunTime<C>
 impl<C: Constants> RunTime<C> {
     fn machine_at_reset(&self) -> Machine<AtRunTime<C>> {
         Machine::new(state_at_reset(self.constants))
-    }
-
-    fn machine(&self) -> &Machine<AtRunTime<C>> {
-        match &self.machine {
-            Some(machine) => machine,
-            None => unreachable!("`add_machine` comes before the use of a machine"),
-        }
     }
 }
 
@@ -121,52 +115,39 @@ where
         digest.finish()
     }
 
-    fn add_machine(&mut self) -> Result<(), ControllerError> {
-        self.machine = Some(Box::new(self.machine_at_reset()));
-        Ok(())
-    }
-
     fn reset_machine(&mut self) {
-        self.machine = Some(Box::new(self.machine_at_reset()));
+        *self.machine = self.machine_at_reset();
     }
 
     fn step_machine(&mut self, input: &[u64], output: &mut [u64]) {
-        let Some(machine) = &mut self.machine else { unreachable!("`add_machine` comes before the use of a machine") };
-        let result = supervise(self.constants, &self.config, machine, &MachineInput::read(self.constants, input));
-        write_machine_output(self.constants, &result, machine, output);
+        let input = MachineInput::read(self.constants, input);
+        let result = supervise(self.constants, &self.config, &mut self.machine, &input);
+        write_machine_output(self.constants, &result, &self.machine, output);
     }
 
     fn machine_digest(&self) -> u64 {
-        self.machine().digest()
+        self.machine.digest()
     }
 
     fn machine_words(&self) -> usize {
-        let sizes = self.constants.sizes();
-        match &self.machine {
-            Some(machine) => machine.word_count(sizes),
-            None => self.machine_at_reset().word_count(sizes),
-        }
+        self.machine.word_count(self.constants.sizes())
     }
 
-    fn save_machine(&self, words: &mut [u64]) -> Result<(), ControllerError> {
-        let Ok(()) = self.machine().show(&mut Writer::new(words).within(self.constants.sizes()));
+    fn save_machine(&self, words: &mut [u64]) {
+        let Ok(()) = self.machine.show(&mut Writer::new(words).within(self.constants.sizes()));
+    }
+
+    fn load_machine(&mut self, words: &[u64]) -> Result<(), usize> {
+        // Into a machine at reset, which is given up where a word is refused.
+        let mut machine = self.machine_at_reset();
+        let restored = machine.restore(&mut Reader::new(words).within(self.constants.sizes()));
+        restored.map_err(|invalid| invalid.word)?;
+        *self.machine = machine;
         Ok(())
     }
 
-    fn load_machine(&mut self, words: &[u64]) -> Result<Option<usize>, ControllerError> {
-        // Into a machine at reset, which is given up where a word is refused.
-        let mut machine = self.machine_at_reset();
-        match machine.restore(&mut Reader::new(words).within(self.constants.sizes())) {
-            Ok(()) => {
-                self.machine = Some(Box::new(machine));
-                Ok(None)
-            }
-            Err(invalid) => Ok(Some(invalid.word)),
-        }
-    }
-
-    fn words_per_leg(&self, gauges: &[u64; 6]) -> Result<[[u64; 6]; 6], ControllerError> {
+    fn words_per_leg(&self, gauges: &[u64; 6]) -> [[u64; 6]; 6] {
         let rows = C::Law::words_per_leg(self.constants, &gauges.map(C::Real::from_word));
-        Ok(rows.map(|row| row.map(|number| number.to_word())))
+        rows.map(|row| row.map(|number| number.to_word()))
     }
 }

@@ -3,8 +3,6 @@
 use std::alloc::Layout;
 use std::any::Any;
 
-use super::ControllerError;
-
 /// One configuration, one state of the control law, and one machine: the law under its supervisor. All numbers are words, as in the
 /// C interface of emitted libraries.
 ///
@@ -38,12 +36,7 @@ pub trait Engine: Send + Sync {
     /// Digest of the law's state.
     fn digest(&self) -> u64;
 
-    /// Whether there is a machine. It begins at rest.
-    ///
-    /// # Errors
-    /// If a library lacks it: it is of an older specgen.
-    fn add_machine(&mut self) -> Result<(), ControllerError>;
-    /// The machine as at power-up: disarmed.
+    /// The machine as at power-up: disarmed. It comes before every other use of the machine.
     fn reset_machine(&mut self);
     /// One supervised tick.
     fn step_machine(&mut self, input: &[u64], output: &mut [u64]);
@@ -52,20 +45,13 @@ pub trait Engine: Send + Sync {
     /// Words of a snapshot of the machine.
     fn machine_words(&self) -> usize;
     /// Snapshot of the machine.
-    ///
-    /// # Errors
-    /// If a library does not offer it.
-    fn save_machine(&self, words: &mut [u64]) -> Result<(), ControllerError>;
+    fn save_machine(&self, words: &mut [u64]);
     /// Takes a snapshot.
     ///
     /// # Errors
-    /// If a library does not offer it. `Ok` holds the index of the first word that no machine holds, if there is one; the machine
-    /// then stays as it is.
-    fn load_machine(&mut self, words: &[u64]) -> Result<Option<usize>, ControllerError>;
+    /// Index of the first word that no machine holds; the machine then stays as it is.
+    fn load_machine(&mut self, words: &[u64]) -> Result<(), usize>;
 
     /// Word of each gauge (rows) per displacement of each leg (columns) near these words.
-    ///
-    /// # Errors
-    /// If a library does not offer it.
-    fn words_per_leg(&self, gauges: &[u64; 6]) -> Result<[[u64; 6]; 6], ControllerError>;
+    fn words_per_leg(&self, gauges: &[u64; 6]) -> [[u64; 6]; 6];
 }

@@ -7,11 +7,11 @@
 
 use std::alloc::{Layout, alloc_zeroed, dealloc, handle_alloc_error};
 use std::any::Any;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::ptr::NonNull;
 use std::sync::Arc;
 
-use libloading::{Library, Symbol};
+use libloading::Library;
 
 use super::ControllerError;
 use super::engine::Engine;
@@ -20,30 +20,26 @@ use crate::description::{DescriptionError, fields};
 /// Version of the C interface that this module speaks.
 pub const ABI_VERSION: u32 = 2;
 
+type Reset = unsafe extern "C" fn(*mut u8);
+type Step = unsafe extern "C" fn(*const u8, *mut u8, *const u64, *mut u64);
+type Digest = unsafe extern "C" fn(*const u8) -> u64;
+type Load = unsafe extern "C" fn(*mut u8, *const u64) -> i32;
+
 /// The library's functions. Valid while the library is loaded.
 #[derive(Clone, Copy)]
 struct Functions {
     config_default: unsafe extern "C" fn(*mut u64),
     config_check: unsafe extern "C" fn(*const u64) -> i32,
-    config_load: unsafe extern "C" fn(*mut u8, *const u64) -> i32,
-    state_reset: unsafe extern "C" fn(*mut u8),
-    step: unsafe extern "C" fn(*const u8, *mut u8, *const u64, *mut u64),
-    state_digest: unsafe extern "C" fn(*const u8) -> u64,
-}
-
-type Reset = unsafe extern "C" fn(*mut u8);
-type Step = unsafe extern "C" fn(*const u8, *mut u8, *const u64, *mut u64);
-type Digest = unsafe extern "C" fn(*const u8) -> u64;
-type Save = unsafe extern "C" fn(*const u8, *mut u64);
-type Load = unsafe extern "C" fn(*mut u8, *const u64) -> i32;
-type WordsPerLeg = unsafe extern "C" fn(*const u64, *mut u64);
-
-/// A machine: its memory and its functions.
-struct Machine {
-    memory: Buffer,
-    reset: Reset,
+    config_load: Load,
+    state_reset: Reset,
     step: Step,
-    digest: Digest,
+    state_digest: Digest,
+    machine_reset: Reset,
+    machine_step: Step,
+    machine_digest: Digest,
+    machine_save: unsafe extern "C" fn(*const u8, *mut u64),
+    machine_load: Load,
+    words_per_leg: unsafe extern "C" fn(*const u64, *mut u64),
 }
 
 /// An emitted controller with one configuration and one state.
@@ -52,12 +48,9 @@ pub(super) struct Emitted {
     functions: Functions,
     config: Buffer,
     state: Buffer,
-    machine: Option<Machine>,
-    machine_layout: Layout,
+    machine: Buffer,
     /// Words of a machine's snapshot.
     machine_words: usize,
-    /// Where it came from.
-    path: PathBuf,
     /// Last, so that it is unloaded after everything else.
     library: Arc<Library>,
 }
@@ -69,7 +62,8 @@ unsafe impl Send for Emitted {}
 unsafe impl Sync for Emitted {}
 
 impl Emitted {
-    /// Loads a library. Configuration and state are zeros until [`Engine::configure`] and [`Engine::reset`].
+    /// Loads a library. Configuration, state and machine are zeros until [`Engine::configure`], [`Engine::reset`] and
+    /// [`Engine::reset_machine`].
     pub(super) fn load(path: &Path) -> Result<Self, ControllerError> {
         let failed = |cause| ControllerError::Load { path: path.to_owned(), cause };
         // SAFETY: loading runs the library's initialisers. The caller names a controller library; an emitted one has none.
@@ -92,6 +86,12 @@ impl Emitted {
                 state_reset: *library.get(b"specgen_state_reset\0").map_err(failed)?,
                 step: *library.get(b"specgen_step\0").map_err(failed)?,
                 state_digest: *library.get(b"specgen_state_digest\0").map_err(failed)?,
+                machine_reset: *library.get(b"specgen_machine_reset\0").map_err(failed)?,
+                machine_step: *library.get(b"specgen_machine_step\0").map_err(failed)?,
+                machine_digest: *library.get(b"specgen_machine_digest\0").map_err(failed)?,
+                machine_save: *library.get(b"specgen_machine_save\0").map_err(failed)?,
+                machine_load: *library.get(b"specgen_machine_load\0").map_err(failed)?,
+                words_per_leg: *library.get(b"specgen_words_per_leg\0").map_err(failed)?,
             };
             (describe, functions)
         };
@@ -108,30 +108,9 @@ impl Emitted {
         };
         let state = Buffer::new(layout(&text, "state_bytes", "state_align")?);
         let config = Buffer::new(layout(&text, "config_bytes", "config_align")?);
-        let machine_layout = layout(&text, "machine_bytes", "machine_align")?;
+        let machine = Buffer::new(layout(&text, "machine_bytes", "machine_align")?);
         let machine_words = size(&text, "machine_words")?;
-        let (path, library) = (path.to_owned(), Arc::new(library));
-        Ok(Self { text, functions, config, state, machine: None, machine_layout, machine_words, path, library })
-    }
-
-    /// A function that not every library has.
-    ///
-    /// # Safety
-    /// `F` is its type in the interface's version. It is called only while the library is loaded.
-    unsafe fn function<F: Copy>(&self, name: &[u8]) -> Result<F, ControllerError> {
-        // SAFETY: the caller's duty.
-        let function: Result<Symbol<'_, F>, _> = unsafe { self.library.get(name) };
-        match function {
-            Ok(function) => Ok(*function),
-            Err(cause) => Err(ControllerError::Load { path: self.path.clone(), cause }),
-        }
-    }
-
-    fn machine(&self) -> &Machine {
-        match &self.machine {
-            Some(machine) => machine,
-            None => unreachable!("`add_machine` comes before the use of a machine"),
-        }
+        Ok(Self { text, functions, config, state, machine, machine_words, library: Arc::new(library) })
     }
 }
 
@@ -141,20 +120,17 @@ impl Engine for Emitted {
     }
 
     fn layouts(&self) -> [Layout; 3] {
-        [self.state.layout, self.config.layout, self.machine_layout]
+        [self.state.layout, self.config.layout, self.machine.layout]
     }
 
     fn fork(&self) -> Box<dyn Engine> {
-        let machine = self.machine.as_ref().map(|machine| Machine { memory: machine.memory.copy(), ..*machine });
         Box::new(Self {
             text: self.text.clone(),
             functions: self.functions,
             config: self.config.copy(),
             state: self.state.copy(),
-            machine,
-            machine_layout: self.machine_layout,
+            machine: self.machine.copy(),
             machine_words: self.machine_words,
-            path: self.path.clone(),
             library: Arc::clone(&self.library),
         })
     }
@@ -185,7 +161,7 @@ impl Engine for Emitted {
             // SAFETY: the buffer has the size and alignment that the library asks for; the words as above.
             bad = unsafe { (self.functions.config_load)(self.config.start(), words.as_ptr()) };
         }
-        refused(bad).map_or(Ok(()), Err)
+        refused(bad)
     }
 
     fn reset(&mut self) {
@@ -205,72 +181,54 @@ impl Engine for Emitted {
         unsafe { (self.functions.state_digest)(self.state.start()) }
     }
 
-    fn add_machine(&mut self) -> Result<(), ControllerError> {
-        // SAFETY: the types are those of the interface's version, which `load` asked for. The pointers are used only while `self`
-        // keeps the library loaded.
-        let (reset, step, digest) = unsafe {
-            (
-                self.function::<Reset>(b"specgen_machine_reset\0")?,
-                self.function::<Step>(b"specgen_machine_step\0")?,
-                self.function::<Digest>(b"specgen_machine_digest\0")?,
-            )
-        };
-        self.machine = Some(Machine { memory: Buffer::new(self.machine_layout), reset, step, digest });
-        self.reset_machine();
-        Ok(())
-    }
-
     fn reset_machine(&mut self) {
-        let machine = self.machine();
         // SAFETY: the buffer has the size and alignment that the library asks for.
-        unsafe { (machine.reset)(machine.memory.start()) };
+        unsafe { (self.functions.machine_reset)(self.machine.start()) };
     }
 
     fn step_machine(&mut self, input: &[u64], output: &mut [u64]) {
-        let machine = self.machine();
-        // SAFETY: configuration and machine are initialised; the slices have the lengths that the library says, checked by the caller.
+        // SAFETY: `Supervised::new` initialised the machine; the slices have the lengths that the library says, checked by the caller.
         unsafe {
-            (machine.step)(self.config.start(), machine.memory.start(), input.as_ptr(), output.as_mut_ptr());
+            (self.functions.machine_step)(
+                self.config.start(),
+                self.machine.start(),
+                input.as_ptr(),
+                output.as_mut_ptr(),
+            );
         }
     }
 
     fn machine_digest(&self) -> u64 {
-        let machine = self.machine();
-        // SAFETY: the machine is initialised.
-        unsafe { (machine.digest)(machine.memory.start()) }
+        // SAFETY: `Supervised::new` initialised the machine.
+        unsafe { (self.functions.machine_digest)(self.machine.start()) }
     }
 
     fn machine_words(&self) -> usize {
         self.machine_words
     }
 
-    fn save_machine(&self, words: &mut [u64]) -> Result<(), ControllerError> {
+    fn save_machine(&self, words: &mut [u64]) {
         // SAFETY: the machine is initialised; there are as many words as the library says it writes, checked by the caller.
-        unsafe { self.function::<Save>(b"specgen_machine_save\0")?(self.machine().memory.start(), words.as_mut_ptr()) };
-        Ok(())
+        unsafe { (self.functions.machine_save)(self.machine.start(), words.as_mut_ptr()) };
     }
 
-    fn load_machine(&mut self, words: &[u64]) -> Result<Option<usize>, ControllerError> {
+    fn load_machine(&mut self, words: &[u64]) -> Result<(), usize> {
         // SAFETY: the buffer has the size and alignment that the library asks for; there are as many words as it reads, checked by the
         // caller.
-        let bad =
-            unsafe { self.function::<Load>(b"specgen_machine_load\0")?(self.machine().memory.start(), words.as_ptr()) };
-        Ok(refused(bad))
+        refused(unsafe { (self.functions.machine_load)(self.machine.start(), words.as_ptr()) })
     }
 
-    fn words_per_leg(&self, gauges: &[u64; 6]) -> Result<[[u64; 6]; 6], ControllerError> {
+    fn words_per_leg(&self, gauges: &[u64; 6]) -> [[u64; 6]; 6] {
         let mut rows = [[0; 6]; 6];
         // SAFETY: both arrays have the lengths that the function takes.
-        unsafe {
-            self.function::<WordsPerLeg>(b"specgen_words_per_leg\0")?(gauges.as_ptr(), rows.as_mut_ptr().cast());
-        }
-        Ok(rows)
+        unsafe { (self.functions.words_per_leg)(gauges.as_ptr(), rows.as_mut_ptr().cast()) };
+        rows
     }
 }
 
 /// The index of a refused word, of what the library returns: one more, or 0.
-fn refused(bad: i32) -> Option<usize> {
-    usize::try_from(bad).unwrap_or(usize::MAX).checked_sub(1)
+fn refused(bad: i32) -> Result<(), usize> {
+    usize::try_from(bad).unwrap_or(usize::MAX).checked_sub(1).map_or(Ok(()), Err)
 }
 
 /// Zeroed memory of a given size and alignment.

@@ -74,12 +74,10 @@ pub struct Supervised {
 
 impl Supervised {
     /// Puts a controller under its supervisor, disarmed.
-    ///
-    /// # Errors
-    /// If the library lacks the supervised tick: it is of an older specgen.
-    pub fn new(mut controller: Controller) -> Result<Self, ControllerError> {
-        controller.engine.add_machine()?;
-        Ok(Self { controller })
+    #[must_use]
+    pub fn new(mut controller: Controller) -> Self {
+        controller.engine.reset_machine();
+        Self { controller }
     }
 
     /// The controller underneath: its description and configuration. Its own state is not that of the machine.

@@ -118,7 +118,7 @@ impl<'r, 'm> Recorded<'r, 'm> {
             *slot = *word;
         }
         if self.recorder.opens() {
-            let state = self.machine.save().map_err(Ended::Controller)?;
+            let state = self.machine.save();
             let digest = self.machine.digest();
             self.recorder.open(&self.config, digest, |words| {
                 for (slot, word) in words.iter_mut().zip(&state) {

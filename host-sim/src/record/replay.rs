@@ -89,8 +89,6 @@ pub enum ReplayError {
     Decimated(u32),
     /// The controller refuses the recorded settings.
     Config(u64, ControllerError),
-    /// The library cannot be used.
-    Controller(ControllerError),
 }
 
 impl fmt::Display for ReplayError {
@@ -107,7 +105,6 @@ impl fmt::Display for ReplayError {
                 "only every {every}th tick is in the record, so it cannot be replayed; record with decimation 1 (--csv exports it as it is)"
             ),
             Self::Config(tick, error) => write!(f, "settings at tick {tick}: {error}"),
-            Self::Controller(error) => error.fmt(f),
         }
     }
 }
@@ -217,7 +214,7 @@ impl Run<'_> {
             self.machine.configure(&block.config).map_err(|error| ReplayError::Config(block.first, error))?;
             self.config.clone_from(&block.config);
         }
-        self.found.divergence = self.begin(block, follows)?;
+        self.found.divergence = self.begin(block, follows);
         self.found.blocks += 1;
         for row in &block.rows {
             if self.found.divergence.is_some() {
@@ -229,31 +226,26 @@ impl Run<'_> {
     }
 
     /// Puts the machine where the block begins, or compares it with that.
-    fn begin(&mut self, block: &Block, follows: bool) -> Result<Option<Divergence>, ReplayError> {
+    fn begin(&mut self, block: &Block, follows: bool) -> Option<Divergence> {
         let differs =
             |signal: String, recorded, replayed| Some(Divergence { tick: block.first, signal, recorded, replayed });
         if !follows && let Err(error) = self.machine.load(&block.state) {
             return match error {
                 SnapshotError::Word { index, word } => {
-                    Ok(differs(format!("state word {index} (no state holds it)"), word, 0))
+                    differs(format!("state word {index} (no state holds it)"), word, 0)
                 }
                 SnapshotError::Length { given, expected } => {
-                    Ok(differs("number of state words".to_owned(), given as u64, expected as u64))
+                    differs("number of state words".to_owned(), given as u64, expected as u64)
                 }
-                SnapshotError::Library(error) => Err(ReplayError::Controller(error)),
             };
         }
-        let state = self.machine.save().map_err(ReplayError::Controller)?;
+        let state = self.machine.save();
         if let Some(index) = (0..state.len()).find(|k| block.state.get(*k) != state.get(*k)) {
             let recorded = block.state.get(index).copied().unwrap_or_default();
-            return Ok(differs(format!("state word {index} before it"), recorded, state[index]));
+            return differs(format!("state word {index} before it"), recorded, state[index]);
         }
         let digest = self.machine.digest();
-        Ok(if digest == block.digest {
-            None
-        } else {
-            differs("state_digest before it".to_owned(), block.digest, digest)
-        })
+        if digest == block.digest { None } else { differs("state_digest before it".to_owned(), block.digest, digest) }
     }
 
     fn tick(&mut self, row: &Row) -> Option<Divergence> {

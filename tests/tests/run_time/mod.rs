@@ -185,7 +185,7 @@ type Phases = [usize; 6];
 /// to where they ran, so that most of the ticks are of the running phase.
 fn machines_alike(name: &str, emitted: &Emitted, library: Controller, at_run_time: Controller, ticks: usize) -> Phases {
     let ir = &emitted.compiled.ir;
-    let [mut library, mut at_run_time] = [library, at_run_time].map(|controller| Supervised::new(controller).unwrap());
+    let [mut library, mut at_run_time] = [library, at_run_time].map(|controller| Supervised::new(controller));
     for machine in [&mut library, &mut at_run_time] {
         machine.configure(&ir.integrity.settings).unwrap();
     }
@@ -219,8 +219,8 @@ fn machines_alike(name: &str, emitted: &Emitted, library: Controller, at_run_tim
             assert_eq!(results[0], results[1], "{name}: settings {words:x?}");
         }
         if tick % 400 == 0 {
-            let saved = library.save().unwrap();
-            assert_eq!(saved, at_run_time.save().unwrap(), "{name}, supervised tick {tick}: snapshot");
+            let saved = library.save();
+            assert_eq!(saved, at_run_time.save(), "{name}, supervised tick {tick}: snapshot");
             for _ in 0..20 {
                 let mut spoilt = saved.clone();
                 spoil(&mut spoilt, &mut draw, bits);
@@ -236,7 +236,7 @@ fn machines_alike(name: &str, emitted: &Emitted, library: Controller, at_run_tim
             at_run_time.load(&saved).unwrap();
         }
         match (&ran, word.phase) {
-            (None, 2) => ran = Some((library.save().unwrap(), course.standing.clone())),
+            (None, 2) => ran = Some((library.save(), course.standing.clone())),
             (_, 2) => away = 0,
             (Some((state, standing)), _) => {
                 away += 1;
@@ -273,7 +273,7 @@ fn record(mut machine: Supervised, emitted: &Emitted, ticks: usize) -> Vec<u8> {
     for _ in 0..ticks {
         course.next(&machine, &output, &mut input);
         if recorder.opens() {
-            let state = machine.save().unwrap();
+            let state = machine.save();
             recorder.open(&config, machine.digest(), |words| words.copy_from_slice(&state));
         }
         machine.step(&input, &mut output);
@@ -293,8 +293,8 @@ fn record(mut machine: Supervised, emitted: &Emitted, ticks: usize) -> Vec<u8> {
 /// What one recorded, the other replays.
 fn records_alike(name: &str, emitted: &Emitted, library: &Controller, at_run_time: &Controller, ticks: usize) {
     for (recorder, player) in [(library, at_run_time), (at_run_time, library)] {
-        let bytes = record(Supervised::new(recorder.fork()).unwrap(), emitted, ticks);
-        let mut player = Supervised::new(player.fork()).unwrap();
+        let bytes = record(Supervised::new(recorder.fork()), emitted, ticks);
+        let mut player = Supervised::new(player.fork());
         let mut reader = Reader::new(Cursor::new(&bytes)).unwrap();
         let replayed = replay(&mut reader, &mut player, |_, _, _| ()).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(replayed.divergence, None, "{name}");

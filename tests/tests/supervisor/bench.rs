@@ -108,7 +108,7 @@ impl Bench {
         for (name, value) in settings {
             description.set_config(&mut config, name, *value).expect("a setting");
         }
-        let mut machine = Supervised::new(controller).expect("a library with the supervised tick");
+        let mut machine = Supervised::new(controller);
         machine.configure(&config).expect("permitted settings");
         let ir = &emitted.compiled.ir;
         let rest = i64::from(ir.supervision.rest);

@@ -98,7 +98,7 @@ struct Loop {
 
 impl Loop {
     fn new(emitted: &Emitted, leg: &LegParameters, seed: u64) -> Self {
-        let machine = Supervised::new(emitted.at_run_time()).expect("a library with the supervised tick");
+        let machine = Supervised::new(emitted.at_run_time());
         let scalar = machine.controller().description().scalar;
         let (inputs, outputs) = (machine.input_names(), machine.output_names());
         let place = |names: &[String], name: &str| names.iter().position(|one| one == name);

@@ -226,7 +226,7 @@ fn finding(word: MachineWord) -> Finding {
 fn every_single_fault_of_a_platform_is_refused_and_named() {
     let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
     let compiled = &emitted.compiled;
-    let mut supervised = Supervised::new(emitted.at_run_time()).unwrap();
+    let mut supervised = Supervised::new(emitted.at_run_time());
     let task = compiled.model.task_space.as_ref().unwrap();
     let specimen = machine::specimen(&compiled.model, task, &LegParameters::reference(), Some(5));
     let scenario = machine::scenario(&compiled.model, task, &specimen, &Noise::of(&specimen), 5);
@@ -255,7 +255,7 @@ fn every_single_fault_of_a_platform_is_refused_and_named() {
 fn every_single_fault_of_six_legs_is_refused_and_named_with_what_looks_like_it() {
     let emitted = Emitted::new("supervisor-wiring-legs", "legs.toml", &[]);
     let compiled = &emitted.compiled;
-    let mut supervised = Supervised::new(emitted.at_run_time()).unwrap();
+    let mut supervised = Supervised::new(emitted.at_run_time());
     let parameters = machine::leg(&compiled.model, &LegParameters::reference());
     let alike = &compiled.ir.supervision.wiring.as_ref().unwrap().alike;
     let run = |supervised: &mut Supervised, mix| {
@@ -360,7 +360,7 @@ fn random(compiled: &Compiled, number: u64) -> Legs {
 fn no_fault_free_machine_is_refused() {
     let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
     let compiled = &emitted.compiled;
-    let mut supervised = Supervised::new(emitted.at_run_time()).unwrap();
+    let mut supervised = Supervised::new(emitted.at_run_time());
     let machines = specgen_tests::length(9, 200);
     let refused: Vec<String> = (0..machines)
         .filter_map(|number| {
@@ -376,7 +376,7 @@ fn no_fault_free_machine_is_refused() {
 fn what_all_of_them_have_in_common_is_refused() {
     let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
     let compiled = &emitted.compiled;
-    let mut supervised = Supervised::new(emitted.at_run_time()).unwrap();
+    let mut supervised = Supervised::new(emitted.at_run_time());
     let task = compiled.model.task_space.as_ref().unwrap();
     let specimen = machine::specimen(&compiled.model, task, &LegParameters::reference(), Some(5));
     let scenario = machine::scenario(&compiled.model, task, &specimen, &Noise::of(&specimen), 5);
@@ -401,7 +401,7 @@ fn what_all_of_them_have_in_common_is_refused() {
 fn a_stop_ends_the_pulses_at_once() {
     let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
     let compiled = &emitted.compiled;
-    let mut supervised = Supervised::new(emitted.at_run_time()).unwrap();
+    let mut supervised = Supervised::new(emitted.at_run_time());
     let codes_at = supervised.output_names().iter().position(|name| name == "dac_code[0]").unwrap();
     let rest = i64::from(compiled.ir.supervision.rest);
     for then in [HOLD, RAMP_DOWN] {
@@ -424,7 +424,7 @@ fn a_stop_ends_the_pulses_at_once() {
 fn vibration_blames_no_gauge_or_leg() {
     let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
     let compiled = &emitted.compiled;
-    let mut supervised = Supervised::new(emitted.at_run_time()).unwrap();
+    let mut supervised = Supervised::new(emitted.at_run_time());
     let (machines, amplitudes) = specgen_tests::length((6, &[(20e-9, 3)][..]), (26, &[(20e-9, 8), (40e-9, 20)]));
     for &(amplitude, most) in amplitudes {
         let mut refused = 0;
@@ -450,7 +450,7 @@ fn a_check_has_the_same_bits_on_the_mcu() {
     ] {
         let emitted = Emitted::new(name, spec, &[]);
         let compiled = &emitted.compiled;
-        let mut supervised = Supervised::new(emitted.at_run_time()).unwrap();
+        let mut supervised = Supervised::new(emitted.at_run_time());
         let Some(image) = emitted.image(mcu) else { return };
         let config = supervised.controller().default_config();
         let parameters = machine::leg(&compiled.model, &LegParameters::reference());

@@ -114,7 +114,7 @@ fn export(
     ui.progress("building the emitted controller for this host");
     let library = build_loadable(&folder, &scratch.path().join("target"))?;
     let bytes = fs::read(&library).map_err(environment)?;
-    let machine = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;
+    let machine = Supervised::new(Controller::load(&library).map_err(environment)?);
     let (texts, next) = texts(&machine)?;
     let mut files: Vec<(String, Vec<u8>)> =
         texts.into_iter().map(|(name, text)| (name.to_owned(), text.into_bytes())).collect();

@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     ui.runs(ControllerForm::Emitted);
     ui.progress(&format!("building the host library in {}", output.display()));
     let library = target::host::build_loadable(&output, &target_dir)?;
-    let host = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;
+    let host = Supervised::new(Controller::load(&library).map_err(environment)?);
 
     match (line, emulator) {
         (Some(line), _) => {

@@ -12,7 +12,7 @@ use std::path::Path;
 use clap::Args;
 use host_sim::controller::{MachineWord, Supervised};
 use host_sim::description::Description;
-use host_sim::record::{self, Again, Block, Header, PhaseChange, Piece, Reader, Replay, ReplayError};
+use host_sim::record::{self, Again, Block, Header, PhaseChange, Piece, Reader, Replay};
 use serde::Serialize;
 
 use super::file::unread_file;
@@ -76,7 +76,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     // Before a library is built: a wrong spec is refused at once.
     same_build(&arguments.recording, spec, &reader.header().description, &compiled)?;
     let controller = sim::controller(&compiled, arguments.emitted, ui)?;
-    let mut machine = Supervised::new(controller).map_err(sim::environment)?;
+    let mut machine = Supervised::new(controller);
     ui.progress("running the record again");
     let names = machine.output_names();
     let mut errors = Errors::default();
@@ -89,10 +89,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             trouble = exports.add(header, block, Some(Again { names: &names, rows })).err();
         }
     });
-    let found = match found {
-        Err(ReplayError::Controller(error)) => return Err(sim::environment(error)),
-        other => other.map_err(|error| refuse(&error))?,
-    };
+    let found = found.map_err(|error| refuse(&error))?;
     if let Some(failure) = trouble {
         return Err(failure);
     }

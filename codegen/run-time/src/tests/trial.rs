@@ -120,7 +120,7 @@ impl Part {
             }
             Self::Machine { first, then } => machine(controller, first, then, seen).is_none(),
             Self::Running { state, rows } => {
-                let mut machine = Supervised::new(controller).unwrap();
+                let mut machine = Supervised::new(controller);
                 if machine.load(state).is_err() {
                     return seen.differs(1);
                 }
@@ -129,7 +129,7 @@ impl Part {
                     for row in rows {
                         machine.step(row, &mut output);
                     }
-                    seen.differs(machine.digest()) || seen.differs(of(&machine.save().unwrap()))
+                    seen.differs(machine.digest()) || seen.differs(of(&machine.save()))
                 })
             }
         }
@@ -139,7 +139,7 @@ impl Part {
 /// Runs a machine, whose gauges show what its legs move, from power-up for [`TICKS`]: `first` while it is armed, `then` where it runs. Its
 /// snapshot after a thousand ticks in which it ran, or of the end, with its input there; none if a digest was not the expected one.
 fn machine(controller: Controller, first: &[u64], then: &[u64], seen: &mut Seen<'_>) -> Option<(Vec<u64>, Vec<u64>)> {
-    let mut machine = Supervised::new(controller).unwrap();
+    let mut machine = Supervised::new(controller);
     let mut output = vec![0; machine.output_names().len()];
     let mut standing: Standing = machine.standing(first).unwrap();
     let request = first.len() - 2;
@@ -157,16 +157,16 @@ fn machine(controller: Controller, first: &[u64], then: &[u64], seen: &mut Seen<
             standing.show(&machine, &output, &mut input);
         }
         if ran == 1_000 && saved.is_none() {
-            saved = Some((machine.save().unwrap(), input.clone()));
+            saved = Some((machine.save(), input.clone()));
         }
         if tick % EVERY == EVERY - 1 && (seen.differs(machine.digest()) || seen.differs(of(&output))) {
             return None;
         }
-        if tick % 1_000 == 999 && seen.differs(of(&machine.save().unwrap())) {
+        if tick % 1_000 == 999 && seen.differs(of(&machine.save())) {
             return None;
         }
     }
-    saved.or_else(|| Some((machine.save().ok()?, input)))
+    saved.or_else(|| Some((machine.save(), input)))
 }
 
 /// Makes the parts.

@@ -3,7 +3,6 @@
 use std::fmt;
 
 use super::Supervised;
-use crate::controller::ControllerError;
 
 /// Why words are not taken for a machine.
 #[derive(Debug)]
@@ -22,8 +21,6 @@ pub enum SnapshotError {
         /// Its bits.
         word: u64,
     },
-    /// The library does not offer it.
-    Library(ControllerError),
 }
 
 impl fmt::Display for SnapshotError {
@@ -31,7 +28,6 @@ impl fmt::Display for SnapshotError {
         match self {
             Self::Length { given, expected } => write!(f, "a state of {given} words; this controller's has {expected}"),
             Self::Word { index, word } => write!(f, "word {index} of the state is {word:016x}, which no state holds"),
-            Self::Library(error) => error.fmt(f),
         }
     }
 }
@@ -46,13 +42,11 @@ impl Supervised {
     }
 
     /// The machine as words.
-    ///
-    /// # Errors
-    /// If a library does not offer it.
-    pub fn save(&self) -> Result<Vec<u64>, ControllerError> {
+    #[must_use]
+    pub fn save(&self) -> Vec<u64> {
         let mut words = vec![0; self.state_words()];
-        self.controller.engine.save_machine(&mut words)?;
-        Ok(words)
+        self.controller.engine.save_machine(&mut words);
+        words
     }
 
     /// Takes the machine that [`Supervised::save`] wrote.
@@ -64,9 +58,7 @@ impl Supervised {
         if words.len() != expected {
             return Err(SnapshotError::Length { given: words.len(), expected });
         }
-        match self.controller.engine.load_machine(words).map_err(SnapshotError::Library)? {
-            None => Ok(()),
-            Some(index) => Err(SnapshotError::Word { index, word: words.get(index).copied().unwrap_or_default() }),
-        }
+        let loaded = self.controller.engine.load_machine(words);
+        loaded.map_err(|index| SnapshotError::Word { index, word: words.get(index).copied().unwrap_or_default() })
     }
 }

@@ -19,7 +19,7 @@ impl Supervised {
     /// Of a machine that stands at rest, as this input reads.
     ///
     /// # Errors
-    /// A word or the library's function is missing: it is of an older specgen.
+    /// A word is missing.
     pub fn standing(&self, input: &[u64]) -> Result<Standing, ControllerError> {
         let description = self.controller.description();
         let gauges = description.input("gauge[0]").or_else(|_| description.input("displacement[0]"))?;
@@ -28,7 +28,7 @@ impl Supervised {
         for (bits, word) in bits.iter_mut().zip(input.iter().skip(gauges)) {
             *bits = *word;
         }
-        let rows = self.controller.engine.words_per_leg(&bits)?;
+        let rows = self.controller.engine.words_per_leg(&bits);
         let scalar = description.scalar;
         let per_leg = rows.map(|row| row.map(|word| scalar.decode(word)));
         Ok(Standing { gauges, requested, words: bits.map(|word| scalar.decode(word)), per_leg, rest: None })

@@ -92,7 +92,7 @@ struct Places {
 
 impl Machine {
     pub fn new(emitted: &Emitted, leg: &LegParameters, seed: u64) -> Self {
-        Self::with(Supervised::new(emitted.at_run_time()).unwrap(), &emitted.compiled, leg, seed)
+        Self::with(Supervised::new(emitted.at_run_time()), &emitted.compiled, leg, seed)
     }
 
     pub fn with(supervised: Supervised, compiled: &Compiled, leg: &LegParameters, seed: u64) -> Self {

@@ -274,7 +274,7 @@ fn a_stage_stays_until_it_is_acknowledged_or_armed_anew() {
     machine.structure = Some(LEG(1200.0, 0.01));
     assert_eq!(observe(&mut machine, 0.5).times.iter().flatten().count(), 1);
     assert_eq!(machine.conditions() >> 28 & 0xf, 0b0010, "stage 1, and nothing that goes on");
-    let words = machine.supervised.save().unwrap();
+    let words = machine.supervised.save();
     let mut other = machine.supervised.fork();
     other.load(&words).unwrap();
     for _ in 0..100 {

@@ -281,7 +281,7 @@ impl Usage<'_> {
 type Found = (u64, Vec<String>);
 
 fn platform(emitted: &Emitted, spec: &str, ticks: u64, number: u64) -> Found {
-    let supervised = Supervised::new(emitted.at_run_time()).unwrap();
+    let supervised = Supervised::new(emitted.at_run_time());
     let (mut made, mut alarms) = (0, Vec::new());
     for class in 0..3 {
         let mut machine = Machine::with(supervised.fork(), &emitted.compiled, &self::class(class), 5 + class);
@@ -308,7 +308,7 @@ fn platform(emitted: &Emitted, spec: &str, ticks: u64, number: u64) -> Found {
 /// Six legs with their own gauges, whose set-points rest, step and go to and fro.
 fn legs(emitted: &Emitted, spec: &str, ticks: u64, number: u64) -> Found {
     let model = &emitted.compiled.model;
-    let mut supervised = Supervised::new(emitted.at_run_time()).unwrap();
+    let mut supervised = Supervised::new(emitted.at_run_time());
     let (scalar, period) = (supervised.controller().description().scalar, model.timing.period);
     let (inputs, outputs) = (supervised.input_names(), supervised.output_names());
     let at = |names: &[String], name: &str| names.iter().position(|one| one == name).expect("a word");

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::controller::{MachineWord, Supervised};
-use host_sim::record::{self, Block, Header, ReplayError};
+use host_sim::record::{self, Block, Header};
 use serde::Serialize;
 
 use super::{Measured, refused};
@@ -61,15 +61,12 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let dir = arguments.spec.parent().unwrap_or(Path::new(""));
     let tables = declared::records(model, dir).map_err(refused)?;
 
-    let mut machine = Supervised::new(sim::at_run_time(&compiled, ui)?).map_err(sim::environment)?;
+    let mut machine = Supervised::new(sim::at_run_time(&compiled, ui)?);
     ui.progress("running the record again");
     let names = machine.output_names();
     let mut moves = Moves::new(&compiled, &names)?;
     let found = record::replay(&mut reader, &mut machine, |header, block, rows| moves.add(header, block, rows));
-    let found = match found {
-        Err(ReplayError::Controller(error)) => return Err(sim::environment(error)),
-        other => other.map_err(|error| refuse(&error))?,
-    };
+    let found = found.map_err(|error| refuse(&error))?;
     if let Some(message) = replay::verdict(&found) {
         return Err(refuse(&message));
     }

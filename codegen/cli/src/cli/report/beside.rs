@@ -123,7 +123,7 @@ pub(super) fn simulate(
     let period = compiled.model.timing.period;
     let settle = (SETTLE / period) as u64;
     controller.reset();
-    let power_up = controller.save().map_err(|error| error.to_string())?;
+    let power_up = controller.save();
     let prepared = Simulated::of(&compiled.model);
     let (mut machine, mut offset) = (prepared.clone(), [0.0; 6]);
     let mut output = vec![0; controller.output_names().len()];

@@ -28,7 +28,7 @@ pub fn read(path: &Path, compiled: &Compiled, ui: &Ui) -> Result<Run, Failure> {
             recorded.digest, compiled.source.display_name, compiled.ir.digest
         )));
     }
-    let mut machine = Supervised::new(at_run_time(compiled, ui)?).map_err(environment)?;
+    let mut machine = Supervised::new(at_run_time(compiled, ui)?);
     ui.progress("running the record again");
     let mut blocks: Vec<Block> = Vec::new();
     let header = reader.header().clone();

@@ -73,7 +73,7 @@ pub(super) fn run(
         )));
     }
     let text = controller.text().to_owned();
-    let machine = Supervised::new(controller).map_err(environment)?;
+    let machine = Supervised::new(controller);
     let layout = Layout {
         config: machine.controller().description().config_names.len(),
         input: machine.input_names().len(),

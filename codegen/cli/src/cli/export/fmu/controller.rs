@@ -23,7 +23,7 @@ pub(super) fn built(compiled: &Compiled, ui: &Ui) -> Result<Built, Failure> {
     ui.progress("building the emitted controller for this host");
     let target = scratch.path().join("target");
     let library = build_loadable(&rust, &target)?;
-    let machine = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;
+    let machine = Supervised::new(Controller::load(&library).map_err(environment)?);
     fits(&machine)?;
     let unit = unit(compiled, &machine);
     let own = [("controller.h", header(&machine)), ("model.h", MODEL.to_owned()), ("fmu.h", unit.header(""))];
