@@ -1,11 +1,20 @@
-//! What a controller says of itself: `key=value` lines, lists separated by commas. Between the two parts that are made here stand the
-//! names of its words.
+//! What a controller says of itself: `key=value` lines, lists separated by commas.
 
-use crate::ir::{Frames, Ir};
+use specgen_law::{legs, platform};
 
-/// The lines before the names of words, and those after them.
+use crate::ir::{Frames, Ir, TaskSpace};
+
+/// Input words of a controller without a correction, and with one.
+const INPUT_NAMES: [&[&str]; 2] = [&platform::tick::input_names::<33>(), &platform::tick::input_names::<39>()];
+/// Output words of a controller without output lines, and with some.
+const OUTPUT_NAMES: [&[&str]; 2] = [
+    &platform::tick::output_names::<{ platform::tick::output_words_with(0) }>(),
+    &platform::tick::output_names::<{ platform::tick::output_words_with(1) }>(),
+];
+
+/// All lines.
 #[must_use]
-pub fn description(ir: &Ir) -> [String; 2] {
+pub fn description(ir: &Ir) -> String {
     let (name, digest, version) = (&ir.name, &ir.digest, &ir.specgen_version);
     let about = format!(
         "name={name}\ndigest={digest}\nversion={version}\nkind={}\nscalar_bits={}\nleg_gain={:?}\nperiod={:?}\ngrid={}\ndrive_range={:?},{:?}\n",
@@ -17,7 +26,17 @@ pub fn description(ir: &Ir) -> [String; 2] {
         ir.actuation.voltage[0],
         ir.actuation.voltage[1],
     );
-    [about, motion(ir)]
+    let [inputs, outputs] = match &ir.task_space {
+        None => [&legs::tick::INPUT_NAMES[..], &legs::tick::OUTPUT_NAMES],
+        Some(TaskSpace { law, defaults, .. }) => [
+            INPUT_NAMES[usize::from(law.correction.is_some())],
+            OUTPUT_NAMES[usize::from(!defaults.triggers.is_empty())],
+        ],
+    }
+    .map(|names| names.join(","));
+    let settings = ir.permitted.names().join(",");
+    let motion = motion(ir);
+    format!("{about}config_names={settings}\ninput_names={inputs}\noutput_names={outputs}\n{motion}")
 }
 
 /// Where a platform may go, how fast, and in which coordinates: what a host has to know beforehand to say whether a pose can be

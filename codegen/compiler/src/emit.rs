@@ -7,7 +7,6 @@
 
 mod body;
 mod checked;
-mod constants;
 mod crate_root;
 mod defaults;
 mod format;
@@ -38,7 +37,6 @@ pub type EmittedCrate = BTreeMap<String, String>;
 pub fn emit(ir: &Ir) -> EmittedCrate {
     let mut sources = vec![
         ("src/checked.rs", checked::emit(ir)),
-        ("src/constants.rs", constants::emit(ir)),
         ("src/defaults.rs", defaults::emit(ir)),
         ("src/geometry.rs", geometry::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),

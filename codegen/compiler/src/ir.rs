@@ -13,6 +13,7 @@ pub use permitted::*;
 use specgen_language::model::FaultAction;
 use specgen_runtime::dynamics::Leg;
 use specgen_runtime::supervisor::TIMERS;
+pub use specgen_runtime::{Interaction, Law, SetpointKind};
 use specgen_runtime::{Platform, Real};
 pub use steadiness::Steadiness;
 pub use task_space::*;
@@ -218,35 +219,19 @@ impl Dynamics {
 
     /// Every number rounded to the scalar, but for the pivot ratio, which is a finding and no constant.
     #[must_use]
-    pub fn rounded(&self, scalar: Scalar) -> Self {
-        let number = |value: f64| scalar.round(value);
-        let vector = |value: [f64; 3]| value.map(number);
-        Self {
-            legs: self.legs.clone().map(|leg| DynamicsLeg {
-                base: vector(leg.base),
-                joint: vector(leg.joint),
-                arm: vector(leg.arm),
-                rest: vector(leg.rest),
-                length: number(leg.length),
-                inverse_length: number(leg.inverse_length),
-                half_inverse_square: number(leg.half_inverse_square),
-            }),
-            places: self.places,
-            rows: self.rows,
-            flat_base: self.flat_base,
-            flat_platform: self.flat_platform,
-            base_depth: number(self.base_depth),
-            pole: vector(self.pole),
-            mass: number(self.mass),
-            first_moment: vector(self.first_moment),
-            pole_moment: vector(self.pole_moment),
-            second_moment: self.second_moment.map(vector),
-            extensible_moment: number(self.extensible_moment),
-            leg_inertia: number(self.leg_inertia),
-            leg_weight_moment: number(self.leg_weight_moment),
-            gravity: number(self.gravity),
-            pivot_ratio: self.pivot_ratio,
+    pub fn rounded(mut self, scalar: Scalar) -> Self {
+        let round = |value: &mut f64| *value = scalar.round(*value);
+        for leg in &mut self.legs {
+            let vectors = [&mut leg.base, &mut leg.joint, &mut leg.arm, &mut leg.rest];
+            vectors.into_iter().flatten().for_each(round);
+            [&mut leg.length, &mut leg.inverse_length, &mut leg.half_inverse_square].into_iter().for_each(round);
         }
+        let vectors = [&mut self.pole, &mut self.first_moment, &mut self.pole_moment];
+        vectors.into_iter().chain(&mut self.second_moment).flatten().for_each(round);
+        let of_platform = [&mut self.base_depth, &mut self.mass, &mut self.gravity];
+        let of_legs = [&mut self.extensible_moment, &mut self.leg_inertia, &mut self.leg_weight_moment];
+        of_platform.into_iter().chain(of_legs).for_each(round);
+        self
     }
 }
 
@@ -462,9 +447,11 @@ pub struct Rest {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Defaults {
     /// Adaptation law.
+    #[serde(serialize_with = "in_lower_case")]
     pub law: Law,
     /// Meaning of the set-point.
-    pub setpoint: Setpoint,
+    #[serde(serialize_with = "in_lower_case")]
+    pub setpoint: SetpointKind,
     /// ω or ω1 per run.
     pub level_weight: f64,
     /// ω2 per run.
@@ -479,28 +466,6 @@ pub struct Defaults {
     pub leg_gain: f64,
 }
 
-/// Adaptation law.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Law {
-    /// Inverse Preisach alone.
-    Invhys,
-    /// (AII.3).
-    Ewma,
-    /// (AII.5), (AII.6).
-    Pcc,
-}
-
-/// Meaning of the six set-point numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Setpoint {
-    /// Pose from rest.
-    Pose,
-    /// Leg displacements.
-    Leg,
-}
-
 /// What the controller checks itself by.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Integrity {
@@ -511,6 +476,11 @@ pub struct Integrity {
     pub settings: Vec<u64>,
     /// CRC-32 of identity, tables, trajectories and settings.
     pub crc: u32,
+}
+
+/// The name of a variant.
+fn in_lower_case<S: Serializer>(choice: &impl core::fmt::Debug, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&format!("{choice:?}").to_lowercase())
 }
 
 /// Words in hexadecimal: as numbers, readers that know `f64` alone would round them.

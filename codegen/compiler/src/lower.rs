@@ -26,7 +26,7 @@ pub use sensing::{PoseNoise, pose_noise, poses_per_reading, reading_noise};
 pub use supervision::{describe_wiring, single_faults};
 
 use crate::ir::{
-    Bounds, Defaults, Hysteresis, Ir, Law, Load, PlatformDefaults, Scalar, Sensing, Setpoint, Setpoints, TaskSpace,
+    Bounds, Defaults, Hysteresis, Ir, Law, Load, PlatformDefaults, Scalar, Sensing, SetpointKind, Setpoints, TaskSpace,
 };
 use crate::stability::platform::{Design, RestDynamics};
 use specgen_identify::everett::EverettTable;
@@ -75,8 +75,8 @@ pub fn lower(
             model::AdaptationMode::Pcc => Law::Pcc,
         },
         setpoint: match model.controller.setpoint {
-            model::SetpointKind::Pose => Setpoint::Pose,
-            model::SetpointKind::Leg => Setpoint::Leg,
+            model::SetpointKind::Pose => SetpointKind::Pose,
+            model::SetpointKind::Leg => SetpointKind::Leg,
         },
         level_weight: round(model.adaptation.level_weight),
         drift_weight: round(model.adaptation.drift_weight),

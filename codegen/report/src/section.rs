@@ -171,21 +171,6 @@ impl Section {
         self
     }
 
-    /// Every part, those of panes first, and columns followed into.
-    pub fn all_parts(&self) -> Vec<&Part> {
-        fn into<'a>(parts: &'a [Part], all: &mut Vec<&'a Part>) {
-            for part in parts {
-                all.push(part);
-                if let Part::Columns(columns) = part {
-                    columns.iter().for_each(|column| into(column, all));
-                }
-            }
-        }
-        let mut all = Vec::new();
-        self.panes.iter().for_each(|pane| into(&pane.parts, &mut all));
-        into(&self.parts, &mut all);
-        all
-    }
     /// Adds a table of the paper beside ours, with the remarks that it needs.
     #[must_use]
     pub fn comparison(mut self, table: &Comparison) -> Self {

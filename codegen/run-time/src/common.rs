@@ -57,7 +57,55 @@ macro_rules! accessors {
         )+
     };
 }
-pub(crate) use accessors;
+
+/// The constants of a law beside those that both ask for: of each its name, its type, and what it is made of. The law is given a value
+/// (`copy`), a reference (`lend`), a reference if there is one (`maybe`), or nothing (`own`).
+macro_rules! law_constants {
+    (@accessor own $field:ident: $kind:ty) => {};
+    (@accessor copy $field:ident: $kind:ty) => {
+        #[inline(always)]
+        fn $field(&self) -> $kind {
+            self.0.$field
+        }
+    };
+    (@accessor lend $field:ident: $kind:ty) => {
+        #[inline(always)]
+        fn $field(&self) -> &$kind {
+            &self.0.$field
+        }
+    };
+    (@accessor maybe $field:ident: $kind:ty as $lent:ty) => {
+        #[inline(always)]
+        fn $field(&self) -> $lent {
+            self.0.$field.as_ref()
+        }
+    };
+    (
+        $(#[$about:meta])*
+        $name:ident: $trait:ident { $(type $type:ident = $is:ty;)+ }
+        of ($convert:ident $(, $part:ident: $of:ty)*);
+        $($how:ident $field:ident: $kind:ty $(as $lent:ty)? = $value:expr;)+
+    ) => {
+        $(#[$about])*
+        #[derive(Debug)]
+        pub struct $name<T: Real> {
+            common: Common<T>,
+            $($field: $kind,)+
+        }
+
+        impl<T: Number> $trait for AtRunTime<$name<T>> {
+            $(type $type = $is;)+
+            $(law_constants!(@accessor $how $field: $kind $(as $lent)?);)+
+        }
+
+        impl<T: Number> $name<T> {
+            fn new(common: Common<T>, $convert: &Convert<T> $(, $part: $of)*) -> Result<Self, InvalidIr> {
+                Ok(Self { common, $($field: $value),+ })
+            }
+        }
+    };
+}
+pub(crate) use law_constants;
 
 impl<C: Constants> Spec for AtRunTime<C> {
     type Real = C::Real;
@@ -110,7 +158,7 @@ pub struct Common<T: Real> {
 }
 
 impl<T: Real + Debug> Common<T> {
-    pub fn new(ir: &Ir, convert: &Convert<T>, names: [&[&str]; 2]) -> Result<Self, InvalidIr> {
+    pub fn new(ir: &Ir, convert: &Convert<T>) -> Result<Self, InvalidIr> {
         let (k, a) = (&ir.kinematics, &ir.actuation);
         let (tables, fresh) = models(convert, &ir.hysteresis)?;
         let (memory, displacement, code) = match &ir.supervision.risen {
@@ -145,15 +193,7 @@ impl<T: Real + Debug> Common<T> {
             displacement,
             code,
             settings: ir.integrity.settings.clone(),
-            text: text(ir, names),
+            text: description(ir),
         })
     }
-}
-
-/// What the controller says of itself; `names` are those of inputs and outputs.
-fn text(ir: &Ir, names: [&[&str]; 2]) -> String {
-    let [before, after] = description(ir);
-    let [inputs, outputs] = names.map(|names| names.join(","));
-    let settings = ir.permitted.names().join(",");
-    format!("{before}config_names={settings}\ninput_names={inputs}\noutput_names={outputs}\n{after}")
 }

@@ -1,45 +1,32 @@
 //! Six legs with their own gauges whose constants are read at run time.
 
 use specgen_compiler::constants::Numbers as _;
-use specgen_compiler::ir::Ir;
-use specgen_law::legs::{self, Lead, LegSpace, SixLegs, State};
+use specgen_compiler::ir::{self, Ir};
+use specgen_law::legs::{Lead, LegSpace, SixLegs, State};
 use specgen_runtime::Real;
 
 use crate::InvalidIr;
-use crate::common::{AtRunTime, Common, Constants, Number, accessors};
+use crate::common::{AtRunTime, Common, Constants, Number, law_constants};
 use crate::convert::Convert;
 use crate::parts::Optional;
 
 /// A way this short, m and rad, is none; as the emitted `APPROACH_NEGLIGIBLE`.
 const APPROACH_NEGLIGIBLE: f64 = 1e-13;
 
-/// The constants.
-#[derive(Debug)]
-pub struct LegConstants<T: Real> {
-    common: Common<T>,
-    /// Whether legs are asked to be ahead, for their dead time.
-    led: bool,
-    lead: T,
-    lead_limit: T,
-    leg_setpoint: [T; 2],
-    leg_gain: T,
-    period_seconds: f64,
-    approach_keep: T,
-    approach_negligible: T,
-}
-
-impl<T: Number> SixLegs for AtRunTime<LegConstants<T>> {
-    type Lead = Optional<Lead<T, 1>>;
-
-    accessors! { constants =>
-        lead -> T = constants.lead;
-        lead_limit -> T = constants.lead_limit;
-        leg_setpoint -> &[T; 2] = &constants.leg_setpoint;
-        leg_gain -> T = constants.leg_gain;
-        period_seconds -> f64 = constants.period_seconds;
-        approach_keep -> T = constants.approach_keep;
-        approach_negligible -> T = constants.approach_negligible;
+law_constants! {
+    /// The constants.
+    LegConstants: SixLegs {
+        type Lead = Optional<Lead<T, 1>>;
     }
+    of (convert, ir: &Ir, asked: Option<&ir::Lead>);
+    own led: bool = asked.is_some();
+    copy lead: T = convert.real(asked.map_or(0.0, |lead| lead.ticks));
+    copy lead_limit: T = convert.real(asked.map_or(0.0, |lead| lead.limit));
+    lend leg_setpoint: [T; 2] = convert.vector(&ir.bounds.leg);
+    copy leg_gain: T = convert.real(ir.defaults.leg_gain);
+    copy period_seconds: f64 = ir.defaults.period;
+    copy approach_keep: T = convert.real(ir.supervision.approach_keep);
+    copy approach_negligible: T = convert.real(APPROACH_NEGLIGIBLE);
 }
 
 impl<T: Number> Constants for LegConstants<T> {
@@ -60,18 +47,8 @@ impl<T: Number> Constants for LegConstants<T> {
 /// The constants of a compiled spec.
 pub fn constants<T: Number>(ir: &Ir) -> Result<LegConstants<T>, InvalidIr> {
     let convert = &Convert::new();
-    let (ticks, limit) = ir.hysteresis.lead.as_ref().map_or((0.0, 0.0), |lead| (lead.ticks, lead.limit));
-    let constants = LegConstants {
-        common: Common::new(ir, convert, [&legs::tick::INPUT_NAMES, &legs::tick::OUTPUT_NAMES])?,
-        led: ir.hysteresis.lead.is_some(),
-        lead: convert.real(ticks),
-        lead_limit: convert.real(limit),
-        leg_setpoint: convert.vector(&ir.bounds.leg),
-        leg_gain: convert.real(ir.defaults.leg_gain),
-        period_seconds: ir.defaults.period,
-        approach_keep: convert.real(ir.supervision.approach_keep),
-        approach_negligible: convert.real(APPROACH_NEGLIGIBLE),
-    };
+    let common = Common::new(ir, convert)?;
+    let made = LegConstants::new(common, convert, ir, ir.hysteresis.lead.as_ref())?;
     convert.finish()?;
-    Ok(constants)
+    Ok(made)
 }

@@ -2,90 +2,51 @@
 
 use specgen_compiler::constants::{self, Numbers as _, kept};
 use specgen_compiler::ir::{self, Frames, Ir, LEGS, Path, TaskSpace as Task};
-use specgen_law::platform::{self, Platform, State, TaskSpace};
+use specgen_law::platform::{Platform, State, TaskSpace};
 use specgen_runtime::setpoint::{Setpoints, Table as Rows, Tool, Trajectory, Work};
 use specgen_runtime::{Affine, Correction, CorrectionLimit, Damping, Gauges, Notch, RateFilter, Real, Resonator};
 
 use crate::InvalidIr;
-use crate::common::{AtRunTime, Common, Constants, Number, accessors};
+use crate::common::{AtRunTime, Common, Constants, Number, law_constants};
 use crate::convert::Convert;
 use crate::parts::{LineSettings, Lines, Optional, Polynomials, UserFrames};
 
-/// Input words of a controller without a correction, and with one.
-const INPUT_NAMES: [&[&str]; 2] = [&platform::tick::input_names::<33>(), &platform::tick::input_names::<39>()];
-/// Output words of a controller without output lines, and with some.
-const OUTPUT_NAMES: [&[&str]; 2] = [
-    &platform::tick::output_names::<{ platform::tick::output_words_with(0) }>(),
-    &platform::tick::output_names::<{ platform::tick::output_words_with(1) }>(),
-];
-
-/// The constants.
-#[derive(Debug)]
-pub struct PlatformConstants<T: Real> {
-    common: Common<T>,
-    period: T,
-    compliance: T,
-    wrench_to_legs: [[T; 6]; LEGS],
-    legs_to_wrench: [[T; LEGS]; 6],
-    force_to_modes: [[T; 6]; 6],
-    legs_to_modes: [[T; LEGS]; 6],
-    modes_to_legs: [[T; 6]; LEGS],
-    body: specgen_runtime::Platform<T>,
-    affine_load: Option<Affine<T>>,
-    rest_force: [T; LEGS],
-    wrench_limit: [T; 6],
-    lead: T,
-    own_leads: Vec<T>,
-    transfer_keep: T,
-    transfer_negligible: T,
-    cells_per_metre: T,
-    metres_per_cell: T,
-    notch: Option<Notch<T>>,
-    damping: Option<[Resonator<T>; 6]>,
-    hands_over: bool,
-    correction: Option<[CorrectionLimit<T>; 6]>,
-    lines: LineSettings<T>,
-    setpoints: Setpoints<T, UserFrames<T>>,
-    gauges: Gauges<'static, T>,
-    calibration: Option<Polynomials<T>>,
-    rate_filter: RateFilter<T>,
-}
-
-impl<T: Number> Platform for AtRunTime<PlatformConstants<T>> {
-    type Damping = Optional<Damping<T, 6>>;
-    type Correction = Optional<Correction<T, 6>>;
-    type Lines = Lines<T>;
-    type Frames = UserFrames<T>;
-    type Calibration = Polynomials<T>;
-
-    accessors! { constants =>
-        period -> T = constants.period;
-        compliance -> T = constants.compliance;
-        wrench_to_legs -> &[[T; 6]; 6] = &constants.wrench_to_legs;
-        legs_to_wrench -> &[[T; 6]; 6] = &constants.legs_to_wrench;
-        force_to_modes -> &[[T; 6]; 6] = &constants.force_to_modes;
-        legs_to_modes -> &[[T; 6]; 6] = &constants.legs_to_modes;
-        modes_to_legs -> &[[T; 6]; 6] = &constants.modes_to_legs;
-        body -> &specgen_runtime::Platform<T> = &constants.body;
-        affine_load -> Option<&Affine<T>> = constants.affine_load.as_ref();
-        rest_force -> &[T; LEGS] = &constants.rest_force;
-        wrench_limit -> &[T; 6] = &constants.wrench_limit;
-        lead -> T = constants.lead;
-        own_leads -> &[T] = &constants.own_leads;
-        transfer_keep -> T = constants.transfer_keep;
-        transfer_negligible -> T = constants.transfer_negligible;
-        cells_per_metre -> T = constants.cells_per_metre;
-        metres_per_cell -> T = constants.metres_per_cell;
-        notch -> Option<&Notch<T>> = constants.notch.as_ref();
-        damping -> &Option<[Resonator<T>; 6]> = &constants.damping;
-        hands_over -> bool = constants.hands_over;
-        correction -> &Option<[CorrectionLimit<T>; 6]> = &constants.correction;
-        lines -> &LineSettings<T> = &constants.lines;
-        setpoints -> &Setpoints<T, UserFrames<T>> = &constants.setpoints;
-        gauges -> &Gauges<'_, T> = &constants.gauges;
-        calibration -> Option<&Polynomials<T>> = constants.calibration.as_ref();
-        rate_filter -> &RateFilter<T> = &constants.rate_filter;
+law_constants! {
+    /// The constants.
+    PlatformConstants: Platform {
+        type Damping = Optional<Damping<T, 6>>;
+        type Correction = Optional<Correction<T, 6>>;
+        type Lines = Lines<T>;
+        type Frames = UserFrames<T>;
+        type Calibration = Polynomials<T>;
     }
+    of (convert, ir: &Ir, task: &Task, law: &ir::ControlLaw, sensing: &ir::Sensing);
+    copy period: T = convert.real(law.period);
+    copy compliance: T = convert.real(law.compliance);
+    lend wrench_to_legs: [[T; 6]; LEGS] = convert.matrix(&law.wrench_to_legs);
+    lend legs_to_wrench: [[T; LEGS]; 6] = convert.matrix(&law.legs_to_wrench);
+    lend force_to_modes: [[T; 6]; 6] = convert.matrix(&law.force_to_modes);
+    lend legs_to_modes: [[T; LEGS]; 6] = convert.matrix(&law.legs_to_modes);
+    lend modes_to_legs: [[T; 6]; LEGS] = convert.matrix(&law.modes_to_legs);
+    lend body: specgen_runtime::Platform<T> = body(convert, ir)?;
+    maybe affine_load: Option<Affine<T>> as Option<&Affine<T>> = constants::affine(convert, &task.load);
+    lend rest_force: [T; LEGS] = convert.vector(&law.rest_force);
+    lend wrench_limit: [T; 6] = convert.vector(&law.wrench_limit);
+    copy lead: T = convert.real(law.lead);
+    copy own_leads: &'static [T] = convert.slice(&law.own_leads);
+    copy transfer_keep: T = convert.real(law.transfer_keep);
+    copy transfer_negligible: T = convert.real(law.transfer_negligible);
+    copy cells_per_metre: T = convert.real(law.cells_per_metre);
+    copy metres_per_cell: T = convert.real(law.metres_per_cell);
+    maybe notch: Option<Notch<T>> as Option<&Notch<T>> = constants::notch(convert, law);
+    lend damping: Option<[Resonator<T>; 6]> = law.damping.map(|sections| constants::damping(convert, &sections));
+    copy hands_over: bool = law.hands_over;
+    lend correction: Option<[CorrectionLimit<T>; 6]> = law.correction.map(|limits| constants::correction(convert, &limits));
+    lend lines: LineSettings<T> = lines(convert, &task.defaults)?;
+    lend setpoints: Setpoints<T, UserFrames<T>> = setpoints(convert, ir, &task.setpoints)?;
+    lend gauges: Gauges<'static, T> = constants::gauges(convert, sensing);
+    maybe calibration: Option<Polynomials<T>> as Option<&Polynomials<T>> = calibration(convert, sensing);
+    lend rate_filter: RateFilter<T> = constants::rate_filter(convert, sensing);
 }
 
 impl<T: Number> Constants for PlatformConstants<T> {
@@ -106,47 +67,27 @@ impl<T: Number> Constants for PlatformConstants<T> {
 /// The constants of a compiled spec.
 pub fn constants<T: Number>(ir: &Ir, task: &Task) -> Result<PlatformConstants<T>, InvalidIr> {
     let convert = &Convert::new();
-    let (law, sensing) = (&task.law, &task.sensing);
-    let lines = constants::lines(convert, &task.defaults);
-    let names = [INPUT_NAMES[usize::from(law.correction.is_some())], OUTPUT_NAMES[usize::from(!lines.is_empty())]];
+    let common = Common::new(ir, convert)?;
+    let made = PlatformConstants::new(common, convert, ir, task, &task.law, &task.sensing)?;
+    convert.finish()?;
+    Ok(made)
+}
+
+fn body<T: Real>(convert: &Convert<T>, ir: &Ir) -> Result<specgen_runtime::Platform<T>, InvalidIr> {
     let body = constants::body(convert, &ir.dynamics);
     if body.places.iter().chain(&body.rows).any(|place| *place >= LEGS) {
         return Err(InvalidIr::Part("the order of elimination"));
     }
-    let made = PlatformConstants {
-        common: Common::new(ir, convert, names)?,
-        period: convert.real(law.period),
-        compliance: convert.real(law.compliance),
-        wrench_to_legs: convert.matrix(&law.wrench_to_legs),
-        legs_to_wrench: convert.matrix(&law.legs_to_wrench),
-        force_to_modes: convert.matrix(&law.force_to_modes),
-        legs_to_modes: convert.matrix(&law.legs_to_modes),
-        modes_to_legs: convert.matrix(&law.modes_to_legs),
-        body,
-        affine_load: constants::affine(convert, &task.load),
-        rest_force: convert.vector(&law.rest_force),
-        wrench_limit: convert.vector(&law.wrench_limit),
-        lead: convert.real(law.lead),
-        own_leads: law.own_leads.iter().map(|lead| convert.real(*lead)).collect(),
-        transfer_keep: convert.real(law.transfer_keep),
-        transfer_negligible: convert.real(law.transfer_negligible),
-        cells_per_metre: convert.real(law.cells_per_metre),
-        metres_per_cell: convert.real(law.metres_per_cell),
-        notch: constants::notch(convert, law),
-        damping: law.damping.map(|sections| constants::damping(convert, &sections)),
-        hands_over: law.hands_over,
-        correction: law.correction.map(|limits| constants::correction(convert, &limits)),
-        lines: LineSettings::new(&lines).ok_or(InvalidIr::Part("the number of output lines"))?,
-        setpoints: setpoints(convert, ir, &task.setpoints)?,
-        gauges: constants::gauges(convert, sensing),
-        calibration: sensing
-            .calibration
-            .as_ref()
-            .map(|gauges| Polynomials(gauges.each_ref().map(|coefficients| convert.slice(coefficients)))),
-        rate_filter: constants::rate_filter(convert, sensing),
-    };
-    convert.finish()?;
-    Ok(made)
+    Ok(body)
+}
+
+fn lines<T: Real>(convert: &Convert<T>, defaults: &ir::PlatformDefaults) -> Result<LineSettings<T>, InvalidIr> {
+    LineSettings::new(&constants::lines(convert, defaults)).ok_or(InvalidIr::Part("the number of output lines"))
+}
+
+fn calibration<T: Real>(convert: &Convert<T>, sensing: &ir::Sensing) -> Option<Polynomials<T>> {
+    let gauges = sensing.calibration.as_ref()?;
+    Some(Polynomials(gauges.each_ref().map(|coefficients| convert.slice(coefficients))))
 }
 
 fn setpoints<T: Real>(

@@ -373,7 +373,7 @@ mod tests {
         {
             for (file, expected) in [
                 ("law/src/platform/step.rs", law),
-                ("controller/src/constants.rs", law),
+                ("controller/src/lib.rs", law),
                 ("runtime/src/memory.rs", law),
                 ("runtime/src/setpoint/trajectory.rs", law),
                 ("board/src/cycle.rs", board),

@@ -27,7 +27,6 @@
 
 pub mod body;
 mod checked;
-mod constants;
 mod defaults;
 mod gauges;
 mod geometry;

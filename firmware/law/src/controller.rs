@@ -1,7 +1,8 @@
 //! The names of an emitted controller, which targets use.
 
 /// Gives an emitted controller the names that targets use: types and sizes of this spec, and functions that call the law with its
-/// constants. It stands at the root of the crate, beside the modules with the constants; `platform` or `legs` says which law it is.
+/// constants. It stands at the root of the crate, beside the modules with the constants; `platform` or `legs` says which law it is,
+/// whose trait it implements with them.
 ///
 /// The functions with a tick in them are not generic, so that each is compiled once, in the controller.
 #[macro_export]
@@ -32,7 +33,45 @@ macro_rules! controller {
             pub use super::gauges::{CALIBRATION, CONVERTER, GAUGES, RATE, RAW_LIMITS};
         }
 
-        $crate::controller!(@both platform, super::task_space::CORRECTED != 0, [super::defaults::LINES, super::defaults::INPUT]);
+        impl $crate::platform::Platform for Constants {
+            type Damping = $crate::specgen_runtime::Damping<Real, { task_space::DAMPED }>;
+            type Correction = $crate::specgen_runtime::Correction<Real, { task_space::CORRECTED }>;
+            type Lines = $crate::specgen_runtime::trigger::Triggers<Real, { defaults::LINES }>;
+            type Frames = setpoint::UserFrames;
+            type Calibration = gauges::Meaning;
+
+            $crate::controller! { @accessors
+                period -> Real = task_space::PERIOD;
+                compliance -> Real = task_space::COMPLIANCE;
+                wrench_to_legs -> &[[Real; 6]; LEGS] = &task_space::WRENCH_TO_LEGS;
+                legs_to_wrench -> &[[Real; LEGS]; 6] = &task_space::LEGS_TO_WRENCH;
+                force_to_modes -> &[[Real; 6]; 6] = &task_space::FORCE_TO_MODES;
+                legs_to_modes -> &[[Real; LEGS]; 6] = &task_space::LEGS_TO_MODES;
+                modes_to_legs -> &[[Real; 6]; LEGS] = &task_space::MODES_TO_LEGS;
+                body -> &$crate::specgen_runtime::Platform<Real> = &body::PLATFORM;
+                affine_load -> Option<&$crate::specgen_runtime::Affine<Real>> =
+                    const { task_space::AFFINE_LOAD.as_ref() };
+                rest_force -> &[Real; LEGS] = &task_space::REST_FORCE;
+                wrench_limit -> &[Real; 6] = &task_space::WRENCH_LIMIT;
+                lead -> Real = task_space::LEAD;
+                own_leads -> &[Real] = &task_space::OWN_LEADS;
+                transfer_keep -> Real = task_space::TRANSFER_KEEP;
+                transfer_negligible -> Real = task_space::TRANSFER_NEGLIGIBLE;
+                cells_per_metre -> Real = task_space::CELLS_PER_METRE;
+                metres_per_cell -> Real = task_space::METRES_PER_CELL;
+                notch -> Option<&$crate::specgen_runtime::Notch<Real>> = const { task_space::NOTCH.as_ref() };
+                damping -> &[$crate::specgen_runtime::Resonator<Real>; task_space::DAMPED] = &task_space::DAMPING;
+                hands_over -> bool = task_space::HANDS_OVER;
+                correction -> &[$crate::specgen_runtime::CorrectionLimit<Real>; task_space::CORRECTED] = &task_space::CORRECTION;
+                lines -> &[$crate::specgen_runtime::trigger::Line<Real>; defaults::LINES] = &defaults::TRIGGERS;
+                setpoints -> &$crate::specgen_runtime::setpoint::Setpoints<Real, setpoint::UserFrames> = &setpoint::SETPOINTS;
+                gauges -> &$crate::specgen_runtime::Gauges<'_, Real> = &gauges::GAUGES;
+                calibration -> Option<&gauges::Meaning> = const { gauges::CALIBRATION.as_ref() };
+                rate_filter -> &$crate::specgen_runtime::RateFilter<Real> = &gauges::RATE;
+            }
+        }
+
+        $crate::controller!(@both platform TaskSpace, super::task_space::CORRECTED != 0, [super::defaults::LINES, super::defaults::INPUT]);
     };
     (legs) => {
         pub use $crate::legs::tick::{COMMAND_WORDS, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS};
@@ -44,11 +83,27 @@ macro_rules! controller {
             pub use super::gauges::{CONVERTER, LEG_SETPOINT, RAW_LIMITS};
         }
 
-        $crate::controller!(@both legs, false, [0, false]);
+        impl $crate::legs::SixLegs for Constants {
+            type Lead = $crate::legs::Lead<Real, { hysteresis::LED as usize }>;
+
+            $crate::controller! { @accessors
+                lead -> Real = hysteresis::LEAD;
+                lead_limit -> Real = hysteresis::LEAD_LIMIT;
+                leg_setpoint -> &[Real; 2] = &gauges::LEG_SETPOINT;
+                leg_gain -> Real = defaults::LEG_GAIN;
+                period_seconds -> f64 = PERIOD_SECONDS;
+                approach_keep -> Real = supervision::APPROACH_KEEP;
+                approach_negligible -> Real = supervision::APPROACH_NEGLIGIBLE;
+            }
+        }
+
+        $crate::controller!(@both legs LegSpace, false, [0, false]);
     };
-    (@both $law:ident, $corrects:expr, [$lines:expr, $input:expr]) => {
+    (@both $law:ident $kind:ident, $corrects:expr, [$lines:expr, $input:expr]) => {
         pub use defaults::LEG_GAIN;
-        pub use identity::{ASSUMED, Constants, LEGS, PERIOD_SECONDS, Real, SCALAR_BITS, SPEC_DIGEST, SPEC_NAME, SPECGEN_VERSION};
+        pub use identity::{
+            ASSUMED, Constants, DESCRIPTION, LEGS, PERIOD_SECONDS, Real, SCALAR_BITS, SPEC_DIGEST, SPEC_NAME, SPECGEN_VERSION,
+        };
         pub use $crate::ConfigError;
         pub use $crate::$law::tick::PLACE_WORDS;
 
@@ -68,20 +123,26 @@ macro_rules! controller {
         /// Names of the settings.
         pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = permitted::NAMES;
 
-        /// What this controller is, one `key=value` a line, lists separated by commas: for tools that load it at run time.
-        pub const DESCRIPTION: &str = $crate::description::text(&DESCRIBED);
-        const DESCRIBED: [u8; describe(&mut [])] = {
-            let mut text = [0; describe(&mut [])];
-            describe(&mut text);
-            text
-        };
-        const fn describe(text: &mut [u8]) -> usize {
-            let lists: [(&str, &[&str]); 3] = [
-                ("config_names=", &CONFIG_NAMES),
-                ("input_names=", &INPUT_NAMES),
-                ("output_names=", &OUTPUT_NAMES),
-            ];
-            $crate::description::describe(text, identity::ABOUT, &lists, identity::MOTION)
+        impl $crate::Spec for Constants {
+            type Real = Real;
+            type Law = $crate::$law::$kind;
+            type Table = hysteresis::Table;
+            type Memory = hysteresis::Memory;
+
+            $crate::controller! { @accessors
+                tables -> &[hysteresis::Table; LEGS] = &hysteresis::TABLES;
+                dac -> &$crate::specgen_runtime::Dac<Real> = &limits::DAC;
+                supervision -> &$crate::specgen_runtime::supervisor::Supervision<Real> = &supervision::SUPERVISION;
+                raw_limits -> &[[Real; 2]; 6] = &gauges::RAW_LIMITS;
+                readings_per_leg -> &[[Real; LEGS]; 6] = &supervision::READINGS_PER_LEG;
+                geometry -> &$crate::specgen_runtime::Legs<'_, Real> = &geometry::GEOMETRY;
+                inverse_jacobian -> &[[Real; LEGS]; 6] = &geometry::INVERSE_JACOBIAN;
+                corrections -> usize = geometry::CORRECTIONS;
+                pose_bound -> &[Real; 6] = &geometry::POSE_BOUND;
+                permitted -> &[($crate::specgen_runtime::Permitted<Real>, usize)] = &permitted::SETTINGS;
+                sizes -> $crate::specgen_runtime::snapshot::Sizes = permitted::STATE;
+                reset -> $crate::Reset<Self> = supervision::at_rest();
+            }
         }
 
         impl $crate::Compiled for Constants {
@@ -353,5 +414,13 @@ macro_rules! controller {
                 $crate::$law::stages::prepare(Constants, config, state, input);
             }
         }
+    };
+    (@accessors $($name:ident -> $type:ty = $value:expr;)+) => {
+        $(
+            #[inline(always)]
+            fn $name(&self) -> $type {
+                $value
+            }
+        )+
     };
 }

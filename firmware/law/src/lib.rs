@@ -14,7 +14,6 @@
 //! No panic path, no allocation; the rules of `specgen_runtime` hold here, too.
 
 mod controller;
-pub mod description;
 pub mod integrity;
 pub mod kinematics;
 pub mod legs;

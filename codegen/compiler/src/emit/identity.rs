@@ -12,7 +12,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let bits = literal::count(ir.scalar.bits() as usize);
     let period = literal::real(Scalar::F64, ir.defaults.period);
     let (name, digest, version) = (&ir.name, &ir.digest, &ir.specgen_version);
-    let [about, motion] = description(ir);
+    let description = description(ir);
     let assumed = &ir.assumed;
     quote! {
         #![doc = " What this controller is."]
@@ -37,8 +37,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         /// What nobody measured: paths of the spec whose values are assumed, and simulated records. A program that drives a real machine
         /// asks its user first where this is not empty. Nothing of it is in the law.
         pub const ASSUMED: &[&str] = &[#(#assumed),*];
-        /// Of the description what stands before the names of words, and what stands after them.
-        pub(crate) const ABOUT: &str = #about;
-        pub(crate) const MOTION: &str = #motion;
+        /// What this controller is, one `key=value` a line, lists separated by commas: for tools that load it at run time.
+        pub const DESCRIPTION: &str = #description;
     }
 }

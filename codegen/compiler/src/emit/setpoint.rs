@@ -19,27 +19,11 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
         .enumerate()
         .map(|(index, trajectory)| path(scalar, index, &trajectory.name, &trajectory.path))
         .unzip();
-    let mut imports: Vec<&str> = vec!["MoveLimits", "Setpoints"];
-    imports.push(match s.frames {
-        Frames::Parallel => "Parallel",
-        Frames::Tool { .. } => "Tool",
-        Frames::Work { .. } => "Work",
-    });
-    let has = |wanted: fn(&Path) -> bool| s.trajectories.iter().any(|trajectory| wanted(&trajectory.path));
-    if has(|path| matches!(path, Path::Segments { .. })) {
-        imports.extend(["Axis", "Segment"]);
-    }
-    if has(|path| matches!(path, Path::Table { .. })) {
-        imports.extend(["Row", "Table"]);
-    }
-    imports.extend(["StopLimits", "Trajectory"]);
-    imports.sort_unstable();
-    let imports = imports.into_iter().map(|name| format_ident!("{name}"));
     quote! {
         #![doc = " Set-points: limits of bias, moves and streams, user frames, trajectories."]
         #![allow(clippy::approx_constant)] // A frequency of 1 Hz is τ rad/s.
 
-        use specgen_runtime::setpoint::{#(#imports),*};
+        use specgen_runtime::setpoint::*;
 
         use crate::Real;
 

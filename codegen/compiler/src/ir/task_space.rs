@@ -3,7 +3,7 @@
 use serde::Serialize;
 use specgen_runtime::trigger;
 
-use super::{LEGS, Law, Scalar};
+use super::{Interaction, LEGS, Law, Scalar, in_lower_case};
 
 /// Control in task space.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -161,18 +161,6 @@ pub enum Mode {
     PF,
 }
 
-/// Where the interaction force comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Interaction {
-    /// Left to the feedback.
-    Neglected,
-    /// K_e (h_d − h_e).
-    Modelled,
-    /// Force/torque sensor.
-    Measured,
-}
-
 /// Diagonal gains of (7).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Gains {
@@ -190,8 +178,10 @@ pub struct PlatformDefaults {
     /// P, F or P/F.
     pub mode: Mode,
     /// Run-to-run law of F and P/F.
+    #[serde(serialize_with = "in_lower_case")]
     pub law: Law,
     /// Where the interaction force comes from.
+    #[serde(serialize_with = "in_lower_case")]
     pub interaction: Interaction,
     /// ω or ω1 per tick.
     pub level_weight: f64,

@@ -1,12 +1,12 @@
 //! Checksum of tables and settings, as the controller computes it again when it starts.
 
 use super::Origin;
-use specgen_runtime::Crc32;
+use specgen_runtime::{ControlMode, Crc32};
 use specgen_toolchain::{ASSUMED_MARK, ASSUMED_SEPARATOR, IDENTITY_MARK, sha256};
 
 use crate::ir::{
-    Actuation, Defaults, Gains, Hysteresis, Integrity, Interaction, Law, Mode, Path, PlatformDefaults, RateModel,
-    Scalar, Segment, Setpoint, TaskSpace,
+    Actuation, Defaults, Gains, Hysteresis, Integrity, Mode, Path, PlatformDefaults, RateModel, Scalar, Segment,
+    TaskSpace,
 };
 
 /// Digest of what the controller depends on: the text of the spec (line ends as `\n`) and the files that it names, by name and
@@ -95,14 +95,6 @@ fn of_segment(crc: &mut Crc32, word: impl Fn(&f64) -> u64, segment: &Segment) {
     }
 }
 
-fn of_law(law: Law) -> u64 {
-    match law {
-        Law::Invhys => 0,
-        Law::Ewma => 1,
-        Law::Pcc => 2,
-    }
-}
-
 /// A code as the emitted `Config::to_words` has it.
 fn of_code(code: i32) -> u64 {
     u64::from(code.cast_unsigned())
@@ -110,13 +102,9 @@ fn of_code(code: i32) -> u64 {
 
 /// `CONFIG_NAMES` of six legs.
 fn of_legs(word: impl Fn(&f64) -> u64, actuation: &Actuation, defaults: &Defaults) -> Vec<u64> {
-    let setpoint = match defaults.setpoint {
-        Setpoint::Pose => 0,
-        Setpoint::Leg => 1,
-    };
     vec![
-        of_law(defaults.law),
-        setpoint,
+        defaults.law.word(),
+        defaults.setpoint.word(),
         word(&defaults.level_weight),
         word(&defaults.drift_weight),
         u64::from(defaults.run_interval),
@@ -134,19 +122,14 @@ fn of_platform(
     d: &PlatformDefaults,
 ) -> Vec<u64> {
     let mode = match d.mode {
-        Mode::P => 0,
-        Mode::F => 1 + of_law(d.law),
-        Mode::PF => 4 + of_law(d.law),
-    };
-    let interaction = match d.interaction {
-        Interaction::Neglected => 0,
-        Interaction::Modelled => 1,
-        Interaction::Measured => 2,
+        Mode::P => ControlMode::P,
+        Mode::F => ControlMode::F(d.law),
+        Mode::PF => ControlMode::PF(d.law),
     };
     let gains = |gains: &Gains| [gains.proportional, gains.integral, gains.derivative].concat();
     let mut settings = vec![
-        mode,
-        interaction,
+        mode.word(),
+        d.interaction.word(),
         word(&d.level_weight),
         word(&d.drift_weight),
         of_code(defaults.max_step),

@@ -7,7 +7,7 @@ use host_sim::noise::Gaussian;
 use host_sim::trace::Trace;
 
 use super::SEED;
-use specgen_compiler::ir::{Ir, LEGS, Setpoint};
+use specgen_compiler::ir::{Ir, LEGS, SetpointKind};
 use specgen_language::model::Model;
 
 /// Set-points within the stroke; the gauges read what was requested, with their noise.
@@ -52,8 +52,8 @@ fn setpoint(model: &Model, ir: &Ir, time: f64) -> [f64; 6] {
         .fold(model.actuator.stroke, |least, full| if *full < least { *full } else { least });
     let swing = |axis: u32| libm::sin(TAU * (2.0 + 0.7 * f64::from(axis)) * time + f64::from(axis));
     match ir.defaults.setpoint {
-        Setpoint::Leg => [0, 1, 2, 3, 4, 5].map(|leg| reach * (0.5 + 0.3 * swing(leg))),
-        Setpoint::Pose => {
+        SetpointKind::Leg => [0, 1, 2, 3, 4, 5].map(|leg| reach * (0.5 + 0.3 * swing(leg))),
+        SetpointKind::Pose => {
             let bounds = ir.bounds.pose;
             let within = |axis: usize, value: f64| {
                 let limit = 0.95 * bounds[axis];

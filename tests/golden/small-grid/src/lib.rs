@@ -23,7 +23,6 @@
 #![deny(missing_docs)]
 
 mod checked;
-mod constants;
 mod defaults;
 mod gauges;
 mod geometry;

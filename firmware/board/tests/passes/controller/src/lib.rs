@@ -28,8 +28,6 @@
 #[path = "../../../../../controller/src/body.rs"]
 pub mod body;
 mod checked;
-#[path = "../../../../../controller/src/constants.rs"]
-mod constants;
 mod defaults;
 #[path = "../../../../../controller/src/gauges.rs"]
 mod gauges;
