@@ -4,9 +4,7 @@
 //! Set-points: limits of bias, moves and streams, user frames, trajectories.
 #![allow(clippy::approx_constant)]
 
-use specgen_runtime::setpoint::{
-    Axis, MoveLimits, Parallel, Segment, Setpoints, StopLimits, Trajectory,
-};
+use specgen_runtime::setpoint::*;
 use crate::Real;
 
 /// What the generator of set-points needs to know; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
