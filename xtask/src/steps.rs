@@ -71,13 +71,14 @@ const FORMATTED_ALONE: [&str; 12] = [
     BOARDS[1],
 ];
 /// Members of the workspace that people write.
-const HAND_WRITTEN: [&str; 23] = [
+const HAND_WRITTEN: [&str; 24] = [
     "specgen",
     "specgen-cycles",
     "specgen-numerics",
     "specgen-language",
     "specgen-identify",
     "specgen-toolchain",
+    "specgen-ir",
     "specgen-compiler",
     "specgen-run-time",
     "specgen-studies",

@@ -6,14 +6,11 @@
 
 pub mod assumed;
 pub mod compile;
-pub mod constants;
 pub mod demand;
-pub mod description;
 pub mod emit;
 mod figure;
 #[cfg(test)]
 mod golden;
-pub mod ir;
 pub mod lint;
 pub mod lower;
 pub mod precision;
@@ -23,3 +20,5 @@ pub mod rest;
 pub mod settings;
 pub mod stability;
 pub mod workspace;
+
+pub use specgen_ir::{self as ir, constants, description};

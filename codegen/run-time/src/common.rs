@@ -2,9 +2,9 @@
 
 use std::fmt::Debug;
 
-use specgen_compiler::constants::{self, Numbers as _};
-use specgen_compiler::description::description;
-use specgen_compiler::ir::{Ir, LEGS};
+use specgen_ir::constants::{self, Numbers as _};
+use specgen_ir::description::description;
+use specgen_ir::{Ir, LEGS};
 use specgen_law::{ControlLaw, Reset, Spec, StateOf};
 use specgen_runtime::snapshot::Sizes;
 use specgen_runtime::supervisor::Supervision;

@@ -22,8 +22,8 @@ mod tests;
 use std::fmt;
 
 use host_sim::controller::{Controller, ControllerError, Engine};
-use specgen_compiler::constants::{self, Numbers as _};
-use specgen_compiler::ir::{Ir, Scalar};
+use specgen_ir::constants::{self, Numbers as _};
+use specgen_ir::{Ir, Scalar};
 use specgen_runtime::Motion;
 
 use convert::Convert;

@@ -3,8 +3,8 @@
 use std::convert::Infallible;
 use std::fmt::Debug;
 
-use specgen_compiler::constants::Numbers as _;
-use specgen_compiler::ir::{Hysteresis, LEGS, RateModel};
+use specgen_ir::constants::Numbers as _;
+use specgen_ir::{Hysteresis, LEGS, RateModel};
 use specgen_law::LegMemory;
 use specgen_runtime::snapshot::{Field, Invalid, Reader, Words};
 use specgen_runtime::{

@@ -1,7 +1,7 @@
 //! A platform in task space whose constants are read at run time.
 
-use specgen_compiler::constants::{self, Numbers as _, kept};
-use specgen_compiler::ir::{self, Frames, Ir, LEGS, Path, TaskSpace as Task};
+use specgen_ir::constants::{self, Numbers as _, kept};
+use specgen_ir::{self as ir, Frames, Ir, LEGS, Path, TaskSpace as Task};
 use specgen_law::platform::{Platform, State, TaskSpace};
 use specgen_runtime::setpoint::{Setpoints, Table as Rows, Tool, Trajectory, Work};
 use specgen_runtime::{Affine, Correction, CorrectionLimit, Damping, Gauges, Notch, RateFilter, Real, Resonator};

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use host_sim::controller::Controller;
 use specgen_compiler::compile::compile;
-use specgen_compiler::ir::Ir;
+use specgen_ir::Ir;
 use specgen_runtime::Real;
 
 use trial::Trial;

@@ -5,7 +5,7 @@ use host_sim::description::Description;
 use host_sim::stimulus::platform::{self as platform_stimulus, PlatformInputs};
 use host_sim::stimulus::{self, Setpoints};
 use specgen_compiler::compile::Compiled;
-use specgen_compiler::ir::{Ir, Path, Range};
+use specgen_ir::{Ir, Path, Range};
 use specgen_runtime::Digest;
 
 /// Most ticks of a part.

@@ -12,7 +12,7 @@ use specgen_runtime::{
     Section, Series,
 };
 
-use crate::ir::{self, Ir, Range};
+use crate::{self as ir, Ir, Range};
 
 /// Makes numbers of a scalar.
 pub trait Numbers<T: Real> {
@@ -57,7 +57,8 @@ pub fn kept<X>(values: impl IntoIterator<Item = X>) -> &'static [X] {
 }
 
 /// Rounds.
-pub(crate) struct Rounding<T>(pub PhantomData<T>);
+#[derive(Debug)]
+pub struct Rounding<T>(pub PhantomData<T>);
 
 impl<T: Real> Numbers<T> for Rounding<T> {
     fn real(&self, value: f64) -> T {

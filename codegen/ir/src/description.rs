@@ -2,7 +2,7 @@
 
 use specgen_law::{legs, platform};
 
-use crate::ir::{Frames, Ir, TaskSpace};
+use crate::{Frames, Ir, TaskSpace};
 
 /// Input words of a controller without a correction, and with one.
 const INPUT_NAMES: [&[&str]; 2] = [&platform::tick::input_names::<33>(), &platform::tick::input_names::<39>()];

@@ -3,6 +3,8 @@
 //! Plain data. Lowering fills it, emitters print it and do no arithmetic of their own. `specgen dump-ir` shows it.
 //! Numbers are already rounded to the controller's scalar, so that the text is the constant.
 
+pub mod constants;
+pub mod description;
 mod permitted;
 mod steadiness;
 mod task_space;
