@@ -1,7 +1,7 @@
 //! Host, Cortex-M7 and Cortex-M4F compute the same bits: every output word and the state digest of every tick, from one
 //! recorded input with saturation, reversals on thresholds, ±0, subnormals, NaN and infinities.
 
-use crate::supervisor::bench::SECTION;
+use crate::supervisor::bench::{ALIGNED, SECTION};
 use host_sim::controller::TickController;
 use host_sim::trace::{Trace, first_difference};
 use specgen::ir::Ir;
@@ -15,8 +15,6 @@ fn ticks() -> usize {
 }
 /// With the supervisor of its tests, whose image this is, too.
 const SUPERVISED: (&str, &str) = ("[timing]\n", SECTION);
-/// A converter whose codes meet every threshold of the grid: 2.5 mV a code, 1250 codes a cell.
-pub const ALIGNED: (&str, &str) = ("[\"0 V\", \"150 V\"]", "[\"0 V\", \"163.8375 V\"]");
 const CODES_PER_CELL: i64 = 1250;
 const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
 

@@ -10,6 +10,9 @@ pub use super::oracle::{
     RAMPING, RUN, RUNNING, STALLED,
 };
 
+/// A converter whose codes meet every threshold of the grid: 2.5 mV a code, 1250 codes a cell.
+pub const ALIGNED: (&str, &str) = ("[\"0 V\", \"150 V\"]", "[\"0 V\", \"163.8375 V\"]");
+
 /// Short times, so that a sequence gets somewhere; `timing.period` of the two kinds.
 pub const SECTION: &str = "[supervisor]
 arm_time          = \"2 ms\"

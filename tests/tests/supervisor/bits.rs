@@ -2,7 +2,6 @@
 
 use super::bench::*;
 use super::sequences;
-use crate::bit_identity::ALIGNED;
 use specgen::model::Mcu;
 use specgen::target;
 use specgen_tests::Emitted;
