@@ -3,6 +3,21 @@
 //! ```text
 //! model → lint, stability, requirements, demand (findings) → lower → ir (every constant) → emit (text) → workspace (folder)
 //! ```
+//!
+//! | module | what |
+//! |---|---|
+//! | [`compile`] | the phases in their order: start reading here |
+//! | [`stability`] | legs: Jury tests and the sampled leg; platform: modes, notch, start values, closed loop, margins, refusals |
+//! | [`reach`], [`demand`] | travel, workspace, bias and paths against the strokes; what motion requires of the legs against what they can do |
+//! | [`lint`] | values that are legal one by one and implausible together, a rule a function |
+//! | [`precision`] | rounding errors of the scalar: the runtime's kernels on numbers that record every operation |
+//! | [`lower`], [`ir`] | every constant of the controller, computed and rounded; `specgen dump-ir` prints it |
+//! | [`constants`] | constants of the IR as structs of the runtime; the emitted text is their `{:?}` |
+//! | [`emit`] | IR to text, one emitter for each emitted file, no arithmetic |
+//! | [`workspace`] | the output folder, written completely or not at all |
+//! | [`requirements`], [`rest`] | converter steps and noise against the requirements of the spec |
+//!
+//! The test `golden` compares every constant, margin and finding of many specs with committed text.
 
 pub mod assumed;
 pub mod compile;

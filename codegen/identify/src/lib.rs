@@ -8,6 +8,15 @@
 //! offset, so that drift and creep between the curves cannot bend the table. Of a first-order reversal record only
 //! the falls are fitted, with most weight on samples near the thresholds of the grid: the result is the classical
 //! E(u_i, u_j) = f(u_i) − f_{u_i}(u_j) with less noise, for any spacing of the curves, and without negative weights.
+//!
+//! | module | what |
+//! |---|---|
+//! | `columns`, `container`, `record` | the reader of CSV, MATLAB, HDF5 and TDMS files; checked samples |
+//! | `normal`, `selection`, `residual` | normal equations, choice of the grid, causes of the residual |
+//! | [`rate`] | records at several rates: dead time, dynamic Preisach (6), creep, each tested on the rate it was not fitted on |
+//! | [`linear`], [`response`], [`gauge`], [`stiffness`], [`gains`] | other records to values of the spec |
+//! | [`declared`] | the records that a spec names, compared with the spec |
+//! | [`waveform`] | tables of poses from CSV, every bad row reported |
 
 mod branches;
 mod cause;

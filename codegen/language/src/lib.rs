@@ -4,6 +4,9 @@
 //! TOML → spec (tables, keys, units, places) → model (SI, checked)
 //!          └─ diagnostic: findings, each with its place
 //! ```
+//! [`model`] declares each section of a spec once, keys and fields together. Parsing, checks, JSON Schema and the reference of keys in
+//! [`spec`] follow from these declarations; `keys/declare.rs` has their form. The pages of the findings are in `findings/`.
+//!
 //! The one crate that reads TOML. [`files`], [`interrupt`] and [`lock`] are here because everything that reads or writes needs
 //! them, [`shell`] because messages of every crate print lines for one.
 

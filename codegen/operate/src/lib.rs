@@ -4,6 +4,9 @@
 //! line ─► Order ─► Session ─ link ─► device (a board at a serial port, a program at a socket)
 //!                     └─ status, every 20 ms: after 0.1 s of silence a device holds
 //! ```
+//! [`pil`] runs host library and device in lock-step. [`gcs`] serves the General Command Set: `input` (bytes to commands), `commands`,
+//! `stage` (servo, target, limits), `server` (clients, one of which is in control). [`served`] is the simulated machine behind converters,
+//! and [`doctor`] checks a PC for real time.
 
 pub mod doctor;
 pub mod frame;

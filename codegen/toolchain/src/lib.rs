@@ -8,6 +8,13 @@
 //! ```
 //! [`toolchain`] is the one place that looks for a cross compiler, [`places`] says where tools may be, [`provision`] brings them.
 //! Nothing here knows TOML, the IR or the control law; the words it moves are opaque.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`checks`], [`size`], [`budget`] | rules of the tick in the image; bytes by owner; figures against budget and part |
+//! | [`trace`], [`time`] | executed blocks, priced by `specgen-cycles`; the longest tick of a board against the period |
+//! | [`targets`] | the list of targets |
+//! | [`cache`] | builds by the digest of everything that determines their bytes, checked when used |
 
 use std::io::Write as _;
 use std::sync::atomic::{AtomicU32, Ordering};
