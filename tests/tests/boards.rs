@@ -252,7 +252,7 @@ fn the_stm32f446_image_fits_and_its_tick_cannot_fail_nor_compute_doubles() {
     check(&F446);
 }
 
-/// The sizes and limits in docs/bring-up.md are those of the images above.
+/// The sizes and limits in docs/boards.md are those of the images above.
 #[test]
 fn the_page_says_what_the_images_take() {
     let row = |Board { name, mcu, flash, ram, stack, .. }: &Board| {
@@ -261,12 +261,12 @@ fn the_page_says_what_the_images_take() {
         let columns = taken.iter().zip(most).map(|(taken, most)| format!("{taken} of {most} bytes"));
         format!("| {} | {} |", mcu.part().board, columns.collect::<Vec<_>>().join(" | "))
     };
-    figures::shown("bring-up.md", &[row(&H743), row(&F446)]);
+    figures::shown("boards.md", &[row(&H743), row(&F446)]);
     for (board, signs) in [(&H743, "48 µs on the H743"), (&F446, "95 µs on the F446")] {
         let source = repository().join("firmware").join(board.folder).join("src/clocks.rs");
         let nanoseconds = signs.split(' ').next().unwrap().to_owned() + "_000";
         assert!(fs::read_to_string(source).unwrap().contains(&format!("const OUTPUT: u32 = {nanoseconds};")));
-        for page in ["bring-up.md", "porting.md"] {
+        for page in ["boards.md", "porting.md"] {
             let text = fs::read_to_string(repository().join("docs").join(page)).unwrap();
             assert!(text.contains(signs), "docs/{page}: {signs}");
         }

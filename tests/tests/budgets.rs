@@ -93,7 +93,7 @@ fn the_page_says_what_a_tick_of_six_legs_costs() {
         "figures.md",
         &[
             format!(
-                "| inverse Preisach, one leg, N = 32, M7 f64 | tracking {} instructions mean, {} worst; with converter and memory update {} and {}; \
+                "| inverse Preisach, one leg, N = 32, M7 f64 | tracking {} instructions mean, {} worst; with converter and memory {} and {}; \
              hostile record {} and {} at worst | `… budgets -- --nocapture` |",
                 tracking(INVERSE_MEAN),
                 tracking(INVERSE_MOST),
@@ -108,7 +108,7 @@ fn the_page_says_what_a_tick_of_six_legs_costs() {
             ),
             format!(
                 "| the same, worst tick, M7 f64, rustc 1.95 | tracking {}; hostile record {}; all six reversal memories overflowing in one tick {} \
-             (65 nested loops on every leg) | same |",
+             (65 nested loops a leg) | same |",
                 tracking(LONGEST),
                 hostile(LONGEST),
                 figure("M7 f64, overflow", LONGEST)

@@ -1,4 +1,4 @@
-//! docs/dependencies.md: every package of others that a manifest names has a line that says what for, and none is left over.
+//! tests/dependencies.txt: every package of others that a manifest names has a line that says what for, and none is left over.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use specgen_tests::repository;
 
-const PAGE: &str = "docs/dependencies.md";
+const PAGE: &str = "tests/dependencies.txt";
 /// Folders with manifests in them, beside the repository's own.
 const FOLDERS: [&str; 6] = ["codegen", "examples", "firmware", "host-sim", "tests", "xtask"];
 const KINDS: [&str; 3] = ["dependencies", "dev-dependencies", "build-dependencies"];

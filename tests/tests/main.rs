@@ -6,6 +6,7 @@ mod board_support;
 mod boards;
 mod budgets;
 mod dependencies;
+mod documentation;
 mod dynamics;
 mod dynamics_load;
 mod emitted;

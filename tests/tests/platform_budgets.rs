@@ -106,7 +106,7 @@ fn the_page_says_what_a_tick_costs() {
         "figures.md",
         &[
             format!(
-                "| platform, whole tick, six gauges to six voltages, P/F with PCC (rustc 1.95) | load of the legs to first order: M7 f64 {m7} \
+                "| platform, whole tick, six gauges to six voltages, P/F with PCC (rustc 1.95) | first-order load: M7 f64 {m7} \
              instructions mean, M7 f32 {m7_single}, M4F f32 {m4f}; stack {stack}, {stack_single}, {stack_m4f} bytes | \
              `cargo test --release -p specgen-tests platform_budgets -- --nocapture` |"
             ),

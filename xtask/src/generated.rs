@@ -6,6 +6,7 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+mod help;
 mod make;
 mod trace;
 
@@ -30,16 +31,22 @@ const GENERATED: &[Generated] = &[
     Generated { folder: "firmware/controller", whole: true, make: make::reference_controller },
     Generated { folder: "firmware/board/tests/passes/controller/src", whole: true, make: make::controller_with_passes },
     Generated { folder: "tests/golden", whole: true, make: make::goldens },
-    // Last: it names lines of the emitted files above.
-    Generated { folder: "docs", whole: false, make: make::docs },
 ];
 
 /// In a folder of generated files, the sources of some of them.
 const BY_HAND: [&str; 1] = ["law"];
 
-/// Compares every folder with what would be generated.
+/// Pages of the book that are not committed, by their names in `docs`.
+///
+/// # Errors
+/// A spec does not compile, or an equation has no code or no test.
+pub fn pages(root: &Path) -> Result<Files, String> {
+    make::pages(root)
+}
+
+/// Compares every folder with what would be generated, and generates the pages of the book.
 pub fn check(root: &Path) -> Outcome {
-    let stale = match all(root, GENERATED, differences) {
+    let stale = match all(root, GENERATED, differences).and_then(|stale| pages(root).map(|_| stale)) {
         Ok(stale) => stale,
         Err(why) => return Outcome::Failed(why),
     };

@@ -2,6 +2,7 @@
 
 mod binaries;
 mod board;
+mod book;
 mod builds;
 mod changelog;
 mod fresh;
@@ -36,8 +37,9 @@ const USAGE: &str = "usage: cargo xtask COMMAND
           tests/results.txt; `fuzz keep` keeps what it found
   wheel   the Python package: builds it into target/wheel/dist, and tries it in a fresh environment
   bless   writes the generated files that are committed anew
+  book    the documentation as HTML, with the generated pages, into target/book
   changelog VERSION: puts the fragments in changelog/ into CHANGELOG.md, as a release
-  release VERSION [-o DIR]: sources, the command for Linux with glibc and static, the wheel, and their digests, into target/dist
+  release VERSION [-o DIR]: sources, the command for Linux with glibc and static, the wheel, the book, and their digests, into target/dist
   fresh   the two commands of the README in minimal Debian roots; `cargo xtask fresh --help`
 
 With SPECGEN_ALLOW_MISSING=1, what needs a tool that cannot be installed is skipped, and said so.";
@@ -54,6 +56,7 @@ fn main() -> ExitCode {
         }
         ["wheel"] => wheel::command(&root()),
         ["bless"] => steps::bless(&root()),
+        ["book"] => book::command(&root()),
         ["changelog", version] => match changelog::release(&root(), version) {
             Ok(()) => ExitCode::SUCCESS,
             Err(text) => {

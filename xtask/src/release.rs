@@ -1,4 +1,4 @@
-//! What is released: sources, the command for two kinds of Linux, the Python package, and the digests of all.
+//! What is released: sources, the command for two kinds of Linux, the Python package, the book, and the digests of all.
 //!
 //! Times are the commit's, folders of this computer are not in the binaries, archives are in the order of names. So two runs of one
 //! commit in one folder give the same bytes with the same compiler: seen of the command for glibc, with all of specgen's own packages
@@ -13,7 +13,7 @@ use std::process::{Command, ExitCode, Stdio};
 use specgen_toolchain::sha256;
 
 use crate::run::{Outcome, Report, cargo};
-use crate::{changelog, wheel};
+use crate::{book, changelog, wheel};
 
 /// Where it builds: other flags than those of the daily work.
 const MADE: &str = "target/released";
@@ -43,7 +43,7 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
 }
 
 fn release(root: &Path, version: &str, output: &Path) -> ExitCode {
-    let mut report = Report::new(8);
+    let mut report = Report::new(9);
     let mut commit = Commit::default();
     report.step("tree, versions, changelog", || {
         outcome(ready(root, version).and_then(|found| {
@@ -67,6 +67,13 @@ fn release(root: &Path, version: &str, output: &Path) -> ExitCode {
         });
     }
     report.step("Python package", || outcome(builds.wheel(output)));
+    report.step("book", || {
+        let folder = output.join(format!("{name}-book"));
+        match book::build(root, &folder) {
+            Outcome::Passed => outcome(pack_folder(&format!("{name}-book"), output, &commit.time)),
+            other => other,
+        }
+    });
     report.step("tried in an empty folder", || outcome(tried(root, &name, output)));
     report.step("cargo install of the sources", || outcome(builds.installed(&name, output)));
     report.step("digests", || outcome(digests(output, &name)));
@@ -195,12 +202,18 @@ fn pack(files: &[&Path], name: &str, output: &Path, time: &str) -> Result<(), St
     for file in files {
         fs::copy(file, folder.join(file.file_name().unwrap_or_default())).map_err(failed(file))?;
     }
+    pack_folder(name, output, time)
+}
+
+/// A folder in `output`, as `name.tar.gz` in its place.
+fn pack_folder(name: &str, output: &Path, time: &str) -> Result<(), String> {
+    let folder = output.join(name);
     let archive = output.join(format!("{name}.tar"));
     let mut tar = Command::new("tar");
     tar.current_dir(output).args(["--sort=name", "--owner=0", "--group=0", "--numeric-owner", "--mode=u=rwX,go=rX"]);
     tar.arg(format!("--mtime=@{time}")).args(["--format=ustar", "-cf"]).arg(archive.file_name().unwrap_or_default());
     let packed = done(tar.arg(name));
-    fs::remove_dir_all(&folder).map_err(failed(&folder))?;
+    fs::remove_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     packed?;
     zip(&archive)
 }

@@ -8,7 +8,7 @@ use std::fs;
 use std::process::Command;
 use std::time::Instant;
 
-use crate::support::commands::{Line, blocks, shell};
+use crate::support::commands::{Line, blocks, pages, shell};
 use crate::support::{Folder, repository};
 
 /// Every command with its path, such as `specgen identify linear`, and the examples below its help.
@@ -151,13 +151,12 @@ fn examples_run_as_they_stand() {
 
 /// Documents by name, with what they say.
 fn documents() -> Vec<(String, String)> {
-    let mut names: Vec<String> = vec!["README.md".to_owned(), "ARCHITECTURE.md".to_owned()];
-    for entry in fs::read_dir(repository().join("docs")).unwrap() {
-        names.push(format!("docs/{}", entry.unwrap().file_name().to_str().unwrap()));
-    }
-    names.retain(|name| name.ends_with(".md"));
-    names.sort();
-    names.into_iter().map(|name| (name.clone(), fs::read_to_string(repository().join(name)).unwrap())).collect()
+    let names = ["README.md", "ARCHITECTURE.md"].map(str::to_owned).into_iter().chain(pages());
+    let read = |name: String| (name.clone(), fs::read_to_string(repository().join(name)).unwrap());
+    // Of the generated pages those that have commands.
+    let findings = ("findings".to_owned(), specgen::diagnostic::reference_markdown());
+    let keys = ("keys".to_owned(), specgen::spec::reference_markdown());
+    names.map(read).chain([findings, keys]).collect()
 }
 
 /// Lines that call specgen in the blocks of a document, each with the language of its block.

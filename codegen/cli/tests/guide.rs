@@ -1,4 +1,4 @@
-//! docs/guide.md walked as a reader would: its commands in order, in one folder, their output in the form that it shows.
+//! The tutorials walked as a reader would: their commands in order, in one folder, their output in the form that they show.
 
 use std::fs;
 use std::time::Instant;
@@ -32,38 +32,44 @@ fn missing(shown: &str, output: &str) -> Vec<String> {
     shown.lines().filter(|line| !is_there(line)).map(str::to_owned).collect()
 }
 
+/// In the order in which they are read.
+const TUTORIALS: [&str; 3] = ["first-controller.md", "your-platform.md", "guide.md"];
+
 #[test]
-fn the_guide_can_be_walked() {
+fn the_tutorials_can_be_walked() {
     let folder = tempfile::tempdir().unwrap();
     let specs = folder.path().join("specs");
     fs::create_dir_all(&specs).unwrap();
     fs::copy(repository().join("specs/minimal.toml"), specs.join("minimal.toml")).unwrap();
-    let text = fs::read_to_string(repository().join("docs/guide.md")).unwrap();
     let mut here = folder.path().to_owned();
-    let mut output = None;
     let (mut commands, mut compared) = (0, 0);
-    for block in blocks(&text) {
-        match (block.language.as_str(), output.take()) {
-            ("sh", _) => {
-                let script: String =
-                    block.body.lines().filter(|line| !is_marked(line)).map(|line| format!("{line}\n")).collect();
-                commands += script.lines().filter(|line| line.starts_with("specgen ")).count();
-                let start = Instant::now();
-                let place = folder.path().join("place");
-                let run = shell(&here, &format!("{script}\npwd > '{}'", place.display()));
-                println!("{:5.1} s  guide.md:{}", start.elapsed().as_secs_f64(), block.line);
-                assert_eq!(run.code, 0, "guide.md:{}\n{script}{}\n{}", block.line, run.stdout, run.stderr);
-                here = fs::read_to_string(place).unwrap().trim().into();
-                // Nothing to compare with where everything is marked.
-                output = script.contains("specgen ").then_some(run.stdout);
+    for page in TUTORIALS {
+        let text = fs::read_to_string(repository().join("docs").join(page)).unwrap();
+        let mut output = None;
+        for block in blocks(&text) {
+            let place = format!("{page}:{}", block.line);
+            match (block.language.as_str(), output.take()) {
+                ("sh", _) => {
+                    let script: String =
+                        block.body.lines().filter(|line| !is_marked(line)).map(|line| format!("{line}\n")).collect();
+                    commands += script.lines().filter(|line| line.starts_with("specgen ")).count();
+                    let start = Instant::now();
+                    let folder = folder.path().join("place");
+                    let run = shell(&here, &format!("{script}\npwd > '{}'", folder.display()));
+                    println!("{:5.1} s  {place}", start.elapsed().as_secs_f64());
+                    assert_eq!(run.code, 0, "{place}\n{script}{}\n{}", run.stdout, run.stderr);
+                    here = fs::read_to_string(folder).unwrap().trim().into();
+                    // Nothing to compare with where everything is marked.
+                    output = script.contains("specgen ").then_some(run.stdout);
+                }
+                // What is shown right below commands came from them.
+                ("text", Some(printed)) => {
+                    let missing = missing(&block.body, &printed);
+                    assert!(missing.is_empty(), "{place} shows {missing:#?}, the command printed:\n{printed}");
+                    compared += 1;
+                }
+                _ => {}
             }
-            // What is shown right below commands came from them.
-            ("text", Some(said)) => {
-                let missing = missing(&block.body, &said);
-                assert!(missing.is_empty(), "guide.md:{} shows {missing:#?}, the command said:\n{said}", block.line);
-                compared += 1;
-            }
-            _ => {}
         }
     }
     assert!(commands >= 10 && compared >= 6, "{commands} commands, {compared} outputs");

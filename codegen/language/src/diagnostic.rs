@@ -107,7 +107,7 @@ these pages. An example is a change of a spec of the repository, or commands; a 
 is marked (minutes) or stands in a block `text`.
 ";
 
-/// The pages of all codes as one Markdown text; `docs/diagnostics.md` is this text.
+/// The pages of all codes as one Markdown text: the page *Findings* of the book.
 #[must_use]
 pub fn reference_markdown() -> String {
     let mut text = MARKDOWN_HEAD.to_owned();

@@ -1,6 +1,6 @@
 //! What the committed generated files ought to hold.
 
-use super::{Files, trace};
+use super::{Files, help, trace};
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
@@ -44,14 +44,28 @@ pub fn schema(_: &Path) -> Result<Files, String> {
     Ok(Files::from([("platform.schema.json".to_owned(), spec::json_schema())]))
 }
 
-/// References printed from the key table, the registry of findings and the table of settings.
-pub fn docs(root: &Path) -> Result<Files, String> {
+/// References printed from the key table, the registry of findings, the table of settings and the help of the commands.
+pub fn pages(root: &Path) -> Result<Files, String> {
     Ok(Files::from([
+        ("commands.md".to_owned(), help::markdown(root)?),
         ("traceability.md".to_owned(), trace::markdown(root)?),
         ("spec-reference.md".to_owned(), spec::reference_markdown()),
         ("diagnostics.md".to_owned(), diagnostic::reference_markdown()),
         ("settings.md".to_owned(), settings(root)?),
+        ("dependencies.md".to_owned(), dependencies(root)?),
     ]))
+}
+
+/// Packages of others, as a table.
+fn dependencies(root: &Path) -> Result<String, String> {
+    let path = root.join("tests/dependencies.txt");
+    let list = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let rows: Vec<&str> = list.lines().filter(|line| line.starts_with('|')).collect();
+    Ok(format!(
+        "# Dependencies\n\nThird-party packages that the manifests name. `cargo xtask test` checks that the list is complete, and the \
+         licences and lock files of all packages.\n\n| package | what for | where |\n|---|---|---|\n{}\n",
+        rows.join("\n")
+    ))
 }
 
 /// The ranges of settings, of a platform and of six legs.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use super::{BINARY, Run};
+use super::{BINARY, Run, repository};
 
 /// What a line needs that a test has not: it is parsed only. The main help explains both.
 const MARKS: [&str; 2] = ["(minutes)", "(board)"];
@@ -46,6 +46,19 @@ impl Line {
 pub fn is_marked(line: &str) -> bool {
     let remark = line.split_once(" # ").map_or("", |(_, remark)| remark);
     MARKS.iter().any(|mark| remark.trim_start().starts_with(mark))
+}
+
+/// Names of the pages of `docs`, from the root, sorted.
+pub fn pages() -> Vec<String> {
+    let mut pages = Vec::new();
+    for folder in ["docs", "docs/decisions"] {
+        for entry in std::fs::read_dir(repository().join(folder)).unwrap() {
+            pages.push(format!("{folder}/{}", entry.unwrap().file_name().to_str().unwrap()));
+        }
+    }
+    pages.retain(|name| name.ends_with(".md"));
+    pages.sort();
+    pages
 }
 
 /// A block between fences.

@@ -1,4 +1,4 @@
-//! The reference of the spec language, printed from the key table; `docs/spec-reference.md` is this text.
+//! The reference of the spec language, printed from the key table: the page *Keys of a spec* of the book.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use super::messages::range_of;
 const HEAD: &str = "\
 <!-- Generated from the sections in codegen/language/src/model/; do not edit. -->
 
-# Spec reference
+# Keys of a spec
 
 A spec is one TOML file. A value with a dimension is a text with number and unit: `\"1.195 kg\"`, `\"3.26e7 g mm^2\"`,
 `\"0.012 pi rad\"`, `\"40 V/ms\"`, `\"12 N m/rad\"`. Units are m, g, s, min, V, N, Hz, rad, deg, arcmin, arcsec, Pa, J, W, A, F and B
@@ -18,7 +18,7 @@ Radians count as a unit: a rotational stiffness is in N m/rad, a bandwidth in ra
 A conversion to SI rounds once, so that `\"150 mm\"` is the double nearest to 0.15.
 
 The column *example* shows the form of a value with its unit; any other unit of the same dimension will do. Ranges are those of a single
-value; `docs/diagnostics.md` lists what is checked across values, and a finding names the keys that it is about.
+value; [Findings](diagnostics.md) lists what is checked across values, and a finding names the keys that it is about.
 File names are relative to the spec and use forward slashes.
 ";
 
