@@ -185,7 +185,7 @@ type Phases = [usize; 6];
 /// to where they ran, so that most of the ticks are of the running phase.
 fn machines_alike(name: &str, emitted: &Emitted, library: Controller, at_run_time: Controller, ticks: usize) -> Phases {
     let ir = &emitted.compiled.ir;
-    let [mut library, mut at_run_time] = [library, at_run_time].map(|controller| Supervised::new(controller));
+    let [mut library, mut at_run_time] = [library, at_run_time].map(Supervised::new);
     for machine in [&mut library, &mut at_run_time] {
         machine.configure(&ir.integrity.settings).unwrap();
     }
