@@ -50,7 +50,7 @@ pub fn compile(root: &Path, full: bool) -> Result<Vec<Binary>, String> {
     let arguments = ["test", "--release", "--workspace", "--no-run", "--message-format=json-render-diagnostics"];
     let left_out = WITHOUT_TESTS.iter().chain(LONG_TO_COMPILE.iter().filter(|_| !full));
     let without = left_out.flat_map(|package| ["--exclude", package]);
-    let lengthy = ["--config", "profile.release.package.specgen-tests.opt-level=1"];
+    let lengthy = ["--config", "profile.release.package.specgen-tests.opt-level=2"];
     let output = cargo(root, &arguments)
         .args(without)
         // Millions of ticks are judged by the tests' own code.

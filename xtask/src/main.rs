@@ -26,7 +26,8 @@ use std::process::ExitCode;
 const USAGE: &str = "usage: cargo xtask COMMAND
 
   setup   installs what the tests need: a cross compiler for Cortex-M and QEMU
-  test    setup, then formatting, lints, every test at its short length, freshness of generated files, lock files and licences
+  test    setup, then formatting, every test at its short length, freshness of generated files, lock files and licences; with the
+          variable CI set, lints, too
   test --full
           every test at full length, board images, faults, documentation, known defects of packages; writes tests/results.txt
   mutants [MINUTES | K/N | all]: code changed one operator at a time, to see whether a test notices: sample after sample for so

@@ -429,8 +429,13 @@ fn no_finding_says_a_number_that_is_none() {
     assert_ne!(wide, silent.text);
     sources.push(SpecSource { text: wide, ..silent });
     let mut count = 0;
-    for source in sources {
-        let slips = factors.iter().flat_map(|factor| slips(&source.text, *factor)).map(|(_, slip)| slip);
+    for (index, source) in sources.into_iter().enumerate() {
+        // Specs share most of their lines: each gets every second factor, and the next spec the others.
+        let due = |at: usize, factor: usize| factors.len() == 2 || (index + at + factor) % 2 == 0;
+        let slips = (0..factors.len()).flat_map(|factor| {
+            slips(&source.text, factors[factor]).into_iter().filter(move |(at, _)| due(*at, factor))
+        });
+        let slips = slips.map(|(_, slip)| slip);
         for text in slips.chain([source.text.clone()]) {
             let source = SpecSource { text, ..source.clone() };
             let (model, mut found) = spec::load_as_far(&source);
