@@ -30,7 +30,6 @@ const LISTED: &[(&str, usize, &str)] = &[
     ("codegen/cli/src/cli/export/fmu.rs", 1, OWN),
     ("codegen/cli/src/cli/file.rs", 1, OWN),
     ("codegen/cli/src/cli/operate/panel/http.rs", 1, SYSTEM),
-    ("codegen/compiler/src/golden.rs", 3, "of the tests"),
     ("codegen/compiler/src/workspace/found.rs", 2, OUTPUT),
     ("codegen/compiler/src/workspace/hold.rs", 1, OUTPUT),
     ("codegen/compiler/src/workspace/output.rs", 6, OUTPUT),

@@ -55,7 +55,7 @@ const TABLE: &[(&str, f64)] = &[
     ("tests all::integrity", 7.3),
     ("cli all::new", 7.3),
     ("tests all::sensing_emitted", 7.3),
-    ("compiler::golden", 7.1),
+    ("compiler all::golden", 7.1),
     ("link all::panic_free", 6.8),
     ("tests all::floors", 6.3),
     ("cli all::tune", 6.2),

@@ -17,15 +17,13 @@
 //! | [`workspace`] | the output folder, written completely or not at all |
 //! | [`requirements`], [`rest`] | converter steps and noise against the requirements of the spec |
 //!
-//! The test `golden` compares every constant, margin and finding of many specs with committed text.
+//! The test `golden` (`tests/all`) compares every constant, margin and finding of many specs with committed text.
 
 pub mod assumed;
 pub mod compile;
 pub mod demand;
 pub mod emit;
 mod figure;
-#[cfg(test)]
-mod golden;
 pub mod lint;
 pub mod lower;
 pub mod precision;

@@ -38,7 +38,7 @@ mod weights;
 pub use allow::{allow, unused};
 pub use budget::{estimated, least};
 pub use culprit::in_order;
-pub(crate) use factors::say_once;
+pub use factors::say_once;
 
 use specgen_runtime::Platform;
 

@@ -83,7 +83,7 @@ pub(super) fn near_defaults(facts: &Facts, found: &mut Found) {
 }
 
 /// A value that is refused is not also far from its default.
-pub(crate) fn say_once(findings: &mut Vec<Diagnostic>) {
+pub fn say_once(findings: &mut Vec<Diagnostic>) {
     let list = |key: &str| key.split('[').next().unwrap_or_default().to_owned();
     let errors = findings.iter().filter(|one| one.severity == Severity::Error);
     let refused: Vec<String> = errors.map(|one| list(&one.key)).collect();

@@ -13,8 +13,7 @@ mod stop;
 mod stopping;
 mod table;
 
-#[cfg(test)]
-pub(crate) use corners::step;
+pub use corners::step;
 pub use declared::{Declared, declared};
 pub use poses::{Stretch, stretches};
 pub use stopping::{Stopping, check as check_stops, describe as describe_stops};

@@ -1,10 +1,11 @@
-//! Design and stability of the platform loop against the study's figures, and against a simulation that shares nothing
-//! with it.
+//! Constants, margins and findings against committed text. Design and stability of the platform loop against the study's figures,
+//! and against a simulation that shares nothing with it.
 
 #![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
 mod design;
+mod golden;
 mod plant;
 mod simulation;
 mod study;

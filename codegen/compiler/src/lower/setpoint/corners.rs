@@ -71,7 +71,7 @@ pub(super) fn warning(model: &Model, name: &str, waveform: &Waveform, period: f6
 }
 
 /// A step of a table that stands out from those around it: a jump that no speed limit sees.
-pub(crate) fn step(waveform: &Waveform) -> Option<Diagnostic> {
+pub fn step(waveform: &Waveform) -> Option<Diagnostic> {
     let Step { row, axis, step, around } = stands_out(waveform)?;
     let place = Place::File { path: waveform.shown_as.clone(), line: waveform.lines.get(row).copied() };
     let message = format!(

@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use crate::assumed::Assumptions;
-use crate::compile::check_stability;
-use crate::ir::Ir;
-use crate::lower::{Origin, setpoint};
-use crate::{demand, lint, lower, reach, requirements, rest};
+use specgen_compiler::assumed::Assumptions;
+use specgen_compiler::compile::check_stability;
+use specgen_compiler::ir::Ir;
+use specgen_compiler::lower::{Origin, setpoint};
+use specgen_compiler::{demand, lint, lower, reach, requirements, rest};
 use specgen_identify::everett::EverettTable;
 use specgen_identify::waveform::{self, Waveform};
 use specgen_language::diagnostic::{Diagnostic, Place, Severity};
@@ -20,7 +20,7 @@ use specgen_language::spec::{self, SpecSource};
 
 mod cases;
 #[expect(dead_code, reason = "of each rule only the texts are used here")]
-#[path = "../../../tests/tests/physical_lint/support/rules.rs"]
+#[path = "../../../../tests/tests/physical_lint/support/rules.rs"]
 mod rules;
 
 /// Specs below `specs/`: both kinds of controller first, each written in full; of the others, what is not as in these.
@@ -97,7 +97,7 @@ impl Golden {
     fn compare(&self, committed: Option<&String>, found: Option<&String>) {
         assert!(
             self.bless || committed == found,
-            "golden/{}, `SPECGEN_BLESS=1 cargo test -p specgen-compiler golden` if that is meant:\nwas {committed:?}\nis  {found:?}",
+            "golden/{}, `SPECGEN_BLESS=1 cargo test -p specgen-compiler --test all golden` if that is meant:\nwas {committed:?}\nis  {found:?}",
             self.file
         );
     }
