@@ -12,7 +12,7 @@ use std::time::{Duration, Instant, SystemTime};
 use crate::builds::{Builds, MOST};
 use crate::progress::{Durations, Progress};
 use crate::run::{Outcome, cargo};
-use crate::skips;
+use crate::{setup, skips};
 
 /// How tests are run.
 #[derive(Debug, Clone, Copy, Default)]
@@ -261,7 +261,7 @@ impl Job<'_> {
             command.env(FULL, "1").arg("--include-ignored");
         }
         if !mode.tools_missing {
-            command.env(specgen_toolchain::REQUIRE_TOOLS, "1");
+            command.env(setup::REQUIRE_TOOLS, "1");
         }
         match command.output() {
             Ok(output) => {

@@ -82,7 +82,7 @@ impl Trial {
             judged.extend(format!("{} {}\n", file.display(), content.len()).into_bytes());
             judged.extend(content);
         }
-        Ok(specgen_toolchain::sha256(&judged))
+        Ok(crate::sha256(&judged))
     }
 }
 

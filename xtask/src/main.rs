@@ -1,27 +1,23 @@
 //! Developer commands: see [`USAGE`].
 
 mod binaries;
-mod board;
-mod book;
 mod builds;
 mod changelog;
-mod fresh;
 mod fuzz;
-mod generated;
 mod judged;
 mod mutants;
 mod packages;
 mod progress;
 mod release;
 mod results;
-mod run;
-mod setup;
 mod skips;
 mod steps;
 mod wheel;
 
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+
+use sha2::{Digest as _, Sha256};
+use xtask::{root, run, setup};
 
 const USAGE: &str = "usage: cargo xtask COMMAND
 
@@ -49,7 +45,6 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match words[..] {
-        ["setup"] => steps::setup(),
         ["test"] => steps::test(&root()),
         ["test", "--full"] => steps::full(&root()),
         ["mutants", ref more @ ..] => {
@@ -57,7 +52,6 @@ fn main() -> ExitCode {
         }
         ["wheel"] => wheel::command(&root()),
         ["bless"] => steps::bless(&root()),
-        ["book"] => book::command(&root()),
         ["changelog", version] => match changelog::release(&root(), version) {
             Ok(()) => ExitCode::SUCCESS,
             Err(text) => {
@@ -66,13 +60,8 @@ fn main() -> ExitCode {
             }
         },
         ["release", ref arguments @ ..] => release::command(&root(), arguments).unwrap_or_else(misused),
-        ["fresh", "--help" | "-h"] => {
-            println!("{}", fresh::usage());
-            ExitCode::SUCCESS
-        }
-        ["fresh", ref arguments @ ..] => fresh::fresh(&root(), arguments),
-        ["board", ref arguments @ ..] => board::command(&root(), arguments).unwrap_or_else(misused),
         ["fuzz", ref arguments @ ..] => fuzz::command(&root(), arguments).unwrap_or_else(misused),
+        ["setup"] | ["book"] | ["fresh" | "board", ..] => steps::maintain(&root(), &words),
         ["help" | "--help" | "-h"] => {
             println!("{USAGE}");
             ExitCode::SUCCESS
@@ -86,8 +75,7 @@ fn misused() -> ExitCode {
     ExitCode::from(2)
 }
 
-/// The repository: this crate stands directly below it.
-fn root() -> PathBuf {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    here.parent().unwrap_or(here).to_owned()
+/// SHA-256 in hex.
+fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

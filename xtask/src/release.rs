@@ -10,10 +10,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 
-use specgen_toolchain::sha256;
-
 use crate::run::{Outcome, Report, cargo};
-use crate::{book, changelog, wheel};
+use crate::{changelog, sha256, steps, wheel};
 
 /// Where it builds: other flags than those of the daily work.
 const MADE: &str = "target/released";
@@ -69,7 +67,7 @@ fn release(root: &Path, version: &str, output: &Path) -> ExitCode {
     report.step("Python package", || outcome(builds.wheel(output)));
     report.step("book", || {
         let folder = output.join(format!("{name}-book"));
-        match book::build(root, &folder) {
+        match steps::maintained(root, &["book", &folder.to_string_lossy()]) {
             Outcome::Passed => outcome(pack_folder(&format!("{name}-book"), output, &commit.time)),
             other => other,
         }

@@ -63,7 +63,7 @@ pub fn of_tests(ran: &Ran, took: Duration) -> String {
         ran.tests.len() - passed,
         ran.skipped.len(),
         took.as_secs_f64() / 60.0,
-        &specgen_toolchain::sha256(results.as_bytes())[..16],
+        &crate::sha256(results.as_bytes())[..16],
     )
 }
 

@@ -4,6 +4,9 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
+/// Exit code of a program that did not run a step, which was allowed.
+pub const SKIPPED: u8 = 3;
+
 /// How a step ended.
 pub enum Outcome {
     /// As it should.
@@ -23,6 +26,8 @@ pub struct Report {
 }
 
 impl Report {
+    /// Of so many steps.
+    #[must_use]
     pub fn new(total: usize) -> Self {
         Self { start: Instant::now(), total, steps: Vec::new() }
     }
@@ -37,16 +42,19 @@ impl Report {
     }
 
     /// Whether every step passed, none was skipped.
+    #[must_use]
     pub fn is_whole(&self) -> bool {
         self.steps.iter().all(|(_, outcome, _)| matches!(outcome, Outcome::Passed))
     }
 
     /// Whether a step failed.
+    #[must_use]
     pub fn has_failed(&self) -> bool {
         self.steps.iter().any(|(_, outcome, _)| matches!(outcome, Outcome::Failed(_)))
     }
 
     /// Prints one line per step; fails if one failed.
+    #[must_use]
     pub fn finish(self) -> ExitCode {
         println!("\n=== {}  summary", clock(self.start.elapsed()));
         for (name, outcome, took) in &self.steps {
@@ -62,12 +70,14 @@ impl Report {
 }
 
 /// Minutes and seconds.
+#[must_use]
 pub fn clock(time: Duration) -> String {
     let seconds = time.as_secs();
     format!("{:2}:{:02}", seconds / 60, seconds % 60)
 }
 
 /// Cargo in the repository, the one that runs this.
+#[must_use]
 pub fn cargo(root: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root).args(arguments);
@@ -75,6 +85,7 @@ pub fn cargo(root: &Path, arguments: &[&str]) -> Command {
 }
 
 /// Runs it in view; `fix` says what to do if it fails.
+#[must_use]
 pub fn expect_success(mut command: Command, fix: &str) -> Outcome {
     match command.status() {
         Ok(status) if status.success() => Outcome::Passed,

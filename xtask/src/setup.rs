@@ -1,22 +1,20 @@
-//! What has to be on the machine before anything can be tested.
+//! What has to be on the machine before anything can be tested. Cross compiler and QEMU: `maintain setup`.
 
 use crate::run::Outcome;
-use specgen_toolchain as target;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+/// The target of microcontrollers.
+pub const TRIPLE: &str = "thumbv7em-none-eabihf";
+/// Set to `1`, a test that misses a tool fails.
+pub const REQUIRE_TOOLS: &str = "SPECGEN_REQUIRE_TOOLS";
 /// Set to `1`, what needs a tool that cannot be installed is skipped, and said so.
 const ALLOW_MISSING: &str = "SPECGEN_ALLOW_MISSING";
 
-/// The cross compiler and QEMU, installed if need be.
-pub fn microcontroller() -> Outcome {
-    match target::provision::provision(&mut |line| println!("{line}")) {
-        Ok(_) => Outcome::Passed,
-        Err(error) => missing(format!("{error}")),
-    }
-}
-
 /// A part of the Rust toolchain that comes on its own, such as `clippy`; installed if need be.
+///
+/// # Errors
+/// It is missing, and rustup does not bring it.
 pub fn component(name: &str, subcommand: &str) -> Result<(), Outcome> {
     let works = || {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
@@ -37,12 +35,14 @@ pub fn component(name: &str, subcommand: &str) -> Result<(), Outcome> {
 }
 
 /// Whether the compiler that cargo takes here has the library of microcontrollers: another one may be the cross compiler.
+#[must_use]
 pub fn has_target() -> bool {
-    let printed = Command::new("rustc").args(["--print", "target-libdir", "--target", target::TRIPLE]).output();
+    let printed = Command::new("rustc").args(["--print", "target-libdir", "--target", TRIPLE]).output();
     printed.is_ok_and(|output| Path::new(String::from_utf8_lossy(&output.stdout).trim()).is_dir())
 }
 
 /// A failure, unless the user allows that something is missing.
+#[must_use]
 pub fn missing(why: String) -> Outcome {
     if std::env::var_os(ALLOW_MISSING).is_some_and(|value| value == "1") {
         Outcome::Skipped(why)

@@ -4,13 +4,12 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::time::Instant;
 
-use specgen_toolchain::TRIPLE;
-
 use crate::binaries::{self, Binary, Mode, Ran};
 use crate::judged::Trial;
 use crate::mutants::Sample;
-use crate::run::{Outcome, Report, cargo, expect_success};
-use crate::{board, fuzz, generated, mutants, packages, results, setup, wheel};
+use crate::run::{Outcome, Report, SKIPPED, cargo, expect_success};
+use crate::setup::{self, TRIPLE};
+use crate::{fuzz, mutants, packages, results, wheel};
 
 /// Its own workspace, built for another machine.
 const FIRMWARE: &str = "firmware/qemu/Cargo.toml";
@@ -20,13 +19,15 @@ const TICK: &str = "firmware/tick/Cargo.toml";
 const HOST_LIBRARY: &str = "firmware/host/Cargo.toml";
 /// Boards, each its own workspace; built from an emitted one.
 const BOARDS: [&str; 2] = ["firmware/stm32h743/Cargo.toml", "firmware/stm32f4/Cargo.toml"];
+/// The emulated board.
+const EMULATED: &str = "tests/board/Cargo.toml";
 /// What they share: built as a part of theirs.
 const BOARDS_COMMON: &str = "firmware/stm32/Cargo.toml";
 /// Its own workspace, because of its dependencies.
 const REAL_TIME: &str = "firmware/rt-pc/Cargo.toml";
 /// Workspaces of their own with lock files of their own.
 const STANDING_ALONE: [&str; 10] =
-    [FIRMWARE, TICK, REAL_TIME, wheel::MANIFEST, SCHEMA, fuzz::MANIFEST, board::MANIFEST, LOOM, BOARDS[0], BOARDS[1]];
+    [FIRMWARE, TICK, REAL_TIME, wheel::MANIFEST, SCHEMA, fuzz::MANIFEST, EMULATED, LOOM, BOARDS[0], BOARDS[1]];
 /// Every lock file there is.
 const LOCKED: [&str; 12] = [
     "Cargo.toml",
@@ -36,7 +37,7 @@ const LOCKED: [&str; 12] = [
     wheel::MANIFEST,
     SCHEMA,
     fuzz::MANIFEST,
-    board::MANIFEST,
+    EMULATED,
     LOOM,
     BOARDS[0],
     BOARDS[1],
@@ -65,7 +66,7 @@ const FORMATTED_ALONE: [&str; 12] = [
     BOARDS_COMMON,
     SCHEMA,
     fuzz::MANIFEST,
-    board::MANIFEST,
+    EMULATED,
     LOOM,
     BOARDS[0],
     BOARDS[1],
@@ -102,11 +103,29 @@ const HAND_WRITTEN: [&str; 24] = [
 #[cfg(test)]
 const EMITTED: [&str; 2] = ["controller", "controller-with-passes"];
 
-/// `cargo xtask setup`
-pub fn setup() -> ExitCode {
-    let mut report = Report::new(1);
-    report.step("cross compiler and QEMU", setup::microcontroller);
-    report.finish()
+/// The commands and steps that compute with the product: see `tests/src/bin/maintain`.
+const MAINTAIN: [&str; 7] =
+    ["run", "--release", "--quiet", "--package=specgen-tests", "--bin=maintain", "--locked", "--"];
+
+/// A command of `maintain`.
+pub fn maintain(root: &Path, words: &[&str]) -> ExitCode {
+    match cargo(root, &[&MAINTAIN[..], words].concat()).status() {
+        Ok(status) => ExitCode::from(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)),
+        Err(error) => {
+            eprintln!("cargo cannot be run: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// A step of `maintain`, which says why it was left out or failed.
+pub fn maintained(root: &Path, words: &[&str]) -> Outcome {
+    match cargo(root, &[&MAINTAIN[..], &["step"], words].concat()).status() {
+        Ok(status) if status.success() => Outcome::Passed,
+        Ok(status) if status.code() == Some(SKIPPED.into()) => Outcome::Skipped("see above".to_owned()),
+        Ok(_) => Outcome::Failed("see above".to_owned()),
+        Err(error) => Outcome::Failed(format!("cargo cannot be run: {error}")),
+    }
 }
 
 /// `cargo xtask test`
@@ -115,18 +134,17 @@ pub fn test(root: &Path) -> ExitCode {
     // Lints find no wrong result and cost a second pass of the compiler: on a desk, `cargo clippy` and the full run have them.
     let lints_too = std::env::var_os("CI").is_some();
     let mut report = Report::new(9 + usize::from(lints_too) + LOCKED.len());
-    report.step("cross compiler and QEMU", setup::microcontroller);
-    let mode = Mode { tools_missing: !report.is_whole(), ..Mode::default() };
     report.step("the last full run", || results::judge(root));
     report.step("formatting", || formatting(root));
     let binaries = compiled(root, false, &mut report);
+    let mode = Mode { tools_missing: !set_up(root, &mut report), ..Mode::default() };
     report.step("tests", || binaries::test(root, &binaries, mode, &mut Ran::default()));
     if lints_too {
         report.step("lints", || lints(root, false));
     }
     report.step("published schema", || PUBLISHED_SCHEMA.unless_unchanged(root));
     report.step("orders of shared memory", || SHARED_MEMORY.unless_unchanged(root));
-    report.step("generated files are fresh", || generated::check(root));
+    report.step("generated files are fresh", || maintained(root, &["check"]));
     for manifest in LOCKED {
         report.step(&format!("lock file and licences of {manifest}"), || packages::check(root, manifest));
     }
@@ -138,13 +156,12 @@ pub fn test(root: &Path) -> ExitCode {
 pub fn full(root: &Path) -> ExitCode {
     let start = Instant::now();
     let mut report = Report::new(13);
-    report.step("cross compiler and QEMU", setup::microcontroller);
-    let mode = Mode { full: true, tools_missing: !report.is_whole() };
     report.step("known defects of packages", || packages::advisories(root, &LOCKED));
     let binaries = compiled(root, true, &mut report);
+    let mode = Mode { full: true, tools_missing: !set_up(root, &mut report) };
     let mut ran = Ran::default();
     report.step("tests at full length", || binaries::test(root, &binaries, mode, &mut ran));
-    report.step("images on the emulated board, and faults", || board::long(root));
+    report.step("images on the emulated board, and faults", || maintained(root, &["boards"]));
     report.step("lock file and licences of examples/own-board/Cargo.toml", || {
         if root.join(OWN_BOARD).is_file() {
             packages::check(root, OWN_BOARD)
@@ -194,6 +211,17 @@ fn checked(root: &Path) -> Outcome {
     Outcome::Passed
 }
 
+/// Whether the cross compiler and QEMU are there, installed if need be.
+fn set_up(root: &Path, report: &mut Report) -> bool {
+    let mut there = false;
+    report.step("cross compiler and QEMU", || {
+        let outcome = maintained(root, &["setup"]);
+        there = matches!(outcome, Outcome::Passed);
+        outcome
+    });
+    there
+}
+
 /// Every test binary; none where they do not compile, which fails.
 fn compiled(root: &Path, full: bool, report: &mut Report) -> Vec<Binary> {
     let mut binaries = Vec::new();
@@ -210,7 +238,7 @@ fn compiled(root: &Path, full: bool, report: &mut Report) -> Vec<Binary> {
 /// `cargo xtask bless`
 pub fn bless(root: &Path) -> ExitCode {
     let mut report = Report::new(1 + STANDING_ALONE.len());
-    report.step("generated files", || generated::bless(root));
+    report.step("generated files", || maintained(root, &["bless"]));
     for manifest in STANDING_ALONE {
         report.step(&format!("lock file of {manifest}"), || {
             // Keeps the versions that are locked; only the path packages follow their manifests.
@@ -272,7 +300,7 @@ fn lints(root: &Path, all: bool) -> Outcome {
     // Into the same folder: most of its dependencies are those of the workspace.
     let alone = |manifest| ["--manifest-path", manifest, "--all-targets", "--locked", "--target-dir", "target"];
     let mut scopes = vec![own];
-    scopes.extend([REAL_TIME, board::MANIFEST].map(alone).iter().filter(|_| all).map(|scope| scope.to_vec()));
+    scopes.extend([REAL_TIME, EMULATED].map(alone).iter().filter(|_| all).map(|scope| scope.to_vec()));
     // Their lints forbid what the optimiser cannot prove away.
     if !all {
         println!("members of the workspace; the others in the full run");

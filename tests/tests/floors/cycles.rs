@@ -128,7 +128,7 @@ fn a_cycle_in_a_crate_of_the_repository_is_found() {
             "use crate::platform::study::PlatformStudy;",
             &["study.rs", "scenario.rs"],
         ),
-        ("xtask/src/main.rs", "src/run.rs", "use crate::binaries::*;\nfn f(_: Binary) {}", &["binaries.rs"]),
+        ("xtask/src/main.rs", "src/results.rs", "use crate::steps::*;\nfn f() { test(); }", &["steps.rs"]),
     ];
     for (root, file, line, expected) in cases {
         assert_eq!(cycles_with(root, &read, file, ""), [""; 0], "{file}");

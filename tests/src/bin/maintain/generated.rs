@@ -1,10 +1,10 @@
 //! Committed files that a program writes: checked to be what it would write today, or written anew.
 
-use crate::run::Outcome;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::Path;
+use xtask::run::Outcome;
 
 mod help;
 mod make;

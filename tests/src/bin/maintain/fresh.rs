@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn the_commands_are_those_of_the_readme() {
-        let readme = include_str!("../../README.md");
+        let readme = include_str!("../../../../README.md");
         assert!(readme.contains(MAIN_JOB) && readme.contains(TESTS));
     }
 

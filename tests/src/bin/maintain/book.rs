@@ -6,8 +6,8 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 
 use crate::generated;
-use crate::run::{Outcome, Report, cargo, expect_success};
-use crate::setup;
+use xtask::run::{Outcome, Report, cargo, expect_success};
+use xtask::setup;
 
 /// Version of mdBook.
 const VERSION: &str = "0.5.4";
@@ -89,7 +89,7 @@ mod tests {
     fn the_source_of_the_book_has_every_page_of_its_contents() {
         let folder = tempfile::tempdir().unwrap();
         let source = folder.path().join("source");
-        sources(&crate::root(), &source).unwrap();
+        sources(&xtask::root(), &source).unwrap();
         let contents = fs::read_to_string(source.join("SUMMARY.md")).unwrap();
         let pages: Vec<&str> = contents.split("](").skip(1).filter_map(|link| link.split(')').next()).collect();
         assert!(pages.len() > 30, "{pages:?}");

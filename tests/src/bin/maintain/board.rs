@@ -16,9 +16,9 @@ use specgen_language::model::{Trigger, TriggerKind};
 use specgen_language::{SpecSource, spec};
 use specgen_toolchain::provision;
 
-use crate::run::{Outcome, Report, cargo, expect_success};
-use crate::setup;
 use session::{Host, Session};
+use xtask::run::{Outcome, Report, cargo, expect_success};
+use xtask::setup;
 
 /// Its own workspace.
 pub const MANIFEST: &str = "tests/board/Cargo.toml";
