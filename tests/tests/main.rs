@@ -46,6 +46,7 @@ mod sensing_emitted;
 mod setpoint;
 mod setpoint_emitted;
 mod settings;
+mod size;
 mod snapshots;
 mod spec_corpus;
 mod spec_errors;
