@@ -163,7 +163,7 @@ pub fn follow(
                     follow(Some(hertz), hertz == *frequency, streamed)?;
                 }
             }
-            TrajectoryKind::Step { .. } | TrajectoryKind::Waveform { .. } => {
+            _ => {
                 let Some(path) = on_board(compiled, number as u32) else { continue };
                 progress(&format!("{name} on board"));
                 follow(None, true, Course::Played(path))?;

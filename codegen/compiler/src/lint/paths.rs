@@ -9,7 +9,7 @@ use specgen_runtime::Platform;
 use super::{Found, Legs, figure};
 use crate::lower::setpoint::Stretch;
 use specgen_language::diagnostic::{Diagnostic, codes};
-use specgen_language::model::{Model, TaskSpace, TrajectoryKind};
+use specgen_language::model::{Model, TaskSpace};
 
 /// The local gain of a stack differs from its mean by about a quarter, so that a path needs this much less slew at best.
 const GAIN_SLACK: f64 = 1.3;
@@ -62,16 +62,13 @@ pub fn check(
         }
         demand.slew = demand.leg_speed / model.actuator.leg_gain();
         demand.current = model.actuator.capacitance.map(|capacitance| capacitance * demand.slew);
-        let key = match trajectory.kind {
-            TrajectoryKind::Paper { .. } => format!("trajectory[{index}].frequency"),
-            TrajectoryKind::Step { .. } => format!("trajectory[{index}].time"),
-            TrajectoryKind::Waveform { .. } => format!("trajectory[{index}].period"),
-        };
+        let (rate, frequency) = trajectory.kind.rate();
+        let key = format!("trajectory[{index}].{rate}");
         slew(model, &key, &demand, &mut found);
         current(model, &key, &demand, &mut found);
         deflection(model, &key, &demand, &mut found);
-        if let (TrajectoryKind::Paper { frequency, .. }, Some(modes)) = (&trajectory.kind, legs.modes) {
-            excitation(&key, &demand.name, *frequency, modes[0], &mut found);
+        if let ("frequency", Some(modes)) = (rate, legs.modes) {
+            excitation(&key, &demand.name, frequency, modes[0], &mut found);
         }
         demands.push(demand);
     }

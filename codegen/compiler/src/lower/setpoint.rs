@@ -61,19 +61,15 @@ pub fn lower(
     let mut warnings = Vec::new();
     let mut trajectories = Vec::new();
     for (index, trajectory) in task.trajectories.iter().enumerate() {
-        let waveform = waveforms.get(index).and_then(Option::as_ref);
-        let lowered = match (&trajectory.kind, waveform) {
-            (TrajectoryKind::Paper { path, as_printed, frequency }, _) => {
-                segments::lower(model, task, &user, index, paper::pieces(*path, *as_printed, *frequency), *frequency)
-            }
-            (TrajectoryKind::Step { to, time }, _) => {
-                segments::lower(model, task, &user, index, paper::step(to, *time), 1.0 / time)
-            }
-            (TrajectoryKind::Waveform { period, repeat, .. }, Some(waveform)) => {
+        let lowered = match (&trajectory.kind, waveforms.get(index)) {
+            (TrajectoryKind::Waveform { period, repeat, .. }, Some(Some(waveform))) => {
                 table::lower(model, task, &user, index, waveform, *period, *repeat)
             }
-            // Whoever reads the file reports that it cannot be read.
-            (TrajectoryKind::Waveform { .. }, None) => continue,
+            (kind, _) => match paper::formula(kind) {
+                Some((pieces, frequency)) => segments::lower(model, task, &user, index, pieces, frequency),
+                // Whoever reads the file reports that it cannot be read.
+                None => continue,
+            },
         };
         match lowered {
             Ok((path, found)) => {

@@ -348,6 +348,16 @@ pub enum TrajectoryKind {
 }
 
 impl TrajectoryKind {
+    /// The key that sets how fast it is, and its value: Hz of `frequency`, s of `time` and `period`.
+    #[must_use]
+    pub const fn rate(&self) -> (&'static str, f64) {
+        match self {
+            Self::Paper { frequency, .. } => ("frequency", *frequency),
+            Self::Step { time, .. } => ("time", *time),
+            Self::Waveform { period, .. } => ("period", *period),
+        }
+    }
+
     fn read(fields: &Fields, table: &str) -> Option<Self> {
         let key = |name: &str| join(table, name);
         let paper = |path| {

@@ -6,7 +6,7 @@
 
 use core::f64::consts::PI;
 
-use specgen_language::model::PaperPath;
+use specgen_language::model::{PaperPath, TrajectoryKind};
 
 /// A = π/72, mrad.
 const AMPLITUDE: f64 = PI / 72.0;
@@ -37,8 +37,19 @@ pub(super) struct Piece {
     pub coordinates: [Coordinate; 6],
 }
 
+/// Pieces of a trajectory that formulas give, with their frequency, Hz; none of a table.
+pub(super) fn formula(kind: &TrajectoryKind) -> Option<(Vec<Piece>, f64)> {
+    match kind {
+        TrajectoryKind::Paper { path, as_printed, frequency } => {
+            Some((pieces(*path, *as_printed, *frequency), *frequency))
+        }
+        TrajectoryKind::Step { to, time } => Some((step(to, *time), 1.0 / time)),
+        TrajectoryKind::Waveform { .. } => None,
+    }
+}
+
 /// The pieces of a path at f_c = `frequency` (Hz), from t = 0.
-pub(super) fn pieces(path: PaperPath, as_printed: bool, frequency: f64) -> Vec<Piece> {
+fn pieces(path: PaperPath, as_printed: bool, frequency: f64) -> Vec<Piece> {
     // tf is f_c/0.1 Hz; machining's spans and phases fit together only with tf = f_c/1 Hz.
     let factor = if path == PaperPath::Machining && !as_printed { frequency } else { 10.0 * frequency };
     let scaled = match path {
@@ -53,7 +64,7 @@ pub(super) fn pieces(path: PaperPath, as_printed: bool, frequency: f64) -> Vec<P
 }
 
 /// A step from zero to a pose (m and rad) within a time (s): h = to (t/T − sin(2π t/T)/(2π)), whose sinusoid has the frequency 1/T.
-pub(super) fn step(to: &[f64; 6], time: f64) -> Vec<Piece> {
+fn step(to: &[f64; 6], time: f64) -> Vec<Piece> {
     let coordinates = to.map(|to| Coordinate { line: [0.0, to / time], radius: [-to / (2.0 * PI), 0.0], turns: 0.0 });
     vec![Piece { end: time, coordinates }]
 }

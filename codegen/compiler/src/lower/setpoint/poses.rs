@@ -39,19 +39,16 @@ pub fn stretches(model: &Model, task: &TaskSpace, setpoints: &Setpoints) -> Resu
 
 /// The same of one trajectory, in the user's coordinates.
 pub(super) fn along(kind: &TrajectoryKind, path: &Path) -> Vec<Stretch> {
-    match (kind, path) {
-        (TrajectoryKind::Paper { path, as_printed, frequency }, _) => {
-            analytic(*frequency, &paper::pieces(*path, *as_printed, *frequency))
-        }
-        (TrajectoryKind::Step { to, time }, _) => analytic(1.0 / time, &paper::step(to, *time)),
-        (TrajectoryKind::Waveform { period, .. }, Path::Table { rows, .. }) => {
+    match (paper::formula(kind), path) {
+        (Some((pieces, frequency)), _) => analytic(frequency, &pieces),
+        (None, Path::Table { rows, .. }) => {
             let between = rows.windows(2).flat_map(|pair| {
                 (0..A_ROW).map(|k| table::at(&pair[0], &pair[1], f64::from(k) / f64::from(A_ROW), 1.0).0)
             });
             let poses = between.chain(rows.last().map(|row| row.pose)).collect();
-            vec![Stretch { interval: period / f64::from(A_ROW), poses }]
+            vec![Stretch { interval: kind.rate().1 / f64::from(A_ROW), poses }]
         }
-        (TrajectoryKind::Waveform { .. }, Path::Segments { .. }) => Vec::new(),
+        (None, Path::Segments { .. }) => Vec::new(),
     }
 }
 

@@ -7,7 +7,7 @@ use super::paper::{Coordinate, Piece};
 use super::{AXES, LONGEST, User, amount};
 use crate::ir::{Path, Segment, SegmentAxis};
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
-use specgen_language::model::{Model, TaskSpace, TrajectoryKind};
+use specgen_language::model::{Model, TaskSpace};
 
 /// A step at a joint that is none: below what a gauge sees. m and rad.
 const NO_JUMP: [f64; 6] = [1e-9, 1e-9, 1e-9, 10e-9, 10e-9, 10e-9];
@@ -26,8 +26,8 @@ pub(super) fn lower(
     frequency: f64,
 ) -> Result<(Path, Vec<Diagnostic>), Vec<Diagnostic>> {
     let period = model.timing.period;
-    let steps = matches!(task.trajectories[index].kind, TrajectoryKind::Step { .. });
-    let key = format!("trajectory[{index}].{}", if steps { "time" } else { "frequency" });
+    let (rate, _) = task.trajectories[index].kind.rate();
+    let (steps, key) = (rate == "time", format!("trajectory[{index}].{rate}"));
     let refuse = |code: Code, message: String, help: &str| {
         let message = format!("trajectory \"{}\": {message}", task.trajectories[index].name);
         Diagnostic::at(&model.spans, &[&key], code, message, help)

@@ -76,16 +76,10 @@ fn harder(model: &Model, stop: &Stopping, room: &[f64; 6], limits: &stop::Limits
 
 /// A stop on the way of trajectory `index`.
 pub(super) fn leaves(model: &Model, index: usize, name: &str, kind: &TrajectoryKind, leaves: &Leaves) -> Diagnostic {
-    let (key, fix) = match kind {
-        TrajectoryKind::Paper { frequency, .. } => {
-            ("frequency", format!("at most {} Hz stops within", down(frequency * leaves.share)))
-        }
-        TrajectoryKind::Step { time, .. } => {
-            ("time", format!("at least {} ms stops within", up(time / leaves.share * 1e3)))
-        }
-        TrajectoryKind::Waveform { period, .. } => {
-            ("period", format!("a period of at least {} ms stops within", up(period / leaves.share * 1e3)))
-        }
+    let (key, rate) = kind.rate();
+    let fix = match key {
+        "frequency" => format!("at most {} Hz stops within", down(rate * leaves.share)),
+        time => format!("a {time} of at least {} ms stops within", up(rate / leaves.share * 1e3)),
     };
     // On the way it is outside before it stops: no time helps.
     let fix =
