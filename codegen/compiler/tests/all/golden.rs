@@ -158,7 +158,7 @@ fn waveforms(source: &SpecSource, model: &Model, table: Option<&str>) -> Vec<Opt
                 let read = || std::fs::read_to_string(source.dir.join(file)).ok();
                 waveform::parse(&table.map(str::to_owned).or_else(read)?, file, *period).ok()
             }
-            TrajectoryKind::Paper { .. } | TrajectoryKind::Step { .. } => None,
+            _ => None,
         })
         .collect()
 }
