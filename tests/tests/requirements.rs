@@ -2,9 +2,10 @@
 
 use std::fs;
 
-use specgen::compile::{Refused, compile};
+use specgen::compile::compile;
 use specgen::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen::lower::leg_jacobian;
+use specgen::outcome::Refused;
 use specgen::requirements::{Steps, steps};
 use specgen_tests::{repository, worse};
 

@@ -13,7 +13,6 @@ mod dynamics;
 mod examples;
 mod explain;
 mod export;
-mod file;
 mod firmware;
 mod forc;
 mod gcs;
@@ -33,10 +32,8 @@ mod reproduce;
 mod robust;
 mod sim;
 mod spec;
-mod table;
 mod trajectory;
 mod tune;
-mod ui;
 
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -50,14 +47,14 @@ use serde::Serialize;
 use serde_json::Value;
 
 pub use named::{Role, role};
-use specgen_compiler::compile::{Compiled, Refused};
+use specgen_compiler::compile::Compiled;
 use specgen_compiler::ir::Ir;
 use specgen_language::diagnostic::{Diagnostic, Severity};
+use specgen_language::outcome::{Failure, Outcome, Refused};
 use specgen_language::spec::nearest;
+use specgen_language::ui::{Message, Ui};
 use specgen_language::{files, interrupt};
 use specgen_toolchain as target;
-pub use ui::Said;
-use ui::{Failure, Outcome, Ui};
 
 /// Compiles one description of a piezo-driven Stewart platform into a `no_std` Rust controller.
 #[derive(Parser, Debug)]
@@ -203,21 +200,21 @@ pub fn run() -> ExitCode {
 }
 
 /// Performs one command as a function of this program: `arguments` are those behind `specgen`, what `--json` prints comes back,
-/// and `hear` is told of the progress. After `stop` is set, the command ends with what there is of a result, or at the next tick
-/// of a simulation or line of progress. `orders` are the lines of a session that reads any: `operate` without commands.
+/// and `listener` gets the progress. After `stop` is set, the command ends with what there is of a result, or at the next tick
+/// of a simulation or line of progress. `lines` are the commands of a session that reads any: `operate` without commands.
 #[must_use]
 pub fn call(
     arguments: impl IntoIterator<Item = OsString>,
     stop: &'static AtomicBool,
-    hear: impl Fn(Said<'_>) + 'static,
-    orders: Option<Receiver<String>>,
+    listener: impl Fn(Message<'_>) + 'static,
+    lines: Option<Receiver<String>>,
 ) -> Value {
     interrupt::own(stop);
-    let said = move |said: Said<'_>| {
-        hear(said);
+    let listener = move |message: Message<'_>| {
+        listener(message);
         interrupt::point();
     };
-    let mut ui = Ui::called(said, orders);
+    let mut ui = Ui::called(listener, lines);
     let done = match parsed(std::iter::once("specgen".into()).chain(arguments)) {
         // What it has not shown when it unwinds is not looked at.
         Ok((cli, matches)) => {
@@ -233,7 +230,7 @@ pub fn call(
     if let Err(failure) = done {
         ui.failed(&failure);
     }
-    ui.taken()
+    ui.into_document()
 }
 
 /// The arguments, as values and by their names.
@@ -316,7 +313,7 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
     }
     // Help and version are results: that they are whole is known.
     let ui = Ui::new(false);
-    ui.styled(&error.render());
+    ui.styled(&error.render().ansi().to_string());
     ExitCode::from(ui.not_all_out().unwrap_or(0))
 }
 

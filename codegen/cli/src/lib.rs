@@ -11,7 +11,7 @@ pub use specgen_compiler::{
     assumed, compile, emit, ir, lint, lower, precision, reach, requirements, rest, settings, stability, workspace,
 };
 pub use specgen_identify::{self as identify, everett, waveform};
-pub use specgen_language::{diagnostic, files, interrupt, lock, model, shell, spec};
+pub use specgen_language::{diagnostic, files, interrupt, lock, model, outcome, shell, spec, ui};
 pub use specgen_operate::{self as operate, doctor, pil, served};
 pub use specgen_report::{self as report, plot};
 pub use specgen_run_time as run_time;

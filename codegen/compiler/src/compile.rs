@@ -18,6 +18,7 @@ use crate::{requirements, workspace};
 use specgen_identify::{self as identify, declared};
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::model::Model;
+use specgen_language::outcome::Refused;
 use specgen_language::spec::{self, SpecSource};
 use specgen_toolchain::targets::Target;
 
@@ -51,15 +52,6 @@ pub struct Compiled {
     /// Files of the workspace: path, text.
     pub files: BTreeMap<String, String>,
     /// Warnings and notes.
-    pub findings: Vec<Diagnostic>,
-}
-
-/// A spec that was refused: at least one finding is an error.
-#[derive(Debug)]
-pub struct Refused {
-    /// The file, if it could be read.
-    pub source: Option<SpecSource>,
-    /// All findings of the run.
     pub findings: Vec<Diagnostic>,
 }
 

@@ -14,7 +14,6 @@ use crate::ir::Ir;
 
 pub use error::WriteError;
 pub use hold::Hold;
-pub use output::sync;
 pub use output::{write, write_scratch};
 use parts::Part;
 

@@ -351,5 +351,17 @@ pub fn open_device(path: &Path) -> Result<File, Unwritten> {
     }
 }
 
+/// Waits until a file, or the list of a folder, is on the disk.
+///
+/// # Errors
+/// As the file system reports them.
+pub fn sync(path: &Path) -> io::Result<()> {
+    match File::open(path)?.sync_all() {
+        // A file system that knows no such thing.
+        Err(error) if matches!(error.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => Ok(()),
+        done => done,
+    }
+}
+
 #[cfg(test)]
 mod tests;

@@ -7,8 +7,8 @@
 //! [`model`] declares each section of a spec once, keys and fields together. Parsing, checks, JSON Schema and the reference of keys in
 //! [`spec`] follow from these declarations; `keys/declare.rs` has their form. The pages of the findings are in `findings/`.
 //!
-//! The one crate that reads TOML. [`files`], [`interrupt`] and [`lock`] are here because everything that reads or writes needs
-//! them, [`shell`] because messages of every crate print lines for one.
+//! The one crate that reads TOML. What every crate above needs is here, too: [`files`], [`output`], [`interrupt`] and [`lock`] to read
+//! and write files, [`outcome`], [`ui`] and [`table`] for the results of commands, [`shell`] for lines of a shell in messages.
 
 pub mod diagnostic;
 pub mod files;
@@ -16,9 +16,13 @@ pub mod interrupt;
 mod keys;
 pub mod lock;
 pub mod model;
+pub mod outcome;
+pub mod output;
 pub mod quantity;
 pub mod shell;
 mod source;
 pub mod spec;
+pub mod table;
+pub mod ui;
 
 pub use source::SpecSource;

@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::{Py, PyAny, PyErr, PyResult, Python, pyclass, pyfunction, pymethods};
-use specgen::cli::{Said, call as perform};
+use specgen::cli::call as perform;
+use specgen::ui::Message;
 
 use crate::Error;
 
@@ -50,10 +51,10 @@ impl Running {
         let (tell, words) = mpsc::channel();
         thread::Builder::new().name("specgen".to_owned()).spawn(move || {
             let told = tell.clone();
-            let hear = move |said: Said<'_>| {
-                let word = match said {
-                    Said::Progress(line) => Word::Progress(line.to_owned()),
-                    Said::Answers(answers) => Word::Answers(answers.to_string()),
+            let hear = move |message: Message<'_>| {
+                let word = match message {
+                    Message::Progress(line) => Word::Progress(line.to_owned()),
+                    Message::Answers(answers) => Word::Answers(answers.to_string()),
                 };
                 // Where nobody listens any more, it was told to stop.
                 let _ = told.send(word);

@@ -5,7 +5,7 @@
 
 use core::array::from_fn;
 
-use host_sim::closed_loop::LEGS;
+use host_sim::closed_loop::{LEGS, RunError};
 use host_sim::plant::{LegParameters, NoiseParameters};
 use host_sim::platform::rig::{Noise, OnBoard, PlatformRig, RunOptions};
 use host_sim::platform::{GaugeSignal, Joints, PlatformParameters, PlatformScenario, Probe, Specimen, UserFrames};
@@ -13,6 +13,7 @@ use host_sim::scenario::LegScenario;
 
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::{Model, TaskSpace};
+use specgen_language::outcome::Failure;
 
 /// Gain of the reference leg's controller, 5 × 0.1262 µm/V: what its measured gain is relative to, m/V.
 const REFERENCE_GAIN: f64 = 0.631e-6;
@@ -22,6 +23,18 @@ const STEPS_PER_PERIOD: f64 = 60.0;
 const STEPS: [f64; 2] = [1e-7, 2e-5];
 /// Rest at the bias pose before a run, s.
 const SETTLE: f64 = 0.2;
+
+/// The failure of a command whose simulated run failed.
+#[must_use]
+pub fn run_failure(error: RunError) -> Failure {
+    let message = error.to_string();
+    match error {
+        RunError::EndedEarly { .. } | RunError::NotEnded { .. } => {
+            Failure::EndedEarly { message, result: serde_json::Value::Null }
+        }
+        _ => Failure::Environment(message),
+    }
+}
 
 /// Six legs of these parameters under the voltages of the spec, prepared.
 #[must_use]

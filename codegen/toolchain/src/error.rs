@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use specgen_language::outcome::Failure;
+
 /// A failure of a tool, of a build or of the emulator, with what to do about it.
 #[derive(Debug)]
 #[non_exhaustive]
@@ -148,5 +150,11 @@ impl std::error::Error for TargetError {
             Self::Io { source, .. } => Some(source),
             _ => None,
         }
+    }
+}
+
+impl From<TargetError> for Failure {
+    fn from(error: TargetError) -> Self {
+        Self::Tool { message: error.to_string(), is_missing: error.is_of_a_tool() }
     }
 }

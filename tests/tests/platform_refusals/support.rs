@@ -3,8 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use specgen::compile::{Refused, compile};
+use specgen::compile::compile;
 use specgen::diagnostic::{Diagnostic, Place, Severity, codes, render};
+use specgen::outcome::Refused;
 use specgen_tests::repository;
 
 /// A spec that is wrong, and how what the finding says fixes it.

@@ -11,11 +11,12 @@ use super::check::describe;
 use super::firmware::{self, late};
 use super::named::{InputFile, OutputFolder};
 use super::spec;
-use super::ui::{ControllerForm, Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::workspace;
 use specgen_language::model;
+use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::shell;
+use specgen_language::ui::{ControllerForm, Ui};
 use specgen_studies::verdict::{Answer, Verdict};
 use specgen_studies::verify::{self, Inspection, Measurement};
 use specgen_toolchain as target;
@@ -120,10 +121,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     };
     let refused = match built {
         Ok(()) => None,
-        Err(Failure::Target(error)) if error.is_of_a_tool() => {
+        Err(Failure::Tool { message, is_missing: true }) => {
             // Set-up knows more of the same tool: what was tried.
             let undone = summary.undone();
-            let missing = format!("left out: {undone}: {}", set_up.unwrap_or(error));
+            let missing = format!("left out: {undone}: {}", set_up.map_or(message, |error| error.to_string()));
             summary.verdict.unmeasured = Some(undone.to_owned());
             summary.missing = Some(missing.clone());
             if !arguments.require_target {
@@ -131,7 +132,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             }
             arguments.require_target.then_some(missing)
         }
-        Err(Failure::Target(error)) => Some(error.to_string()),
+        Err(Failure::Tool { message, .. }) => Some(message),
         Err(failure) => return Err(failure),
     };
     summary.over_budget = over_budget(&compiled, &summary);

@@ -3,7 +3,8 @@
 use clap::Args;
 use serde::Serialize;
 
-use super::ui::{Failure, Outcome, Ui};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::ui::Ui;
 use specgen_toolchain::budget::group;
 use specgen_toolchain::cache::{Cache, LIMIT};
 use specgen_toolchain::user_cache::VARIABLE;

@@ -7,9 +7,8 @@ use serde::Serialize;
 
 use super::named::InputFile;
 use super::spec;
-use super::ui::{Failure, Outcome, Ui};
 use crate::{lint, precision, reach, stability};
-use specgen_compiler::compile::{Compiled, Refused};
+use specgen_compiler::compile::Compiled;
 use specgen_compiler::lint::paths::PathDemand;
 use specgen_compiler::lower::setpoint::{self, Stopping};
 use specgen_compiler::lower::{self, PoseNoise};
@@ -19,7 +18,10 @@ use specgen_compiler::rest::RestNoise;
 use specgen_compiler::stability::Margins;
 use specgen_compiler::stability::platform::Design;
 use specgen_identify::Report;
+use specgen_language::outcome::Refused;
+use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::shell;
+use specgen_language::ui::Ui;
 use specgen_studies::lead::{self, LeadOf};
 use specgen_studies::verdict::{Answer, Verdict};
 

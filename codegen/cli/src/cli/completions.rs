@@ -4,7 +4,8 @@ use clap::Args;
 use clap_complete::Shell;
 use serde::Serialize;
 
-use super::ui::{Outcome, Ui};
+use specgen_language::outcome::Outcome;
+use specgen_language::ui::Ui;
 
 /// Arguments of `completions`.
 #[derive(Args, Debug)]

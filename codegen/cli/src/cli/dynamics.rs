@@ -9,16 +9,17 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use specgen_runtime::Motion;
 
-use super::file::unread_file;
-use super::file::write_file;
 use super::named::{InputFile, OutputFile};
 use super::spec;
-use super::ui::{ControllerForm, Failure, Outcome, Ui};
-use specgen_compiler::compile::Refused;
 use specgen_compiler::lower;
 use specgen_identify::states;
 use specgen_language::files;
 use specgen_language::model::Model;
+use specgen_language::outcome::Refused;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::unread_file;
+use specgen_language::output::write_file;
+use specgen_language::ui::{ControllerForm, Ui};
 use specgen_numerics::{coriolis, displacements, gravity, jacobian, leg_forces, mass_matrix};
 use specgen_run_time::Dynamics;
 
@@ -96,13 +97,6 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         None => ui.result(&document),
     }
     Ok(())
-}
-
-/// What has no other text is shown as JSON.
-impl Outcome for Value {
-    fn text(&self) -> String {
-        format!("{self:#}\n")
-    }
 }
 
 #[derive(Serialize)]

@@ -3,8 +3,9 @@
 use clap::Args;
 use serde::Serialize;
 
-use super::ui::{Failure, Outcome, Ui};
 use specgen_language::diagnostic::codes;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::ui::Ui;
 use specgen_studies::verdict::WIDTH;
 
 /// Arguments of `explain`.

@@ -16,12 +16,13 @@ use specgen_language::interrupt::Scratch;
 use specgen_runtime::supervisor::{self, Request};
 use specgen_toolchain::host::build_loadable;
 
-use super::file::{claim, write_folder};
 use super::named::{InputFile, OutputFolder};
 use super::sim::environment;
 use super::spec;
-use super::ui::{ControllerForm, Failure, Outcome, Ui};
 use specgen_compiler::workspace;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::{claim, write_folder};
+use specgen_language::ui::{ControllerForm, Ui};
 
 /// Requests to the supervisor, by their words.
 const REQUESTS: [(&str, u32); 6] = [

@@ -12,13 +12,14 @@ use specgen_language::model::Model;
 use specgen_report::chart::{Axis, Chart, LINE};
 use specgen_studies::machine;
 
-use super::file::write_file;
 use super::identify::range;
 use super::named::{InputFile, OutputFile};
 use super::plot::Plot;
 use super::sim::PlantArguments;
 use super::spec;
-use super::ui::{Failure, Outcome, Ui};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::write_file;
+use specgen_language::ui::Ui;
 
 /// Curves where nothing else is said.
 const CURVES: u32 = 32;

@@ -10,7 +10,8 @@ use super::line::Line;
 use super::named::InputFile;
 use super::operate::{Operator, Served};
 use super::spec;
-use super::ui::{Failure, Ui};
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
 
 /// Arguments of `gcs`.
 #[derive(Args, Debug)]

@@ -17,9 +17,10 @@ mod stiffness;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::ui::{Failure, Ui};
-use specgen_compiler::compile::Refused;
 use specgen_language::diagnostic::Diagnostic;
+use specgen_language::outcome::Failure;
+use specgen_language::outcome::Refused;
+use specgen_language::ui::Ui;
 
 pub(super) use everett::range;
 pub use everett::summary;

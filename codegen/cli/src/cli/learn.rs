@@ -14,19 +14,20 @@ use host_sim::word::status_words;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::file::{check_input, check_place, write_file};
 use super::line::Line;
 use super::named::{InputFile, OutputFile};
 use super::operate::{Ended, Operator, motion_name};
 use super::sim::{PlantArguments, at_run_time, frequency};
 use super::spec;
-use super::table::{left, right, row};
 use super::trajectory;
-use super::ui::{Failure, Outcome, Ui};
 use machine::{Own, Remote};
 use specgen_compiler::compile::Compiled;
 use specgen_language::interrupt;
 use specgen_language::model::TaskSpace;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::{check_input, check_place, write_file};
+use specgen_language::table::{left, right, row};
+use specgen_language::ui::Ui;
 use specgen_report::learning::BANDWIDTH;
 use specgen_runtime::playback::Knot;
 use specgen_studies::learning::{
@@ -34,6 +35,7 @@ use specgen_studies::learning::{
     Update, course, knots, learn,
 };
 use specgen_studies::machine as plant;
+use specgen_studies::machine::run_failure;
 use specgen_studies::robust::Factors;
 use specgen_studies::robust::factors::Given;
 
@@ -277,7 +279,7 @@ fn simulated<T, F>(
     let noise = if arguments.plant.no_noise { Noise::NONE } else { Noise::of(&specimen) };
     let scenario = plant::scenario(model, task, &specimen, &noise, seed);
     let mut rig = scenario.rig().clone();
-    let mut bench = Bench::new(&mut rig, &mut controller, model.timing.period, 0)?;
+    let mut bench = Bench::new(&mut rig, &mut controller, model.timing.period, 0).map_err(run_failure)?;
     bench.arm(ARMING).map_err(gate)?;
     let found = match work(&mut bench, ui) {
         Ok(done) => Some(keep(done, ui)?),

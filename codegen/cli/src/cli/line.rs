@@ -6,7 +6,7 @@ use specgen_operate::pil::{BAUD, OpenError, SerialLine};
 use specgen_operate::{Session, SocketLine};
 
 use super::named::Endpoint;
-use super::ui::Failure;
+use specgen_language::outcome::Failure;
 
 /// A serial port or a socket.
 #[derive(Args, Debug)]

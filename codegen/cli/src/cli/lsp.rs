@@ -12,9 +12,9 @@ use lsp_server::{Connection, ErrorCode, Message, Notification, Request, Response
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
-use super::ui::Failure;
 use specgen_compiler::compile;
 use specgen_language::diagnostic::{Diagnostic, Place, Severity};
+use specgen_language::outcome::Failure;
 use specgen_language::spec::{SpecSource, key_markdown};
 use text::{Lines, Part, Spot};
 

@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 use clap::builder::{MapValueParser, PathBufValueParser, TypedValueParser, ValueParserFactory};
 use clap::{ArgMatches, ValueHint};
 
-use super::file::refused_output;
-use super::ui::Failure;
 use specgen_language::files::{self, Unwritten, Way};
+use specgen_language::outcome::Failure;
+use specgen_language::output::refused_output;
 
 macro_rules! named {
     ($($(#[$doc:meta])* $name:ident)*) => {$(

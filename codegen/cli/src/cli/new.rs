@@ -10,22 +10,24 @@ use std::path::Path;
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, ValueEnum};
 use serde::Serialize;
-use specgen_compiler::compile::{self, Compiled, Refused};
+use specgen_compiler::compile::{self, Compiled};
 use specgen_compiler::lower;
 use specgen_compiler::reach::{self, Reach};
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::interrupt::Scratch;
+use specgen_language::outcome::Refused;
 use specgen_language::shell;
 use specgen_language::spec::quantity;
 use specgen_language::spec::{self, SpecSource, json_schema};
 
-use super::file::{write_folder, write_scratch};
 use super::forc;
 use super::named::OutputFolder;
 use super::sim::environment;
-use super::ui::{Failure, Outcome, Ui};
 use draft::{Draft, Origin};
 use questions::{QUESTIONS, Question};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::{write_folder, write_scratch};
+use specgen_language::ui::Ui;
 
 /// Name of the spec in its folder.
 const SPEC: &str = "platform.toml";

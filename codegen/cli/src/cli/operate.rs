@@ -20,11 +20,9 @@ use clap::{ArgGroup, Args};
 use serde::Serialize;
 use specgen_link::client::Port;
 
-use super::file::read_text;
 use super::line::Line;
 use super::named::InputFile;
 use super::spec;
-use super::ui::{Failure, Outcome, Ui};
 use answer::{Mistake, Report};
 pub use ended::Ended;
 pub use operator::Operator;
@@ -32,6 +30,9 @@ pub use passes::motion_name;
 use specgen_compiler::compile;
 use specgen_language::interrupt;
 use specgen_language::model::Model;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::read_text;
+use specgen_language::ui::Ui;
 use specgen_operate::{ALIVE, Order, Session};
 use specgen_runtime::supervisor::Request;
 
@@ -189,7 +190,7 @@ fn lines(operator: &mut Operator<impl Port + 'static>, ui: &mut Ui) -> Result<()
         }
         Err(_) => Ok(()),
     }));
-    let lines = match ui.orders() {
+    let lines = match ui.take_lines() {
         Some(lines) => {
             line("status", operator, ui)?;
             lines

@@ -13,16 +13,18 @@ use host_sim::controller::{Controller, Supervised};
 use serde_json::json;
 use specgen_link::Counted;
 use specgen_link::client::{Port, Timeout};
+use specgen_studies::machine::run_failure;
 
-use super::file::unread_file;
 use super::named::{Endpoint, InputFile, OutputFolder};
 use super::plot::Plot;
 use super::sim::{PlantArguments, environment, frequency};
 use super::spec;
-use super::ui::{ControllerForm, Failure, Outcome, Ui};
 use report::Report;
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::workspace;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::unread_file;
+use specgen_language::ui::{ControllerForm, Ui};
 use specgen_language::{files, interrupt};
 use specgen_operate::pil::{BAUD, Lockstep, OpenError, Pipes, SerialLine, Stop};
 use specgen_toolchain::emulator::Emulator;
@@ -178,7 +180,7 @@ fn in_the_loop<P: Port>(
         }
         (_, Some(stop)) => Err(stopped(stop, report, ui)),
         (Err(Broken::Command(failure)), None) => Err(failure),
-        (Err(Broken::Run(error)), None) => Err(error.into()),
+        (Err(Broken::Run(error)), None) => Err(run_failure(error)),
     }
 }
 

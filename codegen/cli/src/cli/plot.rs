@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::file::{check_place, write_file};
 use super::named::OutputFile;
-use super::ui::Failure;
+use specgen_language::outcome::Failure;
+use specgen_language::output::{check_place, write_file};
 use specgen_report::chart::Chart;
 use specgen_report::plot::{figure, html};
 

@@ -15,16 +15,17 @@ use host_sim::description::Description;
 use host_sim::record::{self, Again, Block, Header, PhaseChange, Piece, Reader, Replay};
 use serde::Serialize;
 
-use super::file::unread_file;
 use super::named::{InputFile, OutputFile};
 use super::plot::Plot;
 use super::sim;
 use super::spec;
-use super::table::{left, right, row};
-use super::ui::{Failure, Outcome, Ui};
 use export::Exports;
 use specgen_compiler::compile::Compiled;
 use specgen_language::files;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::unread_file;
+use specgen_language::table::{left, right, row};
+use specgen_language::ui::Ui;
 use specgen_report::chart::{Axis, Chart, DASHED, LINE};
 
 /// Changes of the phase that are shown.

@@ -9,14 +9,16 @@ use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::Noise;
 use host_sim::platform::table::{MachiningTable, PoseTable};
 
-use super::file::{claim, write_folder};
 use super::named::OutputFolder;
 use super::plot::Plot;
 use super::sim::{at_run_time, environment};
-use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::{self, Compiled};
 use specgen_language::interrupt::Scratch;
+use specgen_language::outcome::Failure;
+use specgen_language::output::{claim, write_folder};
+use specgen_language::ui::Ui;
 use specgen_studies::machine;
+use specgen_studies::machine::run_failure;
 use specgen_studies::paper::{convergence, printed};
 use specgen_studies::reproduce::table::{Cell, Row, Table};
 use specgen_studies::reproduce::write::Results;
@@ -44,12 +46,6 @@ pub struct Arguments {
     /// The genetic algorithm: cost by generation.
     #[command(flatten)]
     plot: Plot,
-}
-
-impl Outcome for Results {
-    fn text(&self) -> String {
-        self.markdown()
-    }
 }
 
 /// What is done and what is left, a line each.
@@ -129,7 +125,7 @@ fn section_3(compiled: &Compiled, steps: &mut Steps) -> Result<Vec<Table>, Failu
     let table_2 = legs::table_2(&scenario, &mut controller);
     steps.next("Fig. 29: the stability region", REGION);
     let figure_29 = legs::figure_29(&mut controller, compiled.model.adaptation.run_interval);
-    [table_1, table_2, figure_29].into_iter().map(|table| table.map_err(Failure::from)).collect()
+    [table_1, table_2, figure_29].into_iter().map(|table| table.map_err(run_failure)).collect()
 }
 
 /// Tables 5 to 9.
@@ -140,13 +136,13 @@ fn section_4(compiled: &Compiled, steps: &mut Steps) -> Result<(Vec<Table>, Cont
     for case in platform::CASES {
         for frequency in platform::FREQUENCIES {
             steps.next(&format!("Tables 5 to 8: {} at {frequency} Hz", case.0), CASE);
-            platform::free_motion(&scenario, &mut controller, case, frequency, &mut free)?;
+            platform::free_motion(&scenario, &mut controller, case, frequency, &mut free).map_err(run_failure)?;
         }
     }
     let mut machining = MachiningTable::default();
     for part in platform::parts() {
         steps.next(&format!("Table 9: machining {}", part.0), MACHINING);
-        platform::machining(&scenario, &mut controller, part, &mut machining)?;
+        platform::machining(&scenario, &mut controller, part, &mut machining).map_err(run_failure)?;
     }
     let mut tables: Vec<Table> = Vec::new();
     for (case, _) in platform::CASES {

@@ -11,17 +11,19 @@ use std::time::Instant;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use super::file::{check_place, claim, write_folder};
 use super::learn::{NOWHERE, takes_correction};
 use super::named::{InputFile, OutputFolder};
 use super::plot::Plot;
 use super::sim::{PlantArguments, at_run_time, frequency};
 use super::spec;
 use super::trajectory;
-use super::ui::{Failure, Ui};
 use specgen_language::interrupt;
+use specgen_language::outcome::Failure;
+use specgen_language::output::{check_place, claim, write_folder};
 use specgen_language::spec::quantity::{self, Dimension};
+use specgen_language::ui::Ui;
 use specgen_report::learning::BANDWIDTH;
+use specgen_studies::machine::run_failure;
 use specgen_studies::robust::factors::Given;
 use specgen_studies::robust::{Factors, Learning, Member, Outcome, Plan, Shard, Study};
 use work::{Part, Ran, Work};
@@ -148,7 +150,8 @@ fn study(arguments: &StudyArguments, ui: &mut Ui) -> Result<(), Failure> {
     let learning = match arguments.learn {
         Some(passes) => {
             takes_correction(&compiled)?;
-            let learning = Learning::of(&compiled, &followed.choice, &factors, BANDWIDTH, passes)?;
+            let learning =
+                Learning::of(&compiled, &followed.choice, &factors, BANDWIDTH, passes).map_err(run_failure)?;
             Some(learning.ok_or_else(|| Failure::Gate(NOWHERE.to_owned()))?)
         }
         None => None,
@@ -194,7 +197,7 @@ fn study(arguments: &StudyArguments, ui: &mut Ui) -> Result<(), Failure> {
         }
     });
     ui.rate_done();
-    let runs = runs?;
+    let runs = runs.map_err(run_failure)?;
     if let (Some(shard), Some(file)) = (arguments.shard, &arguments.output) {
         if runs.len() < all {
             // A part is whole or not there.

@@ -12,15 +12,16 @@ use host_sim::controller::{Controller, ControllerError, TickController};
 use host_sim::description::Description;
 use host_sim::plant::{LegParameters, NoiseParameters};
 
-use super::file::{check_place, claim, write_folder};
 use super::named::{InputFile, OutputFile, OutputFolder};
 use super::plot::Plot;
 use super::spec;
-use super::ui::{ControllerForm, Failure, Ui};
 use specgen_compiler::compile;
 use specgen_compiler::workspace;
 use specgen_language::files;
 use specgen_language::interrupt::{self, Scratch};
+use specgen_language::outcome::Failure;
+use specgen_language::output::{check_place, claim, write_folder};
+use specgen_language::ui::{ControllerForm, Ui};
 use specgen_toolchain as target;
 
 /// Arguments of `sim`.

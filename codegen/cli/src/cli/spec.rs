@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
-use super::ui::{Failure, Ui};
-use specgen_compiler::compile::{self, Compiled, Refused};
+use specgen_compiler::compile::{self, Compiled};
 use specgen_language::model::Model;
+use specgen_language::outcome::Failure;
+use specgen_language::outcome::Refused;
 use specgen_language::spec::{self, SpecSource};
+use specgen_language::ui::Ui;
 
 /// Compiles the spec at `path`; its findings are shown.
 pub fn compiled(path: &Path, ui: &mut Ui) -> Result<Compiled, Failure> {

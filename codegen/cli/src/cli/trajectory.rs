@@ -2,9 +2,9 @@
 
 use host_sim::trajectory::{PaperPath, Step};
 
-use super::ui::Failure;
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::TrajectoryKind;
+use specgen_language::outcome::Failure;
 use specgen_language::shell;
 use specgen_studies::lead::streamed;
 use specgen_studies::tuning::TrajectoryChoice;

@@ -12,16 +12,19 @@ use host_sim::plant::LegParameters;
 use host_sim::trajectory::PaperPath;
 use serde_json::json;
 
-use super::file::{check_edit, claim, edit_file, write_folder};
 use super::named::{InputFile, OutputFolder};
 use super::plot::Plot;
 use super::sim::{PlantArguments, at_run_time, frequency};
 use super::spec;
-use super::ui::{Failure, Ui};
-use specgen_compiler::compile::{self, Compiled, Refused};
+use specgen_compiler::compile::{self, Compiled};
 use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
 use specgen_language::interrupt;
+use specgen_language::outcome::Failure;
+use specgen_language::outcome::Refused;
+use specgen_language::output::{check_edit, claim, edit_file, write_folder};
 use specgen_language::spec::SpecSource;
+use specgen_language::ui::Ui;
+use specgen_studies::machine::run_failure;
 use specgen_studies::tuning::cma::Cma;
 use specgen_studies::tuning::feasible::{Feasibility, Required};
 use specgen_studies::tuning::genetic::{Genetic, Settings};
@@ -277,7 +280,7 @@ impl Job<'_> {
     }
 
     fn case(&self, start: &Setting, conditions: &Conditions) -> Result<Case, Failure> {
-        Case::new(&self.compiled, &self.controller, &self.leg, start, conditions).map_err(Failure::from)
+        Case::new(&self.compiled, &self.controller, &self.leg, start, conditions).map_err(run_failure)
     }
 
     fn conditions(&self, trajectory: TrajectoryChoice, seed: u64, whole_ticks: bool) -> Conditions {
@@ -354,7 +357,7 @@ impl Job<'_> {
             };
             let search = Search::run(optimiser.as_mut(), &self.space, &self.feasibility, case, &options);
             ui.rate_done();
-            searches.push((name, search?));
+            searches.push((name, search.map_err(run_failure)?));
         }
         Ok(searches)
     }

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use specgen_language::outcome::Failure;
+
 /// Why an output folder could not be written.
 #[derive(Debug)]
 pub enum WriteError {
@@ -85,3 +87,13 @@ impl std::fmt::Display for WriteError {
 }
 
 impl std::error::Error for WriteError {}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        let message = error.to_string();
+        match error {
+            WriteError::Occupied { .. } | WriteError::NotAFolder { .. } => Self::Gate(message),
+            _ => Self::Environment(message),
+        }
+    }
+}

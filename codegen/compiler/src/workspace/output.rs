@@ -8,13 +8,14 @@
 mod replace;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use super::error::WriteError;
 use super::found::{MANIFEST, Manifest, WORK, check_free, entries};
 use super::hold::Hold;
+use specgen_language::files::sync;
 use specgen_language::interrupt;
 
 /// In the work folder: what is to be the output; after the swap, what was.
@@ -206,15 +207,6 @@ fn write_file(path: &Path, text: &str) -> Result<(), WriteError> {
         fs::create_dir_all(folder).map_err(|e| WriteError::io("create", folder, e))?;
     }
     fs::write(path, text).map_err(|e| WriteError::io("write", path, e))
-}
-
-/// Waits until a file, or the list of a folder, is on the disk.
-pub fn sync(path: &Path) -> io::Result<()> {
-    match File::open(path)?.sync_all() {
-        // A file system that knows no such thing.
-        Err(error) if matches!(error.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => Ok(()),
-        done => done,
-    }
 }
 
 fn sync_tree(root: &Path) -> io::Result<()> {

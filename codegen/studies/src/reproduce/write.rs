@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use serde::{Serialize, Serializer};
 use serde_json::json;
+use specgen_language::outcome::Outcome;
 
 use super::table::{Cell, Row, Table};
 use crate::paper::convergence::Convergence;
@@ -70,6 +71,12 @@ pub fn fell(convergence: &Convergence) -> String {
         cost(first.median),
         cost(last.median)
     )
+}
+
+impl Outcome for Results {
+    fn text(&self) -> String {
+        self.markdown()
+    }
 }
 
 impl Results {

@@ -15,11 +15,12 @@ use rawzip::ZipArchiveWriter;
 use serde::Serialize;
 use specgen_compiler::compile::Compiled;
 
-use crate::cli::file::{claim, write_folder, write_scratch};
 use crate::cli::named::{InputFile, OutputFolder};
 use crate::cli::sim::environment;
 use crate::cli::spec;
-use crate::cli::ui::{Failure, Outcome, Ui};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::{claim, write_folder, write_scratch};
+use specgen_language::ui::Ui;
 
 /// Where FMI 2.0 looks for the library of this host.
 const PLATFORM: &str = match (cfg!(target_os = "windows"), cfg!(target_os = "macos")) {

@@ -8,10 +8,11 @@ use serde::Serialize;
 
 use super::{Common, Purpose, make, read_image, refusal, text};
 use crate::cli::named::InputFile;
-use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_language::diagnostic::codes;
 use specgen_language::model::{self, Mcu};
+use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::shell;
+use specgen_language::ui::Ui;
 use specgen_toolchain::budget;
 use specgen_toolchain::checks::{self, Checked, Rules};
 use specgen_toolchain::find_program;

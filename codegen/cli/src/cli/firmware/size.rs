@@ -6,7 +6,8 @@ use serde::Serialize;
 
 use super::{Common, Made, Purpose, make, read_image, refusal, text};
 use crate::cli::named::InputFile;
-use crate::cli::ui::{Failure, Outcome, Ui};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::ui::Ui;
 use specgen_toolchain::TargetError;
 use specgen_toolchain::checks::{self, Checked, Rules};
 use specgen_toolchain::size::{Size, has_tick, size};

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::{Made, time};
-use crate::cli::table::{left, right, row};
-use crate::cli::ui::Outcome;
+use specgen_language::outcome::Outcome;
+use specgen_language::table::{left, right, row};
 use specgen_toolchain::budget::{Used, group};
 use specgen_toolchain::checks::Checked;
 use specgen_toolchain::size::Size;

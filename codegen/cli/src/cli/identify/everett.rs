@@ -10,13 +10,14 @@ use super::cause::account;
 use super::predict;
 use super::reading::ReadingArguments;
 use super::{Measured, refused};
-use crate::cli::file::write_file;
 use crate::cli::named::{InputFile, OutputFile};
 use crate::cli::plot::{Plot, wrote};
-use crate::cli::table::{right, row};
-use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_identify::{self as identify, DeadTime, GridChoice, Options, Prediction, Report};
 use specgen_language::diagnostic::Diagnostic;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::write_file;
+use specgen_language::table::{right, row};
+use specgen_language::ui::Ui;
 use specgen_report::identification as figure;
 
 /// Arguments of `identify RECORD`.

@@ -8,16 +8,18 @@ use host_sim::record::{self, Block, Header};
 use serde::Serialize;
 
 use super::{Measured, refused};
-use crate::cli::file::write_folder;
 use crate::cli::named::InputFile;
-use crate::cli::table::{right, row};
-use crate::cli::ui::{Failure, Outcome, Ui};
 use crate::cli::{replay, sim, spec};
-use specgen_compiler::compile::{Compiled, Refused};
+use specgen_compiler::compile::Compiled;
 use specgen_compiler::lower;
 use specgen_identify::gains::{self, LegGain};
 use specgen_identify::{declared, marked_as_simulated, write_table_csv};
 use specgen_language::model::RateDependence;
+use specgen_language::outcome::Refused;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::write_folder;
+use specgen_language::table::{right, row};
+use specgen_language::ui::Ui;
 use specgen_numerics::displacements;
 
 /// Phases of the supervisor in which the law moves the legs: running, holding.

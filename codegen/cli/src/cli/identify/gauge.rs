@@ -7,10 +7,11 @@ use serde::Serialize;
 
 use super::reading::ReadingArguments;
 use super::{Measured, refused};
-use crate::cli::file::write_file;
 use crate::cli::named::{InputFile, OutputFile};
 use crate::cli::plot::{Plot, wrote};
-use crate::cli::ui::{Failure, Outcome, Ui};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::write_file;
+use specgen_language::ui::Ui;
 
 use specgen_identify::gauge::{self, GaugeReport};
 use specgen_report::identification as figure;

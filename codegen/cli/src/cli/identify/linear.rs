@@ -10,15 +10,17 @@ use super::reading::ReadingArguments;
 use super::{Measured, refused};
 use crate::cli::named::InputFile;
 use crate::cli::plot::Plot;
-use crate::cli::table::{left, right, row};
-use crate::cli::ui::{Failure, Outcome, Ui};
-use specgen_compiler::compile::{self, Refused};
+use specgen_compiler::compile;
 use specgen_compiler::stability::Margins;
 use specgen_identify as identify;
 use specgen_identify::linear::{self, LinearReport, PAPER_PROPORTION};
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::Adaptation;
+use specgen_language::outcome::Refused;
+use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::spec::{self, SpecSource};
+use specgen_language::table::{left, right, row};
+use specgen_language::ui::Ui;
 use specgen_report::identification as figure;
 
 /// Weights per run that the paper prints.

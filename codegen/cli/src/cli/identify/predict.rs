@@ -8,14 +8,15 @@ use clap::Args;
 use super::cause::account;
 use super::reading::ReadingArguments;
 use super::{Identified, Measured, refused};
-use crate::cli::file::write_file;
 use crate::cli::named::{InputFile, OutputFile};
 use crate::cli::plot::{Plot, wrote};
 use crate::cli::spec;
-use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_identify::mode::{self, Mode};
 use specgen_identify::rate::{Inertia, RateModel};
 use specgen_identify::{Drive, Prediction, declared, predict, read_drive, read_file, read_table_csv};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::write_file;
+use specgen_language::ui::Ui;
 use specgen_report::identification as figure;
 
 /// Arguments of `identify predict`.

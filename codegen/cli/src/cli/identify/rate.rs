@@ -8,14 +8,15 @@ use clap::Args;
 use super::everett::{grid, range};
 use super::reading::ReadingArguments;
 use super::{Identified, Measured};
-use crate::cli::file::write_folder;
 use crate::cli::named::{InputFile, OutputFolder};
 use crate::cli::plot::{Plot, wrote};
-use crate::cli::table::{left, right, row};
-use crate::cli::ui::{Failure, Outcome, Ui};
-use specgen_compiler::compile::Refused;
 use specgen_identify::rate::{RateIdentified, RateOption, RateReport, identify_rate, spec_lines, write_rate_csv};
 use specgen_identify::{Options, marked_as_simulated, read_record, write_table_csv};
+use specgen_language::outcome::Refused;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::write_folder;
+use specgen_language::table::{left, right, row};
+use specgen_language::ui::Ui;
 use specgen_report::identification as figure;
 
 /// Arguments of `identify rate`.

@@ -3,7 +3,7 @@
 use clap::Args;
 use specgen_identify::Reading;
 
-use crate::cli::ui::Failure;
+use specgen_language::outcome::Failure;
 
 /// Arguments of every kind of record.
 #[derive(Args, Debug)]

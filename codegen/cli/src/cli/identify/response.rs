@@ -8,7 +8,8 @@ use super::reading::ReadingArguments;
 use super::{Identified, Measured, refused};
 use crate::cli::named::InputFile;
 use crate::cli::plot::Plot;
-use crate::cli::ui::{Failure, Outcome, Ui};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::ui::Ui;
 
 use specgen_identify::response::{self, Estimate, ResponseReport};
 use specgen_report::identification as figure;

@@ -9,11 +9,12 @@ use serde::Serialize;
 
 use super::machine::Own;
 use super::{Arguments, Done, learnable_of, machine_name, motion_of, on, takes_correction};
-use crate::cli::file::write_file;
-use crate::cli::table::{right, row};
-use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_language::interrupt;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::write_file;
+use specgen_language::table::{right, row};
+use specgen_language::ui::Ui;
 use specgen_studies::learning::{Convergence, Excitation, Heard, PASSES};
 use specgen_studies::robust::Factors;
 

@@ -11,7 +11,8 @@ use specgen_runtime::supervisor::{Phase, Request};
 use specgen_studies::learning::{LearnError, Motion, Plan, Repeating, Seen, course, held};
 
 use crate::cli::operate::{Ended, Operator};
-use crate::cli::ui::{Failure, Ui};
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
 
 /// How long arming, and the way to the bias pose, may take.
 const ARMING: Duration = Duration::from_secs(120);

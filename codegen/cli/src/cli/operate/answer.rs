@@ -9,7 +9,7 @@ use serde_json::Value;
 use specgen_operate::FRESH;
 
 use super::located::ago;
-use crate::cli::ui::Outcome;
+use specgen_language::outcome::Outcome;
 
 /// A session: every order with its answer, and how the machine stood at the end. Answers were shown as they came.
 #[derive(Serialize)]

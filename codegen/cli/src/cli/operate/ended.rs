@@ -3,7 +3,7 @@
 use specgen_link::Refusal;
 use specgen_link::client::ClientError;
 
-use crate::cli::ui::Failure;
+use specgen_language::outcome::Failure;
 
 /// Why a session ends before its orders do.
 pub enum Ended {

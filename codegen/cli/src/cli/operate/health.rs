@@ -9,7 +9,7 @@ use specgen_runtime::supervisor::{AMPLIFIER, Cause, EVENTS, FIRST_EVENT};
 
 use super::answer::MachineStatus;
 use super::located::Located;
-use crate::cli::ui::Outcome;
+use specgen_language::outcome::Outcome;
 
 /// Answer to `status`: how the machine stands, and what it noticed.
 #[derive(Serialize)]

@@ -11,8 +11,8 @@ use specgen_runtime::setpoint::BUSY;
 use specgen_runtime::supervisor::Phase;
 
 use super::pose::unit;
-use crate::cli::table::{left, right, row};
-use crate::cli::ui::Outcome;
+use specgen_language::outcome::Outcome;
+use specgen_language::table::{left, right, row};
 
 /// Where a platform is: µm and µrad, V.
 #[derive(Debug, Serialize)]

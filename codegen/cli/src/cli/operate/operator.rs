@@ -15,11 +15,12 @@ use super::answer::{Answer, Downloaded, MachineStatus, Moves, Plain, RecorderSta
 use super::ended::{Ended, unsupported, waving};
 use super::health::Standing;
 use super::pose::{ZERO, in_words};
-use crate::cli::file::{check_input, check_place, write_file};
-use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
 use specgen_language::files;
 use specgen_language::model::Model;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::{check_input, check_place, write_file};
+use specgen_language::ui::Ui;
 use specgen_operate::frame::Frame;
 use specgen_operate::{Order, Session, Until};
 

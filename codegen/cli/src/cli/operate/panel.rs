@@ -37,9 +37,10 @@ use super::{Ended, Operator, Served, mistake};
 use crate::cli::line::Line;
 use crate::cli::named::InputFile;
 use crate::cli::spec;
-use crate::cli::ui::{Failure, Ui};
 use hall::{Hall, now};
 use orders::{carry_out, question};
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
 
 /// Between two messages with samples.
 const FRAME: Duration = Duration::from_millis(25);

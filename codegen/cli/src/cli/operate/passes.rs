@@ -18,7 +18,8 @@ use specgen_studies::learning::{Table, translation_nm};
 
 use super::Ended;
 use super::operator::Operator;
-use crate::cli::ui::{Outcome, Ui};
+use specgen_language::outcome::Outcome;
+use specgen_language::ui::Ui;
 
 /// Rest before a pass, s: what rings after the way to its start has died away.
 const REST: f64 = 0.1;

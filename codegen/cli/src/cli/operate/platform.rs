@@ -20,8 +20,9 @@ use super::ended::Ended;
 use super::located::Located;
 use super::operator::Operator;
 use super::pose::{ZERO, in_words, unit};
-use crate::cli::table::{left, right, row};
-use crate::cli::ui::Outcome;
+use specgen_language::outcome::Outcome;
+use specgen_language::table::{left, right, row};
+use specgen_language::ui::Ui;
 
 /// Gains of each kind, in the order of the settings; those of P alone have `position_` before them.
 const GAINS: [&str; 3] = ["kp", "ki", "kv"];
@@ -201,7 +202,7 @@ impl<P: Port> Operator<P> {
     }
 
     /// Carries out what is about a platform.
-    pub(super) fn of_platform(&mut self, order: &Order, line: &str, ui: &crate::cli::ui::Ui) -> Result<(), Ended> {
+    pub(super) fn of_platform(&mut self, order: &Order, line: &str, ui: &Ui) -> Result<(), Ended> {
         match order {
             Order::Where => {
                 let place = self.place()?;
@@ -288,7 +289,7 @@ impl<P: Port> Operator<P> {
         core::array::from_fn(|axis| number(axis).unwrap_or_default())
     }
 
-    fn show_gains(&mut self, gain_ratio_limit: Option<f64>, line: &str, ui: &crate::cli::ui::Ui) -> Result<(), Ended> {
+    fn show_gains(&mut self, gain_ratio_limit: Option<f64>, line: &str, ui: &Ui) -> Result<(), Ended> {
         let words = self.session.config()?;
         let mode = self.word_of(&words, "mode").and_then(|mode| MODES.get(usize::try_from(mode).ok()?).copied());
         let set = |prefix: &str| GAINS.map(|name| self.six(&words, &format!("{prefix}{name}")));

@@ -9,7 +9,7 @@ use specgen_runtime::pending::Stage;
 
 use super::ended::{Ended, no_input};
 use super::operator::Operator;
-use crate::cli::ui::Outcome;
+use specgen_language::outcome::Outcome;
 
 /// How it stands with the input line.
 #[derive(Serialize)]

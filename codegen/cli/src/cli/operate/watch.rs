@@ -12,9 +12,10 @@ use specgen_operate::samples::{Block, Row, Spread};
 
 use super::ended::Ended;
 use super::operator::Operator;
-use crate::cli::file::{PendingFile, unwritten};
-use crate::cli::table::{Column, right, row};
-use crate::cli::ui::{Outcome, Ui};
+use specgen_language::outcome::Outcome;
+use specgen_language::output::{PendingFile, unwritten};
+use specgen_language::table::{Column, right, row};
+use specgen_language::ui::Ui;
 
 /// Time of a row, if nothing else is said, s.
 const ROW: f64 = 0.1;

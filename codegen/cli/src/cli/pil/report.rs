@@ -10,9 +10,9 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::cli::sim::platform::Played;
-use crate::cli::table::{left, right, row};
-use crate::cli::ui::Outcome;
 use specgen_compiler::compile::Compiled;
+use specgen_language::outcome::Outcome;
+use specgen_language::table::{left, right, row};
 use specgen_operate::pil::{Cost, Difference};
 use specgen_report::chart::Chart;
 

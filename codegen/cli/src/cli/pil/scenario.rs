@@ -14,9 +14,10 @@ use specgen_link::client::Port;
 use super::report::Report;
 use super::{Arguments, Broken, timed};
 use crate::cli::sim;
-use crate::cli::ui::{Failure, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::TaskSpace;
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
 use specgen_operate::pil::Lockstep;
 use specgen_studies::machine;
 

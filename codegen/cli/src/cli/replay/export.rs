@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use host_sim::record::{self, Again, Block, Header};
 
 use super::messages::Messages;
-use crate::cli::file::{PendingFile, unwritten};
-use crate::cli::ui::Failure;
+use specgen_language::outcome::Failure;
+use specgen_language::output::{PendingFile, unwritten};
 
 /// Files on their way.
 #[derive(Default)]

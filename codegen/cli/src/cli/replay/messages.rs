@@ -11,8 +11,8 @@ use host_sim::word::{Scalar, WordKind, status_words};
 use serde_json::{Value, json};
 
 use super::mcap::Writer;
-use crate::cli::file::{PendingFile, unwritten};
-use crate::cli::ui::Failure;
+use specgen_language::outcome::Failure;
+use specgen_language::output::{PendingFile, unwritten};
 use specgen_operate::place::AXES;
 
 /// Channels whose numbers are those of a pose, where there is one.

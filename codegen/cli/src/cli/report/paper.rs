@@ -10,12 +10,14 @@ use specgen_language::shell;
 use specgen_report::hysteresis;
 use specgen_report::paper::{legs, linear, machining, motion, region};
 use specgen_report::section::Section;
+use specgen_studies::machine::run_failure;
 use specgen_studies::paper::convergence;
 
 use super::SEED;
 use crate::cli::sim::environment;
-use crate::cli::ui::{Failure, Ui};
 use crate::{lower, machine, reproduce};
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
 
 pub fn sections(
     compiled: &Compiled,
@@ -46,12 +48,12 @@ fn of_platform(
     })?;
     let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED);
     let sim = shell::on("specgen sim", name, "--frequency 0.1,1,10 -o DIR");
-    let mut sections = motion::sections(&scenario, controller, &sim, &|what| ui.progress(what))?;
+    let mut sections = motion::sections(&scenario, controller, &sim, &|what| ui.progress(what)).map_err(run_failure)?;
     ui.progress("machining, linear relation");
     let machined = machining::section(&scenario, controller, &shell::on("specgen sim", name, "-o DIR"));
-    sections.push(machined?);
+    sections.push(machined.map_err(run_failure)?);
     sections.push(hysteresis::of_paper(&specimen.legs[0], model.actuator.voltage[0]));
-    sections.push(linear::of_platform(&scenario, controller, &platform, &model.actuator, "")?);
+    sections.push(linear::of_platform(&scenario, controller, &platform, &model.actuator, "").map_err(run_failure)?);
     sections.push(region::section(compiled, None).map_err(environment)?);
     Ok(sections)
 }
@@ -65,7 +67,7 @@ fn of_legs(compiled: &Compiled, controller: &mut Controller, name: &str, ui: &Ui
     ui.progress("leg tracking, linear relation, stability region");
     let adaptation = &model.adaptation;
     let mode = usize::from(adaptation.level_weight > 0.0) + usize::from(adaptation.drift_weight > 0.0);
-    let mut tracking = legs::section(&scenario, controller, &sim)?;
+    let mut tracking = legs::section(&scenario, controller, &sim).map_err(run_failure)?;
     // A law without its weight is the one before it.
     let same = [
         "The spec gives no weights: EWMA and PCC are here the inverse model alone, and no reproduction of the paper's.",
@@ -74,7 +76,7 @@ fn of_legs(compiled: &Compiled, controller: &mut Controller, name: &str, ui: &Ui
     if let Some(text) = same.get(mode) {
         tracking = tracking.text(text);
     }
-    let lines = linear::of_legs(&scenario, controller, &model.actuator, &sim)?;
+    let lines = linear::of_legs(&scenario, controller, &model.actuator, &sim).map_err(run_failure)?;
     let region = region::section(compiled, Some(controller)).map_err(environment)?;
     Ok(vec![tracking, hysteresis::of_paper(&leg, model.actuator.voltage[0]), lines, region])
 }

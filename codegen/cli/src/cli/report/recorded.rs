@@ -12,7 +12,8 @@ use super::beside;
 use super::words::Words;
 use crate::cli::replay;
 use crate::cli::sim::{at_run_time, environment};
-use crate::cli::ui::{Failure, Ui};
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
 
 /// Phase of the supervisor.
 const FAULTED: u8 = 5;

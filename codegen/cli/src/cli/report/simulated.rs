@@ -16,12 +16,14 @@ use specgen_report::platform::{self, Motion};
 use specgen_report::section::Section;
 use specgen_report::tracking::{self, Followed, Line, Shown, norm, short};
 use specgen_report::{hysteresis, learning, margins};
+use specgen_studies::machine::run_failure;
 use specgen_studies::verdict::Figure;
 
 use super::SEED;
 use crate::cli::sim::environment;
-use crate::cli::ui::{Failure, Ui};
 use crate::{lower, machine, reproduce};
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
 
 /// Frequencies at which six legs are tried, Hz: that of the budget first.
 const LEG_FREQUENCIES: [f64; 2] = [1.0, 10.0];
@@ -55,7 +57,8 @@ fn of_platform(
     })?;
     ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
     let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED);
-    let all = tracking::follow(compiled, task, &scenario, controller, &|what| ui.progress(what))?;
+    let all =
+        tracking::follow(compiled, task, &scenario, controller, &|what| ui.progress(what)).map_err(run_failure)?;
     let mode = tracking::mode_of(controller);
     let law = margins::name(Law::ALL.get(mode as usize).copied().unwrap_or(Law::Position));
     let corners = compiled.findings.iter().any(|finding| finding.code == codes::TRAJECTORY_CORNERS.id);
@@ -77,7 +80,7 @@ fn of_platform(
     }
     ui.progress("error budget");
     let pair = Pair { own: &mut *controller, fine };
-    sections.push(budget::of_platform(model, task, &specimen, pair, SEED, &all)?);
+    sections.push(budget::of_platform(model, task, &specimen, pair, SEED, &all).map_err(run_failure)?);
     sections.push(margins::section(compiled, mode, &shell::on("specgen check", name, "")));
     if task.correction.is_some() {
         ui.progress("learning between passes");
@@ -88,7 +91,7 @@ fn of_platform(
     let legs = &specimen.legs;
     let behind =
         hysteresis::of_platform(&scenario, controller, &platform, &model.actuator, legs, &compiled.records, &all);
-    sections.push(behind?);
+    sections.push(behind.map_err(run_failure)?);
     let noise = compiled.pose_noise.as_ref().map(|noise| noise.pose);
     let speed = |own: bool| all.iter().find(|one| one.own == own && one.frequency.is_some()).map(Followed::speed);
     let picture = |turning: bool, unit: &'static str| {
@@ -132,7 +135,7 @@ fn of_legs(
     for frequency in LEG_FREQUENCIES {
         ui.progress(&format!("six legs at {frequency} Hz"));
         select(controller, word).map_err(environment)?;
-        let run = scenario.run(controller, frequency)?.tracking;
+        let run = scenario.run(controller, frequency).map_err(run_failure)?.tracking;
         let speed = format!("{frequency}\u{2009}Hz");
         let shown = Shown {
             id: format!("legs-{frequency}hz"),
@@ -160,7 +163,7 @@ fn of_legs(
         );
     }
     ui.progress("error budget");
-    sections.push(budget::of_legs(&leg, mode, Pair { own: &mut *controller, fine }, SEED)?);
+    sections.push(budget::of_legs(&leg, mode, Pair { own: &mut *controller, fine }, SEED).map_err(run_failure)?);
     sections.push(margins::section(compiled, mode as u32, &shell::on("specgen check", name, "")));
     sections.push(hysteresis::of_legs(&leg, model.actuator.voltage[0], &compiled.records));
     let said = values.iter().zip(LEG_FREQUENCIES).map(|((_, nm, coverage), hertz)| {

@@ -11,7 +11,7 @@ use specgen_runtime::supervisor::MISSED_TICK;
 
 use crate::cli::sim::environment;
 use crate::cli::sim::platform::LEG_LIMITED;
-use crate::cli::ui::Failure;
+use specgen_language::outcome::Failure;
 
 /// Phase of the supervisor.
 const RUNNING: u8 = 2;

@@ -4,10 +4,11 @@ use clap::Args;
 
 use super::Results;
 use super::work::Part;
-use crate::cli::file::{claim, read_text};
 use crate::cli::named::{InputFile, OutputFolder};
 use crate::cli::plot::Plot;
-use crate::cli::ui::{ControllerForm, Failure, Ui};
+use specgen_language::outcome::Failure;
+use specgen_language::output::{claim, read_text};
+use specgen_language::ui::{ControllerForm, Ui};
 use specgen_studies::robust::shard;
 
 /// Arguments of `robust merge`.

@@ -8,8 +8,8 @@ use specgen_language::shell;
 use specgen_report::chart::{Axis, Chart, DOTS};
 
 use super::work::{Lessons, Work};
-use crate::cli::table::{left, right, row};
-use crate::cli::ui::Outcome as Shown;
+use specgen_language::outcome::Outcome as Shown;
+use specgen_language::table::{left, right, row};
 use specgen_studies::robust::quantiles::quantile;
 use specgen_studies::robust::{Deviation, Factor, Factors, Figures, Gate, Learnt, Member, Outcome};
 

@@ -7,11 +7,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use super::StudyArguments;
-use crate::cli::file::write_file;
 use crate::cli::trajectory::Followed;
-use crate::cli::ui::{Failure, Outcome as Shown, Ui};
 use specgen_compiler::compile::Compiled;
+use specgen_language::outcome::{Failure, Outcome as Shown};
+use specgen_language::output::write_file;
 use specgen_language::shell;
+use specgen_language::ui::Ui;
 use specgen_studies::robust::{Factors, Gate, Learning, Member, Outcome, Plan, Shard, shard};
 use specgen_toolchain::sha256;
 

@@ -13,13 +13,15 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{Arguments, environment, write_files};
-use crate::cli::table::{left, right, row};
-use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::stability;
 use specgen_language::model::{Adaptation, Model};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::table::{left, right, row};
+use specgen_language::ui::Ui;
 use specgen_report::chart::{Axis, Chart, DASHED, LINE};
 use specgen_studies::machine;
+use specgen_studies::machine::run_failure;
 use specgen_studies::paper::printed;
 
 /// Control ticks per period of the paper's trajectory, unless asked otherwise.
@@ -101,7 +103,7 @@ fn own(
             let interval =
                 arguments.samples.map_or(model.timing.period, |samples| 1.0 / frequency / f64::from(samples));
             let sweep = LegSweep { range: range(model), frequency, periods: PERIODS };
-            let mut run = scenario.rig().clone().run(controller, &sweep, interval)?;
+            let mut run = scenario.rig().clone().run(controller, &sweep, interval).map_err(run_failure)?;
             let first = run.tracking.samples.iter().take_while(|sample| sample.time < 1.0 / frequency).count();
             if own_law == u64::from(word) {
                 charts.push(chart(&run.tracking, &format!("{mode} at {frequency} Hz")));
@@ -184,16 +186,16 @@ pub(super) fn run(
     let scenario = machine::legs(&compiled.model, &legs, &noise, arguments.plant.seed, samples);
     let modes = modes(&compiled.model.adaptation);
     ui.progress("Table 2: every law that the spec gives weights for, at three frequencies");
-    let tracking = scenario.tracking(controller, &modes, &TRACKING_FREQUENCIES)?;
+    let tracking = scenario.tracking(controller, &modes, &TRACKING_FREQUENCIES).map_err(run_failure)?;
     ui.progress("Table 1: inverse model alone at six frequencies");
-    let linearity = scenario.linearity(controller, &LINEARITY_FREQUENCIES)?;
+    let linearity = scenario.linearity(controller, &LINEARITY_FREQUENCIES).map_err(run_failure)?;
 
     let mut traces = Vec::new();
     if arguments.traces {
         for &(mode, word) in &modes {
             select(controller, word).map_err(environment)?;
             for frequency in TRACKING_FREQUENCIES {
-                let run = scenario.run(controller, frequency)?;
+                let run = scenario.run(controller, frequency).map_err(run_failure)?;
                 let stem = format!("trace-{mode}-{frequency}hz");
                 traces.push((format!("{stem}.csv"), run.trace.to_csv().into_bytes()));
                 traces.push((format!("{stem}.trace"), run.trace.to_bytes()));

@@ -20,14 +20,16 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{Arguments, File, environment, record, write_files};
-use crate::cli::table::{left, right, row};
-use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::{AdaptationMode, ControlMode, TaskSpace};
+use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::spec::nearest;
+use specgen_language::table::{left, right, row};
+use specgen_language::ui::Ui;
 use specgen_report::chart::{Axis, Chart, LINE};
 use specgen_runtime::wave::Wave;
 use specgen_studies::machine;
+use specgen_studies::machine::run_failure;
 
 /// How long the platform is looked at while it rests, s.
 const REST: f64 = 1.0;
@@ -443,7 +445,7 @@ impl Experiment<'_> {
                 self.ended.push(name.to_owned());
                 return Ok(None);
             }
-            run => run?,
+            run => run.map_err(run_failure)?,
         };
         if self.traced {
             self.traces.push((format!("{}.csv", name.replace(' ', "-")), run.to_csv().into_bytes()));

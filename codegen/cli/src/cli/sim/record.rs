@@ -17,10 +17,11 @@ use specgen_runtime::recorder::{Recorder, Settings as Recording};
 use specgen_runtime::wave::{AxisWave, Limits, Settings, Shape, Tone, Wave, step_of};
 
 use super::{Arguments, environment};
-use crate::cli::file::{PendingFile, unwritten};
-use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::TaskSpace;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::{PendingFile, unwritten};
+use specgen_language::ui::Ui;
 use specgen_studies::machine;
 
 /// Blocks of the recorder, and words of each: a tenth of a second at 10 kHz.

@@ -7,10 +7,12 @@ use std::path::Path;
 use host_sim::controller::Controller;
 use serde::Serialize;
 
-use super::super::file::read_text;
-use super::super::ui::{Failure, Outcome, Ui};
 use super::Job;
 use specgen_language::interrupt;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::read_text;
+use specgen_language::ui::Ui;
+use specgen_studies::machine::run_failure;
 use specgen_studies::tuning::search::{Verdict, evaluate};
 use specgen_studies::tuning::{self, Evaluation, Setting, Space};
 
@@ -72,7 +74,7 @@ pub(super) fn run(job: &Job, asked: &[Setting], ui: &Ui) -> Result<(), Failure> 
         for (setting, verdict) in asked.iter().zip(verdicts) {
             // A list that lacks some is not what was asked for.
             let Some(verdict) = verdict else { return Err(Failure::interrupted()) };
-            let verdict = verdict?;
+            let verdict = verdict.map_err(run_failure)?;
             let cost = match verdict {
                 Verdict::Run(Evaluation::Scored(score)) => Some(score.cost),
                 _ => None,

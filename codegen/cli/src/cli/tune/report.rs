@@ -4,14 +4,15 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::super::table::{left, right, row};
-use super::super::ui::{Failure, Outcome};
 use super::Job;
 use super::start::Starts;
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::stability::platform::{Adapting, Conditions, Law, ModeMargins};
 use specgen_compiler::stability::{LegDynamics, phase_margin, transition};
 use specgen_language::model::{AdaptationMode, ControlMode};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::table::{left, right, row};
+use specgen_studies::machine::run_failure;
 use specgen_studies::tuning::feasible::Feasibility;
 use specgen_studies::tuning::relay::Ultimate;
 use specgen_studies::tuning::search::Generation;
@@ -99,8 +100,8 @@ impl<'a> Report<'a> {
                 name,
                 setting,
                 holds_margins: job.feasibility.holds(&setting),
-                tuned_on: case.run(&mut here, &setting)?,
-                scored_on: other.run(&mut there, &setting)?,
+                tuned_on: case.run(&mut here, &setting).map_err(run_failure)?,
+                scored_on: other.run(&mut there, &setting).map_err(run_failure)?,
             });
         }
         let result = rows.last().map(|row| row.setting);

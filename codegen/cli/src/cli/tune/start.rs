@@ -2,11 +2,13 @@
 
 use host_sim::platform::rig::Noise;
 
-use super::super::ui::{Failure, Ui};
 use super::{Job, refused};
 use specgen_compiler::stability::platform::{ClosedLoop, Tuning};
 use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
 use specgen_studies::machine;
+use specgen_studies::machine::run_failure;
 use specgen_studies::tuning::feasible::Feasibility;
 use specgen_studies::tuning::relay::{self, Ultimate};
 use specgen_studies::tuning::space::{Role, rounded};
@@ -53,7 +55,7 @@ pub(super) fn starts(job: &Job, case: &Case, own: Setting, ui: &Ui) -> Result<St
     let mut limited = None;
     for start in [Some(own), ziegler_nichols].into_iter().flatten() {
         let Some(setting) = shrunk(job, start) else { continue };
-        match case.run(&mut worker, &setting)? {
+        match case.run(&mut worker, &setting).map_err(run_failure)? {
             Evaluation::Scored(score) => scored.push((setting, score)),
             Evaluation::Limited { time, status } => limited = Some((time, status)),
         }
@@ -104,7 +106,7 @@ fn relay_test(job: &Job, ui: &Ui) -> Result<Option<[Option<Ultimate>; 6]>, Failu
     // Active damping is P/F's.
     let active_damping = closed_loop.active_damping.filter(|_| !job.space.alone);
     let closed_loop = ClosedLoop { active_damping, ..closed_loop.as_ref().clone() };
-    relay::test(&scenario, &job.controller, &closed_loop, [radius, lead]).map(Some).map_err(Failure::from)
+    relay::test(&scenario, &job.controller, &closed_loop, [radius, lead]).map(Some).map_err(run_failure)
 }
 
 /// PI gains of the relay test in place of the spec's; none if an axis did not oscillate.

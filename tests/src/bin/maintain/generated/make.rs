@@ -4,8 +4,9 @@ use super::{Files, help, trace};
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
-use specgen_compiler::compile::{Compiled, Refused, compile, compile_source};
+use specgen_compiler::compile::{Compiled, compile, compile_source};
 use specgen_compiler::{emit, settings, workspace};
+use specgen_language::outcome::Refused;
 use specgen_language::{SpecSource, diagnostic, spec};
 use std::path::Path;
 

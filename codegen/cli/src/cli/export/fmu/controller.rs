@@ -10,7 +10,8 @@ use specgen_toolchain::host::{build_loadable, build_unit};
 use super::{Built, Unit, Variable};
 use crate::cli::export::{fits, header};
 use crate::cli::sim::environment;
-use crate::cli::ui::{ControllerForm, Failure, Ui};
+use specgen_language::outcome::Failure;
+use specgen_language::ui::{ControllerForm, Ui};
 
 const MODEL: &str = include_str!("controller_model.h");
 

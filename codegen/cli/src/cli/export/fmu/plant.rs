@@ -13,9 +13,10 @@ use specgen_toolchain::host::build_unit;
 use toml_edit::{Array, DocumentMut};
 
 use super::{Built, Unit, Variable};
-use crate::cli::file::write_scratch;
 use crate::cli::sim::environment;
-use crate::cli::ui::{Failure, Ui};
+use specgen_language::outcome::Failure;
+use specgen_language::output::write_scratch;
+use specgen_language::ui::Ui;
 
 const MODEL: &str = include_str!("plant_model.h");
 const MANIFEST: &str = include_str!("../../../../../../Cargo.toml");

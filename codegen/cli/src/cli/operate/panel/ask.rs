@@ -8,7 +8,7 @@ use specgen_operate::{ALIVE, Order};
 use specgen_runtime::supervisor::Request;
 
 use crate::cli::operate::{Ended, Operator};
-use crate::cli::ui::Ui;
+use specgen_language::ui::Ui;
 
 /// How long a request that is to begin to be given is not given before, ticks.
 const BEFORE: u64 = 10;

@@ -14,7 +14,7 @@ use super::ask::{ask, begin};
 use super::hall::{Asked, Begin};
 use super::{Panel, check};
 use crate::cli::operate::{Ended, Operator, mistake};
-use crate::cli::ui::Ui;
+use specgen_language::ui::Ui;
 
 /// Kind of a message with a record.
 const RECORD: u32 = 2;

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-use super::ui::Failure;
-use crate::{lock, workspace};
-use specgen_language::files::{self, Unread, Unwritten, Way};
-use specgen_language::interrupt::{self, Claimed, Guard};
+use crate::files::{self, Unread, Unwritten, Way};
+use crate::interrupt::{self, Claimed, Guard};
+use crate::lock;
+use crate::outcome::Failure;
 
 /// The text of a file that is named to a command.
 pub fn read_text(path: &Path) -> Result<String, Failure> {
@@ -122,6 +122,10 @@ enum Place {
 }
 
 impl PendingFile {
+    /// Begins a file, which replaces the one at `path` when it is kept.
+    ///
+    /// # Errors
+    /// The file may not be written, or not made.
     pub fn create(path: &Path) -> Result<Self, Failure> {
         Self::of(path, files::guard)
     }
@@ -171,10 +175,10 @@ impl PendingFile {
                     let _ = fs::set_permissions(file.path(), before.permissions());
                 }
                 // On the disk before it takes the place of what was there.
-                workspace::sync(file.path()).map_err(|error| unwritten(&target, &error))?;
+                files::sync(file.path()).map_err(|error| unwritten(&target, &error))?;
                 file.persist(&target).map_err(|error| unwritten(&target, &error.error))?;
                 let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
-                let _ = workspace::sync(folder.unwrap_or(Path::new(".")));
+                let _ = files::sync(folder.unwrap_or(Path::new(".")));
                 Ok(())
             }
         }
