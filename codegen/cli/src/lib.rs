@@ -8,7 +8,8 @@
 pub mod cli;
 
 pub use specgen_compiler::{
-    assumed, compile, emit, ir, lint, lower, precision, reach, requirements, rest, settings, stability, workspace,
+    assumed, compile, emit, findings, ir, lint, lower, precision, reach, requirements, rest, settings, stability,
+    workspace,
 };
 pub use specgen_identify::{self as identify, everett, waveform};
 pub use specgen_language::{diagnostic, files, interrupt, lock, model, outcome, shell, spec, ui};

@@ -154,7 +154,7 @@ fn documents() -> Vec<(String, String)> {
     let names = ["README.md", "ARCHITECTURE.md"].map(str::to_owned).into_iter().chain(pages());
     let read = |name: String| (name.clone(), fs::read_to_string(repository().join(name)).unwrap());
     // Of the generated pages those that have commands.
-    let findings = ("findings".to_owned(), specgen::diagnostic::reference_markdown());
+    let findings = ("findings".to_owned(), specgen::findings::reference_markdown());
     let keys = ("keys".to_owned(), specgen::spec::reference_markdown());
     names.map(read).chain([findings, keys]).collect()
 }

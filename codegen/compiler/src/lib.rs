@@ -9,7 +9,8 @@
 //! | [`compile`] | the phases in their order: start reading here |
 //! | [`stability`] | legs: Jury tests and the sampled leg; platform: modes, notch, start values, closed loop, margins, refusals |
 //! | [`reach`], [`demand`] | travel, workspace, bias and paths against the strokes; what motion requires of the legs against what they can do |
-//! | [`lint`] | values that are legal one by one and implausible together, a rule a function |
+//! | [`lint`] | values that are legal one by one and implausible together: each file has pages, messages and rules |
+//! | [`findings`] | every code with its page |
 //! | [`precision`] | rounding errors of the scalar: the runtime's kernels on numbers that record every operation |
 //! | [`lower`], [`ir`] | every constant of the controller, computed and rounded; `specgen dump-ir` prints it |
 //! | [`constants`] | constants of the IR as structs of the runtime; the emitted text is their `{:?}` |
@@ -24,6 +25,7 @@ pub mod compile;
 pub mod demand;
 pub mod emit;
 mod figure;
+pub mod findings;
 pub mod lint;
 pub mod lower;
 pub mod precision;

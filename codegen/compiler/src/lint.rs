@@ -12,6 +12,15 @@
 //! What needs no such judgement is checked elsewhere: ranges and consistency in [`specgen_language::spec`], reach in [`crate::reach`],
 //! stability in [`crate::stability`], paths in [`crate::lower::setpoint`], gauges in [`crate::lower`].
 
+/// The lints of a file: the rules in the order in which they run, then each finding with its page as the comment above it.
+/// The page is Markdown: a heading with code and title, what is checked, and *Why it matters*, *Example* and *Fix*.
+macro_rules! lints {
+    (rules: $($rule:ident),*; $($(#[doc = $line:literal])* $name:ident = $code:literal;)*) => {
+        $($(#[doc = $line])* pub static $name: Code = Code::new($code, &[$($line),*]);)*
+        pub(super) static LINTS: Lints = Lints { rules: &[$($rule),*], codes: &[$($name),*] };
+    };
+}
+
 mod actuator;
 mod alike;
 mod allow;
@@ -23,11 +32,14 @@ mod electronics;
 mod factors;
 mod frames;
 mod gauge_layout;
+mod gauge_order;
 mod gauge_pattern;
+mod gauge_places;
 mod gauges;
 mod layout;
 mod motion;
 mod order;
+mod pairs;
 pub mod paths;
 mod requirements;
 mod tick;
@@ -44,96 +56,46 @@ use specgen_runtime::Platform;
 
 use crate::figure::{AXES, figure};
 use crate::stability::platform::{ModalBasis, RestDynamics};
-use specgen_language::diagnostic::{Code, Diagnostic, codes};
+use frames::OTHER_FRAME;
+use specgen_language::diagnostic::{Code, Diagnostic};
 use specgen_language::model::Model;
 
 /// A rule looks at the platform and reports what it finds.
 type Rule = fn(&Facts, &mut Found);
 
-const RULES: &[Rule] = &[
-    layout::joints_apart,
-    layout::joints_turn,
-    layout::base_is_wider,
-    layout::proportions,
-    order::joints_run_round,
-    order::legs_cross,
-    frames::other_frame,
-    layout::angles_of_pairs,
-    bodies::leg_parts_have_size,
-    bodies::mass_centres_off_the_joints,
-    bodies::parts_are_bodies,
-    bodies::centre_over_joints,
-    bodies::moments_of_each_axis,
-    bodies::moments_fit_symmetry,
-    bodies::leg_parts_against_platform,
-    bodies::moments_about_the_centre,
-    actuator::strain,
-    actuator::stiffness_fits_resonance,
-    actuator::slew_spares_the_stacks,
-    actuator::slew_moves_the_legs,
-    actuator::resonance_is_damped,
-    actuator::grid_shows_the_loop,
-    electronics::lag_fits_slew,
-    electronics::current_fits_slew,
-    electronics::amplifier_noise,
-    electronics::capacitance_of_the_stacks,
-    electronics::converter_step,
-    electronics::converter_range,
-    electronics::rest_without_power,
-    gauges::differ,
-    gauges::noise_of_a_step,
-    gauges::range_centred,
-    gauges::range_beyond_zero,
-    gauges::step_against_stroke,
-    gauges::odd_coordinates,
-    gauges::opposite_directions,
-    gauges::noise_of_many_steps,
-    frames::turned_layout,
-    frames::size_of_pattern,
-    gauges::size_of_layout,
-    gauge_pattern::out_of_pattern,
-    gauge_layout::slip_of_one,
-    order::gauges_run_round,
-    alike::calibrations_fit_converter,
-    alike::calibrations,
-    alike::calibrations_straight,
-    alike::gains_by_stiffness,
-    alike::gains_in_order,
-    alike::integral_in_time,
-    contact::work_piece,
-    contact::lever_of_contact,
-    contact::contact_near_bias,
-    weights::ratio_of_gains,
-    weights::adapts_in_time,
-    weights::drift_behind_level,
-    timing::times_that_do_nothing,
-    timing::lead_of_the_lag,
-    timing::transfer,
-    timing::velocity_filter,
-    timing::ticks_against_modes,
-    timing::gauges_in_time,
-    timing::modes_seen_as_others,
-    tick::fits_period,
-    motion::rotations_beside_translations,
-    motion::stops_take_ticks,
-    motion::correction_moves_codes,
-    motion::moves_within_slew,
-    motion::moves_end,
-    motion::limits_bind,
-    motion::stream_limit_binds,
-    motion::streams_keep_up,
-    motion::streams_within_slew,
-    motion::workspace_is_used,
-    triggers::more_than_one,
-    triggers::some_at_all,
-    triggers::steps_apart,
-    triggers::above_noise,
-    triggers::pulses_apart,
-    requirements::ask_something,
-    requirements::frequencies,
-    factors::near_defaults,
-    factors::near_one,
-    budget::tables_fit,
+/// The lints of a file.
+struct Lints {
+    rules: &'static [Rule],
+    codes: &'static [Code],
+}
+
+/// In the order in which they run: a rule may look at what earlier ones found. The last three have findings and no rule.
+static FAMILIES: [&Lints; 25] = [
+    &layout::LINTS,
+    &order::LINTS,
+    &frames::LINTS,
+    &pairs::LINTS,
+    &bodies::LINTS,
+    &actuator::LINTS,
+    &electronics::LINTS,
+    &gauges::LINTS,
+    &gauge_places::LINTS,
+    &gauge_pattern::LINTS,
+    &gauge_layout::LINTS,
+    &gauge_order::LINTS,
+    &alike::LINTS,
+    &contact::LINTS,
+    &weights::LINTS,
+    &timing::LINTS,
+    &tick::LINTS,
+    &motion::LINTS,
+    &triggers::LINTS,
+    &requirements::LINTS,
+    &factors::LINTS,
+    &budget::LINTS,
+    &allow::LINTS,
+    &culprit::LINTS,
+    &paths::LINTS,
 ];
 
 /// A value that is so many times beyond what its rule lets pass is refused. A slip of a thousand is 32 times where its root
@@ -189,6 +151,11 @@ impl Legs {
     }
 }
 
+/// The findings of all lints.
+pub(crate) fn codes() -> impl Iterator<Item = Code> {
+    FAMILIES.iter().flat_map(|family| family.codes.iter().copied())
+}
+
 /// Every finding about values that do not fit together; in the order of the rules.
 #[must_use]
 pub fn check(model: &Model) -> Vec<Diagnostic> {
@@ -196,7 +163,7 @@ pub fn check(model: &Model) -> Vec<Diagnostic> {
     let legs = crate::lower::platform(model).ok().map(|platform| Legs::of(model, &platform));
     let facts = Facts { model, legs };
     let mut found = Found { model, list: Vec::new() };
-    for rule in RULES {
+    for rule in FAMILIES.iter().flat_map(|family| family.rules) {
         rule(&facts, &mut found);
     }
     found.list
@@ -220,7 +187,7 @@ impl<'a> Found<'a> {
     /// Whether a point of this gauge is found to be in the other frame: that explains whatever else is odd about it.
     fn is_in_other_frame(&self, gauge: usize) -> bool {
         let of_gauge = format!("gauge[{gauge}].");
-        self.list.iter().any(|one| one.code == codes::OTHER_FRAME && one.key.starts_with(&of_gauge))
+        self.list.iter().any(|one| one.code == OTHER_FRAME && one.key.starts_with(&of_gauge))
     }
 
     /// The same of a value that lies so many `times` beyond what the rule lets pass.
@@ -233,7 +200,7 @@ impl<'a> Found<'a> {
             false => format!("{message}: further beyond what passes than any factor says"),
         };
         let help = format!("{help}; if it is meant, say why in [lint]: allow = [\"{key}: <reason>\"]");
-        self.add(codes::FAR_OFF, key, message, &help);
+        self.add(allow::FAR_OFF, key, message, &help);
     }
 
     /// At `key`; where only its list or its section stands in the spec, there.

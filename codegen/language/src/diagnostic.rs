@@ -94,35 +94,3 @@ impl Diagnostic {
         Self::new(code, "", Place::File { path: path.to_owned(), line }, message, help)
     }
 }
-
-const MARKDOWN_HEAD: &str = "\
-<!-- Generated from the pages in codegen/language/findings; do not edit. -->
-
-# Findings
-
-Every finding has a code that keeps its meaning. E: refused, nothing is written. W: pointed out, nothing is refused. N: worth
-knowing. Numbers: 01 file and syntax, 02 keys and values, 03 ranges and consistency, 04 stability, reach, set-points, gauges and
-supervisor, 05 records, 06 identification, 07 tuning, 08 values that do not fit together. `specgen explain CODE` prints one of
-these pages. An example is a change of a spec of the repository, or commands; a test runs it, with and without its fix, unless it
-is marked (minutes) or stands in a block `text`.
-";
-
-/// The pages of all codes as one Markdown text: the page *Findings* of the book.
-#[must_use]
-pub fn reference_markdown() -> String {
-    let mut text = MARKDOWN_HEAD.to_owned();
-    for code in codes::REGISTRY {
-        text.push('\n');
-        let mut is_code = false;
-        for line in code.page.lines() {
-            is_code ^= line.starts_with("```");
-            // One level below the heading of the document.
-            if line.starts_with('#') && !is_code {
-                text.push('#');
-            }
-            text += line;
-            text.push('\n');
-        }
-    }
-    text
-}

@@ -5,7 +5,8 @@ mod record;
 
 use std::path::PathBuf;
 
-use specgen::diagnostic::{Diagnostic, Place, Severity, codes, render, to_json};
+use specgen::diagnostic::{Diagnostic, Place, Severity, render, to_json};
+use specgen::findings;
 use specgen::identify::{gauge, parse_record, read_table_csv, response, stiffness, write_table_csv};
 use specgen::operate::{Order, read_wave};
 use specgen::spec::{self, SpecSource};
@@ -44,7 +45,7 @@ fn shown(findings: &[Diagnostic], source: &SpecSource) {
 /// A finding about a spec has a known code, words, and a place within its text.
 pub fn assert_sound(finding: &Diagnostic, text: &str) {
     assert!(!finding.message.is_empty() && !finding.help.is_empty(), "{finding:?}");
-    assert!(codes::find(finding.code).is_some(), "{finding:?}");
+    assert!(findings::find(finding.code).is_some(), "{finding:?}");
     // A number that is computed is one; what a spec says may be shown as it stands.
     let words = format!("{} {}", finding.message, finding.help);
     let is_none = |word: &str| word == "NaN" && !text.contains("NaN");
@@ -91,7 +92,7 @@ fn accepted<T>(outcome: Result<T, Vec<Diagnostic>>) -> Option<T> {
     assert!(findings.iter().any(|finding| finding.severity == Severity::Error), "{findings:?}");
     for finding in &findings {
         assert!(!finding.message.is_empty() && !finding.help.is_empty(), "{finding:?}");
-        assert!(codes::find(finding.code).is_some(), "{finding:?}");
+        assert!(findings::find(finding.code).is_some(), "{finding:?}");
         assert!(
             matches!(&finding.place, Place::File { path, line } if path == FILE && *line != Some(0)),
             "{finding:?}"

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use specgen::compile::compile;
-use specgen::diagnostic::{Diagnostic, Place, Severity, codes, render};
+use specgen::diagnostic::{Diagnostic, Place, Severity, render};
 use specgen::outcome::Refused;
 use specgen_tests::repository;
 
@@ -88,7 +88,7 @@ pub fn hold(cases: Vec<Case>) {
             .find(|found| found.code == case.code)
             .unwrap_or_else(|| panic!("{what}: no {}:\n{shown}", case.code));
         assert_eq!(found.severity, Severity::Error, "{what}");
-        assert!(codes::find(found.code).is_some(), "{what}");
+        assert!(specgen::findings::find(found.code).is_some(), "{what}");
         assert!(found.message.contains(case.says), "{what}: {}", found.message);
         match case.at {
             Some(at) => {

@@ -3,7 +3,7 @@
 use clap::Args;
 use serde::Serialize;
 
-use specgen_language::diagnostic::codes;
+use specgen_compiler::findings;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::ui::Ui;
 use specgen_studies::verdict::WIDTH;
@@ -22,21 +22,21 @@ struct Explained {
     code: &'static str,
     title: &'static str,
     /// Markdown.
-    page: &'static str,
+    page: String,
 }
 
 pub fn run(arguments: &Arguments, ui: &Ui) -> Result<(), Failure> {
     let asked = arguments.code.to_uppercase();
-    let Some(code) = codes::find(&asked) else {
+    let Some(code) = findings::find(&asked) else {
         // The letter may be mistaken, or left out.
-        let same = codes::REGISTRY.iter().find(|code| asked.get(1..) == code.id.get(1..) || asked == code.id[1..]);
+        let same = findings::all().into_iter().find(|code| asked.get(1..) == code.id.get(1..) || asked == code.id[1..]);
         let help = same.map_or_else(
             || "docs/diagnostics.md lists them".to_owned(),
             |code| format!("did you mean {}, {}?", code.id, code.title()),
         );
         return Err(Failure::Usage(format!("there is no finding `{}`; {help}", arguments.code)));
     };
-    ui.result(&Explained { code: code.id, title: code.title(), page: code.page });
+    ui.result(&Explained { code: code.id, title: code.title(), page: code.page() });
     Ok(())
 }
 
@@ -96,8 +96,8 @@ mod tests {
 
     #[test]
     fn no_line_of_a_page_is_longer_than_a_terminal_is_wide() {
-        for code in codes::REGISTRY {
-            let page = Explained { code: code.id, title: code.title(), page: code.page }.text();
+        for code in findings::all() {
+            let page = Explained { code: code.id, title: code.title(), page: code.page() }.text();
             let long = page.lines().find(|line| line.chars().count() > WIDTH);
             assert_eq!(long, None, "{}", code.id);
         }

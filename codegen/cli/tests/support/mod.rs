@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
-use specgen::diagnostic::codes;
+use specgen::findings;
 pub use specgen::target::skipped;
 use specgen::target::{self, Tools};
 
@@ -147,10 +147,10 @@ impl Document {
         assert!(run.code == 1 || value["result"].is_null() == (run.code != 0), "{value:#}");
         assert_eq!(value["specgen"], env!("CARGO_PKG_VERSION"));
         let document = Self { code: run.code, value };
-        let reference = specgen::diagnostic::reference_markdown();
+        let reference = findings::reference_markdown();
         for finding in document.findings() {
             let code = finding["code"].as_str().unwrap();
-            assert!(codes::find(code).is_some(), "{code} is not registered");
+            assert!(findings::find(code).is_some(), "{code} is not registered");
             assert!(reference.contains(&format!("\n## {code}: ")), "{code} is not in the page of findings");
             for key in ["message", "help", "severity"] {
                 assert!(finding[key].as_str().is_some_and(|text| !text.is_empty()), "{key} of {finding:#}");

@@ -2,8 +2,186 @@
 
 use core::f64::consts::TAU;
 
-use super::{Facts, Found, figure, times_beyond};
-use specgen_language::diagnostic::codes;
+use super::{Facts, Found, Lints, figure, times_beyond};
+use specgen_language::diagnostic::Code;
+
+lints! {
+    rules: strain, stiffness_fits_resonance, slew_spares_the_stacks, slew_moves_the_legs, resonance_is_damped,
+        grid_shows_the_loop;
+
+    /// # W0802: a stroke that does not fit the length of a leg
+    ///
+    /// The stroke should be between a millionth and 0.015 of the length of a leg.
+    ///
+    /// ## Why it matters
+    ///
+    /// Piezo stacks stretch by 0.001 to 0.0015 of their own length, and a leg is
+    /// longer than its stacks.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [actuator] @@
+    /// -stroke          = "60 um"
+    /// +stroke          = "6 mm"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the units of `actuator.stroke` and `[geometry]`.
+    ///
+    /// ```toml
+    /// stroke          = "60 um"
+    /// ```
+    STRAIN_ODD = "W0802";
+
+    /// # W0803: resonance, stiffness and mass do not fit
+    ///
+    /// `actuator.resonance` is compared with sqrt(k_a / m) / 2π of the extensible
+    /// part alone and with a sixth of the platform.
+    ///
+    /// ## Why it matters
+    ///
+    /// The three are not independent; a value far from both is most often a stiffness
+    /// in N/um or a mass in the wrong unit.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [actuator] @@
+    /// -axial_stiffness = "1e7 N/m"
+    /// +axial_stiffness = "1e5 N/m"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check `resonance`, `axial_stiffness`, `leg.extensible_mass` and
+    /// `platform.mass`.
+    ///
+    /// ```toml
+    /// axial_stiffness = "1e7 N/m"
+    /// ```
+    RESONANCE_ODD = "W0803";
+
+    /// # W0804: a slew rate that does not spare the stacks
+    ///
+    /// The voltage should not be able to cross its range within a third of a period
+    /// of the resonance.
+    ///
+    /// ## Why it matters
+    ///
+    /// A stack that is driven so fast overshoots into tension, which ceramics do not
+    /// stand.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [actuator] @@
+    /// -slew_rate       = "40 V/ms"
+    /// +slew_rate       = "400 V/ms"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check V/ms against V/s; otherwise lower the slew rate to what the help names.
+    ///
+    /// ```toml
+    /// slew_rate       = "40 V/ms"
+    /// ```
+    SLEW_TOO_FAST = "W0804";
+
+    /// # W0809: a slew rate that leaves the legs standing
+    ///
+    /// The voltage should take less than a second over its range.
+    ///
+    /// ## Why it matters
+    ///
+    /// A stack can be driven over its range in milliseconds; a slower limit is most
+    /// often V/s where V/ms is meant.
+    ///
+    /// ## Example
+    ///
+    /// `specs/legs.toml` with
+    ///
+    /// ```diff
+    /// @@ [actuator] @@
+    /// -slew_rate       = "40 V/ms"
+    /// +slew_rate       = "0.04 V/ms"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit.
+    ///
+    /// ```toml
+    /// slew_rate       = "40 V/ms"
+    /// ```
+    SLEW_TOO_SLOW = "W0809";
+
+    /// # W0858: a damping ratio that cannot be
+    ///
+    /// `actuator.damping_ratio` should be at least 0.0002 and at most 0.6,
+    /// `control.modal_damping` between 0.0005 and 0.3.
+    ///
+    /// ## Why it matters
+    ///
+    /// Bare ceramic has a damping ratio of 0.0002; glued and loaded stacks have a
+    /// hundred times more. With more than 0.6 a leg hardly rings. A value that is too
+    /// large is often a percentage, or a quality factor Q in place of 1/(2 Q).
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [actuator] @@
+    /// -damping_ratio   = 0.1
+    /// +damping_ratio   = 0.0001
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Write ζ: 0.02 for 2 per cent.
+    ///
+    /// ```toml
+    /// damping_ratio   = 0.1
+    /// ```
+    DAMPING_ODD = "W0858";
+
+    /// # W0859: a grid too coarse for a hysteresis loop
+    ///
+    /// `hysteresis.grid` should be at least 8.
+    ///
+    /// ## Why it matters
+    ///
+    /// The branches of a loop are interpolated between nodes: with fewer each is a
+    /// few straight pieces, and the error of the inverse is that of the pieces.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [hysteresis] @@
+    /// -grid    = 32
+    /// +grid    = 4
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Take 16 or more; the table grows with the square.
+    ///
+    /// ```toml
+    /// grid    = 32
+    /// ```
+    GRID_COARSE = "W0859";
+}
 
 /// Stroke of a leg, in leg lengths. Stacks give 0.0015 of their own length; levers in a leg make ten times that.
 const LARGEST_STRAIN: f64 = 0.015;
@@ -32,7 +210,7 @@ const LEAST_DAMPED_MODE: f64 = 5e-4;
 const COARSEST_GRID: usize = 8;
 
 /// No piezo leg moves by more than a hundredth of its length.
-pub(super) fn strain(facts: &Facts, found: &mut Found) {
+fn strain(facts: &Facts, found: &mut Found) {
     let Some(legs) = &facts.legs else { return };
     let (stroke, length) = (facts.model.actuator.stroke, legs.shortest());
     let off = times_beyond(stroke / length, &(SMALLEST_STRAIN..=LARGEST_STRAIN));
@@ -41,7 +219,7 @@ pub(super) fn strain(facts: &Facts, found: &mut Found) {
     }
     found.add_off(
         off,
-        codes::STRAIN_ODD,
+        STRAIN_ODD,
         "actuator.stroke",
         format!(
             "a stroke of {} um is {} of a leg of {} mm",
@@ -54,7 +232,7 @@ pub(super) fn strain(facts: &Facts, found: &mut Found) {
 }
 
 /// Stiffness and masses bound the resonance of a leg: as bare as its extensible part, or with its share of the platform.
-pub(super) fn stiffness_fits_resonance(facts: &Facts, found: &mut Found) {
+fn stiffness_fits_resonance(facts: &Facts, found: &mut Found) {
     let model = facts.model;
     let own = model.leg.extensible_mass;
     let of = |mass: f64| libm::sqrt(model.actuator.axial_stiffness / mass) / TAU;
@@ -76,7 +254,7 @@ pub(super) fn stiffness_fits_resonance(facts: &Facts, found: &mut Found) {
     );
     found.add_off(
         off,
-        codes::RESONANCE_ODD,
+        RESONANCE_ODD,
         key,
         format!("{sizes}; the spec says {} Hz", figure(resonance)),
         "check the units of `actuator.axial_stiffness` (N/m or N/um), `actuator.resonance` (Hz or kHz), `leg.extensible_mass` and `platform.mass`",
@@ -84,7 +262,7 @@ pub(super) fn stiffness_fits_resonance(facts: &Facts, found: &mut Found) {
 }
 
 /// A slew limit protects the stacks if they are not driven over their range within a fraction of their own period.
-pub(super) fn slew_spares_the_stacks(facts: &Facts, found: &mut Found) {
+fn slew_spares_the_stacks(facts: &Facts, found: &mut Found) {
     let actuator = &facts.model.actuator;
     let [low, high] = actuator.voltage;
     let time = (high - low) / actuator.slew_rate;
@@ -93,7 +271,7 @@ pub(super) fn slew_spares_the_stacks(facts: &Facts, found: &mut Found) {
     }
     found.add_off(
         FASTEST / (time * actuator.resonance),
-        codes::SLEW_TOO_FAST,
+        SLEW_TOO_FAST,
         "actuator.slew_rate",
         format!(
             "at {} V/ms a stack goes over its range of {} V in {} us; one period of its resonance is {} us",
@@ -110,7 +288,7 @@ pub(super) fn slew_spares_the_stacks(facts: &Facts, found: &mut Found) {
 }
 
 /// A limit so low that nothing moves.
-pub(super) fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
+fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
     let actuator = &facts.model.actuator;
     let [low, high] = actuator.voltage;
     let time = (high - low) / actuator.slew_rate;
@@ -119,7 +297,7 @@ pub(super) fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
     }
     found.add_off(
         time / SLOWEST,
-        codes::SLEW_TOO_SLOW,
+        SLEW_TOO_SLOW,
         "actuator.slew_rate",
         format!(
             "at {} V/ms a leg takes {} s over its stroke: it moves at {} um/s at most",
@@ -132,7 +310,7 @@ pub(super) fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
 }
 
 /// Everything that is built is damped.
-pub(super) fn resonance_is_damped(facts: &Facts, found: &mut Found) {
+fn resonance_is_damped(facts: &Facts, found: &mut Found) {
     let actuator = &facts.model.actuator;
     let structure = facts.model.task_space.as_ref().map_or(0.02, |task| task.modal_damping);
     for (key, damping) in [("actuator.damping_ratio", actuator.damping_ratio), ("control.modal_damping", structure)] {
@@ -142,7 +320,7 @@ pub(super) fn resonance_is_damped(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::DAMPING_ODD,
+            DAMPING_ODD,
             key,
             format!(
                 "a damping ratio of {} is {}",
@@ -161,7 +339,7 @@ pub(super) fn resonance_is_damped(facts: &Facts, found: &mut Found) {
     }
     found.add_off(
         LEAST_DAMPED / actuator.damping_ratio,
-        codes::DAMPING_ODD,
+        DAMPING_ODD,
         "actuator.damping_ratio",
         format!(
             "with a damping ratio of {} a leg that is pushed rings for {} s (to a hundredth); a bare ceramic has {} and more",
@@ -174,14 +352,14 @@ pub(super) fn resonance_is_damped(facts: &Facts, found: &mut Found) {
 }
 
 /// A table of a few cells is no model of a hysteresis loop.
-pub(super) fn grid_shows_the_loop(facts: &Facts, found: &mut Found) {
+fn grid_shows_the_loop(facts: &Facts, found: &mut Found) {
     let grid = facts.model.hysteresis.grid;
     if grid >= COARSEST_GRID {
         return;
     }
     let [low, high] = facts.model.actuator.voltage;
     found.add(
-        codes::GRID_COARSE,
+        GRID_COARSE,
         "hysteresis.grid",
         format!(
             "{grid} intervals of {} V each: within one the model of a leg is a straight line",

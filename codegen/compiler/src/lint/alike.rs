@@ -1,8 +1,157 @@
 //! Values that come six at a time and are much alike: calibrations of gauges, gains by stiffness.
 
-use super::{AXES, Facts, Found, figure, times_beyond};
-use specgen_language::diagnostic::{Diagnostic, codes};
+use super::{AXES, Facts, Found, Lints, figure, times_beyond};
+use specgen_language::diagnostic::{Code, Diagnostic};
 use specgen_language::model::{Gains, TaskSpace};
+
+lints! {
+    rules: calibrations_fit_converter, calibrations, calibrations_straight, gains_by_stiffness, gains_in_order,
+        integral_in_time;
+
+    /// # W0827: a calibration unlike the others
+    ///
+    /// Offset and slope of each gauge are compared with those of the other five.
+    ///
+    /// ## Why it matters
+    ///
+    /// Six gauges of one kind have alike calibrations; a factor of three or another
+    /// sign is a coefficient in another unit.
+    ///
+    /// ## Example
+    ///
+    /// `specs/features/platform-calibration.toml` with
+    ///
+    /// ```diff
+    /// @@ [[gauge]] @@
+    /// -calibration = ["-44.8 um", "9.97 um/V", "12 nm/V^2", "-0.4 nm/V^3"]
+    /// +calibration = ["-44.8 um", "99.7 um/V", "12 nm/V^2", "-0.4 nm/V^3"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the coefficients of that gauge, lowest power first.
+    ///
+    /// ```toml
+    /// calibration = ["-44.8 um", "9.97 um/V", "12 nm/V^2", "-0.4 nm/V^3"]
+    /// ```
+    CALIBRATION_ODD = "W0827";
+
+    /// # W0847: a calibration that is far from straight
+    ///
+    /// A power of the voltage above the first should add less than a tenth of the
+    /// range.
+    ///
+    /// ## Why it matters
+    ///
+    /// Gauges are straight within a hundredth or two; a large coefficient is in
+    /// another unit (um/V^2 for nm/V^2).
+    ///
+    /// ## Example
+    ///
+    /// `specs/features/platform-calibration.toml` with
+    ///
+    /// ```diff
+    /// @@ [[gauge]] @@
+    /// -calibration = ["-44.8 um", "9.97 um/V", "12 nm/V^2", "-0.4 nm/V^3"]
+    /// +calibration = ["-44.8 um", "9.97 um/V", "120 nm/V^2", "-0.4 nm/V^3"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the units of the coefficients.
+    ///
+    /// ```toml
+    /// calibration = ["-44.8 um", "9.97 um/V", "12 nm/V^2", "-0.4 nm/V^3"]
+    /// ```
+    CALIBRATION_BENT = "W0847";
+
+    /// # W0828: a gain unlike the others
+    ///
+    /// The gains over the stiffness of their axes, K = J^T k_a J, should be within a
+    /// factor of ten of each other.
+    ///
+    /// ## Why it matters
+    ///
+    /// (8) gives each axis the bandwidth gain / stiffness; one axis ten times slower
+    /// or faster than the rest is a digit too few or too many.
+    ///
+    /// ## Example
+    ///
+    /// `specs/features/platform-gains.toml` with
+    ///
+    /// ```diff
+    /// @@ [position_gains] @@
+    /// -proportional = ["5.7e5 N/m", "5.7e5 N/m", "2.2e6 N/m", "1.1e4 N m/rad", "1.1e4 N m/rad", "1.1e4 N m/rad"]
+    /// +proportional = ["5e4 N/m", "5.7e5 N/m", "2.2e6 N/m", "1.1e4 N m/rad", "1.1e4 N m/rad", "1.1e4 N m/rad"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the number and its power of ten.
+    ///
+    /// ```toml
+    /// proportional = ["5.7e5 N/m", "5.7e5 N/m", "2.2e6 N/m", "1.1e4 N m/rad", "1.1e4 N m/rad", "1.1e4 N m/rad"]
+    /// ```
+    GAIN_UNEVEN = "W0828";
+
+    /// # W0845: gains of two axes in each other's place?
+    ///
+    /// Gains go with the stiffness of their axes. Two that are five times apart for
+    /// it, and would fit exchanged, are named.
+    ///
+    /// ## Why it matters
+    ///
+    /// z of a hexapod is some times stiffer than x and y, with other gains.
+    /// Exchanged, one axis is sluggish and the other near its limit.
+    ///
+    /// ## Example
+    ///
+    /// `specs/features/platform-gains.toml` with
+    ///
+    /// ```diff
+    /// @@ [gains] @@
+    /// -proportional = ["5.07e5 N/m", "5.07e5 N/m", "1.99e6 N/m", "9.9e3 N m/rad", "9.9e3 N m/rad", "9.9e3 N m/rad"]
+    /// +proportional = ["1.99e6 N/m", "5.07e5 N/m", "5.07e5 N/m", "9.9e3 N m/rad", "9.9e3 N m/rad", "9.9e3 N m/rad"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// The order is x, y, z, θx, θy, θz.
+    ///
+    /// ```toml
+    /// proportional = ["5.07e5 N/m", "5.07e5 N/m", "1.99e6 N/m", "9.9e3 N m/rad", "9.9e3 N m/rad", "9.9e3 N m/rad"]
+    /// ```
+    GAINS_EXCHANGED = "W0845";
+
+    /// # W0878: an integral that takes seconds
+    ///
+    /// `integral` over the stiffness of the axes, K = J^T k_a J, should be at least
+    /// 2 1/s.
+    ///
+    /// ## Why it matters
+    ///
+    /// Its inverse is about the time in which the integral takes out what feed-forward
+    /// leaves. The error of a hysteresis model changes with every turn of the motion.
+    ///
+    /// ## Example
+    ///
+    /// `specs/features/platform-gains.toml` with
+    ///
+    /// ```diff
+    /// @@ [gains] @@
+    /// -integral     = ["1.52e9 N/(m s)", "1.52e9 N/(m s)", "5.96e9 N/(m s)", "2.98e7 N m/(rad s)", "2.98e7 N m/(rad s)", "2.97e7 N m/(rad s)"]
+    /// +integral     = ["1.52e6 N/(m s)", "1.52e6 N/(m s)", "5.96e6 N/(m s)", "2.98e4 N m/(rad s)", "2.98e4 N m/(rad s)", "2.97e4 N m/(rad s)"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit, or leave the gains to the compiler.
+    ///
+    /// ```toml
+    /// integral     = ["1.52e9 N/(m s)", "1.52e9 N/(m s)", "5.96e9 N/(m s)", "2.98e7 N m/(rad s)", "2.98e7 N m/(rad s)", "2.97e7 N m/(rad s)"]
+    /// ```
+    INTEGRAL_SLOW = "W0878";
+}
 
 /// A coefficient of a calibration against the middle one of the six.
 const CALIBRATION_SPREAD: f64 = 3.0;
@@ -29,7 +178,7 @@ const INPUT: [f64; 2] = [-10.0, 10.0];
 const SOUND_SPAN: core::ops::RangeInclusive<f64> = 0.05..=20.0;
 
 /// The volts of a calibration are those of the converter.
-pub(super) fn calibrations_fit_converter(facts: &Facts, found: &mut Found) {
+fn calibrations_fit_converter(facts: &Facts, found: &mut Found) {
     let Some(calibration) = facts.model.task_space.as_ref().and_then(|task| task.calibration.as_ref()) else { return };
     let sensor = &facts.model.sensor;
     let [[low, high], [from, to]] = [sensor.range, sensor.input_range.unwrap_or(INPUT)];
@@ -44,7 +193,7 @@ pub(super) fn calibrations_fit_converter(facts: &Facts, found: &mut Found) {
         }
         found.add_off(
             off,
-            codes::CALIBRATION_ODD,
+            CALIBRATION_ODD,
             &format!("{key}[1]"),
             format!(
                 "at {} um/V the gauge reads {} um over the {} V of its converter, and `sensor.range` is {} um",
@@ -60,7 +209,7 @@ pub(super) fn calibrations_fit_converter(facts: &Facts, found: &mut Found) {
 }
 
 /// Gauges of one make have calibrations alike.
-pub(super) fn calibrations(facts: &Facts, found: &mut Found) {
+fn calibrations(facts: &Facts, found: &mut Found) {
     let Some(calibration) = facts.model.task_space.as_ref().and_then(|task| task.calibration.as_ref()) else { return };
     // Where slopes do not fit the converter, that says which.
     let said = |one: &Diagnostic| one.key.ends_with("calibration[1]");
@@ -80,7 +229,7 @@ pub(super) fn calibrations(facts: &Facts, found: &mut Found) {
                 continue;
             }
             found.add(
-                codes::CALIBRATION_ODD,
+                CALIBRATION_ODD,
                 &format!("gauge[{gauge}].calibration[{power}]"),
                 format!(
                     "{} of the calibration of gauge {gauge} is {}, while the six have about {}",
@@ -95,7 +244,7 @@ pub(super) fn calibrations(facts: &Facts, found: &mut Found) {
 }
 
 /// A gauge is nearly straight: what it adds in higher powers of the voltage is small over its range.
-pub(super) fn calibrations_straight(facts: &Facts, found: &mut Found) {
+fn calibrations_straight(facts: &Facts, found: &mut Found) {
     let Some(calibration) = facts.model.task_space.as_ref().and_then(|task| task.calibration.as_ref()) else { return };
     let [low, high] = facts.model.sensor.range;
     for (gauge, powers) in calibration.iter().enumerate() {
@@ -111,7 +260,7 @@ pub(super) fn calibrations_straight(facts: &Facts, found: &mut Found) {
             let own = format!("gauge[{gauge}].calibration");
             let key = if found.model.spans.contains_key(&own) { own } else { "sensor.calibration".to_owned() };
             found.add(
-                codes::CALIBRATION_BENT,
+                CALIBRATION_BENT,
                 &format!("{key}[{power}]"),
                 format!(
                     "power {power} of the calibration of gauge {gauge} adds {} um at {} V, on a range of {} um",
@@ -137,7 +286,7 @@ fn gains_of(task: &TaskSpace) -> Vec<(String, [f64; 6])> {
 }
 
 /// Gains go with the stiffness of the axes.
-pub(super) fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
+fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
     for (key, values) in gains_of(task) {
@@ -150,7 +299,7 @@ pub(super) fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
             }
             found.add_off(
                 times_beyond(ratio / usual, &(1.0 / GAIN_SPREAD..=GAIN_SPREAD)),
-                codes::GAIN_UNEVEN,
+                GAIN_UNEVEN,
                 &format!("{key}[{axis}]"),
                 format!(
                     "the gain of {} is {}: {} times what the other axes have for their stiffness (its own is {})",
@@ -166,7 +315,7 @@ pub(super) fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
 }
 
 /// An integral that takes seconds takes out nothing that lasts less.
-pub(super) fn integral_in_time(facts: &Facts, found: &mut Found) {
+fn integral_in_time(facts: &Facts, found: &mut Found) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
     for (key, values) in gains_of(task).into_iter().filter(|(key, _)| key.ends_with("integral")) {
@@ -175,7 +324,7 @@ pub(super) fn integral_in_time(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::INTEGRAL_SLOW,
+            INTEGRAL_SLOW,
             &key,
             format!(
                 "gains over the stiffness of their axes are about {} 1/s: the integral has a time constant of {} s",
@@ -188,7 +337,7 @@ pub(super) fn integral_in_time(facts: &Facts, found: &mut Found) {
 }
 
 /// Two axes with each other's gains: each is off for its stiffness, and both fit when exchanged.
-pub(super) fn gains_in_order(facts: &Facts, found: &mut Found) {
+fn gains_in_order(facts: &Facts, found: &mut Found) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
     for (key, values) in gains_of(task) {
@@ -203,7 +352,7 @@ pub(super) fn gains_in_order(facts: &Facts, found: &mut Found) {
                 continue;
             }
             found.add(
-                codes::GAINS_EXCHANGED,
+                GAINS_EXCHANGED,
                 &format!("{key}[{a}]"),
                 format!(
                     "the gains of {} and {} are {} and {}, while the platform is {} times as stiff along the first as along the second",

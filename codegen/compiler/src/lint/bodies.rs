@@ -1,7 +1,246 @@
 //! Masses and inertias against sizes.
 
-use super::{Facts, Found, figure, times_beyond};
-use specgen_language::diagnostic::{Diagnostic, codes};
+use super::{Facts, Found, Lints, figure, times_beyond};
+use specgen_language::diagnostic::{Code, Diagnostic};
+
+lints! {
+    rules: leg_parts_have_size, mass_centres_off_the_joints, parts_are_bodies, centre_over_joints, moments_of_each_axis,
+        moments_fit_symmetry, leg_parts_against_platform, moments_about_the_centre;
+
+    /// # W0810: mass and inertia of a leg part do not fit the leg
+    ///
+    /// The radius of gyration of a part, sqrt(I/m), should be at least a fiftieth of
+    /// the leg.
+    ///
+    /// ## Why it matters
+    ///
+    /// A part of a leg reaches over a good part of it; an inertia so small is in
+    /// another unit.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [leg] @@
+    /// -fixed_inertia      = "1.07e5 g mm^2"
+    /// +fixed_inertia      = "1.07e2 g mm^2"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the units of inertia and mass of the part.
+    ///
+    /// ```toml
+    /// fixed_inertia      = "1.07e5 g mm^2"
+    /// ```
+    LEG_PART_SMALL = "W0810";
+
+    /// # W0811: mass centre in the joint
+    ///
+    /// A mass centre should not lie far nearer to its joint than the part's radius of
+    /// gyration.
+    ///
+    /// ## Why it matters
+    ///
+    /// A value next to zero is a slip of mm for um. A part that is balanced about its
+    /// joint has exactly 0.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [leg] @@
+    /// -fixed_center       = "50 mm"
+    /// +fixed_center       = "0.5 mm"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit, or write 0.
+    ///
+    /// ```toml
+    /// fixed_center       = "50 mm"
+    /// ```
+    CENTRE_AT_JOINT = "W0811";
+
+    /// # W0856: mass, inertia and mass centre of no one body
+    ///
+    /// A part of a leg reaches from its joint on: its radius of gyration should be a
+    /// quarter to a little more than the whole of the way to its mass centre.
+    ///
+    /// ## Why it matters
+    ///
+    /// A uniform rod has 0.58, and 1.15 about its joint. Outside, one of mass, inertia
+    /// (about the mass centre) and centre is wrong, and with it the leg's part in (4).
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [leg] @@
+    /// -fixed_inertia      = "1.07e5 g mm^2"
+    /// +fixed_inertia      = "1.07e4 g mm^2"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the three.
+    ///
+    /// ```toml
+    /// fixed_inertia      = "1.07e5 g mm^2"
+    /// ```
+    LEG_PART_SHAPE = "W0856";
+
+    /// # W0857: a centre of mass outside the legs
+    ///
+    /// `platform.center_of_mass` should lie within the joint circle, and not three
+    /// times as far above or below it.
+    ///
+    /// ## Why it matters
+    ///
+    /// A load that hangs so far out loads the legs one-sidedly; more often the centre
+    /// was measured from another point than P_C.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [platform] @@
+    /// -center_of_mass = ["0 mm", "0 mm", "0 mm"]
+    /// +center_of_mass = ["150 mm", "0 mm", "0 mm"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Measure from P_C, in {P}; check the unit.
+    ///
+    /// ```toml
+    /// center_of_mass = ["0 mm", "0 mm", "0 mm"]
+    /// ```
+    CENTRE_FAR = "W0857";
+
+    /// # W0812: a moment of inertia that does not fit the size
+    ///
+    /// About x and y the radius of gyration should be a tenth to three times the
+    /// joint circle; about z 0.3 to 1.5 times.
+    ///
+    /// ## Why it matters
+    ///
+    /// I_zz of a plate that carries its joints on its rim is bounded by the rim; a
+    /// moment outside is in another unit, or about another point than the mass
+    /// centre.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [platform] @@
+    /// -inertia        = ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e6 g mm^2"]
+    /// +inertia        = ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e5 g mm^2"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check `platform.inertia`, about the mass centre, and `platform.mass`.
+    ///
+    /// ```toml
+    /// inertia        = ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e6 g mm^2"]
+    /// ```
+    MOMENT_ODD = "W0812";
+
+    /// # W0813: moments of inertia in another order?
+    ///
+    /// I_xx and I_yy should be within a factor of two on a platform whose joints lie
+    /// alike along x and y; and where one of them is as I_zz, closer.
+    ///
+    /// ## Why it matters
+    ///
+    /// `platform.inertia` is I_xx, I_yy, I_zz in {P}, z along the axis of the
+    /// hexapod; CAD programs often have y there.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [platform] @@
+    /// -inertia        = ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e6 g mm^2"]
+    /// +inertia        = ["3.26e7 g mm^2", "9.7e6 g mm^2", "3.26e7 g mm^2"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Put the moments into this order.
+    ///
+    /// ```toml
+    /// inertia        = ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e6 g mm^2"]
+    /// ```
+    MOMENTS_UNEVEN = "W0813";
+
+    /// # W0814: leg and platform of very different mass
+    ///
+    /// A part of a leg should weigh between a five-thousandth of the platform and
+    /// five times as much.
+    ///
+    /// ## Why it matters
+    ///
+    /// In (4) the legs add a few per cent to the platform. Other proportions are
+    /// grams for kilograms.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [leg] @@
+    /// -extensible_mass    = "73.62 g"
+    /// +extensible_mass    = "73.62 mg"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the units of both masses.
+    ///
+    /// ```toml
+    /// extensible_mass    = "73.62 g"
+    /// ```
+    LEG_MASS_ODD = "W0814";
+
+    /// # W0865: moments of inertia about another point?
+    ///
+    /// I_xx + I_yy − I_zz is twice the integral of z² dm about the centre of mass. It
+    /// should not lie as far above and below as the base is away.
+    ///
+    /// ## Why it matters
+    ///
+    /// Moments about another point, such as the base or a corner in a CAD program, are
+    /// larger by mass times distance squared (Steiner). The leg forces of the motion
+    /// are then too large, and so is the feed-forward.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [platform] @@
+    /// -inertia        = ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e6 g mm^2"]
+    /// +inertia        = ["7.1e7 g mm^2", "7.1e7 g mm^2", "9.7e6 g mm^2"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Give moments of inertia about the centre of mass.
+    ///
+    /// ```toml
+    /// inertia        = ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e6 g mm^2"]
+    /// ```
+    MOMENTS_ELSEWHERE = "W0865";
+}
 
 /// Least radius of gyration of a leg part, in leg lengths: that of a disc a fifteenth of the leg long.
 const THINNEST: f64 = 0.02;
@@ -34,7 +273,7 @@ fn parts<'a>(facts: &Facts<'a>) -> [(&'static str, &'a f64, &'a f64, &'a f64); 2
 }
 
 /// A part of a leg is as long as a part of a leg. (That it is not longer is checked with the spec.)
-pub(super) fn leg_parts_have_size(facts: &Facts, found: &mut Found) {
+fn leg_parts_have_size(facts: &Facts, found: &mut Found) {
     let Some(legs) = &facts.legs else { return };
     for (part, mass, inertia, _) in parts(facts) {
         let (radius, length) = (libm::sqrt(inertia / mass), legs.shortest());
@@ -43,7 +282,7 @@ pub(super) fn leg_parts_have_size(facts: &Facts, found: &mut Found) {
         }
         found.add_off(
             THINNEST * length / radius,
-            codes::LEG_PART_SMALL,
+            LEG_PART_SMALL,
             &format!("leg.{part}_inertia"),
             format!(
                 "the {part} part of a leg has a radius of gyration of {} mm (from {} g and {} g mm^2), in a leg of {} mm",
@@ -58,7 +297,7 @@ pub(super) fn leg_parts_have_size(facts: &Facts, found: &mut Found) {
 }
 
 /// A part reaches from its joint, so that its mass centre does not lie in it.
-pub(super) fn mass_centres_off_the_joints(facts: &Facts, found: &mut Found) {
+fn mass_centres_off_the_joints(facts: &Facts, found: &mut Found) {
     for (part, mass, inertia, center) in parts(facts) {
         let radius = libm::sqrt(inertia / mass);
         // Zero is a choice: a part that is balanced about its joint.
@@ -67,7 +306,7 @@ pub(super) fn mass_centres_off_the_joints(facts: &Facts, found: &mut Found) {
         }
         found.add_off(
             NEAREST_CENTRE * radius / center,
-            codes::CENTRE_AT_JOINT,
+            CENTRE_AT_JOINT,
             &format!("leg.{part}_center"),
             format!(
                 "the mass centre of the {part} part lies {} mm from its joint, but the part's radius of gyration is {} mm",
@@ -80,7 +319,7 @@ pub(super) fn mass_centres_off_the_joints(facts: &Facts, found: &mut Found) {
 }
 
 /// Mass, inertia and mass centre of a part are those of one body, which begins at its joint.
-pub(super) fn parts_are_bodies(facts: &Facts, found: &mut Found) {
+fn parts_are_bodies(facts: &Facts, found: &mut Found) {
     for (part, mass, inertia, center) in parts(facts) {
         let radius = libm::sqrt(inertia / mass);
         let key = format!("leg.{part}_inertia");
@@ -91,7 +330,7 @@ pub(super) fn parts_are_bodies(facts: &Facts, found: &mut Found) {
         }
         found.add_off(
             times_beyond(radius / center, &SOUND_PART),
-            codes::LEG_PART_SHAPE,
+            LEG_PART_SHAPE,
             &key,
             format!(
                 "the {part} part of a leg has a radius of gyration of {} mm (from {} g and {} g mm^2) about a mass centre {} mm from its joint",
@@ -109,7 +348,7 @@ pub(super) fn parts_are_bodies(facts: &Facts, found: &mut Found) {
 }
 
 /// The centre of mass lies above the joints, or near them.
-pub(super) fn centre_over_joints(facts: &Facts, found: &mut Found) {
+fn centre_over_joints(facts: &Facts, found: &mut Found) {
     let (body, size) = (&facts.model.platform, facts.model.geometry.joint_radius());
     for (axis, value) in body.center_of_mass.into_iter().enumerate() {
         if libm::fabs(value) <= FARTHEST_CENTRE[axis] * size {
@@ -117,7 +356,7 @@ pub(super) fn centre_over_joints(facts: &Facts, found: &mut Found) {
         }
         found.add_off(
             libm::fabs(value) / (FARTHEST_CENTRE[axis] * size),
-            codes::CENTRE_FAR,
+            CENTRE_FAR,
             &format!("platform.center_of_mass[{axis}]"),
             format!(
                 "the centre of mass lies {} mm from P_C along {}, on a platform whose joints are {} mm from the middle",
@@ -131,7 +370,7 @@ pub(super) fn centre_over_joints(facts: &Facts, found: &mut Found) {
 }
 
 /// Each moment by itself. (The largest is checked with the spec.)
-pub(super) fn moments_of_each_axis(facts: &Facts, found: &mut Found) {
+fn moments_of_each_axis(facts: &Facts, found: &mut Found) {
     let (body, size) = (&facts.model.platform, facts.model.geometry.joint_radius());
     for (axis, moment) in body.inertia.into_iter().enumerate() {
         let radius = libm::sqrt(moment / body.mass);
@@ -141,7 +380,7 @@ pub(super) fn moments_of_each_axis(facts: &Facts, found: &mut Found) {
         }
         found.add_off(
             times_beyond(radius / size, &sound),
-            codes::MOMENT_ODD,
+            MOMENT_ODD,
             &format!("platform.inertia[{axis}]"),
             format!(
                 "about {} the platform has a radius of gyration of {} mm (from {} g mm^2 and {} kg), but its joints are {} mm from the middle",
@@ -157,7 +396,7 @@ pub(super) fn moments_of_each_axis(facts: &Facts, found: &mut Found) {
 }
 
 /// Joints that look alike along x and y carry a body that does.
-pub(super) fn moments_fit_symmetry(facts: &Facts, found: &mut Found) {
+fn moments_fit_symmetry(facts: &Facts, found: &mut Found) {
     let [xx, yy, zz] = facts.model.platform.inertia;
     let joints = &facts.model.geometry.platform_joints;
     let spread = |axis: usize| joints.iter().fold(0.0, |sum, joint| sum + joint[axis] * joint[axis]);
@@ -173,7 +412,7 @@ pub(super) fn moments_fit_symmetry(facts: &Facts, found: &mut Found) {
     // The odd one of the three is suspected: the one whose fellow is on the third axis.
     let odd = usize::from(from_yy > from_xx);
     found.add(
-        codes::MOMENTS_UNEVEN,
+        MOMENTS_UNEVEN,
         &format!("platform.inertia[{odd}]"),
         format!(
             "I_xx is {} g mm^2 and I_yy {} g mm^2, {} times apart, on a platform whose joints lie alike along x and y",
@@ -186,7 +425,7 @@ pub(super) fn moments_fit_symmetry(facts: &Facts, found: &mut Found) {
 }
 
 /// A leg part outweighs the platform by a few times at most.
-pub(super) fn leg_parts_against_platform(facts: &Facts, found: &mut Found) {
+fn leg_parts_against_platform(facts: &Facts, found: &mut Found) {
     let platform = facts.model.platform.mass;
     for (part, mass, _, _) in parts(facts) {
         if SOUND_SHARE.contains(&(mass / platform)) {
@@ -194,7 +433,7 @@ pub(super) fn leg_parts_against_platform(facts: &Facts, found: &mut Found) {
         }
         found.add_off(
             times_beyond(mass / platform, &SOUND_SHARE),
-            codes::LEG_MASS_ODD,
+            LEG_MASS_ODD,
             &format!("leg.{part}_mass"),
             format!("the {part} part of a leg weighs {} kg, the platform {} kg", figure(*mass), figure(platform)),
             &format!("check the units of `leg.{part}_mass` and `platform.mass`: kg or g"),
@@ -204,7 +443,7 @@ pub(super) fn leg_parts_against_platform(facts: &Facts, found: &mut Found) {
 
 /// Moments are about the centre of mass. About the base's origin they would be larger by m h², as if mass lay as far above and
 /// below the platform as its base is.
-pub(super) fn moments_about_the_centre(facts: &Facts, found: &mut Found) {
+fn moments_about_the_centre(facts: &Facts, found: &mut Found) {
     let (body, height) = (&facts.model.platform, facts.model.geometry.height);
     let [xx, yy, zz] = body.inertia;
     // I_xx + I_yy − I_zz = 2 ∫ z² dm.
@@ -213,7 +452,7 @@ pub(super) fn moments_about_the_centre(facts: &Facts, found: &mut Found) {
         return;
     }
     found.add(
-        codes::MOMENTS_ELSEWHERE,
+        MOMENTS_ELSEWHERE,
         "platform.inertia[0]",
         format!(
             "with these moments and {} kg the mass of the platform lies {} mm (rms) above and below its centre, and the base is {} mm away",

@@ -1,8 +1,121 @@
 //! Memory that the constants take whatever the code does.
 
-use super::{Facts, Found, figure};
-use specgen_language::diagnostic::{Diagnostic, codes};
+use super::{Facts, Found, Lints, figure};
+use specgen_language::diagnostic::{Code, Diagnostic};
 use specgen_language::model::{Model, Scalar};
+
+lints! {
+    rules: tables_fit;
+
+    /// # E0870: a budget below what the tables take
+    ///
+    /// The constants of the tables and the reversal memories are counted before
+    /// anything is built, and compared with `[target.budget]`; so are the least times
+    /// and instructions of a tick.
+    ///
+    /// ## Why it matters
+    ///
+    /// The image cannot become smaller than its tables: n(n+1)/2 nodes for each
+    /// different leg.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [target.budget] @@
+    /// -flash        = "128 KiB"
+    /// +flash        = "128 B"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit; otherwise a coarser grid or less memory.
+    ///
+    /// ```toml
+    /// flash        = "128 KiB"
+    /// ```
+    BUDGET_IMPOSSIBLE = "E0870";
+
+    /// # W0871: a budget that checks nothing
+    ///
+    /// A budget should not be hundreds of times what the tables take, nor the time of
+    /// a tick longer than the period.
+    ///
+    /// ## Why it matters
+    ///
+    /// It would let an image pass that has grown tenfold.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [target.budget] @@
+    /// -flash        = "128 KiB"
+    /// +flash        = "4 MiB"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check KiB against MiB; the measured size and a tenth is a good budget.
+    ///
+    /// ```toml
+    /// flash        = "128 KiB"
+    /// ```
+    BUDGET_LOOSE = "W0871";
+
+    /// # W0873: more RAM than flash
+    ///
+    /// The budget of RAM should not exceed that of flash.
+    ///
+    /// ## Why it matters
+    ///
+    /// Parts have more flash than RAM, and controllers need more of it: tables are
+    /// constants.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [target.budget] @@
+    /// -ram          = "32 KiB"
+    /// +ram          = "256 KiB"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Are the two in each other's place?
+    ///
+    /// ```toml
+    /// ram          = "32 KiB"
+    /// ```
+    BUDGET_SWAPPED = "W0873";
+
+    /// # N0872: memory and time are measured by a build
+    ///
+    /// `specgen check` knows what tables and memories take.
+    ///
+    /// ## Why it matters
+    ///
+    /// Code, stack and instructions per tick are known once the image is built and
+    /// run; until then a part of the budget is not checked.
+    ///
+    /// ## Example
+    ///
+    /// `specs/minimal.toml` with
+    ///
+    /// ```diff
+    /// +[target.budget]
+    /// +flash = "128 KiB"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Nothing: build with `specgen SPEC -o DIR`.
+    ESTIMATED = "N0872";
+}
 
 /// Least stack of a tick, bytes: six legs and a pose in flight.
 const LEAST_STACK: u64 = 256;
@@ -37,7 +150,7 @@ pub fn estimated(model: &Model) -> Option<Diagnostic> {
     Some(Diagnostic::at(
         &model.spans,
         &["target.budget"],
-        codes::ESTIMATED,
+        ESTIMATED,
         format!(
             "tables take {tables} B of flash, reversal memories {memory} B of RAM; the rest of the budget is not checked here"
         ),
@@ -46,7 +159,7 @@ pub fn estimated(model: &Model) -> Option<Diagnostic> {
 }
 
 /// A budget below what the tables take, or so far above it that it checks nothing.
-pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
+fn tables_fit(facts: &Facts, found: &mut Found) {
     let budget = &facts.model.target.budget;
     let [table, memory] = least(facts.model);
     let lines = [
@@ -59,14 +172,14 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
         let key = format!("target.budget.{name}");
         if declared < least {
             found.add(
-                codes::BUDGET_IMPOSSIBLE,
+                BUDGET_IMPOSSIBLE,
                 &key,
                 format!("`{key}` is {declared} B, but {what} {least} B"),
                 "check the unit (B or KiB); `specgen build` measures what it really takes",
             );
         } else if declared > LOOSE * least.max(if name == "stack" { 1024 } else { 4096 }) {
             found.add(
-                codes::BUDGET_LOOSE,
+                BUDGET_LOOSE,
                 &key,
                 format!(
                     "`{key}` is {} MiB; the tables take {} KiB",
@@ -81,7 +194,7 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
         && ram > flash
     {
         found.add(
-            codes::BUDGET_SWAPPED,
+            BUDGET_SWAPPED,
             "target.budget.ram",
             format!("a budget of {ram} B of RAM and {flash} B of flash"),
             "code and tables are in flash, which is the larger on every part: are `target.budget.flash` and `target.budget.ram` in each other's place?",
@@ -91,7 +204,7 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
         && declared > LOOSE * LEAST_INSTRUCTIONS
     {
         found.add(
-            codes::BUDGET_LOOSE,
+            BUDGET_LOOSE,
             "target.budget.instructions",
             format!("`target.budget.instructions` is {declared}, and no tick of six legs comes near that"),
             "some thousands are usual: a budget that no controller can exceed checks nothing",
@@ -102,14 +215,14 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
         let shown = |time: f64| figure(time * 1e6);
         if time > period {
             found.add(
-                codes::BUDGET_LOOSE,
+                BUDGET_LOOSE,
                 "target.budget.time",
                 format!("`target.budget.time` is {} us, more than the period of {} us", shown(time), shown(period)),
                 "the period is a limit without it: check the unit (us or ms)",
             );
         } else if time < LEAST_TIME {
             found.add(
-                codes::BUDGET_IMPOSSIBLE,
+                BUDGET_IMPOSSIBLE,
                 "target.budget.time",
                 format!("`target.budget.time` is {} us, and reading six gauges alone takes longer", shown(time)),
                 "check the unit (us or ms); `specgen build` estimates what a tick takes on a board",
@@ -120,7 +233,7 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
         && declared < LEAST_INSTRUCTIONS
     {
         found.add(
-            codes::BUDGET_IMPOSSIBLE,
+            BUDGET_IMPOSSIBLE,
             "target.budget.instructions",
             format!("`target.budget.instructions` is {declared}, but the kinematics of six legs alone takes more than {LEAST_INSTRUCTIONS}"),
             "some thousands are usual; `specgen build` measures what a tick really takes",

@@ -1,7 +1,98 @@
 //! The work piece that the platform touches.
 
-use super::{AXES, Facts, Found, amount, figure, times_beyond};
-use specgen_language::diagnostic::codes;
+use super::{AXES, Facts, Found, Lints, amount, figure, times_beyond};
+use specgen_language::diagnostic::Code;
+
+lints! {
+    rules: work_piece, lever_of_contact, contact_near_bias;
+
+    /// # W0829: a work piece too soft or too stiff
+    ///
+    /// The stiffness of the work piece along an axis should lie between a thousandth
+    /// and twenty times that of the platform on its legs.
+    ///
+    /// ## Why it matters
+    ///
+    /// Softer it does not matter in (5); stiffer the legs bend and the platform
+    /// cannot move against it.
+    ///
+    /// ## Example
+    ///
+    /// `specs/features/platform-environment.toml` with
+    ///
+    /// ```diff
+    /// @@ [control.environment] @@
+    /// -stiffness = ["2.4e6 N/m", "2.4e6 N/m", "3e6 N/m", "3.8e3 N m/rad", "3.8e3 N m/rad", "0 N m/rad"]
+    /// +stiffness = ["5e3 N/m", "2.4e6 N/m", "3e6 N/m", "3.8e3 N m/rad", "3.8e3 N m/rad", "0 N m/rad"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check N/m against N/um; 0 means no contact on that axis.
+    ///
+    /// ```toml
+    /// stiffness = ["2.4e6 N/m", "2.4e6 N/m", "3e6 N/m", "3.8e3 N m/rad", "3.8e3 N m/rad", "0 N m/rad"]
+    /// ```
+    WORK_PIECE_ODD = "W0829";
+
+    /// # W0838: a work piece that turns on too long a lever
+    ///
+    /// The stiffness of turning over that along an axis is a lever squared; it should
+    /// be less than three radii of the platform.
+    ///
+    /// ## Why it matters
+    ///
+    /// A contact lies on the platform, so that its lever is at most about a radius. N
+    /// m/rad and N m/deg differ by 57.
+    ///
+    /// ## Example
+    ///
+    /// `specs/features/platform-environment.toml` with
+    ///
+    /// ```diff
+    /// @@ [control.environment] @@
+    /// -stiffness = ["2.4e6 N/m", "2.4e6 N/m", "3e6 N/m", "3.8e3 N m/rad", "3.8e3 N m/rad", "0 N m/rad"]
+    /// +stiffness = ["2.4e6 N/m", "2.4e6 N/m", "3e6 N/m", "3.8e6 N m/rad", "3.8e3 N m/rad", "0 N m/rad"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit of the turning stiffness.
+    ///
+    /// ```toml
+    /// stiffness = ["2.4e6 N/m", "2.4e6 N/m", "3e6 N/m", "3.8e3 N m/rad", "3.8e3 N m/rad", "0 N m/rad"]
+    /// ```
+    CONTACT_LEVER = "W0838";
+
+    /// # W0839: a work piece that presses the legs together
+    ///
+    /// At the bias, the force of the work piece, stiffness × (bias − rest) as in (5),
+    /// should not bend the legs by more than they reach.
+    ///
+    /// ## Why it matters
+    ///
+    /// Such a contact cannot be moved against. `control.environment.rest` is the pose
+    /// at which the work piece is unloaded, counted from rest.
+    ///
+    /// ## Example
+    ///
+    /// `specs/features/platform-environment.toml` with
+    ///
+    /// ```diff
+    /// @@ [control.environment] @@
+    /// -rest      = ["0 um", "0 um", "10 um", "0 urad", "0 urad", "0 urad"]
+    /// +rest      = ["0 um", "0 um", "1 mm", "0 urad", "0 urad", "0 urad"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit of `rest`.
+    ///
+    /// ```toml
+    /// rest      = ["0 um", "0 um", "10 um", "0 urad", "0 urad", "0 urad"]
+    /// ```
+    CONTACT_FAR = "W0839";
+}
 
 /// Stiffness of a work piece over that of the platform on its legs.
 const SOUND_WORK_PIECE: core::ops::RangeInclusive<f64> = 1e-3..=20.0;
@@ -9,7 +100,7 @@ const SOUND_WORK_PIECE: core::ops::RangeInclusive<f64> = 1e-3..=20.0;
 const LONGEST_LEVER: f64 = 3.0;
 
 /// A work piece that the platform feels, and that does not hold it fast.
-pub(super) fn work_piece(facts: &Facts, found: &mut Found) {
+fn work_piece(facts: &Facts, found: &mut Found) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
     for (axis, value) in task.environment.stiffness.into_iter().enumerate() {
@@ -19,7 +110,7 @@ pub(super) fn work_piece(facts: &Facts, found: &mut Found) {
         }
         found.add_off(
             times_beyond(ratio, &SOUND_WORK_PIECE),
-            codes::WORK_PIECE_ODD,
+            WORK_PIECE_ODD,
             &format!("control.environment.stiffness[{axis}]"),
             format!(
                 "along {} the work piece is {} times as stiff as the platform on its legs ({} against {})",
@@ -34,7 +125,7 @@ pub(super) fn work_piece(facts: &Facts, found: &mut Found) {
 }
 
 /// A contact resists turning by its stiffness over a lever, and the lever is one of the platform's size.
-pub(super) fn lever_of_contact(facts: &Facts, found: &mut Found) {
+fn lever_of_contact(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
     let stiffness = task.environment.stiffness;
     let radius = facts.model.geometry.joint_radius();
@@ -48,7 +139,7 @@ pub(super) fn lever_of_contact(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::CONTACT_LEVER,
+            CONTACT_LEVER,
             &format!("control.environment.stiffness[{axis}]"),
             format!(
                 "{} N m/rad about {} beside {} N/m is a lever of {} mm, on a platform whose joints are {} mm from the middle",
@@ -64,7 +155,7 @@ pub(super) fn lever_of_contact(facts: &Facts, found: &mut Found) {
 }
 
 /// At the bias the work piece does not press the platform further than its legs reach.
-pub(super) fn contact_near_bias(facts: &Facts, found: &mut Found) {
+fn contact_near_bias(facts: &Facts, found: &mut Found) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
     let environment = &task.environment;
@@ -76,7 +167,7 @@ pub(super) fn contact_near_bias(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::CONTACT_FAR,
+            CONTACT_FAR,
             &format!("control.environment.rest[{axis}]"),
             format!(
                 "at the bias the work piece presses along {} with {} {}: that bends the legs by {}, and they reach {}",

@@ -8,10 +8,44 @@ mod readings;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use super::{allow, check, figure};
+use super::{Lints, allow, check, figure};
 use crate::reach;
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Code, Diagnostic, Place, Severity};
 use specgen_language::spec::{self, SpecSource};
+
+lints! {
+    rules:;
+
+    /// # W0893: one value that would explain several findings
+    ///
+    /// Where several findings come together, the spec is checked anew with one value
+    /// changed by a power of ten, its sign or its order; a change after which most of
+    /// the findings are gone is named first.
+    ///
+    /// ## Why it matters
+    ///
+    /// One slip in the voltage shows as ten findings about other keys. What explains
+    /// most of them is the place to look.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [actuator] @@
+    /// -voltage         = ["0 V", "100 V"]
+    /// +voltage         = ["0 V", "100 mV"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Look at that value first; the rest of the findings may go with it.
+    ///
+    /// ```toml
+    /// voltage         = ["0 V", "100 V"]
+    /// ```
+    ONE_VALUE = "W0893";
+}
 
 /// What is tried, the likeliest slips first; of a number without unit only what does not come from a unit.
 const SLIPS: [(f64, &str); 11] = [
@@ -90,7 +124,7 @@ pub fn in_order(source: &SpecSource, findings: &mut Vec<Diagnostic>) {
             let Some(span) = spans.get(&culprit.key) else { return };
             let message = format!("`{}` would explain most of what follows", culprit.key);
             let help = format!("check its unit, sign and order; {explains}");
-            Diagnostic::new(codes::ONE_VALUE, &culprit.key, Place::Spec(span.clone()), message, help)
+            Diagnostic::new(ONE_VALUE, &culprit.key, Place::Spec(span.clone()), message, help)
         }
     };
     findings.insert(0, first);

@@ -1,8 +1,215 @@
 //! Amplifier and converter.
 
-use super::{Facts, Found, figure, times_beyond};
-use specgen_language::diagnostic::codes;
+use super::{Facts, Found, Lints, figure, times_beyond};
+use specgen_language::diagnostic::Code;
 use specgen_language::model::Model;
+
+lints! {
+    rules: lag_fits_slew, current_fits_slew, amplifier_noise, capacitance_of_the_stacks, converter_step,
+        converter_range, rest_without_power;
+
+    /// # W0805: an amplifier too slow for the slew rate
+    ///
+    /// A first-order lag makes at most range / lag of slew; `actuator.slew_rate`
+    /// should not exceed it.
+    ///
+    /// ## Why it matters
+    ///
+    /// The controller counts on a slew that the amplifier does not make, and its
+    /// model of the voltage runs ahead.
+    ///
+    /// ## Example
+    ///
+    /// `specs/minimal.toml` with
+    ///
+    /// ```diff
+    /// +[amplifier]
+    /// +lag = "3.5 ms"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check `amplifier.lag` (ms or us) and `slew_rate` (V/ms or V/s).
+    ///
+    /// ```toml
+    /// [amplifier]
+    /// lag = "0.35 ms"
+    /// ```
+    LAG_AGAINST_SLEW = "W0805";
+
+    /// # W0806: an amplifier without the current for the slew rate
+    ///
+    /// capacitance × slew_rate should not exceed `amplifier.current`, of one leg.
+    ///
+    /// ## Why it matters
+    ///
+    /// I = C dU/dt: beyond its current the amplifier limits the slew itself, unknown
+    /// to the controller. C is that of all stacks of a leg.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [actuator] @@
+    ///  damping_ratio   = 0.1
+    /// +capacitance = "1 uF"
+    /// @@ [amplifier] @@
+    ///  noise = "2 mV"
+    /// +current = "20 mA"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Write the amplifier's own limit as `slew_rate`, or check the two values.
+    ///
+    /// ```toml
+    /// current = "50 mA"
+    /// ```
+    CURRENT_AGAINST_SLEW = "W0806";
+
+    /// # W0807: amplifier noise that cannot be
+    ///
+    /// `amplifier.noise` (rms) should be between 2e-7 and 3e-4 of the voltage range.
+    /// Above 1e-4 it should also move a leg by less than 25 times the noise of its
+    /// gauge, or one step of its converter if that is larger.
+    ///
+    /// ## Why it matters
+    ///
+    /// Amplifiers for piezo stacks have 0.1 to 10 mV rms. Far more or far less is
+    /// usually a slip of the unit.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [amplifier] @@
+    /// -noise = "2 mV"
+    /// +noise = "50 mV"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check mV against uV and V.
+    ///
+    /// ```toml
+    /// noise = "2 mV"
+    /// ```
+    AMPLIFIER_NOISE = "W0807";
+
+    /// # W0864: a capacitance that does not fit stiffness and stroke
+    ///
+    /// The energy of the charge at full voltage, C V²/2, is compared with that of the
+    /// blocked leg over its stroke, k d²/2: the second should be between a thousandth
+    /// of the first and five times the first.
+    ///
+    /// ## Why it matters
+    ///
+    /// Ceramics turn at most half of the electrical energy into mechanical. A
+    /// capacitance in nF that is meant in uF, or of one stack instead of all, makes the
+    /// current, and with it the slew rate, wrong by as much.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [actuator] @@
+    /// +capacitance = "0.35 uF"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Give the capacitance of all stacks of a leg together, in uF.
+    ///
+    /// ```toml
+    /// capacitance = "35 uF"
+    /// ```
+    CAPACITANCE_ODD = "W0864";
+
+    /// # W0808: converter step large against the stroke
+    ///
+    /// One code of `dac.bits` over `dac.range` should move a leg by less than a
+    /// thousandth of its stroke.
+    ///
+    /// ## Why it matters
+    ///
+    /// The platform goes to and fro between two codes by that much. 16 bits are
+    /// usual.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [dac] @@
+    /// -bits  = 16
+    /// +bits  = 10
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check bits and range; the range is in volts at the stack.
+    ///
+    /// ```toml
+    /// bits  = 16
+    /// ```
+    CONVERTER_COARSE = "W0808";
+
+    /// # W0849: a converter that the stacks hardly use
+    ///
+    /// `dac.range` should span less than four times `actuator.voltage`.
+    ///
+    /// ## Why it matters
+    ///
+    /// Two bits and more are never used, and one code moves the leg four times as
+    /// far.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [dac] @@
+    /// -range = ["0 V", "150 V"]
+    /// +range = ["0 V", "1500 V"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check both ranges; both are in volts at the stack.
+    ///
+    /// ```toml
+    /// range = ["0 V", "150 V"]
+    /// ```
+    CONVERTER_WIDE = "W0849";
+
+    /// # W0819: a rest that amplifiers do not keep when they are off
+    ///
+    /// `supervisor.rest_voltage` should be 0 V where `actuator.voltage` allows it.
+    ///
+    /// ## Why it matters
+    ///
+    /// A stack whose amplifier is off discharges to 0 V. At another rest the legs
+    /// jump when the amplifiers are switched on, and again when they are switched
+    /// off.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// +[supervisor]
+    /// +rest_voltage = "20 V"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Leave the key out, unless the amplifiers switch on and off slowly by
+    /// themselves.
+    REST_NOT_ZERO = "W0819";
+}
 
 /// Largest slew rate of a first-order lag is range over time constant: a limit above that never binds.
 const LAG_SLACK: f64 = 1.0;
@@ -23,7 +230,7 @@ const COARSEST_STEP: f64 = 1e-3;
 const WIDEST_RANGE: f64 = 4.0;
 
 /// An amplifier that is so slow never makes the declared slew rate.
-pub(super) fn lag_fits_slew(facts: &Facts, found: &mut Found) {
+fn lag_fits_slew(facts: &Facts, found: &mut Found) {
     let (amplifier, actuator) = (&facts.model.amplifier, &facts.model.actuator);
     let [low, high] = actuator.voltage;
     let off = amplifier.lag * actuator.slew_rate / (LAG_SLACK * (high - low));
@@ -32,7 +239,7 @@ pub(super) fn lag_fits_slew(facts: &Facts, found: &mut Found) {
     }
     found.add_off(
         off,
-        codes::LAG_AGAINST_SLEW,
+        LAG_AGAINST_SLEW,
         "amplifier.lag",
         format!(
             "with a lag of {} ms a step over {} V begins at {} V/ms, but `actuator.slew_rate` is {} V/ms",
@@ -46,7 +253,7 @@ pub(super) fn lag_fits_slew(facts: &Facts, found: &mut Found) {
 }
 
 /// What charges a stack: I = C dU/dt.
-pub(super) fn current_fits_slew(facts: &Facts, found: &mut Found) {
+fn current_fits_slew(facts: &Facts, found: &mut Found) {
     let model = facts.model;
     let (Some(capacitance), Some(current)) = (model.actuator.capacitance, model.amplifier.current) else { return };
     let needed = capacitance * model.actuator.slew_rate;
@@ -55,7 +262,7 @@ pub(super) fn current_fits_slew(facts: &Facts, found: &mut Found) {
     }
     found.add_off(
         needed / current,
-        codes::CURRENT_AGAINST_SLEW,
+        CURRENT_AGAINST_SLEW,
         "amplifier.current",
         format!(
             "{} uF at {} V/ms take {} A, but the amplifier gives {} A",
@@ -72,7 +279,7 @@ pub(super) fn current_fits_slew(facts: &Facts, found: &mut Found) {
 }
 
 /// Noise that would move a leg by much of its stroke, or that no amplifier is free of.
-pub(super) fn amplifier_noise(facts: &Facts, found: &mut Found) {
+fn amplifier_noise(facts: &Facts, found: &mut Found) {
     let (noise, actuator) = (facts.model.amplifier.noise, &facts.model.actuator);
     let [low, high] = actuator.voltage;
     let sensor = &facts.model.sensor;
@@ -94,7 +301,7 @@ pub(super) fn amplifier_noise(facts: &Facts, found: &mut Found) {
     };
     found.add_off(
         of_range,
-        codes::AMPLIFIER_NOISE,
+        AMPLIFIER_NOISE,
         "amplifier.noise",
         format!("an amplifier noise of {} mV rms on {} V {how}", figure(noise * 1e3), figure(high - low)),
         "amplifiers for stacks have 0.1 to 10 mV rms: check the unit (V, mV or uV), and that it is rms, not peak to peak",
@@ -102,7 +309,7 @@ pub(super) fn amplifier_noise(facts: &Facts, found: &mut Found) {
 }
 
 /// What a stack makes of its charge.
-pub(super) fn capacitance_of_the_stacks(facts: &Facts, found: &mut Found) {
+fn capacitance_of_the_stacks(facts: &Facts, found: &mut Found) {
     let actuator = &facts.model.actuator;
     let Some(capacitance) = actuator.capacitance else { return };
     let [low, high] = actuator.voltage;
@@ -115,7 +322,7 @@ pub(super) fn capacitance_of_the_stacks(facts: &Facts, found: &mut Found) {
     }
     found.add_off(
         off,
-        codes::CAPACITANCE_ODD,
+        CAPACITANCE_ODD,
         "actuator.capacitance",
         format!(
             "charging {} uF to {} V takes {} J, and the blocked leg holds {} J (stiffness x stroke^2 / 2)",
@@ -129,7 +336,7 @@ pub(super) fn capacitance_of_the_stacks(facts: &Facts, found: &mut Found) {
 }
 
 /// One code of the converter in nanometres.
-pub(super) fn converter_step(facts: &Facts, found: &mut Found) {
+fn converter_step(facts: &Facts, found: &mut Found) {
     let (dac, actuator) = (&facts.model.dac, &facts.model.actuator);
     let [low, high] = dac.range;
     let volts = (high - low) / (libm::exp2(f64::from(dac.bits)) - 1.0);
@@ -139,7 +346,7 @@ pub(super) fn converter_step(facts: &Facts, found: &mut Found) {
     }
     found.add_off(
         step / (COARSEST_STEP * actuator.stroke),
-        codes::CONVERTER_COARSE,
+        CONVERTER_COARSE,
         "dac.bits",
         format!(
             "one code of {} mV moves a leg by {} nm, {} of its stroke of {} um",
@@ -153,14 +360,14 @@ pub(super) fn converter_step(facts: &Facts, found: &mut Found) {
 }
 
 /// A converter is not spread over many times what the stacks take.
-pub(super) fn converter_range(facts: &Facts, found: &mut Found) {
+fn converter_range(facts: &Facts, found: &mut Found) {
     let ([low, high], [from, to]) = (facts.model.dac.range, facts.model.actuator.voltage);
     if high - low <= WIDEST_RANGE * (to - from) {
         return;
     }
     let item = usize::from(high - to >= from - low);
     found.add(
-        codes::CONVERTER_WIDE,
+        CONVERTER_WIDE,
         &format!("dac.range[{item}]"),
         format!(
             "the converter spans {} V, the stacks take {} V of it",
@@ -172,7 +379,7 @@ pub(super) fn converter_range(facts: &Facts, found: &mut Found) {
 }
 
 /// Amplifiers that are off leave the stacks at 0 V.
-pub(super) fn rest_without_power(facts: &Facts, found: &mut Found) {
+fn rest_without_power(facts: &Facts, found: &mut Found) {
     let model = facts.model;
     let [low, high] = model.actuator.voltage;
     let rest = model.rest_voltage();
@@ -181,7 +388,7 @@ pub(super) fn rest_without_power(facts: &Facts, found: &mut Found) {
         return;
     }
     found.add(
-        codes::REST_NOT_ZERO,
+        REST_NOT_ZERO,
         "supervisor.rest_voltage",
         format!(
             "the legs rest at {} V, but stacks whose amplifiers are off stand at 0 V: {} um that a leg jumps when they are switched on",

@@ -2,9 +2,74 @@
 
 use core::ops::RangeInclusive;
 
-use super::{Facts, Found, figure, times_beyond};
+use super::{Facts, Found, Lints, figure, times_beyond};
 use crate::lower::supervision::{defaults, samples, steadiness};
-use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::diagnostic::{Code, Diagnostic, Severity};
+
+lints! {
+    rules: near_defaults, near_one;
+
+    /// # W0888: a value far from its default
+    ///
+    /// Times, counts and bounds of `[supervisor]`, and `control.dynamics_tolerance`,
+    /// should be within a factor of 50 of their defaults. `disagreement` and
+    /// `tracking_error`, which are shares of a whole, should not exceed that whole.
+    /// `disturbance` should be at most 50 times its default, a thirtieth of the stroke.
+    ///
+    /// ## Why it matters
+    ///
+    /// A fault that is seen after ten seconds instead of ten milliseconds is seen too
+    /// late. Such a time is most often in another unit.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// +
+    /// +[supervisor]
+    /// +gauge_time = "10 s"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit, or leave the key out.
+    ///
+    /// ```toml
+    /// [supervisor]
+    /// gauge_time = "10 ms"
+    /// ```
+    FAR_FROM_DEFAULT = "W0888";
+
+    /// # W0889: a factor far from 1
+    ///
+    /// Factors of `[robust]` should be between a quarter and four, and 1 be among them.
+    ///
+    /// ## Why it matters
+    ///
+    /// They multiply what the spec says: 0.05 is not a tolerance of 5 % but a twentieth
+    /// of the mass, and 5 is five times the mass.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// +
+    /// +[robust]
+    /// +mass = [0.05, 0.05]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Write smallest and largest factor.
+    ///
+    /// ```toml
+    /// [robust]
+    /// mass = [0.95, 1.05]
+    /// ```
+    FACTOR_ODD = "W0889";
+}
 
 /// A value over its default: a slip of a thousand lies far outside, whatever has its reason well inside.
 const NEAR_DEFAULT: RangeInclusive<f64> = 1.0 / 50.0..=50.0;
@@ -69,12 +134,12 @@ fn pairs(facts: &Facts) -> Vec<Pair> {
 }
 
 /// Times and bounds of the supervisor, beside what holds without their keys.
-pub(super) fn near_defaults(facts: &Facts, found: &mut Found) {
+fn near_defaults(facts: &Facts, found: &mut Found) {
     for Pair { key, value, default, unit: (unit, scale), sound } in pairs(facts) {
         let Some(value) = value.filter(|value| times_beyond(value / default, &sound) > 1.0) else { continue };
         let shown = |value: f64| format!("{} {unit}", figure(value * scale)).trim_end().to_owned();
         found.add(
-            codes::FAR_FROM_DEFAULT,
+            FAR_FROM_DEFAULT,
             &key,
             format!("`{key}` is {}, {} times its default of {}", shown(value), figure(value / default), shown(default)),
             "check its unit and its digits, or leave the key out",
@@ -87,11 +152,11 @@ pub fn say_once(findings: &mut Vec<Diagnostic>) {
     let list = |key: &str| key.split('[').next().unwrap_or_default().to_owned();
     let errors = findings.iter().filter(|one| one.severity == Severity::Error);
     let refused: Vec<String> = errors.map(|one| list(&one.key)).collect();
-    findings.retain(|one| one.code != codes::FAR_FROM_DEFAULT || !refused.contains(&list(&one.key)));
+    findings.retain(|one| one.code != FAR_FROM_DEFAULT || !refused.contains(&list(&one.key)));
 }
 
 /// What `specgen robust` varies are factors about 1, neither percent nor tolerances.
-pub(super) fn near_one(facts: &Facts, found: &mut Found) {
+fn near_one(facts: &Facts, found: &mut Found) {
     let robust = &facts.model.robust;
     let ranges = [
         ("mass", robust.mass),
@@ -109,14 +174,14 @@ pub(super) fn near_one(facts: &Facts, found: &mut Found) {
         let key = format!("robust.{name}");
         if let Some(end) = [low, high].iter().position(|factor| !SOUND_FACTOR.contains(factor)) {
             found.add(
-                codes::FACTOR_ODD,
+                FACTOR_ODD,
                 &format!("{key}[{end}]"),
                 format!("`{key}` would be tried at {} times what the spec says", figure([low, high][end])),
                 "give the smallest and the largest factor on the value of the spec: a tolerance of 5 % is [0.95, 1.05]",
             );
         } else if low > 1.0 || high < 1.0 {
             found.add(
-                codes::FACTOR_ODD,
+                FACTOR_ODD,
                 &key,
                 format!("`{key}` goes from {} to {}: what the spec says, 1, is not in it", figure(low), figure(high)),
                 "give a smallest factor of at most 1 and a largest of at least 1; correct the value itself if it is off",

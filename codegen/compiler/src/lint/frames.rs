@@ -1,23 +1,48 @@
 //! In which frame points and directions are given: {B} below, {P} at `geometry.height` above it.
 
-use super::gauges::pierced;
-use super::{Facts, Found, figure};
-use specgen_language::diagnostic::codes;
-use specgen_language::model::Probe;
+use super::gauge_places::{ALONG_AXIS, pierced};
+use super::{Facts, Found, Lints, figure};
+use specgen_language::diagnostic::Code;
+
+lints! {
+    rules: other_frame;
+
+    /// # W0881: a point counted in another frame
+    ///
+    /// Points of {P} count from the centre of the platform joints, points of {B} from
+    /// that of the base, `geometry.height` below. Reported is a point of a gauge, a
+    /// target, a joint, the centre of mass or the tool that lies 0.83 to 1.25 heights
+    /// above or below its own body, so that it would lie at it if z were counted from
+    /// the other one.
+    ///
+    /// ## Why it matters
+    ///
+    /// The lever of a gauge or a load is then wrong by the height. Tilts are read as
+    /// translations, and the loop works with gauges that are elsewhere.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [[gauge]] @@
+    /// -point     = ["0 mm", "80 mm", "180 mm"]
+    /// +point     = ["0 mm", "80 mm", "0 mm"]
+    ///  direction = [1, 0, 0]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Count z from the origin of the frame that the key asks for.
+    ///
+    /// ```toml
+    /// point     = ["0 mm", "80 mm", "180 mm"]
+    /// ```
+    OTHER_FRAME = "W0881";
+}
 
 /// A point is given in another frame if a height more or less leaves no more of its distance from the platform than this share.
 const FOUND_AGAIN: f64 = 0.2;
-/// A line within this cosine of the axis: where along the axis it begins does not matter.
-const ALONG_AXIS: f64 = 0.5;
-/// Lines that all look beside radius and tangent by an angle, deg, and how far these angles may differ.
-const TURNED: f64 = 3.0;
-const ALIKE: f64 = 0.5;
-/// Fewest such lines: two are alike by chance.
-const FEWEST: usize = 3;
-/// Nearer to the axis than this share of its radius no line is beside it.
-const OFF_AXIS: f64 = 0.1;
-/// The farthest gauge stands so many joint radii from the axis, at least.
-const NARROWEST: f64 = 0.2;
 
 /// Heights that are to be added to `z`, m above P_C, so that it lies near P_C: 1 or −1. None: neither does that.
 fn heights_off(z: f64, height: f64) -> Option<f64> {
@@ -26,7 +51,7 @@ fn heights_off(z: f64, height: f64) -> Option<f64> {
 }
 
 /// Points that would lie at the platform if they were counted from the other frame.
-pub(super) fn other_frame(facts: &Facts, found: &mut Found) {
+fn other_frame(facts: &Facts, found: &mut Found) {
     let (model, height) = (facts.model, facts.model.geometry.height);
     let mean = |joints: &[[f64; 3]; 6]| joints.iter().fold(0.0, |sum, joint| sum + joint[2]) / 6.0;
     let (base, platform) = (mean(&model.geometry.base_joints), mean(&model.geometry.platform_joints));
@@ -37,7 +62,7 @@ pub(super) fn other_frame(facts: &Facts, found: &mut Found) {
             if z < 0.0 { "below" } else { "above" },
             figure(height * 1e3)
         );
-        found.add(codes::OTHER_FRAME, &key, message, help);
+        found.add(OTHER_FRAME, &key, message, help);
     };
     if heights_off(platform, height) == Some(-1.0) {
         say(
@@ -91,73 +116,6 @@ pub(super) fn other_frame(facts: &Facts, found: &mut Found) {
             say(format!("{key}[2]"), probe.plane_point[2], "P_C", help);
         }
     }
-}
-
-/// Angle from radius or tangent to the line of a gauge that looks across the axis, deg, from -45 to 45.
-fn beside(probe: &Probe, height: f64, radius: f64) -> Option<f64> {
-    let ([x, y, _], [a, b, c]) = (pierced(probe, height), probe.direction);
-    if libm::fabs(c) >= ALONG_AXIS || libm::hypot(x, y) < OFF_AXIS * radius {
-        return None;
-    }
-    let angle = libm::atan2(x * b - y * a, x * a + y * b).to_degrees();
-    Some(angle - 90.0 * libm::rint(angle / 90.0))
-}
-
-/// Gauges look along a radius or across it. All beside it by one angle: points and directions are turned against each other.
-pub(super) fn turned_layout(facts: &Facts, found: &mut Found) {
-    let Some(task) = &facts.model.task_space else { return };
-    let (height, radius) = (facts.model.geometry.height, facts.model.geometry.joint_radius());
-    let angles: Vec<(usize, f64)> = task
-        .probes
-        .iter()
-        .enumerate()
-        .filter_map(|(gauge, probe)| Some((gauge, beside(probe, height, radius)?)))
-        .collect();
-    let Some((gauge, first)) = angles.first().copied() else { return };
-    let apart = |angle: f64| {
-        let apart = angle - first;
-        libm::fabs(apart - 90.0 * libm::rint(apart / 90.0))
-    };
-    // At the corners of a square, along its sides: 45 deg from both.
-    let is_meant = libm::fabs(first) < TURNED || libm::fabs(first) > 45.0 - TURNED;
-    if angles.len() < FEWEST || is_meant || angles.iter().any(|(_, angle)| apart(*angle) > ALIKE) {
-        return;
-    }
-    found.add(
-        codes::LAYOUT_TURNED,
-        &format!("gauge[{gauge}].direction"),
-        format!(
-            "the {} gauges that look across the axis are all turned by {} deg from their radius or its tangent",
-            angles.len(),
-            figure(libm::fabs(first))
-        ),
-        "points and directions are both in {B}: check that both are given along its axes",
-    );
-}
-
-/// Gauges stand apart by much of the platform: on a spot in its middle they do not see it turn.
-pub(super) fn size_of_pattern(facts: &Facts, found: &mut Found) {
-    let Some(task) = &facts.model.task_space else { return };
-    let (height, radius) = (facts.model.geometry.height, facts.model.geometry.joint_radius());
-    let far = task.probes.iter().fold(0.0, |far: f64, probe| {
-        let [x, y, _] = pierced(probe, height);
-        let one = libm::hypot(x, y);
-        if one > far { one } else { far }
-    });
-    if far >= NARROWEST * radius || far == 0.0 {
-        return;
-    }
-    found.add_off(
-        NARROWEST * radius / far,
-        codes::LAYOUT_SMALL,
-        "gauge[0].point",
-        format!(
-            "all gauges stand within {} mm of the axis, on a platform whose joints are {} mm from the middle",
-            figure(far * 1e3),
-            figure(radius * 1e3)
-        ),
-        "check the unit of the points (mm or cm), or set the gauges further apart: so near to each other they hardly see a rotation",
-    );
 }
 
 #[cfg(test)]

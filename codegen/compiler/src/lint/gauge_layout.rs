@@ -2,60 +2,49 @@
 
 use nalgebra::Matrix6;
 
-use super::{Facts, Found, figure};
-use specgen_language::diagnostic::{Diagnostic, codes};
+use super::gauge_pattern::{Change, GAUGE_PATTERN, changes};
+use super::gauges::GAUGES_ALIKE;
+use super::{Facts, Found, Lints, figure};
+use specgen_language::diagnostic::{Code, Diagnostic};
 use specgen_language::model::Probe;
 use specgen_numerics::{cross, dot};
+
+lints! {
+    rules: slip_of_one;
+
+    /// # W0826: a layout of gauges that one slip would explain
+    ///
+    /// Where the gauges see some motion badly, each sign and each order of two
+    /// coordinates is tried; one that makes the layout sound is named.
+    ///
+    /// ## Why it matters
+    ///
+    /// A badly seen motion amplifies the noise of the gauges by the condition number.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [[gauge]] @@
+    /// -point     = ["-80 mm", "0 mm", "180 mm"]
+    /// +point     = ["70 mm", "0 mm", "180 mm"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Correct the gauge that the message names.
+    ///
+    /// ```toml
+    /// point     = ["-80 mm", "0 mm", "180 mm"]
+    /// ```
+    GAUGE_SLIP = "W0826";
+}
 
 /// A layout is suspected if undoing one slip makes its condition this many times better.
 const MUCH_BETTER: f64 = 1.5;
 /// Below this condition a layout is good whatever could be better.
 const GOOD: f64 = 2.0;
-
-/// One change of one gauge: what was mistaken, if it was.
-pub(super) struct Change {
-    pub(super) key: String,
-    pub(super) what: String,
-    pub(super) probe: Probe,
-}
-
-const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// Signs and coordinates of `vector` in each other's place; what they would be called.
-fn changed(vector: [f64; 3]) -> Vec<([f64; 3], String)> {
-    let mut list = Vec::new();
-    for k in 0..3 {
-        let mut other = vector;
-        other[k] = -vector[k];
-        list.push((other, format!("the sign of {}", AXES[k])));
-        let (a, b) = (k, (k + 1) % 3);
-        let mut other = vector;
-        other.swap(a, b);
-        list.push((other, format!("the order of {} and {}", AXES[a], AXES[b])));
-    }
-    for by in 1..3 {
-        let mut other = vector;
-        other.rotate_left(by);
-        list.push((other, "the order of x, y and z".to_owned()));
-    }
-    list.retain(|(other, _)| *other != vector);
-    list
-}
-
-pub(super) fn changes(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
-    let point = changed(probe.point).into_iter().map(|(point, what)| Change {
-        key: format!("gauge[{gauge}].point"),
-        what,
-        // The target faces the gauge, wherever that is.
-        probe: Probe { point, plane_point: [point[0], point[1], point[2] - height], ..probe.clone() },
-    });
-    let direction = changed(probe.direction).into_iter().map(|(direction, what)| Change {
-        key: format!("gauge[{gauge}].direction"),
-        what,
-        probe: Probe { direction, plane_normal: direction, ..probe.clone() },
-    });
-    point.chain(direction).collect()
-}
 
 /// Best seen over worst seen motion, turns counted at the joint radius; infinite if one is not seen at all.
 fn condition(probes: &[Probe; 6], height: f64, radius: f64) -> f64 {
@@ -81,10 +70,10 @@ fn condition(probes: &[Probe; 6], height: f64, radius: f64) -> f64 {
 }
 
 /// Names the one gauge whose sign or order of coordinates would explain a layout that sees badly.
-pub(super) fn slip_of_one(facts: &Facts, found: &mut Found) {
+fn slip_of_one(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
     // A slip that puts a gauge out of the pattern of the others is known better from that, and a copy as a copy.
-    let known = |finding: &Diagnostic| finding.code == codes::GAUGE_PATTERN || finding.code == codes::GAUGES_ALIKE;
+    let known = |finding: &Diagnostic| finding.code == GAUGE_PATTERN || finding.code == GAUGES_ALIKE;
     if found.list.iter().any(known) || (0..6).any(|gauge| found.is_in_other_frame(gauge)) {
         return;
     }
@@ -119,7 +108,7 @@ pub(super) fn slip_of_one(facts: &Facts, found: &mut Found) {
         "do not see every motion".to_owned()
     };
     found.add(
-        codes::GAUGE_SLIP,
+        GAUGE_SLIP,
         &first.key,
         format!(
             "the gauges {seen}; with {} in `{}` changed it would be {} times",

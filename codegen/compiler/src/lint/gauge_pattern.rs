@@ -1,13 +1,92 @@
 //! Gauges stand in a pattern. One that stands out of it, and would not with one slip undone, has that slip: a chance layout
 //! comes within a thousandth of a pattern once in hundreds.
 
-use super::gauge_layout::{Change, changes};
-use super::{Facts, Found};
-use specgen_language::diagnostic::codes;
+use super::gauges::GAUGES_ALIKE;
+use super::{Facts, Found, Lints};
+use specgen_language::diagnostic::Code;
 use specgen_language::model::Probe;
+
+lints! {
+    rules: out_of_pattern;
+
+    /// # W0848: a gauge out of the pattern of the others
+    ///
+    /// Gauges stand at one height or one radius, look along the axis, along their
+    /// radius or across it, or make an equilateral triangle. One that does not, and
+    /// would with another sign, digit or order of its coordinates, is named.
+    ///
+    /// ## Why it matters
+    ///
+    /// A gauge that stands elsewhere than the spec says gives a pose that is wrong by
+    /// its lever: tilts are read where there are none.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [[gauge]] @@
+    /// -point     = ["-40 mm", "69.282 mm", "180 mm"]
+    /// +point     = ["40 mm", "69.282 mm", "180 mm"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Compare with the drawing.
+    ///
+    /// ```toml
+    /// point     = ["-40 mm", "69.282 mm", "180 mm"]
+    /// ```
+    GAUGE_PATTERN = "W0848";
+}
 
 /// How near to a pattern counts as in it: points are written with four digits.
 const NEAR: f64 = 2e-3;
+
+/// One change of one gauge: what was mistaken, if it was.
+pub(super) struct Change {
+    pub(super) key: String,
+    pub(super) what: String,
+    pub(super) probe: Probe,
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Signs and coordinates of `vector` in each other's place; what they would be called.
+fn changed(vector: [f64; 3]) -> Vec<([f64; 3], String)> {
+    let mut list = Vec::new();
+    for k in 0..3 {
+        let mut other = vector;
+        other[k] = -vector[k];
+        list.push((other, format!("the sign of {}", AXES[k])));
+        let (a, b) = (k, (k + 1) % 3);
+        let mut other = vector;
+        other.swap(a, b);
+        list.push((other, format!("the order of {} and {}", AXES[a], AXES[b])));
+    }
+    for by in 1..3 {
+        let mut other = vector;
+        other.rotate_left(by);
+        list.push((other, "the order of x, y and z".to_owned()));
+    }
+    list.retain(|(other, _)| *other != vector);
+    list
+}
+
+pub(super) fn changes(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
+    let point = changed(probe.point).into_iter().map(|(point, what)| Change {
+        key: format!("gauge[{gauge}].point"),
+        what,
+        // The target faces the gauge, wherever that is.
+        probe: Probe { point, plane_point: [point[0], point[1], point[2] - height], ..probe.clone() },
+    });
+    let direction = changed(probe.direction).into_iter().map(|(direction, what)| Change {
+        key: format!("gauge[{gauge}].direction"),
+        what,
+        probe: Probe { direction, plane_normal: direction, ..probe.clone() },
+    });
+    point.chain(direction).collect()
+}
 
 /// Whether a gauge keeps to what the others do; none if those have no such pattern.
 type Pattern = fn(&[Probe; 6], usize) -> Option<bool>;
@@ -88,10 +167,10 @@ fn digits(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
 }
 
 /// Names the gauge whose sign, digits or order of coordinates would put it in line with the others.
-pub(super) fn out_of_pattern(facts: &Facts, found: &mut Found) {
+fn out_of_pattern(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
     // A copy is known as a copy.
-    if found.list.iter().any(|finding| finding.code == codes::GAUGES_ALIKE) {
+    if found.list.iter().any(|finding| finding.code == GAUGES_ALIKE) {
         return;
     }
     // How many patterns each change restores, and one of them; changes that break none.
@@ -124,7 +203,7 @@ pub(super) fn out_of_pattern(facts: &Facts, found: &mut Found) {
         }
     }
     found.add(
-        codes::GAUGE_PATTERN,
+        GAUGE_PATTERN,
         &first.key,
         format!("with {} in `{}` changed, the gauge {pattern}; as it is written it does not", first.what, first.key),
         &format!(

@@ -1,8 +1,244 @@
 //! Gauges: resolution, range, layout.
 
-use super::{FAR_OFF, Facts, Found, amount, figure};
-use specgen_language::diagnostic::codes;
-use specgen_language::model::Probe;
+use super::{FAR_OFF, Facts, Found, Lints, amount, figure};
+use specgen_language::diagnostic::Code;
+
+lints! {
+    rules: differ, noise_of_a_step, range_centred, range_beyond_zero, step_against_stroke, odd_coordinates,
+        opposite_directions, noise_of_many_steps;
+
+    /// # E0328: two gauges that are one
+    ///
+    /// No two of the gauges may have the same `point` and the same `direction`.
+    ///
+    /// ## Why it matters
+    ///
+    /// Six readings are then five, and a motion of the platform is unseen. Most often
+    /// a section was copied and not changed.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// -point     = ["-80 mm", "0 mm", "180 mm"]
+    /// +point     = ["80 mm", "0 mm", "180 mm"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Give the second gauge its own place, or its own direction.
+    ///
+    /// ```toml
+    /// point     = ["-80 mm", "0 mm", "180 mm"]
+    /// ```
+    GAUGES_ALIKE = "E0328";
+
+    /// # W0820: gauge noise far below its step
+    ///
+    /// `sensor.noise` should be at least 0.06 of a step of `sensor.bits` over
+    /// `sensor.range`.
+    ///
+    /// ## Why it matters
+    ///
+    /// A noise below what the converter shows cannot be measured; it is a slip of the
+    /// unit, or the resolution of a data sheet at 1 Hz bandwidth.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [sensor] @@
+    /// -noise = "2.2 nm"
+    /// +noise = "2.2 pm"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Write the noise at the tick rate, or 0 for none.
+    ///
+    /// ```toml
+    /// noise = "2.2 nm"
+    /// ```
+    GAUGE_QUIET = "W0820";
+
+    /// # W0821: a range with ends in different units?
+    ///
+    /// Neither end of `sensor.range` should lie a hundred times further from rest
+    /// than the other, nor five times further and five times beyond what there is to
+    /// see; a leg's gauge should not end five strokes away.
+    ///
+    /// ## Why it matters
+    ///
+    /// The step of the converter, and with it the noise of the loop, is counted from
+    /// the whole range.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [sensor] @@
+    /// -range = ["-55 um", "55 um"]
+    /// +range = ["-55 um", "0.55 mm"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit of each end.
+    ///
+    /// ```toml
+    /// range = ["-55 um", "55 um"]
+    /// ```
+    GAUGE_LOPSIDED = "W0821";
+
+    /// # W0846: an end of the range that is nearly zero
+    ///
+    /// An end of `sensor.range`, if it is not zero, should be at least a thousandth
+    /// of the range from rest.
+    ///
+    /// ## Why it matters
+    ///
+    /// It is a slip of nm for um: creep and drift alone would take the reading out of
+    /// the range.
+    ///
+    /// ## Example
+    ///
+    /// `specs/legs.toml` with
+    ///
+    /// ```diff
+    /// @@ [sensor] @@
+    /// -range = ["-2 um", "48 um"]
+    /// +range = ["-2 nm", "48 um"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit, or write 0.
+    ///
+    /// ```toml
+    /// range = ["-2 um", "48 um"]
+    /// ```
+    RANGE_AT_ZERO = "W0846";
+
+    /// # W0823: a coordinate that is nearly zero
+    ///
+    /// A coordinate of a gauge, if it is not zero, should not be next to nothing
+    /// beside the size of the platform.
+    ///
+    /// ## Why it matters
+    ///
+    /// It is a slip of mm for um or for m. The lever of the gauge about that axis
+    /// would vanish.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [[gauge]] @@
+    /// -point     = ["80 mm", "0 mm", "180 mm"]
+    /// +point     = ["80 um", "0 mm", "180 mm"]
+    ///  direction = [0, 0, 1]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit, or write 0.
+    ///
+    /// ```toml
+    /// point     = ["80 mm", "0 mm", "180 mm"]
+    /// ```
+    COORDINATE_ODD = "W0823";
+
+    /// # W0824: gauges that count against each other
+    ///
+    /// Gauges along the same line should count in the same sense.
+    ///
+    /// ## Why it matters
+    ///
+    /// A wrong sign turns feedback into positive feedback: the loop runs away at
+    /// once. Check it by moving the platform by hand before the amplifiers are on.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [[gauge]] @@
+    ///  point     = ["-40 mm", "69.282 mm", "180 mm"]
+    /// -direction = [0, 0, 1]
+    /// +direction = [0, 0, -1]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Turn the direction round, if the gauge really counts that way.
+    ///
+    /// ```toml
+    /// direction = [0, 0, 1]
+    /// ```
+    GAUGE_REVERSED = "W0824";
+
+    /// # W0886: gauge noise of many steps
+    ///
+    /// `sensor.noise` should be less than 40 steps of a converter of 18 bits or fewer.
+    /// A noise beyond that of all gauges is W0303.
+    ///
+    /// ## Why it matters
+    ///
+    /// A converter is chosen for its gauge. One that shows nothing but noise in its
+    /// last five bits belongs to a better gauge: the noise is in another unit, or peak
+    /// to peak.
+    ///
+    /// ## Example
+    ///
+    /// `specs/legs.toml` with
+    ///
+    /// ```diff
+    /// @@ [sensor] @@
+    /// -noise = "2.2 nm"
+    /// +noise = "35 nm"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit; rms is meant.
+    ///
+    /// ```toml
+    /// noise = "2.2 nm"
+    /// ```
+    GAUGE_NOISY = "W0886";
+
+    /// # W0822: gauge step large against the stroke
+    ///
+    /// One code of a gauge should be less than a thousandth of the stroke, and finer
+    /// than the noise where the range is more than five times what there is to see.
+    ///
+    /// ## Why it matters
+    ///
+    /// Feedback cannot do better than the step; it goes to and fro within it.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [sensor] @@
+    /// -bits  = 17
+    /// +bits  = 10
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check bits and range.
+    ///
+    /// ```toml
+    /// bits  = 17
+    /// ```
+    GAUGE_COARSE = "W0822";
+}
 
 /// Noise below this share of a converter step cannot be known.
 const QUIETEST: f64 = 0.06;
@@ -29,17 +265,15 @@ const NEARLY_ZERO: f64 = 2e-3;
 const ROUNDING: f64 = 1e-6;
 /// Lines within this angle of each other are parallel, as a cosine.
 const PARALLEL: f64 = 0.99;
-/// Farthest target from P_C, in joint radii.
-const DETACHED: f64 = 3.0;
 
 /// A noise far below the converter's step is a slip of the unit.
-pub(super) fn noise_of_a_step(facts: &Facts, found: &mut Found) {
+fn noise_of_a_step(facts: &Facts, found: &mut Found) {
     let (noise, step) = (facts.model.sensor.noise, facts.model.sensor.step());
     if noise == 0.0 || noise >= QUIETEST * step {
         return;
     }
     found.add(
-        codes::GAUGE_QUIET,
+        GAUGE_QUIET,
         "sensor.noise",
         format!(
             "a noise of {} nm rms is {} of the converter's step of {} nm",
@@ -52,7 +286,7 @@ pub(super) fn noise_of_a_step(facts: &Facts, found: &mut Found) {
 }
 
 /// A converter of few bits that shows nothing but noise is a slip of the noise's unit, or of the range.
-pub(super) fn noise_of_many_steps(facts: &Facts, found: &mut Found) {
+fn noise_of_many_steps(facts: &Facts, found: &mut Found) {
     let (noise, step, stroke) = (facts.model.sensor.noise, facts.model.sensor.step(), facts.model.actuator.stroke);
     let [low, high] = facts.model.sensor.range;
     let seen = if stroke < high - low { stroke } else { high - low };
@@ -65,7 +299,7 @@ pub(super) fn noise_of_many_steps(facts: &Facts, found: &mut Found) {
     }
     found.add_off(
         beyond,
-        codes::GAUGE_NOISY,
+        GAUGE_NOISY,
         "sensor.noise",
         format!(
             "a noise of {} nm rms is {} steps of the gauge's converter of {} bits, {} nm each",
@@ -79,7 +313,7 @@ pub(super) fn noise_of_many_steps(facts: &Facts, found: &mut Found) {
 }
 
 /// Both ends of the range in the same unit.
-pub(super) fn range_centred(facts: &Facts, found: &mut Found) {
+fn range_centred(facts: &Facts, found: &mut Found) {
     let [low, high] = facts.model.sensor.range;
     let stroke = facts.model.actuator.stroke;
     let below = -low;
@@ -95,7 +329,7 @@ pub(super) fn range_centred(facts: &Facts, found: &mut Found) {
         return;
     }
     found.add(
-        codes::GAUGE_LOPSIDED,
+        GAUGE_LOPSIDED,
         &format!("sensor.range[{item}]"),
         format!(
             "the gauge reaches from {} um to {} um, the stroke is {} um",
@@ -108,7 +342,7 @@ pub(super) fn range_centred(facts: &Facts, found: &mut Found) {
 }
 
 /// An end of a range in the wrong unit is a tiny one beside the other.
-pub(super) fn range_beyond_zero(facts: &Facts, found: &mut Found) {
+fn range_beyond_zero(facts: &Facts, found: &mut Found) {
     let model = facts.model;
     for (name, range, scale, unit) in
         [("sensor.range", model.sensor.range, 1e6, "um"), ("dac.range", model.dac.range, 1.0, "V")]
@@ -118,7 +352,7 @@ pub(super) fn range_beyond_zero(facts: &Facts, found: &mut Found) {
                 continue;
             }
             found.add(
-                codes::RANGE_AT_ZERO,
+                RANGE_AT_ZERO,
                 &format!("{name}[{item}]"),
                 format!(
                     "a range from {} {unit} to {} {unit} ends next to 0, but not there",
@@ -155,7 +389,7 @@ fn range_too_wide(facts: &Facts, found: &mut Found) {
     }
     let beside = if noise > 0.0 { format!(", {} times its noise", figure(step / noise)) } else { String::new() };
     found.add(
-        codes::GAUGE_COARSE,
+        GAUGE_COARSE,
         "sensor.range",
         format!(
             "the gauge spans {} um, {} times what there is to see; one code of it is {} nm{beside}",
@@ -168,7 +402,7 @@ fn range_too_wide(facts: &Facts, found: &mut Found) {
 }
 
 /// One code of the gauge against the stroke.
-pub(super) fn step_against_stroke(facts: &Facts, found: &mut Found) {
+fn step_against_stroke(facts: &Facts, found: &mut Found) {
     range_too_wide(facts, found);
     let (step, stroke) = (facts.model.sensor.step(), facts.model.actuator.stroke);
     if step <= COARSEST_STEP * stroke {
@@ -176,7 +410,7 @@ pub(super) fn step_against_stroke(facts: &Facts, found: &mut Found) {
     }
     found.add_off(
         step / (COARSEST_STEP * stroke),
-        codes::GAUGE_COARSE,
+        GAUGE_COARSE,
         "sensor.bits",
         format!(
             "one code of the gauge is {} nm, {} of the stroke of {} um",
@@ -189,7 +423,7 @@ pub(super) fn step_against_stroke(facts: &Facts, found: &mut Found) {
 }
 
 /// Two gauges that see the same are one, whatever they are called: most often a section that was copied and not changed.
-pub(super) fn differ(facts: &Facts, found: &mut Found) {
+fn differ(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
     let seen = |gauge: usize| {
         let probe = &task.probes[gauge];
@@ -198,7 +432,7 @@ pub(super) fn differ(facts: &Facts, found: &mut Found) {
     for later in 1..6 {
         let Some(earlier) = (0..later).find(|earlier| seen(*earlier) == seen(later)) else { continue };
         found.add(
-            codes::GAUGES_ALIKE,
+            GAUGES_ALIKE,
             &format!("gauge[{later}].point"),
             format!(
                 "gauge {later} stands and looks as gauge {earlier}: six readings are needed, and these two are one"
@@ -209,7 +443,7 @@ pub(super) fn differ(facts: &Facts, found: &mut Found) {
 }
 
 /// A coordinate in the wrong unit is a tiny one beside large ones.
-pub(super) fn odd_coordinates(facts: &Facts, found: &mut Found) {
+fn odd_coordinates(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
     let radius = facts.model.geometry.joint_radius();
     for (gauge, probe) in task.probes.iter().enumerate() {
@@ -222,7 +456,7 @@ pub(super) fn odd_coordinates(facts: &Facts, found: &mut Found) {
                 continue;
             }
             found.add(
-                codes::COORDINATE_ODD,
+                COORDINATE_ODD,
                 &format!("{key}[{axis}]"),
                 format!(
                     "{} of `{key}` is {}, on a platform of {} mm",
@@ -237,7 +471,7 @@ pub(super) fn odd_coordinates(facts: &Facts, found: &mut Found) {
 }
 
 /// Parallel gauges that count the same way are the rule; one that counts the other way has a wrong sign, or means to.
-pub(super) fn opposite_directions(facts: &Facts, found: &mut Found) {
+fn opposite_directions(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
     let along = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     for (gauge, probe) in task.probes.iter().enumerate() {
@@ -256,7 +490,7 @@ pub(super) fn opposite_directions(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::GAUGE_REVERSED,
+            GAUGE_REVERSED,
             &format!("gauge[{gauge}].direction"),
             format!("gauge {gauge} counts against gauge {other}, which looks along the same line the other way"),
             &format!(
@@ -264,58 +498,4 @@ pub(super) fn opposite_directions(facts: &Facts, found: &mut Found) {
             ),
         );
     }
-}
-
-/// Where the line of a gauge meets its target at rest, in {P}, m.
-pub(super) fn pierced(probe: &Probe, height: f64) -> [f64; 3] {
-    let start = [probe.point[0], probe.point[1], probe.point[2] - height];
-    let (n, m) = (probe.direction, probe.plane_normal);
-    let across = m[0] * n[0] + m[1] * n[1] + m[2] * n[2];
-    let way: f64 = (0..3).fold(0.0, |sum, k| sum + m[k] * (probe.plane_point[k] - start[k])) / across;
-    core::array::from_fn(|k| start[k] + way * n[k])
-}
-
-/// Targets are on the platform.
-pub(super) fn size_of_layout(facts: &Facts, found: &mut Found) {
-    let Some(task) = &facts.model.task_space else { return };
-    let radius = facts.model.geometry.joint_radius();
-    for (gauge, probe) in task.probes.iter().enumerate() {
-        if found.is_in_other_frame(gauge) {
-            continue;
-        }
-        let (n, pierced) = (probe.direction, pierced(probe, facts.model.geometry.height));
-        let far = libm::sqrt(pierced.iter().fold(0.0, |sum, part| sum + part * part));
-        if far.is_nan() || far <= DETACHED * radius {
-            if let Some(axis) = aside(&pierced, &n, radius) {
-                found.add(
-                    codes::GAUGE_FAR,
-                    &format!("gauge[{gauge}].point[{axis}]"),
-                    format!(
-                        "the line of gauge {gauge} meets its target {} mm along {} from P_C, on a platform whose joints are {} mm from it",
-                        figure(pierced[axis] * 1e3),
-                        ["x", "y", "z"][axis],
-                        figure(radius * 1e3)
-                    ),
-                    "check the order and the units of `point`: x, y, z in {B}, whose origin lies in the base",
-                );
-            }
-            continue;
-        }
-        found.add_off(
-            far / (DETACHED * radius),
-            codes::GAUGE_FAR,
-            &format!("gauge[{gauge}].point"),
-            format!(
-                "the line of gauge {gauge} meets its target {} mm from P_C, on a platform whose joints are {} mm from it",
-                figure(far * 1e3),
-                figure(radius * 1e3)
-            ),
-            "check `point`, `direction` ({B}) and `target_point`, `target_normal` ({P}, from P_C) of the gauge",
-        );
-    }
-}
-
-/// The axis, across the gauge's line, on which the target stands out from a platform of `radius`.
-fn aside(pierced: &[f64; 3], direction: &[f64; 3], radius: f64) -> Option<usize> {
-    (0..3).find(|axis| direction[*axis].abs() < 0.5 && pierced[*axis].abs() > 1.5 * radius)
 }

@@ -1,10 +1,125 @@
 //! Where the joints are.
 
-use core::f64::consts::PI;
-
-use super::{Facts, Found, figure};
+use super::{Facts, Found, Lints, figure};
 use crate::reach::joints;
-use specgen_language::diagnostic::codes;
+use specgen_language::diagnostic::Code;
+
+lints! {
+    rules: joints_apart, joints_turn, base_is_wider, proportions;
+
+    /// # W0815: joints that would touch
+    ///
+    /// Two joints of one body should be apart by more than a hundredth of a leg.
+    ///
+    /// ## Why it matters
+    ///
+    /// The legs would have to be thinner than that. Most often the half angle between
+    /// two joints is in another unit, or was halved twice.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [geometry] @@
+    /// -base_angle      = "0.012 pi rad"
+    /// +base_angle      = "0.012 rad"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check `base_angle` and `platform_angle`: each is the whole angle of a pair.
+    ///
+    /// ```toml
+    /// base_angle      = "0.012 pi rad"
+    /// ```
+    JOINTS_TOUCH = "W0815";
+
+    /// # E0860: joints beyond their angle
+    ///
+    /// Over the workspace, no joint at base or platform may turn further from rest
+    /// than `leg.joint_angle`.
+    ///
+    /// ## Why it matters
+    ///
+    /// A flexure bent beyond its angle yields or breaks.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [leg] @@
+    ///  extensible_center  = "50 mm"
+    /// +joint_angle = "0.5 mrad"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Reduce the workspace, or check the unit of the angle.
+    ///
+    /// ```toml
+    /// joint_angle = "5 mrad"
+    /// ```
+    JOINT_ANGLE = "E0860";
+
+    /// # W0816: platform wider than its base
+    ///
+    /// The joint circle of the platform is larger than that of the base.
+    ///
+    /// ## Why it matters
+    ///
+    /// It is possible, but most hexapods stand on the wider side.
+    ///
+    /// ## Example
+    ///
+    /// `specs/legs.toml` with
+    ///
+    /// ```diff
+    /// @@ [geometry] @@
+    /// -base_radius     = "150 mm"
+    /// +base_radius     = "90 mm"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Are the two radii in each other's place?
+    ///
+    /// ```toml
+    /// base_radius     = "150 mm"
+    /// ```
+    PLATFORM_WIDER = "W0816";
+
+    /// # W0817: radii and height out of proportion
+    ///
+    /// Radii of base and platform and the height: one should not be five times larger
+    /// or smaller than what lies between the other two, nor a base more than 2.5 times
+    /// as wide as its platform.
+    ///
+    /// ## Why it matters
+    ///
+    /// A hexapod so flat or so high holds some motions badly; more often it is a slip
+    /// of the unit.
+    ///
+    /// ## Example
+    ///
+    /// `specs/legs.toml` with
+    ///
+    /// ```diff
+    /// @@ [geometry] @@
+    /// -height          = "180 mm"
+    /// +height          = "1.8 m"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the units of the three.
+    ///
+    /// ```toml
+    /// height          = "180 mm"
+    /// ```
+    SIZES_APART = "W0817";
+}
 
 /// Two joints of one body nearer than this share of a leg cannot be built: a leg that is a hundred times as long as thick is no
 /// strut, and two stand beside each other.
@@ -13,11 +128,9 @@ const NEAREST: f64 = 1e-2;
 const OUT_OF_PROPORTION: f64 = 5.0;
 /// A base is so many times as wide as the platform, at most.
 const WIDEST_BASE: f64 = 2.5;
-/// Six joints evenly on their circle are so many degrees apart: no pair is wider.
-const WIDEST_PAIR: f64 = 60.0;
 
 /// The joints of a pair are two parts that stand beside each other.
-pub(super) fn joints_apart(facts: &Facts, found: &mut Found) {
+fn joints_apart(facts: &Facts, found: &mut Found) {
     let geometry = &facts.model.geometry;
     let Some(legs) = &facts.legs else { return };
     for (body, joints) in [("base", &geometry.base_joints), ("platform", &geometry.platform_joints)] {
@@ -40,7 +153,7 @@ pub(super) fn joints_apart(facts: &Facts, found: &mut Found) {
             format!("geometry.{body}_angle")
         };
         found.add(
-            codes::JOINTS_TOUCH,
+            JOINTS_TOUCH,
             &key,
             format!(
                 "joints {i} and {j} of the {body} are {} mm apart, for legs of {} mm",
@@ -55,7 +168,7 @@ pub(super) fn joints_apart(facts: &Facts, found: &mut Found) {
 }
 
 /// The joints of a leg stand what the workspace asks of them.
-pub(super) fn joints_turn(facts: &Facts, found: &mut Found) {
+fn joints_turn(facts: &Facts, found: &mut Found) {
     let Some(most) = facts.model.leg.joint_angle else { return };
     let [base, platform] = joints::angles(&facts.model.geometry, &facts.model.workspace.bounds());
     let (end, angle) = if base > platform { ("base", base) } else { ("platform", platform) };
@@ -63,7 +176,7 @@ pub(super) fn joints_turn(facts: &Facts, found: &mut Found) {
         return;
     }
     found.add(
-        codes::JOINT_ANGLE,
+        JOINT_ANGLE,
         "leg.joint_angle",
         format!(
             "in the declared workspace a joint at the {end} turns by {} mrad, but it may turn by {} mrad",
@@ -75,7 +188,7 @@ pub(super) fn joints_turn(facts: &Facts, found: &mut Found) {
 }
 
 /// Hexapods stand on a base that is wider than their platform.
-pub(super) fn base_is_wider(facts: &Facts, found: &mut Found) {
+fn base_is_wider(facts: &Facts, found: &mut Found) {
     let geometry = &facts.model.geometry;
     let radius = |joints: &[[f64; 3]; 6]| {
         joints.iter().map(|joint| libm::hypot(joint[0], joint[1])).fold(0.0, |a: f64, b| if b > a { b } else { a })
@@ -91,7 +204,7 @@ pub(super) fn base_is_wider(facts: &Facts, found: &mut Found) {
         ["geometry.base_joints", "geometry.platform_joints"]
     };
     found.add(
-        codes::PLATFORM_WIDER,
+        PLATFORM_WIDER,
         key,
         format!(
             "the platform's joints are {} mm from its axis, those of the base {} mm",
@@ -105,7 +218,7 @@ pub(super) fn base_is_wider(facts: &Facts, found: &mut Found) {
 }
 
 /// Radii and height of a hexapod are of one size.
-pub(super) fn proportions(facts: &Facts, found: &mut Found) {
+fn proportions(facts: &Facts, found: &mut Found) {
     let geometry = &facts.model.geometry;
     let radius = |joints: &[[f64; 3]; 6]| {
         joints.iter().map(|joint| libm::hypot(joint[0], joint[1])).fold(0.0, |a: f64, b| if b > a { b } else { a })
@@ -136,7 +249,7 @@ pub(super) fn proportions(facts: &Facts, found: &mut Found) {
     };
     found.add_off(
         libm::exp(apart[odd]) / OUT_OF_PROPORTION,
-        codes::OUT_OF_PROPORTION,
+        SIZES_APART,
         keys[odd],
         format!(
             "joints are {} mm from the axis on the base and {} mm on the platform, at a height of {} mm",
@@ -149,30 +262,4 @@ pub(super) fn proportions(facts: &Facts, found: &mut Found) {
             keys[odd]
         ),
     );
-}
-
-/// Joints of a pair are nearer to each other than to the next pair.
-pub(super) fn angles_of_pairs(facts: &Facts, found: &mut Found) {
-    let geometry = &facts.model.geometry;
-    for (body, joints, other) in [("base", &geometry.base_joints, 1), ("platform", &geometry.platform_joints, 5)] {
-        let key = format!("geometry.{body}_angle");
-        let ([ax, ay, _], [bx, by, _]) = (joints[0], joints[other]);
-        let angle = libm::fabs(libm::atan2(ax * by - ay * bx, ax * bx + ay * by)) * 180.0 / PI;
-        if !found.model.spans.contains_key(&key) || angle <= WIDEST_PAIR {
-            continue;
-        }
-        found.add(
-            codes::PAIR_WIDE,
-            &key,
-            format!(
-                "the joints of a pair are {} deg apart, and {} deg from those of the next pair",
-                figure(angle),
-                figure(120.0 - angle)
-            ),
-            &format!(
-                "`{key}` is the angle within a pair, the smaller of the two: if \"{} deg\" is meant, write that",
-                figure(120.0 - angle)
-            ),
-        );
-    }
 }

@@ -1,8 +1,215 @@
 //! Limits of moves and streams against the workspace, the tick and the legs.
 
-use super::{AXES, Facts, Found, amount, figure};
-use specgen_language::diagnostic::codes;
+use super::{AXES, Facts, Found, Lints, amount, figure};
+use specgen_language::diagnostic::Code;
 use specgen_language::model::SetpointRules;
+
+lints! {
+    rules: rotations_beside_translations, stops_take_ticks, correction_moves_codes, moves_within_slew, moves_end,
+        limits_bind, stream_limit_binds, streams_keep_up, streams_within_slew, workspace_is_used;
+
+    /// # W0887: rotations limited unlike translations
+    ///
+    /// Limits of speed, acceleration and jerk of rotations should be within ten times
+    /// those of translations, at the joints or as parts of the workspace.
+    ///
+    /// ## Why it matters
+    ///
+    /// A rate in degrees where milliradians were meant is 17 times too fast, one in
+    /// radians where degrees were meant 57 times: too little to break another limit,
+    /// and enough to shake the platform.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [control.setpoint] @@
+    /// -speed        = ["100 um/s", "100 um/s", "100 um/s", "1 mrad/s", "1 mrad/s", "1 mrad/s"]
+    /// +speed        = ["100 um/s", "100 um/s", "100 um/s", "1 deg/s", "1 deg/s", "1 deg/s"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit of the last three.
+    ///
+    /// ```toml
+    /// speed        = ["100 um/s", "100 um/s", "100 um/s", "1 mrad/s", "1 mrad/s", "1 mrad/s"]
+    /// ```
+    LIMITS_APART = "W0887";
+
+    /// # W0840: moves faster than the slew rate
+    ///
+    /// At `control.setpoint.speed` no leg should need more than `actuator.slew_rate`.
+    ///
+    /// ## Why it matters
+    ///
+    /// A move at that speed meets the slew limit and lags its profile.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [control.setpoint] @@
+    /// -speed        = ["100 um/s", "100 um/s", "100 um/s", "1 mrad/s", "1 mrad/s", "1 mrad/s"]
+    /// +speed        = ["100 mm/s", "100 um/s", "100 um/s", "1 mrad/s", "1 mrad/s", "1 mrad/s"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check mm/s against um/s, and V/ms against V/s.
+    ///
+    /// ```toml
+    /// speed        = ["100 um/s", "100 um/s", "100 um/s", "1 mrad/s", "1 mrad/s", "1 mrad/s"]
+    /// ```
+    MOVE_BEYOND_SLEW = "W0840";
+
+    /// # W0841: moves that take minutes
+    ///
+    /// A move across the workspace at `control.setpoint.speed` should take less than
+    /// two minutes.
+    ///
+    /// ## Why it matters
+    ///
+    /// It is a slip of the unit: um/s for mm/s.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [control.setpoint] @@
+    /// -speed        = ["100 um/s", "100 um/s", "100 um/s", "1 mrad/s", "1 mrad/s", "1 mrad/s"]
+    /// +speed        = ["100 nm/s", "100 um/s", "100 um/s", "1 mrad/s", "1 mrad/s", "1 mrad/s"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the units of speed and workspace.
+    ///
+    /// ```toml
+    /// speed        = ["100 um/s", "100 um/s", "100 um/s", "1 mrad/s", "1 mrad/s", "1 mrad/s"]
+    /// ```
+    MOVE_SLOW = "W0841";
+
+    /// # W0842: a limit of moves that has no effect
+    ///
+    /// Speed, acceleration and jerk belong together: each should take more than a
+    /// tick to be reached, and be reached at all. A stop should take more than a tick,
+    /// and a correction be worth ten codes of the converter.
+    ///
+    /// ## Why it matters
+    ///
+    /// A limit that is reached within a tick limits nothing; one that is never
+    /// reached is dead text. Either is most often off by 1000.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [control.setpoint] @@
+    /// -acceleration = ["10 mm/s^2", "10 mm/s^2", "10 mm/s^2", "100 mrad/s^2", "100 mrad/s^2", "100 mrad/s^2"]
+    /// +acceleration = ["10 m/s^2", "10 mm/s^2", "10 mm/s^2", "100 mrad/s^2", "100 mrad/s^2", "100 mrad/s^2"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Choose times: speed / acceleration and acceleration / jerk of some ten ticks.
+    ///
+    /// ```toml
+    /// acceleration = ["10 mm/s^2", "10 mm/s^2", "10 mm/s^2", "100 mrad/s^2", "100 mrad/s^2", "100 mrad/s^2"]
+    /// ```
+    LIMIT_WITHOUT_EFFECT = "W0842";
+
+    /// # W0843: streamed set-points that are not checked
+    ///
+    /// At `control.setpoint.stream_speed` a stream should not be able to cross the
+    /// workspace in one tick.
+    ///
+    /// ## Why it matters
+    ///
+    /// The bound is what protects the machine from a jump of the host. So high, it
+    /// lets every jump pass.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [control.setpoint] @@
+    /// -stream_speed = ["5 mm/s", "5 mm/s", "5 mm/s", "50 mrad/s", "50 mrad/s", "50 mrad/s"]
+    /// +stream_speed = ["5 m/s", "5 mm/s", "5 mm/s", "50 mrad/s", "50 mrad/s", "50 mrad/s"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Write the speed that your paths have, with some reserve.
+    ///
+    /// ```toml
+    /// stream_speed = ["5 mm/s", "5 mm/s", "5 mm/s", "50 mrad/s", "50 mrad/s", "50 mrad/s"]
+    /// ```
+    STREAM_UNCHECKED = "W0843";
+
+    /// # W0867: streams much slower than moves
+    ///
+    /// On no axis should `control.setpoint.stream_speed` be less than a tenth of
+    /// `control.setpoint.speed`.
+    ///
+    /// ## Why it matters
+    ///
+    /// Streams are the way of fast set-points; a limit below that of moves is probably
+    /// a slip of the unit, and every stream that is faster is refused.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [control.setpoint] @@
+    /// -stream_speed = ["5 mm/s", "5 mm/s", "5 mm/s", "50 mrad/s", "50 mrad/s", "50 mrad/s"]
+    /// +stream_speed = ["5 um/s", "5 mm/s", "5 mm/s", "50 mrad/s", "50 mrad/s", "50 mrad/s"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check um/s against mm/s.
+    ///
+    /// ```toml
+    /// stream_speed = ["5 mm/s", "5 mm/s", "5 mm/s", "50 mrad/s", "50 mrad/s", "50 mrad/s"]
+    /// ```
+    STREAM_SLOW = "W0867";
+
+    /// # W0844: a workspace bound of next to nothing
+    ///
+    /// A bound should be more than half a hundredth of what the legs reach on this
+    /// axis.
+    ///
+    /// ## Why it matters
+    ///
+    /// It is a slip of the unit: nm for um, urad for mrad. Nearly every set-point on
+    /// that axis would be refused.
+    ///
+    /// ## Example
+    ///
+    /// `specs/legs.toml` with
+    ///
+    /// ```diff
+    /// @@ [workspace] @@
+    /// -translation = ["40 um", "40 um", "40 um"]
+    /// +translation = ["40 nm", "40 um", "40 um"]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit.
+    ///
+    /// ```toml
+    /// translation = ["40 um", "40 um", "40 um"]
+    /// ```
+    WORKSPACE_TINY = "W0844";
+}
 
 /// A move across the workspace that takes longer than this is not meant, s.
 const LONGEST_MOVE: f64 = 120.0;
@@ -30,7 +237,7 @@ fn way(facts: &Facts, axis: usize) -> f64 {
 }
 
 /// The voltage follows a move at its largest speed.
-pub(super) fn moves_within_slew(facts: &Facts, found: &mut Found) {
+fn moves_within_slew(facts: &Facts, found: &mut Found) {
     let (Some(rules), Some(legs)) = (rules(facts), &facts.legs) else { return };
     let actuator = &facts.model.actuator;
     for (axis, speed) in rules.speed.into_iter().enumerate() {
@@ -39,7 +246,7 @@ pub(super) fn moves_within_slew(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::MOVE_BEYOND_SLEW,
+            MOVE_BEYOND_SLEW,
             &format!("control.setpoint.speed[{axis}]"),
             format!(
                 "{}/s along {} needs {} V/ms, but `actuator.slew_rate` is {} V/ms",
@@ -57,7 +264,7 @@ pub(super) fn moves_within_slew(facts: &Facts, found: &mut Found) {
 }
 
 /// A move across the workspace ends within the time that an operator waits.
-pub(super) fn moves_end(facts: &Facts, found: &mut Found) {
+fn moves_end(facts: &Facts, found: &mut Found) {
     let Some(rules) = rules(facts) else { return };
     for (axis, speed) in rules.speed.into_iter().enumerate() {
         let time = way(facts, axis) / speed;
@@ -65,7 +272,7 @@ pub(super) fn moves_end(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::MOVE_SLOW,
+            MOVE_SLOW,
             &format!("control.setpoint.speed[{axis}]"),
             format!(
                 "at {}/s a move across the workspace along {} takes {} s",
@@ -80,7 +287,7 @@ pub(super) fn moves_end(facts: &Facts, found: &mut Found) {
 
 /// Speed, acceleration and jerk belong together: each is reached, and none at once.
 #[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
-pub(super) fn limits_bind(facts: &Facts, found: &mut Found) {
+fn limits_bind(facts: &Facts, found: &mut Found) {
     let Some(rules) = rules(facts) else { return };
     let tick = facts.model.timing.period;
     for axis in 0..6 {
@@ -88,7 +295,7 @@ pub(super) fn limits_bind(facts: &Facts, found: &mut Found) {
         let shown = |value: f64, per: &str| format!("{}/{per}", amount(axis, value));
         let mut say = |name: &str, value: String, what: String| {
             found.add(
-                codes::LIMIT_WITHOUT_EFFECT,
+                LIMIT_WITHOUT_EFFECT,
                 &format!("control.setpoint.{name}[{axis}]"),
                 format!("a limit of {value} on {} {what}", AXES[axis]),
                 &format!("check the unit of `control.setpoint.{name}` against the other two limits of moves"),
@@ -134,7 +341,7 @@ fn middle(mut values: [f64; 3]) -> f64 {
 }
 
 /// Rotations and translations are limited alike: at the joints, or as parts of the workspace.
-pub(super) fn rotations_beside_translations(facts: &Facts, found: &mut Found) {
+fn rotations_beside_translations(facts: &Facts, found: &mut Found) {
     let Some(rules) = rules(facts) else { return };
     let radius = facts.model.geometry.joint_radius();
     let bounds = facts.model.workspace.bounds();
@@ -157,7 +364,7 @@ pub(super) fn rotations_beside_translations(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::LIMITS_APART,
+            LIMITS_APART,
             &format!("{key}[3]"),
             format!(
                 "rotations are limited to {} {}, which is {} {} at the joints, translations to {} {}: {} times {}",
@@ -176,7 +383,7 @@ pub(super) fn rotations_beside_translations(facts: &Facts, found: &mut Found) {
 }
 
 /// A stop that is over within a tick is no stop, but a jump.
-pub(super) fn stops_take_ticks(facts: &Facts, found: &mut Found) {
+fn stops_take_ticks(facts: &Facts, found: &mut Found) {
     let Some(rules) = rules(facts) else { return };
     let Some(limits) = rules.stop_acceleration else { return };
     let tick = facts.model.timing.period;
@@ -187,7 +394,7 @@ pub(super) fn stops_take_ticks(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::LIMIT_WITHOUT_EFFECT,
+            LIMIT_WITHOUT_EFFECT,
             &format!("control.setpoint.stop_acceleration[{axis}]"),
             format!(
                 "a limit of {}/s^2 on {} does nothing: a speed of {}/s is gone within a tick",
@@ -202,7 +409,7 @@ pub(super) fn stops_take_ticks(facts: &Facts, found: &mut Found) {
 }
 
 /// A correction of a few codes corrects nothing.
-pub(super) fn correction_moves_codes(facts: &Facts, found: &mut Found) {
+fn correction_moves_codes(facts: &Facts, found: &mut Found) {
     let model = facts.model;
     let Some(correction) = model.task_space.as_ref().and_then(|task| task.correction) else { return };
     let [low, high] = model.dac.range;
@@ -211,7 +418,7 @@ pub(super) fn correction_moves_codes(facts: &Facts, found: &mut Found) {
         return;
     }
     found.add(
-        codes::LIMIT_WITHOUT_EFFECT,
+        LIMIT_WITHOUT_EFFECT,
         "control.correction",
         format!(
             "a correction of {} nm at most does nothing: one code of the converter moves a leg by {} nm",
@@ -223,7 +430,7 @@ pub(super) fn correction_moves_codes(facts: &Facts, found: &mut Found) {
 }
 
 /// A streamed set-point that may jump across the workspace is not checked at all.
-pub(super) fn stream_limit_binds(facts: &Facts, found: &mut Found) {
+fn stream_limit_binds(facts: &Facts, found: &mut Found) {
     let Some(rules) = rules(facts) else { return };
     for (axis, speed) in rules.stream_speed.into_iter().enumerate() {
         let step = speed * facts.model.timing.period;
@@ -231,7 +438,7 @@ pub(super) fn stream_limit_binds(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::STREAM_UNCHECKED,
+            STREAM_UNCHECKED,
             &format!("control.setpoint.stream_speed[{axis}]"),
             format!(
                 "{}/s lets a stream jump by {} along {} in a tick, more than the whole workspace of {}",
@@ -246,14 +453,14 @@ pub(super) fn stream_limit_binds(facts: &Facts, found: &mut Found) {
 }
 
 /// A stream that may not go a tenth as fast as moves go is in another unit.
-pub(super) fn streams_keep_up(facts: &Facts, found: &mut Found) {
+fn streams_keep_up(facts: &Facts, found: &mut Found) {
     let Some(rules) = rules(facts) else { return };
     for (axis, stream) in rules.stream_speed.into_iter().enumerate() {
         if stream >= SLOWEST_STREAM * rules.speed[axis] {
             continue;
         }
         found.add(
-            codes::STREAM_SLOW,
+            STREAM_SLOW,
             &format!("control.setpoint.stream_speed[{axis}]"),
             format!(
                 "streamed set-points may move at {}/s along {}, while moves go at {}/s",
@@ -267,7 +474,7 @@ pub(super) fn streams_keep_up(facts: &Facts, found: &mut Found) {
 }
 
 /// The voltage follows a stream at its largest speed. Where it does not on most axes, the slew rate is suspected.
-pub(super) fn streams_within_slew(facts: &Facts, found: &mut Found) {
+fn streams_within_slew(facts: &Facts, found: &mut Found) {
     let (Some(rules), Some(legs)) = (rules(facts), &facts.legs) else { return };
     let actuator = &facts.model.actuator;
     let slews: [f64; 6] =
@@ -280,7 +487,7 @@ pub(super) fn streams_within_slew(facts: &Facts, found: &mut Found) {
         format!("control.setpoint.stream_speed[{worst}]")
     };
     found.add(
-        codes::MOVE_BEYOND_SLEW,
+        MOVE_BEYOND_SLEW,
         &key,
         format!(
             "a stream along {} at {}/s needs {} V/ms, but `actuator.slew_rate` is {} V/ms",
@@ -295,7 +502,7 @@ pub(super) fn streams_within_slew(facts: &Facts, found: &mut Found) {
 
 /// A bound that uses next to nothing of what the legs reach.
 #[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
-pub(super) fn workspace_is_used(facts: &Facts, found: &mut Found) {
+fn workspace_is_used(facts: &Facts, found: &mut Found) {
     let Some(legs) = &facts.legs else { return };
     let stroke = facts.model.actuator.stroke;
     for axis in 0..6 {
@@ -311,7 +518,7 @@ pub(super) fn workspace_is_used(facts: &Facts, found: &mut Found) {
             format!("workspace.rotation[{}]", axis - 3)
         };
         found.add(
-            codes::WORKSPACE_TINY,
+            WORKSPACE_TINY,
             &key,
             format!(
                 "{} is bound to ±{}, while the legs reach ±{}",

@@ -1,17 +1,123 @@
-//! In which order joints and gauges are listed.
+//! In which order joints are listed.
 
-use super::{Facts, Found, figure};
-use specgen_language::diagnostic::codes;
+use super::{Facts, Found, Lints, figure};
+use specgen_language::diagnostic::Code;
 use specgen_language::model::Geometry;
+
+lints! {
+    rules: joints_run_round, legs_cross;
+
+    /// # W0882: joints numbered clockwise
+    ///
+    /// `base_joints` and `platform_joints` should be listed counter-clockwise, seen
+    /// from above, as equations (1) and (2) number them.
+    ///
+    /// ## Why it matters
+    ///
+    /// In right-handed coordinates with z up the paper's legs run counter-clockwise.
+    /// If they do not, y was measured to the other side or x and y are exchanged: the
+    /// geometry is a mirror image, and rotations have the wrong sign. Lists that were
+    /// written backwards look the same; legs that are numbered clockwise on purpose
+    /// are no fault.
+    ///
+    /// ## Example
+    ///
+    /// `specs/features/platform-joints.toml` with
+    ///
+    /// ```diff
+    /// @@ [geometry] @@
+    /// -    ["81 mm", "125 mm", "2 mm"],
+    /// -    ["66 mm", "134 mm", "-1 mm"],
+    /// -    ["-147 mm", "9 mm", "0 mm"],
+    /// -    ["-152 mm", "-4 mm", "3 mm"],
+    /// -    ["74 mm", "-128 mm", "-2 mm"],
+    /// -    ["83 mm", "-133 mm", "1 mm"],
+    /// -]
+    /// -platform_joints = [
+    /// -    ["103 mm", "5 mm", "-12 mm"],
+    /// -    ["-44 mm", "91 mm", "-10 mm"],
+    /// -    ["-56 mm", "83 mm", "-11 mm"],
+    /// -    ["-51 mm", "-88 mm", "-12 mm"],
+    /// -    ["-46 mm", "-84 mm", "-9 mm"],
+    /// -    ["98 mm", "-3 mm", "-10 mm"],
+    /// +    ["81 mm", "-125 mm", "2 mm"],
+    /// +    ["66 mm", "-134 mm", "-1 mm"],
+    /// +    ["-147 mm", "-9 mm", "0 mm"],
+    /// +    ["-152 mm", "4 mm", "3 mm"],
+    /// +    ["74 mm", "128 mm", "-2 mm"],
+    /// +    ["83 mm", "133 mm", "1 mm"],
+    /// +]
+    /// +platform_joints = [
+    /// +    ["103 mm", "-5 mm", "-12 mm"],
+    /// +    ["-44 mm", "-91 mm", "-10 mm"],
+    /// +    ["-56 mm", "-83 mm", "-11 mm"],
+    /// +    ["-51 mm", "88 mm", "-12 mm"],
+    /// +    ["-46 mm", "84 mm", "-9 mm"],
+    /// +    ["98 mm", "3 mm", "-10 mm"],
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Measure y to the left of x, seen from above.
+    ///
+    /// ```toml
+    ///     ["81 mm", "125 mm", "2 mm"],
+    ///     ["66 mm", "134 mm", "-1 mm"],
+    ///     ["-147 mm", "9 mm", "0 mm"],
+    ///     ["-152 mm", "-4 mm", "3 mm"],
+    ///     ["74 mm", "-128 mm", "-2 mm"],
+    ///     ["83 mm", "-133 mm", "1 mm"],
+    /// ]
+    /// platform_joints = [
+    ///     ["103 mm", "5 mm", "-12 mm"],
+    ///     ["-44 mm", "91 mm", "-10 mm"],
+    ///     ["-56 mm", "83 mm", "-11 mm"],
+    ///     ["-51 mm", "-88 mm", "-12 mm"],
+    ///     ["-46 mm", "-84 mm", "-9 mm"],
+    ///     ["98 mm", "-3 mm", "-10 mm"],
+    /// ```
+    JOINTS_CLOCKWISE = "W0882";
+
+    /// # W0818: legs that cross
+    ///
+    /// No two legs should be shorter with each other's joints, nor all of them if one
+    /// list began elsewhere or ran in the other direction.
+    ///
+    /// ## Why it matters
+    ///
+    /// Both lists of joints go in the order of the legs. With two of them exchanged
+    /// each voltage goes to the wrong leg. A layout with crossed legs is possible,
+    /// and rare.
+    ///
+    /// ## Example
+    ///
+    /// `specs/features/platform-joints.toml` with
+    ///
+    /// ```diff
+    /// @@ [geometry] @@
+    /// -    ["-46 mm", "-84 mm", "-9 mm"],
+    /// -    ["98 mm", "-3 mm", "-10 mm"],
+    /// +    ["98 mm", "-3 mm", "-10 mm"],
+    /// +    ["-46 mm", "-84 mm", "-9 mm"],
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Put both lists into the same order.
+    ///
+    /// ```toml
+    ///     ["-46 mm", "-84 mm", "-9 mm"],
+    ///     ["98 mm", "-3 mm", "-10 mm"],
+    /// ```
+    LEGS_CROSS = "W0818";
+}
 
 /// Legs that would be shorter by more than this share with each other's joints cross.
 const CROSSED: f64 = 1e-3;
-/// Within this cosine of the axis a gauge looks along it.
-const AXIAL: f64 = 0.99;
 
 /// Which way points run round their middle in the order of the list, seen from above: positive counter-clockwise. Twice the
 /// area of their polygon, m².
-fn turn(points: &[[f64; 3]]) -> f64 {
+pub(super) fn turn(points: &[[f64; 3]]) -> f64 {
     let count = points.len();
     let following = |k: usize| points[(k + 1) % count];
     (0..count).fold(0.0, |sum, k| sum + points[k][0] * following(k)[1] - points[k][1] * following(k)[0])
@@ -22,7 +128,7 @@ fn is_listed(facts: &Facts, body: &str) -> bool {
 }
 
 /// Joints are numbered as in (1) and (2), counter-clockwise seen from above.
-pub(super) fn joints_run_round(facts: &Facts, found: &mut Found) {
+fn joints_run_round(facts: &Facts, found: &mut Found) {
     let geometry = &facts.model.geometry;
     let bodies = [("base", turn(&geometry.base_joints)), ("platform", turn(&geometry.platform_joints))];
     let clockwise: Vec<&str> =
@@ -38,38 +144,12 @@ pub(super) fn joints_run_round(facts: &Facts, found: &mut Found) {
         _ => return,
     };
     found.add(
-        codes::JOINTS_CLOCKWISE,
+        JOINTS_CLOCKWISE,
         &format!("geometry.{key}_joints"),
         message,
         &format!(
             "the paper's equations (1) and (2) number legs counter-clockwise, x to the right, y up, seen from above: check the sign of y, that x and y are not exchanged, and the order of the lists; if the legs are numbered clockwise, say so in [lint]: allow = [\"geometry.{key}_joints: <reason>\"]"
         ),
-    );
-}
-
-/// Gauges along the axis that are numbered the other way round than the joints: a mirrored layout looks so.
-pub(super) fn gauges_run_round(facts: &Facts, found: &mut Found) {
-    let Some(task) = &facts.model.task_space else { return };
-    // These findings explain it.
-    let known = [codes::JOINTS_CLOCKWISE, codes::GAUGE_PATTERN, codes::GAUGE_FAR];
-    if found.list.iter().any(|one| known.iter().any(|code| one.code == *code)) {
-        return;
-    }
-    let axial = task.probes.iter().enumerate().filter(|(_, probe)| libm::fabs(probe.direction[2]) > AXIAL);
-    let (numbers, points): (Vec<usize>, Vec<[f64; 3]>) = axial.map(|(gauge, probe)| (gauge, probe.point)).unzip();
-    let of_joints = turn(&facts.model.geometry.base_joints);
-    if points.len() != 3 || turn(&points) * of_joints >= 0.0 {
-        return;
-    }
-    let way = if of_joints < 0.0 { ["counter-clockwise", "clockwise"] } else { ["clockwise", "counter-clockwise"] };
-    found.add(
-        codes::GAUGES_MIRRORED,
-        &format!("gauge[{}].point", numbers[1]),
-        format!(
-            "gauges {}, {} and {} run {} seen from above, the joints {}",
-            numbers[0], numbers[1], numbers[2], way[0], way[1]
-        ),
-        "gauges may be numbered in any order; but if x or y was measured to the other side, the layout is mirrored, and rotations come out with the wrong sign",
     );
 }
 
@@ -84,7 +164,7 @@ fn leg(geometry: &Geometry, base: usize, platform: usize) -> f64 {
 }
 
 /// Legs do not cross. Joints on circles are paired by rule; those of a list may be in another order on one body.
-pub(super) fn legs_cross(facts: &Facts, found: &mut Found) {
+fn legs_cross(facts: &Facts, found: &mut Found) {
     let geometry = &facts.model.geometry;
     if !["base", "platform"].iter().any(|body| is_listed(facts, body)) {
         return;
@@ -113,7 +193,7 @@ pub(super) fn legs_cross(facts: &Facts, found: &mut Found) {
     if let Some((k, shorter)) = best.filter(|(_, shorter)| *shorter < limit && *shorter < best_pair) {
         let how = if k < 6 { format!("{k} places further on") } else { "in the other direction".to_owned() };
         found.add(
-            codes::LEGS_CROSS,
+            LEGS_CROSS,
             "geometry.platform_joints[0]",
             format!(
                 "the legs cross: together they are {} mm long, and {} mm if the platform's joints were listed {how}",
@@ -127,7 +207,7 @@ pub(super) fn legs_cross(facts: &Facts, found: &mut Found) {
     let Some((i, j)) = pairs.iter().copied().find(crossing) else { return };
     let (now, then) = (leg(geometry, i, i) + leg(geometry, j, j), leg(geometry, i, j) + leg(geometry, j, i));
     found.add(
-        codes::LEGS_CROSS,
+        LEGS_CROSS,
         &format!("geometry.platform_joints[{i}]"),
         format!(
             "legs {i} and {j} cross: together they are {} mm long, and {} mm if each went to the other's joint",

@@ -6,10 +6,164 @@ use serde::Serialize;
 use specgen_numerics::{displacements, mass_matrix};
 use specgen_runtime::Platform;
 
-use super::{Found, Legs, figure};
+use super::{Found, Legs, Lints, figure};
 use crate::lower::setpoint::Stretch;
-use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::diagnostic::{Code, Diagnostic};
 use specgen_language::model::{Model, TaskSpace};
+
+lints! {
+    rules:;
+
+    /// # E0850: trajectory faster than the slew rate
+    ///
+    /// Along a trajectory no leg may need a faster change of voltage than
+    /// `actuator.slew_rate`, even with a quarter more gain than the mean.
+    ///
+    /// ## Why it matters
+    ///
+    /// The leg would lag from the first fast piece on, and the platform leave its
+    /// path on all axes.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [actuator] @@
+    /// -slew_rate       = "40 V/ms"
+    /// +slew_rate       = "0.09 V/ms"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Lower the frequency, or check the unit of `slew_rate`.
+    ///
+    /// ```toml
+    /// slew_rate       = "40 V/ms"
+    /// ```
+    PATH_BEYOND_SLEW = "E0850";
+
+    /// # W0851: trajectory near the slew rate
+    ///
+    /// Where a stack's gain is lowest, a leg should still have slew to spare.
+    ///
+    /// ## Why it matters
+    ///
+    /// The gain over a hysteresis loop varies by some ten per cent; at its lowest the
+    /// same motion needs more voltage.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [actuator] @@
+    /// -slew_rate       = "40 V/ms"
+    /// +slew_rate       = "0.15 V/ms"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Lower the frequency a little, or allow a higher slew rate.
+    ///
+    /// ```toml
+    /// slew_rate       = "40 V/ms"
+    /// ```
+    PATH_NEAR_SLEW = "W0851";
+
+    /// # E0852: trajectory that takes more current than the amplifier gives
+    ///
+    /// I = C dU/dt along the trajectory, with `actuator.capacitance` and the gain of
+    /// the stacks, must not exceed `amplifier.current`.
+    ///
+    /// ## Why it matters
+    ///
+    /// The amplifier would limit the current, and with it the slew, unknown to the
+    /// controller.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// +[lint]
+    /// +allow = ["amplifier.current: a small one"]
+    /// @@ [actuator] @@
+    ///  damping_ratio   = 0.1
+    /// +capacitance = "1 uF"
+    /// @@ [amplifier] @@
+    ///  noise = "2 mV"
+    /// +current = "0.1 mA"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Lower the frequency, or check capacitance (of a whole leg) and current.
+    ///
+    /// ```toml
+    /// current = "100 mA"
+    /// ```
+    PATH_BEYOND_CURRENT = "E0852";
+
+    /// # W0853: trajectory whose inertia bends the legs
+    ///
+    /// The force of inertia along the trajectory, by (3), over the stiffness of a leg
+    /// should be less than a tenth of the stroke.
+    ///
+    /// ## Why it matters
+    ///
+    /// The feed-forward takes the bend out, but reach does not count it: near the
+    /// ends of the strokes it is missing.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [actuator] @@
+    /// -slew_rate       = "40 V/ms"
+    /// +slew_rate       = "430 V/ms"
+    /// @@ [control.setpoint] @@
+    /// -stream_speed = ["5 mm/s", "5 mm/s", "5 mm/s", "50 mrad/s", "50 mrad/s", "50 mrad/s"]
+    /// +stream_speed = ["0.9 m/s", "0.9 m/s", "0.9 m/s", "6 rad/s", "6 rad/s", "6 rad/s"]
+    /// @@ [[trajectory]] @@
+    ///  kind      = "case-1"
+    /// -frequency = "1 Hz"
+    /// +frequency = "340 Hz"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Lower the frequency.
+    PATH_INERTIA = "W0853";
+
+    /// # W0854: trajectory near the lowest mode
+    ///
+    /// A sinusoid should be below a fifth of the lowest mode's frequency.
+    ///
+    /// ## Why it matters
+    ///
+    /// Nearer, it excites the mode: the platform moves further than its legs.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [control.setpoint] @@
+    /// -stream_speed = ["5 mm/s", "5 mm/s", "5 mm/s", "50 mrad/s", "50 mrad/s", "50 mrad/s"]
+    /// +stream_speed = ["0.9 m/s", "0.9 m/s", "0.9 m/s", "6 rad/s", "6 rad/s", "6 rad/s"]
+    /// @@ [[trajectory]] @@
+    ///  kind      = "case-1"
+    /// -frequency = "1 Hz"
+    /// +frequency = "80 Hz"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Lower the frequency.
+    PATH_EXCITES = "W0854";
+}
 
 /// The local gain of a stack differs from its mean by about a quarter, so that a path needs this much less slew at best.
 const GAIN_SLACK: f64 = 1.3;
@@ -134,9 +288,9 @@ fn slew(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
     );
     // Beyond doubt only where the mean gain and a quarter more do not do.
     if demand.slew > limit * GAIN_SLACK {
-        found.add(codes::PATH_BEYOND_SLEW, key, message, &help);
+        found.add(PATH_BEYOND_SLEW, key, message, &help);
     } else {
-        found.add(codes::PATH_NEAR_SLEW, key, message, &help);
+        found.add(PATH_NEAR_SLEW, key, message, &help);
     }
 }
 
@@ -146,7 +300,7 @@ fn current(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
         return;
     }
     found.add(
-        codes::PATH_BEYOND_CURRENT,
+        PATH_BEYOND_CURRENT,
         key,
         format!(
             "`{}` charges a leg with about {} A (at {} V/ms); `amplifier.current` is {} A",
@@ -168,7 +322,7 @@ fn deflection(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) 
         return;
     }
     found.add(
-        codes::PATH_INERTIA,
+        PATH_INERTIA,
         key,
         format!(
             "the inertia along `{}` bends a leg by {} um of its stroke of {} um (leg acceleration {} m/s^2)",
@@ -186,7 +340,7 @@ fn excitation(key: &str, name: &str, frequency: f64, mode: f64, found: &mut Foun
         return;
     }
     found.add(
-        codes::PATH_EXCITES,
+        PATH_EXCITES,
         key,
         format!("`{name}` at {} Hz excites the lowest mode of {} Hz", figure(frequency), figure(mode)),
         "a tenth of the lowest mode is usual: check the unit of the frequency, and `actuator.axial_stiffness`, which makes the mode",

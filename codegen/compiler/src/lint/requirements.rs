@@ -1,13 +1,47 @@
 //! Requirements that would be met whatever is built, and such as no motion has.
 
-use super::{Facts, Found, figure};
-use specgen_language::diagnostic::codes;
+use super::paths::PATH_EXCITES;
+use super::{Facts, Found, Lints, figure};
+use specgen_language::diagnostic::Code;
+
+lints! {
+    rules: ask_something, frequencies;
+
+    /// # W0866: a requirement that asks nothing
+    ///
+    /// A precision, a noise or a largest error of more than a twentieth of the stroke
+    /// is reported, and one of a rotation of more than a twentieth of the workspace.
+    ///
+    /// ## Why it matters
+    ///
+    /// It is met whatever is built, so that it checks nothing: probably a slip of the
+    /// unit.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// +[requirements]
+    /// +precision = "50 um"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check nm against um, or leave the key out.
+    ///
+    /// ```toml
+    /// [requirements]
+    /// precision = "50 nm"
+    /// ```
+    ASKS_NOTHING = "W0866";
+}
 
 /// A precision or an error of more than this share of the stroke, or of the workspace, asks nothing of a nanopositioner.
 const LOOSEST: f64 = 0.05;
 
 /// What the platform is for is finer than a twentieth of its stroke.
-pub(super) fn ask_something(facts: &Facts, found: &mut Found) {
+fn ask_something(facts: &Facts, found: &mut Found) {
     let model = facts.model;
     let rotation = model.workspace.rotation.into_iter().fold(0.0, |most: f64, one| if one > most { one } else { most });
     let wholes = [(model.actuator.stroke, "a stroke", "um", 1e6), (rotation, "a workspace", "mrad", 1e3)];
@@ -34,7 +68,7 @@ pub(super) fn ask_something(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::ASKS_NOTHING,
+            ASKS_NOTHING,
             &key,
             format!("`{key}` is {} {unit}, of {of} of {} {unit}", figure(limit * scale), figure(whole * scale)),
             if about == 0 {
@@ -47,12 +81,12 @@ pub(super) fn ask_something(facts: &Facts, found: &mut Found) {
 }
 
 /// A limit at a frequency is about a motion that the platform can make.
-pub(super) fn frequencies(facts: &Facts, found: &mut Found) {
+fn frequencies(facts: &Facts, found: &mut Found) {
     let Some(modes) = facts.legs.as_ref().and_then(|legs| legs.modes) else { return };
     for (index, limit) in facts.model.requirements.tracking.iter().enumerate() {
         let Some(frequency) = limit.frequency.filter(|frequency| *frequency > modes[0]) else { continue };
         found.add(
-            codes::PATH_EXCITES,
+            PATH_EXCITES,
             &format!("requirements.tracking[{index}].frequency"),
             format!(
                 "a limit at {} Hz is above the lowest mode of the platform, {} Hz",

@@ -1,9 +1,11 @@
 //! Whether the board that a spec names can keep its period, by a table of what boards and laws take. `specgen build` estimates
 //! the tick from the image itself, a minute later, and refuses a period that is shorter.
 
-use super::{Facts, Found, figure};
+use super::{Facts, Found, Lints, figure};
 use specgen_language::diagnostic::codes;
 use specgen_language::model::{DynamicsChoice, Interaction, Mcu, Model, Scalar};
+
+pub(super) static LINTS: Lints = Lints { rules: &[fits_period], codes: &[] };
 
 /// Longest tick of a board, µs: of six legs as in `specs/legs.toml`, of a platform as in `specs/reference.toml`, and of one with
 /// the whole kernel of the inverse dynamics. Of the H743 as `specgen build` estimates it; of six legs and of the whole kernel
@@ -31,7 +33,7 @@ pub fn about(model: &Model) -> Option<f64> {
 }
 
 /// The period is longer than what the tick of the named board takes.
-pub(super) fn fits_period(facts: &Facts, found: &mut Found) {
+fn fits_period(facts: &Facts, found: &mut Found) {
     let (model, period) = (facts.model, facts.model.timing.period);
     let Some(tick) = about(model).filter(|tick| period < *tick) else { return };
     let part = model.target.mcu.part();

@@ -1,7 +1,217 @@
 //! Times against the tick, and the tick against the modes.
 
-use super::{Facts, Found, figure};
-use specgen_language::diagnostic::codes;
+use super::{Facts, Found, Lints, figure};
+use specgen_language::diagnostic::Code;
+
+lints! {
+    rules: times_that_do_nothing, lead_of_the_lag, transfer, velocity_filter, ticks_against_modes, gauges_in_time,
+        modes_seen_as_others;
+
+    /// # W0830: a time too short to have an effect
+    ///
+    /// Lag, lead, dead time and the width of a trigger's pulse should be at least a
+    /// hundredth of a tick, or 0.
+    ///
+    /// ## Why it matters
+    ///
+    /// A time so short changes no number: it is us written for ms.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [amplifier] @@
+    /// -lag   = "0.35 ms"
+    /// +lag   = "0.35 us"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit, or take the key out.
+    ///
+    /// ```toml
+    /// lag   = "0.35 ms"
+    /// ```
+    TIME_WITHOUT_EFFECT = "W0830";
+
+    /// # W0831: a lead longer than what it takes out
+    ///
+    /// `control.lead`, and `lead` of a trajectory, should not exceed amplifier lag and
+    /// tick together by more than a quarter; `hysteresis.dead_time` of six legs not be
+    /// more than three times these and a period of the legs' resonance.
+    ///
+    /// ## Why it matters
+    ///
+    /// The lead lets the feed-forward run ahead of the set-point by what amplifier
+    /// and sampling are late. More, and the legs are early.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [control] @@
+    /// +lead            = "1 ms"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Leave the key out: the compiler takes the delay from command to pose, which
+    /// `specgen check --details` states. Or write at most amplifier lag and tick
+    /// together; `specgen sim` shows which lead is best on a path with corners.
+    ///
+    /// ```toml
+    /// lead            = "0.1 ms"
+    /// ```
+    LEAD_TOO_LONG = "W0831";
+
+    /// # W0832: a transfer time that is no transfer
+    ///
+    /// `control.transfer_time` should be from a tick to five seconds.
+    ///
+    /// ## Why it matters
+    ///
+    /// It is the time constant with which the offset of a change of mode fades.
+    /// Shorter it is a step of the voltage; longer, the offset stays.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [control] @@
+    /// -transfer_time   = "50 ms"
+    /// +transfer_time   = "50 us"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit; 50 ms is usual.
+    ///
+    /// ```toml
+    /// transfer_time   = "50 ms"
+    /// ```
+    TRANSFER_ODD = "W0832";
+
+    /// # W0833: a velocity filter far below the modes
+    ///
+    /// `control.velocity_cutoff` should be above a tenth of the lowest mode.
+    ///
+    /// ## Why it matters
+    ///
+    /// The derivative term of (7) would act on a velocity that is late by the filter.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [control] @@
+    /// -velocity_cutoff = "1.9e4 rad/s"
+    /// +velocity_cutoff = "19 rad/s"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check rad/s against Hz: 1 Hz is 2 pi rad/s.
+    ///
+    /// ```toml
+    /// velocity_cutoff = "1.9e4 rad/s"
+    /// ```
+    VELOCITY_FILTER_SLOW = "W0833";
+
+    /// # W0834: tick and modes do not fit
+    ///
+    /// A period of the platform's lowest mode should have between four and three
+    /// thousand ticks.
+    ///
+    /// ## Why it matters
+    ///
+    /// With fewer the loop hardly sees the mode; with more the tick is far faster
+    /// than anything there is to control. Period, stiffness or masses are in another
+    /// unit.
+    ///
+    /// ## Example
+    ///
+    /// `specs/minimal.toml` with
+    ///
+    /// ```diff
+    /// @@ [timing] @@
+    /// -period = "200 us"
+    /// +period = "2 ms"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check `timing.period`, `actuator.axial_stiffness` and the masses.
+    ///
+    /// ```toml
+    /// period = "200 us"
+    /// ```
+    TICKS_AGAINST_MODES = "W0834";
+
+    /// # W0862: gauges far slower than the tick
+    ///
+    /// `sensor.lag` should not exceed five ticks.
+    ///
+    /// ## Why it matters
+    ///
+    /// What the controller does is seen only after the lag of the gauges. A tick
+    /// that is much faster than that costs computation and gains nothing, and the
+    /// stability check allows small gains. Mostly the unit is another one.
+    ///
+    /// ## Example
+    ///
+    /// `specs/minimal.toml` with
+    ///
+    /// ```diff
+    /// @@ [sensor] @@
+    /// +lag = "2 ms"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check `sensor.lag` (us or ms): for a gauge or filter of first order it is
+    /// 1/(2 pi bandwidth), and several in a row add.
+    ///
+    /// ```toml
+    /// lag = "0.2 ms"
+    /// ```
+    GAUGE_LATE = "W0862";
+
+    /// # W0869: a mode above half the tick rate
+    ///
+    /// The tick samples a mode of the platform that lies above half the tick rate,
+    /// and the gauges pass more than a third of it.
+    ///
+    /// ## Why it matters
+    ///
+    /// Such a mode appears as another, lower frequency, and the loop answers to that.
+    /// The stability check contains it as it is; what it cannot contain are the
+    /// changes of a mode by a few hertz, which move its alias by as much in the
+    /// other direction.
+    ///
+    /// ## Example
+    ///
+    /// `specs/minimal.toml` with
+    ///
+    /// ```diff
+    /// @@ [timing] @@
+    /// -period = "200 us"
+    /// +period = "0.68 ms"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Sample faster than twice the highest mode, or filter the gauges and say so in
+    /// `sensor.lag`.
+    ///
+    /// ```toml
+    /// period = "200 us"
+    /// ```
+    MODE_ALIASED = "W0869";
+}
 
 /// Below this share of a tick a time does nothing.
 const NOTHING: f64 = 0.01;
@@ -22,7 +232,7 @@ const FEWEST_TICKS: f64 = 4.0;
 const MOST_TICKS: f64 = 3000.0;
 
 /// Lag and lead are entered to have an effect.
-pub(super) fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
+fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
     let model = facts.model;
     let tick = model.timing.period;
     let lead = model.task_space.as_ref().and_then(|task| task.lead).unwrap_or(0.0);
@@ -39,7 +249,7 @@ pub(super) fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::TIME_WITHOUT_EFFECT,
+            TIME_WITHOUT_EFFECT,
             &key,
             format!(
                 "`{key}` is {} us, {} of a tick of {} us: it has no effect",
@@ -53,14 +263,14 @@ pub(super) fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
 }
 
 /// A lead takes out the lag, no more.
-pub(super) fn lead_of_the_lag(facts: &Facts, found: &mut Found) {
+fn lead_of_the_lag(facts: &Facts, found: &mut Found) {
     let model = facts.model;
     let lag = model.amplifier.lag + model.timing.period;
     // The legs' own resonance delays them by a part of its period.
     let (dead_time, most) = (model.hysteresis.dead_time, LONGEST_DEAD_TIME * (lag + 1.0 / model.actuator.resonance));
     if dead_time > most {
         found.add(
-            codes::LEAD_TOO_LONG,
+            LEAD_TOO_LONG,
             "hysteresis.dead_time",
             format!(
                 "legs are asked for {} ms early, but amplifier, tick and a period of their resonance together are {} ms",
@@ -76,7 +286,7 @@ pub(super) fn lead_of_the_lag(facts: &Facts, found: &mut Found) {
     for (key, lead) in std::iter::once(("control.lead".to_owned(), task.lead)).chain(of_paths) {
         let Some(lead) = lead.filter(|lead| *lead > LARGEST_LEAD * lag) else { continue };
         found.add(
-            codes::LEAD_TOO_LONG,
+            LEAD_TOO_LONG,
             &key,
             format!(
                 "legs are asked for {} ms early, but amplifier and tick together lag {} ms",
@@ -91,7 +301,7 @@ pub(super) fn lead_of_the_lag(facts: &Facts, found: &mut Found) {
 }
 
 /// The offset of a change of mode fades over some ticks and not for ever.
-pub(super) fn transfer(facts: &Facts, found: &mut Found) {
+fn transfer(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
     let (time, tick) = (task.transfer_time, facts.model.timing.period);
     if time >= tick && time <= LONGEST_TRANSFER {
@@ -103,7 +313,7 @@ pub(super) fn transfer(facts: &Facts, found: &mut Found) {
         "so long that a mode takes a minute to be what it says"
     };
     found.add(
-        codes::TRANSFER_ODD,
+        TRANSFER_ODD,
         "control.transfer_time",
         format!("a transfer time of {} ms is {how}", figure(time * 1e3)),
         "some tens of milliseconds are usual: check the unit (ms or us)",
@@ -111,7 +321,7 @@ pub(super) fn transfer(facts: &Facts, found: &mut Found) {
 }
 
 /// A velocity that is filtered below the modes says nothing about them.
-pub(super) fn velocity_filter(facts: &Facts, found: &mut Found) {
+fn velocity_filter(facts: &Facts, found: &mut Found) {
     let (Some(task), Some(modes)) = (&facts.model.task_space, facts.legs.as_ref().and_then(|legs| legs.modes)) else {
         return;
     };
@@ -120,7 +330,7 @@ pub(super) fn velocity_filter(facts: &Facts, found: &mut Found) {
         return;
     }
     found.add(
-        codes::VELOCITY_FILTER_SLOW,
+        VELOCITY_FILTER_SLOW,
         "control.velocity_cutoff",
         format!(
             "the velocity is filtered at {} Hz, far below the lowest mode of {} Hz",
@@ -132,7 +342,7 @@ pub(super) fn velocity_filter(facts: &Facts, found: &mut Found) {
 }
 
 /// The tick must see the platform move.
-pub(super) fn ticks_against_modes(facts: &Facts, found: &mut Found) {
+fn ticks_against_modes(facts: &Facts, found: &mut Found) {
     let tick = facts.model.timing.period;
     let Some(modes) = facts.legs.as_ref().and_then(|legs| legs.modes) else { return };
     let ticks = 1.0 / (modes[0] * tick);
@@ -140,7 +350,7 @@ pub(super) fn ticks_against_modes(facts: &Facts, found: &mut Found) {
         return;
     }
     found.add(
-        codes::TICKS_AGAINST_MODES,
+        TICKS_AGAINST_MODES,
         "timing.period",
         format!(
             "a period of the platform's lowest mode, {} Hz, has {} ticks of {} us",
@@ -153,7 +363,7 @@ pub(super) fn ticks_against_modes(facts: &Facts, found: &mut Found) {
 }
 
 /// Gauges see what a tick does within some ticks.
-pub(super) fn gauges_in_time(facts: &Facts, found: &mut Found) {
+fn gauges_in_time(facts: &Facts, found: &mut Found) {
     let (lag, tick) = (facts.model.sensor.lag, facts.model.timing.period);
     let off = lag / (SLOWEST_GAUGE * tick);
     if off <= 1.0 {
@@ -161,7 +371,7 @@ pub(super) fn gauges_in_time(facts: &Facts, found: &mut Found) {
     }
     found.add_off(
         off,
-        codes::GAUGE_LATE,
+        GAUGE_LATE,
         "sensor.lag",
         format!(
             "the gauges lag {} us, {} ticks of {} us: what a tick does is seen long after",
@@ -174,7 +384,7 @@ pub(super) fn gauges_in_time(facts: &Facts, found: &mut Found) {
 }
 
 /// A mode above half the tick rate is sampled as another frequency, unless the gauges keep it out.
-pub(super) fn modes_seen_as_others(facts: &Facts, found: &mut Found) {
+fn modes_seen_as_others(facts: &Facts, found: &mut Found) {
     let (lag, tick) = (facts.model.sensor.lag, facts.model.timing.period);
     let Some(modes) = facts.legs.as_ref().and_then(|legs| legs.modes) else { return };
     let share = |mode: f64| 1.0 / libm::hypot(1.0, core::f64::consts::TAU * mode * lag);
@@ -182,7 +392,7 @@ pub(super) fn modes_seen_as_others(facts: &Facts, found: &mut Found) {
     let Some(mode) = modes.iter().find(seen) else { return };
     let alias = (mode - libm::rint(mode * tick) / tick).abs();
     found.add(
-        codes::MODE_ALIASED,
+        MODE_ALIASED,
         "timing.period",
         format!(
             "a mode of the platform of {} Hz lies above half the tick rate, {} Hz: the gauges show it as {} Hz, with {} of its amplitude",

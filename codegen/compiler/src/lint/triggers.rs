@@ -1,10 +1,157 @@
 //! Output lines against noise, speed and themselves.
 
-use super::{Facts, Found, amount, figure};
+use super::{Facts, Found, Lints, amount, figure};
 use crate::lower::{pose_noise, triggers};
-use specgen_language::diagnostic::codes;
+use specgen_language::diagnostic::Code;
 use specgen_language::model::{Trigger, TriggerKind};
 use specgen_runtime::trigger::MOST_STEPS;
+
+lints! {
+    rules: more_than_one, some_at_all, steps_apart, above_noise, pulses_apart;
+
+    /// # W0877: a trigger that passes one position
+    ///
+    /// `step` of a trigger of kind "position" should not be longer than the way from
+    /// `start` to `stop`, and `last` of any trigger not lie before its `first`.
+    ///
+    /// ## Why it matters
+    ///
+    /// There is then a pulse at `start` and at no other position: one of the three is
+    /// in another unit.
+    ///
+    /// ## Example
+    ///
+    /// `specs/features/triggers.toml` with
+    ///
+    /// ```diff
+    /// @@ [[trigger]] @@
+    /// -step  = "1 um"
+    /// +step  = "1 mm"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the units of start, stop and step.
+    ///
+    /// ```toml
+    /// step  = "1 um"
+    /// ```
+    TRIGGER_SINGLE = "W0877";
+
+    /// # E0874: positions of a trigger within its hysteresis
+    ///
+    /// `step` of a trigger must be above its `hysteresis`, which is ten times the
+    /// noise of the measured pose where the spec does not say it, and there are at most
+    /// a million steps from `start` to `stop`.
+    ///
+    /// ## Why it matters
+    ///
+    /// A position that was passed counts again only after the pose was away from it by
+    /// the hysteresis. With positions closer than that, noise would decide which of
+    /// them give a pulse.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// +[[trigger]]
+    /// +name       = "camera"
+    /// +kind       = "position"
+    /// +start      = "-20 um"
+    /// +step       = "40 nm"
+    /// +hysteresis = "50 nm"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Write a larger step, or a smaller hysteresis that is still above the noise.
+    ///
+    /// ```toml
+    /// [[trigger]]
+    /// name       = "camera"
+    /// kind       = "position"
+    /// start      = "-20 um"
+    /// step       = "1 um"
+    /// hysteresis = "50 nm"
+    /// ```
+    TRIGGER_STEP = "E0874";
+
+    /// # W0875: hysteresis of a trigger within the noise
+    ///
+    /// A `hysteresis` below ten times the noise of the measured pose (rms) along the
+    /// axis is reported.
+    ///
+    /// ## Why it matters
+    ///
+    /// The pose is measured with noise: at rest near a position it passes to and fro.
+    /// A hysteresis of ten times its rms is passed by chance once in 10⁶ ticks or
+    /// less; below that the line shows the noise, and one position gives several
+    /// pulses.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// +[[trigger]]
+    /// +name       = "camera"
+    /// +kind       = "position"
+    /// +start      = "-20 um"
+    /// +step       = "1 um"
+    /// +hysteresis = "2 nm"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Leave the key out: then it is ten times the noise.
+    ///
+    /// ```toml
+    /// [[trigger]]
+    /// name       = "camera"
+    /// kind       = "position"
+    /// start      = "-20 um"
+    /// step       = "1 um"
+    /// ```
+    TRIGGER_IN_NOISE = "W0875";
+
+    /// # W0876: pulses of a trigger run into one another
+    ///
+    /// At the largest speed of moves, `control.setpoint.speed`, a position is passed
+    /// while the pulse of the one before lasts.
+    ///
+    /// ## Why it matters
+    ///
+    /// Each pulse has an edge of its own: the line is low for a tick before the next.
+    /// A position that is passed before that gives no pulse, and is counted as missed.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// +[[trigger]]
+    /// +name  = "camera"
+    /// +kind  = "position"
+    /// +start = "-20 um"
+    /// +step  = "1 um"
+    /// +width = "20 ms"
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Write a shorter width or a larger step.
+    ///
+    /// ```toml
+    /// [[trigger]]
+    /// name  = "camera"
+    /// kind  = "position"
+    /// start = "-20 um"
+    /// step  = "1 um"
+    /// width = "1 ms"
+    /// ```
+    TRIGGERS_MERGE = "W0876";
+}
 
 /// The triggers of a kind, by their number.
 fn of_kind<'a>(facts: &Facts<'a>, kinds: &[TriggerKind]) -> Vec<(usize, &'a Trigger)> {
@@ -24,7 +171,7 @@ fn key(index: usize, trigger: &Trigger, name: &str) -> String {
 }
 
 /// Positions that are passed one after the other are more than one.
-pub(super) fn more_than_one(facts: &Facts, found: &mut Found) {
+fn more_than_one(facts: &Facts, found: &mut Found) {
     for (index, trigger) in of_kind(facts, &[TriggerKind::Position]) {
         let (Some(start), Some(step)) = (trigger.start, trigger.step) else { continue };
         let stop = trigger.stop.unwrap_or(facts.model.workspace.bounds()[trigger.axis]);
@@ -33,7 +180,7 @@ pub(super) fn more_than_one(facts: &Facts, found: &mut Found) {
             continue;
         }
         found.add(
-            codes::TRIGGER_SINGLE,
+            TRIGGER_SINGLE,
             &key(index, trigger, "step"),
             format!(
                 "`step` of trigger[{index}] is {}, but from start to stop there are {}: only the first position gives a pulse",
@@ -46,12 +193,12 @@ pub(super) fn more_than_one(facts: &Facts, found: &mut Found) {
 }
 
 /// What may have a pulse does not end before it begins.
-pub(super) fn some_at_all(facts: &Facts, found: &mut Found) {
+fn some_at_all(facts: &Facts, found: &mut Found) {
     let triggers = facts.model.task_space.iter().flat_map(|task| task.triggers.iter().enumerate());
     for (index, trigger) in triggers {
         let Some(last) = trigger.last.filter(|last| *last < trigger.first) else { continue };
         found.add(
-            codes::TRIGGER_SINGLE,
+            TRIGGER_SINGLE,
             &format!("trigger[{index}].last"),
             format!("`last` of trigger[{index}] is {last}, before its `first`, {}: it gives no pulse", trigger.first),
             "exchange the two, or leave `last` out",
@@ -60,7 +207,7 @@ pub(super) fn some_at_all(facts: &Facts, found: &mut Found) {
 }
 
 /// Positions are apart by more than the hysteresis, and not so many that a single precision cannot tell them apart.
-pub(super) fn steps_apart(facts: &Facts, found: &mut Found) {
+fn steps_apart(facts: &Facts, found: &mut Found) {
     for (index, trigger) in of_kind(facts, &[TriggerKind::Position]) {
         let (Some(noise), Some(step)) = (noise(facts), trigger.step) else { continue };
         let (hysteresis, shown) = (triggers::hysteresis(trigger, &noise), |value| amount(trigger.axis, value));
@@ -82,7 +229,7 @@ pub(super) fn steps_apart(facts: &Facts, found: &mut Found) {
             continue;
         };
         found.add(
-            codes::TRIGGER_STEP,
+            TRIGGER_STEP,
             &key(index, trigger, "step"),
             format!("`step` of trigger[{index}] is {}, {}", shown(step), problem.0),
             &format!("write \"{}\" or more", shown(problem.1)),
@@ -91,13 +238,13 @@ pub(super) fn steps_apart(facts: &Facts, found: &mut Found) {
 }
 
 /// The hysteresis is above the noise.
-pub(super) fn above_noise(facts: &Facts, found: &mut Found) {
+fn above_noise(facts: &Facts, found: &mut Found) {
     for (index, trigger) in of_kind(facts, &[TriggerKind::Position, TriggerKind::Level]) {
         let (Some(noise), Some(hysteresis)) = (noise(facts), trigger.hysteresis) else { continue };
         let quiet = triggers::QUIET * noise[trigger.axis];
         if hysteresis < quiet * (1.0 - 1e-9) {
             found.add(
-                codes::TRIGGER_IN_NOISE,
+                TRIGGER_IN_NOISE,
                 &key(index, trigger, "hysteresis"),
                 format!(
                     "`hysteresis` of trigger[{index}] is {}, but the pose has {} of noise, rms",
@@ -111,7 +258,7 @@ pub(super) fn above_noise(facts: &Facts, found: &mut Found) {
 }
 
 /// A pulse is over, and the line low for a tick, before the next position is passed.
-pub(super) fn pulses_apart(facts: &Facts, found: &mut Found) {
+fn pulses_apart(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
     let period = facts.model.timing.period;
     for (index, trigger) in of_kind(facts, &[TriggerKind::Position]) {
@@ -120,7 +267,7 @@ pub(super) fn pulses_apart(facts: &Facts, found: &mut Found) {
         let between = step / speed / period;
         if f64::from(ticks + 1) > between {
             found.add(
-                codes::TRIGGERS_MERGE,
+                TRIGGERS_MERGE,
                 &format!("trigger[{index}].width"),
                 format!(
                     "a pulse of trigger[{index}] takes {ticks} tick{} and one between, but at {}/s a position is passed every {} ticks",

@@ -1,23 +1,43 @@
-//! The registry of finding codes. A code never changes its meaning; a retired one is not used again.
+//! The findings of every crate but those of the lints, which stand with their rules in `codegen/compiler/src/lint/`. A code
+//! never changes its meaning; a retired one is not used again.
 //!
 //! What a code means stands in its page, `codegen/language/findings/E0441.md` and so on: what is checked, why it matters, a
-//! spec that shows it, the fix. `docs/diagnostics.md` is these pages, see [`super::reference_markdown`]; the examples are
-//! run by `codegen/cli/tests/findings.rs`.
+//! spec that shows it, the fix. The examples are run by `codegen/cli/tests/findings.rs`.
 
 use super::Severity;
 
-/// A code and its page. The ones below are all there are: a finding with another code does not compile.
+/// A code and its page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Code {
     /// Such as `E0102`: E for an error, W for a warning, N for a note.
     pub id: &'static str,
-    /// Its page as Markdown: a heading with id and title, then what is checked, and below headings of the second level
-    /// `Why it matters`, `Example` and `Fix`. Lines of text have at most 80 columns.
-    pub page: &'static str,
+    /// Its page: a file, or the lines of a comment.
+    page: &'static [&'static str],
 }
 
 impl Code {
+    /// A code with its page as Markdown: a heading with id and title, then what is checked, and below headings of the second
+    /// level `Why it matters`, `Example` and `Fix`. Lines of text have at most 80 columns. The page is one text, or a line
+    /// each, as the compiler passes on the lines of a comment: with the space behind the slashes.
+    #[must_use]
+    pub const fn new(id: &'static str, page: &'static [&'static str]) -> Self {
+        Self { id, page }
+    }
+
+    /// The page as Markdown.
+    #[must_use]
+    pub fn page(self) -> String {
+        let mut text = String::new();
+        for piece in self.page {
+            text += piece.strip_prefix(' ').unwrap_or(piece);
+            if !piece.ends_with('\n') {
+                text.push('\n');
+            }
+        }
+        text
+    }
+
     /// How bad every finding with this code is: its letter says so.
     #[must_use]
     pub const fn severity(self) -> Severity {
@@ -31,14 +51,15 @@ impl Code {
     /// What is wrong, in a few words: the heading of the page.
     #[must_use]
     pub fn title(self) -> &'static str {
-        let heading = self.page.lines().next().unwrap_or_default();
+        let heading = self.page.first().and_then(|piece| piece.lines().next()).unwrap_or_default();
         heading.split_once(": ").map_or(heading, |(_, title)| title)
     }
 
     /// What is checked and why it matters: the text of the page above its example, without headings, as one line.
     #[must_use]
     pub fn explanation(self) -> String {
-        let text = self.page.split("\n## Example").next().unwrap_or_default();
+        let page = self.page();
+        let text = page.split("\n## Example").next().unwrap_or_default();
         let lines = text.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
         lines.collect::<Vec<_>>().join(" ")
     }
@@ -55,8 +76,8 @@ impl PartialEq<Code> for &str {
 macro_rules! codes {
     ($($name:ident = $id:literal;)*) => {
         $(#[doc = include_str!(concat!("../../findings/", $id, ".md"))]
-        pub static $name: Code = Code { id: $id, page: include_str!(concat!("../../findings/", $id, ".md")) };)*
-        /// Every code, by number.
+        pub static $name: Code = Code { id: $id, page: &[include_str!(concat!("../../findings/", $id, ".md"))] };)*
+        /// These codes, by number.
         pub static REGISTRY: &[Code] = &[$($name),*];
     };
 }
@@ -125,7 +146,6 @@ codes! {
     CALIBRATION_PARTLY = "E0325";
     TOO_MANY_TRAJECTORIES = "E0326";
     RATE_KEYS = "E0327";
-    GAUGES_ALIKE = "E0328";
     ALLOW_FORM = "E0329";
     SCALAR_WITHOUT_FPU = "E0330";
     BUDGET_BEYOND_PART = "E0331";
@@ -257,122 +277,17 @@ codes! {
     TUNE_REFUSED = "E0704";
     TUNE_LIMITED = "E0705";
 
-    // Values that do not fit together: the physical lint.
+    // Values that do not fit together, beside the lints.
     STROKE_IMPOSSIBLE = "E0801";
-    STRAIN_ODD = "W0802";
-    RESONANCE_ODD = "W0803";
-    SLEW_TOO_FAST = "W0804";
-    LAG_AGAINST_SLEW = "W0805";
-    CURRENT_AGAINST_SLEW = "W0806";
-    AMPLIFIER_NOISE = "W0807";
-    CONVERTER_COARSE = "W0808";
-    SLEW_TOO_SLOW = "W0809";
-    LEG_PART_SMALL = "W0810";
-    CENTRE_AT_JOINT = "W0811";
-    MOMENT_ODD = "W0812";
-    MOMENTS_UNEVEN = "W0813";
-    LEG_MASS_ODD = "W0814";
-    JOINTS_TOUCH = "W0815";
-    PLATFORM_WIDER = "W0816";
-    OUT_OF_PROPORTION = "W0817";
-    LEGS_CROSS = "W0818";
-    REST_NOT_ZERO = "W0819";
-    GAUGE_QUIET = "W0820";
-    GAUGE_LOPSIDED = "W0821";
-    GAUGE_COARSE = "W0822";
-    COORDINATE_ODD = "W0823";
-    GAUGE_REVERSED = "W0824";
-    GAUGE_FAR = "W0825";
-    GAUGE_SLIP = "W0826";
-    CALIBRATION_ODD = "W0827";
-    GAIN_UNEVEN = "W0828";
-    WORK_PIECE_ODD = "W0829";
-    TIME_WITHOUT_EFFECT = "W0830";
-    LEAD_TOO_LONG = "W0831";
-    TRANSFER_ODD = "W0832";
-    VELOCITY_FILTER_SLOW = "W0833";
-    TICKS_AGAINST_MODES = "W0834";
-    GAIN_RATIO_ODD = "W0835";
-    ADAPTATION_SLOW = "W0836";
-    DRIFT_ODD = "W0837";
-    CONTACT_LEVER = "W0838";
-    CONTACT_FAR = "W0839";
-    MOVE_BEYOND_SLEW = "W0840";
-    MOVE_SLOW = "W0841";
-    LIMIT_WITHOUT_EFFECT = "W0842";
-    STREAM_UNCHECKED = "W0843";
-    WORKSPACE_TINY = "W0844";
-    GAINS_EXCHANGED = "W0845";
-    RANGE_AT_ZERO = "W0846";
-    CALIBRATION_BENT = "W0847";
-    GAUGE_PATTERN = "W0848";
-    CONVERTER_WIDE = "W0849";
-    PATH_BEYOND_SLEW = "E0850";
-    PATH_NEAR_SLEW = "W0851";
-    PATH_BEYOND_CURRENT = "E0852";
-    PATH_INERTIA = "W0853";
-    PATH_EXCITES = "W0854";
     WAVEFORM_STEP = "W0855";
-    LEG_PART_SHAPE = "W0856";
-    CENTRE_FAR = "W0857";
-    DAMPING_ODD = "W0858";
-    GRID_COARSE = "W0859";
-    JOINT_ANGLE = "E0860";
     CONDITION_POOR = "W0861";
-    GAUGE_LATE = "W0862";
     GAUGE_SHORT_OF_STROKE = "N0863";
-    CAPACITANCE_ODD = "W0864";
-    MOMENTS_ELSEWHERE = "W0865";
-    ASKS_NOTHING = "W0866";
-    STREAM_SLOW = "W0867";
-    PAIR_WIDE = "W0868";
-    MODE_ALIASED = "W0869";
-    BUDGET_IMPOSSIBLE = "E0870";
-    BUDGET_LOOSE = "W0871";
-    ESTIMATED = "N0872";
-    BUDGET_SWAPPED = "W0873";
-    TRIGGER_STEP = "E0874";
-    TRIGGER_IN_NOISE = "W0875";
-    TRIGGERS_MERGE = "W0876";
-    TRIGGER_SINGLE = "W0877";
-    INTEGRAL_SLOW = "W0878";
     PRECISION_POOR = "W0880";
-    OTHER_FRAME = "W0881";
-    JOINTS_CLOCKWISE = "W0882";
-    GAUGES_MIRRORED = "N0883";
-    LAYOUT_TURNED = "W0884";
-    LAYOUT_SMALL = "W0885";
-    GAUGE_NOISY = "W0886";
-    LIMITS_APART = "W0887";
-    FAR_FROM_DEFAULT = "W0888";
-    FACTOR_ODD = "W0889";
-    FAR_OFF = "E0890";
-    ALLOWED = "N0891";
-    ALLOWED_NOTHING = "W0892";
-    ONE_VALUE = "W0893";
-}
-
-/// The entry of `id`.
-#[must_use]
-pub fn find(id: &str) -> Option<&'static Code> {
-    REGISTRY.iter().find(|code| code.id == id)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn codes_are_well_formed_and_in_order() {
-        for code in REGISTRY {
-            assert!(code.id.len() == 5 && code.id.starts_with(['E', 'W', 'N']), "{}", code.id);
-            assert!(code.id[1..].bytes().all(|b| b.is_ascii_digit()), "{}", code.id);
-        }
-        for pair in REGISTRY.windows(2) {
-            let [first, second] = [pair[0].id, pair[1].id].map(|id| (&id[1..], &id[..1]));
-            assert!(first < second, "{} before {}", pair[0].id, pair[1].id);
-        }
-    }
 
     #[test]
     fn every_page_has_its_code() {
@@ -383,26 +298,5 @@ mod tests {
         files.sort();
         pages.sort();
         assert_eq!(files, pages);
-    }
-
-    #[test]
-    fn every_page_has_its_parts() {
-        for code in REGISTRY {
-            let (heading, rest) = code.page.split_once("\n\n").unwrap();
-            assert_eq!(heading, format!("# {}: {}", code.id, code.title()));
-            let headings = ["\n## Why it matters\n\n", "\n## Example\n\n", "\n## Fix\n\n"];
-            let mut parts = Vec::new();
-            let mut rest = rest;
-            for heading in headings {
-                let (part, behind) = rest.split_once(heading).unwrap_or_else(|| panic!("{}: no {heading:?}", code.id));
-                parts.push(part);
-                rest = behind;
-            }
-            parts.push(rest);
-            assert!(parts.iter().all(|part| !part.trim().is_empty()), "{}", code.id);
-            // Text, and not the blocks of code between.
-            let text = code.page.split("```").step_by(2).flat_map(str::lines);
-            text.for_each(|line| assert!(line.chars().count() <= 80, "{}: {line}", code.id));
-        }
     }
 }

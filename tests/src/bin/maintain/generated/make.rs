@@ -5,9 +5,9 @@ use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
 use specgen_compiler::compile::{Compiled, compile, compile_source};
-use specgen_compiler::{emit, settings, workspace};
+use specgen_compiler::{emit, findings, settings, workspace};
 use specgen_language::outcome::Refused;
-use specgen_language::{SpecSource, diagnostic, spec};
+use specgen_language::{SpecSource, spec};
 use std::path::Path;
 
 /// Seed of the gauge noise in the committed records.
@@ -51,7 +51,7 @@ pub fn pages(root: &Path) -> Result<Files, String> {
         ("commands.md".to_owned(), help::markdown(root)?),
         ("traceability.md".to_owned(), trace::markdown(root)?),
         ("spec-reference.md".to_owned(), spec::reference_markdown()),
-        ("diagnostics.md".to_owned(), diagnostic::reference_markdown()),
+        ("diagnostics.md".to_owned(), findings::reference_markdown()),
         ("settings.md".to_owned(), settings(root)?),
         ("dependencies.md".to_owned(), dependencies(root)?),
     ]))

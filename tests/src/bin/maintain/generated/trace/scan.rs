@@ -54,7 +54,7 @@ pub fn file(name: &str, text: &str) -> Vec<Mention> {
     let only_tests = name.contains("/tests/") || name.ends_with("/tests.rs");
     let mut mentions = Vec::new();
     for (k, line) in lines.iter().enumerate() {
-        let Some(comment) = comment(line) else { continue };
+        let Some(comment) = comment(line).filter(|_| !is_page(&lines[k..])) else { continue };
         for equation in cited(comment) {
             let (item, is_test) = place(&lines, k);
             let test = is_test || only_tests;
@@ -62,6 +62,18 @@ pub fn file(name: &str, text: &str) -> Vec<Mention> {
         }
     }
     mentions
+}
+
+/// Whether a comment is the page of a lint: what it explains is in the rule below.
+fn is_page(lines: &[&str]) -> bool {
+    let declared = lines.iter().find(|line| !line.starts_with("///"));
+    lines[0].starts_with("///") && declared.is_some_and(|line| is_code(line))
+}
+
+/// `NAME = "W0801";`
+fn is_code(line: &str) -> bool {
+    let name = line.split_once(" = \"").filter(|(_, rest)| rest.len() == 7 && rest.ends_with("\";"));
+    name.is_some_and(|(name, _)| name.chars().all(|c| c.is_ascii_uppercase() || c == '_'))
 }
 
 /// The comment on a line.
@@ -176,5 +188,8 @@ mod tests {
         );
         assert!(file("crate/tests/a.rs", text)[0].test);
         assert!(file("a.rs", "fn law() { x(1) }").is_empty());
+        let lint = "lints! {\n    /// as in (7)\n    ///\n    /// (9)\n    ODD = \"W0801\";\n}\n";
+        assert!(file("a.rs", lint).is_empty());
+        assert_eq!(file("a.rs", &lint.replace("W0801", "word")).len(), 2);
     }
 }

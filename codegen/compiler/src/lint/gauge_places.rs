@@ -1,0 +1,322 @@
+//! Where gauges look at the platform.
+
+use super::{Facts, Found, Lints, figure};
+use specgen_language::diagnostic::Code;
+use specgen_language::model::Probe;
+
+lints! {
+    rules: turned_layout, size_of_pattern, size_of_layout;
+
+    /// # W0884: gauge points and directions turned against each other
+    ///
+    /// Gauges that look across the axis look along a radius or along its tangent.
+    /// Three or more that are all turned from it by the same angle are reported; 45
+    /// degrees is not, for gauges at the corners of a square look so.
+    ///
+    /// ## Why it matters
+    ///
+    /// Points and directions are then in frames that are turned against each other.
+    /// Translations come out turned, too.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [[gauge]] @@
+    /// -point     = ["80 mm", "0 mm", "180 mm"]
+    /// -direction = [0, 1, 0]
+    /// -
+    /// -[[gauge]]
+    /// -point     = ["-80 mm", "0 mm", "180 mm"]
+    /// -direction = [0, 1, 0]
+    /// -
+    /// -[[gauge]]
+    /// -point     = ["0 mm", "80 mm", "180 mm"]
+    /// -direction = [1, 0, 0]
+    /// +point     = ["69.282 mm", "40 mm", "180 mm"]
+    /// +direction = [0, 1, 0]
+    /// +
+    /// +[[gauge]]
+    /// +point     = ["-69.282 mm", "-40 mm", "180 mm"]
+    /// +direction = [0, 1, 0]
+    /// +
+    /// +[[gauge]]
+    /// +point     = ["-40 mm", "69.282 mm", "180 mm"]
+    /// +direction = [1, 0, 0]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Give points and directions in {B}.
+    ///
+    /// ```toml
+    /// point     = ["80 mm", "0 mm", "180 mm"]
+    /// direction = [0, 1, 0]
+    ///
+    /// [[gauge]]
+    /// point     = ["-80 mm", "0 mm", "180 mm"]
+    /// direction = [0, 1, 0]
+    ///
+    /// [[gauge]]
+    /// point     = ["0 mm", "80 mm", "180 mm"]
+    /// direction = [1, 0, 0]
+    /// ```
+    LAYOUT_TURNED = "W0884";
+
+    /// # W0885: gauges close together
+    ///
+    /// The farthest gauge should stand at least a fifth of the joint radius from the
+    /// axis.
+    ///
+    /// ## Why it matters
+    ///
+    /// Close together, gauges see a rotation through a short lever, and noise hides it.
+    /// Points in cm that were written as mm look like this.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [[gauge]] @@
+    /// -point     = ["80 mm", "0 mm", "180 mm"]
+    /// -direction = [0, 0, 1]
+    /// -
+    /// -[[gauge]]
+    /// -point     = ["-40 mm", "69.282 mm", "180 mm"]
+    /// -direction = [0, 0, 1]
+    /// -
+    /// -[[gauge]]
+    /// -point     = ["-40 mm", "-69.282 mm", "180 mm"]
+    /// -direction = [0, 0, 1]
+    /// -
+    /// -[[gauge]]
+    /// -point     = ["80 mm", "0 mm", "180 mm"]
+    /// -direction = [0, 1, 0]
+    /// -
+    /// -[[gauge]]
+    /// -point     = ["-80 mm", "0 mm", "180 mm"]
+    /// -direction = [0, 1, 0]
+    /// -
+    /// -[[gauge]]
+    /// -point     = ["0 mm", "80 mm", "180 mm"]
+    /// -direction = [1, 0, 0]
+    /// +point     = ["8 mm", "0 mm", "180 mm"]
+    /// +direction = [0, 0, 1]
+    /// +
+    /// +[[gauge]]
+    /// +point     = ["-4 mm", "6.9282 mm", "180 mm"]
+    /// +direction = [0, 0, 1]
+    /// +
+    /// +[[gauge]]
+    /// +point     = ["-4 mm", "-6.9282 mm", "180 mm"]
+    /// +direction = [0, 0, 1]
+    /// +
+    /// +[[gauge]]
+    /// +point     = ["8 mm", "0 mm", "180 mm"]
+    /// +direction = [0, 1, 0]
+    /// +
+    /// +[[gauge]]
+    /// +point     = ["-8 mm", "0 mm", "180 mm"]
+    /// +direction = [0, 1, 0]
+    /// +
+    /// +[[gauge]]
+    /// +point     = ["0 mm", "8 mm", "180 mm"]
+    /// +direction = [1, 0, 0]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check the unit of the points.
+    ///
+    /// ```toml
+    /// point     = ["80 mm", "0 mm", "180 mm"]
+    /// direction = [0, 0, 1]
+    ///
+    /// [[gauge]]
+    /// point     = ["-40 mm", "69.282 mm", "180 mm"]
+    /// direction = [0, 0, 1]
+    ///
+    /// [[gauge]]
+    /// point     = ["-40 mm", "-69.282 mm", "180 mm"]
+    /// direction = [0, 0, 1]
+    ///
+    /// [[gauge]]
+    /// point     = ["80 mm", "0 mm", "180 mm"]
+    /// direction = [0, 1, 0]
+    ///
+    /// [[gauge]]
+    /// point     = ["-80 mm", "0 mm", "180 mm"]
+    /// direction = [0, 1, 0]
+    ///
+    /// [[gauge]]
+    /// point     = ["0 mm", "80 mm", "180 mm"]
+    /// direction = [1, 0, 0]
+    /// ```
+    LAYOUT_SMALL = "W0885";
+
+    /// # W0825: a gauge that looks past the platform
+    ///
+    /// The line of a gauge should meet its target plane within about one and a half
+    /// radii of the platform.
+    ///
+    /// ## Why it matters
+    ///
+    /// There is no target there: coordinates are in another order or unit.
+    ///
+    /// ## Example
+    ///
+    /// `specs/reference.toml` with
+    ///
+    /// ```diff
+    /// @@ [[gauge]] @@
+    /// -point     = ["80 mm", "0 mm", "180 mm"]
+    /// +point     = ["800 mm", "0 mm", "180 mm"]
+    ///  direction = [0, 0, 1]
+    /// ```
+    ///
+    /// ## Fix
+    ///
+    /// Check point and direction, both in {B}.
+    ///
+    /// ```toml
+    /// point     = ["80 mm", "0 mm", "180 mm"]
+    /// ```
+    GAUGE_FAR = "W0825";
+}
+
+/// A line within this cosine of the axis: where along the axis it begins does not matter.
+pub(super) const ALONG_AXIS: f64 = 0.5;
+/// Lines that all look beside radius and tangent by an angle, deg, and how far these angles may differ.
+const TURNED: f64 = 3.0;
+const ALIKE: f64 = 0.5;
+/// Fewest such lines: two are alike by chance.
+const FEWEST: usize = 3;
+/// Nearer to the axis than this share of its radius no line is beside it.
+const OFF_AXIS: f64 = 0.1;
+/// The farthest gauge stands so many joint radii from the axis, at least.
+const NARROWEST: f64 = 0.2;
+/// Farthest target from P_C, in joint radii.
+const DETACHED: f64 = 3.0;
+
+/// Where the line of a gauge meets its target at rest, in {P}, m.
+pub(super) fn pierced(probe: &Probe, height: f64) -> [f64; 3] {
+    let start = [probe.point[0], probe.point[1], probe.point[2] - height];
+    let (n, m) = (probe.direction, probe.plane_normal);
+    let across = m[0] * n[0] + m[1] * n[1] + m[2] * n[2];
+    let way: f64 = (0..3).fold(0.0, |sum, k| sum + m[k] * (probe.plane_point[k] - start[k])) / across;
+    core::array::from_fn(|k| start[k] + way * n[k])
+}
+
+/// Angle from radius or tangent to the line of a gauge that looks across the axis, deg, from -45 to 45.
+fn beside(probe: &Probe, height: f64, radius: f64) -> Option<f64> {
+    let ([x, y, _], [a, b, c]) = (pierced(probe, height), probe.direction);
+    if libm::fabs(c) >= ALONG_AXIS || libm::hypot(x, y) < OFF_AXIS * radius {
+        return None;
+    }
+    let angle = libm::atan2(x * b - y * a, x * a + y * b).to_degrees();
+    Some(angle - 90.0 * libm::rint(angle / 90.0))
+}
+
+/// Gauges look along a radius or across it. All beside it by one angle: points and directions are turned against each other.
+fn turned_layout(facts: &Facts, found: &mut Found) {
+    let Some(task) = &facts.model.task_space else { return };
+    let (height, radius) = (facts.model.geometry.height, facts.model.geometry.joint_radius());
+    let angles: Vec<(usize, f64)> = task
+        .probes
+        .iter()
+        .enumerate()
+        .filter_map(|(gauge, probe)| Some((gauge, beside(probe, height, radius)?)))
+        .collect();
+    let Some((gauge, first)) = angles.first().copied() else { return };
+    let apart = |angle: f64| {
+        let apart = angle - first;
+        libm::fabs(apart - 90.0 * libm::rint(apart / 90.0))
+    };
+    // At the corners of a square, along its sides: 45 deg from both.
+    let is_meant = libm::fabs(first) < TURNED || libm::fabs(first) > 45.0 - TURNED;
+    if angles.len() < FEWEST || is_meant || angles.iter().any(|(_, angle)| apart(*angle) > ALIKE) {
+        return;
+    }
+    found.add(
+        LAYOUT_TURNED,
+        &format!("gauge[{gauge}].direction"),
+        format!(
+            "the {} gauges that look across the axis are all turned by {} deg from their radius or its tangent",
+            angles.len(),
+            figure(libm::fabs(first))
+        ),
+        "points and directions are both in {B}: check that both are given along its axes",
+    );
+}
+
+/// Gauges stand apart by much of the platform: on a spot in its middle they do not see it turn.
+fn size_of_pattern(facts: &Facts, found: &mut Found) {
+    let Some(task) = &facts.model.task_space else { return };
+    let (height, radius) = (facts.model.geometry.height, facts.model.geometry.joint_radius());
+    let far = task.probes.iter().fold(0.0, |far: f64, probe| {
+        let [x, y, _] = pierced(probe, height);
+        let one = libm::hypot(x, y);
+        if one > far { one } else { far }
+    });
+    if far >= NARROWEST * radius || far == 0.0 {
+        return;
+    }
+    found.add_off(
+        NARROWEST * radius / far,
+        LAYOUT_SMALL,
+        "gauge[0].point",
+        format!(
+            "all gauges stand within {} mm of the axis, on a platform whose joints are {} mm from the middle",
+            figure(far * 1e3),
+            figure(radius * 1e3)
+        ),
+        "check the unit of the points (mm or cm), or set the gauges further apart: so near to each other they hardly see a rotation",
+    );
+}
+
+/// Targets are on the platform.
+fn size_of_layout(facts: &Facts, found: &mut Found) {
+    let Some(task) = &facts.model.task_space else { return };
+    let radius = facts.model.geometry.joint_radius();
+    for (gauge, probe) in task.probes.iter().enumerate() {
+        if found.is_in_other_frame(gauge) {
+            continue;
+        }
+        let (n, pierced) = (probe.direction, pierced(probe, facts.model.geometry.height));
+        let far = libm::sqrt(pierced.iter().fold(0.0, |sum, part| sum + part * part));
+        if far.is_nan() || far <= DETACHED * radius {
+            if let Some(axis) = aside(&pierced, &n, radius) {
+                found.add(
+                    GAUGE_FAR,
+                    &format!("gauge[{gauge}].point[{axis}]"),
+                    format!(
+                        "the line of gauge {gauge} meets its target {} mm along {} from P_C, on a platform whose joints are {} mm from it",
+                        figure(pierced[axis] * 1e3),
+                        ["x", "y", "z"][axis],
+                        figure(radius * 1e3)
+                    ),
+                    "check the order and the units of `point`: x, y, z in {B}, whose origin lies in the base",
+                );
+            }
+            continue;
+        }
+        found.add_off(
+            far / (DETACHED * radius),
+            GAUGE_FAR,
+            &format!("gauge[{gauge}].point"),
+            format!(
+                "the line of gauge {gauge} meets its target {} mm from P_C, on a platform whose joints are {} mm from it",
+                figure(far * 1e3),
+                figure(radius * 1e3)
+            ),
+            "check `point`, `direction` ({B}) and `target_point`, `target_normal` ({P}, from P_C) of the gauge",
+        );
+    }
+}
+
+/// The axis, across the gauge's line, on which the target stands out from a platform of `radius`.
+fn aside(pierced: &[f64; 3], direction: &[f64; 3], radius: f64) -> Option<usize> {
+    (0..3).find(|axis| direction[*axis].abs() < 0.5 && pierced[*axis].abs() > 1.5 * radius)
+}
