@@ -1,11 +1,12 @@
-//! Lists the files that are copied verbatim into outputs: all that lie in these folders, but for tests and for packages of their own.
+//! Lists the files that are copied verbatim into outputs: all that lie in these folders and in those of boards, but for tests and
+//! for packages of their own.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 /// Folders in the repository. In an output each stands beside the others, under its own name.
-const FOLDERS: [&str; 15] = [
+const FOLDERS: [&str; 13] = [
     "firmware/board",
     "firmware/hal",
     "firmware/host",
@@ -16,20 +17,33 @@ const FOLDERS: [&str; 15] = [
     "firmware/rt-pc",
     "firmware/runtime",
     "firmware/stm32",
-    "firmware/stm32f4",
-    "firmware/stm32h743",
     "firmware/tick",
     "host-sim",
     "host-sim/unit",
 ];
+
+/// Where boards are: packages whose manifest says what specgen knows of them.
+const FIRMWARE: &str = "../../firmware";
 
 /// What files there are: not those that an editor leaves.
 const KINDS: [&str; 6] = ["json", "lock", "md", "rs", "toml", "x"];
 
 fn main() -> io::Result<()> {
     let mut text = String::new();
-    for place in FOLDERS {
-        let folder = Path::new("../..").join(place).canonicalize()?;
+    let mut folders = FOLDERS.map(str::to_owned).to_vec();
+    // The text of `target.mcu` names every board.
+    println!("cargo:rerun-if-changed=../language/src/model/target.rs");
+    for entry in fs::read_dir(FIRMWARE)? {
+        let entry = entry?;
+        let manifest = fs::read_to_string(entry.path().join("Cargo.toml")).unwrap_or_default();
+        if manifest.contains("[package.metadata.board]") {
+            folders.push(format!("firmware/{}", entry.file_name().to_string_lossy()));
+        }
+    }
+    folders.sort();
+    let mut arms = String::new();
+    for place in folders {
+        let folder = Path::new("../..").join(&place).canonicalize()?;
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut files = Vec::new();
         collect(&folder, &mut files)?;
@@ -47,7 +61,12 @@ fn main() -> io::Result<()> {
             let _ = writeln!(text, "({inner:?}, include_str!({file:?})),");
         }
         text.push_str("];\n");
+        let _ = writeln!(arms, "{name:?} => {constant},");
     }
+    let _ = writeln!(
+        text,
+        "/// Of any folder.\npub fn of(folder: &str) -> &'static [(&'static str, &'static str)] {{\nmatch folder {{\n{arms}_ => &[],\n}}\n}}"
+    );
     let out = env::var_os("OUT_DIR").map(PathBuf::from).unwrap_or_default();
     fs::write(out.join("files.rs"), text)
 }

@@ -12,7 +12,7 @@ use std::sync::Mutex;
 
 use specgen::budget::group;
 use specgen::emit;
-use specgen::model::Mcu;
+use specgen::model::{BOARDS, Mcu};
 use specgen::target::callgraph::CallGraph;
 use specgen::target::checks::{self, Rule, Rules};
 use specgen::target::toolchain::CoreLibrary;
@@ -26,7 +26,6 @@ use crate::porting::own_board_builds;
 struct Board {
     name: &'static str,
     folder: &'static str,
-    mcu: Mcu,
     /// Bytes of flash that the image may take.
     flash: u64,
     /// Bytes of RAM, the stack's reserve included, without the buffer of a recorder.
@@ -38,6 +37,12 @@ struct Board {
     edits: &'static [(&'static str, &'static str)],
 }
 
+impl Board {
+    fn mcu(&self) -> Mcu {
+        BOARDS.into_iter().find(|board| board.folder == self.folder).map(Mcu::Board).unwrap()
+    }
+}
+
 /// What the emulation of these images is to wait for is short.
 const SHORT: (&str, &str) = (
     "[timing]\n",
@@ -47,7 +52,6 @@ const SHORT: (&str, &str) = (
 const H743: Board = Board {
     name: "board-h743",
     folder: "stm32h743",
-    mcu: Mcu::Stm32H743Zi,
     flash: 116 * 1024,
     ram: 44 * 1024,
     stack: 16 * 1024,
@@ -57,7 +61,6 @@ const H743: Board = Board {
 const F446: Board = Board {
     name: "board-f446",
     folder: "stm32f4",
-    mcu: Mcu::Stm32F446Re,
     flash: 106 * 1024,
     ram: 32 * 1024,
     stack: 12 * 1024,
@@ -89,7 +92,7 @@ fn image_of(board: &Board) -> Option<Image> {
     let dir = scratch(board.name);
     let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[board.folder]);
     workspace::write_scratch(&dir, &files).unwrap();
-    let built = build::build_folder(&toolchain, &dir, board.folder, board.mcu, &image_target(), false);
+    let built = build::build_folder(&toolchain, &dir, board.folder, board.mcu(), &image_target(), false);
     let image = built.unwrap_or_else(|error| panic!("{error}"));
     keep(board, &image.elf);
     Some(image)
@@ -112,7 +115,7 @@ fn keep(board: &Board, elf: &[u8]) {
 fn check(board: &Board) {
     let Some(Image { elf, compiler, .. }) = image_of(board) else { return };
     assert_eq!(size::size(&elf).unwrap().target, Some(board.folder), "what `specgen flash` goes by");
-    let single = board.mcu == Mcu::Stm32F446Re;
+    let single = !board.mcu().part().double;
     let rules = Rules { single, whole_image: false };
 
     // The whole interrupt, not only the tick that it calls.
@@ -200,6 +203,11 @@ fn no_path_of_this_machine_is_in_flash(board: &Board, elf: &[u8]) {
 }
 
 #[test]
+fn every_board_is_tested() {
+    assert_eq!(BOARDS.map(|board| board.folder), [H743.folder, F446.folder]);
+}
+
+#[test]
 #[ignore = "long: images of real boards"]
 fn the_stm32h743_image_fits_and_its_tick_cannot_fail() {
     check(&H743);
@@ -237,11 +245,11 @@ fn a_folder_of_a_board_is_built_by_hand() {
         let output = cargo.output().unwrap();
         assert!(output.status.success(), "{}: {}", board.name, String::from_utf8_lossy(&output.stderr));
         let elf = fs::read(dir.join(board.folder).join("target/thumbv7em-none-eabihf/release/firmware")).unwrap();
-        let rules = Rules { single: board.mcu == Mcu::Stm32F446Re, whole_image: false };
+        let rules = Rules { single: !board.mcu().part().double, whole_image: false };
         let faults = checks::check(&elf, Some("TIM2"), rules).unwrap().faults;
         assert!(faults.is_empty(), "{}: {faults:#?}", board.name);
         let config = fs::read_to_string(dir.join(board.folder).join(".cargo/config.toml")).unwrap();
-        let chip = board.mcu.part().chip.unwrap();
+        let chip = board.mcu().part().chip.unwrap();
         assert!(config.contains(&format!("runner = \"probe-rs run --chip {chip}")), "{config}");
     }
 }
@@ -255,11 +263,12 @@ fn the_stm32f446_image_fits_and_its_tick_cannot_fail_nor_compute_doubles() {
 /// The sizes and limits in docs/boards.md are those of the images above.
 #[test]
 fn the_page_says_what_the_images_take() {
-    let row = |Board { name, mcu, flash, ram, stack, .. }: &Board| {
+    let row = |board: &Board| {
+        let Board { name, flash, ram, stack, .. } = board;
         let taken = [FLASH, RAM, STACK].map(|what| figures::figure("boards.json", name, what));
         let most = [*flash, *ram, *stack].map(group);
         let columns = taken.iter().zip(most).map(|(taken, most)| format!("{taken} of {most} bytes"));
-        format!("| {} | {} |", mcu.part().board, columns.collect::<Vec<_>>().join(" | "))
+        format!("| {} | {} |", board.mcu().part().board, columns.collect::<Vec<_>>().join(" | "))
     };
     figures::shown("boards.md", &[row(&H743), row(&F446)]);
     for (board, signs) in [(&H743, "48 µs on the H743"), (&F446, "95 µs on the F446")] {

@@ -23,7 +23,8 @@ pub fn own_board_builds() {
     let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &["board"]);
     workspace::write_scratch(&dir.join("generated"), &files).unwrap();
     copy(&repository().join("examples/own-board"), &dir.join("own-board"));
-    let built = build::build_folder(&toolchain, &dir, "own-board", Mcu::Stm32H743Zi, &image_target(), false);
+    let mcu = Mcu::named("stm32h743zi").unwrap();
+    let built = build::build_folder(&toolchain, &dir, "own-board", mcu, &image_target(), false);
     let elf = built.unwrap_or_else(|error| panic!("{error}")).elf;
     let checked = checks::check(&elf, Some("specgen_tick"), Rules { single: false, whole_image: false }).unwrap();
     assert!(checked.faults.is_empty(), "{:#?}", checked.faults);

@@ -28,7 +28,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
           every test at full length, board images, faults, documentation, known defects of packages; writes tests/results.txt
   mutants [MINUTES | K/N | all]: code changed one operator at a time, to see whether a test notices: sample after sample for so
           long, one sample, or all; writes tests/results.txt
-  board   SPEC [--target stm32h743|stm32f4] [--cycles | --faults [NAME]], or --tested [--faults]: a board's image on an emulated board, from boot to a
+  board   SPEC [--target BOARD] [--cycles | --faults [NAME]], or --tested [--faults]: a board's image on an emulated board, from boot to a
           record that replays; with times by a model of the core, or with faults, or one fault alone
   fuzz    [SECONDS [TARGET]]: what comes from outside, under a fuzzer guided by coverage, 300 s each target; writes
           tests/results.txt; `fuzz keep` keeps what it found

@@ -135,7 +135,7 @@ pub fn host() -> String {
 const DATABASE: &str = "SPECGEN_ADVISORY_DB";
 
 /// Asks the RustSec database for known defects of the packages in each lock file.
-pub fn advisories(root: &Path, manifests: &[&str]) -> Outcome {
+pub fn advisories(root: &Path, manifests: &[String]) -> Outcome {
     let there = cargo(root, &["audit", "--version"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
     if !there.is_ok_and(|status| status.success()) {
         return Outcome::Skipped("no cargo-audit here; it comes by: cargo install cargo-audit --locked".to_owned());

@@ -17,32 +17,17 @@ const FIRMWARE: &str = "firmware/qemu/Cargo.toml";
 const TICK: &str = "firmware/tick/Cargo.toml";
 /// Built from an emitted workspace.
 const HOST_LIBRARY: &str = "firmware/host/Cargo.toml";
-/// Boards, each its own workspace; built from an emitted one.
-const BOARDS: [&str; 2] = ["firmware/stm32h743/Cargo.toml", "firmware/stm32f4/Cargo.toml"];
 /// The emulated board.
 const EMULATED: &str = "tests/board/Cargo.toml";
 /// What they share: built as a part of theirs.
 const BOARDS_COMMON: &str = "firmware/stm32/Cargo.toml";
 /// Its own workspace, because of its dependencies.
 const REAL_TIME: &str = "firmware/rt-pc/Cargo.toml";
-/// Workspaces of their own with lock files of their own.
-const STANDING_ALONE: [&str; 10] =
-    [FIRMWARE, TICK, REAL_TIME, wheel::MANIFEST, SCHEMA, fuzz::MANIFEST, EMULATED, LOOM, BOARDS[0], BOARDS[1]];
-/// Every lock file there is.
-const LOCKED: [&str; 12] = [
-    "Cargo.toml",
-    FIRMWARE,
-    TICK,
-    REAL_TIME,
-    wheel::MANIFEST,
-    SCHEMA,
-    fuzz::MANIFEST,
-    EMULATED,
-    LOOM,
-    BOARDS[0],
-    BOARDS[1],
-    LINK_PROOF,
-];
+/// Workspaces of their own with lock files of their own, beside those of boards.
+const STANDING_ALONE: [&str; 8] = [FIRMWARE, TICK, REAL_TIME, wheel::MANIFEST, SCHEMA, fuzz::MANIFEST, EMULATED, LOOM];
+/// Every lock file there is, beside those of boards.
+const LOCKED: [&str; 10] =
+    ["Cargo.toml", FIRMWARE, TICK, REAL_TIME, wheel::MANIFEST, SCHEMA, fuzz::MANIFEST, EMULATED, LOOM, LINK_PROOF];
 /// The board of one's own beside what is generated, where the test of the boards leaves both.
 const OWN_BOARD: &str = "target/tests/boards/own-board/own-board/Cargo.toml";
 /// Its own workspace, built by a test.
@@ -56,21 +41,9 @@ const PUBLISHED_SCHEMA: Trial =
 const LOOM: &str = "firmware/rt/tests/loom/Cargo.toml";
 /// What orders memory that two processes share, under a model checker.
 const SHARED_MEMORY: Trial = Trial { manifest: LOOM, judges: &[("firmware/rt/src/exchange", ".rs")] };
-/// Packages that are no members of the workspace, and formatted one by one.
-const FORMATTED_ALONE: [&str; 12] = [
-    FIRMWARE,
-    TICK,
-    HOST_LIBRARY,
-    REAL_TIME,
-    wheel::MANIFEST,
-    BOARDS_COMMON,
-    SCHEMA,
-    fuzz::MANIFEST,
-    EMULATED,
-    LOOM,
-    BOARDS[0],
-    BOARDS[1],
-];
+/// Packages that are no members of the workspace, and formatted one by one, beside boards.
+const FORMATTED_ALONE: [&str; 10] =
+    [FIRMWARE, TICK, HOST_LIBRARY, REAL_TIME, wheel::MANIFEST, BOARDS_COMMON, SCHEMA, fuzz::MANIFEST, EMULATED, LOOM];
 /// Members of the workspace that people write.
 const HAND_WRITTEN: [&str; 24] = [
     "specgen",
@@ -128,12 +101,28 @@ pub fn maintained(root: &Path, words: &[&str]) -> Outcome {
     }
 }
 
+/// A list of manifests with those of boards: the packages in `firmware` whose manifest has the table of a board. Each is its own
+/// workspace, built from an emitted one.
+fn with_boards(root: &Path, manifests: &[&str]) -> Vec<String> {
+    let folders = std::fs::read_dir(root.join("firmware")).into_iter().flatten().flatten();
+    let is_board = |path: &String| {
+        std::fs::read_to_string(root.join(path)).is_ok_and(|text| text.contains("\n[package.metadata.board]\n"))
+    };
+    let mut boards: Vec<String> = folders
+        .map(|folder| format!("firmware/{}/Cargo.toml", folder.file_name().display()))
+        .filter(is_board)
+        .collect();
+    boards.sort();
+    manifests.iter().map(|manifest| (*manifest).to_owned()).chain(boards).collect()
+}
+
 /// `cargo xtask test`
 pub fn test(root: &Path) -> ExitCode {
     let before = results::changes(root);
     // Lints find no wrong result and cost a second pass of the compiler: on a desk, `cargo clippy` and the full run have them.
     let lints_too = std::env::var_os("CI").is_some();
-    let mut report = Report::new(9 + usize::from(lints_too) + LOCKED.len());
+    let locked = with_boards(root, &LOCKED);
+    let mut report = Report::new(9 + usize::from(lints_too) + locked.len());
     report.step("the last full run", || results::judge(root));
     report.step("formatting", || formatting(root));
     let binaries = compiled(root, false, &mut report);
@@ -145,7 +134,7 @@ pub fn test(root: &Path) -> ExitCode {
     report.step("published schema", || PUBLISHED_SCHEMA.unless_unchanged(root));
     report.step("orders of shared memory", || SHARED_MEMORY.unless_unchanged(root));
     report.step("generated files are fresh", || maintained(root, &["check"]));
-    for manifest in LOCKED {
+    for manifest in &locked {
         report.step(&format!("lock file and licences of {manifest}"), || packages::check(root, manifest));
     }
     report.step("the clone is as it was", || results::unchanged(before.as_deref(), results::changes(root).as_deref()));
@@ -156,7 +145,7 @@ pub fn test(root: &Path) -> ExitCode {
 pub fn full(root: &Path) -> ExitCode {
     let start = Instant::now();
     let mut report = Report::new(13);
-    report.step("known defects of packages", || packages::advisories(root, &LOCKED));
+    report.step("known defects of packages", || packages::advisories(root, &with_boards(root, &LOCKED)));
     let binaries = compiled(root, true, &mut report);
     let mode = Mode { full: true, tools_missing: !set_up(root, &mut report) };
     let mut ran = Ran::default();
@@ -237,9 +226,10 @@ fn compiled(root: &Path, full: bool, report: &mut Report) -> Vec<Binary> {
 
 /// `cargo xtask bless`
 pub fn bless(root: &Path) -> ExitCode {
-    let mut report = Report::new(1 + STANDING_ALONE.len());
+    let alone = with_boards(root, &STANDING_ALONE);
+    let mut report = Report::new(1 + alone.len());
     report.step("generated files", || maintained(root, &["bless"]));
-    for manifest in STANDING_ALONE {
+    for manifest in &alone {
         report.step(&format!("lock file of {manifest}"), || {
             // Keeps the versions that are locked; only the path packages follow their manifests.
             expect_success(cargo(root, &["update", "--workspace", "--manifest-path", manifest]), "see above")
@@ -254,7 +244,8 @@ fn formatting(root: &Path) -> Outcome {
     }
     // Not `--all`: the emitted controller is formatted by specgen itself.
     let members = HAND_WRITTEN.iter().flat_map(|name| ["--package", name]);
-    let excluded = FORMATTED_ALONE.into_iter().map(|manifest| vec!["--manifest-path", manifest]);
+    let alone = with_boards(root, &FORMATTED_ALONE);
+    let excluded = alone.iter().map(|manifest| vec!["--manifest-path", manifest]);
     for scope in std::iter::once(members.collect()).chain(excluded) {
         let fix = format!("run: cargo fmt {}", scope.join(" "));
         let outcome = expect_success(cargo(root, &[&["fmt", "--check"], &scope[..]].concat()), &fix);
@@ -344,7 +335,7 @@ mod tests {
         // By a step of its own; its lock file is looked at where it was generated.
         let own_board = "examples/own-board/Cargo.toml";
         let locked: BTreeSet<String> = named("Cargo.lock").iter().map(|path| path.replace(".lock", ".toml")).collect();
-        assert_eq!(locked, LOCKED.into_iter().chain([own_board]).map(str::to_owned).collect());
+        assert_eq!(locked, with_boards(&crate::root(), &LOCKED).into_iter().chain([own_board.to_owned()]).collect());
 
         let workspace = fs::read_to_string(crate::root().join("Cargo.toml")).unwrap();
         let members = workspace.split_once("members = [").unwrap().1.split_once(']').unwrap().0;
@@ -354,7 +345,7 @@ mod tests {
         let others = ["Cargo.toml", "firmware/controller/Cargo.toml", LINK_PROOF, own_board];
         let alone =
             named("Cargo.toml").into_iter().filter(|path| !members.contains(path) && !others.contains(&path.as_str()));
-        assert_eq!(alone.collect::<BTreeSet<_>>(), FORMATTED_ALONE.into_iter().map(str::to_owned).collect());
+        assert_eq!(alone.collect::<BTreeSet<_>>(), with_boards(&crate::root(), &FORMATTED_ALONE).into_iter().collect());
         let name = |path: &String| {
             let text = fs::read_to_string(crate::root().join(path)).unwrap();
             text.lines().find_map(|line| line.strip_prefix("name = ")).unwrap().trim_matches('"').to_owned()

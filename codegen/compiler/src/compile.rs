@@ -112,7 +112,7 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compile
     let rest_noise = accepted(rest::noise(&model, design.as_ref()), findings)?;
     // With the program of the spec's board, if it has one.
     let target = Target::of(model.target.mcu);
-    let files = workspace::files_with(&ir, &emit::emit(&ir), &[target.folder]);
+    let files = workspace::files_with(&ir, &emit::emit(&ir), &[target.name]);
     lint::allow(&model, findings);
     findings.extend(lint::unused(&model, findings));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));

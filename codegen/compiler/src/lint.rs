@@ -16,8 +16,8 @@
 /// The page is Markdown: a heading with code and title, what is checked, and *Why it matters*, *Example* and *Fix*.
 macro_rules! lints {
     (rules: $($rule:ident),*; $($(#[doc = $line:literal])* $name:ident = $code:literal;)*) => {
-        $($(#[doc = $line])* pub static $name: Code = Code::new($code, &[$($line),*]);)*
-        pub(super) static LINTS: Lints = Lints { rules: &[$($rule),*], codes: &[$($name),*] };
+        $($(#[doc = $line])* pub static $name: $crate::lint::Code = $crate::lint::Code::new($code, &[$($line),*]);)*
+        pub(super) static LINTS: $crate::lint::Lints = $crate::lint::Lints { rules: &[$($rule),*], codes: &[$($name),*] };
     };
 }
 
@@ -32,7 +32,6 @@ mod electronics;
 mod factors;
 mod frames;
 mod gauge_layout;
-mod gauge_order;
 mod gauge_pattern;
 mod gauge_places;
 mod gauges;
@@ -69,34 +68,14 @@ struct Lints {
     codes: &'static [Code],
 }
 
-/// In the order in which they run: a rule may look at what earlier ones found. The last three have findings and no rule.
-static FAMILIES: [&Lints; 25] = [
-    &layout::LINTS,
-    &order::LINTS,
-    &frames::LINTS,
-    &pairs::LINTS,
-    &bodies::LINTS,
-    &actuator::LINTS,
-    &electronics::LINTS,
-    &gauges::LINTS,
-    &gauge_places::LINTS,
-    &gauge_pattern::LINTS,
-    &gauge_layout::LINTS,
-    &gauge_order::LINTS,
-    &alike::LINTS,
-    &contact::LINTS,
-    &weights::LINTS,
-    &timing::LINTS,
-    &tick::LINTS,
-    &motion::LINTS,
-    &triggers::LINTS,
-    &requirements::LINTS,
-    &factors::LINTS,
-    &budget::LINTS,
-    &allow::LINTS,
-    &culprit::LINTS,
-    &paths::LINTS,
-];
+macro_rules! families {
+    ($($family:ident)+) => { static FAMILIES: &[&Lints] = &[$(&$family::LINTS),+]; };
+}
+// In the order in which they run: a rule may look at what earlier ones found. The last three have findings and no rule.
+families! {
+    layout order frames pairs bodies actuator electronics gauges gauge_places gauge_pattern gauge_layout alike contact
+    weights timing tick motion triggers requirements factors budget allow culprit paths
+}
 
 /// A value that is so many times beyond what its rule lets pass is refused. A slip of a thousand is 32 times where its root
 /// counts, as that of a stiffness in a resonance, and no such rule is wider than four and a half.

@@ -27,7 +27,7 @@ pub fn files(ir: &Ir, controller: &EmittedCrate) -> BTreeMap<String, String> {
 #[must_use]
 pub fn files_with(ir: &Ir, controller: &EmittedCrate, targets: &[&str]) -> BTreeMap<String, String> {
     let parts = parts::select(targets);
-    let fixed = parts.iter().flat_map(|part| part.files.iter());
+    let fixed = parts.iter().flat_map(|part| part.files().iter());
     let mut files: BTreeMap<String, String> =
         fixed.map(|(path, text)| ((*path).to_owned(), (*text).to_owned())).collect();
     for (path, text) in controller {
@@ -49,7 +49,7 @@ pub fn ir_text(ir: &Ir) -> String {
     }
 }
 
-fn root_manifest(ir: &Ir, parts: &[&Part]) -> String {
+fn root_manifest(ir: &Ir, parts: &[Part]) -> String {
     let list = |member: bool| {
         let folders = parts.iter().filter(|part| part.member == member).map(|part| format!("\"{}\"", part.folder));
         folders.collect::<Vec<_>>().join(", ")
@@ -78,8 +78,8 @@ debug = \"line-tables-only\"
     )
 }
 
-fn readme(ir: &Ir, parts: &[&Part]) -> String {
-    let row = |part: &&Part| format!("| `{}/` | {} | {} |\n", part.folder, part.what, part.needs);
+fn readme(ir: &Ir, parts: &[Part]) -> String {
+    let row = |part: &Part| format!("| `{}/` | {} | {} |\n", part.folder, part.what, part.needs);
     let folders: Vec<String> = parts.iter().map(|part| format!("`{}/`", part.folder)).collect();
     let (last, others) = folders.split_last().map_or(("", &[][..]), |(last, others)| (last.as_str(), others));
     format!(
@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn every_target_has_a_folder() {
         for target in specgen_toolchain::targets::TARGETS {
-            assert!(parts::PARTS.iter().any(|part| part.folder == target.folder), "{}", target.name);
+            assert!(parts::all().iter().any(|part| part.folder == target.name), "{}", target.name);
         }
     }
 
@@ -143,17 +143,17 @@ mod tests {
         let folders = entries.filter(|entry| entry.path().is_dir()).map(|entry| entry.file_name());
         let folders = folders.map(|name| name.to_string_lossy().into_owned()).filter(|name| name != "controller");
         for folder in folders {
-            let part = parts::PARTS.iter().find(|part| part.folder == folder);
+            let part = parts::all().into_iter().find(|part| part.folder == folder);
             let part = part.unwrap_or_else(|| panic!("firmware/{folder} is no part: see workspace/parts.rs"));
             let mut present = list(&firmware, &folder);
             present.retain(|path| !path.starts_with(&format!("{folder}/tests/")));
             // A lock file that cargo leaves in a member of some workspace is nobody's.
-            present.retain(|path| part.files.iter().any(|(file, _)| file == path) || !path.ends_with("/Cargo.lock"));
-            let mut copied: Vec<String> = part.files.iter().map(|(path, _)| (*path).to_owned()).collect();
+            present.retain(|path| part.files().iter().any(|(file, _)| file == path) || !path.ends_with("/Cargo.lock"));
+            let mut copied: Vec<String> = part.files().iter().map(|(path, _)| (*path).to_owned()).collect();
             present.sort();
             copied.sort();
             assert_eq!(present, copied, "codegen/compiler/build.rs lists the files of firmware/{folder}");
-            let text = |name: &str| part.files.iter().find(|(path, _)| *path == format!("{folder}/{name}"));
+            let text = |name: &str| part.files().iter().find(|(path, _)| *path == format!("{folder}/{name}"));
             if text("Cargo.toml").is_some_and(|(_, manifest)| manifest.contains("[workspace]")) {
                 assert!(text("Cargo.lock").is_some(), "firmware/{folder} stands alone: commit its Cargo.lock");
             }
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn a_target_brings_what_it_depends_on() {
         let folders = |targets: &[&str]| parts::select(targets).iter().map(|part| part.folder).collect::<Vec<_>>();
-        for part in &parts::PARTS {
+        for part in parts::all() {
             let chosen = folders(&[part.folder]);
             for needed in part.with.iter().chain(parts::ALWAYS).chain([&part.folder]) {
                 assert!(chosen.contains(needed), "{} without {needed}", part.folder);

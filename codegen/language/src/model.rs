@@ -21,7 +21,7 @@ use crate::keys::declare::*;
 
 pub use electronics::{Actuator, Amplifier, Dac, Sensor};
 pub use hysteresis::{Adaptation, AdaptationMode, Hysteresis, LARGEST_RUN_INTERVAL, MAX_GRID, RateDependence};
-pub use mcu::{Mcu, Part};
+pub use mcu::{BOARDS, Mcu, Part};
 pub use mechanics::{Geometry, LARGEST_TRAVEL, LARGEST_TURN, LegBody, RigidBody, Workspace};
 pub use supervisor::{FaultAction, LARGEST_PULSE, LONGEST_TIMEOUT, LegMakes, Robust, Supervisor, WiringCheck};
 pub use target::{Budget, ControllerOptions, Lint, Requirements, Scalar, SetpointKind, Target, Timing, TrackingLimit};

@@ -220,7 +220,7 @@ pub fn time_board(
     let elf = match elf {
         Some(elf) => elf,
         None => {
-            built = build(board.folder)?.elf;
+            built = build(board.name)?.elf;
             &built
         }
     };

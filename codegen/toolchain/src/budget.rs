@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     fn without_a_budget_the_part_is_the_limit() {
-        let target = Target { mcu: Mcu::Stm32F446Re, budget: Budget::NONE };
+        let target = Target { mcu: Mcu::named("stm32f446re").unwrap(), budget: Budget::NONE };
         assert_eq!(over(&target, &used()), Vec::<String>::new());
         let words = over(&target, &Used { flash: 600_000, ..used() }).join("\n");
         assert!(words.contains("stm32f446re has 524,288") && words.contains("shrink it by 75,712"), "{words}");

@@ -1,6 +1,6 @@
 //! What a workspace can be built for, by the names that `--target` takes.
 
-use specgen_language::model::Mcu;
+use specgen_language::model::{BOARDS, Mcu};
 
 /// How a target is built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,22 +18,26 @@ pub enum Kind {
 /// A target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Target {
-    /// As `--target` names it.
+    /// As `--target` names it, and its folder in the workspace.
     pub name: &'static str,
-    /// Its folder in the workspace.
-    pub folder: &'static str,
     /// How it is built.
     pub kind: Kind,
 }
 
+const PROGRAM: Target = Target { name: "rt-pc", kind: Kind::Program };
+
 /// Every target.
-pub const TARGETS: [Target; 5] = [
-    Target { name: "host", folder: "host", kind: Kind::Host },
-    Target { name: "qemu", folder: "qemu", kind: Kind::Emulated },
-    Target { name: "stm32h743", folder: "stm32h743", kind: Kind::Board(Mcu::Stm32H743Zi) },
-    Target { name: "stm32f4", folder: "stm32f4", kind: Kind::Board(Mcu::Stm32F446Re) },
-    Target { name: "rt-pc", folder: "rt-pc", kind: Kind::Program },
-];
+pub const TARGETS: [Target; 3 + BOARDS.len()] = {
+    let mut all = [PROGRAM; 3 + BOARDS.len()];
+    all[0] = Target { name: "host", kind: Kind::Host };
+    all[1] = Target { name: "qemu", kind: Kind::Emulated };
+    let mut k = 0;
+    while k < BOARDS.len() {
+        all[2 + k] = Target { name: BOARDS[k].folder, kind: Kind::Board(Mcu::Board(BOARDS[k])) };
+        k += 1;
+    }
+    all
+};
 
 /// Their names.
 pub const NAMES: [&str; TARGETS.len()] = {
@@ -70,8 +74,9 @@ mod tests {
         for target in TARGETS {
             assert_eq!(Target::named(target.name), Some(target));
         }
-        assert_eq!(Target::of(Mcu::Stm32H743Zi).name, "stm32h743");
-        assert_eq!(Target::of(Mcu::Stm32F446Re).name, "stm32f4");
+        for board in BOARDS {
+            assert_eq!(Target::of(Mcu::Board(board)).name, board.folder);
+        }
         assert_eq!(Target::of(Mcu::Mps2An386).name, "qemu");
         assert_eq!(Target::named("esp32"), None);
     }

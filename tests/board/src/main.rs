@@ -43,7 +43,7 @@ use meter::Meter;
 use plant::Plant;
 use time::{MICROSECOND, Time, microseconds};
 
-const USAGE: &str = "usage: emulated-board --library FILE --target stm32h743|stm32f4 --bits N [--plant NAME] [--socket PATH] [--cycles] IMAGE
+const USAGE: &str = "usage: emulated-board --library FILE --target BOARD --bits N [--plant NAME] [--socket PATH] [--cycles] IMAGE
 
   --library FILE  the Unicorn engine, libunicorn.so.2
   --bits N        of a gauge: sensor.bits of the spec
@@ -71,11 +71,8 @@ fn options() -> Option<Options> {
         match argument.as_str() {
             "--library" => library = Some(arguments.next()?.into()),
             "--target" => {
-                part = Some(match arguments.next()?.as_str() {
-                    "stm32h743" => &part::H743,
-                    "stm32f4" => &part::F446,
-                    _ => return None,
-                });
+                let name = arguments.next()?;
+                part = Some(part::PARTS.iter().find(|(target, _)| *target == name)?.1);
             }
             "--bits" => bits = arguments.next()?.parse().ok().filter(|bits| (8..=18).contains(bits)),
             "--plant" => plant = Some(arguments.next()?),

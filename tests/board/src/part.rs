@@ -94,7 +94,10 @@ const E: usize = 4;
 const F: usize = 5;
 const G: usize = 6;
 
-pub const H743: Part = Part {
+/// By the name of the board's target.
+pub const PARTS: [(&str, &Part); 2] = [("stm32h743", &H743), ("stm32f4", &F446)];
+
+const H743: Part = Part {
     family: Family::H7,
     memories: &[[0x0800_0000, 0x20_0000], [0, 0x1_0000], [0x2000_0000, 0x2_0000], [0x2400_0000, 0x8_0000]],
     flash: 0x0800_0000,
@@ -153,7 +156,7 @@ pub const H743: Part = Part {
     fault: (B, 11),
 };
 
-pub const F446: Part = Part {
+const F446: Part = Part {
     family: Family::F4,
     memories: &[[0x0800_0000, 0x8_0000], [0x2000_0000, 0x2_0000]],
     flash: 0x0800_0000,

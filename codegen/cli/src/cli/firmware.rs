@@ -21,7 +21,7 @@ use specgen_compiler::assumed::Assumptions;
 use specgen_compiler::compile::Compiled;
 use specgen_language::diagnostic::{Diagnostic, Severity, codes};
 use specgen_language::files;
-use specgen_language::model::{self, Mcu};
+use specgen_language::model::{self, BOARDS, Mcu};
 use specgen_language::outcome::Failure;
 use specgen_language::outcome::Refused;
 use specgen_language::output::unread_file;
@@ -175,7 +175,7 @@ fn make(spec: &Path, common: &Common, purpose: Purpose, ui: &mut Ui) -> Result<M
     }
     accept_assumptions(target, &compiled, common)?;
     if common.lockstep && !matches!(target.kind, Kind::Board(_)) {
-        let boards = "stm32h743, stm32f4";
+        let boards = BOARDS.map(|board| board.folder).join(", ");
         let message = format!("--lockstep is for the targets {boards}; {} has it in any case or never", target.name);
         return Err(Failure::Usage(message));
     }
@@ -187,7 +187,7 @@ fn make(spec: &Path, common: &Common, purpose: Purpose, ui: &mut Ui) -> Result<M
         .output
         .as_deref()
         .map_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)), Path::to_owned);
-    let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[target.folder]);
+    let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[target.name]);
     let _hold = workspace::write(&output, &files)?;
     ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
     let target_dir = common.target_dir.as_deref().map_or_else(|| output.join("target"), Path::to_owned);
@@ -260,9 +260,9 @@ fn build(
             made.artifact = target::host::build_library(output, &output.join("target"))?.display().to_string();
         }
         Kind::Program => {
-            ui.progress(&format!("building {} for this machine", target.folder));
+            ui.progress(&format!("building {} for this machine", target.name));
             made.board = "this machine".to_owned();
-            made.artifact = target::host::build_program(output, target.folder, target_dir)?.display().to_string();
+            made.artifact = target::host::build_program(output, target.name, target_dir)?.display().to_string();
         }
         Kind::Emulated => {
             made.board = declared.part().emulated.to_owned();
@@ -279,8 +279,7 @@ fn build(
             made.board = mcu.part().board.to_owned();
             let toolchain = target::toolchain::find()?;
             ui.progress(&format!("building for {}", made.board));
-            let image =
-                target::build::build_folder(&toolchain, output, target.folder, mcu, target_dir, common.lockstep)?;
+            let image = target::build::build_folder(&toolchain, output, target.name, mcu, target_dir, common.lockstep)?;
             examine(&mut made, &image, false, output)?;
             made.stack = Reserve::of(&image.elf)?;
             if mcu != declared {

@@ -2,8 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use super::{Facts, Found, Lints, figure, times_beyond};
-use specgen_language::diagnostic::Code;
+use super::{Facts, Found, figure, times_beyond};
 
 lints! {
     rules: strain, stiffness_fits_resonance, slew_spares_the_stacks, slew_moves_the_legs, resonance_is_damped,

@@ -1,7 +1,7 @@
 //! Values that come six at a time and are much alike: calibrations of gauges, gains by stiffness.
 
-use super::{AXES, Facts, Found, Lints, figure, times_beyond};
-use specgen_language::diagnostic::{Code, Diagnostic};
+use super::{AXES, Facts, Found, figure, times_beyond};
+use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Gains, TaskSpace};
 
 lints! {

@@ -1,7 +1,6 @@
 //! What `[lint] allow` lets pass.
 
-use super::Lints;
-use specgen_language::diagnostic::{Code, Diagnostic, Place, Severity};
+use specgen_language::diagnostic::{Diagnostic, Place, Severity};
 use specgen_language::model::Model;
 
 lints! {

@@ -1,7 +1,7 @@
 //! Masses and inertias against sizes.
 
-use super::{Facts, Found, Lints, figure, times_beyond};
-use specgen_language::diagnostic::{Code, Diagnostic};
+use super::{Facts, Found, figure, times_beyond};
+use specgen_language::diagnostic::Diagnostic;
 
 lints! {
     rules: leg_parts_have_size, mass_centres_off_the_joints, parts_are_bodies, centre_over_joints, moments_of_each_axis,

@@ -1,7 +1,7 @@
 //! Memory that the constants take whatever the code does.
 
-use super::{Facts, Found, Lints, figure};
-use specgen_language::diagnostic::{Code, Diagnostic};
+use super::{Facts, Found, figure};
+use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, Scalar};
 
 lints! {

@@ -1,7 +1,6 @@
 //! The work piece that the platform touches.
 
-use super::{AXES, Facts, Found, Lints, amount, figure, times_beyond};
-use specgen_language::diagnostic::Code;
+use super::{AXES, Facts, Found, amount, figure, times_beyond};
 
 lints! {
     rules: work_piece, lever_of_contact, contact_near_bias;

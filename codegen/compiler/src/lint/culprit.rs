@@ -8,9 +8,9 @@ mod readings;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use super::{Lints, allow, check, figure};
+use super::{allow, check, figure};
 use crate::reach;
-use specgen_language::diagnostic::{Code, Diagnostic, Place, Severity};
+use specgen_language::diagnostic::{Diagnostic, Place, Severity};
 use specgen_language::spec::{self, SpecSource};
 
 lints! {

@@ -1,7 +1,6 @@
 //! Amplifier and converter.
 
-use super::{Facts, Found, Lints, figure, times_beyond};
-use specgen_language::diagnostic::Code;
+use super::{Facts, Found, figure, times_beyond};
 use specgen_language::model::Model;
 
 lints! {

@@ -2,9 +2,9 @@
 
 use core::ops::RangeInclusive;
 
-use super::{Facts, Found, Lints, figure, times_beyond};
+use super::{Facts, Found, figure, times_beyond};
 use crate::lower::supervision::{defaults, samples, steadiness};
-use specgen_language::diagnostic::{Code, Diagnostic, Severity};
+use specgen_language::diagnostic::{Diagnostic, Severity};
 
 lints! {
     rules: near_defaults, near_one;

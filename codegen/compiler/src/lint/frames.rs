@@ -1,8 +1,7 @@
 //! In which frame points and directions are given: {B} below, {P} at `geometry.height` above it.
 
 use super::gauge_places::{ALONG_AXIS, pierced};
-use super::{Facts, Found, Lints, figure};
-use specgen_language::diagnostic::Code;
+use super::{Facts, Found, figure};
 
 lints! {
     rules: other_frame;

@@ -2,8 +2,7 @@
 //! comes within a thousandth of a pattern once in hundreds.
 
 use super::gauges::GAUGES_ALIKE;
-use super::{Facts, Found, Lints};
-use specgen_language::diagnostic::Code;
+use super::{Facts, Found};
 use specgen_language::model::Probe;
 
 lints! {

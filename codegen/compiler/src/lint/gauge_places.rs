@@ -1,7 +1,6 @@
 //! Where gauges look at the platform.
 
-use super::{Facts, Found, Lints, figure};
-use specgen_language::diagnostic::Code;
+use super::{Facts, Found, figure};
 use specgen_language::model::Probe;
 
 lints! {

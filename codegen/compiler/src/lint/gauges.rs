@@ -1,7 +1,6 @@
 //! Gauges: resolution, range, layout.
 
-use super::{FAR_OFF, Facts, Found, Lints, amount, figure};
-use specgen_language::diagnostic::Code;
+use super::{FAR_OFF, Facts, Found, amount, figure};
 
 lints! {
     rules: differ, noise_of_a_step, range_centred, range_beyond_zero, step_against_stroke, odd_coordinates,

@@ -1,8 +1,7 @@
 //! Where the joints are.
 
-use super::{Facts, Found, Lints, figure};
+use super::{Facts, Found, figure};
 use crate::reach::joints;
-use specgen_language::diagnostic::Code;
 
 lints! {
     rules: joints_apart, joints_turn, base_is_wider, proportions;

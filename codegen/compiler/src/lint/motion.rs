@@ -1,7 +1,6 @@
 //! Limits of moves and streams against the workspace, the tick and the legs.
 
-use super::{AXES, Facts, Found, Lints, amount, figure};
-use specgen_language::diagnostic::Code;
+use super::{AXES, Facts, Found, amount, figure};
 use specgen_language::model::SetpointRules;
 
 lints! {

@@ -1,7 +1,6 @@
 //! In which order joints are listed.
 
-use super::{Facts, Found, Lints, figure};
-use specgen_language::diagnostic::Code;
+use super::{Facts, Found, figure};
 use specgen_language::model::Geometry;
 
 lints! {

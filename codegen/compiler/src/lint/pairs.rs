@@ -2,8 +2,7 @@
 
 use core::f64::consts::PI;
 
-use super::{Facts, Found, Lints, figure};
-use specgen_language::diagnostic::Code;
+use super::{Facts, Found, figure};
 
 lints! {
     rules: angles_of_pairs;

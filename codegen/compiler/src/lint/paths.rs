@@ -6,9 +6,9 @@ use serde::Serialize;
 use specgen_numerics::{displacements, mass_matrix};
 use specgen_runtime::Platform;
 
-use super::{Found, Legs, Lints, figure};
+use super::{Found, Legs, figure};
 use crate::lower::setpoint::Stretch;
-use specgen_language::diagnostic::{Code, Diagnostic};
+use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, TaskSpace};
 
 lints! {

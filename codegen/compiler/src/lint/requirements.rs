@@ -1,8 +1,7 @@
 //! Requirements that would be met whatever is built, and such as no motion has.
 
 use super::paths::PATH_EXCITES;
-use super::{Facts, Found, Lints, figure};
-use specgen_language::diagnostic::Code;
+use super::{Facts, Found, figure};
 
 lints! {
     rules: ask_something, frequencies;

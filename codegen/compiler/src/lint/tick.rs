@@ -1,4 +1,4 @@
-//! Whether the board that a spec names can keep its period, by a table of what boards and laws take. `specgen build` estimates
+//! Whether the board that a spec names can keep its period, by what boards and laws take, as the manifests of the boards have it. `specgen build` estimates
 //! the tick from the image itself, a minute later, and refuses a period that is shorter.
 
 use super::{Facts, Found, Lints, figure};
@@ -7,29 +7,24 @@ use specgen_language::model::{DynamicsChoice, Interaction, Mcu, Model, Scalar};
 
 pub(super) static LINTS: Lints = Lints { rules: &[fits_period], codes: &[] };
 
-/// Longest tick of a board, µs: of six legs as in `specs/legs.toml`, of a platform as in `specs/reference.toml`, and of one with
-/// the whole kernel of the inverse dynamics. Of the H743 as `specgen build` estimates it; of six legs and of the whole kernel
-/// in `f32` it is scaled from the others. Of the F446 the platform alone is known, from 49 to 98 (docs/bring-up.md): six legs
-/// stand at the least of it and the whole kernel at the most, so that nothing is refused that would fit.
-const TICKS: [(Mcu, Scalar, [f64; 3]); 3] = [
-    (Mcu::Stm32H743Zi, Scalar::F64, [40.0, 49.0, 58.0]),
-    (Mcu::Stm32H743Zi, Scalar::F32, [35.0, 39.0, 43.0]),
-    (Mcu::Stm32F446Re, Scalar::F32, [49.0, 98.0, 98.0]),
-];
 /// Another law, scalar or compiler takes this share of the table at least: below it the period is refused.
 const CERTAIN: f64 = 0.8;
 
 /// About what the longest tick of the named board takes, s; none for an emulated one.
 #[must_use]
 pub fn about(model: &Model) -> Option<f64> {
-    let is_of = |mcu: Mcu, scalar: Scalar| mcu == model.target.mcu && scalar == model.controller.scalar;
-    let (.., [legs, platform, whole]) = TICKS.into_iter().find(|(mcu, scalar, _)| is_of(*mcu, *scalar))?;
+    let Mcu::Board(board) = model.target.mcu else { return None };
+    let ticks = match model.controller.scalar {
+        Scalar::F32 => board.ticks_f32,
+        Scalar::F64 => board.ticks_f64,
+    };
+    let [legs, platform, whole] = *ticks else { return None };
     let time = match &model.task_space {
         None => legs,
         Some(task) if task.dynamics == DynamicsChoice::Whole || task.interaction != Interaction::None => whole,
         Some(_) => platform,
     };
-    Some(time * 1e-6)
+    Some(f64::from(time) * 1e-6)
 }
 
 /// The period is longer than what the tick of the named board takes.

@@ -1,7 +1,6 @@
 //! Times against the tick, and the tick against the modes.
 
-use super::{Facts, Found, Lints, figure};
-use specgen_language::diagnostic::Code;
+use super::{Facts, Found, figure};
 
 lints! {
     rules: times_that_do_nothing, lead_of_the_lag, transfer, velocity_filter, ticks_against_modes, gauges_in_time,

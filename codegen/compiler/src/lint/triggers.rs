@@ -1,8 +1,7 @@
 //! Output lines against noise, speed and themselves.
 
-use super::{Facts, Found, Lints, amount, figure};
+use super::{Facts, Found, amount, figure};
 use crate::lower::{pose_noise, triggers};
-use specgen_language::diagnostic::Code;
 use specgen_language::model::{Trigger, TriggerKind};
 use specgen_runtime::trigger::MOST_STEPS;
 

@@ -1,7 +1,6 @@
 //! How fast the run-to-run adaptation works, and for which gains.
 
-use super::{Facts, Found, Lints, figure};
-use specgen_language::diagnostic::Code;
+use super::{Facts, Found, figure};
 use specgen_language::model::AdaptationMode;
 
 lints! {

@@ -1,10 +1,12 @@
 //! The folders that are copied verbatim into a workspace, each with what it needs beside it. The build script lists their files: a new
-//! file is in by being there, a new target is one more entry of [`PARTS`] and one more line of the script.
+//! file is in by being there, and so is a new board; another new folder is one more entry of [`PARTS`] and one more line of the script.
 
 use std::collections::BTreeSet;
 
+use specgen_language::model;
+
 /// A folder of `firmware/` that is copied as it is.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct Part {
     /// Its name, in `firmware/` and in the workspace.
     pub folder: &'static str,
@@ -16,8 +18,14 @@ pub struct Part {
     pub needs: &'static str,
     /// Folders that it depends on, beside `controller`, `law` and `runtime`.
     pub with: &'static [&'static str],
+}
+
+impl Part {
     /// Path below the workspace, text.
-    pub files: &'static [(&'static str, &'static str)],
+    #[must_use]
+    pub fn files(&self) -> &'static [(&'static str, &'static str)] {
+        files::of(self.folder)
+    }
 }
 
 /// The files of the folders.
@@ -26,31 +34,22 @@ mod files {
 }
 pub use files::{HOST_SIM, UNIT};
 
-/// Every folder there is. Not a constant, of which each crate that names it has a copy.
-pub static PARTS: [Part; 13] = [
+/// Every folder there is, but for boards.
+const PARTS: [Part; 11] = [
     Part {
         folder: "law",
         member: true,
         what: "the control law and its supervised tick: start at `src/platform/step.rs`, or `src/legs/step.rs` for six legs",
         needs: "nothing",
         with: &[],
-        files: files::LAW,
     },
-    Part {
-        folder: "runtime",
-        member: true,
-        what: "the kernels it calls",
-        needs: "nothing",
-        with: &[],
-        files: files::RUNTIME,
-    },
+    Part { folder: "runtime", member: true, what: "the kernels it calls", needs: "nothing", with: &[] },
     Part {
         folder: "host",
         member: true,
         what: "the same controller as a shared library: `cargo build --release`",
         needs: "a host toolchain",
         with: &[],
-        files: files::HOST,
     },
     Part {
         folder: "qemu",
@@ -58,7 +57,6 @@ pub static PARTS: [Part; 13] = [
         what: "the same controller on an emulated Cortex-M: see its README",
         needs: "target `thumbv7em-none-eabihf`, QEMU",
         with: &["link"],
-        files: files::QEMU,
     },
     Part {
         folder: "link",
@@ -66,7 +64,6 @@ pub static PARTS: [Part; 13] = [
         what: "the protocol between a board and the host",
         needs: "nothing",
         with: &[],
-        files: files::LINK,
     },
     Part {
         folder: "hal",
@@ -74,7 +71,6 @@ pub static PARTS: [Part; 13] = [
         what: "gauges and amplifiers: traits and drivers",
         needs: "nothing",
         with: &[],
-        files: files::HAL,
     },
     Part {
         folder: "board",
@@ -82,7 +78,6 @@ pub static PARTS: [Part; 13] = [
         what: "what all boards have in common: one tick on real converters, what is said over the link",
         needs: "nothing",
         with: &["hal", "link"],
-        files: files::BOARD,
     },
     Part {
         folder: "stm32",
@@ -90,23 +85,6 @@ pub static PARTS: [Part; 13] = [
         what: "what the STM32 boards have in common",
         needs: "nothing by itself",
         with: &["board", "hal", "link"],
-        files: files::STM32,
-    },
-    Part {
-        folder: "stm32h743",
-        member: false,
-        what: "firmware of the NUCLEO-H743ZI2 (Cortex-M7)",
-        needs: "target `thumbv7em-none-eabihf`",
-        with: &["board", "hal", "link", "stm32", "tick"],
-        files: files::STM32H743,
-    },
-    Part {
-        folder: "stm32f4",
-        member: false,
-        what: "firmware of the NUCLEO-F446RE (Cortex-M4F, `f32`)",
-        needs: "target `thumbv7em-none-eabihf`",
-        with: &["board", "hal", "link", "stm32", "tick"],
-        files: files::STM32F4,
     },
     Part {
         folder: "tick",
@@ -114,7 +92,6 @@ pub static PARTS: [Part; 13] = [
         what: "a board's tick between stand-ins for its converters, on an emulated Cortex-M: what its time is estimated from",
         needs: "target `thumbv7em-none-eabihf`, QEMU",
         with: &["board", "hal", "link", "qemu", "stm32"],
-        files: files::TICK,
     },
     Part {
         folder: "rt",
@@ -122,7 +99,6 @@ pub static PARTS: [Part; 13] = [
         what: "what a control loop needs of Linux: clock, rights, book of late ticks, shared memory",
         needs: "Linux",
         with: &[],
-        files: files::RT,
     },
     Part {
         folder: "rt-pc",
@@ -130,26 +106,45 @@ pub static PARTS: [Part; 13] = [
         what: "the controller on a real-time Linux PC",
         needs: "a host toolchain, Linux",
         with: &["hal", "link", "rt"],
-        files: files::RT_PC,
     },
 ];
+
+/// The folder of a board.
+const fn of_board(board: &model::Part) -> Part {
+    Part {
+        folder: board.folder,
+        member: false,
+        what: board.readme,
+        needs: "target `thumbv7em-none-eabihf`",
+        with: &["board", "hal", "link", "stm32", "tick"],
+    }
+}
+
+/// Every folder there is: boards behind what they have in common.
+#[must_use]
+pub fn all() -> Vec<Part> {
+    let (before, behind) = PARTS.split_at(PARTS.iter().take_while(|part| part.folder != "tick").count());
+    before.iter().copied().chain(model::BOARDS.map(of_board)).chain(behind.iter().copied()).collect()
+}
 
 /// Folders of every workspace: with these the bits of host and emulated machine can be compared.
 pub const ALWAYS: &[&str] = &["law", "runtime", "host", "qemu"];
 
-/// [`ALWAYS`], `targets` and all that these depend on, in the order of [`PARTS`].
+/// [`ALWAYS`], `targets` and all that these depend on, in the order of [`all`].
 #[must_use]
-pub fn select(targets: &[&str]) -> Vec<&'static Part> {
+pub fn select(targets: &[&str]) -> Vec<Part> {
+    let mut parts = all();
     let mut wanted: BTreeSet<&str> = ALWAYS.iter().chain(targets).copied().collect();
     // What is added may depend on more; a folder is added once, so this ends.
     loop {
         let needed =
-            PARTS.iter().filter(|part| wanted.contains(part.folder)).flat_map(|part| part.with.iter().copied());
+            parts.iter().filter(|part| wanted.contains(part.folder)).flat_map(|part| part.with.iter().copied());
         let more: Vec<&str> = needed.filter(|folder| !wanted.contains(folder)).collect();
         if more.is_empty() {
             break;
         }
         wanted.extend(more);
     }
-    PARTS.iter().filter(|part| wanted.contains(part.folder)).collect()
+    parts.retain(|part| wanted.contains(part.folder));
+    parts
 }

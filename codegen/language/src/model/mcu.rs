@@ -7,13 +7,11 @@ pub enum Mcu {
     Mps2An500,
     /// Cortex-M4F, single-precision FPU, emulated.
     Mps2An386,
-    /// Cortex-M7 with double-precision FPU.
-    Stm32H743Zi,
-    /// Cortex-M4F, single-precision FPU.
-    Stm32F446Re,
+    /// That of a board, one of [`BOARDS`].
+    Board(&'static Part),
 }
 
-/// What is known of a microcontroller.
+/// What is known of a microcontroller: of that of a board, the table `package.metadata.board` of its manifest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part {
     /// As the spec names it.
@@ -32,7 +30,18 @@ pub struct Part {
     pub chip: Option<&'static str>,
     /// QEMU's board with this core, where instructions are counted.
     pub emulated: &'static str,
+    /// Folder of the firmware, in `firmware/` and in a workspace, and what `--target` calls it.
+    pub folder: &'static str,
+    /// What the folder is, for the README of a workspace.
+    pub readme: &'static str,
+    /// Longest tick in `f32`, us: of six legs as in `specs/legs.toml`, of a platform as in `specs/reference.toml`, and of one
+    /// with the whole kernel of the inverse dynamics. Empty where it is not known.
+    pub ticks_f32: &'static [u32],
+    /// The same in `f64`.
+    pub ticks_f64: &'static [u32],
 }
+
+include!(concat!(env!("OUT_DIR"), "/boards.rs"));
 
 const KIB: u64 = 1024;
 
@@ -45,6 +54,10 @@ const M7: Part = Part {
     board: "QEMU mps2-an500",
     chip: None,
     emulated: "mps2-an500",
+    folder: "qemu",
+    readme: "",
+    ticks_f32: &[],
+    ticks_f64: &[],
 };
 
 const M4F: Part = Part {
@@ -57,33 +70,36 @@ const M4F: Part = Part {
 };
 
 impl Mcu {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Mps2An500, Self::Mps2An386, Self::Stm32H743Zi, Self::Stm32F446Re];
+    /// All of them: the emulated ones, and those of [`BOARDS`].
+    pub const ALL: [Self; 2 + BOARDS.len()] = {
+        let mut all = [Self::Mps2An500; 2 + BOARDS.len()];
+        all[1] = Self::Mps2An386;
+        let mut k = 0;
+        while k < BOARDS.len() {
+            all[2 + k] = Self::Board(BOARDS[k]);
+            k += 1;
+        }
+        all
+    };
+
+    /// Their names.
+    pub const NAMES: [&str; Self::ALL.len()] = {
+        let mut names = [""; Self::ALL.len()];
+        let mut k = 0;
+        while k < names.len() {
+            names[k] = Self::ALL[k].part().name;
+            k += 1;
+        }
+        names
+    };
 
     /// What is known of it.
     #[must_use]
-    pub fn part(self) -> Part {
+    pub const fn part(self) -> Part {
         match self {
             Self::Mps2An500 => M7,
             Self::Mps2An386 => M4F,
-            // DS12110: 2 MiB of flash; of its RAM the 128 KiB of DTCM, which the core reads without waiting.
-            Self::Stm32H743Zi => Part {
-                name: "stm32h743zi",
-                flash: 2048 * KIB,
-                ram: 128 * KIB,
-                board: "NUCLEO-H743ZI2",
-                chip: Some("STM32H743ZITx"),
-                ..M7
-            },
-            // DS10693: 512 KiB of flash, 128 KiB of SRAM.
-            Self::Stm32F446Re => Part {
-                name: "stm32f446re",
-                flash: 512 * KIB,
-                ram: 128 * KIB,
-                board: "NUCLEO-F446RE",
-                chip: Some("STM32F446RETx"),
-                ..M4F
-            },
+            Self::Board(part) => *part,
         }
     }
 

@@ -131,7 +131,7 @@ section! {
     /// What it runs on.
     "target" ["mcu", "board", "hardware"], Plain => Target {
         /// Microcontroller: `mps2-an500` and `stm32h743zi` are a Cortex-M7 with double-precision FPU, `mps2-an386` and `stm32f446re` a Cortex-M4F with single precision; the first of each is emulated.
-        mcu: Mcu = one_of(&["mps2-an500", "mps2-an386", "stm32h743zi", "stm32f446re"]), Default("mps2-an500"), "" ["processor", "part", "chip", "board", "cpu"], "mps2-an500";
+        mcu: Mcu = one_of(&Mcu::NAMES), Default("mps2-an500"), "" ["processor", "part", "chip", "board", "cpu"], "mps2-an500";
     }
     and |fields, _table| {
         /// What it may use there.

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use serde_json::Value;
-use specgen_language::model::{Trigger, TriggerKind};
+use specgen_language::model::{BOARDS, Trigger, TriggerKind};
 use specgen_language::{SpecSource, spec};
 use specgen_toolchain::provision;
 
@@ -29,7 +29,6 @@ const TOOL: Package = ["--manifest-path", MANIFEST];
 const SPECGEN: Package = ["--package", "specgen"];
 /// Where `tests/tests/boards.rs` leaves image and spec of each target.
 const TESTED: &str = "target/tests/boards";
-const TARGETS: [&str; 2] = ["stm32h743", "stm32f4"];
 /// When the record of a played motion ends, s after its order: rest and knots take half a second, then it moves.
 const RECORD: f64 = 0.7;
 /// A record of triggers that is worth comparing has so many edges.
@@ -54,7 +53,7 @@ struct Trial {
     cycles: bool,
 }
 
-/// `cargo xtask board SPEC [--target stm32h743|stm32f4] [--cycles | --faults [NAME]]`, or `--tested [--faults]` for the images that the
+/// `cargo xtask board SPEC [--target BOARD] [--cycles | --faults [NAME]]`, or `--tested [--faults]` for the images that the
 /// tests built; none if the arguments are something else.
 pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     let (arguments, with_faults, fault, cycles) = match arguments {
@@ -66,8 +65,8 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     let (spec, target) = match *arguments {
         ["--tested"] => return Some(tested(root, with_faults)),
         [option, ..] if option.starts_with('-') => return None,
-        [spec] | [spec, "--target", "stm32h743"] => (spec, "stm32h743"),
-        [spec, "--target", "stm32f4"] => (spec, "stm32f4"),
+        [spec] => (spec, BOARDS[0].folder),
+        [spec, "--target", name] => (spec, BOARDS.iter().find(|board| board.folder == name)?.folder),
         _ => return None,
     };
     let folder = built_in(root).join("board").join(target);
@@ -128,7 +127,7 @@ fn each(root: &Path, packages: &[Package], work: impl Fn(&Trial) -> Result<(), S
     if !matches!(prepared, Outcome::Passed) {
         return prepared;
     }
-    for target in TARGETS {
+    for target in BOARDS.map(|board| board.folder) {
         let folder = root.join(TESTED).join(target);
         let trial = Trial {
             spec: folder.join("platform.toml"),

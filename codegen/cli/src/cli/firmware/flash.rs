@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::{Common, Purpose, make, read_image, refusal, text};
 use crate::cli::named::InputFile;
 use specgen_language::diagnostic::codes;
-use specgen_language::model::{self, Mcu};
+use specgen_language::model::{self, BOARDS, Mcu};
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::shell;
 use specgen_language::ui::Ui;
@@ -203,9 +203,8 @@ fn board_of(image: &str, target: Option<&str>, named: Option<&str>) -> Result<Mc
 }
 
 pub(super) fn not_a_board(name: &str) -> Failure {
-    Failure::Usage(format!(
-        "nothing was flashed: {name} is no board with a debug probe; name one by --target stm32h743 or --target stm32f4"
-    ))
+    let boards = BOARDS.map(|board| format!("--target {}", board.folder)).join(" or ");
+    Failure::Usage(format!("nothing was flashed: {name} is no board with a debug probe; name one by {boards}"))
 }
 
 /// A controller that starts with its amplifiers on could move the platform.
