@@ -2,10 +2,12 @@
 
 use std::marker::PhantomData;
 
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
 use specgen_language::model::FaultAction;
 use specgen_runtime::setpoint::{Axis, MoveLimits, Row, Segment, Setpoints, StopLimits, Trajectory};
 use specgen_runtime::snapshot::Sizes;
-use specgen_runtime::supervisor::{Reaction, Steadiness, Supervision, Wiring};
+use specgen_runtime::supervisor;
 use specgen_runtime::trigger::Line;
 use specgen_runtime::{
     Affine, CorrectionLimit, Dac, Gains, Gauges, Legs, Notch, Permitted, Platform, RateFilter, Real, Resonator,
@@ -265,48 +267,117 @@ pub fn sizes(ir: &Ir) -> Sizes {
 }
 
 /// What the supervisor takes for a fault.
-pub fn supervision<T: Real>(numbers: &impl Numbers<T>, s: &ir::Supervision) -> Supervision<T> {
-    let steadiness = &s.steadiness;
-    Supervision {
-        arm_ticks: s.arm_ticks,
-        rest: s.rest,
-        ramp_step: s.ramp_step,
-        ramp_every: s.ramp_every,
-        timeout: s.timeout,
-        weight: s.weight,
-        stuck_motion: numbers.real(s.stuck_motion),
-        stuck_samples: s.stuck_samples,
-        disagreement: numbers.real(s.disagreement),
-        disagreement_samples: s.disagreement_samples,
-        tracking: numbers.vector(&s.tracking),
-        tracking_samples: s.tracking_samples,
-        leap: numbers.vector(&s.leap),
-        repeats: s.repeats,
-        steadiness: Steadiness {
-            per_limit: numbers.vector(&steadiness.per_limit),
-            follow: numbers.real(steadiness.follow),
-            motion: numbers.real(steadiness.motion),
-            keep: numbers.real(steadiness.keep),
-            keep_fallen: numbers.real(steadiness.keep_fallen),
-            one_way: steadiness.one_way,
-            first: steadiness.first,
-            next: steadiness.next,
-        },
-        amplifier_fault: match s.amplifier_fault {
-            FaultAction::Off => Reaction::Off,
-            FaultAction::RampDown => Reaction::RampDown,
-            FaultAction::Hold => Reaction::Hold,
-        },
-        wiring: s.wiring.as_ref().map(|wiring| Wiring {
-            ticks: wiring.ticks,
-            height: wiring.height,
-            turn: numbers.matrix(&wiring.turn),
-            lag: numbers.vector(&wiring.lag),
-            weights: numbers.vector(&wiring.weights),
-            per_metre: numbers.vector(&wiring.per_metre),
-            gauge_gain: numbers.vector(&wiring.gauge_gain),
-            leg_gain: wiring.leg_gain.as_ref().map(|range| numbers.vector(range)),
-            residual: numbers.real(wiring.residual),
-        }),
+pub fn supervision<T: Real>(numbers: &impl Numbers<T>, s: &ir::Supervision) -> supervisor::Supervision<T> {
+    let wiring = s.wiring.as_ref().map(|wiring| wiring.constants);
+    supervisor::Supervision { wiring, ..s.constants }.of(numbers)
+}
+
+/// Constants that the IR holds as the runtime has them, in `f64`.
+pub trait Constant {
+    /// The same in a scalar.
+    type In<T: Real>;
+
+    /// Its numbers as `numbers` makes them.
+    #[track_caller]
+    fn of<T: Real>(&self, numbers: &impl Numbers<T>) -> Self::In<T>;
+
+    /// Writes it as the text of the IR has it.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error>;
+}
+
+/// A constant that is written.
+#[derive(Debug)]
+pub struct Written<'a, C>(pub &'a C);
+
+impl<C: Constant> Serialize for Written<'_, C> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.write(serializer)
     }
 }
+
+impl Constant for f64 {
+    type In<T: Real> = T;
+
+    fn of<T: Real>(&self, numbers: &impl Numbers<T>) -> T {
+        numbers.real(*self)
+    }
+
+    fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_f64(*self)
+    }
+}
+
+impl<C: Constant, const N: usize> Constant for [C; N] {
+    type In<T: Real> = [C::In<T>; N];
+
+    fn of<T: Real>(&self, numbers: &impl Numbers<T>) -> Self::In<T> {
+        self.each_ref().map(|one| one.of(numbers))
+    }
+
+    fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.iter().map(Written))
+    }
+}
+
+impl<C: Constant> Constant for Option<C> {
+    type In<T: Real> = Option<C::In<T>>;
+
+    fn of<T: Real>(&self, numbers: &impl Numbers<T>) -> Self::In<T> {
+        self.as_ref().map(|one| one.of(numbers))
+    }
+
+    fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.as_ref().map(Written).serialize(serializer)
+    }
+}
+
+/// What is the same in every scalar.
+macro_rules! without_numbers {
+    ($($of:ty, $written:expr;)+) => {$(
+        impl Constant for $of {
+            type In<T: Real> = Self;
+
+            fn of<T: Real>(&self, _: &impl Numbers<T>) -> Self {
+                *self
+            }
+
+            fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                let written: fn(Self) -> _ = $written;
+                written(*self).serialize(serializer)
+            }
+        }
+    )+};
+}
+without_numbers! {
+    u32, |count| count;
+    i32, |code| code;
+    supervisor::Reaction, |reaction| match reaction {
+        supervisor::Reaction::Off => FaultAction::Off.word(),
+        supervisor::Reaction::RampDown => FaultAction::RampDown.word(),
+        supervisor::Reaction::Hold => FaultAction::Hold.word(),
+    };
+}
+
+macro_rules! of_numbers {
+    ($name:ident: $($field:ident)+) => {
+        impl Constant for supervisor::$name<f64> {
+            type In<T: Real> = supervisor::$name<T>;
+
+            fn of<T: Real>(&self, numbers: &impl Numbers<T>) -> Self::In<T> {
+                supervisor::$name { $($field: self.$field.of(numbers)),+ }
+            }
+
+            fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                let mut map = serializer.serialize_map(None)?;
+                $(map.serialize_entry(stringify!($field), &Written(&self.$field))?;)+
+                map.end()
+            }
+        }
+    };
+}
+specgen_runtime::supervision_fields!(of_numbers);
+specgen_runtime::steadiness_fields!(of_numbers);
+specgen_runtime::wiring_fields!(of_numbers);

@@ -6,18 +6,16 @@
 pub mod constants;
 pub mod description;
 mod permitted;
-mod steadiness;
+mod supervision;
 mod task_space;
 
 use serde::{Serialize, Serializer};
 
 pub use permitted::*;
-use specgen_language::model::FaultAction;
 use specgen_runtime::dynamics::Leg;
-use specgen_runtime::supervisor::TIMERS;
 pub use specgen_runtime::{Interaction, Law, SetpointKind};
 use specgen_runtime::{Platform, Real};
-pub use steadiness::Steadiness;
+pub use supervision::{Rest, Supervision, Wiring};
 pub use task_space::*;
 
 /// Number of legs.
@@ -338,111 +336,6 @@ pub struct GaugeConverter {
     pub highest: i32,
     /// Below and above what is believed.
     pub beyond: [f64; 2],
-}
-
-/// The supervisor; the constants of [`specgen_runtime::supervisor::Supervision`], where each is explained.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Supervision {
-    /// Ticks.
-    pub arm_ticks: u32,
-    /// Code at rest.
-    pub rest: i32,
-    /// How the legs stand there; none at the lowest voltage, where every history is forgotten.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub risen: Option<Rest>,
-    /// Codes of a step of a ramp.
-    pub ramp_step: i32,
-    /// Ticks from one to the next.
-    pub ramp_every: u32,
-    /// Ticks without a request over a link after which its host is lost.
-    pub host_ticks: u32,
-    /// Missed ticks in a row of which more are a fault.
-    pub stall_ticks: u32,
-    /// Counts at which a condition is a cause: gauge not finite, gauge range, voltage, slew, missed tick, converter, host gone.
-    pub timeout: [u32; TIMERS],
-    /// What a tick with the condition counts.
-    pub weight: [u32; TIMERS],
-    /// m.
-    pub stuck_motion: f64,
-    /// Samples.
-    pub stuck_samples: u32,
-    /// m.
-    pub disagreement: f64,
-    /// Samples.
-    pub disagreement_samples: u32,
-    /// m and rad, of each axis; or m, of each leg.
-    pub tracking: [f64; 6],
-    /// Samples.
-    pub tracking_samples: u32,
-    /// Of each gauge, in the unit of its words.
-    pub leap: [f64; 6],
-    /// A count; 0 where repeated samples say nothing.
-    pub repeats: u32,
-    /// What a sustained oscillation is told by.
-    pub steadiness: Steadiness,
-    /// What a fault of an amplifier leads to.
-    #[serde(serialize_with = "word_of")]
-    pub amplifier_fault: FaultAction,
-    /// The wiring check; none where the spec switches it off.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub wiring: Option<Wiring>,
-    /// Reading of each gauge (rows) per leg displacement (columns); none where each leg has its own gauge.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub readings_per_leg: Option<[[f64; 6]; LEGS]>,
-    /// What is left of the way to the set-point after a tick, where there is no generator.
-    pub approach_keep: f64,
-}
-
-/// The constants of [`specgen_runtime::supervisor::Wiring`], where each is explained, and what hosts say of findings.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Wiring {
-    /// Ticks of a leg.
-    pub ticks: u32,
-    /// Codes.
-    pub height: i32,
-    /// Of the pulse, of the mains.
-    pub turn: [[f64; 2]; 2],
-    /// Of the pulse.
-    pub lag: [f64; 2],
-    /// Of what is regressed on.
-    pub weights: [f64; 6],
-    /// 1/m, of each leg.
-    pub per_metre: [f64; LEGS],
-    /// Range.
-    pub gauge_gain: [f64; 2],
-    /// Range; none where it is not tested.
-    pub leg_gain: Option<[f64; 2]>,
-    /// Squared.
-    pub residual: f64,
-    /// Sets of single faults that look alike on this geometry, as words of [`specgen_runtime::supervisor::Finding`].
-    pub alike: Vec<Vec<u32>>,
-    /// Single faults that the check lets pass, as such words.
-    pub unseen: Vec<u32>,
-    /// Places by which the connectors of gauges and of legs may be turned at once without the check seeing it.
-    pub turned: Vec<[usize; 2]>,
-}
-
-fn word_of<S: Serializer>(action: &FaultAction, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(action.word())
-}
-
-impl Supervision {
-    /// Sets of faults that look alike to the wiring check; none where there is no check.
-    #[must_use]
-    pub fn alike(&self) -> &[Vec<u32>] {
-        self.wiring.as_ref().map_or(&[], |wiring| &wiring.alike)
-    }
-}
-
-/// The legs at rest above the lowest voltage, risen to it from there.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Rest {
-    /// Cells of the Everett grid.
-    pub drive: f64,
-    /// E(`drive`, 0) of each leg, m.
-    pub displacement: [f64; LEGS],
-    /// The same of the second weight of (6), m per cell a tick; zero in other models.
-    pub rate: [f64; LEGS],
 }
 
 /// Config at start-up.

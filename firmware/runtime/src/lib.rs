@@ -47,6 +47,7 @@
 pub mod adaptation;
 pub mod attitude;
 mod choice;
+mod constants;
 pub mod correction;
 pub mod crc;
 pub mod creep;

@@ -1,7 +1,7 @@
 //! Every cause in every phase: what it does, after how long, and how the machine is armed again.
 
 use super::bench::*;
-use specgen::model::FaultAction;
+use specgen_runtime::supervisor::Reaction;
 use specgen_tests::Emitted;
 use std::collections::BTreeMap;
 
@@ -83,10 +83,10 @@ fn inject(bench: &mut Bench, cause: u8, tick: u32, request: u64) -> u8 {
 
 /// Where a cause leads from a phase, and the cause that is shown then; `None` if it changes nothing.
 /// `amplifier`: what the spec says of a fault of an amplifier.
-fn expected(cause: u8, phase: u8, amplifier: FaultAction) -> Option<(u8, u8)> {
+fn expected(cause: u8, phase: u8, amplifier: Reaction) -> Option<(u8, u8)> {
     let amplifier = (cause == AMPLIFIER_FAULT).then_some(amplifier);
-    let off = matches!(cause, 10 | 12) || amplifier == Some(FaultAction::Off);
-    let ramp = matches!(cause, 1..=4 | 11 | 15) || amplifier == Some(FaultAction::RampDown);
+    let off = matches!(cause, 10 | 12) || amplifier == Some(Reaction::Off);
+    let ramp = matches!(cause, 1..=4 | 11 | 15) || amplifier == Some(Reaction::RampDown);
     match phase {
         // Disarmed machines do not mind gauges, links or amplifiers: they only refuse to arm.
         DISARMED => (off && amplifier.is_none()).then_some((FAULTED, cause)),
@@ -256,10 +256,11 @@ fn every_cause_in_every_phase_of_a_platform() {
 /// What a fault of an amplifier leads to where the spec says so; switching off, the default, is among every cause above.
 #[test]
 fn a_fault_of_an_amplifier_ramps_down_or_holds_as_the_spec_says() {
-    for (action, kind) in [("ramp-down", Kind::Platform), ("hold", Kind::Legs)] {
+    let cases = [("ramp-down", Reaction::RampDown, Kind::Platform), ("hold", Reaction::Hold, Kind::Legs)];
+    for (action, reaction, kind) in cases {
         let line = format!("arm_time          = \"2 ms\"\namplifier_fault = \"{action}\"");
         let emitted = emitted(&format!("supervisor-{action}"), kind.spec(), &[("arm_time          = \"2 ms\"", &line)]);
-        assert_eq!(emitted.compiled.ir.supervision.amplifier_fault.word(), action);
+        assert_eq!(emitted.compiled.ir.supervision.amplifier_fault, reaction);
         rows(kind, &emitted, [AMPLIFIER_FAULT], true);
     }
 }

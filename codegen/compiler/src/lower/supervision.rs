@@ -14,9 +14,9 @@ use super::sensing::{PoseNoise, pose_noise, readings_per_pose};
 use crate::figure::{AXES, figure};
 use crate::ir::{Actuation, Hysteresis, Scalar, Sensing, Supervision};
 use specgen_language::diagnostic::{Code, Diagnostic, codes};
-use specgen_language::model::Model;
+use specgen_language::model::{FaultAction, Model};
 use specgen_numerics::multiply6;
-use specgen_runtime::supervisor::WRONG;
+use specgen_runtime::supervisor::{self, Reaction, WRONG};
 
 /// Gauges are looked at in turn.
 const CHANNELS: f64 = 6.0;
@@ -88,25 +88,32 @@ pub(super) fn lower(
     }
     let round = |value: f64| scalar.round(value);
     Ok(Supervision {
-        arm_ticks,
-        rest,
+        constants: supervisor::Supervision {
+            arm_ticks,
+            rest,
+            ramp_step,
+            ramp_every,
+            timeout: [gauge, gauge, voltage, slew, missed, gauge, host_gone],
+            weight: [WRONG, WRONG, 1, 1, window, WRONG, 1],
+            stuck_motion: round(stuck_motion),
+            stuck_samples,
+            disagreement: round(disagreement),
+            disagreement_samples,
+            tracking: tracking.map(round),
+            tracking_samples,
+            leap: leap.map(round),
+            repeats: samples::repeats(model),
+            steadiness,
+            amplifier_fault: match spec.amplifier_fault {
+                FaultAction::Off => Reaction::Off,
+                FaultAction::RampDown => Reaction::RampDown,
+                FaultAction::Hold => Reaction::Hold,
+            },
+            wiring: None,
+        },
         risen: rest::risen(rest, hysteresis, actuation, scalar),
-        ramp_step,
-        ramp_every,
         host_ticks,
         stall_ticks: spec.missed_in_a_row,
-        timeout: [gauge, gauge, voltage, slew, missed, gauge, host_gone],
-        weight: [WRONG, WRONG, 1, 1, window, WRONG, 1],
-        stuck_motion: round(stuck_motion),
-        stuck_samples,
-        disagreement: round(disagreement),
-        disagreement_samples,
-        tracking: tracking.map(round),
-        tracking_samples,
-        leap: leap.map(round),
-        repeats: samples::repeats(model),
-        steadiness,
-        amplifier_fault: spec.amplifier_fault,
         wiring,
         readings_per_leg: readings_per_leg.map(|rows| rows.map(|row| row.map(round))),
         approach_keep: round(libm::exp(-1.0 / f64::from(arm_ticks))),

@@ -65,25 +65,27 @@ impl Fallback {
     }
 }
 
-/// Constants of the detection; from `supervisor.disturbance`.
-#[derive(Debug, Clone, Copy)]
-pub struct Steadiness<T> {
-    /// Of each axis (1/m, 1/rad), or of each leg (1/m): one over what noise and environment may make of its swing.
-    pub per_limit: [T; 6],
-    /// Part of a swing that the slow mean takes up, in (0, 1].
-    pub follow: T,
-    /// Swing that is explained by a change of the set-point from one sample to the next, as a multiple of it.
-    pub motion: T,
-    /// What is left in the next tick of the power that was explained in this one, in (0, 1).
-    pub keep: T,
-    /// The same in a stage, where what goes on is to be told soon from what went before.
-    pub keep_fallen: T,
-    /// Samples with one sign in a row of which more are no oscillation.
-    pub one_way: u32,
-    /// Samples that lead to the first stage, ≥ 1.
-    pub first: u32,
-    /// Samples that lead from one stage to the next: a ring that the last stage left has died out by then.
-    pub next: u32,
+crate::constants::constants! {
+    ($) steadiness_fields;
+    /// Constants of the detection; from `supervisor.disturbance`.
+    pub struct Steadiness<T> {
+        /// Of each axis (1/m, 1/rad), or of each leg (1/m): one over what noise and environment may make of its swing.
+        pub per_limit: [T; 6],
+        /// Part of a swing that the slow mean takes up, in (0, 1].
+        pub follow: T,
+        /// Swing that is explained by a change of the set-point from one sample to the next, as a multiple of it.
+        pub motion: T,
+        /// What is left in the next tick of the power that was explained in this one, in (0, 1).
+        pub keep: T,
+        /// The same in a stage, where what goes on is to be told soon from what went before.
+        pub keep_fallen: T,
+        /// Samples with one sign in a row of which more are no oscillation.
+        pub one_way: u32,
+        /// Samples that lead to the first stage, ≥ 1.
+        pub first: u32,
+        /// Samples that lead from one stage to the next: a ring that the last stage left has died out by then.
+        pub next: u32,
+    }
 }
 
 crate::state! { |words|

@@ -20,28 +20,30 @@ use crate::snapshot::LARGEST;
 /// Readings of the gauges (rows) per displacement of the legs (columns).
 pub type Response<T> = [[T; 6]; 6];
 
-/// Constants of the check; from `supervisor.wiring_check`.
-#[derive(Debug, Clone, Copy)]
-pub struct Wiring<T> {
-    /// Ticks of a leg, ≥ 8.
-    pub ticks: u32,
-    /// Height of the pulse, codes; below zero where there is no room above rest.
-    pub height: i32,
-    /// Cosine and sine of a tick's part of the pulse, then of the mains.
-    pub turn: [[T; 2]; 2],
-    /// Cosine and sine of what the readings lag, of the pulse.
-    pub lag: [T; 2],
-    /// Weights of u, of its way, of a constant, of the time (0 to 1), of the mains' cosine and sine: their sum is the weight of a
-    /// sample.
-    pub weights: [T; 6],
-    /// Of each leg, what its response is counted in: one over the displacement that the spec has for it at the pulse, 1/m.
-    pub per_metre: [T; 6],
-    /// Lowest and highest gain of a gauge over the median of all.
-    pub gauge_gain: [T; 2],
-    /// Lowest and highest gain of a leg over the mean of the five others; none where legs differ and nobody knows by how much.
-    pub leg_gain: Option<[T; 2]>,
-    /// Largest part of the response that no gains explain, squared.
-    pub residual: T,
+crate::constants::constants! {
+    ($) wiring_fields;
+    /// Constants of the check; from `supervisor.wiring_check`.
+    pub struct Wiring<T> {
+        /// Ticks of a leg, ≥ 8.
+        pub ticks: u32,
+        /// Height of the pulse, codes; below zero where there is no room above rest.
+        pub height: i32,
+        /// Cosine and sine of a tick's part of the pulse, then of the mains.
+        pub turn: [[T; 2]; 2],
+        /// Cosine and sine of what the readings lag, of the pulse.
+        pub lag: [T; 2],
+        /// Weights of u, of its way, of a constant, of the time (0 to 1), of the mains' cosine and sine: their sum is the weight of a
+        /// sample.
+        pub weights: [T; 6],
+        /// Of each leg, what its response is counted in: one over the displacement that the spec has for it at the pulse, 1/m.
+        pub per_metre: [T; 6],
+        /// Lowest and highest gain of a gauge over the median of all.
+        pub gauge_gain: [T; 2],
+        /// Lowest and highest gain of a leg over the mean of the five others; none where legs differ and nobody knows by how much.
+        pub leg_gain: Option<[T; 2]>,
+        /// Largest part of the response that no gains explain, squared.
+        pub residual: T,
+    }
 }
 
 /// Below this gain a leg is dead; of the gauges likewise. Creep and hysteresis leave half of it and more.

@@ -1,10 +1,11 @@
 //! A sustained oscillation: what noise, environment and motion explain of an error, and for how long it must last.
 
 use super::{CHANNELS, above, defaults, finding, whole};
-use crate::ir::{Scalar, Steadiness};
+use crate::ir::Scalar;
 use crate::lower::sensing::{PoseNoise, pose_noise};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
+use specgen_runtime::supervisor::Steadiness;
 
 /// Errors are looked at from here on, Hz: below it the feedback is at work.
 pub(crate) const LOWEST: f64 = 60.0;
@@ -50,7 +51,7 @@ pub(super) fn lower(
     rings: f64,
     scalar: Scalar,
     findings: &mut Vec<Diagnostic>,
-) -> Steadiness {
+) -> Steadiness<f64> {
     let between = CHANNELS * model.timing.period;
     let (arms, least) = arms_and_least(model, noise);
     let disturbance = model.supervisor.disturbance.unwrap_or(libm::fmax(defaults::disturbance(model), least));
