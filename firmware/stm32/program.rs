@@ -1,7 +1,7 @@
 // The program of an STM32 board, included by the `main.rs` of each: what is its own are `clocks`, `pins`, `spi`, `BOARD`,
 // `RECORD`, `PASSES`, `prepare` and `memory_intact`.
 
-use specgen_board::{Exchange, Noticed, SampleMemory};
+use specgen_board::{Exchange, SampleMemory, TargetStatus};
 use specgen_stm32::{converters, timer};
 
 /// The machine on this board's converters.
@@ -17,7 +17,7 @@ static SPECGEN_TIMES: specgen_stm32::times::Times = clocks::TIMES;
 /// A tick without its timer, under a name that the analyses of the image know.
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn specgen_tick(board: &mut Board, exchange: &mut Exchange, noticed: Noticed) -> bool {
+fn specgen_tick(board: &mut Board, exchange: &mut Exchange, noticed: TargetStatus) -> bool {
     board.timed_tick(exchange, noticed, timer::now)
 }
 
@@ -31,7 +31,8 @@ mod app {
 
     use controller::supervised::Machine;
     use specgen_board::{
-        Desk, Exchange, Health, Kept, Noticed, Probes, SampleMemory, Schedule, catch_up, gather, learn,
+        Exchange, Health, LinkHandler, MachineSnapshot, Probes, SampleMemory, Schedule, TargetStatus, catch_up, gather,
+        learn,
     };
     use specgen_link::Endpoint;
     use specgen_stm32::cycles::{self, CYCLES};
@@ -68,7 +69,7 @@ mod app {
         record: [u64; RECORD] = [0; RECORD],
         #[unsafe(link_section = ".record.passes")]
         passes: [[i32; 6]; PASSES] = [[0; 6]; PASSES],
-        kept: MaybeUninit<Kept> = MaybeUninit::uninit(),
+        kept: MaybeUninit<MachineSnapshot> = MaybeUninit::uninit(),
         #[unsafe(link_section = ".record.samples")]
         samples: SampleMemory = SampleMemory::new(),
         #[unsafe(link_section = ".axisram.ring")]
@@ -122,7 +123,7 @@ mod app {
         timer::acknowledge();
         let due = local.schedule.begin(begin);
         timer::arm(due.next);
-        let noticed = Noticed { missed: due.missed, stop: local.stop.is_open(), amplifier: local.fault.level() };
+        let noticed = TargetStatus { missed: due.missed, stop: local.stop.is_open(), amplifier: local.fault.level() };
         (context.shared.exchange, context.shared.board).lock(|exchange, board| {
             if crate::specgen_tick(board, exchange, noticed) {
                 timer::restart(local.schedule);
@@ -140,7 +141,7 @@ mod app {
         binds = CEC,
         priority = 1,
         shared = [exchange, board],
-        local = [line, endpoint: Endpoint = Endpoint::new(), desk: Desk = Desk::new(CYCLES)]
+        local = [line, endpoint: Endpoint = Endpoint::new(), desk: LinkHandler = LinkHandler::new(CYCLES)]
     )]
     fn link(context: link::Context) {
         let local = context.local;

@@ -96,7 +96,7 @@ pub struct TrackingSample {
 }
 
 /// The words of one tick.
-pub struct Words<'a> {
+pub struct TickWords<'a> {
     /// Into the controller.
     pub input: &'a [u64],
     /// Out of it.
@@ -104,7 +104,7 @@ pub struct Words<'a> {
     controller: &'a dyn TickController,
 }
 
-impl Words<'_> {
+impl TickWords<'_> {
     /// Digest of the controller's state after the tick.
     #[must_use]
     pub fn digest(&self) -> u64 {
@@ -343,7 +343,7 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
         controller: &mut dyn TickController,
         trajectory: &dyn LegTrajectory,
         interval: f64,
-        mut watch: impl FnMut(&TrackingSample, &Words) -> ControlFlow<()>,
+        mut watch: impl FnMut(&TrackingSample, &TickWords) -> ControlFlow<()>,
     ) -> Result<Coverage, RunError> {
         let (ticks, path) = ticks_of(trajectory, interval)?;
         let wiring = Wiring::of(controller)?;
@@ -362,7 +362,7 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
             }
             controller.step(&input, &mut output);
             // Of the tick, before anything moves: costs nothing unless it is asked for.
-            let words = Words { input: &input, output: &output, controller: &*controller };
+            let words = TickWords { input: &input, output: &output, controller: &*controller };
             let (requested, voltages) = (wiring.requested, wiring.voltage);
             let [requested, voltages] = [requested, voltages].map(|six| six.map(|place| scalar.decode(output[place])));
             if let Some(leg) = voltages.iter().position(|voltage| !voltage.is_finite()) {

@@ -13,7 +13,7 @@ use crate::description::{Description, DescriptionError};
 
 pub use engine::Engine;
 pub use library::ABI_VERSION;
-pub use supervised::{MachineWord, SnapshotError, Standing, Supervised};
+pub use supervised::{MachineWord, RestingReadings, SnapshotError, Supervised};
 
 /// Something that runs one control tick: the emitted controller, or a stand-in in a test.
 pub trait TickController {

@@ -18,8 +18,8 @@ use specgen_runtime::record::{
 
 use crate::description::{Description, DescriptionError, fields};
 
-pub use csv::{Again, write_csv};
-pub use recorded::{Ended, Recorded};
+pub use csv::{ReplayedRows, write_csv};
+pub use recorded::{RecordedController, RecordingEnd};
 pub use replay::{Divergence, PhaseChange, Replay, ReplayError, replay};
 pub use writer::{Taker, Writer};
 
@@ -77,7 +77,7 @@ pub struct Block {
 
 /// What a file holds next.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Piece {
+pub enum FileItem {
     /// A block.
     Block(Block),
     /// A block that is not as it was written; the next one can be found.
@@ -203,7 +203,7 @@ impl<R: Read> Reader<R> {
     ///
     /// # Errors
     /// The file cannot be read.
-    pub fn next_piece(&mut self) -> Result<Option<Piece>, RecordError> {
+    pub fn next_piece(&mut self) -> Result<Option<FileItem>, RecordError> {
         if self.ended {
             return Ok(None);
         }
@@ -238,18 +238,18 @@ impl<R: Read> Reader<R> {
             return Ok(Some(self.damaged(format!("its checksum is {found:08x}, {sum:08x} was written"))));
         }
         Ok(Some(match parse(&words, self.header.input_names().len()) {
-            Ok(block) => Piece::Block(block),
+            Ok(block) => FileItem::Block(block),
             Err(reason) => self.damaged(reason),
         }))
     }
 
-    fn damaged(&self, reason: String) -> Piece {
-        Piece::Damaged { block: self.block, reason }
+    fn damaged(&self, reason: String) -> FileItem {
+        FileItem::Damaged { block: self.block, reason }
     }
 
-    fn cut(&mut self, bytes: usize) -> Piece {
+    fn cut(&mut self, bytes: usize) -> FileItem {
         self.ended = true;
-        Piece::Cut { bytes }
+        FileItem::Cut { bytes }
     }
 }
 

@@ -6,7 +6,7 @@
 mod draw;
 pub mod platform;
 
-use draw::Draw;
+use draw::RandomSource;
 
 use crate::closed_loop::LEGS;
 use crate::description::{Description, DescriptionError};
@@ -116,7 +116,7 @@ fn in_stretches<G, K: Copy>(
 
 /// State of the generator within and between stretches.
 struct Generator<'a> {
-    draw: Draw,
+    draw: RandomSource,
     setpoints: &'a Setpoints,
     /// Centre and half-width of each set-point word.
     center: [f64; LEGS],
@@ -128,7 +128,7 @@ struct Generator<'a> {
     speed: [f64; LEGS],
     last: [f64; LEGS],
     /// Drive of each leg on the grid.
-    walks: [Walk; LEGS],
+    walks: [ReversalStack; LEGS],
 }
 
 impl<'a> Generator<'a> {
@@ -138,7 +138,7 @@ impl<'a> Generator<'a> {
             Setpoints::Pose { bounds, stroke } => ([0.0; LEGS], *bounds, 0.5 * stroke),
         };
         Self {
-            draw: Draw::new(seed),
+            draw: RandomSource::new(seed),
             setpoints,
             center,
             half,
@@ -146,7 +146,7 @@ impl<'a> Generator<'a> {
             phase: [0.0; LEGS],
             speed: [0.0; LEGS],
             last: center,
-            walks: std::array::from_fn(|_| Walk::default()),
+            walks: std::array::from_fn(|_| ReversalStack::default()),
         }
     }
 
@@ -159,7 +159,7 @@ impl<'a> Generator<'a> {
             }
         }
         if kind == Kind::Thresholds {
-            self.walks = std::array::from_fn(|_| Walk::default());
+            self.walks = std::array::from_fn(|_| ReversalStack::default());
         }
         length
     }
@@ -209,11 +209,11 @@ impl<'a> Generator<'a> {
 /// Reversals of one leg's drive that are not wiped out, as grid levels: minimum 0, maximum, minimum, ...
 /// Empty before the first row of a stretch.
 #[derive(Debug, Clone, Default)]
-struct Walk {
+struct ReversalStack {
     extrema: Vec<usize>,
 }
 
-impl Walk {
+impl ReversalStack {
     /// Turns round and moves on by 1 + `pick` levels, or as far as the grid goes; returns the displacement there, m.
     ///
     /// Ending exactly on an earlier extremum happens often: there the smallest change decides whether it is wiped out.
@@ -318,7 +318,7 @@ mod tests {
     #[test]
     fn a_walk_reverses_within_loops_and_wipes_them_out() {
         let everett = everett();
-        let mut walk = Walk::default();
+        let mut walk = ReversalStack::default();
         let mut go = |pick| {
             let q = walk.reverse(pick, &everett);
             (walk.extrema.clone(), q)

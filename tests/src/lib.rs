@@ -14,7 +14,7 @@ use host_sim::replay;
 use host_sim::stimulus::platform::{self as platform_stimulus, PlatformInputs};
 use host_sim::stimulus::{self, InputRecording, Setpoints};
 use host_sim::trace::{Trace, first_difference};
-use specgen::compile::{Compiled, compile};
+use specgen::compile::{Compilation, compile};
 use specgen::model::Mcu;
 pub use specgen::target::skipped;
 use specgen::target::{self, Image};
@@ -75,7 +75,7 @@ fn builds() -> PathBuf {
 /// A compiled spec with its workspace on disk.
 pub struct Emitted {
     /// What compiled.
-    pub compiled: Compiled,
+    pub compiled: Compilation,
     /// The workspace.
     pub dir: PathBuf,
 }
@@ -166,7 +166,7 @@ impl Emitted {
     /// # Panics
     /// If it cannot be written.
     #[must_use]
-    pub fn of(name: &str, compiled: Compiled) -> Self {
+    pub fn of(name: &str, compiled: Compilation) -> Self {
         let dir = scratch(name);
         workspace::write_scratch(&dir, &compiled.files).expect("an empty folder");
         Self { compiled, dir }
@@ -253,7 +253,7 @@ impl Emitted {
 /// # Panics
 /// If an edit finds nothing to replace, or the spec is refused.
 #[must_use]
-pub fn compile_edited(name: &str, spec: &str, edits: &[(&str, &str)], more: &[(&str, String)]) -> Compiled {
+pub fn compile_edited(name: &str, spec: &str, edits: &[(&str, &str)], more: &[(&str, String)]) -> Compilation {
     let specs = repository().join("specs");
     let mut text = fs::read_to_string(specs.join(spec)).expect("a spec of this repository");
     for (old, new) in edits {

@@ -3,7 +3,7 @@
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen::compile::Compiled;
+use specgen::compile::Compilation;
 use specgen::ir::{Load, LoadBound};
 use specgen::lower;
 use specgen_runtime::dynamics::Affine;
@@ -16,7 +16,7 @@ type State = [f64; 18];
 
 struct Case {
     name: &'static str,
-    compiled: Compiled,
+    compiled: Compilation,
     platform: Platform<f64>,
 }
 

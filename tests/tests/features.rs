@@ -12,10 +12,10 @@ use specgen_tests::repository;
 
 /// Features by package and version; as a set, because a package is built once for the host (build scripts, macros) and once
 /// for the target where the two differ.
-type Resolved = BTreeMap<String, BTreeSet<String>>;
+type Resolution = BTreeMap<String, BTreeSet<String>>;
 
 /// What cargo would build for this host, dependencies of build scripts and macros among it.
-fn resolve(scope: &[&str]) -> Resolved {
+fn resolve(scope: &[&str]) -> Resolution {
     let output = Command::new(env!("CARGO"))
         .args(["tree", "--locked", "--prefix=none", "--no-dedupe", "--format={p}|{f}"])
         .args(scope)
@@ -26,8 +26,8 @@ fn resolve(scope: &[&str]) -> Resolved {
     parse(&String::from_utf8(output.stdout).unwrap())
 }
 
-fn parse(tree: &str) -> Resolved {
-    let mut packages = Resolved::new();
+fn parse(tree: &str) -> Resolution {
+    let mut packages = Resolution::new();
     for line in tree.lines().filter(|line| !line.is_empty()) {
         // The mark of a package that its own tests lead back to.
         let (package, features) = line.trim_end_matches(" (*)").split_once('|').unwrap();
@@ -39,7 +39,7 @@ fn parse(tree: &str) -> Resolved {
 }
 
 /// One line for every package of the product that the test build has otherwise, or not at all.
-fn differences(product: &Resolved, tested: &Resolved) -> Vec<String> {
+fn differences(product: &Resolution, tested: &Resolution) -> Vec<String> {
     let mut lines = Vec::new();
     for (package, shipped) in product {
         match tested.get(package) {

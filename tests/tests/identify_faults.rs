@@ -5,7 +5,9 @@ use crate::identify_support::{Drive, generator, normal, random_table, uniform};
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
 use specgen::identify::regressor::{Plane, evaluate};
-use specgen::identify::{DeadTime, Identified, Options, Record, Source, Staircase, choose_grid, identify, validate};
+use specgen::identify::{
+    DeadTime, Identification, Options, Record, Source, Staircase, choose_grid, identify, validate,
+};
 use specgen::report::identification;
 use specgen_tests::worse;
 
@@ -47,12 +49,12 @@ impl Columns {
         Record::from_columns("r.csv", self.time, self.drive, self.displacement)
     }
 
-    fn identified(self) -> Result<Identified, Vec<Diagnostic>> {
+    fn identified(self) -> Result<Identification, Vec<Diagnostic>> {
         identify(&self.record()?, &Options::new(8, RANGE))
     }
 }
 
-fn with(change: impl FnOnce(&mut Columns)) -> Result<Identified, Vec<Diagnostic>> {
+fn with(change: impl FnOnce(&mut Columns)) -> Result<Identification, Vec<Diagnostic>> {
     let mut columns = Columns::good();
     change(&mut columns);
     columns.identified()
@@ -171,7 +173,7 @@ fn a_glitch_gets_no_weight_and_is_named_with_its_time() {
     expect(&found.warnings, "W0517", "at 3.21 s");
     expect(&found.warnings, "W0517", "at 14.5 s");
     assert_eq!(found.report.weightless, 3);
-    let apart = |a: &Identified, b: &Identified| {
+    let apart = |a: &Identification, b: &Identification| {
         a.table.nodes.iter().zip(&b.table.nodes).fold(0.0, |w, (x, y)| worse(w, (x - y).abs()))
     };
     assert!(apart(&clean, &found) < 2e-9, "{:e}", apart(&clean, &found));

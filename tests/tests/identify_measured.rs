@@ -6,12 +6,12 @@ use crate::identify_support::measured;
 use std::time::Instant;
 
 use specgen::everett::EverettTable;
-use specgen::identify::{Branches, Compared, DeadTime, Identified, Options, Record, identify, validate};
+use specgen::identify::{Branches, DeadTime, Identification, Options, PredictionError, Record, identify, validate};
 use specgen_tests::length;
 
 const DRIVE: [f64; 2] = [-90.0, 90.0];
 
-fn found(record: &Record, options: &Options) -> Identified {
+fn found(record: &Record, options: &Options) -> Identification {
     let result = identify(record, options).unwrap_or_else(|d| panic!("{d:#?}"));
     assert!(result.warnings.is_empty(), "{:#?}", result.warnings);
     let r = &result.report;
@@ -31,7 +31,7 @@ fn found(record: &Record, options: &Options) -> Identified {
     result
 }
 
-fn predicted(table: &EverettTable, record: &Record, dead_time: f64) -> Compared {
+fn predicted(table: &EverettTable, record: &Record, dead_time: f64) -> PredictionError {
     let validation = validate(table, record, dead_time).unwrap();
     let compared = validation.compared.unwrap();
     println!(

@@ -6,7 +6,7 @@ use core::f64::consts::TAU;
 use host_sim::plant::{LegParameters, LegPlant, Plant};
 use specgen::identify::mode::ring;
 use specgen::identify::rate::{RateModel, RateOption, identify_rate};
-use specgen::identify::{Compared, Drive, Options, Record, Source, predict};
+use specgen::identify::{Drive, Options, PredictionError, Record, Source, predict};
 
 const SAMPLE: f64 = 1e-4;
 
@@ -70,7 +70,7 @@ fn noise(cut: f64) -> Record {
     record("noise", shape.iter().map(|x| 50.0 + 40.0 * x / most).collect(), 8)
 }
 
-fn compared(model: &RateModel, record: &Record) -> Compared {
+fn compared(model: &RateModel, record: &Record) -> PredictionError {
     predict(model, &Drive::from(record)).unwrap().compared.unwrap()
 }
 

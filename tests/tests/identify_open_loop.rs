@@ -5,7 +5,7 @@
 
 use crate::identify_support::measured;
 use core::f64::consts::TAU;
-use specgen::identify::rate::{RateIdentified, RateModel, RateOption, identify_rate, spec_lines};
+use specgen::identify::rate::{RateIdentification, RateModel, RateOption, identify_rate, spec_lines};
 use specgen::identify::{Options, Record, parse_drive, predict, write_table_csv};
 use specgen::ir;
 use specgen_runtime::creep::{Creep, CreepEverett, CreepMemory};
@@ -23,12 +23,12 @@ const FINE: usize = 5;
 /// Set-point: lowest and highest, m.
 const BETWEEN: [f64; 2] = [0.7e-6, 6.1e-6];
 
-fn model(found: &RateIdentified, wanted: RateOption) -> &RateModel {
+fn model(found: &RateIdentification, wanted: RateOption) -> &RateModel {
     &found.models.iter().find(|(option, _)| *option == wanted).unwrap().1
 }
 
 /// The leg's hysteresis as a spec with the lines of `identify rate` lowers it, from 0 V on.
-fn lowered(found: &RateIdentified, earlier: f64) -> ir::Hysteresis {
+fn lowered(found: &RateIdentification, earlier: f64) -> ir::Hysteresis {
     let mut leg = model(found, RateOption::Creep).clone();
     leg.dead_time -= earlier;
     (leg.still.drive_min, leg.still.drive_max) = (0.0, RANGE[1] - RANGE[0]);

@@ -7,7 +7,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
 use specgen::identify::rate::{
-    RateIdentified, RateOption, RateReport, identify_rate, read_rate_csv, spec_lines, write_rate_csv,
+    RateIdentification, RateOption, RateReport, identify_rate, read_rate_csv, spec_lines, write_rate_csv,
 };
 use specgen::identify::{Options, Record};
 
@@ -96,7 +96,7 @@ fn record(truth: &Truth, frequency: f64, seed: u64) -> Record {
     Record::from_columns(&format!("{frequency} Hz"), time, drive, displacement).unwrap()
 }
 
-fn found(truth: &Truth) -> RateIdentified {
+fn found(truth: &Truth) -> RateIdentification {
     let records: Vec<Record> = [5.0, 20.0, 80.0].iter().zip(1..).map(|(f, seed)| record(truth, *f, seed)).collect();
     let found = identify_rate(&records, None, &Options::new(GRID, DRIVE)).unwrap_or_else(|d| panic!("{d:#?}"));
     show(&found.report);
@@ -178,7 +178,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-fn codes(found: Result<RateIdentified, Vec<Diagnostic>>) -> Vec<&'static str> {
+fn codes(found: Result<RateIdentification, Vec<Diagnostic>>) -> Vec<&'static str> {
     found.err().unwrap().into_iter().map(|d| d.code).collect()
 }
 

@@ -5,7 +5,7 @@ use specgen::everett::EverettTable;
 use specgen::identify::rate::RateModel;
 use specgen::identify::regressor::{Plane, evaluate};
 use specgen::identify::{
-    Branches, DeadTime, Identified, Options, Record, Staircase, identify, parse_drive, parse_record, predict,
+    Branches, DeadTime, Identification, Options, Record, Staircase, identify, parse_drive, parse_record, predict,
     read_table_csv, validate, write_table_csv,
 };
 
@@ -28,7 +28,7 @@ fn response(table: &EverettTable, mut memory: Staircase, drive: &[f64]) -> Vec<f
         .collect()
 }
 
-fn found(drive: &Drive, displacement: Vec<f64>, options: &Options) -> Identified {
+fn found(drive: &Drive, displacement: Vec<f64>, options: &Options) -> Identification {
     let record = Record::from_columns("made.csv", drive.time(), drive.samples.clone(), displacement).unwrap();
     identify(&record, options).unwrap_or_else(|d| panic!("{d:#?}"))
 }
@@ -449,7 +449,7 @@ fn two_runs_give_the_same_bits() {
         .map(|f| f + 5.0 * NM * normal(&mut random))
         .collect();
     let options = Options { dead_time: DeadTime::Fixed(0.0), ..Options::new(12, range) };
-    let bits = |r: Identified| r.table.nodes.iter().map(|e| e.to_bits()).collect::<Vec<_>>();
+    let bits = |r: Identification| r.table.nodes.iter().map(|e| e.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(found(&drive, y.clone(), &options)), bits(found(&drive, y, &options)));
 }
 

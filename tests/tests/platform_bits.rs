@@ -9,7 +9,7 @@ use std::fs;
 use host_sim::controller::TickController;
 use host_sim::stimulus::InputRecording;
 use host_sim::trace::{Difference, Trace, first_difference};
-use specgen::compile::Compiled;
+use specgen::compile::Compilation;
 use specgen::model::Mcu;
 use specgen::target::Image;
 use specgen::verify;
@@ -59,7 +59,7 @@ fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
         let (hostile, config) = host_trace(&mut controller, &settings, &inputs);
         covers(&hostile, what, interaction == MEASURED);
         // The controller keeps these settings.
-        let Compiled { model, ir, .. } = &emitted.compiled;
+        let Compilation { model, ir, .. } = &emitted.compiled;
         let tracking = verify::exercise(&mut controller, model, ir, tracked()).unwrap();
         tracks(&tracking, what, edits.contains(&PARTS) || edits.contains(&DAMPED));
         for image in &images {

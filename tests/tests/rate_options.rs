@@ -9,7 +9,7 @@ use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
 use host_sim::scenario::{LegScenario, MODES};
 use specgen::everett::EverettTable;
-use specgen::identify::rate::{RateIdentified, RateModel, RateOption, identify_rate, spec_lines, write_rate_csv};
+use specgen::identify::rate::{RateIdentification, RateModel, RateOption, identify_rate, spec_lines, write_rate_csv};
 use specgen::identify::{Options, Record, identify, parse_record, write_table_csv};
 use specgen::model::Mcu;
 use specgen::target::Image;
@@ -213,7 +213,7 @@ fn tracking(name: &str, lines: &str, records: &[(&str, String)]) -> [[f64; 3]; 2
     result
 }
 
-fn option(found: &RateIdentified, wanted: RateOption) -> &RateModel {
+fn option(found: &RateIdentification, wanted: RateOption) -> &RateModel {
     &found.models.iter().find(|(option, _)| *option == wanted).unwrap().1
 }
 
@@ -226,7 +226,7 @@ fn what_the_options_are_worth_on_the_reference_plant() {
     let found = identify_rate(&records, None, &Options::new(32, [0.0, 100.0])).unwrap_or_else(|d| panic!("{d:#?}"));
     println!("{:#?}", found.report.options);
     println!("{}", found.report.verdict.text);
-    let run = |name: &str, found: &RateIdentified, wanted: RateOption| {
+    let run = |name: &str, found: &RateIdentification, wanted: RateOption| {
         let model = option(found, wanted);
         let mut files = vec![("table.csv", write_table_csv(&model.still))];
         files.extend(model.rate.as_ref().map(|rate| ("mu1.csv", write_rate_csv(rate))));

@@ -8,7 +8,7 @@ use crate::figures;
 use host_sim::controller::{Supervised, TickController};
 use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{BUSY, Bench, Noise, Request};
-use host_sim::record::{Piece, Reader, Recorded, Replay, Row, Writer, replay};
+use host_sim::record::{FileItem, Reader, RecordedController, Replay, Row, Writer, replay};
 use host_sim::trajectory::PoseTarget;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -44,7 +44,7 @@ fn closed_loop(emitted: &Emitted) -> Vec<u8> {
     let mut recorder = Recorder::new(&mut memory, 2, layout(&machine)).unwrap();
     recorder.start(Settings::STREAM);
     let mut writer = Writer::new(Vec::new(), &text).unwrap();
-    let mut recorded = Recorded::new(machine, &mut recorder, &mut writer).unwrap();
+    let mut recorded = RecordedController::new(machine, &mut recorder, &mut writer).unwrap();
 
     let (model, ir) = (&emitted.compiled.model, &emitted.compiled.ir);
     let (task, setpoints) = (model.task_space.as_ref().unwrap(), &ir.task_space.as_ref().unwrap().setpoints);
@@ -128,7 +128,7 @@ fn rows(bytes: &[u8]) -> Vec<Row> {
     let mut reader = Reader::new(Cursor::new(bytes)).unwrap();
     let mut rows = Vec::new();
     while let Some(piece) = reader.next_piece().unwrap() {
-        let Piece::Block(block) = piece else { panic!("{piece:?}") };
+        let FileItem::Block(block) = piece else { panic!("{piece:?}") };
         rows.extend(block.rows);
     }
     rows

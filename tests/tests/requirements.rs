@@ -5,7 +5,7 @@ use std::fs;
 use specgen::compile::compile;
 use specgen::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen::lower::leg_jacobian;
-use specgen::outcome::Refused;
+use specgen::outcome::Refusal;
 use specgen::requirements::{Steps, steps};
 use specgen_tests::{repository, worse};
 
@@ -22,7 +22,7 @@ fn verdict(spec: &str, edits: &[(&str, &str)]) -> (String, Result<Steps, Vec<Dia
     }
     let path = folder.path().join("platform.toml");
     fs::write(&path, &text).unwrap();
-    let found = compile(&path).map(|compiled| steps(&compiled.model)).map_err(|refused: Refused| refused.findings);
+    let found = compile(&path).map(|compiled| steps(&compiled.model)).map_err(|refused: Refusal| refused.findings);
     (text, found)
 }
 

@@ -5,7 +5,7 @@ use host_sim::controller::{Supervised, TickController};
 use host_sim::word::Scalar;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen::ir::{Permitted, Range};
+use specgen::ir::{PermittedRanges, Range};
 use specgen_runtime::snapshot::Field;
 use specgen_runtime::supervisor::Supervisor;
 use specgen_tests::Emitted;
@@ -23,12 +23,12 @@ const WIDE: (&str, &str) = (
     "[supervisor]\nwiring_check = { off = \"random readings\" }\narm_time = \"1 ms\"\nramp_rate = \"40 V/ms\"\ndisagreement = \"200 um\"\nleap = \"10 mm\"\ntracking_error = 9.0\nvoltage_time = \"5 s\"\nslew_time = \"5 s\"\n\n[timing]\n",
 );
 
-struct Draw {
+struct RandomSource {
     rng: ChaCha8Rng,
     scalar: Scalar,
 }
 
-impl Draw {
+impl RandomSource {
     fn below(&mut self, bound: u64) -> u64 {
         self.rng.next_u64() % bound
     }
@@ -73,7 +73,7 @@ impl Draw {
         }
     }
 
-    fn settings(&mut self, table: &Permitted) -> Vec<u64> {
+    fn settings(&mut self, table: &PermittedRanges) -> Vec<u64> {
         let mut words: Vec<u64> = table.words().map(|(_, range)| self.within(range)).collect();
         let at = table.names().iter().position(|name| name == "code_min").expect("a setting");
         if words[at] > words[at + 1] {
@@ -84,7 +84,7 @@ impl Draw {
 }
 
 /// What the table takes.
-fn is_permitted(table: &Permitted, words: &[u64], scalar: Scalar) -> bool {
+fn is_permitted(table: &PermittedRanges, words: &[u64], scalar: Scalar) -> bool {
     let at = table.names().iter().position(|name| name == "code_min").expect("a setting");
     let each = table.words().zip(words).all(|((_, range), word)| match range {
         Range::Whole(least, most) => (least as u64..=most as u64).contains(word),
@@ -106,7 +106,7 @@ struct Bench {
 
 /// What a run met.
 #[derive(Default, Debug)]
-struct Met {
+struct LimitHits {
     accepted: u32,
     refused: u32,
     snapshots: u32,
@@ -131,7 +131,7 @@ fn hostile(name: &str, spec: &str, edits: &[(&str, &str)], records: &[(&str, Str
     assert_eq!(slew, Range::Whole(1, ir.defaults.max_step), "the slew limit of the spec is the largest step");
     let [low, high] = emitted.compiled.model.actuator.voltage;
     let platform = ir.task_space.is_some();
-    let mut draw = Draw { rng: ChaCha8Rng::seed_from_u64(23), scalar };
+    let mut draw = RandomSource { rng: ChaCha8Rng::seed_from_u64(23), scalar };
     let mut bench = Bench {
         other: load(),
         input: vec![0; inputs.len()],
@@ -141,7 +141,7 @@ fn hostile(name: &str, spec: &str, edits: &[(&str, &str)], records: &[(&str, Str
     };
     let mut config = bench.machine.controller().default_config();
     let mut codes = [i64::from(ir.supervision.rest); 6];
-    let (mut met, mut request, mut beside, mut sequence) = (Met::default(), 0, 0, 0);
+    let (mut met, mut request, mut beside, mut sequence) = (LimitHits::default(), 0, 0, 0);
     for tick in 0..specgen_tests::length(60_000, 5_000_000) as u32 {
         if tick % STRETCH == 0 {
             let mut words = draw.settings(&ir.permitted);

@@ -3,7 +3,7 @@
 
 use crate::rate_options::{CREEP, DYNAMIC, rate_table};
 use host_sim::controller::TickController as _;
-use host_sim::controller::{SnapshotError, Standing, Supervised};
+use host_sim::controller::{RestingReadings, SnapshotError, Supervised};
 use host_sim::word::Scalar;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -18,7 +18,7 @@ const MOMENTS: [u32; 4] = [2000, 5200, 9000, 9300];
 struct Course {
     machine: Supervised,
     /// Gauges that show what the legs move until the machine runs, and stand still from then on.
-    standing: Standing,
+    standing: RestingReadings,
     input: Vec<u64>,
     output: Vec<u64>,
     /// Where the set-point and the gauges stand among the inputs.

@@ -7,7 +7,7 @@ use std::time::Duration;
 use host_sim::controller::{Supervised, TickController};
 use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{BUSY, Bench, Command, Noise, Request};
-use host_sim::record::{Reader, Recorded, Writer, replay};
+use host_sim::record::{Reader, RecordedController, Writer, replay};
 use host_sim::trajectory::PoseTarget;
 use specgen::machine;
 use specgen::model::Mcu;
@@ -71,7 +71,7 @@ fn record(emitted: &Emitted) -> Vec<u8> {
     let mut recorder = Recorder::new(&mut memory, 2, layout).unwrap();
     recorder.start(Settings::STREAM);
     let mut writer = Writer::new(Vec::new(), &text).unwrap();
-    let mut recorded = Recorded::new(machine, &mut recorder, &mut writer).unwrap();
+    let mut recorded = RecordedController::new(machine, &mut recorder, &mut writer).unwrap();
     let model = &emitted.compiled.model;
     let task = model.task_space.as_ref().unwrap();
     let specimen = machine::specimen(model, task, &LegParameters::reference(), Some(1));
@@ -105,10 +105,10 @@ fn record(emitted: &Emitted) -> Vec<u8> {
 }
 
 /// Words of settings, input and output of a tick.
-type Words = (Vec<u64>, Vec<u64>, Vec<u64>);
+type TickWords = (Vec<u64>, Vec<u64>, Vec<u64>);
 
 /// The record, run again.
-fn ticks(bytes: &[u8], machine: &mut Supervised) -> (Vec<Tick>, Vec<Words>) {
+fn ticks(bytes: &[u8], machine: &mut Supervised) -> (Vec<Tick>, Vec<TickWords>) {
     let place = |name: &str| machine.output_names().iter().position(|known| known == name).unwrap();
     let (pose, missed) = (place("pose[0]"), place("missed"));
     let names = machine.controller().description().config_names.clone();

@@ -38,7 +38,7 @@ const FULL: &str = "SPECGEN_FULL";
 
 /// What was run.
 #[derive(Debug, Default)]
-pub struct Ran {
+pub struct TestResults {
     /// `package::module::test`, sorted, with whether it passed.
     pub tests: Vec<(String, bool)>,
     /// Why a test or a part of one was not run: job, reason.
@@ -70,7 +70,7 @@ pub fn compile(root: &Path, full: bool) -> Result<Vec<Binary>, String> {
 }
 
 /// Runs the binaries' tests, then looks at what was skipped.
-pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut Ran) -> Outcome {
+pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut TestResults) -> Outcome {
     let kept = root.join("target/tests");
     let durations = Durations::read(&kept.join("durations.json"));
     let jobs = match jobs(binaries, &durations, mode.full) {
@@ -197,7 +197,7 @@ fn jobs<'a>(binaries: &'a [Binary], durations: &Durations, full: bool) -> Result
 }
 
 /// How a job ended.
-struct Ended {
+struct JobResult {
     name: String,
     good: bool,
     took: Duration,
@@ -207,7 +207,7 @@ struct Ended {
 
 /// Runs them; a line for each, with all that it printed where it failed. Those that wait have a worker of their own beside one
 /// for each processor, which help it when they have nothing else to do.
-fn run(jobs: &[Job<'_>], workers: usize, kept: &Path, durations: &Durations, mode: Mode) -> Vec<Ended> {
+fn run(jobs: &[Job<'_>], workers: usize, kept: &Path, durations: &Durations, mode: Mode) -> Vec<JobResult> {
     let (waiting, computing): (Vec<usize>, Vec<usize>) =
         (0..jobs.len()).partition(|index| WAITING.contains(&jobs[*index].name.as_str()));
     let queues = [computing, waiting].map(|queue| Mutex::new(VecDeque::from(queue)));
@@ -272,9 +272,9 @@ impl Job<'_> {
         }
     }
 
-    fn ended(&self, good: bool, text: &str, took: Duration) -> Ended {
+    fn ended(&self, good: bool, text: &str, took: Duration) -> JobResult {
         let failed = |test: &str| !text.lines().any(|line| line == format!("test {test} ... ok"));
-        Ended {
+        JobResult {
             name: self.name.clone(),
             // A binary that runs none of the tests that are named ends well, too.
             good: good && passed(text) == Some(self.tests.len()),

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use crate::binaries::Ran;
+use crate::binaries::TestResults;
 use crate::run::Outcome;
 
 /// Where it is kept.
@@ -48,7 +48,7 @@ fn of(line: &str) -> &str {
 }
 
 /// Tests that passed, failed and were skipped, how long it took, and a digest of every test with its result.
-pub fn of_tests(ran: &Ran, took: Duration) -> String {
+pub fn of_tests(ran: &TestResults, took: Duration) -> String {
     let mut results = String::new();
     for (name, passed) in &ran.tests {
         // Writing to a String cannot fail.
@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn one_result_that_differs_changes_the_digest() {
-        let ran = |passed| Ran { tests: vec![("tests a".to_owned(), passed)], skipped: Vec::new() };
+        let ran = |passed| TestResults { tests: vec![("tests a".to_owned(), passed)], skipped: Vec::new() };
         let of = |passed| of_tests(&ran(passed), Duration::from_secs(60));
         assert_ne!(of(true), of(false));
         assert!(of(true).starts_with("1 passed, 0 failed, 0 skipped, 1 min, sha256 "), "{}", of(true));

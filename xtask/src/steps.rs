@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::time::Instant;
 
-use crate::binaries::{self, Binary, Mode, Ran};
+use crate::binaries::{self, Binary, Mode, TestResults};
 use crate::judged::Trial;
 use crate::mutants::Sample;
 use crate::run::{Outcome, Report, SKIPPED, cargo, expect_success};
@@ -127,7 +127,7 @@ pub fn test(root: &Path) -> ExitCode {
     report.step("formatting", || formatting(root));
     let binaries = compiled(root, false, &mut report);
     let mode = Mode { tools_missing: !set_up(root, &mut report), ..Mode::default() };
-    report.step("tests", || binaries::test(root, &binaries, mode, &mut Ran::default()));
+    report.step("tests", || binaries::test(root, &binaries, mode, &mut TestResults::default()));
     if lints_too {
         report.step("lints", || lints(root, false));
     }
@@ -148,7 +148,7 @@ pub fn full(root: &Path) -> ExitCode {
     report.step("known defects of packages", || packages::advisories(root, &with_boards(root, &LOCKED)));
     let binaries = compiled(root, true, &mut report);
     let mode = Mode { full: true, tools_missing: !set_up(root, &mut report) };
-    let mut ran = Ran::default();
+    let mut ran = TestResults::default();
     report.step("tests at full length", || binaries::test(root, &binaries, mode, &mut ran));
     report.step("images on the emulated board, and faults", || maintained(root, &["boards"]));
     report.step("lock file and licences of examples/own-board/Cargo.toml", || {

@@ -47,10 +47,10 @@ use serde::Serialize;
 use serde_json::Value;
 
 pub use named::{Role, role};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::ir::Ir;
 use specgen_language::diagnostic::{Diagnostic, Severity};
-use specgen_language::outcome::{Failure, Outcome, Refused};
+use specgen_language::outcome::{Failure, Outcome, Refusal};
 use specgen_language::spec::nearest;
 use specgen_language::ui::{Message, Ui};
 use specgen_language::{files, interrupt};
@@ -96,11 +96,11 @@ struct Strictness {
 
 impl Strictness {
     /// Refuses `compiled` if warnings are denied and there is one among `findings`.
-    fn accept(self, compiled: &Compiled, findings: &[Diagnostic]) -> Result<(), Failure> {
+    fn accept(self, compiled: &Compilation, findings: &[Diagnostic]) -> Result<(), Failure> {
         if !self.deny_warnings || findings.iter().all(|one| one.severity < Severity::Warning) {
             return Ok(());
         }
-        Err(Refused { source: Some(compiled.source.clone()), findings: findings.to_vec() }.into())
+        Err(Refusal { source: Some(compiled.source.clone()), findings: findings.to_vec() }.into())
     }
 }
 
@@ -219,7 +219,7 @@ pub fn call(
         // What it has not shown when it unwinds is not looked at.
         Ok((cli, matches)) => {
             catch_unwind(AssertUnwindSafe(|| perform(&cli, &matches, &mut ui))).unwrap_or_else(|cause| {
-                if cause.is::<interrupt::Ended>() { Err(Failure::interrupted()) } else { resume_unwind(cause) }
+                if cause.is::<interrupt::Interruption>() { Err(Failure::interrupted()) } else { resume_unwind(cause) }
             })
         }
         Err(error) => {

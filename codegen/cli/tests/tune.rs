@@ -4,7 +4,7 @@ use crate::support;
 
 use crate::support::{Folder, Run, contents};
 use serde_json::Value;
-use specgen::compile::{Compiled, compile};
+use specgen::compile::{Compilation, compile};
 use specgen::lower::platform;
 use specgen::stability::platform::{Conditions, Law, RestDynamics, Tuning, closed_loop_of};
 
@@ -88,7 +88,7 @@ fn the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads() {
 }
 
 /// k_p over the stiffness of its axis at which P on that axis alone is at its limit of stability.
-fn ultimate_gain(compiled: &Compiled, axis: usize) -> f64 {
+fn ultimate_gain(compiled: &Compilation, axis: usize) -> f64 {
     let model = &compiled.model;
     let rest = RestDynamics::of(&platform(model).unwrap());
     let closed_loop = closed_loop_of(model, model.task_space.as_ref().unwrap(), &rest).unwrap();

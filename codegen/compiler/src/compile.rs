@@ -18,13 +18,13 @@ use crate::{requirements, workspace};
 use specgen_identify::{self as identify, declared};
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::model::Model;
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::spec::{self, SpecSource};
 use specgen_toolchain::targets::Target;
 
 /// A spec that compiled.
 #[derive(Debug)]
-pub struct Compiled {
+pub struct Compilation {
     /// The file as read.
     pub source: SpecSource,
     /// What it says.
@@ -55,7 +55,7 @@ pub struct Compiled {
     pub findings: Vec<Diagnostic>,
 }
 
-impl Compiled {
+impl Compilation {
     /// What of the requirements the spec misses although it compiles: errors that whoever judges the spec shows. A simulation runs all the
     /// same.
     #[must_use]
@@ -68,26 +68,26 @@ impl Compiled {
 ///
 /// # Errors
 /// The spec or a record is refused. Later phases run only on what earlier ones accepted, so a second run may find more.
-pub fn compile(path: &Path) -> Result<Compiled, Refused> {
-    compile_source(SpecSource::read(path).map_err(|finding| Refused { source: None, findings: vec![finding] })?)
+pub fn compile(path: &Path) -> Result<Compilation, Refusal> {
+    compile_source(SpecSource::read(path).map_err(|finding| Refusal { source: None, findings: vec![finding] })?)
 }
 
 /// The same for a text at hand.
 ///
 /// # Errors
 /// As [`compile`].
-pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
+pub fn compile_source(source: SpecSource) -> Result<Compilation, Refusal> {
     let mut findings = Vec::new();
     let compiled = phases(&source, &mut findings);
     lint::in_order(&source, &mut findings);
     match compiled {
-        Some(compiled) => Ok(Compiled { findings, ..compiled }),
-        None => Err(Refused { source: Some(source), findings }),
+        Some(compiled) => Ok(Compilation { findings, ..compiled }),
+        None => Err(Refusal { source: Some(source), findings }),
     }
 }
 
 /// The phases in their order. None: at least one of `findings` is an error.
-fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compiled> {
+fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compilation> {
     let model = check_spec(source, findings)?;
 
     // These do not depend on each other: one run reports what any of them refuses.
@@ -116,7 +116,7 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compile
     lint::allow(&model, findings);
     findings.extend(lint::unused(&model, findings));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));
-    Some(Compiled {
+    Some(Compilation {
         source: source.clone(),
         model,
         records: records.reports,

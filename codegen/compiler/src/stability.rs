@@ -38,12 +38,12 @@ pub struct Margins {
 
 /// A law that a running controller can be switched to with the spec's weights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Adapting {
+enum Estimator {
     Ewma,
     Pcc,
 }
 
-impl Adapting {
+impl Estimator {
     /// The laws whose weights are given: which of them is used is a setting, not a build, so each must be stable.
     fn of(adaptation: &Adaptation) -> Vec<Self> {
         let level = adaptation.level_weight > 0.0;
@@ -87,7 +87,7 @@ impl Adapting {
 pub fn check(model: &Model) -> Result<Margins, Vec<Diagnostic>> {
     let adaptation = &model.adaptation;
     let dynamics = LegDynamics::of(model);
-    let laws = Adapting::of(adaptation);
+    let laws = Estimator::of(adaptation);
     // What every law allows; none of them, and there is nothing to allow.
     let largest = laws.iter().map(|law| largest_level_weight(&dynamics, adaptation, *law)).reduce(f64::min);
     let mut margins = Margins { static_gain_limit: None, spectral_radius: 0.0, largest_level_weight: largest };
@@ -103,7 +103,7 @@ pub fn check(model: &Model) -> Result<Margins, Vec<Diagnostic>> {
 fn check_law(
     model: &Model,
     dynamics: &LegDynamics,
-    law: Adapting,
+    law: Estimator,
     largest: f64,
 ) -> Result<(f64, f64), Vec<Diagnostic>> {
     let adaptation = &model.adaptation;
@@ -111,8 +111,8 @@ fn check_law(
     let highest_ratio = adaptation.gain_ratio[1];
     if highest_ratio >= static_limit {
         let source = match law {
-            Adapting::Pcc => "AII.19",
-            Adapting::Ewma => "AII.18 corrected to 0 < λω < 2",
+            Estimator::Pcc => "AII.19",
+            Estimator::Ewma => "AII.18 corrected to 0 < λω < 2",
         };
         let message = format!(
             "{} is unstable even on a leg without dynamics: with these weights λ = ρ/ρ̂ must stay below {static_limit:.4}, \
@@ -145,14 +145,14 @@ fn gauge_lag_text(lag: f64) -> String {
 }
 
 /// Largest spectral radius over the λ interval with both weights scaled by `scale`.
-fn worst_radius(dynamics: &LegDynamics, adaptation: &Adaptation, law: Adapting, scale: f64) -> f64 {
+fn worst_radius(dynamics: &LegDynamics, adaptation: &Adaptation, law: Estimator, scale: f64) -> f64 {
     let [low, high] = adaptation.gain_ratio;
     (0..RATIOS)
         .map(|k| low + (high - low) * f64::from(k) / f64::from(RATIOS - 1))
         .map(|ratio| {
             let drift = match law {
-                Adapting::Pcc => Some(scale * adaptation.drift_weight),
-                Adapting::Ewma => None,
+                Estimator::Pcc => Some(scale * adaptation.drift_weight),
+                Estimator::Ewma => None,
             };
             spectral_radius(dynamics, scale * adaptation.level_weight, drift, ratio)
         })
@@ -161,10 +161,10 @@ fn worst_radius(dynamics: &LegDynamics, adaptation: &Adaptation, law: Adapting, 
 
 /// Largest level weight, drift weight in proportion, below which every weight is stable. Found by scanning upwards and
 /// bisecting the first crossing: beyond a first unstable stretch a loop may be stable again, but nobody should rely on it.
-fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation, law: Adapting) -> f64 {
+fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation, law: Estimator) -> f64 {
     let largest_scale = match law {
-        Adapting::Ewma => 1.0 / adaptation.level_weight,
-        Adapting::Pcc => 1.0 / adaptation.level_weight.max(adaptation.drift_weight),
+        Estimator::Ewma => 1.0 / adaptation.level_weight,
+        Estimator::Pcc => 1.0 / adaptation.level_weight.max(adaptation.drift_weight),
     };
     let stable = |scale: f64| {
         adaptation.gain_ratio[1] < law.static_limit(adaptation, scale)
@@ -188,7 +188,7 @@ fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation, law: Ad
 }
 
 /// `largest` is rounded down to what the message shows, so that the number shown is itself accepted.
-fn refusal(model: &Model, code: Code, law: Adapting, mut message: String, largest: f64) -> Diagnostic {
+fn refusal(model: &Model, code: Code, law: Estimator, mut message: String, largest: f64) -> Diagnostic {
     let bandwidth = model.spans.contains_key("adaptation.level_bandwidth");
     let key = if bandwidth { "adaptation.level_bandwidth" } else { "adaptation.level_weight" };
     let run = model.timing.period * f64::from(model.adaptation.run_interval);

@@ -146,30 +146,36 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
 }
 
 /// A part that was taken out.
-struct Taken {
+struct RemovedPart {
     /// Mean square by which it lowered the residual.
     explained: f64,
     left: Vec<f64>,
 }
 
 /// What a parabola over time explains.
-fn bend_of(time: &[f64], left: &[f64]) -> Option<Taken> {
+fn bend_of(time: &[f64], left: &[f64]) -> Option<RemovedPart> {
     let middle = 0.5 * (time.first()? + time.last()?);
     let line = centred(time.to_vec());
     let bent = centred(time.iter().map(|t| (t - middle) * (t - middle)).collect());
     let found = fit(&[&line, &bent], left)?;
-    Some(Taken { explained: mean_square(left) - mean_square(&found.residual), left: found.residual })
+    Some(RemovedPart { explained: mean_square(left) - mean_square(&found.residual), left: found.residual })
 }
 
 /// What creep explains beside the drive itself, so that a wrong gain is not taken for it; one time constant after the other
 /// keeps every fit solvable. `pick` takes the samples at `chosen` out of all.
-fn creep_of(time: &[f64], drive: &[f64], pick: &impl Fn(&[f64]) -> Vec<f64>, chosen: &[f64], left: &[f64]) -> Taken {
+fn creep_of(
+    time: &[f64],
+    drive: &[f64],
+    pick: &impl Fn(&[f64]) -> Vec<f64>,
+    chosen: &[f64],
+    left: &[f64],
+) -> RemovedPart {
     let duration = chosen.last().copied().unwrap_or(0.0) - chosen.first().copied().unwrap_or(0.0);
     let states: Vec<Vec<f64>> =
         CREEP.iter().map(|share| centred(pick(&lagging(time, drive, share * duration)))).collect();
     let level = centred(pick(drive));
     let Some(gain) = fit(&[&level], left) else {
-        return Taken { explained: 0.0, left: left.to_vec() };
+        return RemovedPart { explained: 0.0, left: left.to_vec() };
     };
     let mut columns: Vec<&[f64]> = vec![&level];
     let before = mean_square(&gain.residual);
@@ -186,7 +192,7 @@ fn creep_of(time: &[f64], drive: &[f64], pick: &impl Fn(&[f64]) -> Vec<f64>, cho
             None => drop(columns.pop()),
         }
     }
-    Taken { explained, left: if best.is_empty() { left.to_vec() } else { best } }
+    RemovedPart { explained, left: if best.is_empty() { left.to_vec() } else { best } }
 }
 
 /// Central differences, V/s, without the samples that do not count: a jump behind a sample is not its rate.

@@ -69,7 +69,7 @@ pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch
 }
 
 /// Where a search ended.
-pub(super) struct Found {
+pub(super) struct SearchResult {
     /// s.
     pub(super) dead_time: f64,
     /// Σ of squares without dead time, and with the best one tried.
@@ -89,7 +89,7 @@ pub(super) fn longest(record: &Record, branches: &[Branch]) -> f64 {
 
 /// The dead time up to `longest` (s) of least `residual`, a function of those tried (s): coarse over all, then fine beside the best, then the
 /// vertex of a parabola. `None` where the residual is not known.
-pub(super) fn search(longest: f64, mut residual: impl FnMut(&[f64]) -> Option<Vec<f64>>) -> Option<Found> {
+pub(super) fn search(longest: f64, mut residual: impl FnMut(&[f64]) -> Option<Vec<f64>>) -> Option<SearchResult> {
     let between = |from: f64, to: f64| -> Vec<f64> {
         (0..=STEPS).map(|k| from + (to - from) * k as f64 / STEPS as f64).collect()
     };
@@ -105,7 +105,7 @@ pub(super) fn search(longest: f64, mut residual: impl FnMut(&[f64]) -> Option<Ve
     if near > 0 && near < STEPS {
         dead_time += vertex([beside[near - 1], beside[near], beside[near + 1]], fine[1] - fine[0]);
     }
-    Some(Found { dead_time, none: left[0], least: beside[near], at_end })
+    Some(SearchResult { dead_time, none: left[0], least: beside[near], at_end })
 }
 
 /// Samples whose displacement `tau` (s) later is still in the record.

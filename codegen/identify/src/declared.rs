@@ -16,7 +16,7 @@ const LARGEST_SCALE: f64 = 5.0;
 
 /// What the records of a spec yield.
 #[derive(Debug, Default)]
-pub struct Declared {
+pub struct SpecRecords {
     /// The table of each record, in the order of `hysteresis.records`.
     pub tables: Vec<EverettTable>,
     /// The tables of the second weight of (6), m s/V, in the order of `hysteresis.rate_tables`.
@@ -35,8 +35,8 @@ pub struct Declared {
 ///
 /// # Errors
 /// All findings, if a record cannot be read or identified, or contradicts the spec's grid, voltages or stack gain.
-pub fn records(model: &Model, dir: &Path) -> Result<Declared, Vec<Diagnostic>> {
-    let mut all = Declared::default();
+pub fn records(model: &Model, dir: &Path) -> Result<SpecRecords, Vec<Diagnostic>> {
+    let mut all = SpecRecords::default();
     let mut errors = Vec::new();
     for name in &model.hysteresis.records {
         let added = read_file(&dir.join(name), name).and_then(|text| all.add_record(model, name, text));
@@ -57,7 +57,7 @@ pub fn records(model: &Model, dir: &Path) -> Result<Declared, Vec<Diagnostic>> {
     Err(errors)
 }
 
-impl Declared {
+impl SpecRecords {
     /// The model of `leg`, 0 to 5, as `model` uses it; its dead time counts from the voltage. None without records.
     #[must_use]
     pub fn leg(&self, model: &Model, leg: usize) -> Option<RateModel> {

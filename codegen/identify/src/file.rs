@@ -9,7 +9,7 @@ use super::container::{Kind, Lines};
 use super::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
 pub use specgen_language::files::MAX_BYTES as MAX_FILE_BYTES;
-use specgen_language::files::{self, Unread};
+use specgen_language::files::{self, ReadError};
 
 /// The text of a data file, record or table, without a byte order mark.
 ///
@@ -25,7 +25,7 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
     findings.lies_at(path);
     let bytes = match files::open_file(path).and_then(|file| files::content(file, MAX_FILE_BYTES)) {
         Ok(bytes) => bytes,
-        Err(Unread::Large(limit)) => {
+        Err(ReadError::Large(limit)) => {
             let message = format!("is larger than {} MiB", limit >> 20);
             let help = "name the table that `specgen identify RECORD -o table.csv` makes of a record of any size";
             findings.add(codes::RECORD_TOO_LARGE, None, message, help);
@@ -88,6 +88,6 @@ impl Read for Source {
     }
 }
 
-fn unreadable(unread: &Unread, findings: &mut Findings) {
+fn unreadable(unread: &ReadError, findings: &mut Findings) {
     findings.add(codes::RECORD_IO, None, format!("cannot be read: {unread}"), "name an existing CSV file");
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::findings::Findings;
 use super::least_squares::{Fit, fit, mean_square};
 use super::reading::Reading;
-use super::signals::{self, Signals, Wanted};
+use super::signals::{self, ColumnSpec, Signals};
 use super::statistics::{extent, median};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
@@ -70,10 +70,10 @@ const HYSTERESIS: f64 = 2.0;
 /// A reference range (m) outside these bounds suggests another unit.
 const PLAUSIBLE: [f64; 2] = [50e-9, 5e-3];
 
-const COLUMNS: [Wanted; 3] = [
-    Wanted { name: "time_s", required: false },
-    Wanted { name: "gauge_V", required: true },
-    Wanted { name: "reference_um", required: true },
+const COLUMNS: [ColumnSpec; 3] = [
+    ColumnSpec { name: "time_s", required: false },
+    ColumnSpec { name: "gauge_V", required: true },
+    ColumnSpec { name: "reference_um", required: true },
 ];
 
 /// Calibrates from the columns `gauge_V`, `reference_um` and, if there is one, `time_s`. `degree` 1 to 5 overrides the choice.

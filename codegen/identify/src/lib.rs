@@ -73,7 +73,7 @@ pub use coverage::Region;
 pub use export::{is_table_csv, read_table_csv, write_table_csv};
 pub use file::{MAX_FILE_BYTES, read_file};
 pub use grid_choice::{GridChoice, Score, choose_grid};
-pub use rate::predict::{Compared, Drive, Prediction, parse_drive, predict, read_drive, validate};
+pub use rate::predict::{Drive, Prediction, PredictionError, parse_drive, predict, read_drive, validate};
 pub use reading::Reading;
 pub use record::{Record, parse_record, read_record};
 pub use report::{Branches, Report};
@@ -117,7 +117,7 @@ pub enum DeadTime {
 
 /// An identified table and how well it is founded.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Identified {
+pub struct Identification {
     /// The table, monotone.
     pub table: EverettTable,
     /// Figures of record and fit.
@@ -136,14 +136,14 @@ const POOR_FIT_PERCENT: f64 = 3.0;
 /// # Errors
 /// All findings if the record cannot identify the table: unit or range that contradict `options.drive`, parts of the
 /// range never reached, too few reversal curves.
-pub fn identify(record: &Record, options: &Options) -> Result<Identified, Vec<Diagnostic>> {
+pub fn identify(record: &Record, options: &Options) -> Result<Identification, Vec<Diagnostic>> {
     let mut findings = Findings::new(&record.shown_as);
     let found = identify_checked(record, options, &mut findings);
     let refused = findings.any_error();
     let mut all = record.warnings.clone();
     all.extend(findings.into_diagnostics());
     match found {
-        Some((table, report, trace)) if !refused => Ok(Identified { table, report, trace, warnings: all }),
+        Some((table, report, trace)) if !refused => Ok(Identification { table, report, trace, warnings: all }),
         _ => Err(all),
     }
 }

@@ -31,13 +31,13 @@ impl Mode {
         let omega = self.angular();
         let lag = 2.0 * self.damping / omega;
         let (mut y, mut rate) = (f.first().copied().unwrap_or(0.0), 0.0);
-        let mut turn = Turn::over(self, 0.0);
+        let mut turn = FreeStep::over(self, 0.0);
         let mut all = Vec::with_capacity(f.len());
         for (k, &value) in f.iter().enumerate() {
             if k > 0 {
                 let step = time[k] - time[k - 1];
                 if (step - turn.step).abs() > SAME_STEP * step {
-                    turn = Turn::over(self, step);
+                    turn = FreeStep::over(self, step);
                 }
                 // Behind a ramp y lags by 2ζ/ω times its slope; the rest turns and decays.
                 let slope = (value - f[k - 1]) / step;
@@ -66,12 +66,12 @@ impl Mode {
 const SAME_STEP: f64 = 1e-6;
 
 /// The free motion of a mode over one step: displacement and speed after it, of those before it.
-struct Turn {
+struct FreeStep {
     step: f64,
     of: [[f64; 2]; 2],
 }
 
-impl Turn {
+impl FreeStep {
     fn over(mode: Mode, step: f64) -> Self {
         let (omega, zeta) = (mode.angular(), mode.damping);
         let free = omega * (1.0 - zeta * zeta).sqrt();

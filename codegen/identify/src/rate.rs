@@ -37,7 +37,7 @@ use super::record::Record;
 use super::{Options, coverage, time_unit};
 
 pub use export::{read_rate_csv, spec_lines, write_rate_csv};
-pub use report::{HoldOut, Measured, OptionReport, RateReport, Verdict};
+pub use report::{HoldOut, OptionReport, RateRecord, RateReport, Verdict};
 
 /// A way to account for the rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
@@ -129,7 +129,7 @@ impl RateModel {
 
 /// What [`identify_rate`] found.
 #[derive(Debug, Clone)]
-pub struct RateIdentified {
+pub struct RateIdentification {
     /// The options fitted to all records, in the order of [`RateOption::ALL`].
     pub models: Vec<(RateOption, RateModel)>,
     /// Figures of records and options.
@@ -149,7 +149,7 @@ pub fn identify_rate(
     records: &[Record],
     hold_out: Option<&Record>,
     options: &Options,
-) -> Result<RateIdentified, Vec<Diagnostic>> {
+) -> Result<RateIdentification, Vec<Diagnostic>> {
     let mut all: Vec<Diagnostic> = records.iter().chain(hold_out).flat_map(|r| r.warnings.clone()).collect();
     let mut refused = false;
     let mut prepared = Vec::new();
@@ -193,7 +193,7 @@ pub fn identify_rate(
         }
     };
     all.extend(findings.into_diagnostics());
-    Ok(RateIdentified { models: RateOption::ALL.into_iter().zip(models).collect(), report, warnings: all })
+    Ok(RateIdentification { models: RateOption::ALL.into_iter().zip(models).collect(), report, warnings: all })
 }
 
 /// The mode of the clearest ring in any of the records.

@@ -5,14 +5,14 @@ use super::columns::names::{self, Quantity};
 /// How records are read where their names do not say it. By default, by their names.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Reading {
-    columns: Vec<Chosen>,
+    columns: Vec<ColumnChoice>,
     /// Samples per second, Hz: time is counted from it.
     rate: Option<f64>,
 }
 
 /// A column that the user names.
 #[derive(Debug, Clone, PartialEq)]
-struct Chosen {
+struct ColumnChoice {
     /// The quantity's name in this project, or `sample`.
     quantity: &'static str,
     /// How many of the column's unit are one of the quantity's.
@@ -58,7 +58,7 @@ impl Reading {
     }
 }
 
-fn chosen(text: &str) -> Result<Chosen, String> {
+fn chosen(text: &str) -> Result<ColumnChoice, String> {
     let expected = || format!("expected a name with its unit and a column, such as drive_V=2, found `{text}`");
     let (name, column) = text.split_once('=').ok_or_else(expected)?;
     let (name, column) = (name.trim(), column.trim().to_owned());
@@ -66,11 +66,11 @@ fn chosen(text: &str) -> Result<Chosen, String> {
         return Err(expected());
     }
     if name == SAMPLE {
-        return Ok(Chosen { quantity: SAMPLE, per: 1.0, column });
+        return Ok(ColumnChoice { quantity: SAMPLE, per: 1.0, column });
     }
     let found = names::all().find_map(|quantity: &Quantity| quantity.per_of(name).map(|per| (quantity.name, per)));
     match found {
-        Some((quantity, per)) => Ok(Chosen { quantity, per, column }),
+        Some((quantity, per)) => Ok(ColumnChoice { quantity, per, column }),
         None => {
             let plain = name.split('_').next().unwrap_or(name);
             let near = names::all().find(|quantity| quantity.plain().eq_ignore_ascii_case(plain));

@@ -11,7 +11,7 @@ use super::distrust;
 use super::file::open_file;
 use super::findings::Findings;
 use super::reading::Reading;
-use super::signals::{self, Wanted};
+use super::signals::{self, ColumnSpec};
 use super::{sanity, statistics};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
@@ -112,12 +112,12 @@ pub fn parse_record(text: &str, shown_as: &str) -> Result<Record, Vec<Diagnostic
 }
 
 /// Columns of a record; the displacement may be missing in one that is only predicted.
-pub(crate) const fn wanted(displacement: bool) -> [Wanted; 4] {
+pub(crate) const fn wanted(displacement: bool) -> [ColumnSpec; 4] {
     [
-        Wanted { name: NAMES[TIME], required: true },
-        Wanted { name: NAMES[DRIVE], required: true },
-        Wanted { name: signals::MONITOR, required: false },
-        Wanted { name: NAMES[DISPLACEMENT], required: displacement },
+        ColumnSpec { name: NAMES[TIME], required: true },
+        ColumnSpec { name: NAMES[DRIVE], required: true },
+        ColumnSpec { name: signals::MONITOR, required: false },
+        ColumnSpec { name: NAMES[DISPLACEMENT], required: displacement },
     ]
 }
 

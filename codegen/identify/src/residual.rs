@@ -4,7 +4,7 @@ use super::branches::Branch;
 use super::cause::{self, Cause};
 use super::record::Record;
 use super::regressor::{self, Plane};
-use super::selection::Used;
+use super::selection::RecordSpan;
 use super::trace::Trace;
 use super::{normal, statistics, trend};
 use crate::everett::EverettTable;
@@ -23,7 +23,13 @@ pub(crate) struct Residual {
 
 impl Residual {
     /// Runs `table` over the used samples of `displacement` (m, dead time and drift already removed).
-    pub(crate) fn of(plane: &Plane, record: &Record, used: &Used, displacement: &[f64], table: &EverettTable) -> Self {
+    pub(crate) fn of(
+        plane: &Plane,
+        record: &Record,
+        used: &RecordSpan,
+        displacement: &[f64],
+        table: &EverettTable,
+    ) -> Self {
         let mut plain = Vec::with_capacity(displacement.len() - used.first);
         normal::each_row(plane, &record.drive, used.first, |k, row| {
             plain.push(displacement[k] - regressor::evaluate(row, &table.nodes));

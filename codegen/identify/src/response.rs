@@ -15,12 +15,12 @@ use serde::Serialize;
 
 use super::findings::Findings;
 use super::reading::Reading;
-use super::signals::{self, Signals, Wanted};
+use super::signals::{self, ColumnSpec, Signals};
 use super::statistics::{extent, median};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 pub use fit::response;
-pub use fit::{Estimate, Fitted};
+pub use fit::{Estimate, ResonanceFit};
 pub use welch::Bin;
 
 /// A response and what was fitted to it.
@@ -45,7 +45,7 @@ pub struct ResponseReport {
     /// Median coherence of the bins used.
     pub coherence: f64,
     /// Resonance, lag and dead time with their errors.
-    pub fitted: Fitted,
+    pub fitted: ResonanceFit,
     /// Root mean square of |H1/H − 1| over the bins used, weighted as in the fit, %.
     pub misfit_percent: f64,
     /// Bins from zero up, for drawing.
@@ -87,10 +87,10 @@ const POOR: f64 = 15.0;
 /// Bands narrower than this many bins are not named one by one.
 const NARROW: usize = 3;
 
-const COLUMNS: [Wanted; 3] = [
-    Wanted { name: "time_s", required: true },
-    Wanted { name: "drive_V", required: true },
-    Wanted { name: "displacement_um", required: true },
+const COLUMNS: [ColumnSpec; 3] = [
+    ColumnSpec { name: "time_s", required: true },
+    ColumnSpec { name: "drive_V", required: true },
+    ColumnSpec { name: "displacement_um", required: true },
 ];
 
 /// Identifies from a record of a swept sine, multisine or noise. `segment`: samples in a segment, a power of two is best.
@@ -337,7 +337,7 @@ fn named(bands: &[Band]) -> String {
 
 /// Refuses a resonance that the record does not show: outside the band, or where the coherence is too low.
 fn check_resonance(
-    fitted: &Fitted,
+    fitted: &ResonanceFit,
     band: [f64; 2],
     bins: &[Bin],
     usable: &dyn Fn(&Bin) -> bool,

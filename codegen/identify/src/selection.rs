@@ -20,7 +20,7 @@ const FIRST_ORDER: f64 = 0.9;
 const FALLS_SUFFICE: f64 = 0.99;
 
 /// The part of a record that identification uses.
-pub(crate) struct Used {
+pub(crate) struct RecordSpan {
     /// First sample; the drive is at its minimum there and rises after it.
     pub(crate) first: usize,
     /// One past the last sample.
@@ -33,7 +33,7 @@ pub(crate) struct Used {
     first_order: bool,
 }
 
-impl Used {
+impl RecordSpan {
     /// Leaves out what lies behind sample `end`.
     pub(crate) fn until(&mut self, end: usize) {
         let end = if end > self.first { end } else { self.first };
@@ -44,7 +44,7 @@ impl Used {
 }
 
 /// Finds the usable part; refuses a record with too few reversal curves.
-pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) -> Option<Used> {
+pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) -> Option<RecordSpan> {
     let tolerance = AT_MINIMUM * (plane.range[1] - plane.range[0]);
     let Some(first) = branches::first_usable(record, tolerance) else {
         let message = "the drive never rises from its minimum".to_owned();
@@ -68,13 +68,18 @@ pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) ->
     let minimum = at_minimum(record, plane);
     let from_saturation = rises.clone().filter(|b| record.drive[b.first] <= minimum).count();
     let first_order = from_saturation as f64 >= FIRST_ORDER * rises.count() as f64;
-    Some(Used { first, end: record.time.len(), branches, curves, first_order })
+    Some(RecordSpan { first, end: record.time.len(), branches, curves, first_order })
 }
 
 /// Normal equations over the falls of first-order reversal curves, if they excite the plane as well as all branches do,
 /// else over all branches: in other records it takes the rises to tell apart cells that only switch off together.
 /// The third value says of each cell whether the chosen branches excite it.
-pub(crate) fn select(plane: &Plane, record: &Record, used: &Used, target: &[f64]) -> (Normal, Branches, Vec<bool>) {
+pub(crate) fn select(
+    plane: &Plane,
+    record: &Record,
+    used: &RecordSpan,
+    target: &[f64],
+) -> (Normal, Branches, Vec<bool>) {
     let over = |branches: &[Branch], weighting| {
         normal::accumulate(plane, record, used.first, branches, weighting, 1, |k, values| {
             values[0] = target[k];

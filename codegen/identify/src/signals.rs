@@ -14,7 +14,7 @@ use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A column that a record may have.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Wanted {
+pub(crate) struct ColumnSpec {
     /// Name with unit, such as `force_N`.
     pub(crate) name: &'static str,
     /// Whether the record is refused without it.
@@ -46,7 +46,7 @@ const MIN_SAMPLES: usize = 8;
 pub(crate) fn read(
     path: &Path,
     shown_as: &str,
-    wanted: &[Wanted],
+    wanted: &[ColumnSpec],
     reading: &Reading,
 ) -> Result<Signals, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
@@ -55,7 +55,7 @@ pub(crate) fn read(
 }
 
 /// The same from the text of a file.
-pub(crate) fn parse(text: &str, shown_as: &str, wanted: &[Wanted]) -> Result<Signals, Vec<Diagnostic>> {
+pub(crate) fn parse(text: &str, shown_as: &str, wanted: &[ColumnSpec]) -> Result<Signals, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
     let signals = checked(text.as_bytes(), wanted, &Reading::default(), &mut findings);
     findings.conclude(signals).map(|(signals, _)| signals)
@@ -63,7 +63,7 @@ pub(crate) fn parse(text: &str, shown_as: &str, wanted: &[Wanted]) -> Result<Sig
 
 pub(crate) fn checked(
     source: impl Read,
-    wanted: &[Wanted],
+    wanted: &[ColumnSpec],
     reading: &Reading,
     findings: &mut Findings,
 ) -> Option<Signals> {
@@ -81,7 +81,7 @@ pub(crate) fn checked(
 /// The `wanted` columns without any check of their values; `None` after every problem of the header was reported.
 pub(crate) fn columns_of(
     source: impl Read,
-    wanted: &[Wanted],
+    wanted: &[ColumnSpec],
     reading: &Reading,
     findings: &mut Findings,
 ) -> Option<Signals> {

@@ -11,7 +11,7 @@ use super::cause::lagging;
 use super::findings::Findings;
 use super::least_squares::{Fit, fit, independent_samples, mean_square};
 use super::reading::Reading;
-use super::signals::{self, Signals, Wanted};
+use super::signals::{self, ColumnSpec, Signals};
 use super::statistics::extent;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
@@ -53,11 +53,11 @@ pub struct StiffnessReport {
     pub warnings: Vec<Diagnostic>,
 }
 
-const COLUMNS: [Wanted; 4] = [
-    Wanted { name: "time_s", required: true },
-    Wanted { name: "force_N", required: true },
-    Wanted { name: "displacement_um", required: true },
-    Wanted { name: "drive_V", required: false },
+const COLUMNS: [ColumnSpec; 4] = [
+    ColumnSpec { name: "time_s", required: true },
+    ColumnSpec { name: "force_N", required: true },
+    ColumnSpec { name: "displacement_um", required: true },
+    ColumnSpec { name: "drive_V", required: false },
 ];
 /// Creep time constants tried per decade from ten samples to the record's length.
 const PER_DECADE: usize = 6;

@@ -4,7 +4,7 @@ use super::findings::Findings;
 use super::record::Record;
 use super::regressor::Plane;
 use super::report::Report;
-use super::selection::Used;
+use super::selection::RecordSpan;
 use super::statistics::median;
 use super::time_unit;
 use specgen_language::diagnostic::codes;
@@ -19,7 +19,7 @@ const ABOVE_NOISE: f64 = 2.0;
 const SAME_LEVEL: f64 = 0.005;
 
 /// Rate of the sweep against sampling and dead time, and spacing of the curves against noise.
-pub(crate) fn check(plane: &Plane, record: &Record, used: &Used, report: &Report, findings: &mut Findings) {
+pub(crate) fn check(plane: &Plane, record: &Record, used: &RecordSpan, report: &Report, findings: &mut Findings) {
     let span = plane.range[1] - plane.range[0];
     let gain = report.displacement_range / span;
     let mut intervals: Vec<f64> = record.time.windows(2).map(|w| w[1] - w[0]).collect();
@@ -76,7 +76,7 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &Used, report: &Report
 }
 
 /// Mean rate of the drive in the fastest branch (V/s), and that branch's first sample.
-pub(crate) fn fastest(record: &Record, used: &Used) -> (f64, usize) {
+pub(crate) fn fastest(record: &Record, used: &RecordSpan) -> (f64, usize) {
     let mut fastest = (0.0, 0);
     for branch in &used.branches {
         let last = branch.end - 1;

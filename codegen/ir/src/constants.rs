@@ -10,7 +10,7 @@ use specgen_runtime::snapshot::Sizes;
 use specgen_runtime::supervisor;
 use specgen_runtime::trigger::Line;
 use specgen_runtime::{
-    Affine, CorrectionLimit, Dac, Gains, Gauges, Legs, Notch, Permitted, Platform, RateFilter, Real, Resonator,
+    Affine, CorrectionLimit, Dac, Gains, Gauges, Legs, Notch, PermittedRange, Platform, RateFilter, Real, Resonator,
     Section, Series,
 };
 
@@ -230,11 +230,11 @@ pub fn lines<T: Real>(numbers: &impl Numbers<T>, defaults: &ir::PlatformDefaults
 
 /// Ranges of the settings, each for so many words: those that are alike are in one row. Most gains have one range, and a row for each would
 /// take a kilobyte of flash.
-pub fn permitted<T: Real>(numbers: &impl Numbers<T>, table: &ir::Permitted) -> Vec<(Permitted<T>, usize)> {
+pub fn permitted<T: Real>(numbers: &impl Numbers<T>, table: &ir::PermittedRanges) -> Vec<(PermittedRange<T>, usize)> {
     let ranges: Vec<Range> = table.words().map(|(_, range)| range).collect();
     let of_range = |range| match range {
-        Range::Whole(least, most) => Permitted::Whole(least as u64, most as u64),
-        Range::Number(least, most) => Permitted::Number(numbers.real(least), numbers.real(most)),
+        Range::Whole(least, most) => PermittedRange::Whole(least as u64, most as u64),
+        Range::Number(least, most) => PermittedRange::Number(numbers.real(least), numbers.real(most)),
     };
     let alike = ranges.chunk_by(|a, b| a == b);
     alike.filter_map(|alike| Some((of_range(*alike.first()?), alike.len()))).collect()

@@ -90,7 +90,7 @@ pub struct Ir {
     /// Config at start-up.
     pub defaults: Defaults,
     /// What a Config may hold, and how large the numbers of a state may become.
-    pub permitted: Permitted,
+    pub permitted: PermittedRanges,
     /// Control in task space; none for six legs with their own gauges.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub task_space: Option<TaskSpace>,

@@ -7,7 +7,7 @@ use super::LEGS;
 
 /// The table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Permitted {
+pub struct PermittedRanges {
     /// In the order of the emitted `CONFIG_NAMES`.
     pub settings: Vec<Setting>,
     /// Numbers of a state that settings and gauges decide about.
@@ -90,7 +90,7 @@ impl Setting {
     }
 }
 
-impl Permitted {
+impl PermittedRanges {
     /// Every word of the settings: name and range.
     pub fn words(&self) -> impl Iterator<Item = (String, Range)> {
         self.settings.iter().flat_map(Setting::words)

@@ -63,7 +63,7 @@ fn kind(found: &Metadata) -> &'static str {
 
 /// Why a file cannot be read.
 #[derive(Debug)]
-pub enum Unread {
+pub enum ReadError {
     /// It is no regular file, but this.
     Kind(&'static str),
     /// It has more bytes than this.
@@ -79,7 +79,7 @@ pub enum Unread {
     System(io::Error),
 }
 
-impl Unread {
+impl ReadError {
     /// What to do about it.
     #[must_use]
     pub fn help(&self) -> &'static str {
@@ -93,7 +93,7 @@ impl Unread {
     }
 }
 
-impl fmt::Display for Unread {
+impl fmt::Display for ReadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Kind(kind) => write!(f, "it is {kind}, expected a regular file"),
@@ -117,9 +117,9 @@ fn write_error(error: &io::Error, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     }
 }
 
-impl std::error::Error for Unread {}
+impl std::error::Error for ReadError {}
 
-impl From<io::Error> for Unread {
+impl From<io::Error> for ReadError {
     fn from(error: io::Error) -> Self {
         Self::System(error)
     }
@@ -130,7 +130,7 @@ impl From<io::Error> for Unread {
 ///
 /// # Errors
 /// If it is of another kind, or the system refuses it.
-pub fn open(path: &Path) -> Result<File, Unread> {
+pub fn open(path: &Path) -> Result<File, ReadError> {
     let found = fs::metadata(path)?;
     // What has no name is in the hands of this process already.
     let given = found.file_type().is_fifo() && fs::canonicalize(path).is_err();
@@ -141,21 +141,21 @@ pub fn open(path: &Path) -> Result<File, Unread> {
 ///
 /// # Errors
 /// As [`open`].
-pub fn open_file(path: &Path) -> Result<File, Unread> {
+pub fn open_file(path: &Path) -> Result<File, ReadError> {
     opened(path, &fs::metadata(path)?, false)
 }
 
-fn opened(path: &Path, found: &Metadata, pipe: bool) -> Result<File, Unread> {
+fn opened(path: &Path, found: &Metadata, pipe: bool) -> Result<File, ReadError> {
     let fits = |found: &Metadata| found.is_file() || (pipe && found.file_type().is_fifo());
     if !fits(found) {
-        return Err(Unread::Kind(kind(found)));
+        return Err(ReadError::Kind(kind(found)));
     }
     // It may be another file by now: opening this one waits for nobody, and it is looked at again.
     let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
     let file = OpenOptions::new().read(true).custom_flags(flags.bits().cast_signed()).open(path)?;
     let found = file.metadata()?;
     if !fits(&found) {
-        return Err(Unread::Kind(kind(&found)));
+        return Err(ReadError::Kind(kind(&found)));
     }
     if pipe {
         fcntl_setfl(&file, OFlags::empty()).map_err(io::Error::from)?;
@@ -169,16 +169,16 @@ fn opened(path: &Path, found: &Metadata, pipe: bool) -> Result<File, Unread> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn look(path: &Path) -> Result<(), Unread> {
+pub fn look(path: &Path) -> Result<(), ReadError> {
     let found = open(path)?.metadata()?;
-    if found.is_file() && found.len() > MAX_BYTES { Err(Unread::Large(MAX_BYTES)) } else { Ok(()) }
+    if found.is_file() && found.len() > MAX_BYTES { Err(ReadError::Large(MAX_BYTES)) } else { Ok(()) }
 }
 
 /// The content of a file.
 ///
 /// # Errors
 /// As [`open`], and if it has more bytes than `limit`.
-pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, Unread> {
+pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
     content(open(path)?, limit)
 }
 
@@ -186,18 +186,18 @@ pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, Unread> {
 ///
 /// # Errors
 /// If it has more bytes than `limit`, or the system refuses it.
-pub fn content(file: File, limit: u64) -> Result<Vec<u8>, Unread> {
+pub fn content(file: File, limit: u64) -> Result<Vec<u8>, ReadError> {
     let mut bytes = Vec::new();
     // One more tells that it is too large.
     file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > limit { Err(Unread::Large(limit)) } else { Ok(bytes) }
+    if bytes.len() as u64 > limit { Err(ReadError::Large(limit)) } else { Ok(bytes) }
 }
 
 /// The content of a text file of at most [`MAX_BYTES`].
 ///
 /// # Errors
 /// As [`read`], and if it is not in UTF-8.
-pub fn text(path: &Path) -> Result<String, Unread> {
+pub fn text(path: &Path) -> Result<String, ReadError> {
     text_of(path, MAX_BYTES)
 }
 
@@ -205,11 +205,11 @@ pub fn text(path: &Path) -> Result<String, Unread> {
 ///
 /// # Errors
 /// As [`text`].
-pub fn text_of(path: &Path, limit: u64) -> Result<String, Unread> {
+pub fn text_of(path: &Path, limit: u64) -> Result<String, ReadError> {
     String::from_utf8(read(path, limit)?).map_err(|error| {
         let byte = error.utf8_error().valid_up_to();
         let line = 1 + error.as_bytes()[..byte].iter().filter(|byte| **byte == b'\n').count();
-        Unread::Text { byte, line }
+        ReadError::Text { byte, line }
     })
 }
 
@@ -230,7 +230,7 @@ fn input(path: &Path) -> Option<PathBuf> {
 
 /// Why a file cannot be written.
 #[derive(Debug)]
-pub enum Unwritten {
+pub enum OutputError {
     /// It is this input of the same command.
     Input(PathBuf),
     /// Another output of the same command has this name.
@@ -245,7 +245,7 @@ pub enum Unwritten {
     System(io::Error),
 }
 
-impl fmt::Display for Unwritten {
+impl fmt::Display for OutputError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Input(name) => {
@@ -261,9 +261,9 @@ impl fmt::Display for Unwritten {
     }
 }
 
-impl std::error::Error for Unwritten {}
+impl std::error::Error for OutputError {}
 
-impl From<io::Error> for Unwritten {
+impl From<io::Error> for OutputError {
     fn from(error: io::Error) -> Self {
         Self::System(error)
     }
@@ -271,7 +271,7 @@ impl From<io::Error> for Unwritten {
 
 /// Where an output that may be written goes.
 #[derive(Debug)]
-pub enum Way {
+pub enum Destination {
     /// A regular file of this name, which is there or not: no link.
     File(PathBuf),
     /// A device or a pipe.
@@ -282,36 +282,36 @@ pub enum Way {
 ///
 /// # Errors
 /// Why not.
-pub fn guard(path: &Path) -> Result<Way, Unwritten> {
-    if let Some(name) = input(path) { Err(Unwritten::Input(name)) } else { guard_edit(path) }
+pub fn guard(path: &Path) -> Result<Destination, OutputError> {
+    if let Some(name) = input(path) { Err(OutputError::Input(name)) } else { guard_edit(path) }
 }
 
 /// The same for a command whose purpose is to edit an input.
 ///
 /// # Errors
 /// As [`guard`].
-pub fn guard_edit(path: &Path) -> Result<Way, Unwritten> {
+pub fn guard_edit(path: &Path) -> Result<Destination, OutputError> {
     let target = behind_links(path)?;
     let found = match fs::metadata(path) {
         Ok(found) => found,
         // What is missing above it is made, or stands in the way then.
         Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
-            return Ok(Way::File(target));
+            return Ok(Destination::File(target));
         }
         Err(error) => return Err(error.into()),
     };
     let of = found.file_type();
     if of.is_dir() || of.is_socket() || of.is_block_device() {
-        return Err(Unwritten::Kind(if of.is_block_device() { "a disk" } else { kind(&found) }));
+        return Err(OutputError::Kind(if of.is_block_device() { "a disk" } else { kind(&found) }));
     }
     if !found.is_file() {
-        return Ok(Way::Device);
+        return Ok(Destination::Device);
     }
     // Whoever may write everything, as root, still means what the permissions say.
     if found.mode() & 0o222 == 0 || access(path, Access::WRITE_OK).is_err() {
-        return Err(Unwritten::Protected);
+        return Err(OutputError::Protected);
     }
-    Ok(Way::File(target))
+    Ok(Destination::File(target))
 }
 
 /// The name that links lead to, which need not be there.
@@ -333,7 +333,7 @@ fn behind_links(path: &Path) -> io::Result<PathBuf> {
 ///
 /// # Errors
 /// If nobody reads the pipe, or the system refuses it.
-pub fn open_device(path: &Path) -> Result<File, Unwritten> {
+pub fn open_device(path: &Path) -> Result<File, OutputError> {
     let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
     let until = Instant::now() + READER;
     loop {
@@ -345,7 +345,7 @@ pub fn open_device(path: &Path) -> Result<File, Unwritten> {
             Err(error) if error.raw_os_error() != Some(rustix::io::Errno::NXIO.raw_os_error()) => {
                 return Err(error.into());
             }
-            Err(_) if Instant::now() >= until => return Err(Unwritten::Unheard),
+            Err(_) if Instant::now() >= until => return Err(OutputError::Unheard),
             Err(_) => std::thread::sleep(Duration::from_millis(20)),
         }
     }

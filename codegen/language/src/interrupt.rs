@@ -26,11 +26,11 @@ static HEEDED: AtomicBool = AtomicBool::new(false);
 /// Held by whoever must not be cut in two.
 static WHOLE: Mutex<()> = Mutex::new(());
 /// What is there on the way only, in the order in which it was made.
-static PASSING: Mutex<Vec<Passing>> = Mutex::new(Vec::new());
+static PASSING: Mutex<Vec<TemporaryPath>> = Mutex::new(Vec::new());
 
 /// What goes away at the end, whichever end.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Passing {
+enum TemporaryPath {
     /// With all that is in it.
     Tree(PathBuf),
     File(PathBuf),
@@ -38,7 +38,7 @@ enum Passing {
     EmptyFolder(PathBuf),
 }
 
-impl Passing {
+impl TemporaryPath {
     fn remove(&self) -> io::Result<()> {
         match self {
             Self::Tree(path) => fs::remove_dir_all(path),
@@ -69,8 +69,9 @@ fn leave(end: &impl Fn() -> u8) -> ! {
     let passing = locked(&PASSING);
     for one in passing.iter().rev() {
         // A compiler that was interrupted with us may write its last file just now.
-        let grows =
-            |error: &io::Error| error.kind() == io::ErrorKind::DirectoryNotEmpty && matches!(one, Passing::Tree(_));
+        let grows = |error: &io::Error| {
+            error.kind() == io::ErrorKind::DirectoryNotEmpty && matches!(one, TemporaryPath::Tree(_))
+        };
         for _ in 0..20 {
             match one.remove() {
                 Err(error) if grows(&error) => std::thread::sleep(Duration::from_millis(20)),
@@ -100,12 +101,12 @@ pub fn own(stop: &'static AtomicBool) {
 
 /// How a command unwinds that its caller interrupted.
 #[derive(Debug)]
-pub struct Ended;
+pub struct Interruption;
 
-/// Unwinds with [`Ended`] if the command of this thread was interrupted by its caller, and does not heed that by itself.
+/// Unwinds with [`Interruption`] if the command of this thread was interrupted by its caller, and does not heed that by itself.
 pub fn point() {
     if OWN.get().is_some_and(|(stop, heeded)| !heeded && stop.load(Ordering::SeqCst)) {
-        std::panic::resume_unwind(Box::new(Ended));
+        std::panic::resume_unwind(Box::new(Interruption));
     }
 }
 
@@ -130,10 +131,10 @@ fn locked<T>(mutex: &'static Mutex<T>) -> MutexGuard<'static, T> {
 
 /// Keeps the name of something that an interrupt is to take away; dropped when it is gone, or another process'.
 #[derive(Debug)]
-pub struct Guard(Passing);
+pub struct Guard(TemporaryPath);
 
 impl Guard {
-    fn of(passing: Passing) -> Self {
+    fn of(passing: TemporaryPath) -> Self {
         locked(&PASSING).push(passing.clone());
         Self(passing)
     }
@@ -145,7 +146,7 @@ impl Guard {
     pub fn file<T>(make: impl FnOnce() -> io::Result<T>, path: impl Fn(&T) -> PathBuf) -> io::Result<(T, Self)> {
         let _whole = whole();
         let made = make()?;
-        let guard = Self::of(Passing::File(path(&made)));
+        let guard = Self::of(TemporaryPath::File(path(&made)));
         Ok((made, guard))
     }
 }
@@ -197,7 +198,7 @@ impl Scratch {
                 // Where folders cannot be locked nobody sweeps.
                 Err(_) => None,
             };
-            let guard = Guard::of(Passing::Tree(folder.path().to_owned()));
+            let guard = Guard::of(TemporaryPath::Tree(folder.path().to_owned()));
             return Ok(Self { folder, _guard: guard, _lock: lock });
         }
     }
@@ -211,9 +212,9 @@ impl Scratch {
 
 /// Folders that were made for results to come; those that are still empty at the end go.
 #[derive(Debug)]
-pub struct Claimed(Vec<Guard>);
+pub struct ResultFolders(Vec<Guard>);
 
-impl Claimed {
+impl ResultFolders {
     /// Makes `folder` and what is missing above it.
     ///
     /// # Errors
@@ -226,13 +227,13 @@ impl Claimed {
         for path in missing {
             let _whole = whole();
             if make_folder(path)? {
-                claimed.0.push(Guard::of(Passing::EmptyFolder(path.to_owned())));
+                claimed.0.push(Guard::of(TemporaryPath::EmptyFolder(path.to_owned())));
             }
         }
         // Another run may have removed it meanwhile; what is there and is no folder shows when it is tried.
         let _whole = whole();
         if !folder.is_dir() && make_folder(folder)? {
-            claimed.0.push(Guard::of(Passing::EmptyFolder(folder.to_owned())));
+            claimed.0.push(Guard::of(TemporaryPath::EmptyFolder(folder.to_owned())));
         }
         Ok(claimed)
     }
@@ -253,7 +254,7 @@ fn make_folder(path: &Path) -> io::Result<bool> {
     }
 }
 
-impl Drop for Claimed {
+impl Drop for ResultFolders {
     fn drop(&mut self) {
         while let Some(guard) = self.0.pop() {
             // One that holds something stays.
@@ -267,8 +268,7 @@ mod tests {
     use super::*;
 
     fn passing(path: &Path) -> usize {
-        let is_of =
-            |one: &&Passing| matches!(one, Passing::Tree(p) | Passing::File(p) | Passing::EmptyFolder(p) if p == path);
+        let is_of = |one: &&TemporaryPath| matches!(one, TemporaryPath::Tree(p) | TemporaryPath::File(p) | TemporaryPath::EmptyFolder(p) if p == path);
         locked(&PASSING).iter().filter(is_of).count()
     }
 
@@ -305,7 +305,7 @@ mod tests {
     #[test]
     fn a_command_of_a_thread_has_an_interrupt_of_its_own() {
         let [first, second] = [(); 2].map(|()| &*Box::leak(Box::new(AtomicBool::new(false))));
-        let is_ended = || std::panic::catch_unwind(point).is_err_and(|cause| cause.is::<Ended>());
+        let is_ended = || std::panic::catch_unwind(point).is_err_and(|cause| cause.is::<Interruption>());
         own(first);
         assert!(!is_ended());
         first.store(true, Ordering::SeqCst);
@@ -321,17 +321,17 @@ mod tests {
     fn claimed_folders_stay_if_something_is_in_them() {
         let scratch = Scratch::new().unwrap();
         let inner = scratch.path().join("a/b");
-        drop(Claimed::new(&inner).unwrap());
+        drop(ResultFolders::new(&inner).unwrap());
         assert!(!scratch.path().join("a").exists());
-        let claimed = Claimed::new(&inner).unwrap();
+        let claimed = ResultFolders::new(&inner).unwrap();
         fs::write(inner.join("result"), "x").unwrap();
         drop(claimed);
         assert!(inner.join("result").is_file());
         // What was there before is nobody's to remove.
         fs::create_dir(scratch.path().join("old")).unwrap();
-        drop(Claimed::new(&scratch.path().join("old")).unwrap());
+        drop(ResultFolders::new(&scratch.path().join("old")).unwrap());
         assert!(scratch.path().join("old").is_dir());
-        assert!(Claimed::new(&inner.join("result")).is_err());
-        assert!(Claimed::new(&inner.join("result/below")).is_err());
+        assert!(ResultFolders::new(&inner.join("result")).is_err());
+        assert!(ResultFolders::new(&inner.join("result/below")).is_err());
     }
 }

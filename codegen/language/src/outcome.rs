@@ -28,14 +28,14 @@ impl Outcome for Value {
 
 /// A spec or a record that was refused: at least one finding is an error.
 #[derive(Debug)]
-pub struct Refused {
+pub struct Refusal {
     /// The file, if it could be read.
     pub source: Option<SpecSource>,
     /// All findings of the run.
     pub findings: Vec<Diagnostic>,
 }
 
-impl Refused {
+impl Refusal {
     /// The file that is to blame, as its user named it. A spec that names a bad record is refused itself.
     fn file(&self) -> &str {
         if let Some(source) = &self.source {
@@ -53,7 +53,7 @@ impl Refused {
 #[derive(Debug)]
 pub enum Failure {
     /// The spec or a record is refused.
-    Refused(Box<Refused>),
+    Refused(Box<Refusal>),
     /// A declared budget is exceeded, a comparison failed: exit code 1.
     Gate(String),
     /// Arguments that make no sense together.
@@ -146,8 +146,8 @@ impl Failure {
     }
 }
 
-impl From<Refused> for Failure {
-    fn from(refused: Refused) -> Self {
+impl From<Refusal> for Failure {
+    fn from(refused: Refusal) -> Self {
         Self::Refused(Box::new(refused))
     }
 }

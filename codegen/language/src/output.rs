@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-use crate::files::{self, Unread, Unwritten, Way};
-use crate::interrupt::{self, Claimed, Guard};
+use crate::files::{self, Destination, OutputError, ReadError};
+use crate::interrupt::{self, Guard, ResultFolders};
 use crate::lock;
 use crate::outcome::Failure;
 
@@ -22,7 +22,7 @@ pub fn check_input(path: &Path) -> Result<(), Failure> {
 }
 
 /// Says which file could not be read. Its exit code is that of a spec or record which is refused, as it may be named in one.
-pub fn unread_file(path: &Path, unread: &Unread) -> Failure {
+pub fn unread_file(path: &Path, unread: &ReadError) -> Failure {
     Failure::Gate(format!("`{}` cannot be read: {unread}; {}", path.display(), unread.help()))
 }
 
@@ -49,7 +49,7 @@ pub fn check_edit(path: &Path) -> Result<(), Failure> {
 pub fn check_place(path: &Path) -> Result<(), Failure> {
     match files::guard(path) {
         // A pipe would wait for its reader.
-        Ok(Way::Device) => Ok(()),
+        Ok(Destination::Device) => Ok(()),
         _ => PendingFile::create(path).map(|_| ()),
     }
 }
@@ -71,7 +71,7 @@ pub fn write_folder(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Fa
 }
 
 /// Makes a folder for results to come; it goes again if none comes.
-pub fn claim(folder: &Path) -> Result<Claimed, Failure> {
+pub fn claim(folder: &Path) -> Result<ResultFolders, Failure> {
     let failed = |reason: &dyn std::fmt::Display| {
         let shown = folder.display();
         Failure::Environment(format!(
@@ -81,7 +81,7 @@ pub fn claim(folder: &Path) -> Result<Claimed, Failure> {
     if folder.exists() && !folder.is_dir() {
         return Err(failed(&"a file has that name"));
     }
-    Claimed::new(folder).map_err(|error| failed(&error))
+    ResultFolders::new(folder).map_err(|error| failed(&error))
 }
 
 /// Says which file could not be written.
@@ -90,9 +90,9 @@ pub fn unwritten(path: &Path, reason: &dyn std::fmt::Display) -> Failure {
 }
 
 /// Says why a file may not be written. One that the command names twice is a mistake of its arguments.
-pub fn refused_output(path: &Path, why: &Unwritten) -> Failure {
+pub fn refused_output(path: &Path, why: &OutputError) -> Failure {
     match why {
-        Unwritten::Input(_) | Unwritten::Twice => {
+        OutputError::Input(_) | OutputError::Twice => {
             Failure::Usage(format!("`{}` is not written: {why}; nothing was changed", path.display()))
         }
         _ => unwritten(path, why),
@@ -107,7 +107,7 @@ pub struct PendingFile {
     guard: Permit,
 }
 
-type Permit = fn(&Path) -> Result<Way, Unwritten>;
+type Permit = fn(&Path) -> Result<Destination, OutputError>;
 
 enum Place {
     Beside {
@@ -115,7 +115,7 @@ enum Place {
         // After the file: it is kept in mind until it is gone.
         _guard: Guard,
         // After both: folders that were made for the file go again if it does not come.
-        _claimed: Claimed,
+        _claimed: ResultFolders,
     },
     /// A device or a pipe takes what comes.
     Device(fs::File),
@@ -132,8 +132,8 @@ impl PendingFile {
 
     fn of(path: &Path, guard: Permit) -> Result<Self, Failure> {
         let target = match guard(path).map_err(|why| refused_output(path, &why))? {
-            Way::File(target) => target,
-            Way::Device => {
+            Destination::File(target) => target,
+            Destination::Device => {
                 let file = files::open_device(path).map_err(|why| refused_output(path, &why))?;
                 return Ok(Self { place: Place::Device(file), target: path.to_owned(), guard });
             }
@@ -142,7 +142,7 @@ impl PendingFile {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
-        let claimed = Claimed::new(folder).map_err(|error| {
+        let claimed = ResultFolders::new(folder).map_err(|error| {
             unwritten(path, &format_args!("could not create the folder `{}`: {error}", folder.display()))
         })?;
         let (file, passing) = Guard::file(|| temporary_beside(&target, folder), |file| file.path().to_owned())

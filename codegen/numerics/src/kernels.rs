@@ -3,7 +3,7 @@
 
 use specgen_runtime::{Gauges, Legs, Motion, Platform, Real, Series};
 
-use crate::{Double, Expansion, Taylor, Traced, expand};
+use crate::{Double, Expansion, Taylor, TracedNumber, expand};
 
 /// Displacements of the legs from rest at `pose` (m and rad), m: [`Platform::displacements`].
 #[must_use]
@@ -102,4 +102,4 @@ macro_rules! kernels {
     )*};
 }
 
-kernels!(f32, f64, Double, Traced<true>, Traced<false>);
+kernels!(f32, f64, Double, TracedNumber<true>, TracedNumber<false>);

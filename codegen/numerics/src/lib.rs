@@ -7,7 +7,7 @@
 //! | [`dot`], [`cross`], [`norm`], [`rotation`] | vectors of space |
 //! | [`diagonalize`] | eigenvalues of a symmetric matrix of any size, by Jacobi rotations |
 //! | [`Double`] | numbers of 106 bits: the reference for rounding errors |
-//! | [`Traced`] | numbers that record every operation: bounds of rounding errors over a box of poses |
+//! | [`TracedNumber`] | numbers that record every operation: bounds of rounding errors over a box of poses |
 //! | [`Taylor`] | numbers that are polynomials of a motion: expansion at rest, and a bound of what it leaves out |
 //! | [`ewma_limit`], [`pcc_limit`] | Jury limits of the run-to-run laws |
 //! | [`Factor`] | Cholesky factors of large matrices, by blocks |
@@ -56,4 +56,4 @@ pub use search::{largest, simplex};
 pub use space::{cross, dot, norm, rotation};
 pub use symmetric::{diagonalize, generalized_modes, inverse_of_modes, symmetric_eigen};
 pub use taylor::{Expansion, Taylor, expand};
-pub use traced::{Trace, Traced, trace};
+pub use traced::{Trace, TracedNumber, trace};

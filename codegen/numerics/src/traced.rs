@@ -20,7 +20,7 @@ use super::form::{Form, magnitude, times};
 ///
 /// `SINGLE`: the controller computes in `f32`.
 #[derive(Debug, Clone, Copy)]
-pub struct Traced<const SINGLE: bool> {
+pub struct TracedNumber<const SINGLE: bool> {
     form: Form,
     error: f64,
     /// Its node; none for what is exact.
@@ -74,7 +74,7 @@ impl Trace {
     }
 
     /// How much Σ `weights`·results may be off.
-    pub fn error<const SINGLE: bool>(&self, results: &[(Traced<SINGLE>, f64)]) -> f64 {
+    pub fn error<const SINGLE: bool>(&self, results: &[(TracedNumber<SINGLE>, f64)]) -> f64 {
         let derivatives = self.derivatives(results);
         let mut own = 0.0;
         let mut known = [0.0; 2];
@@ -89,15 +89,15 @@ impl Trace {
     /// Range of the derivative of Σ `weights`·results by `number`.
     pub fn derivative<const SINGLE: bool>(
         &self,
-        results: &[(Traced<SINGLE>, f64)],
-        number: Traced<SINGLE>,
+        results: &[(TracedNumber<SINGLE>, f64)],
+        number: TracedNumber<SINGLE>,
     ) -> [f64; 2] {
         let derivatives = self.derivatives(results);
         number.node.and_then(|node| derivatives.get(node as usize).copied()).unwrap_or([0.0; 2])
     }
 
     /// Lowest and highest derivative of the weighted sum of `results` by each node.
-    fn derivatives<const SINGLE: bool>(&self, results: &[(Traced<SINGLE>, f64)]) -> Vec<[f64; 2]> {
+    fn derivatives<const SINGLE: bool>(&self, results: &[(TracedNumber<SINGLE>, f64)]) -> Vec<[f64; 2]> {
         let mut derivatives = vec![[0.0; 2]; self.0.len()];
         for (result, weight) in results {
             if let Some(node) = result.node {
@@ -118,7 +118,7 @@ impl Trace {
     }
 }
 
-impl<const SINGLE: bool> Traced<SINGLE> {
+impl<const SINGLE: bool> TracedNumber<SINGLE> {
     /// Half a last bit of 1.
     const UNIT: f64 = if SINGLE { 5.960_464_477_539_063e-8 } else { 1.110_223_024_625_156_5e-16 };
 
@@ -192,7 +192,7 @@ impl<const SINGLE: bool> Traced<SINGLE> {
     }
 }
 
-impl<const SINGLE: bool> Add for Traced<SINGLE> {
+impl<const SINGLE: bool> Add for TracedNumber<SINGLE> {
     type Output = Self;
     #[inline(never)]
     fn add(self, other: Self) -> Self {
@@ -209,7 +209,7 @@ impl<const SINGLE: bool> Add for Traced<SINGLE> {
     }
 }
 
-impl<const SINGLE: bool> Neg for Traced<SINGLE> {
+impl<const SINGLE: bool> Neg for TracedNumber<SINGLE> {
     type Output = Self;
     #[inline(never)]
     fn neg(self) -> Self {
@@ -219,7 +219,7 @@ impl<const SINGLE: bool> Neg for Traced<SINGLE> {
     }
 }
 
-impl<const SINGLE: bool> Sub for Traced<SINGLE> {
+impl<const SINGLE: bool> Sub for TracedNumber<SINGLE> {
     type Output = Self;
     #[inline(never)]
     fn sub(self, other: Self) -> Self {
@@ -232,7 +232,7 @@ fn is_power_of_two(value: f64) -> bool {
     value.is_normal() && value.to_bits().trailing_zeros() >= 52
 }
 
-impl<const SINGLE: bool> Mul for Traced<SINGLE> {
+impl<const SINGLE: bool> Mul for TracedNumber<SINGLE> {
     type Output = Self;
     #[inline(never)]
     fn mul(self, other: Self) -> Self {
@@ -248,7 +248,7 @@ impl<const SINGLE: bool> Mul for Traced<SINGLE> {
     }
 }
 
-impl<const SINGLE: bool> Div for Traced<SINGLE> {
+impl<const SINGLE: bool> Div for TracedNumber<SINGLE> {
     type Output = Self;
     #[inline(never)]
     fn div(self, other: Self) -> Self {
@@ -271,7 +271,7 @@ impl<const SINGLE: bool> Div for Traced<SINGLE> {
     }
 }
 
-impl<const SINGLE: bool> PartialEq for Traced<SINGLE> {
+impl<const SINGLE: bool> PartialEq for TracedNumber<SINGLE> {
     /// The kernels that are run on this type compare with zero constants only.
     #[inline(never)]
     fn eq(&self, other: &Self) -> bool {
@@ -282,7 +282,7 @@ impl<const SINGLE: bool> PartialEq for Traced<SINGLE> {
     }
 }
 
-impl<const SINGLE: bool> PartialOrd for Traced<SINGLE> {
+impl<const SINGLE: bool> PartialOrd for TracedNumber<SINGLE> {
     /// By ranges that do not overlap.
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         let ([low, high], [other_low, other_high]) = (self.range(), other.range());
@@ -298,11 +298,11 @@ impl<const SINGLE: bool> PartialOrd for Traced<SINGLE> {
     }
 }
 
-impl<const SINGLE: bool> Field for Traced<SINGLE> {
+impl<const SINGLE: bool> Field for TracedNumber<SINGLE> {
     const WORDS: usize = 1;
 }
 
-impl<const SINGLE: bool> Real for Traced<SINGLE> {
+impl<const SINGLE: bool> Real for TracedNumber<SINGLE> {
     const ZERO: Self = Self::exact(Form::constant(0.0));
     const HALF: Self = Self::exact(Form::constant(0.5));
     const ONE: Self = Self::exact(Form::constant(1.0));
@@ -345,7 +345,7 @@ impl<const SINGLE: bool> Real for Traced<SINGLE> {
 mod tests {
     use super::*;
 
-    type Single = Traced<true>;
+    type Single = TracedNumber<true>;
 
     /// Bound of what `run` makes of two coordinates from 1 to 1.001.
     fn bound(run: impl Fn(Single, Single) -> Single) -> f64 {

@@ -21,7 +21,7 @@ mod session;
 mod socket;
 mod wave;
 
-pub use order::{Framed, Order, Until, Wanted};
+pub use order::{FrameChoice, ModeRequest, Order, WaitCondition};
 pub use session::{ALIVE, FRESH, GAUGES, Place, Session};
 pub use socket::SocketLine;
 pub use wave::{read_wave, refused_wave};

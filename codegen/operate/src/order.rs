@@ -8,7 +8,7 @@ use specgen_link::samples::MOST_EVERY;
 use specgen_runtime::supervisor::{Phase, Request};
 use specgen_runtime::trigger::MOST;
 
-use crate::place::{Named, Pace, named, pace};
+use crate::place::{AxisValues, Pace, named, pace};
 
 /// How long something is waited for if nothing else is said.
 const TIMEOUT: Duration = Duration::from_secs(60);
@@ -40,7 +40,7 @@ pub enum Order {
         /// By a step.
         relative: bool,
         /// What is said of each axis.
-        axes: Named,
+        axes: AxisValues,
     },
     /// Say where the platform is.
     Where,
@@ -49,12 +49,12 @@ pub enum Order {
     /// Say whether it can go to a pose, or what binds.
     CanIGo {
         /// What is said of each axis.
-        axes: Named,
+        axes: AxisValues,
         /// At this speed at least, m/s, and rad/s.
         speed: Pace,
     },
     /// Show the frame that poses are said in, or say them in another: work frame, tool point. Of an axis that is not named: zero.
-    Frame(Option<Framed>),
+    Frame(Option<FrameChoice>),
     /// Give the set-point of now a name.
     Mark(String),
     /// Go to a pose that has a name.
@@ -67,7 +67,7 @@ pub enum Order {
         correction: Option<(PathBuf, String)>,
     },
     /// Other terms of the law, as `mode` of the settings: 0 P, 1 to 3 F, 4 to 6 P/F.
-    Mode(Wanted),
+    Mode(ModeRequest),
     /// Show the gains, or set these.
     Gains(Vec<(String, f64)>),
     /// Let an output line show something else.
@@ -80,7 +80,7 @@ pub enum Order {
     /// Go on when something is so.
     Wait {
         /// What.
-        until: Until,
+        until: WaitCondition,
         /// At most so long.
         limit: Duration,
     },
@@ -117,7 +117,7 @@ pub enum Order {
 
 /// Frames of a session.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Framed {
+pub enum FrameChoice {
     /// Those of the controller.
     None,
     /// This work frame, m and rad.
@@ -128,7 +128,7 @@ pub enum Framed {
 
 /// A mode as it is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Wanted {
+pub struct ModeRequest {
     /// Whether the pose error is fed back, and whether the hysteresis is inverted.
     pub terms: [bool; 2],
     /// Number of the run-to-run law; the one in force if none is named.
@@ -138,7 +138,7 @@ pub struct Wanted {
 /// Run-to-run laws by their number.
 const LAWS: [&str; 3] = ["invhys", "ewma", "pcc"];
 
-impl Wanted {
+impl ModeRequest {
     fn parse(text: &str) -> Result<Self, String> {
         let (terms, law) = text.split_once('-').map_or((text, None), |(terms, law)| (terms, Some(law)));
         let law = law.map(|law| LAWS.iter().position(|known| *known == law).map(|place| place as u64));
@@ -173,7 +173,7 @@ impl Wanted {
 
 /// What is waited for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Until {
+pub enum WaitCondition {
     /// The machine is in this phase.
     Phase(Phase),
     /// It runs, and no way to the bias, move, trajectory or stop is under way.
@@ -236,13 +236,13 @@ impl Order {
                 Self::CanIGo { axes: named(&axes)?, speed: pace(&speeds)? }
             }
             ["frame"] => Self::Frame(None),
-            ["frame", "none"] => Self::Frame(Some(Framed::None)),
+            ["frame", "none"] => Self::Frame(Some(FrameChoice::None)),
             ["frame", "work", ref rest @ ..] if !rest.is_empty() => {
-                Self::Frame(Some(Framed::Work(named(rest)?.map(Option::unwrap_or_default))))
+                Self::Frame(Some(FrameChoice::Work(named(rest)?.map(Option::unwrap_or_default))))
             }
             ["frame", "tool", ref rest @ ..] if !rest.is_empty() => match named(rest)? {
                 [x, y, z, None, None, None] => {
-                    Self::Frame(Some(Framed::Tool([x, y, z].map(Option::unwrap_or_default))))
+                    Self::Frame(Some(FrameChoice::Tool([x, y, z].map(Option::unwrap_or_default))))
                 }
                 _ => return Err(format!("`{line}`: a tool point has x, y and z")),
             },
@@ -259,7 +259,7 @@ impl Order {
                 })?;
                 Self::Play { name: name.to_owned(), correction: Some((file.into(), machine)) }
             }
-            ["mode", mode] => Self::Mode(Wanted::parse(mode)?),
+            ["mode", mode] => Self::Mode(ModeRequest::parse(mode)?),
             ["gains", ref rest @ ..] => Self::Gains(rest.iter().map(|text| gain(text)).collect::<Result<_, _>>()?),
             ["trigger", line, first, ref rest @ ..] => {
                 let line = line.parse().ok().filter(|line| *line < MOST);
@@ -315,9 +315,9 @@ impl Order {
         let limit = limit.map(seconds).transpose()?;
         let phase = (0..).map_while(Phase::from_word).find(|phase| phase.name().replace(' ', "-") == until);
         let until = match phase {
-            Some(phase) => Until::Phase(phase),
-            None if until == "arrived" => Until::Arrived,
-            None => Until::Passed(seconds(until)?),
+            Some(phase) => WaitCondition::Phase(phase),
+            None if until == "arrived" => WaitCondition::Arrived,
+            None => WaitCondition::Passed(seconds(until)?),
         };
         Ok(Self::Wait { until, limit: limit.unwrap_or(TIMEOUT) })
     }
@@ -375,11 +375,14 @@ mod tests {
             ("", None),
             ("  # nothing", None),
             ("arm # now", Some(Order::Ask(Request::Arm))),
-            ("wait running", Some(Order::Wait { until: Until::Phase(Phase::Running), limit: TIMEOUT })),
-            ("wait ramping-down 3", Some(Order::Wait { until: Until::Phase(Phase::RampingDown), limit: time(3.0) })),
-            ("wait 0.5", Some(Order::Wait { until: Until::Passed(time(0.5)), limit: TIMEOUT })),
+            ("wait running", Some(Order::Wait { until: WaitCondition::Phase(Phase::Running), limit: TIMEOUT })),
+            (
+                "wait ramping-down 3",
+                Some(Order::Wait { until: WaitCondition::Phase(Phase::RampingDown), limit: time(3.0) }),
+            ),
+            ("wait 0.5", Some(Order::Wait { until: WaitCondition::Passed(time(0.5)), limit: TIMEOUT })),
             ("set a=1 b[2]=-2e-6", Some(Order::Set(vec![("a".into(), "1".into()), ("b[2]".into(), "-2e-6".into())]))),
-            ("wait arrived 3", Some(Order::Wait { until: Until::Arrived, limit: time(3.0) })),
+            ("wait arrived 3", Some(Order::Wait { until: WaitCondition::Arrived, limit: time(3.0) })),
             ("jog z=1um", Some(Order::Move { relative: true, axes: [None, None, Some(1e-6), None, None, None] })),
             ("where", Some(Order::Where)),
             ("gains", Some(Order::Gains(Vec::new()))),
@@ -391,9 +394,9 @@ mod tests {
                     settings: vec![("kind".into(), 1.0), ("axis".into(), 5.0), ("start".into(), -1e-4)],
                 }),
             ),
-            ("frame tool z=40mm", Some(Order::Frame(Some(Framed::Tool([0.0, 0.0, 0.04]))))),
+            ("frame tool z=40mm", Some(Order::Frame(Some(FrameChoice::Tool([0.0, 0.0, 0.04]))))),
             ("goto zero", Some(Order::Goto("zero".into()))),
-            ("mode pf-ewma", Some(Order::Mode(Wanted { terms: [true, true], law: Some(1) }))),
+            ("mode pf-ewma", Some(Order::Mode(ModeRequest { terms: [true, true], law: Some(1) }))),
             (
                 "can-i-go x=1um speed=2um/s",
                 Some(Order::CanIGo { axes: [Some(1e-6), None, None, None, None, None], speed: [Some(2e-6), None] }),
@@ -457,7 +460,7 @@ mod tests {
 
     #[test]
     fn a_mode_keeps_the_law_that_is_not_named() {
-        let word = |text, now| Wanted::parse(text).unwrap().word(now);
+        let word = |text, now| ModeRequest::parse(text).unwrap().word(now);
         assert_eq!([word("p", 6), word("f", 6), word("pf", 2), word("pf-pcc", 0)], [Ok(0), Ok(3), Ok(5), Ok(6)]);
         assert!(word("f", 0).unwrap_err().contains("name one, such as pf-pcc"));
     }

@@ -18,4 +18,4 @@ pub use difference::Difference;
 pub use lockstep::{Cost, Lockstep, Stop};
 pub use pipes::Pipes;
 pub use serial::{BAUD, SerialLine};
-pub use session::{OpenError, Opened, open};
+pub use session::{OpenError, OpenSession, open};

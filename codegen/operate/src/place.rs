@@ -6,13 +6,13 @@ use specgen_language::quantity::{self, Dimension};
 pub const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
 /// What is said of each axis, m and rad; none of one that is not named.
-pub type Named = [Option<f64>; 6];
+pub type AxisValues = [Option<f64>; 6];
 
 /// Reads `AXIS=QUANTITY` words, each axis at most once.
 ///
 /// # Errors
 /// The first word that is wrong, and what is expected.
-pub(crate) fn named(words: &[&str]) -> Result<Named, String> {
+pub(crate) fn named(words: &[&str]) -> Result<AxisValues, String> {
     let mut axes = [None; 6];
     for word in words {
         let expected = || format!("expected AXIS=LENGTH or ANGLE such as z=1um or rx=2urad, found `{word}`");
@@ -57,7 +57,7 @@ pub(crate) fn pace(words: &[&str]) -> Result<Pace, String> {
 
 /// The pose that is meant, from the set-point: axes that are not named stay as they are.
 #[must_use]
-pub fn meant(from: &[f64; 6], relative: bool, axes: &Named) -> [f64; 6] {
+pub fn meant(from: &[f64; 6], relative: bool, axes: &AxisValues) -> [f64; 6] {
     core::array::from_fn(|axis| match axes[axis] {
         Some(value) if relative => from[axis] + value,
         Some(value) => value,

@@ -54,7 +54,7 @@ impl Plant {
 }
 
 /// The plant with its converters and its place in time.
-pub struct Served {
+pub struct PlantServer {
     plant: Plant,
     gauges: ir::GaugeConverter,
     volts_at_zero: f64,
@@ -78,7 +78,7 @@ pub struct Served {
     pub sessions: u64,
 }
 
-impl Served {
+impl PlantServer {
     /// The plant of a spec, with amplifiers off.
     #[must_use]
     pub fn new(plant: Plant, model: &Model, ir: &Ir) -> Self {

@@ -13,7 +13,7 @@ use specgen_runtime::playback::Knot;
 use specgen_runtime::supervisor;
 
 use crate::motion::Motion;
-use crate::pil::{self, OpenError, Opened};
+use crate::pil::{self, OpenError, OpenSession};
 
 /// How often a device gets a request, at least: five times before it takes the link for lost.
 pub const ALIVE: Duration = Duration::from_millis(20);
@@ -79,7 +79,7 @@ impl<P: Port> Session<P> {
     /// # Errors
     /// No answer, or another controller.
     pub fn open(port: P, timeout: Timeout, digest: Option<&str>) -> Result<Self, OpenError> {
-        let Opened { client, identity, text, description } = pil::open(port, timeout)?;
+        let OpenSession { client, identity, text, description } = pil::open(port, timeout)?;
         if digest.is_some_and(|digest| digest != description.digest) {
             return Err(OpenError::Other(format!(
                 "the device runs the controller `{}` of spec digest {}; the spec gives {}: name the spec that it was built from, \

@@ -13,7 +13,7 @@
 
 use serde::Deserialize;
 use specgen_runtime::Real;
-use specgen_runtime::wave::{AxisWave, Refused, Settings, Shape, TONES, Tone, WORDS, step_of};
+use specgen_runtime::wave::{AxisWave, Refusal, Settings, Shape, TONES, Tone, WORDS, step_of};
 
 use crate::place::AXES;
 
@@ -71,7 +71,7 @@ enum Kind {
         seconds: f64,
     },
     Multisine {
-        tones: Vec<ToneOf>,
+        tones: Vec<ToneEntry>,
     },
     Reversals {
         amplitude: f64,
@@ -82,7 +82,7 @@ enum Kind {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct ToneOf {
+struct ToneEntry {
     amplitude: f64,
     frequency: f64,
     #[serde(default)]
@@ -126,7 +126,7 @@ fn words<T: Real>(file: &File, period: f64) -> Result<(Vec<u64>, [u64; 6]), Stri
     match Settings::<T>::from_words(&words) {
         Ok(_) => Ok((words.to_vec(), settings.center.map(Real::to_word))),
         Err(refused) => Err(match refused {
-            Refused::Word(word) => format!(
+            Refusal::Word(word) => format!(
                 "{} cannot be so: amplitudes must not be negative (ramp and reversals: may be), chirps must stay between 0 Hz and \
                  half the control rate",
                 place_of(word)
@@ -149,21 +149,21 @@ fn place_of(word: usize) -> String {
 #[must_use]
 pub fn refused_wave(word: u16) -> String {
     let name = |axis: usize| AXES.get(axis).map_or_else(|| axis.to_string(), |name| format!("{name} (leg {axis})"));
-    match Refused::of_word(usize::from(word)) {
-        Refused::Range(axis) => format!("axis {} would leave its range: less amplitude or offset", name(axis)),
-        Refused::Rate(axis) => {
+    match Refusal::of_word(usize::from(word)) {
+        Refusal::Range(axis) => format!("axis {} would leave its range: less amplitude or offset", name(axis)),
+        Refusal::Rate(axis) => {
             format!(
                 "axis {} would be faster than its stream may be: less amplitude or frequency, or a longer ramp",
                 name(axis)
             )
         }
-        Refused::Acceleration(axis) => {
+        Refusal::Acceleration(axis) => {
             format!(
                 "axis {} would accelerate more than its stream may: less amplitude or frequency, or a longer ramp",
                 name(axis)
             )
         }
-        Refused::Word(_) | Refused::Busy => format!("{} cannot be so", place_of(usize::from(word))),
+        Refusal::Word(_) | Refusal::Busy => format!("{} cannot be so", place_of(usize::from(word))),
     }
 }
 

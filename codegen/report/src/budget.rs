@@ -19,7 +19,7 @@ use super::chart::{Axis, Chart, DASHED, INK, LINE, pairs};
 use super::margins::adapting_name;
 use super::section::{Grid, Part, Rows, Section};
 use super::spectrum::cumulative;
-use super::tracking::{AXES, Followed, LEGS, mode_of};
+use super::tracking::{AXES, LEGS, TrackedPath, mode_of};
 use specgen_language::model::{Model, TaskSpace};
 use specgen_studies::machine;
 use specgen_studies::reproduce;
@@ -53,7 +53,7 @@ pub const FINE_BITS: i64 = 24;
 type Errors = Vec<Vec<f64>>;
 
 /// A source with what it adds.
-struct Added {
+struct ErrorSource {
     name: &'static str,
     errors: Errors,
 }
@@ -69,7 +69,7 @@ pub fn of_platform(
     specimen: &Specimen,
     controllers: Pair,
     seed: u64,
-    all: &[Followed],
+    all: &[TrackedPath],
 ) -> Result<Section, RunError> {
     let Pair { own, fine } = controllers;
     let mode = mode_of(own);
@@ -78,7 +78,7 @@ pub fn of_platform(
     let Some(first) = all.iter().find(|one| one.run.is_some()) else {
         return Ok(empty().lead("Not made: no trajectory of the spec was followed."));
     };
-    let speeds: Vec<&Followed> = all.iter().filter(|one| one.name == first.name && one.run.is_some()).collect();
+    let speeds: Vec<&TrackedPath> = all.iter().filter(|one| one.name == first.name && one.run.is_some()).collect();
     let errors = |run: &PlatformRun| -> Errors {
         (0..6).map(|axis| run.samples.iter().map(|s| s.target[axis] - s.tick.pose[axis]).collect()).collect()
     };
@@ -86,7 +86,7 @@ pub fn of_platform(
     let run = |controller: &mut dyn TickController, noise: &Noise| -> Result<Vec<Errors>, RunError> {
         let mut scenario = machine::scenario(model, task, specimen, noise, seed);
         scenario.options = RunOptions { record: Record::Samples, ..scenario.options };
-        let of = |speed: &&Followed| {
+        let of = |speed: &&TrackedPath| {
             let run = speed.course.run(&scenario, controller)?;
             run.scored()?;
             Ok(errors(&run))
@@ -149,14 +149,14 @@ pub fn of_legs(leg: &LegParameters, mode: usize, controllers: Pair, seed: u64) -
 
 /// What is left without noise, and what each source adds to it; last what the drive converter adds, from the run `silent`
 /// without noise with the converter of the spec.
-fn each(quiet: &Errors, sources: Vec<(&'static str, Errors)>, silent: Errors) -> Vec<Added> {
+fn each(quiet: &Errors, sources: Vec<(&'static str, Errors)>, silent: Errors) -> Vec<ErrorSource> {
     let less = |(name, mut errors): (&'static str, Errors)| {
         for (one, quiet) in errors.iter_mut().flatten().zip(quiet.iter().flatten()) {
             *one -= quiet;
         }
-        Added { name, errors }
+        ErrorSource { name, errors }
     };
-    let residual = Added { name: "hysteresis residual", errors: quiet.clone() };
+    let residual = ErrorSource { name: "hysteresis residual", errors: quiet.clone() };
     core::iter::once(residual).chain(sources.into_iter().chain([("DAC steps", silent)]).map(less)).collect()
 }
 
@@ -185,7 +185,7 @@ fn parts(
     (what, coverage): (&str, Coverage),
     number: usize,
     names: &[&str; 6],
-    added: &[Added],
+    added: &[ErrorSource],
     together: &Errors,
     interval: f64,
 ) -> Vec<Part> {
@@ -256,7 +256,7 @@ fn parts(
         Axis::log("up to frequency", "Hz"),
         Axis::linear("error", "nm rms"),
     );
-    let whole = Added { name: "all together", errors: together.clone() };
+    let whole = ErrorSource { name: "all together", errors: together.clone() };
     let ordered = values.iter().filter_map(|(name, _)| added.iter().find(|one| one.name == *name));
     for (k, one) in ordered.chain([&whole]).enumerate() {
         let signals: Vec<&[f64]> = one.errors[..if legs { 6 } else { 3 }].iter().map(Vec::as_slice).collect();

@@ -3,7 +3,7 @@
 use core::f64::consts::TAU;
 
 use super::section::{Grid, Section};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::ir::Scalar;
 use specgen_compiler::precision::{self, Precision};
 use specgen_compiler::stability::platform::{DampedMode, Design, SLOW};
@@ -15,7 +15,7 @@ use specgen_studies::verify::Measurement;
 
 /// Findings with their places, and what `specgen check` says of the spec.
 #[must_use]
-pub fn findings(compiled: &Compiled, command: &str) -> Section {
+pub fn findings(compiled: &Compilation, command: &str) -> Section {
     let section = Section::new("findings", "Findings", command);
     if compiled.findings.is_empty() {
         return section.lead("None: no error, no warning, no note.");
@@ -190,7 +190,7 @@ pub struct Bits<'a> {
 
 /// Digests of spec, controller and the runs that were compared by bits.
 #[must_use]
-pub fn digests(compiled: &Compiled, bits: &Bits, command: &str) -> Section {
+pub fn digests(compiled: &Compilation, bits: &Bits, command: &str) -> Section {
     let mut table = Grid::new("Digests", &["what", "value"]);
     let mut row = |what: &str, value: String| table.push(vec![what.to_owned(), value]);
     row("specgen", env!("CARGO_PKG_VERSION").to_owned());

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use serde_json::json;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
 use specgen_compiler::reach::{self, Reach};
 use specgen_compiler::stability::platform::Law;
@@ -42,7 +42,7 @@ pub struct Errors {
 /// The first screen of a spec that compiled. `mode`: its control mode, as the word `mode` has it.
 #[must_use]
 pub fn of(
-    compiled: &Compiled,
+    compiled: &Compilation,
     verdict: &Verdict,
     measured: Result<&Measurement, &str>,
     errors: Errors,
@@ -74,7 +74,7 @@ pub fn of(
     parts
 }
 
-fn reach_card(compiled: &Compiled, verdict: &Verdict) -> String {
+fn reach_card(compiled: &Compilation, verdict: &Verdict) -> String {
     let mut content = rows(verdict, &[Subject::Reach]);
     if let Some(reach) = &compiled.reach {
         content += &text_row(
@@ -143,7 +143,7 @@ fn error_card(verdict: &Verdict, errors: Errors) -> Vec<Part> {
     parts
 }
 
-fn controller_card(compiled: &Compiled, verdict: &Verdict, measured: Result<&Measurement, &str>) -> String {
+fn controller_card(compiled: &Compilation, verdict: &Verdict, measured: Result<&Measurement, &str>) -> String {
     let machine = measured.map_or_else(|_| compiled.model.target.mcu.part().emulated.to_owned(), |m| m.machine.clone());
     let mut content = String::new();
     for figure in verdict.figures.iter().filter(|figure| matches!(figure.subject, Subject::Time | Subject::Memory)) {
@@ -183,7 +183,7 @@ fn controller_card(compiled: &Compiled, verdict: &Verdict, measured: Result<&Mea
     card(&format!("Controller on {machine}"), "used of budget", "", &content)
 }
 
-fn margin_card(compiled: &Compiled, verdict: &Verdict, mode: u32) -> String {
+fn margin_card(compiled: &Compilation, verdict: &Verdict, mode: u32) -> String {
     let slew = compiled.demands.iter().map(|demand| demand.slew).fold(0.0, |a: f64, b| if b > a { b } else { a });
     let slew_row = |content: &mut String| {
         let limit = compiled.model.actuator.slew_rate;

@@ -18,7 +18,7 @@ use specgen_studies::reproduce::write::digits;
 
 use super::chart::{Axis, BLUE, Chart, LINE, Note, pairs};
 use super::section::{Grid, Part, Rows, Section};
-use super::tracking::{AXES, Followed, short};
+use super::tracking::{AXES, TrackedPath, short};
 
 /// Rates of the loops, Hz, the least important first.
 const FREQUENCIES: [f64; 3] = [0.1, 10.0, 50.0];
@@ -30,7 +30,7 @@ const SAMPLES: usize = 400;
 const POINTS: usize = 400;
 
 /// A leg behind its inverse model on a path: what was asked of it (V, virtual) against what is left (nm), and the line.
-struct Behind {
+struct InverseResidual {
     points: Vec<[f64; 2]>,
     line: Line,
     rms: f64,
@@ -49,7 +49,7 @@ pub fn of_platform(
     actuator: &Actuator,
     legs: &[LegParameters; 6],
     records: &[Option<Report>],
-    all: &[Followed],
+    all: &[TrackedPath],
 ) -> Result<Section, RunError> {
     let own = all.iter().find(|one| one.own && one.run.is_some());
     let behind = match own {
@@ -74,7 +74,7 @@ pub fn of_platform(
             columns.push(vec![Part::Chart(one.chart(k, own))]);
         }
         let mut last = None;
-        if let Some(rms) = own.and_then(Followed::rms) {
+        if let Some(rms) = own.and_then(TrackedPath::rms) {
             let worst = (1..3).fold(0, |worst, axis| if rms[axis] > rms[worst] { axis } else { worst });
             steps.push(("with feedback, worst axis", rms[worst]));
             last = Some((AXES[worst], rms[worst]));
@@ -139,8 +139,8 @@ fn behind(
     controller: &mut Controller,
     platform: &Platform<f64>,
     actuator: &Actuator,
-    own: &Followed,
-) -> Result<Vec<Behind>, RunError> {
+    own: &TrackedPath,
+) -> Result<Vec<InverseResidual>, RunError> {
     let mut traced = machine.clone();
     traced.options = RunOptions { record: Record::Trace, ..machine.options.clone() };
     select(controller, PLATFORM_MODES[1].1)?;
@@ -151,7 +151,7 @@ fn behind(
             points.iter().map(|(x, y)| [x / actuator.leg_gain(), (y - line.slope * x - line.offset) * 1e9]).collect();
         let rms = libm::sqrt(left.iter().map(|point| point[1] * point[1]).sum::<f64>() / left.len() as f64);
         let every = left.len().div_ceil(POINTS).max(1);
-        Some(Behind { points: left.into_iter().step_by(every).collect(), line, rms })
+        Some(InverseResidual { points: left.into_iter().step_by(every).collect(), line, rms })
     };
     Ok(moved_over_requested(controller, platform, &run)?.into_iter().map_while(of).collect())
 }
@@ -178,8 +178,8 @@ pub(crate) fn moved_over_requested(
     Ok(jacobian(platform, &[0.0; 6]).into_iter().zip(requested).map(of).collect())
 }
 
-impl Behind {
-    fn chart(&self, leg: usize, own: &Followed) -> Chart {
+impl InverseResidual {
+    fn chart(&self, leg: usize, own: &TrackedPath) -> Chart {
         let mut chart = Chart::new(
             &format!("behind-{leg}"),
             &format!(

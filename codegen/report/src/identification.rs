@@ -7,7 +7,7 @@ use specgen_identify::linear::LinearReport;
 use specgen_identify::rate::RateReport;
 use specgen_identify::response::ResponseReport;
 use specgen_identify::stiffness::StiffnessReport;
-use specgen_identify::{GridChoice, Identified, Prediction, Record, Trace};
+use specgen_identify::{GridChoice, Identification, Prediction, Record, Trace};
 
 fn panel(title: &str, x: Axis, y: Axis) -> Chart {
     Chart::new("", title, x, y)
@@ -28,7 +28,7 @@ fn residual(title: &str, trace: &Trace) -> Chart {
 /// Loops against the model, residual, Preisach plane with what was not excited hatched, and the choice of the grid or the
 /// validation if there is one.
 #[must_use]
-pub fn everett(identified: &Identified, choice: Option<&GridChoice>, validation: Option<&Prediction>) -> String {
+pub fn everett(identified: &Identification, choice: Option<&GridChoice>, validation: Option<&Prediction>) -> String {
     let (report, trace) = (&identified.report, &identified.trace);
     let loops = panel("Loops", Axis::linear("drive", "V"), Axis::linear("displacement", "µm"))
         .with("measured", Mark::Line(2.2), micrometres(trace, false))
@@ -113,7 +113,7 @@ fn shortened(name: &str) -> &str {
     name.rsplit(['/', '\\']).next().unwrap_or(name)
 }
 
-fn plane(identified: &Identified) -> Chart {
+fn plane(identified: &Identification) -> Chart {
     let table = &identified.table;
     let mut chart = panel(
         "Preisach plane: weight of the cells",

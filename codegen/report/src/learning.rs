@@ -9,10 +9,10 @@ use host_sim::coverage::Coverage;
 use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::Bench;
 use host_sim::trajectory::{PaperPath, PaperPose};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::model::TaskSpace;
 use specgen_studies::learning::{
-    Convergence, LARGEST_RADIUS, LearnError, Learnable, Learned, Learner, Motion, Update, learn,
+    Convergence, LARGEST_RADIUS, LearnError, Learnable, Learner, LearningResult, Motion, Update, learn,
 };
 use specgen_studies::reproduce::write::digits;
 use specgen_studies::robust::Factors;
@@ -33,7 +33,7 @@ const FREQUENCY: f64 = 10.0;
 /// # Errors
 /// If the machine does not come to its bias pose.
 pub fn section(
-    compiled: &Compiled,
+    compiled: &Compilation,
     task: &TaskSpace,
     scenario: &PlatformScenario,
     controller: &Controller,
@@ -73,7 +73,7 @@ pub fn section(
 }
 
 /// What learning gained, and what it leaves.
-fn lead(learned: &Learned, convergence: &Convergence) -> String {
+fn lead(learned: &LearningResult, convergence: &Convergence) -> String {
     let [first, best] = [0, learned.best].map(|pass| short(learned.passes[pass].translation_nm));
     let [low, high] = convergence.band.map(hertz);
     let case = format!("case 1 at {FREQUENCY:.0}\u{2009}Hz");
@@ -90,12 +90,12 @@ fn lead(learned: &Learned, convergence: &Convergence) -> String {
 }
 
 fn passes(
-    compiled: &Compiled,
+    compiled: &Compilation,
     task: &TaskSpace,
     scenario: &PlatformScenario,
     controller: &Controller,
     (learnable, convergence): (&Learnable, &Convergence),
-) -> Result<Learned, LearnError> {
+) -> Result<LearningResult, LearnError> {
     let model = &compiled.model;
     let period = model.timing.period;
     let path = PaperPose::corrected(PaperPath::Case1, FREQUENCY);
@@ -143,7 +143,7 @@ fn bound(learnable: &Learnable, convergence: &Convergence) -> Chart {
 }
 
 /// The error of each pass.
-fn by_pass(learned: &Learned) -> Chart {
+fn by_pass(learned: &LearningResult) -> Chart {
     let points = learned.passes.iter().enumerate().map(|(number, pass)| [number as f64, pass.translation_nm]).collect();
     let last = learned.passes[learned.best].translation_nm;
     let mut chart = Chart::new(

@@ -3,7 +3,7 @@
 use core::f64::consts::TAU;
 
 use serde_json::{Value, json};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
 use specgen_compiler::stability::platform::{DampedMode, Design, Law, RestDynamics};
 use specgen_language::model::TaskSpace;
@@ -52,7 +52,7 @@ pub fn adapting_name(word: &str) -> &'static str {
 
 /// The section. `mode`: the control mode of the spec, as the word `mode` has it.
 #[must_use]
-pub fn section(compiled: &Compiled, mode: u32, command: &str) -> Section {
+pub fn section(compiled: &Compilation, mode: u32, command: &str) -> Section {
     let section = Section::new("margins", "Margins", command);
     let Some((design, task)) = compiled.design.as_ref().zip(compiled.model.task_space.as_ref()) else {
         return of_legs(compiled, section);
@@ -113,7 +113,7 @@ fn damped(design: &Design) -> String {
     )
 }
 
-fn bode(compiled: &Compiled, design: &Design, task: &TaskSpace, law: Law) -> Option<Vec<Vec<Chart>>> {
+fn bode(compiled: &Compilation, design: &Design, task: &TaskSpace, law: Law) -> Option<Vec<Vec<Chart>>> {
     let rest = RestDynamics::of(&lower::platform(&compiled.model).ok()?);
     let closed_loop = design.closed_loop(&compiled.model, task, &rest)?;
     let tuning = if law == Law::Position { &design.position } else { &design.combined };
@@ -183,7 +183,7 @@ fn bode(compiled: &Compiled, design: &Design, task: &TaskSpace, law: Law) -> Opt
 }
 
 /// λ and gain up to which each control mode is stable.
-fn control_modes(compiled: &Compiled, design: &Design, own: Law) -> Rows {
+fn control_modes(compiled: &Compilation, design: &Design, own: Law) -> Rows {
     let [low, high] = compiled.model.adaptation.gain_ratio;
     let mut rows: Vec<Value> = Vec::new();
     let mut furthest = LARGEST;
@@ -218,7 +218,7 @@ fn control_modes(compiled: &Compiled, design: &Design, own: Law) -> Rows {
     }
 }
 
-fn of_legs(compiled: &Compiled, section: Section) -> Section {
+fn of_legs(compiled: &Compilation, section: Section) -> Section {
     let Some(margins) = &compiled.margins else {
         return section.lead("The law does not adapt: there is no loop that could be unstable.");
     };

@@ -2,7 +2,7 @@
 
 use host_sim::coverage::Coverage;
 use serde_json::{Value, json};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::model::Model;
 use specgen_studies::reproduce::write::digits;
 
@@ -81,7 +81,7 @@ impl Run {
 
 /// What a page shows of a run: what is seen first, and the sections.
 #[must_use]
-pub fn page(compiled: &Compiled, run: &Run) -> (Vec<Part>, Vec<Section>) {
+pub fn page(compiled: &Compilation, run: &Run) -> (Vec<Part>, Vec<Section>) {
     let model = &compiled.model;
     let sections =
         vec![errors(model, run), spectra(compiled, run), noise(model, run), loops(model, run), timing(model, run)];
@@ -127,7 +127,7 @@ fn white(samples: &[Sample], gauge: usize) -> f64 {
     libm::sqrt(sum / (6.0 * count.max(1) as f64)) * 1e9
 }
 
-fn first(compiled: &Compiled, run: &Run) -> Vec<Part> {
+fn first(compiled: &Compilation, run: &Run) -> Vec<Part> {
     let model = &compiled.model;
     let late = run.late();
     let missing: u64 = run.gaps.iter().map(|(from, to)| to - from).sum();
@@ -302,7 +302,7 @@ fn errors(model: &Model, run: &Run) -> Section {
     section.part(Part::Multiples(Multiples { id: "record-errors".to_owned(), items, groups, selected: worst }))
 }
 
-fn spectra(compiled: &Compiled, run: &Run) -> Section {
+fn spectra(compiled: &Compilation, run: &Run) -> Section {
     let model = &compiled.model;
     let (names, lengths) = if model.task_space.is_some() { (AXES, 3) } else { (LEGS, 6) };
     let law = Law::ALL.get(run.mode as usize).map_or_else(String::new, |law| margins::name(*law));

@@ -10,7 +10,7 @@ use host_sim::platform::rig::{OnBoard, PlatformRun, Record, RunOptions};
 use host_sim::platform::scenario::select;
 use host_sim::trajectory::{self, PaperPose, Reading};
 use serde_json::{Value, json};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::model::{Model, PaperPath, TaskSpace, TrajectoryKind};
 use specgen_studies::machine::on_board;
 use specgen_studies::reproduce::write::digits;
@@ -18,7 +18,7 @@ use specgen_studies::verdict::{Figure, Subject};
 
 use super::section::{Grid, Rows, Section};
 
-pub use pane::{Shown, pane, short};
+pub use pane::{PlottedRun, pane, short};
 pub(crate) use pane::{error_groups, round_up};
 
 /// Names of the coordinates.
@@ -58,7 +58,7 @@ impl Course {
 
 /// A trajectory of the spec at a frequency, followed by the simulated machine.
 #[derive(Debug, Clone)]
-pub struct Followed {
+pub struct TrackedPath {
     /// Of the trajectory.
     pub name: String,
     /// Operating frequency, Hz; none: a waveform, which has one speed.
@@ -71,7 +71,7 @@ pub struct Followed {
     pub run: Option<PlatformRun>,
 }
 
-impl Followed {
+impl TrackedPath {
     /// `1 Hz`, or `as it is` for a waveform.
     #[must_use]
     pub fn speed(&self) -> String {
@@ -126,12 +126,12 @@ pub fn mode_of(controller: &Controller) -> u32 {
 /// # Errors
 /// As [`Course::run`].
 pub fn follow(
-    compiled: &Compiled,
+    compiled: &Compilation,
     task: &TaskSpace,
     machine: &PlatformScenario,
     controller: &mut Controller,
     progress: &dyn Fn(&str),
-) -> Result<Vec<Followed>, RunError> {
+) -> Result<Vec<TrackedPath>, RunError> {
     let mut sampled = machine.clone();
     sampled.options = RunOptions { record: Record::Samples, ..machine.options.clone() };
     let mode = mode_of(controller);
@@ -141,7 +141,7 @@ pub fn follow(
         let name = &one.name;
         let mut follow = |frequency: Option<f64>, own: bool, course: Course| -> Result<(), RunError> {
             let run = Some(course.run(&sampled, controller)?).filter(PlatformRun::is_followed);
-            all.push(Followed { name: name.clone(), frequency, own, course, run });
+            all.push(TrackedPath { name: name.clone(), frequency, own, course, run });
             Ok(())
         };
         match &one.kind {
@@ -175,7 +175,7 @@ pub fn follow(
 
 /// What the runs say to the limits of the spec, nm and nrad rms; what has no limit is not judged.
 #[must_use]
-pub fn judged(model: &Model, all: &[Followed]) -> Vec<Figure> {
+pub fn judged(model: &Model, all: &[TrackedPath]) -> Vec<Figure> {
     let mut figures = Vec::new();
     for one in all {
         let Some((rms, coverage)) = one.rms().zip(one.coverage()) else { continue };
@@ -221,7 +221,7 @@ pub struct Line {
 
 /// Lines of the trajectories of a platform, position (nm) or angle (nrad): norm of three axes.
 #[must_use]
-pub fn lines(model: &Model, noise: Option<&[f64; 6]>, all: &[Followed], turning: bool) -> Vec<Line> {
+pub fn lines(model: &Model, noise: Option<&[f64; 6]>, all: &[TrackedPath], turning: bool) -> Vec<Line> {
     let mut lines = Vec::new();
     if let Some(noise) = noise {
         let nano = noise.map(|v| v * 1e9);
@@ -317,12 +317,12 @@ pub fn dumbbell(lines: &[Line], speeds: [Option<String>; 2], unit: &str) -> Rows
 
 /// The section: each trajectory at each speed, axis by axis.
 #[must_use]
-pub fn section(all: &[Followed], law: &str, interval: f64, corners: bool, command: &str) -> Section {
+pub fn section(all: &[TrackedPath], law: &str, interval: f64, corners: bool, command: &str) -> Section {
     let mut section = Section::new("tracking", "Tracking", command);
     // What is hardest to follow is seen first.
-    let hardest = |one: &&Followed| one.rms().map_or(-1.0, |rms| norm(&rms, false));
+    let hardest = |one: &&TrackedPath| one.rms().map_or(-1.0, |rms| norm(&rms, false));
     let first = all.iter().max_by(|a, b| hardest(a).total_cmp(&hardest(b))).map(|one| one.name.clone());
-    let mut ordered: Vec<&Followed> = all.iter().collect();
+    let mut ordered: Vec<&TrackedPath> = all.iter().collect();
     ordered.sort_by_key(|one| (Some(&one.name) != first.as_ref(), Some(&one.name) != first.as_ref() || one.own));
     let mut refused = Vec::new();
     for one in ordered {
@@ -331,7 +331,7 @@ pub fn section(all: &[Followed], law: &str, interval: f64, corners: bool, comman
             refused.push(format!("{} at {speed}", one.name));
             continue;
         };
-        let shown = Shown {
+        let shown = PlottedRun {
             id: format!(
                 "{}-{}",
                 one.name,

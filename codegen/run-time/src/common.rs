@@ -8,7 +8,7 @@ use specgen_ir::{Ir, LEGS};
 use specgen_law::{ControlLaw, Reset, Spec, StateOf};
 use specgen_runtime::snapshot::Sizes;
 use specgen_runtime::supervisor::Supervision;
-use specgen_runtime::{Dac, Legs, Permitted, Real};
+use specgen_runtime::{Dac, Legs, PermittedRange, Real};
 
 use crate::InvalidIr;
 use crate::convert::Convert;
@@ -123,7 +123,7 @@ impl<C: Constants> Spec for AtRunTime<C> {
         inverse_jacobian -> &[[C::Real; LEGS]; 6] = &constants.common().inverse_jacobian;
         corrections -> usize = constants.common().corrections;
         pose_bound -> &[C::Real; 6] = &constants.common().pose_bound;
-        permitted -> &[(Permitted<C::Real>, usize)] = &constants.common().permitted;
+        permitted -> &[(PermittedRange<C::Real>, usize)] = &constants.common().permitted;
         sizes -> Sizes = constants.common().sizes;
     }
 
@@ -145,7 +145,7 @@ pub struct Common<T: Real> {
     pub inverse_jacobian: [[T; LEGS]; 6],
     pub corrections: usize,
     pub pose_bound: [T; 6],
-    pub permitted: Vec<(Permitted<T>, usize)>,
+    pub permitted: Vec<(PermittedRange<T>, usize)>,
     pub sizes: Sizes,
     /// At reset.
     pub memory: Box<[Memory<T>; LEGS]>,

@@ -9,7 +9,7 @@ use specgen_law::{
     Config, ControlLaw as _, Input as _, InputOf, Machine, MachineInput, SettingsOf, Spec as _, StateOf,
     write_machine_output,
 };
-use specgen_runtime::snapshot::{Reader, Snapshot as _, Words as _, Writer};
+use specgen_runtime::snapshot::{Reader, Snapshot as _, WordSink as _, Writer};
 use specgen_runtime::{Digest, Real as _};
 
 use crate::common::{AtRunTime, Constants};

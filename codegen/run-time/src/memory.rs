@@ -6,7 +6,7 @@ use std::fmt::Debug;
 use specgen_ir::constants::Numbers as _;
 use specgen_ir::{Hysteresis, LEGS, RateModel};
 use specgen_law::LegMemory;
-use specgen_runtime::snapshot::{Field, Invalid, Reader, Words};
+use specgen_runtime::snapshot::{Field, InvalidState, Reader, WordSink};
 use specgen_runtime::{
     Creep, CreepEverett, CreepMemory, DynamicEverett, DynamicMemory, LastLine, Nodes, Real, ReversalMemory, Snapshot,
 };
@@ -117,11 +117,11 @@ impl<T: Real> Memory<T> {
 }
 
 impl<T: Real> Snapshot for Memory<T> {
-    fn show(&self, words: &mut impl Words) -> Result<(), Infallible> {
+    fn show(&self, words: &mut impl WordSink) -> Result<(), Infallible> {
         each!(self, memory => memory.show(words))
     }
 
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), InvalidState> {
         each!(self, memory => memory.restore(words))
     }
 }

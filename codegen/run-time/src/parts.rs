@@ -7,8 +7,8 @@ use specgen_law::legs::{DeadTimeLead, Lead};
 use specgen_runtime::attitude::horner;
 use specgen_runtime::linear::each;
 use specgen_runtime::setpoint::{Frames, Parallel, Target, Tool, Work};
-use specgen_runtime::snapshot::{Field, Invalid, Reader, Words};
-use specgen_runtime::trigger::{Line, MOST, OutputLines, Seen, Triggers};
+use specgen_runtime::snapshot::{Field, InvalidState, Reader, WordSink};
+use specgen_runtime::trigger::{Line, MOST, Observation, OutputLines, Triggers};
 use specgen_runtime::{
     Correction, CorrectionLimit, Damping, GaugeCalibration, ModalDamping, Real, RequestCorrection, Resonator, Snapshot,
 };
@@ -26,11 +26,11 @@ impl<S: Field> Field for Optional<S> {
 }
 
 impl<S: Snapshot> Snapshot for Optional<S> {
-    fn show(&self, words: &mut impl Words) -> Result<(), Infallible> {
+    fn show(&self, words: &mut impl WordSink) -> Result<(), Infallible> {
         if self.given { self.part.show(words) } else { Ok(()) }
     }
 
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), InvalidState> {
         if self.given { self.part.restore(words) } else { Ok(()) }
     }
 }
@@ -89,7 +89,7 @@ impl<T: Real> LineSettings<T> {
 
 impl<T: Real + Debug> RequestCorrection<T> for Optional<Correction<T, 6>> {
     type Limits = Option<[CorrectionLimit<T>; 6]>;
-    type Wanted = UpTo<T, 6>;
+    type Offsets = UpTo<T, 6>;
     const REST: Self = Self { given: false, part: Correction::new() };
 
     fn rest(&mut self) {
@@ -172,11 +172,11 @@ impl<T: Real> Field for Lines<T> {
 }
 
 impl<T: Real> Snapshot for Lines<T> {
-    fn show(&self, words: &mut impl Words) -> Result<(), Infallible> {
+    fn show(&self, words: &mut impl WordSink) -> Result<(), Infallible> {
         lines!(self, lines => lines.show(words), Ok(()))
     }
 
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), InvalidState> {
         lines!(self, lines => lines.restore(words), Ok(()))
     }
 }
@@ -189,7 +189,7 @@ impl<T: Real + Debug> OutputLines<T> for Lines<T> {
         !matches!(self, Self::None)
     }
 
-    fn tick(&mut self, settings: &LineSettings<T>, seen: &Seen<'_, T>) -> u32 {
+    fn tick(&mut self, settings: &LineSettings<T>, seen: &Observation<'_, T>) -> u32 {
         lines!(self, lines => settings.values.first_chunk().map_or(0, |settings| lines.tick(settings, seen)), 0)
     }
 

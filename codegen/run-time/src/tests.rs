@@ -69,12 +69,12 @@ fn name(place: Place, sources: &mut BTreeMap<String, String>) -> String {
 type Numbers = BTreeSet<usize>;
 
 /// Constants of a spec by their name: all, and those of which an ulp is not seen.
-struct Found {
+struct ConstantCounts {
     all: usize,
     unseen: BTreeMap<String, Numbers>,
 }
 
-fn trial(spec: &str) -> Found {
+fn trial(spec: &str) -> ConstantCounts {
     let compiled =
         compile(&here().join("../../specs").join(spec)).unwrap_or_else(|refused| panic!("{:?}", refused.findings));
     let good = with_one_ulp(&compiled.ir, None);
@@ -82,7 +82,7 @@ fn trial(spec: &str) -> Found {
     let trial = Trial::of(&compiled, &good);
     let expected = trial.digests(&good, None);
     assert_eq!(trial.digests(&good, Some(&expected)), expected, "{spec}: a trial that repeats");
-    let (mut found, mut sources) = (Found { all: 0, unseen: BTreeMap::new() }, BTreeMap::new());
+    let (mut found, mut sources) = (ConstantCounts { all: 0, unseen: BTreeMap::new() }, BTreeMap::new());
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for (number, place) in places.iter().enumerate() {
         let Some(place) = place else { continue };

@@ -107,7 +107,7 @@ impl fmt::Display for Origin {
 
 /// Range of one factor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Varied {
+pub struct FactorRange {
     /// Which.
     pub factor: Factor,
     /// Smallest and largest value.
@@ -118,7 +118,7 @@ pub struct Varied {
 
 /// A range that a user gives: `mass=5 %`, `gain=0.9:1.1`, `delay_ticks=2`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Given {
+pub struct UserRange {
     /// Which.
     pub factor: Factor,
     /// Smallest and largest value.
@@ -130,7 +130,7 @@ const LARGEST: f64 = 10.0;
 /// Most ticks of delay, as in the key table.
 const MOST_TICKS: f64 = 100.0;
 
-impl Given {
+impl UserRange {
     /// Reads `NAME=RANGE`.
     ///
     /// # Errors
@@ -186,12 +186,12 @@ fn check(factor: Factor, [low, high]: [f64; 2]) -> Result<(), String> {
 
 /// Every factor with its range.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Factors(Vec<Varied>);
+pub struct Factors(Vec<FactorRange>);
 
 impl Factors {
     /// Of the options, else of the spec, else by default.
     #[must_use]
-    pub fn of(model: &Model, given: &[Given]) -> Self {
+    pub fn of(model: &Model, given: &[UserRange]) -> Self {
         let declared = &model.robust;
         let about = |part: f64| [1.0 - part, 1.0 + part];
         let one = |factor: Factor| {
@@ -216,13 +216,13 @@ impl Factors {
                 (None, Some(range)) => (range, Origin::Spec),
                 (None, None) => (default, Origin::Default),
             };
-            Varied { factor, range, origin }
+            FactorRange { factor, range, origin }
         };
         Self(Factor::ALL.into_iter().map(one).collect())
     }
 
     /// In the order of [`Factor::ALL`].
-    pub fn iter(&self) -> impl Iterator<Item = &Varied> {
+    pub fn iter(&self) -> impl Iterator<Item = &FactorRange> {
         self.0.iter()
     }
 
@@ -240,7 +240,7 @@ mod tests {
 
     #[test]
     fn ranges_are_read_in_three_ways() {
-        let range = |text: &str| Given::parse(text).map(|given| (given.factor, given.range));
+        let range = |text: &str| UserRange::parse(text).map(|given| (given.factor, given.range));
         let (factor, [low, high]) = range("mass=5 %").unwrap();
         assert!(factor == Factor::Mass && (low - 0.95).abs() < 1e-12 && (high - 1.05).abs() < 1e-12);
         assert_eq!(range("gain = 0.9 : 1.1"), Ok((Factor::Gain, [0.9, 1.1])));
@@ -266,7 +266,7 @@ mod tests {
             ("delay_ticks=101", "from 0 to 100"),
             ("delay_ticks=10%", "delay_ticks=1"),
         ] {
-            let error = Given::parse(text).unwrap_err();
+            let error = UserRange::parse(text).unwrap_err();
             assert!(error.contains(fix), "{text}: {error}");
         }
     }

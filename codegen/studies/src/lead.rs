@@ -11,7 +11,7 @@
 //! less motion make τ less. Hysteresis is not in the model.
 
 use serde::Serialize;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::stability::platform::ClosedLoop;
 use specgen_language::model::{self, TrajectoryKind};
 
@@ -44,7 +44,7 @@ impl LeadOf {
 
 /// Of each trajectory of the paper's kinds; none for six legs. Waveforms are splines without corners: the usual lead is theirs.
 #[must_use]
-pub fn of(compiled: &Compiled) -> Vec<LeadOf> {
+pub fn of(compiled: &Compilation) -> Vec<LeadOf> {
     let model = &compiled.model;
     let Some((task, learnable)) = model.task_space.as_ref().zip(Learnable::of(compiled)) else { return Vec::new() };
     let usual = compiled.design.as_ref().map_or(0.0, |design| design.lead);

@@ -24,11 +24,13 @@ mod update;
 
 pub use convergence::{Convergence, LARGEST_RADIUS, Learnable};
 pub use excitation::{Excitation, PASSES};
-pub use heard::Heard;
+pub use heard::ModeMeasurement;
 pub use motion::Motion;
-pub use passes::{Ending, LearnError, Learned, Learner, Pass, Repeating, course, held, learn, translation_nm};
+pub use passes::{
+    Ending, LearnError, Learner, LearningResult, Pass, RepeatableMachine, course, held, learn, translation_nm,
+};
 pub use plan::Plan;
 pub use response::{Bin, Response};
-pub use seen::Seen;
+pub use seen::PassObservation;
 pub use table::{Table, TableError, knots};
 pub use update::Update;

@@ -11,7 +11,7 @@ use host_sim::platform::rig::{Noise, OnBoard, PlatformRig, RunOptions};
 use host_sim::platform::{GaugeSignal, Joints, PlatformParameters, PlatformScenario, Probe, Specimen, UserFrames};
 use host_sim::scenario::LegScenario;
 
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::model::{Model, TaskSpace};
 use specgen_language::outcome::Failure;
 
@@ -90,7 +90,7 @@ pub fn scenario(model: &Model, task: &TaskSpace, specimen: &Specimen, noise: &No
 
 /// The trajectory of the spec with this number, as its controller plays it; none if it has no such one.
 #[must_use]
-pub fn on_board(compiled: &Compiled, selector: u32) -> Option<OnBoard> {
+pub fn on_board(compiled: &Compilation, selector: u32) -> Option<OnBoard> {
     let setpoints = &compiled.ir.task_space.as_ref()?.setpoints;
     let path = &setpoints.trajectories.get(selector as usize)?.path;
     let approach = Some(path.start()).filter(|start| *start != setpoints.home);

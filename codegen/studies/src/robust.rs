@@ -17,7 +17,7 @@ pub mod shard;
 pub use crate::factors::{self, Factor, Factors, Origin};
 pub use deviation::Deviation;
 pub use gate::Gate;
-pub use learning::{Learning, Learnt};
+pub use learning::{Learning, LearningFigures};
 pub use plan::{Member, Plan};
 pub use run::{Figures, Outcome, Study};
 pub use shard::Shard;

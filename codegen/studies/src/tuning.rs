@@ -19,7 +19,7 @@ pub mod setting;
 pub mod space;
 pub mod write;
 
-pub use evaluate::{Case, Conditions, Evaluation, Observed, Score, TrajectoryChoice};
+pub use evaluate::{Case, Conditions, Evaluation, Score, TickErrors, TrajectoryChoice};
 pub use search::{Candidate, Optimiser, Search, SearchOptions};
 pub use setting::Setting;
-pub use space::{Space, What};
+pub use space::{Space, TunedNumbers};

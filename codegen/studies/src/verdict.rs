@@ -6,9 +6,9 @@ mod known;
 use serde::Serialize;
 
 use specgen_compiler::assumed::Assumptions;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::diagnostic::Severity;
-use specgen_toolchain::budget::{self, Used, group};
+use specgen_toolchain::budget::{self, ImageUsage, group};
 
 use crate::verify::{Inspection, Measurement};
 
@@ -60,7 +60,7 @@ pub struct Verdict {
 impl Verdict {
     /// What is known of a spec that compiled, before it is built. `unmeasured`: why it is not.
     #[must_use]
-    pub fn of(compiled: &Compiled, unmeasured: &str) -> Self {
+    pub fn of(compiled: &Compilation, unmeasured: &str) -> Self {
         let warnings = compiled.findings.iter().filter(|finding| finding.severity == Severity::Warning).count();
         let mut verdict = Self {
             name: compiled.ir.name.clone(),
@@ -88,7 +88,7 @@ impl Verdict {
     }
 
     /// Adds what a run on the emulated machine showed.
-    pub fn measured(&mut self, compiled: &Compiled, measurement: &Measurement) {
+    pub fn measured(&mut self, compiled: &Compilation, measurement: &Measurement) {
         self.unmeasured = None;
         self.image(compiled, &measurement.used, measurement.checks.faults.iter().map(|fault| &fault.text));
         if let Some(step) = measurement.stage("step") {
@@ -107,11 +107,11 @@ impl Verdict {
     }
 
     /// Adds what an image shows that was not run, for the reason that [`Verdict::unmeasured`] gives.
-    pub fn inspected(&mut self, compiled: &Compiled, inspection: &Inspection) {
+    pub fn inspected(&mut self, compiled: &Compilation, inspection: &Inspection) {
         self.image(compiled, &inspection.used, inspection.checks.faults.iter().map(|fault| &fault.text));
     }
 
-    fn image<'a>(&mut self, compiled: &Compiled, used: &Used, faults: impl Iterator<Item = &'a String>) {
+    fn image<'a>(&mut self, compiled: &Compilation, used: &ImageUsage, faults: impl Iterator<Item = &'a String>) {
         for held in budget::held(&compiled.model.target, used) {
             let (subject, unit) =
                 if held.what == "instructions" { (Subject::Time, "instructions") } else { (Subject::Memory, "bytes") };

@@ -14,8 +14,8 @@ use serde::Serialize;
 
 use specgen_compiler::ir::Ir;
 use specgen_language::model::{Mcu, Model};
-use specgen_toolchain::budget::Used;
-use specgen_toolchain::checks::{self, Checked, Rules};
+use specgen_toolchain::budget::ImageUsage;
+use specgen_toolchain::checks::{self, Rules, TickChecks};
 use specgen_toolchain::targets::{Kind, Target};
 use specgen_toolchain::time::{Clocks, Estimate};
 use specgen_toolchain::{self as target, Image, TargetError, image, size, stack};
@@ -54,7 +54,7 @@ pub struct Measurement {
     pub code: u64,
     /// Of these, constants (tables).
     pub constants: u64,
-    /// Bytes of RAM taken statically, plus Config and State: all but the stack, which [`Used::ram`] has, too.
+    /// Bytes of RAM taken statically, plus Config and State: all but the stack, which [`ImageUsage::ram`] has, too.
     pub ram_without_stack: u64,
     /// Bytes of State.
     pub state: u64,
@@ -73,9 +73,9 @@ pub struct Measurement {
     /// First word that differs from the host's, in words.
     pub first_difference: Option<String>,
     /// What the tick must not do, looked for in the image.
-    pub checks: Checked,
+    pub checks: TickChecks,
     /// What a budget is held against.
-    pub used: Used,
+    pub used: ImageUsage,
     /// How long a tick takes on the spec's board, if it has one; see [`time_board`].
     pub time: Option<Estimate>,
 }
@@ -102,9 +102,9 @@ pub struct Inspection {
     /// Panic or allocator symbols in the image.
     pub forbidden_symbols: Vec<String>,
     /// What the tick must not do, looked for in the image.
-    pub checks: Checked,
+    pub checks: TickChecks,
     /// What a budget is held against.
-    pub used: Used,
+    pub used: ImageUsage,
 }
 
 /// Instructions of one stage.
@@ -234,7 +234,11 @@ pub fn time_board(
 }
 
 /// What the replay image uses, and who of it. Without a run neither Config and State are known, nor with them the RAM, nor instructions.
-fn used(image: &Image, stats: Option<&target::replay::ReplayStats>, checks: &Checked) -> Result<Used, TargetError> {
+fn used(
+    image: &Image,
+    stats: Option<&target::replay::ReplayStats>,
+    checks: &TickChecks,
+) -> Result<ImageUsage, TargetError> {
     let size = size::size(&image.elf)?;
     let stack = checks.stack.unwrap_or(0);
     let words = stats.map_or(Vec::new(), |stats| {
@@ -247,7 +251,7 @@ fn used(image: &Image, stats: Option<&target::replay::ReplayStats>, checks: &Che
         .chain(size.variables.iter().cloned())
         .collect();
     let ram_least = size.ram() + words.iter().map(|(_, bytes)| bytes).sum::<u64>() + stack;
-    Ok(Used {
+    Ok(ImageUsage {
         flash: size.flash(),
         flash_by: size.owners.iter().map(|owner| (owner.name.clone(), owner.flash())).collect(),
         ram: stats.is_some().then_some(ram_least).filter(|_| checks.stack.is_some()),

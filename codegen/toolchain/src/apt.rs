@@ -145,7 +145,7 @@ impl Apt {
         Err(refusal(&said))
     }
 
-    fn call(&self, options: &[&str], packages: &[&str]) -> Result<process::Finished, Refusal> {
+    fn call(&self, options: &[&str], packages: &[&str]) -> Result<process::ProgramOutput, Refusal> {
         let failed = |error: io::Error| Refusal::other(format!("apt-get cannot be run: {error}"));
         let scratch = Scratch::new().map_err(failed)?;
         let mut command = Command::new(&self.words[0]);

@@ -9,7 +9,7 @@ const NAMED: usize = 3;
 
 /// Figures of a built image.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Used {
+pub struct ImageUsage {
     /// Bytes of flash.
     pub flash: u64,
     /// Who takes them: name, bytes.
@@ -32,7 +32,7 @@ pub struct Used {
 
 /// A figure, and what holds it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Held {
+pub struct BudgetLine {
     /// `flash`, `RAM`, `stack` or `instructions`.
     pub what: &'static str,
     /// Bytes; mean instructions of a tick.
@@ -44,36 +44,37 @@ pub struct Held {
 /// Every figure with its limit. What is not known is left out: RAM of which a part is missing, a stack without a bound, instructions that were
 /// not counted.
 #[must_use]
-pub fn held(target: &Target, used: &Used) -> Vec<Held> {
+pub fn held(target: &Target, used: &ImageUsage) -> Vec<BudgetLine> {
     let (part, budget) = (target.mcu.part(), &target.budget);
     let limit = |declared: Option<u64>, key: &str, has: u64| match declared {
         Some(bytes) => (bytes, format!("target.budget.{key}")),
         None => (has, part.name.to_owned()),
     };
-    let mut held = vec![Held { what: "flash", used: used.flash, most: Some(limit(budget.flash, "flash", part.flash)) }];
+    let mut held =
+        vec![BudgetLine { what: "flash", used: used.flash, most: Some(limit(budget.flash, "flash", part.flash)) }];
     let ram = || Some(limit(budget.ram, "ram", part.ram));
-    held.extend(used.ram.map(|ram_used| Held { what: "RAM", used: ram_used, most: ram() }));
+    held.extend(used.ram.map(|ram_used| BudgetLine { what: "RAM", used: ram_used, most: ram() }));
     if let Some(stack) = used.stack {
-        held.push(Held { what: "stack", used: stack, most: Some(limit(budget.stack, "stack", part.ram)) });
+        held.push(BudgetLine { what: "stack", used: stack, most: Some(limit(budget.stack, "stack", part.ram)) });
     }
     if let Some(instructions) = used.instructions {
         let most = budget.instructions.map(|most| (most, "target.budget.instructions".to_owned()));
-        held.push(Held { what: "instructions", used: instructions, most });
+        held.push(BudgetLine { what: "instructions", used: instructions, most });
     }
     held
 }
 
 /// What is over budget, in words; nothing if all is within.
 #[must_use]
-pub fn over(target: &Target, used: &Used) -> Vec<String> {
+pub fn over(target: &Target, used: &ImageUsage) -> Vec<String> {
     let mut over = Vec::new();
     let mut held = held(target, used);
     if used.ram.is_none() {
         // A part that is too much is enough.
-        let part = Used { ram: Some(used.ram_least), ..Used::default() };
+        let part = ImageUsage { ram: Some(used.ram_least), ..ImageUsage::default() };
         held.extend(self::held(target, &part).into_iter().filter(|one| one.what == "RAM"));
     }
-    for Held { what, used: amount, most } in held {
+    for BudgetLine { what, used: amount, most } in held {
         let Some((most, from)) = most.filter(|(most, _)| amount > *most) else { continue };
         let (unit, by) = match what {
             "flash" => ("bytes", &used.flash_by),
@@ -129,9 +130,9 @@ mod tests {
     use super::*;
     use specgen_language::model::{Budget, Mcu};
 
-    fn used() -> Used {
+    fn used() -> ImageUsage {
         let list = |parts: &[(&str, u64)]| parts.iter().map(|(name, amount)| ((*name).to_owned(), *amount)).collect();
-        Used {
+        ImageUsage {
             flash: 60_000,
             flash_by: list(&[("core", 5000), ("controller", 40_000), ("runtime", 15_000)]),
             ram: Some(9000),
@@ -164,13 +165,17 @@ mod tests {
         assert!(words.contains("shrink it by 1; most of it: controller 40,000 (67 %), runtime"), "{words}");
         (target.budget.ram, target.budget.stack) = (Some(1), Some(1));
         assert_eq!(over(&target, &used()).len(), 4);
-        assert!(over(&target, &Used { stack: None, ..used() }).iter().any(|words| words.contains("cannot be bounded")));
+        assert!(
+            over(&target, &ImageUsage { stack: None, ..used() })
+                .iter()
+                .any(|words| words.contains("cannot be bounded"))
+        );
     }
 
     #[test]
     fn ram_of_which_a_part_is_missing_is_no_figure_and_may_be_too_much_all_the_same() {
         let mut target = Target { mcu: Mcu::Mps2An500, budget: Budget { ram: Some(2000), ..Budget::NONE } };
-        let part = Used { ram: None, ram_least: 1440, ..used() };
+        let part = ImageUsage { ram: None, ram_least: 1440, ..used() };
         assert!(held(&target, &part).iter().all(|one| one.what != "RAM"));
         assert_eq!(over(&target, &part), Vec::<String>::new());
         target.budget.ram = Some(1439);
@@ -182,7 +187,7 @@ mod tests {
     fn without_a_budget_the_part_is_the_limit() {
         let target = Target { mcu: Mcu::named("stm32f446re").unwrap(), budget: Budget::NONE };
         assert_eq!(over(&target, &used()), Vec::<String>::new());
-        let words = over(&target, &Used { flash: 600_000, ..used() }).join("\n");
+        let words = over(&target, &ImageUsage { flash: 600_000, ..used() }).join("\n");
         assert!(words.contains("stm32f446re has 524,288") && words.contains("shrink it by 75,712"), "{words}");
     }
 

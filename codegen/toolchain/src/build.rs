@@ -3,7 +3,7 @@
 use super::cache;
 use super::error::TargetError;
 use super::panics;
-use super::process::{self, Finished};
+use super::process::{self, ProgramOutput};
 use super::toolchain::{self, Toolchain};
 use specgen_language::interrupt::Scratch;
 use specgen_language::model::Mcu;
@@ -188,7 +188,7 @@ pub(super) fn cargo_artifact(
 }
 
 /// What cargo printed, in our words where we know better.
-fn failure(what: &str, finished: &Finished) -> TargetError {
+fn failure(what: &str, finished: &ProgramOutput) -> TargetError {
     let text = useful_part(&finished.stderr);
     if finished.status.is_none() {
         let text = format!("still running after {} s, ended; it had printed:\n{text}", LIMIT.as_secs());

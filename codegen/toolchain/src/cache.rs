@@ -63,7 +63,7 @@ pub struct Extent {
 
 /// What was found under a key.
 #[derive(Debug, PartialEq, Eq)]
-struct Found {
+struct CachedFile {
     /// Where cargo had left it in its target folder.
     place: PathBuf,
     bytes: Vec<u8>,
@@ -137,7 +137,7 @@ impl Cache {
     }
 
     /// What is kept under this key, if it is there and whole.
-    fn fetch(&self, key: &str) -> Option<Found> {
+    fn fetch(&self, key: &str) -> Option<CachedFile> {
         let path = self.folder.join(key);
         let mut file = File::open(&path).ok()?;
         let mut content = Vec::new();
@@ -212,7 +212,7 @@ fn pack(key: &str, place: &Path, bytes: &[u8]) -> Vec<u8> {
     [digest.as_bytes(), b"\n", &body].concat()
 }
 
-fn unpack(key: &str, content: &[u8]) -> Option<Found> {
+fn unpack(key: &str, content: &[u8]) -> Option<CachedFile> {
     let (digest, body) = content.split_at_checked(64)?;
     let body = body.strip_prefix(b"\n")?;
     if digest != sha256(&[key.as_bytes(), b"\n", body].concat()).as_bytes() {
@@ -221,7 +221,7 @@ fn unpack(key: &str, content: &[u8]) -> Option<Found> {
     let end = body.iter().position(|&byte| byte == b'\n')?;
     let place = PathBuf::from(std::str::from_utf8(&body[..end]).ok()?);
     let is_below = place.components().all(|part| matches!(part, Component::Normal(_)));
-    is_below.then(|| Found { place, bytes: body[end + 1..].to_vec() })
+    is_below.then(|| CachedFile { place, bytes: body[end + 1..].to_vec() })
 }
 
 /// One build to be made or taken.
@@ -247,7 +247,7 @@ impl Slot {
     /// # Errors
     /// [`TargetError::Io`] if it cannot be put there.
     pub fn fetch(&self, target_dir: &Path) -> Result<Option<(PathBuf, Vec<u8>)>, TargetError> {
-        let Some(Found { place, bytes }) = self.cache.fetch(&self.recipe.key()) else { return Ok(None) };
+        let Some(CachedFile { place, bytes }) = self.cache.fetch(&self.recipe.key()) else { return Ok(None) };
         let path = target_dir.join(place);
         put(&path, &bytes)?;
         Ok(Some((path, bytes)))

@@ -53,7 +53,7 @@ pub struct Fault {
 
 /// What was found out about the tick of an image.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Checked {
+pub struct TickChecks {
     /// The function that counts as one tick.
     pub tick: String,
     /// Functions that it can reach, itself included.
@@ -72,7 +72,7 @@ pub struct Checked {
 ///
 /// # Errors
 /// [`TargetError::MalformedImage`] if the file is damaged or has no such function.
-pub fn check(elf: &[u8], tick: Option<&str>, rules: Rules) -> Result<Checked, TargetError> {
+pub fn check(elf: &[u8], tick: Option<&str>, rules: Rules) -> Result<TickChecks, TargetError> {
     let graph = CallGraph::read(elf)?;
     let debug = panics::debug_info(elf)?;
     let named = tick.or_else(|| TICKS.into_iter().find(|name| graph.symbols.contains_key(*name)));
@@ -122,7 +122,7 @@ pub fn check(elf: &[u8], tick: Option<&str>, rules: Rules) -> Result<Checked, Ta
         }
     }
     faults.sort_by_key(|fault| fault.rule);
-    Ok(Checked {
+    Ok(TickChecks {
         tick: root.to_owned(),
         functions: reach.parents.len(),
         code: bound.code_bytes,
@@ -132,7 +132,7 @@ pub fn check(elf: &[u8], tick: Option<&str>, rules: Rules) -> Result<Checked, Ta
     })
 }
 
-impl Checked {
+impl TickChecks {
     /// Adds the fault of a tick that was seen to use more stack than the bound.
     pub fn hold_against_painted(&mut self, painted: u64) {
         if let Some(bound) = self.stack
@@ -270,7 +270,7 @@ mod tests {
 
     #[test]
     fn a_bound_below_what_was_painted_is_a_fault() {
-        let mut checked = Checked {
+        let mut checked = TickChecks {
             tick: "t".to_owned(),
             functions: 1,
             code: 2,

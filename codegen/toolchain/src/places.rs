@@ -55,8 +55,8 @@ impl Places {
 
     /// The packages that were unpacked under this name, if they were.
     #[must_use]
-    pub fn unpacked(&self, name: &str) -> Option<Unpacked> {
-        Unpacked::at(&self.unpacked.as_deref()?.join(name))
+    pub fn unpacked(&self, name: &str) -> Option<PackageFolder> {
+        PackageFolder::at(&self.unpacked.as_deref()?.join(name))
     }
 
     /// Where packages are unpacked to.
@@ -68,11 +68,11 @@ impl Places {
 
 /// A folder with unpacked packages.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unpacked {
+pub struct PackageFolder {
     root: PathBuf,
 }
 
-impl Unpacked {
+impl PackageFolder {
     /// The folder, if it is there.
     #[must_use]
     pub fn at(root: &Path) -> Option<Self> {

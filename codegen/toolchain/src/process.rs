@@ -8,7 +8,7 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 /// What a program printed and how it ended.
-pub struct Finished {
+pub struct ProgramOutput {
     /// `None` if it was ended at the time limit.
     pub status: Option<ExitStatus>,
     /// Standard output, with anything that is not UTF-8 replaced.
@@ -17,7 +17,7 @@ pub struct Finished {
     pub stderr: String,
 }
 
-impl Finished {
+impl ProgramOutput {
     /// It ended by itself and says that all is well.
     pub fn success(&self) -> bool {
         self.status.is_some_and(|status| status.success())
@@ -90,7 +90,7 @@ pub fn with_libraries<'a>(command: &'a mut Command, folders: &[PathBuf]) -> &'a 
 
 /// Runs to the end, or to the limit, with what it prints going to two files in `scratch`: a pipe
 /// that nobody empties would stop the program.
-pub fn run(command: &mut Command, scratch: &Path, limit: Duration) -> io::Result<Finished> {
+pub fn run(command: &mut Command, scratch: &Path, limit: Duration) -> io::Result<ProgramOutput> {
     let out = scratch.join("specgen-stdout.txt");
     let err = scratch.join("specgen-stderr.txt");
     command.stdin(Stdio::null()).stdout(File::create(&out)?).stderr(File::create(&err)?);
@@ -110,7 +110,7 @@ pub fn run(command: &mut Command, scratch: &Path, limit: Duration) -> io::Result
         pause = (pause * 2).min(Duration::from_millis(50));
     };
     let read = |path: &Path| std::fs::read(path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
-    Ok(Finished { status, stdout: read(&out)?, stderr: read(&err)? })
+    Ok(ProgramOutput { status, stdout: read(&out)?, stderr: read(&err)? })
 }
 
 /// The first file of that name in the folders of `PATH`.

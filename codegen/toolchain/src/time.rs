@@ -20,7 +20,7 @@ use specgen_language::model::Mcu;
 use super::checks;
 use super::error::TargetError;
 use super::image::RECORDER;
-use super::trace::{Computed, Memory, Moved, Share, Trace};
+use super::trace::{Memory, Share, TickShares, Trace, Transfers};
 
 /// The symbol of a board's [`Clocks`]: `firmware/stm32/src/times.rs`.
 const SYMBOL: &str = "SPECGEN_TIMES";
@@ -156,7 +156,7 @@ pub struct Estimate {
     /// What the law takes of a core.
     pub law: Law,
     /// Bytes, frames, waits of the tick with the most of them.
-    pub moved: Moved,
+    pub moved: Transfers,
     /// The shortest period that leaves a little, in steps of 1 µs.
     pub shortest: f64,
 }
@@ -169,13 +169,13 @@ impl Estimate {
     pub fn of(mcu: Mcu, clocks: &Clocks, trace: &Trace<'_>, period: f64, spread: f64) -> Result<Self, TargetError> {
         let ticks = trace.price(&clocks.memory())?;
         let microseconds = |cycles: u64| cycles as f64 * 1e6 / clocks.core as f64;
-        let most = |of: fn(&Computed) -> u64| ticks.iter().map(of).max().unwrap_or(0);
+        let most = |of: fn(&TickShares) -> u64| ticks.iter().map(of).max().unwrap_or(0);
         let count = ticks.len().max(1) as u64;
         let mean = |of: fn(&Share) -> u64| ticks.iter().map(|tick| of(&tick.law)).sum::<u64>() / count;
         let mean = Share { instructions: mean(|law| law.instructions), cycles: mean(|law| law.cycles) };
         let law = most(|tick| tick.law.cycles).max((mean.cycles as f64 * spread) as u64);
         // The wave and the recorder's block do not come in every tick; a worst one has them all.
-        let sum = |moved: &Moved| -> (f64, f64, f64) {
+        let sum = |moved: &Transfers| -> (f64, f64, f64) {
             let [adc_byte, adc_frame, dac_byte, dac_frame, ..] = clocks.buses();
             let pins = clocks.cycles(Work { reads: moved.looks, writes: moved.edges, instructions: 0 });
             (
@@ -184,7 +184,7 @@ impl Estimate {
                 moved.waits as f64 / 1e3 + microseconds(pins),
             )
         };
-        let whole = |moved: &Moved| {
+        let whole = |moved: &Transfers| {
             let (adc, dac, waits) = sum(moved);
             adc + dac + waits
         };
@@ -253,7 +253,7 @@ mod tests {
             worst,
             parts: Vec::new(),
             law: Law::default(),
-            moved: Moved::default(),
+            moved: Transfers::default(),
             shortest: up(worst * MARGIN),
         }
     }

@@ -37,7 +37,7 @@ pub struct Share {
 
 /// What a tick takes, by who takes it.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
-pub struct Computed {
+pub struct TickShares {
     /// The law under its supervisor.
     pub law: Share,
     /// The recorder: row, digest, settings, snapshot.
@@ -48,7 +48,7 @@ pub struct Computed {
     pub board: Share,
 }
 
-impl Computed {
+impl TickShares {
     /// All of it.
     #[must_use]
     pub fn whole(&self) -> Share {
@@ -77,7 +77,7 @@ pub struct Memory {
 
 /// What a tick did with its converters, as `firmware/tick` counts it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Moved {
+pub struct Transfers {
     /// Bytes from the ADC.
     pub adc_bytes: u64,
     /// In so many frames.
@@ -94,7 +94,7 @@ pub struct Moved {
     pub edges: u64,
 }
 
-impl Moved {
+impl Transfers {
     fn of(words: &[u64; 7]) -> Self {
         let [adc_bytes, adc_frames, dac_bytes, dac_frames, waits, looks, edges] = *words;
         Self { adc_bytes, adc_frames, dac_bytes, dac_frames, waits, looks, edges }
@@ -108,7 +108,7 @@ pub struct Trace<'a> {
     /// Runs of blocks that follow each other.
     ticks: Vec<Vec<Vec<u64>>>,
     /// By tick.
-    pub moved: Vec<Moved>,
+    pub moved: Vec<Transfers>,
 }
 
 /// Runs the image on `inputs`, rows as for [`replay`](super::replay()), with the words that `firmware/tick` reads from `rates.bin`.
@@ -128,7 +128,7 @@ pub fn trace<'a>(
     let log = folder.path().join("blocks.log");
     emulator.run(image, folder.path(), &["-d", "exec,nochain", "-D", "blocks.log"], limit)?;
     let counts = read_words(&folder.path().join("counts.bin"))?;
-    let moved: Vec<Moved> = counts.as_chunks().0.iter().map(Moved::of).collect();
+    let moved: Vec<Transfers> = counts.as_chunks().0.iter().map(Transfers::of).collect();
 
     let mut reader = Reader { marks: marks(&image.elf)?, ticks: Vec::new(), within: false, aside: false };
     let reading = |error| TargetError::io("reading", &log, error);
@@ -197,7 +197,7 @@ impl Trace<'_> {
     ///
     /// # Errors
     /// [`TargetError::MalformedImage`] if blocks do not follow each other as the image says.
-    pub fn price(&self, memory: &Memory) -> Result<Vec<Computed>, TargetError> {
+    pub fn price(&self, memory: &Memory) -> Result<Vec<TickShares>, TargetError> {
         let code = Code::of(self.elf)?;
         let debug = panics::debug_info(self.elf)?;
         let mut places = BTreeMap::new();
@@ -207,7 +207,7 @@ impl Trace<'_> {
                 let mut cost = Cost::new(memory.family, true);
                 let [access, control] = memory.registers;
                 cost.configure(access, control);
-                let mut computed = Computed::default();
+                let mut computed = TickShares::default();
                 for pair in blocks.iter().flat_map(|run| run.windows(2)) {
                     code.walk(pair[0], pair[1], |instruction| {
                         let address = instruction.place + if memory.tightly_coupled { 0 } else { memory.flash };
@@ -220,10 +220,10 @@ impl Trace<'_> {
                             cycles += (0..words).map(|_| cost.data(memory.recorder, true)).sum::<u64>();
                         }
                         let share = match who {
-                            Who::Law => &mut computed.law,
-                            Who::Recorder => &mut computed.recorder,
-                            Who::Wave => &mut computed.wave,
-                            Who::Board => &mut computed.board,
+                            CodeOwner::Law => &mut computed.law,
+                            CodeOwner::Recorder => &mut computed.recorder,
+                            CodeOwner::Wave => &mut computed.wave,
+                            CodeOwner::Board => &mut computed.board,
                         };
                         share.instructions += 1;
                         share.cycles += cycles;
@@ -237,7 +237,7 @@ impl Trace<'_> {
 
 /// For whom an instruction was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Who {
+enum CodeOwner {
     Law,
     Recorder,
     Wave,
@@ -245,13 +245,13 @@ enum Who {
 }
 
 /// By the file of its line, and of those that it was inlined into; whether what it stores goes to the recorder's memory.
-fn who(debug: &DebugInfo<'_>, address: u64) -> (Who, bool) {
-    let mut found = (Who::Board, false);
+fn who(debug: &DebugInfo<'_>, address: u64) -> (CodeOwner, bool) {
+    let mut found = (CodeOwner::Board, false);
     let Ok(mut frames) = debug.find_frames(address).skip_all_loads() else { return found };
     while let Ok(Some(frame)) = frames.next() {
         let file = frame.location.and_then(|location| location.file).unwrap_or_default();
         match of_file(file) {
-            Some((Who::Law, _)) => found = (Who::Law, false),
+            Some((CodeOwner::Law, _)) => found = (CodeOwner::Law, false),
             Some(other) => return other,
             None => {}
         }
@@ -260,7 +260,7 @@ fn who(debug: &DebugInfo<'_>, address: u64) -> (Who, bool) {
 }
 
 /// For whom a line of a file was written, by its crate and its place there, never by the folders above; none if its callers say.
-fn of_file(path: &str) -> Option<(Who, bool)> {
+fn of_file(path: &str) -> Option<(CodeOwner, bool)> {
     let (owner, file) = owner::source_of(path);
     let is_law = matches!(owner.as_str(), "controller" | "law" | "runtime");
     if !is_law && owner != "board" {
@@ -269,12 +269,12 @@ fn of_file(path: &str) -> Option<(Who, bool)> {
     let name = file.rsplit('/').next().unwrap_or_default();
     match name {
         // A block begins with the state, which the snapshot writes where the block lies.
-        "ring.rs" | "snapshot.rs" => Some((Who::Recorder, true)),
-        _ if file.starts_with("snapshot/") => Some((Who::Recorder, true)),
-        "recorder.rs" | "record.rs" | "recording.rs" | "digest.rs" => Some((Who::Recorder, false)),
-        "wave.rs" | "waves.rs" => Some((Who::Wave, false)),
-        _ if file.starts_with("wave/") => Some((Who::Wave, false)),
-        _ => is_law.then_some((Who::Law, false)),
+        "ring.rs" | "snapshot.rs" => Some((CodeOwner::Recorder, true)),
+        _ if file.starts_with("snapshot/") => Some((CodeOwner::Recorder, true)),
+        "recorder.rs" | "record.rs" | "recording.rs" | "digest.rs" => Some((CodeOwner::Recorder, false)),
+        "wave.rs" | "waves.rs" => Some((CodeOwner::Wave, false)),
+        _ if file.starts_with("wave/") => Some((CodeOwner::Wave, false)),
+        _ => is_law.then_some((CodeOwner::Law, false)),
     }
 }
 
@@ -361,11 +361,11 @@ mod tests {
     #[test]
     fn who_wrote_an_instruction_does_not_depend_on_the_folder() {
         let [law, board, recorder, far, wave] = [
-            Some((Who::Law, false)),
+            Some((CodeOwner::Law, false)),
             None,
-            Some((Who::Recorder, false)),
-            Some((Who::Recorder, true)),
-            Some((Who::Wave, false)),
+            Some((CodeOwner::Recorder, false)),
+            Some((CodeOwner::Recorder, true)),
+            Some((CodeOwner::Wave, false)),
         ];
         // What a controller is made of, relative as cargo has it, and below folders whose names say something else.
         for folder in

@@ -16,8 +16,8 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal_bus::spi::ExclusiveDevice;
 use embedded_io::{Read, ReadReady, Write};
 use specgen_board::{
-    Access, Board, Desk, Exchange, Health, Kept, Noticed, PERIOD_NANOSECONDS, Probes, Schedule, Stopwatch, Visit,
-    catch_up,
+    Access, Board, Exchange, Health, LinkHandler, MachineSnapshot, PERIOD_NANOSECONDS, Probes, RequestContext,
+    Schedule, Stopwatch, TargetStatus, catch_up,
 };
 use specgen_link::Endpoint;
 
@@ -58,7 +58,7 @@ type OnBoard = Board<'static, Gauges, Amplifiers>;
 // SAFETY: nothing else has the name.
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn specgen_tick(board: &mut OnBoard, exchange: &mut Exchange, noticed: Noticed) -> bool {
+fn specgen_tick(board: &mut OnBoard, exchange: &mut Exchange, noticed: TargetStatus) -> bool {
     board.timed_tick(exchange, noticed, timer::now)
 }
 
@@ -77,7 +77,7 @@ pub struct Running {
 pub struct Link {
     uart: BufferedUart<'static>,
     endpoint: Endpoint,
-    desk: Desk,
+    desk: LinkHandler,
 }
 
 /// Clocks, pins, converters: the board at power-up, its amplifiers off. `machine` is at reset. None if something is not as it has
@@ -85,7 +85,7 @@ pub struct Link {
 pub fn start(
     machine: &'static mut Machine,
     record: &'static mut [u64; RECORD],
-    kept: &'static mut Kept,
+    kept: &'static mut MachineSnapshot,
     buffers: &'static mut [[u8; 512]; 2],
 ) -> Option<(Running, Link)> {
     let p = embassy_stm32::init(clocks());
@@ -119,7 +119,7 @@ pub fn start(
     // Contacts to ground: open is a stop, a fault of the amplifiers.
     let (stop, fault) = (Input::new(p.PB12, Pull::Up), Input::new(p.PB13, Pull::Up));
     let running = Running { board, exchange, schedule, health: Health::new(), watchdog, stop, fault };
-    Some((running, Link { uart, endpoint: Endpoint::new(), desk: Desk::new(Stopwatch::NONE) }))
+    Some((running, Link { uart, endpoint: Endpoint::new(), desk: LinkHandler::new(Stopwatch::NONE) }))
 }
 
 /// 8 MHz from outside, core 400 MHz, timers 200 MHz, SPI 100 MHz.
@@ -160,7 +160,7 @@ impl Running {
         timer::acknowledge();
         let due = self.schedule.begin(begin);
         timer::arm(due.next);
-        let noticed = Noticed { missed: due.missed, stop: self.stop.is_high(), amplifier: self.fault.is_high() };
+        let noticed = TargetStatus { missed: due.missed, stop: self.stop.is_high(), amplifier: self.fault.is_high() };
         if specgen_tick(&mut self.board, &mut self.exchange, noticed) {
             // It started the converters anew, which takes longer than a tick.
             timer::arm(self.schedule.restart(timer::now()));
@@ -191,7 +191,7 @@ impl Link {
             // A frame in which a byte was lost has a wrong CRC, and the host asks again.
             let Ok(count) = self.uart.read(&mut bytes) else { break };
             for byte in bytes.iter().take(count) {
-                let mut visit = Visit { desk: &mut self.desk, with: &mut *with };
+                let mut visit = RequestContext { desk: &mut self.desk, with: &mut *with };
                 if let Some(answer) = self.endpoint.push(*byte, &mut visit) {
                     let _ = self.uart.write_all(answer);
                 }

@@ -11,13 +11,13 @@ use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges, Lines};
 use specgen_link::Silence;
 use specgen_runtime::pending::EDGE;
 
-use crate::exchange::{self, Exchange, Orders};
+use crate::exchange::{self, Exchange, TickCommand};
 use crate::report::Report;
 use crate::words::GAUGE_BITS;
 
 /// What the target noticed since the last tick.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Noticed {
+pub struct TargetStatus {
     /// Ticks in a row that never came.
     pub missed: u32,
     /// The emergency stop is open.
@@ -121,13 +121,13 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
     /// A new request to acknowledge starts the converters again while the amplifiers are off, whatever the cause was: both are
     /// proved before they get power again. The supervisor hears of the request in the tick after that, when nothing that was
     /// read before the start is left to contradict it.
-    pub fn tick(&mut self, exchange: &mut Exchange, noticed: Noticed) -> bool {
+    pub fn tick(&mut self, exchange: &mut Exchange, noticed: TargetStatus) -> bool {
         self.timed_tick(exchange, noticed, || 0)
     }
 
     /// The same, where `now` is the counter of [`Probes::hertz`](crate::Probes::hertz).
     #[inline]
-    pub fn timed_tick(&mut self, exchange: &mut Exchange, noticed: Noticed, now: impl Fn() -> u32) -> bool {
+    pub fn timed_tick(&mut self, exchange: &mut Exchange, noticed: TargetStatus, now: impl Fn() -> u32) -> bool {
         if exchange.in_lockstep() {
             self.stand_by(exchange, noticed);
             return false;
@@ -227,7 +227,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
 
     /// A tick while the host steps the machine: amplifiers off, codes as they are, which is at rest. A host that falls silent
     /// gives the machine back.
-    fn stand_by(&mut self, exchange: &mut Exchange, noticed: Noticed) {
+    fn stand_by(&mut self, exchange: &mut Exchange, noticed: TargetStatus) {
         let report = &mut exchange.report;
         self.done(report, |amplifiers| amplifiers.enable(false));
         if let Some(codes) = self.codes {
@@ -281,7 +281,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
 #[inline(never)]
 fn take<'a>(
     slot: &'a mut Option<MachineInput>,
-    orders: &Orders,
+    orders: &TickCommand,
     readings: &[Real; CHANNELS],
     request: Request,
     events: u32,

@@ -6,7 +6,7 @@ use controller::{COMMAND_WORDS, CONFIG_WORDS, DESCRIPTION, PLACE_WORDS, Real, pa
 use specgen_link::lockstep::{Session, piece};
 use specgen_link::samples::Block;
 use specgen_link::{
-    Bytes, Counted, Counters, Device, EdgeStatus, Identity, KNOT, KNOTS, PassAction, PassStatus, RecorderAction,
+    Bytes, CostUnit, Counters, Device, EdgeStatus, Identity, KNOT, KNOTS, PassAction, PassStatus, RecorderAction,
     Refusal, Reply, Request, Status, WaveAction, put_knots,
 };
 use specgen_runtime::learning::Settings as Plan;
@@ -16,7 +16,7 @@ use specgen_runtime::wave::{self, Settings};
 
 use crate::catch_up::catch_up;
 use crate::download::{self, Download};
-use crate::exchange::{Access, Awaited, Exchange};
+use crate::exchange::{Access, EdgeCommand, Exchange};
 use crate::gather::with_rows;
 use crate::recording;
 use crate::report::{Probes, Report};
@@ -40,7 +40,7 @@ const fn larger(a: usize, b: usize) -> usize {
 /// What lies behind the desk of the background. Everything else is in the [`Exchange`], which it looks into for as long as a copy
 /// takes.
 #[derive(Debug)]
-pub struct Desk {
+pub struct LinkHandler {
     stopwatch: Stopwatch,
     costs: Costs,
     session: Session<WORDS>,
@@ -50,14 +50,14 @@ pub struct Desk {
 }
 
 /// A desk while bytes are looked at. `dyn`, so that there is one copy of it, compiled as this crate is.
-pub struct Visit<'d, 'a> {
+pub struct RequestContext<'d, 'a> {
     /// The desk.
-    pub desk: &'d mut Desk,
+    pub desk: &'d mut LinkHandler,
     /// The access.
     pub with: &'d mut Access<'a>,
 }
 
-impl Desk {
+impl LinkHandler {
     /// At power-up.
     #[must_use]
     pub const fn new(stopwatch: Stopwatch) -> Self {
@@ -67,7 +67,7 @@ impl Desk {
 
 /// What takes much of the stack is not inlined: only one of it is then there at a time, and nothing of it while the answer is
 /// written.
-impl Visit<'_, '_> {
+impl RequestContext<'_, '_> {
     fn identity(&mut self) -> Identity {
         self.desk.session.end();
         (self.with)(&mut |exchange, machine| {
@@ -85,7 +85,7 @@ impl Visit<'_, '_> {
             config_words: CONFIG_WORDS as u16,
             input_words: MACHINE_INPUT_WORDS as u16,
             output_words: MACHINE_OUTPUT_WORDS as u16,
-            stages: u8::from(self.desk.stopwatch.counted != Counted::Nothing),
+            stages: u8::from(self.desk.stopwatch.counted != CostUnit::Nothing),
             counted: self.desk.stopwatch.counted,
             description: DESCRIPTION.len() as u32,
         }
@@ -170,7 +170,7 @@ impl Visit<'_, '_> {
             return Reply::Refused(Refusal::Length { expected: COMMAND_WORDS as u16 });
         }
         if on_edge {
-            return self.wait_for_edge(Awaited::Command(command), None);
+            return self.wait_for_edge(EdgeCommand::Command(command), None);
         }
         self.order(|exchange| {
             // What came before it runs would be followed when nobody expects it any more.
@@ -183,7 +183,7 @@ impl Visit<'_, '_> {
         })
     }
 
-    fn wait_for_edge(&mut self, awaited: Awaited, wave: Option<Wave>) -> Reply<'static> {
+    fn wait_for_edge(&mut self, awaited: EdgeCommand, wave: Option<Wave>) -> Reply<'static> {
         let mut done = Ok(());
         (self.with)(&mut |exchange, _| done = exchange.wait_for_edge(awaited, wave));
         done.map_or_else(Reply::Refused, |()| Reply::Done)
@@ -229,7 +229,7 @@ impl Visit<'_, '_> {
         // What it stopped with.
         catch_up(with, || false);
         let mut refusal = Refusal::Unsupported;
-        let Desk { download, session, .. } = &mut *self.desk;
+        let LinkHandler { download, session, .. } = &mut *self.desk;
         let found = download.read(offset, session.buffer(), |action: &mut dyn FnMut(&_)| {
             let mut stands = false;
             with(&mut |exchange, _| {
@@ -284,7 +284,7 @@ impl Visit<'_, '_> {
             return Reply::Refused(refusal(refused));
         }
         if on_edge {
-            return self.wait_for_edge(Awaited::Wave, Some(wave));
+            return self.wait_for_edge(EdgeCommand::Wave, Some(wave));
         }
         wave.start();
         let center = settings.center;
@@ -422,7 +422,7 @@ impl Visit<'_, '_> {
         if !may {
             return Reply::Refused(Refusal::State);
         }
-        let Desk { stopwatch, costs, session, .. } = &mut *self.desk;
+        let LinkHandler { stopwatch, costs, session, .. } = &mut *self.desk;
         let reply = session.reset(&mut Stepper { stopwatch: *stopwatch, costs, with: &mut *self.with }, config);
         if reply != Reply::Done && !was {
             // Settings that were refused have changed nothing.
@@ -439,7 +439,7 @@ impl Visit<'_, '_> {
         if !steps {
             return Reply::Refused(Refusal::State);
         }
-        let Desk { stopwatch, costs, session, .. } = &mut *self.desk;
+        let LinkHandler { stopwatch, costs, session, .. } = &mut *self.desk;
         session.step(&mut Stepper { stopwatch: *stopwatch, costs, with: &mut *self.with }, input)
     }
 }
@@ -456,17 +456,17 @@ pub(crate) fn standing(player: &Player<'_, Real>) -> PassStatus {
 
 /// The settings of a wave, whose words are done with before the wave is made. None if there are too few or too many.
 #[inline(never)]
-fn settings(bytes: Bytes<'_>) -> Option<Result<Settings<Real>, wave::Refused>> {
+fn settings(bytes: Bytes<'_>) -> Option<Result<Settings<Real>, wave::Refusal>> {
     let mut words = [0; wave::WORDS];
     bytes.read_words(&mut words).then(|| Settings::from_words(&words))
 }
 
 /// Why a wave is refused, as the link says it.
-fn refusal(refused: wave::Refused) -> Refusal {
+fn refusal(refused: wave::Refusal) -> Refusal {
     refused.word().map_or(Refusal::State, |index| Refusal::Word { index: index as u16 })
 }
 
-impl Device for Visit<'_, '_> {
+impl Device for RequestContext<'_, '_> {
     fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
         (self.with)(&mut |exchange, _| exchange.host_alive());
         match *request {
@@ -482,7 +482,7 @@ impl Device for Visit<'_, '_> {
             Request::Edge { drop } => self.edge(drop),
             Request::ReadConfig => self.config(),
             Request::WriteConfig { words } => {
-                let Desk { stopwatch, costs, session, .. } = &mut *self.desk;
+                let LinkHandler { stopwatch, costs, session, .. } = &mut *self.desk;
                 session.configure(&mut Stepper { stopwatch: *stopwatch, costs, with: &mut *self.with }, words)
             }
             #[cfg(feature = "lockstep")]
@@ -490,7 +490,7 @@ impl Device for Visit<'_, '_> {
             #[cfg(feature = "lockstep")]
             Request::LockstepStep { input } => self.step(input),
             #[cfg(feature = "lockstep")]
-            Request::LockstepStage { index: 0 } if self.desk.stopwatch.counted != Counted::Nothing => {
+            Request::LockstepStage { index: 0 } if self.desk.stopwatch.counted != CostUnit::Nothing => {
                 Reply::Stage(self.desk.costs.stage())
             }
             #[cfg(not(feature = "lockstep"))]

@@ -35,8 +35,8 @@ pub(crate) struct Download {
 }
 
 /// What the background may do while the tick is held off: it gets the recorder, none if it records or there is none.
-pub(crate) trait Look: FnMut(&mut dyn FnMut(&Recorder<'static>)) -> bool {}
-impl<F: FnMut(&mut dyn FnMut(&Recorder<'static>)) -> bool> Look for F {}
+pub(crate) trait RecorderAccess: FnMut(&mut dyn FnMut(&Recorder<'static>)) -> bool {}
+impl<F: FnMut(&mut dyn FnMut(&Recorder<'static>)) -> bool> RecorderAccess for F {}
 
 impl Download {
     pub(crate) const fn new() -> Self {
@@ -49,7 +49,7 @@ impl Download {
         &mut self,
         offset: u32,
         piece: &'p mut [u8],
-        mut look: impl Look,
+        mut look: impl RecorderAccess,
     ) -> Option<(u32, &'p [u8])> {
         let offset = usize::try_from(offset).unwrap_or(usize::MAX);
         let mut words = [0; WORDS];
@@ -95,7 +95,7 @@ impl Download {
     }
 
     /// Brings the checksum of a block to its end, where not every piece was asked for in order. None if it records again.
-    fn catch_up(&mut self, block: usize, length: usize, look: &mut impl Look) -> Option<()> {
+    fn catch_up(&mut self, block: usize, length: usize, look: &mut impl RecorderAccess) -> Option<()> {
         if self.block != block || self.summed > length {
             (self.crc, self.block, self.summed) = (Crc32::new(), block, 0);
         }
@@ -151,7 +151,7 @@ fn find(recorder: &Recorder<'static>, offset: usize) -> (Place, usize) {
 }
 
 /// Copies words of a block, a few at a time; how many. None if it records again.
-fn copied(block: usize, first: usize, out: &mut [u64; WORDS], look: &mut impl Look) -> Option<usize> {
+fn copied(block: usize, first: usize, out: &mut [u64; WORDS], look: &mut impl RecorderAccess) -> Option<usize> {
     let mut count = 0;
     for few in out.as_chunks_mut::<AT_ONCE>().0 {
         let before = count;

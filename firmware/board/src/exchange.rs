@@ -7,12 +7,12 @@ use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, Config, Real, passes, triggers};
 use specgen_link::{PassStatus, Refusal, Silence};
 use specgen_runtime::pass::{Course, Player};
-use specgen_runtime::pending::Pending;
+use specgen_runtime::pending::EdgeWait;
 use specgen_runtime::playback::Knot;
 use specgen_runtime::setpoint::BUSY;
 use specgen_runtime::wave::Stage;
 
-use crate::recording::{Kept, recorder};
+use crate::recording::{MachineSnapshot, recorder};
 use crate::report::{Probes, Report};
 use crate::samples::{self, SampleMemory, Samples};
 #[cfg(feature = "lockstep")]
@@ -24,7 +24,7 @@ const LOCKSTEP_TIMEOUT: u32 = 2_000_000_000;
 
 /// What the background wants of the ticks to come.
 #[derive(Debug, Clone, Copy)]
-pub struct Orders {
+pub struct TickCommand {
     /// Input words of the controller that are no measurements.
     pub command: [u64; COMMAND_WORDS],
     /// Of the supervisor; it holds for as long as it stands here.
@@ -33,7 +33,7 @@ pub struct Orders {
 
 /// What waits for the edge of the input line.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Awaited {
+pub(crate) enum EdgeCommand {
     /// This command.
     Command([u64; COMMAND_WORDS]),
     /// The wave of [`Exchange::wave`], which has not begun.
@@ -44,7 +44,7 @@ pub(crate) enum Awaited {
 #[derive(Debug)]
 pub struct Exchange {
     /// What is wanted.
-    pub orders: Orders,
+    pub orders: TickCommand,
     /// Settings in force.
     pub config: Config,
     /// Settings that came: in force after the next tick, see [`Exchange::prepare`].
@@ -62,11 +62,11 @@ pub struct Exchange {
     /// Keeps what the ticks do, where a memory was given for it.
     pub recorder: Option<Recorder<'static>>,
     /// What it owes is written from this, see [`catch_up`](crate::catch_up); none while the background has it.
-    pub(crate) kept: Option<&'static mut Kept>,
+    pub(crate) kept: Option<&'static mut MachineSnapshot>,
     /// Makes the set-points while it is under way.
     pub wave: Option<Wave>,
     /// The input line, and what waits for it.
-    pub(crate) pending: Pending<Awaited>,
+    pub(crate) pending: EdgeWait<EdgeCommand>,
     /// Corrects the motion while a pass is under way, where a memory was given for it.
     pub player: Option<Player<'static, Real>>,
     /// How the player stands while the background has it, which learns.
@@ -93,7 +93,7 @@ impl Exchange {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            orders: Orders { command: [0; COMMAND_WORDS], request: Request::None },
+            orders: TickCommand { command: [0; COMMAND_WORDS], request: Request::None },
             config: Config::new(),
             next: None,
             report: Report::NONE,
@@ -104,7 +104,7 @@ impl Exchange {
             recorder: None,
             kept: None,
             wave: None,
-            pending: Pending::new(),
+            pending: EdgeWait::new(),
             player: None,
             away: None,
             samples: None,
@@ -116,7 +116,7 @@ impl Exchange {
     /// Records into this memory from here on, waiting for a fault; then as much is kept after it as before. Nothing is recorded
     /// if not even two blocks fit, which a controller of very long memory may do to a small part. The background has to call
     /// [`catch_up`](crate::catch_up).
-    pub fn record(&mut self, memory: &'static mut [u64], kept: &'static mut Kept) {
+    pub fn record(&mut self, memory: &'static mut [u64], kept: &'static mut MachineSnapshot) {
         self.recorder = recorder(memory);
         self.kept = Some(kept);
     }
@@ -210,11 +210,11 @@ impl Exchange {
         let Some(awaited) = self.pending.due() else { return };
         let (free, status) = (!self.is_engaged() && self.report.status & BUSY == 0, self.report.status);
         let begun = match (awaited, &mut self.wave) {
-            (Awaited::Command(command), _) if free => {
+            (EdgeCommand::Command(command), _) if free => {
                 self.orders.command = command;
                 true
             }
-            (Awaited::Wave, Some(wave)) if free => {
+            (EdgeCommand::Wave, Some(wave)) if free => {
                 let limits = waves::limits(&self.config);
                 let may = waves::may_begin(status, &self.orders.command, wave.center(), &limits).is_ok();
                 if may {
@@ -239,7 +239,7 @@ impl Exchange {
     ///
     /// # Errors
     /// The machine does not run at rest, or plays something; there is no input line.
-    pub(crate) fn wait_for_edge(&mut self, awaited: Awaited, wave: Option<Wave>) -> Result<(), Refusal> {
+    pub(crate) fn wait_for_edge(&mut self, awaited: EdgeCommand, wave: Option<Wave>) -> Result<(), Refusal> {
         if !triggers::INPUT {
             return Err(Refusal::Unsupported);
         }

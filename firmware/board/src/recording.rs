@@ -59,18 +59,18 @@ pub(crate) fn is_stopped(recorder: &Recorder<'static>) -> bool {
 
 /// A machine and its settings as they were after a tick: what the recorder owes is written from it, while ticks go on.
 #[derive(Debug)]
-pub struct Kept {
+pub struct MachineSnapshot {
     config: Config,
     machine: Machine,
 }
 
-impl Default for Kept {
+impl Default for MachineSnapshot {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl Kept {
+impl MachineSnapshot {
     /// Nothing in it yet.
     #[must_use]
     pub const fn new() -> Self {

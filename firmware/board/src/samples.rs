@@ -21,7 +21,7 @@ pub(crate) const POSSIBLE: bool = PLACE_WORDS > 0;
 
 /// What a tick leaves.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Copied {
+pub(crate) struct TickSample {
     tick: u64,
     status: u32,
     phase: u8,
@@ -30,7 +30,7 @@ pub(crate) struct Copied {
     codes: [i32; LEGS],
 }
 
-impl Copied {
+impl TickSample {
     pub(crate) fn sample(&self) -> Sample {
         let [target, pose] = self.shown;
         let (mut error, mut volts) = ([0.0; AXES], [0.0; AXES]);
@@ -49,7 +49,7 @@ impl Copied {
 /// Memory for samples, 6 KiB. It need not be initialised.
 #[derive(Debug)]
 pub struct SampleMemory {
-    copies: [Copied; COPIES],
+    copies: [TickSample; COPIES],
     rows: Rows,
 }
 
@@ -65,7 +65,7 @@ impl SampleMemory {
     /// Zeros.
     #[must_use]
     pub const fn new() -> Self {
-        let nothing = Copied { tick: 0, status: 0, phase: 0, shown: [[0.0; AXES]; 2], codes: [0; LEGS] };
+        let nothing = TickSample { tick: 0, status: 0, phase: 0, shown: [[0.0; AXES]; 2], codes: [0; LEGS] };
         Self { copies: [nothing; COPIES], rows: Collector::new([Block::EMPTY; BLOCKS]) }
     }
 }
@@ -78,7 +78,7 @@ pub(crate) struct Samples {
     /// Rows begin anew; also at power-up, when nothing is known of their memory.
     pub(crate) anew: bool,
     /// A ring: the oldest, and how many wait.
-    copies: &'static mut [Copied; COPIES],
+    copies: &'static mut [TickSample; COPIES],
     first: usize,
     waiting: usize,
     /// None while the background is at it.
@@ -118,12 +118,12 @@ impl Samples {
         let Some(shown) = passes::shown(&machine.state).filter(|_| self.waiting < COPIES) else { return };
         if let Some(slot) = self.copies.get_mut((self.first + self.waiting) % COPIES) {
             let (status, phase) = (output.tick.status, output.phase.word() as u8);
-            *slot = Copied { tick, status, phase, shown, codes: output.tick.dac_code };
+            *slot = TickSample { tick, status, phase, shown, codes: output.tick.dac_code };
             self.waiting += 1;
         }
     }
 
-    pub(crate) fn pop(&mut self) -> Option<Copied> {
+    pub(crate) fn pop(&mut self) -> Option<TickSample> {
         self.waiting = self.waiting.checked_sub(1)?;
         let oldest = self.first;
         self.first = (oldest + 1) % COPIES;

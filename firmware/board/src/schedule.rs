@@ -4,7 +4,7 @@ use core::num::NonZeroU32;
 
 /// A tick that is due now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Due {
+pub struct DueTick {
     /// Counts from when it was due until it began.
     pub late: u32,
     /// Ticks between the last and this one that never came.
@@ -40,14 +40,14 @@ impl Schedule {
     }
 
     /// The tick begins at counter value `now`.
-    pub const fn begin(&mut self, now: u32) -> Due {
+    pub const fn begin(&mut self, now: u32) -> DueTick {
         // Before its time, by a spurious interrupt, counts as in time. By more than a period it is one that was stopped for long.
         let early = self.due.wrapping_sub(now) <= self.period.get();
         let late = if early { 0 } else { now.wrapping_sub(self.due) };
         // Divided by a number that is not zero.
         let missed = late / self.period.get();
         self.due = self.due.wrapping_add(self.period.get().wrapping_mul(missed)).wrapping_add(self.period.get());
-        Due { late: late - missed * self.period.get(), missed, next: self.due }
+        DueTick { late: late - missed * self.period.get(), missed, next: self.due }
     }
 
     /// Begins anew: what passed since is not counted as missed. For a tick that had to take longer.

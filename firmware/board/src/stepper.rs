@@ -3,7 +3,7 @@
 use controller::snapshot::digest;
 use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, MachineInput, machine_output_words};
 use controller::{CONFIG_WORDS, Config, DESCRIPTION};
-use specgen_link::{Counted, Stage, lockstep};
+use specgen_link::{CostUnit, Stage, lockstep};
 
 use crate::exchange::{self, Access};
 
@@ -14,14 +14,14 @@ const WHOLE: &str = "supervise";
 #[derive(Debug, Clone, Copy)]
 pub struct Stopwatch {
     /// What it counts.
-    pub counted: Counted,
+    pub counted: CostUnit,
     /// The count, which wraps around. Read while nothing interrupts.
     pub now: fn() -> u32,
 }
 
 impl Stopwatch {
     /// Where nothing is counted: on a host.
-    pub const NONE: Self = Self { counted: Counted::Nothing, now: || 0 };
+    pub const NONE: Self = Self { counted: CostUnit::Nothing, now: || 0 };
 }
 
 /// What ticks have cost since power-up.
@@ -73,10 +73,10 @@ impl lockstep::Machine for Stepper<'_, '_> {
     }
 
     fn stages(&self) -> usize {
-        usize::from(self.stopwatch.counted != Counted::Nothing)
+        usize::from(self.stopwatch.counted != CostUnit::Nothing)
     }
 
-    fn counted(&self) -> Counted {
+    fn counted(&self) -> CostUnit {
         self.stopwatch.counted
     }
 

@@ -65,7 +65,7 @@ const fn code_of(millivolts: i32, range: i32, bits: u32) -> i32 {
 }
 
 /// BUSY: high while the part converts.
-pub trait Busy {
+pub trait BusyLine {
     /// Whether it is high.
     ///
     /// # Errors
@@ -75,7 +75,7 @@ pub trait Busy {
     /// Every fall from here on counts.
     fn watch(&mut self) {}
 
-    /// Whether a conversion has ended since [`Busy::watch`], or is under way. A pin that latches no edge tells only the latter.
+    /// Whether a conversion has ended since [`BusyLine::watch`], or is under way. A pin that latches no edge tells only the latter.
     ///
     /// # Errors
     /// [`Fault::Pin`] if it cannot be read.
@@ -84,7 +84,7 @@ pub trait Busy {
     }
 }
 
-impl<PIN: InputPin> Busy for PIN {
+impl<PIN: InputPin> BusyLine for PIN {
     #[inline]
     fn is_high(&mut self) -> Result<bool, Fault> {
         InputPin::is_high(self).map_err(|_| Fault::Pin)
@@ -106,7 +106,7 @@ impl<const BITS: usize, SPI, START, BUSY, RESET, DELAY> Ad7606<BITS, SPI, START,
 where
     SPI: SpiDevice,
     START: Edge,
-    BUSY: Busy,
+    BUSY: BusyLine,
     RESET: OutputPin,
     DELAY: DelayNs,
 {
@@ -165,7 +165,7 @@ impl<const BITS: usize, SPI, START, BUSY, RESET, DELAY> Gauges for Ad7606<BITS, 
 where
     SPI: SpiDevice,
     START: Edge,
-    BUSY: Busy,
+    BUSY: BusyLine,
     RESET: OutputPin,
     DELAY: DelayNs,
 {

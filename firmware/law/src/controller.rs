@@ -139,13 +139,13 @@ macro_rules! controller {
                 inverse_jacobian -> &[[Real; LEGS]; 6] = &geometry::INVERSE_JACOBIAN;
                 corrections -> usize = geometry::CORRECTIONS;
                 pose_bound -> &[Real; 6] = &geometry::POSE_BOUND;
-                permitted -> &[($crate::specgen_runtime::Permitted<Real>, usize)] = &permitted::SETTINGS;
+                permitted -> &[($crate::specgen_runtime::PermittedRange<Real>, usize)] = &permitted::SETTINGS;
                 sizes -> $crate::specgen_runtime::snapshot::Sizes = permitted::STATE;
                 reset -> $crate::Reset<Self> = supervision::at_rest();
             }
         }
 
-        impl $crate::Compiled for Constants {
+        impl $crate::ConstSpec for Constants {
             const CONSTANTS: Self = Self;
             const DEFAULTS: $crate::$law::Settings<Self> = defaults::DEFAULTS;
             type ConfigWords = [u64; CONFIG_WORDS];
@@ -264,7 +264,7 @@ macro_rules! controller {
             use $crate::specgen_runtime::snapshot::Field;
 
             pub use $crate::specgen_runtime::recorder;
-            pub use $crate::specgen_runtime::snapshot::Invalid;
+            pub use $crate::specgen_runtime::snapshot::InvalidState;
 
             /// Words of a [`Machine`].
             pub const MACHINE_STATE_WORDS: usize = Machine::WORDS;

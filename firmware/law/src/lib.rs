@@ -7,7 +7,7 @@
 //! legs with their own gauges. [`supervise`](supervise::supervise) runs either under its supervisor.
 //!
 //! What a law has to know of a spec are the constants and types of a trait: [`Spec`] for both laws, [`platform::Platform`] and
-//! [`legs::SixLegs`] for what only one of them asks for. An emitted controller implements them with constants ([`Compiled`] adds the
+//! [`legs::SixLegs`] for what only one of them asks for. An emitted controller implements them with constants ([`ConstSpec`] adds the
 //! sizes of its memory), and [`controller!`] gives it the names that targets use. The constants are handed on by value: a type without
 //! size where a compiler wrote them, a reference where they are read at run time.
 //!
@@ -30,7 +30,7 @@ pub mod words;
 pub use machine::{MachineInput, MachineOutput, followed_by, write_machine_output};
 pub use memory::LegMemory;
 pub use spec::{
-    Compiled, Config, ConfigError, ControlLaw, Input, InputOf, LEGS, Machine, Reset, Settings, SettingsOf, Spec,
+    Config, ConfigError, ConstSpec, ControlLaw, Input, InputOf, LEGS, Machine, Reset, Settings, SettingsOf, Spec,
     StateOf, TickOutput,
 };
 #[doc(hidden)]

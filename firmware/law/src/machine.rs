@@ -3,7 +3,7 @@
 
 use specgen_runtime::supervisor::{Cause, Phase, Request};
 
-use crate::spec::{Compiled, ControlLaw as _, Input as _, InputOf, Machine, Spec, TickOutput};
+use crate::spec::{ConstSpec, ControlLaw as _, Input as _, InputOf, Machine, Spec, TickOutput};
 
 /// What a tick reads.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +55,7 @@ impl<P: Spec> MachineInput<P> {
     }
 }
 
-impl<P: Compiled> MachineInput<P> {
+impl<P: ConstSpec> MachineInput<P> {
     /// From words in the order of the controller's `MACHINE_INPUT_NAMES`.
     #[must_use]
     pub fn from_words(words: &P::MachineInputWords) -> Self {

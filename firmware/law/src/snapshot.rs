@@ -1,10 +1,10 @@
 //! The machine as 64-bit words and back, and the supervised tick with a recorder.
 
 use specgen_runtime::recorder::{Recorder, Row};
-use specgen_runtime::snapshot::{Invalid, Piece, Reader, Snapshot, Writer};
+use specgen_runtime::snapshot::{InvalidState, Reader, Snapshot, StatePart, Writer};
 
 use crate::machine::{MachineInput, MachineOutput};
-use crate::spec::{Compiled, ControlLaw as _, Input as _, Machine, Spec, TickOutput};
+use crate::spec::{ConstSpec, ControlLaw as _, Input as _, Machine, Spec, TickOutput};
 use crate::words::WordArray as _;
 
 impl<P: Spec> Machine<P> {
@@ -16,11 +16,11 @@ impl<P: Spec> Machine<P> {
     /// Words of it from the `first`-th on, as many as have room.
     #[cold]
     pub fn save_piece(&self, first: usize, words: &mut [u64]) {
-        let Ok(()) = self.show(&mut Piece::new(words, first));
+        let Ok(()) = self.show(&mut StatePart::new(words, first));
     }
 }
 
-impl<P: Compiled> Machine<P> {
+impl<P: ConstSpec> Machine<P> {
     /// Everything that later ticks depend on, as words.
     pub fn save(&self, words: &mut P::MachineWords) {
         self.save_into(words.as_mut());
@@ -30,7 +30,7 @@ impl<P: Compiled> Machine<P> {
     ///
     /// # Errors
     /// The first word that no machine holds: not finite, none of its kind, a code out of limits, no staircase of extrema.
-    pub fn load(words: &P::MachineWords) -> Result<Self, Invalid> {
+    pub fn load(words: &P::MachineWords) -> Result<Self, InvalidState> {
         let mut reader = Reader::new(words.as_ref()).within(P::CONSTANTS.sizes());
         let mut machine = Self::new(P::Law::at_reset(&P::CONSTANTS.reset()));
         machine.restore(&mut reader)?;
@@ -38,7 +38,7 @@ impl<P: Compiled> Machine<P> {
     }
 }
 
-impl<P: Compiled> MachineInput<P> {
+impl<P: ConstSpec> MachineInput<P> {
     /// As words in the order of the controller's `MACHINE_INPUT_NAMES`.
     #[must_use]
     pub fn to_words(&self) -> P::MachineInputWords {
@@ -53,7 +53,7 @@ impl<P: Compiled> MachineInput<P> {
 
 /// What a recorder keeps after a tick.
 #[inline]
-pub fn record_after<P: Compiled>(
+pub fn record_after<P: ConstSpec>(
     machine: &Machine<P>,
     input: &MachineInput<P>,
     output: &MachineOutput<P>,

@@ -7,7 +7,7 @@ use core::fmt::Debug;
 
 use specgen_runtime::snapshot::{Sizes, Writer};
 use specgen_runtime::supervisor::{Fallback, Phase, Supervision};
-use specgen_runtime::{CodeLimits, Dac, Legs, Permitted, Real, Snapshot};
+use specgen_runtime::{CodeLimits, Dac, Legs, PermittedRange, Real, Snapshot};
 
 use crate::memory::LegMemory;
 use crate::words::WordArray;
@@ -48,7 +48,7 @@ pub trait Spec: Copy + Debug + PartialEq + 'static {
     /// Largest |x|, |y|, |z| (m) and |θx|, |θy|, |θz| (rad) accepted.
     fn pose_bound(&self) -> &[Self::Real; 6];
     /// Ranges of the settings, each for so many words.
-    fn permitted(&self) -> &[(Permitted<Self::Real>, usize)];
+    fn permitted(&self) -> &[(PermittedRange<Self::Real>, usize)];
     /// How large the numbers of a state may be.
     fn sizes(&self) -> Sizes;
     /// The legs at reset.
@@ -56,7 +56,7 @@ pub trait Spec: Copy + Debug + PartialEq + 'static {
 }
 
 /// A spec whose constants a compiler wrote, so that all sizes are known. [`controller!`](crate::controller) implements it.
-pub trait Compiled: Spec {
+pub trait ConstSpec: Spec {
     /// The constants.
     const CONSTANTS: Self;
     /// The spec's settings.

@@ -22,13 +22,13 @@ macro_rules! stages {
 
         /// All stages, in the order of the tick.
         #[must_use]
-        pub const fn stages<P: $kind + Compiled>() -> [Stage<P>; STAGE_COUNT] {
+        pub const fn stages<P: $kind + ConstSpec>() -> [Stage<P>; STAGE_COUNT] {
             [$(Stage { name: stringify!($name), calls: $calls, run: $name::<P> }),+]
         }
 
         $(
             $(#[$about])*
-            extern "C" fn $name<P: $kind + Compiled>(
+            extern "C" fn $name<P: $kind + ConstSpec>(
                 $config: &Config<P>,
                 $state: &mut State<P>,
                 $input: &TickInput<P>,

@@ -86,13 +86,13 @@ impl Serialize for Bytes<'_> {
 
 impl<'de: 'a, 'a> Deserialize<'de> for Bytes<'a> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_bytes(Borrowed)
+        deserializer.deserialize_bytes(BytesVisitor)
     }
 }
 
-struct Borrowed;
+struct BytesVisitor;
 
-impl<'de> Visitor<'de> for Borrowed {
+impl<'de> Visitor<'de> for BytesVisitor {
     type Value = Bytes<'de>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

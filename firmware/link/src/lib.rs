@@ -32,7 +32,7 @@ pub use counters::Counters;
 pub use endpoint::{Device, Endpoint, telemetry};
 pub use frame::{Damage, FRAME, Header, Kind, MESSAGE, VERSION};
 pub use message::{
-    Counted, EdgeStatus, Health, Identity, PassAction, PassStatus, RecorderAction, RecorderStatus, Refusal, Reply,
+    CostUnit, EdgeStatus, Health, Identity, PassAction, PassStatus, RecorderAction, RecorderStatus, Refusal, Reply,
     Request, Stage, Status, WaveAction,
 };
 pub use receiver::Receiver;

@@ -3,7 +3,7 @@
 
 use crate::bytes::{Bytes, WORDS, put_words};
 use crate::endpoint::Device;
-use crate::message::{Counted, Identity, Refusal, Reply, Request, Stage};
+use crate::message::{CostUnit, Identity, Refusal, Reply, Request, Stage};
 
 /// A controller that can be stepped from outside.
 pub trait Machine {
@@ -17,7 +17,7 @@ pub trait Machine {
     fn stages(&self) -> usize;
 
     /// In what they are counted.
-    fn counted(&self) -> Counted;
+    fn counted(&self) -> CostUnit;
 
     /// Takes settings; what it remembers stays.
     ///

@@ -296,7 +296,7 @@ pub enum Refusal {
 
 /// What a device counts where it says what something cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Counted {
+pub enum CostUnit {
     /// Nothing.
     Nothing,
     /// Instructions.
@@ -317,7 +317,7 @@ pub struct Identity {
     /// Stages that are counted, the whole tick included.
     pub stages: u8,
     /// In what.
-    pub counted: Counted,
+    pub counted: CostUnit,
     /// Bytes of the controller's description.
     pub description: u32,
 }

@@ -4,7 +4,7 @@ use controller::supervised::{
     MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_at_reset, machine_output_words,
 };
 use controller::{CONFIG_WORDS, Config, DESCRIPTION};
-use specgen_link::{Counted, Stage, WORDS, lockstep};
+use specgen_link::{CostUnit, Stage, WORDS, lockstep};
 
 use crate::counted::counted_tick;
 use crate::instructions::InstructionCounter;
@@ -57,8 +57,8 @@ impl lockstep::Machine for Steps {
         self.stages.all().len()
     }
 
-    fn counted(&self) -> Counted {
-        if self.exact { Counted::Instructions } else { Counted::Nothing }
+    fn counted(&self) -> CostUnit {
+        if self.exact { CostUnit::Instructions } else { CostUnit::Nothing }
     }
 
     fn configure(&mut self, config: &[u64]) -> Result<(), usize> {

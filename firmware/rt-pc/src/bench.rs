@@ -17,8 +17,8 @@ use specgen_rt::{allocation, clock};
 
 use crate::control::{Loop, Timing};
 use crate::devices::{Contacts, Device};
-use crate::handover::{Order, Outer, Row, Shared, Wish, rings};
-use crate::operator::Said;
+use crate::handover::{LoopCommand, OperatorRequest, Outer, Row, Shared, rings};
+use crate::operator::SupervisorReport;
 
 /// Gauges in the middle of their range.
 const MIDDLE: i32 = 1 << 16;
@@ -36,7 +36,7 @@ pub enum Call {
 
 /// Calls that fail from now on.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Broken {
+pub struct InjectedFaults {
     pub read: bool,
     pub beat: bool,
     pub write: bool,
@@ -50,7 +50,7 @@ type Script = Box<dyn FnMut(&mut Bench) + Send>;
 pub struct Bench {
     legs: [Memory; CHANNELS],
     gauges: [i32; CHANNELS],
-    pub broken: Broken,
+    pub broken: InjectedFaults,
     pub contacts: Contacts,
     pub tick: u64,
     /// Tick of the first row that shows it running.
@@ -76,7 +76,7 @@ impl Bench {
         Self {
             legs: [Memory::new(); CHANNELS],
             gauges: [MIDDLE; CHANNELS],
-            broken: Broken::default(),
+            broken: InjectedFaults::default(),
             contacts: Contacts::default(),
             tick: 0,
             ran: None,
@@ -95,12 +95,12 @@ impl Bench {
     }
 
     /// An order for the loop, which takes it after this tick.
-    pub fn order(&mut self, order: Order) {
+    pub fn order(&mut self, order: LoopCommand) {
         self.outer.orders.push(order).expect("room for an order");
     }
 
     pub fn ask(&mut self, request: Request) {
-        self.order(Order::Wish(Wish { command: None, request }));
+        self.order(LoopCommand::Wish(OperatorRequest { command: None, request }));
     }
 
     /// Phase after the last tick.
@@ -151,8 +151,8 @@ pub fn row(tick: u64) -> Row {
 }
 
 /// What the supervisor said in tick 7.
-pub fn said(phase: Phase) -> Said {
-    Said {
+pub fn said(phase: Phase) -> SupervisorReport {
+    SupervisorReport {
         phase,
         cause: Cause::None,
         finding: Finding::None,

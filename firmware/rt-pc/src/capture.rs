@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use controller::snapshot::RECORD_LAYOUT;
 use controller::snapshot::recorder::{Activity, Settings, Trigger};
 
-use crate::handover::{Order, Tape};
+use crate::handover::{LoopCommand, Tape};
 use crate::record;
 
 /// Blocks of the memory, and words of each: together 4 MiB.
@@ -20,7 +20,7 @@ pub const CAPACITY: u32 = {
 };
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Standing {
+pub struct CaptureState {
     pub running: bool,
     pub triggered: bool,
     pub ticks: u64,
@@ -30,7 +30,7 @@ pub struct Standing {
 pub struct Capture {
     here: Option<Tape>,
     settings: Settings,
-    standing: Standing,
+    standing: CaptureState,
     /// Number of the order by which it was last started anew while it was away.
     restarted: Option<u32>,
     /// File of what it holds, as bytes; made when it is first asked for.
@@ -65,7 +65,7 @@ impl Capture {
         let capture = Self {
             here: None,
             settings,
-            standing: Standing { running: true, ..Standing::default() },
+            standing: CaptureState { running: true, ..CaptureState::default() },
             restarted: None,
             image: Vec::new(),
             file: file.map(Path::to_owned),
@@ -74,7 +74,7 @@ impl Capture {
         Ok((capture, tape))
     }
 
-    pub fn standing(&self) -> Standing {
+    pub fn standing(&self) -> CaptureState {
         self.standing
     }
 
@@ -83,36 +83,36 @@ impl Capture {
         if let Some(ticks) = recorded
             && self.here.is_none()
         {
-            self.standing = Standing { running: true, triggered, ticks };
+            self.standing = CaptureState { running: true, triggered, ticks };
         }
     }
 
     /// The order to the loop to record anew, until `after` ticks behind the trigger. `number` is what the order will have.
-    pub fn arm(&mut self, after: u32, number: u32) -> Order {
+    pub fn arm(&mut self, after: u32, number: u32) -> LoopCommand {
         self.settings = settings(after);
-        self.standing = Standing { running: true, ..Standing::default() };
+        self.standing = CaptureState { running: true, ..CaptureState::default() };
         self.image = Vec::new();
         match self.here.take() {
             Some(mut tape) => {
                 tape.start(self.settings);
-                Order::Tape(tape)
+                LoopCommand::Tape(tape)
             }
             None => {
                 self.restarted = Some(number);
-                Order::Record(self.settings)
+                LoopCommand::Record(self.settings)
             }
         }
     }
 
     /// The recorder came back after the loop had taken `taken` orders. An order, if it is to go again: it was started anew when
     /// it was already on its way.
-    pub fn receive(&mut self, mut tape: Tape, taken: u32) -> Option<Order> {
+    pub fn receive(&mut self, mut tape: Tape, taken: u32) -> Option<LoopCommand> {
         if self.restarted.take().is_some_and(|number| number.wrapping_sub(taken).cast_signed() > 0) {
             tape.start(self.settings);
-            return Some(Order::Tape(tape));
+            return Some(LoopCommand::Tape(tape));
         }
         let triggered = self.standing.triggered || tape.activity() == Activity::Complete;
-        self.standing = Standing { running: false, triggered, ticks: tape.rows() };
+        self.standing = CaptureState { running: false, triggered, ticks: tape.rows() };
         // One that was only stopped is written by nobody but the host that downloads it.
         if let Some(path) = self.file.as_ref().filter(|_| triggered) {
             self.written = Some((path.clone(), write(path, &tape)));
@@ -207,11 +207,11 @@ mod tests {
         assert_eq!(tape.capacity() / BLOCKS * (BLOCKS - 1), CAPACITY as usize);
         assert!(tape.capacity() > 10_000, "a second at 10 kHz");
         assert!(capture.image().is_none(), "it is away");
-        assert_eq!(capture.standing(), Standing { running: true, triggered: false, ticks: 0 });
+        assert_eq!(capture.standing(), CaptureState { running: true, triggered: false, ticks: 0 });
         capture.update(None, true);
-        assert_eq!(capture.standing(), Standing { running: true, triggered: false, ticks: 0 });
+        assert_eq!(capture.standing(), CaptureState { running: true, triggered: false, ticks: 0 });
         capture.update(Some(8), true);
-        assert_eq!(capture.standing(), Standing { running: true, triggered: true, ticks: 8 });
+        assert_eq!(capture.standing(), CaptureState { running: true, triggered: true, ticks: 8 });
     }
 
     #[test]
@@ -219,17 +219,17 @@ mod tests {
         let path = std::env::temp_dir().join(format!("rt-pc-kept-{}", std::process::id()));
         let (mut capture, tape) = Capture::new(Some(&path)).unwrap();
         assert!(capture.receive(recorded(tape, 5, false), 0).is_none());
-        assert_eq!(capture.standing(), Standing { running: false, triggered: false, ticks: 5 });
+        assert_eq!(capture.standing(), CaptureState { running: false, triggered: false, ticks: 5 });
         assert!(capture.written.is_none() && !path.exists());
         // What the loop says later is of the time before.
         capture.update(Some(4), true);
         assert!(!capture.standing().running);
-        let Order::Tape(mut tape) = capture.arm(7, 1) else { panic!("it was here") };
-        assert_eq!(capture.standing(), Standing { running: true, triggered: false, ticks: 0 });
+        let LoopCommand::Tape(mut tape) = capture.arm(7, 1) else { panic!("it was here") };
+        assert_eq!(capture.standing(), CaptureState { running: true, triggered: false, ticks: 0 });
         assert!(capture.image().is_none());
         tape.begin(0);
         assert!(capture.receive(recorded(tape, 5, true), 1).is_none());
-        let standing = Standing { running: false, triggered: true, ticks: 5 + 7 };
+        let standing = CaptureState { running: false, triggered: true, ticks: 5 + 7 };
         assert_eq!(capture.standing(), standing);
         let file = std::fs::read(&path).unwrap();
         assert_eq!(capture.image(), Some(file.as_slice()));
@@ -242,10 +242,10 @@ mod tests {
         // The order to start anew has number 5; the loop had taken so many when it gave the recorder back.
         for (taken, goes) in [(4, true), (5, false), (6, false)] {
             let (mut capture, tape) = Capture::new(None).unwrap();
-            assert!(matches!(capture.arm(3, 5), Order::Record(settings) if settings.after == 3));
+            assert!(matches!(capture.arm(3, 5), LoopCommand::Record(settings) if settings.after == 3));
             let again = capture.receive(recorded(tape, 2, false), taken);
             assert_eq!(again.is_some(), goes, "{taken}");
-            if let Some(Order::Tape(tape)) = again {
+            if let Some(LoopCommand::Tape(tape)) = again {
                 assert_eq!((tape.rows(), capture.standing().running), (0, true));
             }
             assert_eq!(capture.image().is_some(), !goes);

@@ -13,8 +13,8 @@ use specgen_runtime::playback::Knot;
 use specgen_runtime::wave::Settings;
 
 use crate::capture::{CAPACITY, Capture};
-use crate::handover::{Awaited, Order, Player, Row};
-use crate::operator::{Operator, Said};
+use crate::handover::{EdgeCommand, LoopCommand, Player, Row};
+use crate::operator::{Operator, SupervisorReport};
 use crate::passes::Passes;
 use crate::words::Command;
 
@@ -22,7 +22,7 @@ use crate::words::Command;
 const MOST_ORDERS: usize = 64;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum No {
+pub enum Rejection {
     /// Not in this state of the machine, of the wave, of the pass or of the recorder.
     State,
     /// This word of what was asked for.
@@ -33,7 +33,7 @@ pub struct Console {
     pub operator: Operator,
     pub capture: Capture,
     pub passes: Passes,
-    pub said: Option<Said>,
+    pub said: Option<SupervisorReport>,
     /// Where the platform was then.
     pub place: [u64; PLACE_WORDS],
     /// When that came, and when one last came whose gauges were read and believed, ns.
@@ -47,7 +47,7 @@ pub struct Console {
     config: Config,
     /// Events that were not yet reported over the link.
     events: u32,
-    orders: VecDeque<Order>,
+    orders: VecDeque<LoopCommand>,
     /// Number of the last order that was put there; the first is 1.
     number: u32,
     /// Number of the order that began the last wave.
@@ -83,7 +83,7 @@ impl Console {
     }
 
     /// Takes what a tick gave, at this time, ns.
-    pub fn update(&mut self, row: &Row, said: Said, now: u64) {
+    pub fn update(&mut self, row: &Row, said: SupervisorReport, now: u64) {
         self.said = Some(said);
         self.place = row.place;
         self.ticked = Some(now);
@@ -123,7 +123,7 @@ impl Console {
     /// Other settings from the next tick on.
     pub fn configure(&mut self, config: Config) {
         self.config = config;
-        self.order(Order::Configure(config));
+        self.order(LoopCommand::Configure(config));
     }
 
     /// Whether the control law is at work, as far as is known.
@@ -138,10 +138,10 @@ impl Console {
         for order in &mut self.orders {
             number = number.wrapping_add(1);
             match order {
-                Order::Wish(wish) => wish.command = None,
-                Order::Wave(_) | Order::Await(_) => {
+                LoopCommand::Wish(wish) => wish.command = None,
+                LoopCommand::Wave(_) | LoopCommand::Await(_) => {
                     // In its place, so that numbers stay.
-                    *order = Order::StopWave;
+                    *order = LoopCommand::StopWave;
                     self.wave.take_if(|wave| *wave == number);
                     self.awaited.take_if(|(awaited, _)| *awaited == number);
                 }
@@ -159,20 +159,21 @@ impl Console {
     ///
     /// # Errors
     /// The machine does not run, or plays something else; a wave or a pass is under way; the word of the axis that would go beyond its limits.
-    pub fn start_wave(&mut self, settings: &Settings<Real>, on_edge: bool) -> Result<(), No> {
+    pub fn start_wave(&mut self, settings: &Settings<Real>, on_edge: bool) -> Result<(), Rejection> {
         let limits = waves::limits(&self.config);
         let running = self.said.filter(|said| said.phase == Phase::Running);
-        let Some(said) = running.filter(|_| !self.is_engaged()) else { return Err(No::State) };
-        Wave::new(limits).set(settings).map_err(|refused| refused.word().map_or(No::State, No::Word))?;
-        waves::may_begin(said.status, self.operator.command(), &settings.center, &limits).map_err(|_| No::State)?;
+        let Some(said) = running.filter(|_| !self.is_engaged()) else { return Err(Rejection::State) };
+        Wave::new(limits).set(settings).map_err(|refused| refused.word().map_or(Rejection::State, Rejection::Word))?;
+        waves::may_begin(said.status, self.operator.command(), &settings.center, &limits)
+            .map_err(|_| Rejection::State)?;
         // What is wanted when it is over goes first.
         self.operator.rest_at(&settings.center);
         self.wish();
         if on_edge {
-            let number = self.order(Order::Await(Awaited::Wave(*settings)));
+            let number = self.order(LoopCommand::Await(EdgeCommand::Wave(*settings)));
             self.awaited = Some((number, None));
         } else {
-            self.wave = Some(self.order(Order::Wave(*settings)));
+            self.wave = Some(self.order(LoopCommand::Wave(*settings)));
         }
         Ok(())
     }
@@ -181,38 +182,38 @@ impl Console {
     ///
     /// # Errors
     /// The machine does not run at rest; a wave or a pass is under way.
-    pub fn command_on_edge(&mut self, command: Command) -> Result<(), No> {
+    pub fn command_on_edge(&mut self, command: Command) -> Result<(), Rejection> {
         let rests = self
             .said
             .is_some_and(|said| said.phase == Phase::Running && said.status & specgen_runtime::setpoint::BUSY == 0);
         if !rests || self.is_engaged() {
-            return Err(No::State);
+            return Err(Rejection::State);
         }
         self.wish();
-        let number = self.order(Order::Await(Awaited::Command(command)));
+        let number = self.order(LoopCommand::Await(EdgeCommand::Command(command)));
         self.awaited = Some((number, Some(command)));
         Ok(())
     }
 
     /// Nothing waits for the edge any more.
     pub fn stop_waiting(&mut self) {
-        self.order(Order::StopWaiting);
+        self.order(LoopCommand::StopWaiting);
     }
 
     /// Brings the wave to rest, if there is one.
     pub fn stop_wave(&mut self) {
-        self.order(Order::StopWave);
+        self.order(LoopCommand::StopWave);
     }
 
     /// Takes knots of the correction of passes.
     ///
     /// # Errors
     /// A pass is under way, or learned from; there is no room for them.
-    pub fn put_knots(&mut self, first: u32, knots: impl ExactSizeIterator<Item = Knot>) -> Result<(), No> {
+    pub fn put_knots(&mut self, first: u32, knots: impl ExactSizeIterator<Item = Knot>) -> Result<(), Rejection> {
         match self.passes.is_busy() {
-            true => Err(No::State),
+            true => Err(Rejection::State),
             false if self.passes.put(first, knots) => Ok(()),
-            false => Err(No::Word(0)),
+            false => Err(Rejection::Word(0)),
         }
     }
 
@@ -220,21 +221,21 @@ impl Console {
     ///
     /// # Errors
     /// The machine does not run, or not at rest; a wave or a pass is under way; this is no pass, or too long.
-    pub fn begin_pass(&mut self, course: Course) -> Result<(), No> {
+    pub fn begin_pass(&mut self, course: Course) -> Result<(), Rejection> {
         let running = self.said.filter(|said| said.phase == Phase::Running);
-        let said = running.filter(|_| !self.is_engaged()).ok_or(No::State)?;
+        let said = running.filter(|_| !self.is_engaged()).ok_or(Rejection::State)?;
         if !passes::may_begin(said.status, self.operator.command()) {
-            return Err(No::State);
+            return Err(Rejection::State);
         }
-        let player = self.passes.begin(course).ok_or(No::Word(0))?;
+        let player = self.passes.begin(course).ok_or(Rejection::Word(0))?;
         self.wish();
-        self.order(Order::Pass(player));
+        self.order(LoopCommand::Pass(player));
         Ok(())
     }
 
     /// Ends the pass under way, if there is one.
     pub fn abort_pass(&mut self) {
-        self.order(Order::AbortPass);
+        self.order(LoopCommand::AbortPass);
     }
 
     /// Takes the player back: what its pass began is what is commanded, while the machine runs.
@@ -250,9 +251,9 @@ impl Console {
     ///
     /// # Errors
     /// There is no room for so many.
-    pub fn arm_recorder(&mut self, after: u32) -> Result<(), No> {
+    pub fn arm_recorder(&mut self, after: u32) -> Result<(), Rejection> {
         if after > CAPACITY {
-            return Err(No::Word(0));
+            return Err(Rejection::Word(0));
         }
         let order = self.capture.arm(after, self.number.wrapping_add(1));
         self.order(order);
@@ -260,11 +261,11 @@ impl Console {
     }
 
     pub fn trigger_recorder(&mut self) {
-        self.order(Order::Trigger);
+        self.order(LoopCommand::Trigger);
     }
 
     pub fn stop_recorder(&mut self) {
-        self.order(Order::StopRecorder);
+        self.order(LoopCommand::StopRecorder);
     }
 
     /// Whether the loop has orders enough for now.
@@ -273,7 +274,7 @@ impl Console {
     }
 
     /// Puts an order behind the others; its number.
-    pub fn order(&mut self, order: Order) -> u32 {
+    pub fn order(&mut self, order: LoopCommand) -> u32 {
         self.number = self.number.wrapping_add(1);
         self.orders.push_back(order);
         self.number
@@ -282,12 +283,12 @@ impl Console {
     /// Puts the operator's wish behind the other orders, if it changed.
     pub fn wish(&mut self) {
         if let Some(wish) = self.operator.wish() {
-            self.order(Order::Wish(wish));
+            self.order(LoopCommand::Wish(wish));
         }
     }
 
     /// Orders that are not sent yet, the oldest first, and the number of the oldest.
-    pub fn outgoing(&mut self) -> (&mut VecDeque<Order>, u32) {
+    pub fn outgoing(&mut self) -> (&mut VecDeque<LoopCommand>, u32) {
         let first = self.number.wrapping_sub(self.orders.len() as u32).wrapping_add(1);
         (&mut self.orders, first)
     }
@@ -297,7 +298,7 @@ impl Console {
 mod tests {
     use super::*;
     use crate::bench::{row, said};
-    use crate::handover::Wish;
+    use crate::handover::OperatorRequest;
     use crate::operator::Timeout;
     use controller::COMMAND_WORDS;
     use controller::supervised::Request;
@@ -310,8 +311,8 @@ mod tests {
     }
 
     /// A machine that runs, shown with so many orders taken.
-    fn show(console: &mut Console, orders: u32, change: impl Fn(&mut Row, &mut Said)) {
-        let (mut row, mut said) = (row(1), Said { orders, ..said(Phase::Running) });
+    fn show(console: &mut Console, orders: u32, change: impl Fn(&mut Row, &mut SupervisorReport)) {
+        let (mut row, mut said) = (row(1), SupervisorReport { orders, ..said(Phase::Running) });
         change(&mut row, &mut said);
         console.update(&row, said, 5);
     }
@@ -323,7 +324,7 @@ mod tests {
             let mut row = row(number);
             (row.input.events, row.place[3]) = (events, number);
             (row.recorded, row.triggered) = (Some(number), number > 1);
-            console.update(&row, Said { status, tick: number, ..said(Phase::Holding) }, number * 10);
+            console.update(&row, SupervisorReport { status, tick: number, ..said(Phase::Holding) }, number * 10);
             assert_eq!((console.place[3], console.ticked), (number, Some(number * 10)));
             assert_eq!(console.measured, Some(if number < 3 { 0 } else { 30 }));
             assert_eq!(console.said.unwrap().tick, number);
@@ -340,11 +341,11 @@ mod tests {
     fn a_stop_takes_back_what_would_move_and_leaves_the_numbers() {
         let mut console = console(Phase::Running);
         console.operator.wish();
-        console.order(Order::Trigger);
-        console.order(Order::Wish(Wish { command: Some([7; COMMAND_WORDS]), request: Request::Run }));
+        console.order(LoopCommand::Trigger);
+        console.order(LoopCommand::Wish(OperatorRequest { command: Some([7; COMMAND_WORDS]), request: Request::Run }));
         console.start_wave(&Settings::still(), true).unwrap();
         console.start_wave(&Settings::still(), false).unwrap();
-        assert_eq!(console.command_on_edge([1; COMMAND_WORDS]), Err(No::State), "under a wave");
+        assert_eq!(console.command_on_edge([1; COMMAND_WORDS]), Err(Rejection::State), "under a wave");
         let numbers = (console.outgoing().0.len(), console.outgoing().1);
         assert!(console.is_engaged());
         console.stop();
@@ -352,13 +353,13 @@ mod tests {
         assert_eq!((console.outgoing().0.len(), console.outgoing().1), numbers);
         for order in console.outgoing().0.iter() {
             let moves = match order {
-                Order::Wish(wish) => wish.command.is_some(),
-                Order::Wave(_) | Order::Await(_) => true,
+                LoopCommand::Wish(wish) => wish.command.is_some(),
+                LoopCommand::Wave(_) | LoopCommand::Await(_) => true,
                 _ => false,
             };
             assert!(!moves, "{order:?}");
         }
-        assert!(matches!(console.outgoing().0.front(), Some(Order::Trigger)));
+        assert!(matches!(console.outgoing().0.front(), Some(LoopCommand::Trigger)));
         console.stop();
         assert_eq!(console.stops, 2);
     }
@@ -370,7 +371,7 @@ mod tests {
         console.outgoing().0.clear();
         // Numbers go on behind what was sent.
         assert_eq!(console.outgoing().1, 3);
-        console.order(Order::Trigger);
+        console.order(LoopCommand::Trigger);
         console.stop();
         assert!(console.is_engaged(), "the wave is under way until a tick shows that it is not");
         show(&mut console, 1, |_, _| {});
@@ -384,25 +385,27 @@ mod tests {
     #[test]
     fn a_wave_or_a_command_begins_from_a_machine_that_runs_at_rest() {
         let still = Settings::still();
-        assert_eq!(console(Phase::Holding).start_wave(&still, false), Err(No::State));
-        assert_eq!(console(Phase::Holding).command_on_edge([0; COMMAND_WORDS]), Err(No::State));
+        assert_eq!(console(Phase::Holding).start_wave(&still, false), Err(Rejection::State));
+        assert_eq!(console(Phase::Holding).command_on_edge([0; COMMAND_WORDS]), Err(Rejection::State));
         let mut console = console(Phase::Running);
-        console.said = Some(Said { status: specgen_runtime::setpoint::BUSY, ..said(Phase::Running) });
-        assert_eq!(console.start_wave(&still, false), Err(No::State));
-        assert_eq!(console.command_on_edge([0; COMMAND_WORDS]), Err(No::State));
+        console.said = Some(SupervisorReport { status: specgen_runtime::setpoint::BUSY, ..said(Phase::Running) });
+        assert_eq!(console.start_wave(&still, false), Err(Rejection::State));
+        assert_eq!(console.command_on_edge([0; COMMAND_WORDS]), Err(Rejection::State));
         console.said = Some(said(Phase::Running));
         let mut far = still;
         far.center[1] = 1.0;
-        assert!(matches!(console.start_wave(&far, false), Err(No::Word(_))));
+        assert!(matches!(console.start_wave(&far, false), Err(Rejection::Word(_))));
         assert!(console.outgoing().0.is_empty());
         console.operator.set_by_link([1; COMMAND_WORDS]);
         console.start_wave(&still, false).unwrap();
         // What is wanted once it is over goes first: to hold.
         let orders = console.outgoing().0;
-        assert!(matches!(orders[0], Order::Wish(Wish { command: Some(command), .. }) if command[0] == 0));
-        assert!(matches!(orders[1], Order::Wave(_)));
+        assert!(
+            matches!(orders[0], LoopCommand::Wish(OperatorRequest { command: Some(command), .. }) if command[0] == 0)
+        );
+        assert!(matches!(orders[1], LoopCommand::Wave(_)));
         console.stop_wave();
-        assert!(matches!(console.outgoing().0.back(), Some(Order::StopWave)));
+        assert!(matches!(console.outgoing().0.back(), Some(LoopCommand::StopWave)));
     }
 
     #[test]
@@ -429,21 +432,21 @@ mod tests {
         }
         let mut console = console(Phase::Running);
         console.stop_waiting();
-        assert!(matches!(console.outgoing().0.back(), Some(Order::StopWaiting)));
+        assert!(matches!(console.outgoing().0.back(), Some(LoopCommand::StopWaiting)));
     }
 
     #[test]
     fn a_pass_takes_the_player_along_and_what_it_began_is_commanded() {
         let mut console = console(Phase::Running);
-        assert_eq!(console.put_knots(0, [[1; 6]].into_iter()), Err(No::Word(0)), "there is no player");
+        assert_eq!(console.put_knots(0, [[1; 6]].into_iter()), Err(Rejection::Word(0)), "there is no player");
         console.passes = Passes::with(8);
         assert_eq!(console.put_knots(0, [[1; 6]].into_iter()), Ok(()));
-        assert_eq!(console.put_knots(9, [[1; 6]].into_iter()), Err(No::Word(0)));
+        assert_eq!(console.put_knots(9, [[1; 6]].into_iter()), Err(Rejection::Word(0)));
         let course = Course { spacing: 1, before: 0, ticks: 2, trajectory: 3 };
         // This controller takes no correction, and so makes no pass.
-        assert_eq!(console.begin_pass(course), Err(No::State));
+        assert_eq!(console.begin_pass(course), Err(Rejection::State));
         console.abort_pass();
-        assert!(matches!(console.outgoing().0.back(), Some(Order::AbortPass)));
+        assert!(matches!(console.outgoing().0.back(), Some(LoopCommand::AbortPass)));
         for (phase, expected) in [(Phase::Holding, 0), (Phase::Running, 3)] {
             let mut player = console.passes.begin(course).unwrap();
             let _ = player.give();
@@ -457,15 +460,15 @@ mod tests {
     #[test]
     fn there_is_room_for_so_many_orders_and_for_so_many_ticks() {
         let mut console = console(Phase::Holding);
-        assert_eq!(console.arm_recorder(CAPACITY + 1), Err(No::Word(0)));
+        assert_eq!(console.arm_recorder(CAPACITY + 1), Err(Rejection::Word(0)));
         assert_eq!(console.arm_recorder(CAPACITY), Ok(()));
         console.trigger_recorder();
         console.stop_recorder();
         let orders: Vec<_> = console.outgoing().0.iter().collect();
-        assert!(matches!(orders[..], [Order::Record(_), Order::Trigger, Order::StopRecorder]));
+        assert!(matches!(orders[..], [LoopCommand::Record(_), LoopCommand::Trigger, LoopCommand::StopRecorder]));
         for number in 4..=MOST_ORDERS as u32 {
             assert!(!console.is_full());
-            assert_eq!(console.order(Order::Trigger), number);
+            assert_eq!(console.order(LoopCommand::Trigger), number);
         }
         assert!(console.is_full());
         console.outgoing().0.clear();
@@ -474,6 +477,6 @@ mod tests {
         assert!(matches!(console.outgoing(), (orders, 65) if orders.len() == 1));
         let config = Config::new();
         console.configure(config);
-        assert!(matches!(console.outgoing().0.back(), Some(Order::Configure(_))) && *console.config() == config);
+        assert!(matches!(console.outgoing().0.back(), Some(LoopCommand::Configure(_))) && *console.config() == config);
     }
 }

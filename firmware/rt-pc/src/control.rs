@@ -23,7 +23,7 @@ use specgen_runtime::pending::EDGE;
 use specgen_runtime::supervisor::OF_GAUGES;
 
 use crate::devices::Device;
-use crate::handover::{Inner, Order, Row, Shared, Tape};
+use crate::handover::{Inner, LoopCommand, Row, Shared, Tape};
 use keeper::Keeper;
 use setpoints::Setpoints;
 
@@ -190,18 +190,18 @@ impl<D: Device> Loop<'_, D> {
             if let Ok(order) = orders.pop() {
                 keeper.ordered();
                 match order {
-                    Order::Wish(wish) => setpoints.wish(wish),
-                    Order::Configure(config) => (self.config, configured) = (config, true),
-                    Order::Wave(settings) => setpoints.start(&settings, &self.config),
-                    Order::StopWave => setpoints.stop(),
-                    Order::Await(awaited) => setpoints.wait_for_edge(awaited),
-                    Order::StopWaiting => setpoints.stop_waiting(),
-                    Order::Pass(player) => setpoints.pass(player),
-                    Order::AbortPass => setpoints.abort_pass(),
-                    Order::Tape(tape) => keeper.take(tape, count),
-                    Order::Record(settings) => keeper.record(settings, count),
-                    Order::Trigger => keeper.trigger(),
-                    Order::StopRecorder => keeper.stop(),
+                    LoopCommand::Wish(wish) => setpoints.wish(wish),
+                    LoopCommand::Configure(config) => (self.config, configured) = (config, true),
+                    LoopCommand::Wave(settings) => setpoints.start(&settings, &self.config),
+                    LoopCommand::StopWave => setpoints.stop(),
+                    LoopCommand::Await(awaited) => setpoints.wait_for_edge(awaited),
+                    LoopCommand::StopWaiting => setpoints.stop_waiting(),
+                    LoopCommand::Pass(player) => setpoints.pass(player),
+                    LoopCommand::AbortPass => setpoints.abort_pass(),
+                    LoopCommand::Tape(tape) => keeper.take(tape, count),
+                    LoopCommand::Record(settings) => keeper.record(settings, count),
+                    LoopCommand::Trigger => keeper.trigger(),
+                    LoopCommand::StopRecorder => keeper.stop(),
                 }
             }
             keeper.prepare(&machine, &self.config, count, configured);
@@ -416,7 +416,7 @@ mod tests {
     /// What the enable line sees of a machine that is told to arm while something is broken for one tick.
     fn armed(break_it: fn(&mut Bench)) -> (Bench, u64) {
         let (bench, _) = run(FAST, move |bench| {
-            bench.broken = crate::bench::Broken::default();
+            bench.broken = crate::bench::InjectedFaults::default();
             match bench.tick {
                 1 => bench.ask(Request::Arm),
                 2 => break_it(bench),
@@ -595,16 +595,16 @@ mod tests {
     fn a_recorder_goes_to_the_loop_and_comes_back_with_its_ticks() {
         let mut tape = Some(Capture::new(None).unwrap().1);
         let (mut bench, _) = run(FAST, move |bench| match bench.tick {
-            2 => bench.order(Order::Tape(tape.take().unwrap())),
-            10 => bench.order(Order::Trigger),
-            20 => bench.order(Order::Record(recorder::Settings {
+            2 => bench.order(LoopCommand::Tape(tape.take().unwrap())),
+            10 => bench.order(LoopCommand::Trigger),
+            20 => bench.order(LoopCommand::Record(recorder::Settings {
                 streaming: false,
                 trigger: recorder::Trigger { fault: true, phase_change: false },
                 after: 5,
                 decimation: 1,
                 digest_every: 1,
             })),
-            30 => bench.order(Order::StopRecorder),
+            30 => bench.order(LoopCommand::StopRecorder),
             40 => bench.stop(),
             _ => {}
         });
@@ -627,7 +627,7 @@ mod tests {
     #[test]
     fn a_wave_is_followed_while_the_machine_runs_and_ends_with_that() {
         let (bench, _) = run(FAST, |bench| match bench.arm_and_run() {
-            Some(10) => bench.order(Order::Wave(wave())),
+            Some(10) => bench.order(LoopCommand::Wave(wave())),
             Some(20) => bench.ask(Request::Hold),
             Some(80) => bench.stop(),
             _ => {}

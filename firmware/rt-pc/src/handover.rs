@@ -66,7 +66,7 @@ pub struct Snapshot {
 
 /// What the operator wants from the next tick on: the words that are his, and the request.
 #[derive(Debug, Clone, Copy)]
-pub struct Wish {
+pub struct OperatorRequest {
     /// None where only the request is another.
     pub command: Option<Command>,
     pub request: Request,
@@ -76,7 +76,7 @@ pub struct Wish {
 // As orders: a box would have to be released by the real-time thread.
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone, Copy)]
-pub enum Awaited {
+pub enum EdgeCommand {
     Command(Command),
     Wave(wave::Settings<Real>),
 }
@@ -85,14 +85,14 @@ pub enum Awaited {
 // The largest variant lies in the ring in any case: a box would have to be released by the real-time thread.
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug)]
-pub enum Order {
-    Wish(Wish),
+pub enum LoopCommand {
+    OperatorRequest(OperatorRequest),
     Configure(Config),
     /// A wave begins, if none is under way.
     Wave(wave::Settings<Real>),
     StopWave,
     /// To begin at the edge, in place of what waited.
-    Await(Awaited),
+    Await(EdgeCommand),
     /// Nothing waits any more.
     StopWaiting,
     /// The pass that this player was told begins, if no wave is under way.
@@ -198,7 +198,7 @@ pub struct Outlets {
 /// The loop's ends of the rings.
 pub struct Inner {
     pub outlets: Outlets,
-    pub orders: Consumer<Order>,
+    pub orders: Consumer<LoopCommand>,
     /// The player, when its pass is over.
     pub players: Producer<Player>,
 }
@@ -207,7 +207,7 @@ pub struct Outer {
     pub rows: Consumer<Row>,
     pub snapshots: Consumer<Snapshot>,
     pub tapes: Consumer<(Tape, u32)>,
-    pub orders: Producer<Order>,
+    pub orders: Producer<LoopCommand>,
     pub players: Consumer<Player>,
 }
 

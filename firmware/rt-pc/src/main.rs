@@ -35,24 +35,24 @@ use controller::supervision::HOST_TICKS;
 use controller::{CONFIG_NAMES, CONFIG_WORDS, Config};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use specgen_rt::account::Account;
-use specgen_rt::allocation::Watched;
-use specgen_rt::scheduling::{self, AwakeProcessors, Refused};
+use specgen_rt::allocation::WatchedAllocator;
+use specgen_rt::scheduling::{self, AwakeProcessors, MissingPrivilege};
 use specgen_rt::{clock, exchange};
 
 use capture::Capture;
 use console::Console;
 use control::{Loop, Timing};
 use devices::Device;
-use devices::simulated::Simulated;
+use devices::simulated::SimulatedDevices;
 use handover::Shared;
 use operator::{Operator, Timeout};
-use options::{Asked, Options};
+use options::{Invocation, Options};
 use service::{Link, Service};
 use summary::Summary;
 
 /// Notices if the real-time thread allocates.
 #[global_allocator]
-static ALLOCATOR: Watched = Watched;
+static ALLOCATOR: WatchedAllocator = WatchedAllocator;
 
 /// Bytes of the real-time thread's stack.
 const STACK: usize = 2 * scheduling::STACK + (1 << 20);
@@ -69,8 +69,8 @@ fn main() -> ExitCode {
     specgen_rt::signals::ignore_file_size();
     let asked = options::parse(std::env::args_os()).map_err(Failure::Usage);
     let done = asked.and_then(|asked| match asked {
-        Asked::Text(text) => outputs::print(&text).map_err(Failure::Environment),
-        Asked::Run(options) => open(&options),
+        Invocation::Text(text) => outputs::print(&text).map_err(Failure::Environment),
+        Invocation::Run(options) => open(&options),
     });
     let (code, text) = match done {
         Ok(()) => return ExitCode::SUCCESS,
@@ -88,7 +88,7 @@ fn open(options: &Options) -> Result<(), Failure> {
         options::Hardware::Simulated(name) => {
             let path = exchange::path_of(name).map_err(|text| Failure::Usage(format!("--sim: {text}")))?;
             let edges = options.sim_edge_every.zip(words::period()).map(|(every, period)| every.div_ceil(period));
-            let device = Simulated::open(&path, options.sim_timeout, edges);
+            let device = SimulatedDevices::open(&path, options.sim_timeout, edges);
             run(options, &mut device.map_err(Failure::Environment)?, signals()?)
         }
         #[cfg(feature = "comedi")]
@@ -233,7 +233,7 @@ fn run<D: Device + Send>(options: &Options, device: &mut D, signal: Arc<AtomicBo
 }
 
 /// Rights of the whole process: what is missing, and what keeps processors awake. That one is a courtesy, not a need.
-fn prepare_process() -> (Vec<Refused>, Option<AwakeProcessors>) {
+fn prepare_process() -> (Vec<MissingPrivilege>, Option<AwakeProcessors>) {
     let awake = match AwakeProcessors::request() {
         Ok(awake) => Some(awake),
         Err(refused) => {
@@ -245,7 +245,7 @@ fn prepare_process() -> (Vec<Refused>, Option<AwakeProcessors>) {
 }
 
 /// Rights of the calling thread: what is missing.
-fn prepare_thread(cpu: Option<usize>, priority: u8) -> Vec<Refused> {
+fn prepare_thread(cpu: Option<usize>, priority: u8) -> Vec<MissingPrivilege> {
     let pinned = cpu.map_or(Ok(()), scheduling::pin);
     pinned.err().into_iter().chain(scheduling::set_fifo(priority).err()).collect()
 }
@@ -280,7 +280,7 @@ mod tests {
 
     fn options(line: &str) -> Options {
         match options::parse(std::iter::once("rt-pc").chain(line.split_whitespace()).map(Into::into)) {
-            Ok(Asked::Run(options)) => *options,
+            Ok(Invocation::Run(options)) => *options,
             other => panic!("{line}: {other:?}"),
         }
     }

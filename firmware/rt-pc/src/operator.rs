@@ -8,9 +8,9 @@ use controller::supervised::{Cause, Finding, MACHINE_INPUT_NAMES, Phase, Request
 use controller::supervision::LOOK_ALIKE;
 use controller::{COMMAND_WORDS, Real, passes, waves};
 use specgen_rt::clock::SECOND;
-use specgen_runtime::supervisor::Named;
+use specgen_runtime::supervisor::FindingText;
 
-use crate::handover::Wish;
+use crate::handover::OperatorRequest;
 use crate::words::{Command, place, word_of};
 
 /// How long a step of the plan may take before it is given up, ns.
@@ -20,7 +20,7 @@ const DOWN_LIMIT: u64 = 30 * SECOND;
 
 /// What the supervisor last said.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Said {
+pub struct SupervisorReport {
     pub phase: Phase,
     pub cause: Cause,
     /// What the wiring check found, if that is the cause.
@@ -41,7 +41,7 @@ pub struct Said {
 pub fn why(cause: Cause, finding: Finding) -> String {
     match finding {
         Finding::None => cause.name().to_owned(),
-        _ => format!("{}, {}", cause.name(), Named(finding, LOOK_ALIKE)),
+        _ => format!("{}, {}", cause.name(), FindingText(finding, LOOK_ALIKE)),
     }
 }
 
@@ -51,7 +51,7 @@ pub struct HostId(pub u64);
 
 /// Why a host does not get the orders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Denied {
+pub enum ControlRefusal {
     /// The program is ramping down to end.
     Ending,
     Others,
@@ -172,7 +172,7 @@ impl Operator {
     }
 
     /// Goes on with the plan by what the supervisor said.
-    pub fn update(&mut self, said: &Said, now: u64) {
+    pub fn update(&mut self, said: &SupervisorReport, now: u64) {
         if std::mem::replace(&mut self.phase, said.phase) == Phase::Running && said.phase != Phase::Running {
             // What was commanded before is not followed when it runs again.
             waves::rest(&[0.0; 6], &mut self.command);
@@ -278,7 +278,7 @@ impl Operator {
     }
 
     /// A host has gone. A machine that is off does not miss it.
-    pub fn left(&mut self, host: HostId, last: Option<&Said>) {
+    pub fn left(&mut self, host: HostId, last: Option<&SupervisorReport>) {
         if let Owner::Host { id, left, .. } = &mut self.owner
             && *id == host
         {
@@ -299,12 +299,12 @@ impl Operator {
     ///
     /// # Errors
     /// There are none to give, or another host has them.
-    pub fn take_for_host(&mut self, host: HostId, now: u64) -> Result<(), Denied> {
+    pub fn take_for_host(&mut self, host: HostId, now: u64) -> Result<(), ControlRefusal> {
         if self.is_ending() {
-            return Err(Denied::Ending);
+            return Err(ControlRefusal::Ending);
         }
         if !self.may_order(host, now) || std::mem::take(&mut self.is_overruled) && self.is_hosts(host) {
-            return Err(Denied::Others);
+            return Err(ControlRefusal::Others);
         }
         if !self.is_hosts(host) {
             self.requests += 1;
@@ -356,9 +356,9 @@ impl Operator {
     }
 
     /// What is to be sent to the loop, if it changed since the last call.
-    pub fn wish(&mut self) -> Option<Wish> {
+    pub fn wish(&mut self) -> Option<OperatorRequest> {
         let command = std::mem::take(&mut self.commanded).then_some(self.command);
-        std::mem::take(&mut self.changed).then_some(Wish { command, request: self.request })
+        std::mem::take(&mut self.changed).then_some(OperatorRequest { command, request: self.request })
     }
 
     fn go(&mut self, step: Step, request: Request, now: u64) {
@@ -400,8 +400,8 @@ mod tests {
     const A: HostId = HostId(1);
     const B: HostId = HostId(2);
 
-    fn said(phase: Phase, on: bool) -> Said {
-        Said {
+    fn said(phase: Phase, on: bool) -> SupervisorReport {
+        SupervisorReport {
             phase,
             cause: Cause::None,
             finding: Finding::None,
@@ -491,7 +491,7 @@ mod tests {
         operator.take_for_host(A, 10).unwrap();
         operator.ask_by_link(Request::Run, A);
         assert!(operator.link_number() > 0 && operator.wish().unwrap().request == Request::Run);
-        assert_eq!(operator.take_for_host(B, 10 + SILENCE), Err(Denied::Others));
+        assert_eq!(operator.take_for_host(B, 10 + SILENCE), Err(ControlRefusal::Others));
         assert!(operator.linked(20) && !operator.is_evicted(A));
         operator.seen(A, 200);
         let number = operator.link_number();
@@ -509,7 +509,7 @@ mod tests {
         operator.left(A, Some(&said(Phase::Disarmed, false)));
         assert_eq!(operator.link_number(), 0);
         operator.ramp_down(700);
-        assert_eq!(operator.take_for_host(A, 701), Err(Denied::Ending));
+        assert_eq!(operator.take_for_host(A, 701), Err(ControlRefusal::Ending));
     }
 
     #[test]
@@ -533,9 +533,9 @@ mod tests {
         operator.take_for_host(A, 0).unwrap();
         operator.ask_by_link(Request::Arm, A);
         operator.update(&said(Phase::Arming, true), 1);
-        assert_eq!(operator.take_for_host(B, 1), Err(Denied::Others));
+        assert_eq!(operator.take_for_host(B, 1), Err(ControlRefusal::Others));
         operator.ask_by_link(Request::Hold, B);
-        assert_eq!(operator.take_for_host(A, 2), Err(Denied::Others));
+        assert_eq!(operator.take_for_host(A, 2), Err(ControlRefusal::Others));
         assert_eq!(operator.take_for_host(A, 2), Ok(()));
         // Where the phase shows it, nobody has to be told.
         operator.update(&said(Phase::Running, true), 3);
@@ -550,7 +550,7 @@ mod tests {
         for now in (0..=IDLE).step_by(50) {
             operator.seen(A, now);
         }
-        assert_eq!(operator.take_for_host(B, IDLE), Err(Denied::Others));
+        assert_eq!(operator.take_for_host(B, IDLE), Err(ControlRefusal::Others));
         operator.seen(A, IDLE + 1);
         // It still has them while no other asks, and its silence would be noticed.
         assert!(operator.is_hosts(A) && operator.link_number() > 0);

@@ -70,7 +70,7 @@ whole, the book does not balance or a card would be driven on assumptions,
 /// What the controller runs on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Hardware {
-    Simulated(String),
+    SimulatedDevices(String),
     /// A card, by device file.
     Comedi(PathBuf),
 }
@@ -117,7 +117,7 @@ pub struct Options {
 
 /// What the command line asks for.
 #[derive(Debug)]
-pub enum Asked {
+pub enum Invocation {
     Run(Box<Options>),
     Text(String),
 }
@@ -126,11 +126,11 @@ pub enum Asked {
 ///
 /// # Errors
 /// In words.
-pub fn parse(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked, String> {
+pub fn parse(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Invocation, String> {
     read(arguments).map_err(|error| format!("{error}; see rt-pc --help"))
 }
 
-fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked, lexopt::Error> {
+fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Invocation, lexopt::Error> {
     let mut options = Options {
         hardware: Hardware::Simulated("plant".to_owned()),
         comedi_outputs: Vec::new(),
@@ -158,11 +158,11 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
     let mut parser = lexopt::Parser::from_iter(arguments);
     while let Some(argument) = parser.next()? {
         match argument {
-            Long("help") | Short('h') => return Ok(Asked::Text(HELP.to_owned())),
+            Long("help") | Short('h') => return Ok(Invocation::Text(HELP.to_owned())),
             Long("version") => {
                 let [name, digest] = [controller::SPEC_NAME, controller::SPEC_DIGEST];
                 let version = controller::SPECGEN_VERSION;
-                return Ok(Asked::Text(format!("rt-pc {version}, controller of `{name}`, digest {digest}\n")));
+                return Ok(Invocation::Text(format!("rt-pc {version}, controller of `{name}`, digest {digest}\n")));
             }
             Long("sim") => options.hardware = Hardware::Simulated(parser.value()?.string()?),
             Long("comedi") => options.hardware = Hardware::Comedi(parser.value()?.into()),
@@ -206,7 +206,7 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
     if options.elastic && !matches!(options.hardware, Hardware::Simulated(_)) {
         return Err("--elastic is for a simulated machine: a real one does not wait".into());
     }
-    Ok(Asked::Run(Box::new(options)))
+    Ok(Invocation::Run(Box::new(options)))
 }
 
 fn number(parser: &mut lexopt::Parser, name: &str, low: f64, high: f64) -> Result<f64, lexopt::Error> {
@@ -230,13 +230,13 @@ fn range(parser: &mut lexopt::Parser, name: &str) -> Result<[f64; 2], lexopt::Er
 mod tests {
     use super::*;
 
-    fn parsed(line: &str) -> Result<Asked, String> {
+    fn parsed(line: &str) -> Result<Invocation, String> {
         parse(std::iter::once("rt-pc").chain(line.split_whitespace()).map(Into::into))
     }
 
     #[test]
     fn options_are_read_and_nonsense_is_refused() {
-        let Ok(Asked::Run(options)) = parsed("--sim a --seconds 2.5 --set command=3 --cpu 1 --record x") else {
+        let Ok(Invocation::Run(options)) = parsed("--sim a --seconds 2.5 --set command=3 --cpu 1 --record x") else {
             unreachable!("a good line")
         };
         assert_eq!((options.hardware, options.duration), (Hardware::Simulated("a".to_owned()), Some(2_500_000_000)));
@@ -256,14 +256,14 @@ mod tests {
             let error = parsed(line).map(|_| ()).unwrap_err();
             assert!(error.contains(expected) && error.ends_with("see rt-pc --help"), "{line}: {error}");
         }
-        assert!(matches!(parsed("--help"), Ok(Asked::Text(text)) if text == HELP));
+        assert!(matches!(parsed("--help"), Ok(Invocation::Text(text)) if text == HELP));
         let wide: Vec<&str> = HELP.lines().filter(|line| line.chars().count() > 80).collect();
         assert!(wide.is_empty(), "{wide:#?}");
     }
 
     fn run(line: &str) -> Options {
         match parsed(line) {
-            Ok(Asked::Run(options)) => *options,
+            Ok(Invocation::Run(options)) => *options,
             other => panic!("{line}: {other:?}"),
         }
     }
@@ -329,7 +329,7 @@ mod tests {
         assert_eq!(paths, ["p", "r", "c"].map(|path| Some(path.into())));
         let options = run("--set command=3 --set setpoint[0]=1");
         assert!(options.arm && options.set == ["command=3", "setpoint[0]=1"]);
-        let Ok(Asked::Text(version)) = parsed("--version") else { panic!("no version") };
+        let Ok(Invocation::Text(version)) = parsed("--version") else { panic!("no version") };
         assert!(version.contains(controller::SPEC_DIGEST) && version.starts_with("rt-pc "));
         for (range, good) in [("1:1", false), ("-100:100", true), ("-101:100", false), ("0:101", false), ("1", false)] {
             assert_eq!(parsed(&format!("--comedi-range {range}")).is_ok(), good, "{range}");

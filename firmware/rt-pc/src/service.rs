@@ -16,8 +16,8 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use specgen_rt::clock;
 
 use crate::console::Console;
-use crate::handover::{Order, Outer, Row, Shared};
-use crate::operator::Said;
+use crate::handover::{LoopCommand, Outer, Row, Shared};
+use crate::operator::SupervisorReport;
 use crate::record;
 pub use link::{Link, Traffic};
 
@@ -53,7 +53,7 @@ pub struct Incident {
 /// What is known at the end.
 #[derive(Debug, Default)]
 pub struct Outcome {
-    pub last: Option<Said>,
+    pub last: Option<SupervisorReport>,
     /// Faults, holds for a cause, and what the law fell back to, in order.
     pub incidents: Vec<Incident>,
     /// The record's rows, or why it is not whole.
@@ -122,7 +122,7 @@ impl Service<'_> {
         while self.rings.orders.slots() > 0
             && let Some(order) = orders.pop_front()
         {
-            if let (Order::Configure(config), Some((_, writer))) = (&order, &mut self.record) {
+            if let (LoopCommand::Configure(config), Some((_, writer))) = (&order, &mut self.record) {
                 writer.configured(number, config);
             }
             number = number.wrapping_add(1);
@@ -188,9 +188,9 @@ impl Service<'_> {
 }
 
 /// The supervisor's part of a row.
-fn said(row: &Row) -> Said {
+fn said(row: &Row) -> SupervisorReport {
     let word = u64::from(row.output.supervisor);
-    Said {
+    SupervisorReport {
         phase: Phase::from_word(word & 0xff).unwrap_or(Phase::Faulted),
         cause: Cause::from_word(word >> 8 & 0xff).unwrap_or(Cause::None),
         finding: Finding::of_word(row.output.supervisor >> 17),
@@ -319,18 +319,18 @@ mod tests {
         let (mut service, mut inner, _) = service(&shared, None, None);
         let room = service.rings.orders.slots();
         for _ in 0..room - 1 {
-            service.console.order(Order::Trigger);
+            service.console.order(LoopCommand::Trigger);
         }
         service.console.configure(Config::new());
         service.console.operator.ramp_down(0);
         service.send();
         // The wish came last, and finds no room.
         assert_eq!((inner.orders.slots(), service.console.outgoing().0.len()), (room, 1));
-        assert!(matches!(inner.orders.pop(), Ok(Order::Trigger)));
+        assert!(matches!(inner.orders.pop(), Ok(LoopCommand::Trigger)));
         service.send();
         let orders: Vec<_> = std::iter::from_fn(|| inner.orders.pop().ok()).collect();
         assert!(
-            matches!(orders[room - 2..], [Order::Configure(_), Order::Wish(wish)] if wish.request == Request::RampDown)
+            matches!(orders[room - 2..], [LoopCommand::Configure(_), LoopCommand::Wish(wish)] if wish.request == Request::RampDown)
         );
         assert!(service.console.outgoing().0.is_empty());
     }
@@ -394,7 +394,7 @@ mod tests {
             let (mut asked, mut tick) = (Request::None, 0);
             while !shared.stop.load(Ordering::Relaxed) && clock::now() < start + 5 * SECOND {
                 while let Ok(order) = inner.orders.pop() {
-                    if let Order::Wish(wish) = order {
+                    if let LoopCommand::Wish(wish) = order {
                         asked = wish.request;
                     }
                 }

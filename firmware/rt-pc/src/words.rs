@@ -3,16 +3,16 @@
 use controller::permitted;
 use controller::supervised::MACHINE_INPUT_NAMES;
 use controller::{COMMAND_WORDS, Real};
-use specgen_runtime::Permitted;
+use specgen_runtime::PermittedRange;
 
 /// Words of a command: what an operator may set, for the others are measured or have a source of their own.
 pub type Command = [u64; COMMAND_WORDS];
 
 /// Why there is no such word.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NoWord(pub String);
+pub struct UnknownWord(pub String);
 
-impl std::fmt::Display for NoWord {
+impl std::fmt::Display for UnknownWord {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "the controller has no input word `{}`; it has {}", self.0, MACHINE_INPUT_NAMES.join(", "))
     }
@@ -22,8 +22,8 @@ impl std::fmt::Display for NoWord {
 ///
 /// # Errors
 /// If there is none of this name.
-pub fn place(name: &str) -> Result<usize, NoWord> {
-    MACHINE_INPUT_NAMES.iter().position(|known| *known == name).ok_or_else(|| NoWord(name.to_owned()))
+pub fn place(name: &str) -> Result<usize, UnknownWord> {
+    MACHINE_INPUT_NAMES.iter().position(|known| *known == name).ok_or_else(|| UnknownWord(name.to_owned()))
 }
 
 /// A number as a word of this controller's arithmetic, an f32 with zeros above.
@@ -43,20 +43,20 @@ pub fn word_of(index: usize, value: f64) -> Option<u64> {
 /// The word of `value` in the setting with this place in `CONFIG_NAMES`.
 #[must_use]
 pub fn setting(place: usize, value: f64) -> Option<u64> {
-    match Permitted::of(&permitted::SETTINGS, place)? {
-        Permitted::Whole(..) => integer(value),
-        Permitted::Number(..) => value.is_finite().then(|| word(value as Real)),
+    match PermittedRange::of(&permitted::SETTINGS, place)? {
+        PermittedRange::Whole(..) => integer(value),
+        PermittedRange::Number(..) => value.is_finite().then(|| word(value as Real)),
     }
 }
 
 /// What the setting with this place may be, in words.
 #[must_use]
 pub fn range(place: usize) -> String {
-    match Permitted::of(&permitted::SETTINGS, place) {
-        Some(Permitted::Whole(least, most)) => {
+    match PermittedRange::of(&permitted::SETTINGS, place) {
+        Some(PermittedRange::Whole(least, most)) => {
             format!("a whole number from {least} to {most}, and code_min at most code_max")
         }
-        Some(Permitted::Number(least, most)) => format!("a number from {least:?} to {most:?}"),
+        Some(PermittedRange::Number(least, most)) => format!("a number from {least:?} to {most:?}"),
         None => "a setting of this controller".to_owned(),
     }
 }

@@ -17,7 +17,7 @@ static NOTICED: AtomicU64 = AtomicU64::new(0);
 
 /// The system's allocator, watched. Install it with `#[global_allocator]`.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Watched;
+pub struct WatchedAllocator;
 
 /// From here on the calling thread must not allocate or release memory.
 pub fn enter() {
@@ -29,7 +29,7 @@ pub fn leave() {
     WATCHED.set(false);
 }
 
-/// Allocations, growths and releases of all threads while they must not; always 0 where [`Watched`] is not installed.
+/// Allocations, growths and releases of all threads while they must not; always 0 where [`WatchedAllocator`] is not installed.
 #[must_use]
 pub fn noticed() -> u64 {
     NOTICED.load(Ordering::Relaxed)
@@ -42,7 +42,7 @@ fn notice() {
 }
 
 // SAFETY: every call, of its functions too, goes to the system's allocator with the arguments that came.
-unsafe impl GlobalAlloc for Watched {
+unsafe impl GlobalAlloc for WatchedAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         notice();
         // SAFETY: the caller's duty.
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[global_allocator]
-    static ALLOCATOR: Watched = Watched;
+    static ALLOCATOR: WatchedAllocator = WatchedAllocator;
 
     #[test]
     fn an_allocation_is_noticed_between_enter_and_leave_and_only_there() {

@@ -26,8 +26,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::clock;
-use mapping::{Mapping, Unfit};
-use words::Words;
+use mapping::{MapError, Mapping};
+use words::SharedWords;
 pub use words::{Actuation, Sensing};
 
 /// "SPGPLANT" in little-endian bytes.
@@ -117,12 +117,12 @@ impl fmt::Display for OpenError {
 impl std::error::Error for OpenError {}
 
 impl OpenError {
-    fn of(unfit: Unfit, path: &Path) -> Self {
+    fn of(unfit: MapError, path: &Path) -> Self {
         let path = path.to_owned();
         match unfit {
-            Unfit::NotOwn(why) => Self::NotOwn { path, why },
-            Unfit::Size => Self::NotAMachine { path },
-            Unfit::File(cause) => Self::File { path, cause },
+            MapError::NotOwn(why) => Self::NotOwn { path, why },
+            MapError::Size => Self::NotAMachine { path },
+            MapError::File(cause) => Self::File { path, cause },
         }
     }
 }
@@ -146,13 +146,13 @@ fn half_digest(digest: &str) -> [u64; 2] {
 
 /// The machine's end.
 pub struct Server {
-    mapping: Mapping<Words>,
+    mapping: Mapping<SharedWords>,
     path: PathBuf,
 }
 
 /// The controller's end.
 pub struct Client {
-    mapping: Mapping<Words>,
+    mapping: Mapping<SharedWords>,
     session: u64,
 }
 
@@ -163,7 +163,7 @@ impl Server {
     /// If a machine of this name is served, something that is not this user's own has that name, or the file cannot be made.
     pub fn create(path: &Path, digest: &str) -> Result<Self, OpenError> {
         let failed = |cause| OpenError::File { path: path.to_owned(), cause };
-        match Mapping::<Words>::open(path) {
+        match Mapping::<SharedWords>::open(path) {
             Ok(old) => {
                 let process = old.words().server.load(Ordering::Acquire);
                 if old.words().magic.load(Ordering::Acquire) == MAGIC && process != 0 && is_alive(process) {
@@ -171,8 +171,8 @@ impl Server {
                 }
             }
             // What is left of another version, or nothing.
-            Err(Unfit::Size) => {}
-            Err(Unfit::File(cause)) if cause.kind() == io::ErrorKind::NotFound => {}
+            Err(MapError::Size) => {}
+            Err(MapError::File(cause)) if cause.kind() == io::ErrorKind::NotFound => {}
             Err(unfit) => return Err(OpenError::of(unfit, path)),
         }
         let (mapping, fresh) = Self::fresh(path)?;
@@ -191,7 +191,7 @@ impl Server {
     }
 
     /// A new file, made under another name and then renamed: nobody maps half a file, and who still maps an old one keeps that.
-    fn fresh(path: &Path) -> Result<(Mapping<Words>, PathBuf), OpenError> {
+    fn fresh(path: &Path) -> Result<(Mapping<SharedWords>, PathBuf), OpenError> {
         let fresh = path.with_extension(format!("{}.part", std::process::id()));
         let failed = |cause| OpenError::File { path: fresh.clone(), cause };
         match Mapping::create(&fresh) {
@@ -199,8 +199,8 @@ impl Server {
             made => return made.map(|mapping| (mapping, fresh.clone())).map_err(failed),
         }
         // Of a process of this number that was killed, if it is this user's own.
-        match Mapping::<Words>::open(&fresh) {
-            Ok(_) | Err(Unfit::Size) => std::fs::remove_file(&fresh).map_err(failed)?,
+        match Mapping::<SharedWords>::open(&fresh) {
+            Ok(_) | Err(MapError::Size) => std::fs::remove_file(&fresh).map_err(failed)?,
             Err(unfit) => return Err(OpenError::of(unfit, &fresh)),
         }
         Mapping::create(&fresh).map(|mapping| (mapping, fresh.clone())).map_err(failed)
@@ -238,7 +238,7 @@ impl Client {
     /// # Errors
     /// If there is none, or it is of another spec.
     pub fn open(path: &Path, digest: &str) -> Result<Self, OpenError> {
-        let mapping = Mapping::<Words>::open(path).map_err(|unfit| OpenError::of(unfit, path))?;
+        let mapping = Mapping::<SharedWords>::open(path).map_err(|unfit| OpenError::of(unfit, path))?;
         let words = mapping.words();
         if words.magic.load(Ordering::Acquire) != MAGIC || words.version.load(Ordering::Relaxed) != VERSION {
             return Err(OpenError::NotAMachine { path: path.to_owned() });

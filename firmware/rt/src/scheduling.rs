@@ -11,7 +11,7 @@ pub const STACK: usize = 512 * 1024;
 
 /// A right that the system did not give.
 #[derive(Debug)]
-pub struct Refused {
+pub struct MissingPrivilege {
     /// What was asked for.
     pub what: String,
     /// The system's answer.
@@ -20,13 +20,13 @@ pub struct Refused {
     pub fix: &'static str,
 }
 
-impl fmt::Display for Refused {
+impl fmt::Display for MissingPrivilege {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}; {}", self.what, self.cause, self.fix)
     }
 }
 
-impl std::error::Error for Refused {}
+impl std::error::Error for MissingPrivilege {}
 
 /// How real-time priority is given to a user, or to a program.
 pub const FIX_PRIORITY: &str = "put `@realtime - rtprio 95` into /etc/security/limits.d/realtime.conf and join group \
@@ -39,7 +39,7 @@ pub const FIX_MEMORY: &str = "put `@realtime - memlock unlimited` into /etc/secu
 ///
 /// # Errors
 /// Without the right to, or if the priority is none.
-pub fn set_fifo(priority: u8) -> Result<(), Refused> {
+pub fn set_fifo(priority: u8) -> Result<(), MissingPrivilege> {
     // SAFETY: an all-zero sched_param is valid (some C libraries have more fields); the call reads it.
     let answer = unsafe {
         let mut parameters: libc::sched_param = core::mem::zeroed();
@@ -54,7 +54,7 @@ pub fn set_fifo(priority: u8) -> Result<(), Refused> {
 ///
 /// # Errors
 /// Without the right to.
-pub fn lock_memory() -> Result<(), Refused> {
+pub fn lock_memory() -> Result<(), MissingPrivilege> {
     // SAFETY: takes no pointers.
     let answer = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) };
     refused(answer, || "locking memory (mlockall)".to_owned(), FIX_MEMORY)
@@ -70,11 +70,11 @@ pub fn unlock_memory() {
 ///
 /// # Errors
 /// If there is no such processor, or it is not among those of this process.
-pub fn pin(processor: usize) -> Result<(), Refused> {
+pub fn pin(processor: usize) -> Result<(), MissingPrivilege> {
     let fix = "choose one that `taskset -p $$` allows; `nproc --all` counts them from 0";
     if processor >= libc::CPU_SETSIZE as usize {
         let cause = io::Error::from(io::ErrorKind::InvalidInput);
-        return Err(Refused { what: format!("processor {processor}"), cause, fix });
+        return Err(MissingPrivilege { what: format!("processor {processor}"), cause, fix });
     }
     // SAFETY: an all-zero set is the empty one; `processor` is within it; the call reads it.
     let answer = unsafe {
@@ -143,14 +143,14 @@ impl AwakeProcessors {
     ///
     /// # Errors
     /// If the device is not there or not writable.
-    pub fn request() -> Result<Self, Refused> {
+    pub fn request() -> Result<Self, MissingPrivilege> {
         let path = PathBuf::from("/dev/cpu_dma_latency");
         let ask = || {
             let mut file = OpenOptions::new().write(true).open(&path)?;
             file.write_all(&0_i32.to_ne_bytes())?;
             Ok(Self { _file: file })
         };
-        ask().map_err(|cause| Refused {
+        ask().map_err(|cause| MissingPrivilege {
             what: format!("keeping processors awake ({})", path.display()),
             cause,
             fix: "let group `realtime` write it by a udev rule: KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"",
@@ -158,12 +158,12 @@ impl AwakeProcessors {
     }
 }
 
-fn refused(answer: libc::c_int, what: impl FnOnce() -> String, fix: &'static str) -> Result<(), Refused> {
+fn refused(answer: libc::c_int, what: impl FnOnce() -> String, fix: &'static str) -> Result<(), MissingPrivilege> {
     if answer == 0 {
         return Ok(());
     }
     let cause = io::Error::last_os_error();
-    Err(Refused { what: what(), cause, fix })
+    Err(MissingPrivilege { what: what(), cause, fix })
 }
 
 #[cfg(test)]

@@ -35,7 +35,7 @@ pub trait RequestCorrection<T: Real>: Copy + Debug + Snapshot {
     /// How far and how fast that of each axis goes.
     type Limits;
     /// What is wanted of each axis.
-    type Wanted: Copy + Debug + PartialEq + AsRef<[T]> + AsMut<[T]>;
+    type Offsets: Copy + Debug + PartialEq + AsRef<[T]> + AsMut<[T]>;
     /// Nothing corrected.
     const REST: Self;
     /// From now on nothing is corrected.
@@ -44,9 +44,9 @@ pub trait RequestCorrection<T: Real>: Copy + Debug + Snapshot {
         *self = Self::REST;
     }
     /// Nothing wanted of as many axes as have limits.
-    fn nothing(limits: &Self::Limits) -> Self::Wanted;
+    fn nothing(limits: &Self::Limits) -> Self::Offsets;
     /// One tick: follows what is wanted as far as the limits let it. Returns whether they held any axis back.
-    fn follow(&mut self, limits: &Self::Limits, wanted: &Self::Wanted) -> bool;
+    fn follow(&mut self, limits: &Self::Limits, wanted: &Self::Offsets) -> bool;
     /// c as a pose; none where there is none.
     #[must_use]
     fn pose(&self) -> Option<[T; 6]>;
@@ -54,7 +54,7 @@ pub trait RequestCorrection<T: Real>: Copy + Debug + Snapshot {
 
 impl<T: Real + Debug, const N: usize> RequestCorrection<T> for Correction<T, N> {
     type Limits = [CorrectionLimit<T>; N];
-    type Wanted = [T; N];
+    type Offsets = [T; N];
     const REST: Self = Self::new();
 
     #[inline(always)]

@@ -100,7 +100,7 @@ pub use memory::ReversalMemory;
 pub use mode::{ControlMode, Interaction, SetpointKind};
 pub use motion::Motion;
 pub use notch::{Notch, NotchState, Section};
-pub use permitted::Permitted;
+pub use permitted::PermittedRange;
 pub use real::Real;
 pub use recorder::Recorder;
 pub use sensing::{Calibration, GaugeCalibration, GaugeConverter, Gauges};

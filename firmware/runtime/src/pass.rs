@@ -78,7 +78,7 @@ impl Stage {
 
 /// What the coming tick of a pass is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Given<T> {
+pub struct PassInput<T> {
     /// c, m and rad.
     pub correction: [T; 6],
     /// This trajectory is played from this tick on.
@@ -237,7 +237,7 @@ impl<'m, T: Real> Player<'m, T> {
     /// What the coming tick is given; none if no pass is under way.
     #[inline]
     #[must_use]
-    pub fn give(&mut self) -> Option<Given<T>> {
+    pub fn give(&mut self) -> Option<PassInput<T>> {
         if self.stage != Stage::Running {
             return None;
         }
@@ -246,7 +246,7 @@ impl<'m, T: Real> Player<'m, T> {
         let table = self.table.get(..self.course.knots() as usize).unwrap_or_default();
         let begins = if tick == before { Some(trajectory) } else { None };
         self.begun = self.begun.or(begins);
-        Some(Given { correction: playback::at(table, spacing, tick), begins })
+        Some(PassInput { correction: playback::at(table, spacing, tick), begins })
     }
 
     /// A tick of the pass is over: its `target` h_d is for its end, its `pose` is h at its beginning, m and rad; `status` is what the controller gave.

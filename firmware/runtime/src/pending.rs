@@ -26,7 +26,7 @@ choice! {
 
 /// An order that waits, and the line that it waits for.
 #[derive(Debug, Clone, Copy)]
-pub struct Pending<T> {
+pub struct EdgeWait<T> {
     order: Option<T>,
     stage: Stage,
     /// The line at the last tick. It begins high: only one that was seen low can rise.
@@ -36,13 +36,13 @@ pub struct Pending<T> {
     tick: u64,
 }
 
-impl<T> Default for Pending<T> {
+impl<T> Default for EdgeWait<T> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<T> Pending<T> {
+impl<T> EdgeWait<T> {
     /// Nothing waits, and no edge was seen.
     #[must_use]
     pub const fn new() -> Self {
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn an_order_is_due_once_in_the_tick_of_a_rising_edge() {
-        let mut pending = Pending::new();
+        let mut pending = EdgeWait::new();
         pending.wait('a');
         // High since before: no edge.
         assert!(!pending.sense(HIGH) && pending.due().is_none());
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn the_last_order_waits_and_one_that_is_dropped_does_not() {
-        let mut pending = Pending::new();
+        let mut pending = EdgeWait::new();
         pending.cancel();
         assert_eq!(pending.stage(), Stage::None);
         pending.wait('a');
@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn a_line_that_was_not_read_does_not_rise_until_it_was_seen_low() {
-        let mut pending = Pending::<()>::new();
+        let mut pending = EdgeWait::<()>::new();
         let seen = [LOW, Err(()), HIGH, HIGH, LOW, HIGH].map(|line| pending.sense(line));
         assert_eq!(seen, [false, false, false, false, false, true]);
     }

@@ -4,14 +4,14 @@ use crate::real::Real;
 
 /// The range of one word of the settings, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Permitted<T> {
+pub enum PermittedRange<T> {
     /// A choice, a count or a code.
     Whole(u64, u64),
     /// A number.
     Number(T, T),
 }
 
-impl<T: Real> Permitted<T> {
+impl<T: Real> PermittedRange<T> {
     /// The range of the setting with this place, in a table whose rows each hold for so many of them; none beyond the last.
     #[must_use]
     pub fn of(table: &[(Self, usize)], place: usize) -> Option<&Self> {
@@ -42,13 +42,13 @@ impl<T: Real> Permitted<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::Permitted;
+    use super::PermittedRange;
 
     #[test]
     fn the_ends_are_taken_and_what_is_beyond_or_no_number_is_not() {
-        let codes = Permitted::<f64>::Whole(1, 1747);
+        let codes = PermittedRange::<f64>::Whole(1, 1747);
         assert_eq!([0, 1, 1747, 1748, u64::MAX].map(|word| codes.takes(word)), [false, true, true, false, false]);
-        let weight = Permitted::Number(0.0_f32, 1.0);
+        let weight = PermittedRange::Number(0.0_f32, 1.0);
         for (value, taken) in [(0.0_f32, true), (1.0, true), (-1e-9, false), (1.0001, false), (f32::NAN, false)] {
             assert_eq!(weight.takes(u64::from(value.to_bits())), taken, "{value}");
         }

@@ -89,7 +89,7 @@ pub struct Row {
 
 /// Why a memory is not enough.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unfit {
+pub enum MemoryError {
     /// It has no room for so many blocks of a row each, or there are fewer than two of them: words needed.
     TooSmall(usize),
     /// An input of more words than a row can tell apart.
@@ -121,12 +121,12 @@ pub struct Recorder<'m> {
     digest: Option<u64>,
     /// Snapshots and digests come later, and which does.
     owing: bool,
-    owed: Option<Owed>,
+    owed: Option<PendingWrite>,
 }
 
 /// For what a machine is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Want {
+pub enum SnapshotPurpose {
     /// A block begins with it, after the settings that are in force.
     Block,
     /// Its digest ends the last row.
@@ -138,7 +138,7 @@ const AHEAD: usize = 8;
 
 /// Where what comes later goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Owed {
+enum PendingWrite {
     /// Settings, state and digest that a block begins with.
     Block(Place),
     /// The digest of a row.
@@ -152,14 +152,14 @@ impl<'m> Recorder<'m> {
     ///
     /// # Errors
     /// There is no room for that.
-    pub fn new(memory: &'m mut [u64], blocks: usize, layout: Layout) -> Result<Self, Unfit> {
+    pub fn new(memory: &'m mut [u64], blocks: usize, layout: Layout) -> Result<Self, MemoryError> {
         if layout.input > LARGEST_INPUT {
-            return Err(Unfit::InputTooLong);
+            return Err(MemoryError::InputTooLong);
         }
         let least = layout.preamble() + layout.longest_row();
         let size = memory.len().checked_div(blocks).unwrap_or_default();
         if blocks < 2 || size < least {
-            return Err(Unfit::TooSmall(least.saturating_mul(if blocks < 2 { 2 } else { blocks })));
+            return Err(MemoryError::TooSmall(least.saturating_mul(if blocks < 2 { 2 } else { blocks })));
         }
         Ok(Self {
             ring: Ring::new(memory, size, blocks, layout),
@@ -195,7 +195,7 @@ impl<'m> Recorder<'m> {
         self.asked = false;
         self.due = Some(Reason::Started);
         self.digest = None;
-        self.owed = self.owed.map(|_| Owed::Nothing);
+        self.owed = self.owed.map(|_| PendingWrite::Nothing);
     }
 
     /// Ends the recording; what there is stays to be fetched.
@@ -288,12 +288,12 @@ impl<'m> Recorder<'m> {
     /// Between two ticks: for what the machine as it is now is to be kept, if for anything. Then [`Recorder::owe`].
     #[cold]
     #[must_use]
-    pub fn wants(&self) -> Option<Want> {
+    pub fn wants(&self) -> Option<SnapshotPurpose> {
         let records = self.owing && self.records() && self.skip == 0 && !self.owes();
         let every = self.settings.digest_every;
         match () {
             // Before the open block is full, so that no row is without one.
-            () if records && (self.due.is_some() || !self.ring.has_room_for(AHEAD)) => Some(Want::Block),
+            () if records && (self.due.is_some() || !self.ring.has_room_for(AHEAD)) => Some(SnapshotPurpose::Block),
             // Of the last row, which is that of the last tick.
             () if records
                 && self.settings.decimation <= 1
@@ -301,7 +301,7 @@ impl<'m> Recorder<'m> {
                 && self.digest_in == 0
                 && self.ring.may_add() =>
             {
-                Some(Want::Digest)
+                Some(SnapshotPurpose::Digest)
             }
             () => None,
         }
@@ -309,15 +309,15 @@ impl<'m> Recorder<'m> {
 
     /// It is kept: a block begins with the next row, or the last row ends with a digest. Both are owed.
     #[cold]
-    pub fn owe(&mut self, want: Want) {
+    pub fn owe(&mut self, want: SnapshotPurpose) {
         self.owed = match want {
-            Want::Block => {
+            SnapshotPurpose::Block => {
                 self.open_with(&[], || 0, |_| {});
-                self.ring.newest_place().map(Owed::Block)
+                self.ring.newest_place().map(PendingWrite::Block)
             }
-            Want::Digest => {
+            SnapshotPurpose::Digest => {
                 self.digest_in = self.settings.digest_every;
-                self.ring.add(HAS_DIGEST).map(Owed::Digest)
+                self.ring.add(HAS_DIGEST).map(PendingWrite::Digest)
             }
         };
     }
@@ -332,13 +332,13 @@ impl<'m> Recorder<'m> {
     /// Whether that is a whole block, settings and state and all, or the digest alone.
     #[must_use]
     pub fn owes_block(&self) -> bool {
-        matches!(self.owed, Some(Owed::Block(_)))
+        matches!(self.owed, Some(PendingWrite::Block(_)))
     }
 
     /// Words of what an owed block begins with, settings and then state, from the `first`-th on.
     #[cold]
     pub fn hand_in(&mut self, first: usize, words: &[u64]) {
-        if let Some(Owed::Block(place)) = self.owed
+        if let Some(PendingWrite::Block(place)) = self.owed
             && first + words.len() <= self.layout.config + self.layout.state
         {
             self.ring.write(place, HEADER_WORDS + first, words);
@@ -349,9 +349,9 @@ impl<'m> Recorder<'m> {
     #[cold]
     pub fn settle(&mut self, digest: u64) {
         match self.owed.take() {
-            Some(Owed::Block(place)) => self.ring.write(place, DIGEST, &[digest]),
-            Some(Owed::Digest(place)) => self.ring.write(place, 0, &[digest]),
-            Some(Owed::Nothing) | None => {}
+            Some(PendingWrite::Block(place)) => self.ring.write(place, DIGEST, &[digest]),
+            Some(PendingWrite::Digest(place)) => self.ring.write(place, 0, &[digest]),
+            Some(PendingWrite::Nothing) | None => {}
         }
     }
 

@@ -13,7 +13,7 @@ mod walk;
 
 pub use crate::choice::Choice;
 pub use crate::field::Field;
-pub use walk::{Within, Words};
+pub use walk::{SizedSink, WordSink};
 
 /// Largest |place| that is loaded, m and rad: poses, set-points, displacements.
 pub const LARGEST_PLACE: f64 = 16.0;
@@ -99,14 +99,14 @@ pub trait Snapshot: Field {
     ///
     /// # Errors
     /// Never.
-    fn show(&self, words: &mut impl Words) -> Result<(), Infallible>;
+    fn show(&self, words: &mut impl WordSink) -> Result<(), Infallible>;
 
     /// Takes the state that [`Snapshot::save`] wrote.
     ///
     /// # Errors
     /// At the first word that no state holds; what was read before it is taken, so that a state which must not be lost is
     /// restored into a copy.
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid>;
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), InvalidState>;
 
     /// Appends the state.
     #[inline]
@@ -130,7 +130,7 @@ pub trait Snapshot: Field {
 
 /// A word that no state holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Invalid {
+pub struct InvalidState {
     /// Its index.
     pub word: usize,
 }
@@ -204,13 +204,13 @@ impl<'a> Writer<'a> {
 
 /// Some words of a state, from the `first`-th on: a state that is written piece by piece, where there is time for a walk each.
 #[derive(Debug)]
-pub struct Piece<'a> {
+pub struct StatePart<'a> {
     words: &'a mut [u64],
     first: usize,
     count: usize,
 }
 
-impl<'a> Piece<'a> {
+impl<'a> StatePart<'a> {
     /// As many words as have room.
     #[must_use]
     pub fn new(words: &'a mut [u64], first: usize) -> Self {
@@ -284,8 +284,8 @@ impl<'a> Reader<'a> {
 
     /// That the word last read is none.
     #[must_use]
-    pub fn refused(&self) -> Invalid {
-        Invalid { word: self.count.saturating_sub(1) }
+    pub fn refused(&self) -> InvalidState {
+        InvalidState { word: self.count.saturating_sub(1) }
     }
 
     /// An integer up to `largest`.
@@ -293,7 +293,7 @@ impl<'a> Reader<'a> {
     /// # Errors
     /// It is larger, or there are no more words.
     #[inline]
-    pub fn word(&mut self, largest: u64) -> Result<u64, Invalid> {
+    pub fn word(&mut self, largest: u64) -> Result<u64, InvalidState> {
         let word = self.words.get(self.count).copied();
         self.count += 1;
         match word {
@@ -307,7 +307,7 @@ impl<'a> Reader<'a> {
     /// # Errors
     /// It is none, see [`Reader::word`].
     #[inline]
-    pub fn count_to(&mut self, largest: i32) -> Result<i32, Invalid> {
+    pub fn count_to(&mut self, largest: i32) -> Result<i32, InvalidState> {
         let largest = if largest < 0 { 0 } else { largest as u64 };
         Ok(self.word(largest)? as i32)
     }
@@ -317,7 +317,7 @@ impl<'a> Reader<'a> {
     /// # Errors
     /// It has more than 32 bits.
     #[inline]
-    pub fn counter(&mut self) -> Result<u32, Invalid> {
+    pub fn counter(&mut self) -> Result<u32, InvalidState> {
         Ok(self.word(u64::from(u32::MAX))? as u32)
     }
 
@@ -326,7 +326,7 @@ impl<'a> Reader<'a> {
     /// # Errors
     /// It is neither 0 nor 1.
     #[inline]
-    pub fn flag(&mut self) -> Result<bool, Invalid> {
+    pub fn flag(&mut self) -> Result<bool, InvalidState> {
         Ok(self.word(1)? != 0)
     }
 
@@ -335,7 +335,7 @@ impl<'a> Reader<'a> {
     /// # Errors
     /// It is none.
     #[inline]
-    pub fn real<T: Real>(&mut self, largest: f64) -> Result<T, Invalid> {
+    pub fn real<T: Real>(&mut self, largest: f64) -> Result<T, InvalidState> {
         let word = self.word(u64::MAX)?;
         let value = T::from_word(word);
         // A NaN fails the comparison; bits above an `f32` do not come back.
@@ -346,7 +346,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// At the first that is none.
-    pub fn reals<T: Real>(&mut self, values: &mut [T], largest: f64) -> Result<(), Invalid> {
+    pub fn reals<T: Real>(&mut self, values: &mut [T], largest: f64) -> Result<(), InvalidState> {
         for value in values {
             *value = self.real(largest)?;
         }

@@ -45,7 +45,7 @@ pub use phases::Supervisor;
 pub use sift::{Activity, SAMPLE_REPEATED, SAMPLE_REPLACED, Sift};
 pub use supervision::{Supervision, TIMED, TIMERS};
 pub use watch::{Channel, Sample, Watch};
-pub use wiring::{Check, Fault, Finding, Named, Response, Wiring, explains, with};
+pub use wiring::{Check, Fault, Finding, FindingText, Response, Wiring, explains, with};
 
 /// `code` moved towards `goal` by at most `step` (≥ 0) codes.
 #[inline]

@@ -100,7 +100,7 @@ crate::state! { |words|
 
 /// What a tick shows.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen<'a, T> {
+pub struct Observation<'a, T> {
     /// Measured pose from rest, m and rad; the last one believed.
     pub pose: &'a [T; 6],
     /// The set-point moves.
@@ -183,7 +183,7 @@ impl<T: Real> Line<T> {
 impl<T: Real> Watch<T> {
     /// One tick of a run; whether the line is high.
     #[inline(never)]
-    fn tick(&mut self, line: &Line<T>, seen: &Seen<'_, T>, fresh: bool) -> bool {
+    fn tick(&mut self, line: &Line<T>, seen: &Observation<'_, T>, fresh: bool) -> bool {
         if self.line != *line {
             *self = Self { line: *line, ..Self::new() };
         }
@@ -317,7 +317,7 @@ pub trait OutputLines<T: Real>: Copy + Debug + Snapshot {
     /// Whether there is any line.
     fn any(&self) -> bool;
     /// One tick of a run under these settings; the lines as bits of the status: [`HIGH`], [`MISSED`].
-    fn tick(&mut self, lines: &Self::Settings, seen: &Seen<'_, T>) -> u32;
+    fn tick(&mut self, lines: &Self::Settings, seen: &Observation<'_, T>) -> u32;
     /// One tick outside a run: all lines are low. What was missed stays: [`MISSED`].
     fn rest(&mut self) -> u32;
     /// Pulses that each line has missed since its settings were given, up to [`MOST_MISSED`]: 15 bits a line, the first lowest.
@@ -335,7 +335,7 @@ impl<T: Real + Debug, const N: usize> OutputLines<T> for Triggers<T, N> {
     }
 
     #[inline]
-    fn tick(&mut self, lines: &[Line<T>; N], seen: &Seen<'_, T>) -> u32 {
+    fn tick(&mut self, lines: &[Line<T>; N], seen: &Observation<'_, T>) -> u32 {
         let mut status = 0;
         for (((watch, last), line), bit) in self.lines.iter_mut().zip(&mut self.sequence).zip(lines).zip(HIGH) {
             let fresh = seen.sequence != *last;

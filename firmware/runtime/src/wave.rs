@@ -73,7 +73,7 @@ pub struct Settings<T> {
 
 /// Why a wave is not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refused {
+pub enum Refusal {
     /// One is under way.
     Busy,
     /// A word that is no number, or none that its place can hold.
@@ -151,7 +151,7 @@ impl<T: Real> Wave<T> {
     ///
     /// # Errors
     /// A wave is under way, a word is none, or an axis would go beyond its limits; the settings stay.
-    pub fn load(&mut self, words: &[u64; WORDS]) -> Result<(), Refused> {
+    pub fn load(&mut self, words: &[u64; WORDS]) -> Result<(), Refusal> {
         self.set(&Settings::from_words(words)?)
     }
 
@@ -159,9 +159,9 @@ impl<T: Real> Wave<T> {
     ///
     /// # Errors
     /// As [`Wave::load`].
-    pub fn set(&mut self, settings: &Settings<T>) -> Result<(), Refused> {
+    pub fn set(&mut self, settings: &Settings<T>) -> Result<(), Refusal> {
         if self.stage != Stage::Idle {
-            return Err(Refused::Busy);
+            return Err(Refusal::Busy);
         }
         settings.check(&self.limits)?;
         self.settings = *settings;
@@ -267,7 +267,7 @@ impl<T: Real> Settings<T> {
     }
 
     /// Whether each axis keeps within its limits, ramps included.
-    fn check(&self, limits: &Limits<T>) -> Result<(), Refused> {
+    fn check(&self, limits: &Limits<T>) -> Result<(), Refusal> {
         // Largest slope and curvature of the envelope: 15/8, and 10/√3 rounded up.
         let n = T::from_i32(if self.ramp_ticks > 0 { self.ramp_ticks } else { 1 });
         let (slope, bend) = (T::from_f64(1.875) / n, T::from_f64(5.774) / n / n);
@@ -280,17 +280,17 @@ impl<T: Real> Settings<T> {
             let highest = center + if high > T::ZERO { high } else { T::ZERO };
             // Asked so that what is not a number is refused.
             if !(lowest >= limits.low[index] && highest <= limits.high[index]) {
-                return Err(Refused::Range(index));
+                return Err(Refusal::Range(index));
             }
             let reach = if -low > high { -low } else { high };
             let within = (peak.rate + reach * slope) * second <= limits.rate[index];
             if !within {
-                return Err(Refused::Rate(index));
+                return Err(Refusal::Rate(index));
             }
             let most = peak.bend + (peak.rate + peak.rate) * slope + reach * bend;
             let within = most * second * second <= limits.acceleration[index];
             if !within {
-                return Err(Refused::Acceleration(index));
+                return Err(Refusal::Acceleration(index));
             }
         }
         Ok(())

@@ -14,9 +14,9 @@ const SELECT: u32 = 20;
 
 /// The SPI did not move a byte in time: its clock stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stuck;
+pub struct SpiTimeout;
 
-impl Error for Stuck {
+impl Error for SpiTimeout {
     fn kind(&self) -> ErrorKind {
         ErrorKind::Other
     }
@@ -27,13 +27,13 @@ pub trait Burst {
     /// Moves `count` bytes: the k-th is `send(k)`, and what comes back for it goes to `take`. Ends with the last bit.
     ///
     /// # Errors
-    /// [`Stuck`]; the next exchange starts anew.
+    /// [`SpiTimeout`]; the next exchange starts anew.
     fn exchange(
         &mut self,
         count: usize,
         send: impl FnMut(usize) -> u8,
         take: impl FnMut(usize, u8),
-    ) -> Result<(), Stuck>;
+    ) -> Result<(), SpiTimeout>;
 
     /// The clock of the exchanges that follow: that of frames whose answer counts, or that of others. Where one clock does for both,
     /// nothing.
@@ -73,12 +73,12 @@ impl<BUS: Burst, const CYCLES: u32> Device<BUS, CYCLES> {
 }
 
 impl<BUS, const CYCLES: u32> ErrorType for Device<BUS, CYCLES> {
-    type Error = Stuck;
+    type Error = SpiTimeout;
 }
 
 /// By `write` alone nothing comes back: all else has the clock of frames whose answer counts.
 impl<BUS: Burst, const CYCLES: u32> SpiDevice for Device<BUS, CYCLES> {
-    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Stuck> {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), SpiTimeout> {
         self.answered(|bus| {
             for operation in operations {
                 match operation {
@@ -96,18 +96,18 @@ impl<BUS: Burst, const CYCLES: u32> SpiDevice for Device<BUS, CYCLES> {
     }
 
     #[inline]
-    fn transfer_in_place(&mut self, bytes: &mut [u8]) -> Result<(), Stuck> {
+    fn transfer_in_place(&mut self, bytes: &mut [u8]) -> Result<(), SpiTimeout> {
         self.answered(|bus| in_place(bus, bytes))
     }
 
     #[inline]
-    fn write(&mut self, bytes: &[u8]) -> Result<(), Stuck> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), SpiTimeout> {
         self.selected(|bus| bus.exchange(bytes.len(), |k| at(bytes, k), |_, _| {}))
     }
 }
 
 #[inline]
-fn in_place(bus: &mut impl Burst, bytes: &mut [u8]) -> Result<(), Stuck> {
+fn in_place(bus: &mut impl Burst, bytes: &mut [u8]) -> Result<(), SpiTimeout> {
     // A byte comes back after it was sent, so one place serves both.
     let cells = core::cell::Cell::from_mut(bytes).as_slice_of_cells();
     bus.exchange(

@@ -5,7 +5,7 @@ use core::mem::MaybeUninit;
 use controller::supervised::{Machine, machine_at_reset};
 use controller::triggers::{INPUT, LINES, MOST};
 use embedded_hal::spi::{MODE_1, MODE_2, Mode};
-use specgen_board::{Board, GAUGE_BITS, Kept};
+use specgen_board::{Board, GAUGE_BITS, MachineSnapshot};
 use specgen_hal::ad5686r::Ad5686rPair;
 use specgen_hal::ad7606::{Ad7606, Window};
 use stm32_metapac::gpio::vals::{Ospeedr, Pupdr};
@@ -13,7 +13,7 @@ use stm32_metapac::gpio::vals::{Ospeedr, Pupdr};
 use crate::CycleDelay;
 use crate::burst::{Burst, Device};
 use crate::enable::Enable;
-use crate::pins::{Input, Latched, Output, Pin};
+use crate::pins::{Input, LatchedInput, Output, Pin};
 use crate::pulses::{self, Sampling};
 
 /// AD7606 for gauges of up to 16 bits; the pin-compatible AD7608 or AD7606C-18 for up to 18.
@@ -23,7 +23,7 @@ const REFERENCE: Window = Window::around(2500, 50, 5000, ADC_BITS as u32);
 
 /// The ADC.
 pub type Adc<BUS, const CYCLES: u32> =
-    Ad7606<ADC_BITS, Device<BUS, CYCLES>, Sampling, Latched, Output, CycleDelay<CYCLES>>;
+    Ad7606<ADC_BITS, Device<BUS, CYCLES>, Sampling, LatchedInput, Output, CycleDelay<CYCLES>>;
 /// The DACs.
 pub type Dacs<BUS, const OUTPUT: usize, const CYCLES: u32> =
     Ad5686rPair<Device<BUS, CYCLES>, Device<BUS, CYCLES>, pulses::Output<OUTPUT>, Enable, CycleDelay<CYCLES>>;
@@ -40,7 +40,7 @@ pub struct AdcPins<BUS, const CYCLES: u32> {
     /// CONVST A and B.
     pub start: Sampling,
     /// BUSY with pull-up, so that a part that is not there is seen.
-    pub busy: Latched,
+    pub busy: LatchedInput,
     /// RESET, low.
     pub reset: Output,
 }
@@ -77,8 +77,8 @@ pub fn at_reset(memory: &'static mut MaybeUninit<Machine>) -> &'static mut Machi
 
 /// What the recorder's background copies the machine into, made where it stays.
 #[inline(never)]
-pub fn kept(memory: &'static mut MaybeUninit<Kept>, machine: &Machine) -> &'static mut Kept {
-    memory.write(Kept::of(machine))
+pub fn kept(memory: &'static mut MaybeUninit<MachineSnapshot>, machine: &Machine) -> &'static mut MachineSnapshot {
+    memory.write(MachineSnapshot::of(machine))
 }
 
 /// Puts machine (at reset) and converters together. `intact`: what `controller::integrity` found.

@@ -4,7 +4,7 @@ use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 use specgen_hal::Fault;
-use specgen_hal::ad7606::Busy;
+use specgen_hal::ad7606::BusyLine;
 use stm32_metapac::gpio::Gpio;
 use stm32_metapac::gpio::vals::{Moder, Ospeedr, Ot, Pupdr};
 use stm32_metapac::{EXTI, GPIOA, SYSCFG};
@@ -52,23 +52,23 @@ impl Pin {
 const PORT: usize = 0x400;
 
 /// An input whose falls the EXTI latches. No interrupt of the core belongs to it.
-pub struct Latched(Input);
+pub struct LatchedInput(Input);
 
 impl Pin {
     /// An input whose falls are latched; no other port has its number there.
     #[must_use]
-    pub fn latched(self, pull: Pupdr) -> Latched {
+    pub fn latched(self, pull: Pupdr) -> LatchedInput {
         let Self(port, number) = self;
         let place = (port.as_ptr() as usize).wrapping_sub(GPIOA.as_ptr() as usize) / PORT;
         let input = self.input(pull);
         SYSCFG.exticr(usize::from(number / 4 & 3)).modify(|w| w.set_exti(usize::from(number % 4), place as u8));
         EXTI.ftsr(0).modify(|w| w.0 |= 1 << number);
         EXTI.imr(0).modify(|w| w.0 |= 1 << number);
-        Latched(input)
+        LatchedInput(input)
     }
 }
 
-impl Busy for Latched {
+impl BusyLine for LatchedInput {
     #[inline]
     fn is_high(&mut self) -> Result<bool, Fault> {
         Ok(self.0.level())

@@ -1,7 +1,7 @@
 //! The SPI of the STM32F4: a byte in its shift register, one before it and one behind it.
 
 use embedded_hal::spi::{Mode, Phase, Polarity};
-use specgen_stm32::burst::{Burst, Stuck};
+use specgen_stm32::burst::{Burst, SpiTimeout};
 use stm32_metapac::spi::Spi;
 use stm32_metapac::spi::vals::{Br, Cpha, Cpol, Mstr};
 
@@ -68,7 +68,7 @@ impl Burst for Registers {
         count: usize,
         mut send: impl FnMut(usize) -> u8,
         mut take: impl FnMut(usize, u8),
-    ) -> Result<(), Stuck> {
+    ) -> Result<(), SpiTimeout> {
         let (mut sent, mut taken) = (0, 0);
         for _ in 0..count * LOOKS {
             if taken == count {
@@ -90,6 +90,6 @@ impl Burst for Registers {
         }
         // What came late is of no use to the next frame.
         let _ = self.spi.dr().read();
-        Err(Stuck)
+        Err(SpiTimeout)
     }
 }

@@ -1,7 +1,7 @@
 //! The SPI of the STM32H7: frames through its FIFO.
 
 use embedded_hal::spi::{Mode, Phase, Polarity};
-use specgen_stm32::burst::{Burst, Stuck};
+use specgen_stm32::burst::{Burst, SpiTimeout};
 use stm32_metapac::spi::Spi;
 use stm32_metapac::spi::regs::Cr1;
 use stm32_metapac::spi::vals::{Cpha, Cpol, Fthlv, Master, Mbr, Ssiop};
@@ -96,7 +96,7 @@ impl Burst for Registers {
         count: usize,
         mut send: impl FnMut(usize) -> u8,
         mut take: impl FnMut(usize, u8),
-    ) -> Result<(), Stuck> {
+    ) -> Result<(), SpiTimeout> {
         let mut sent = 0;
         while sent < count && sent < DEPTH {
             self.spi.txdr8().write_value(send(sent));
@@ -120,6 +120,6 @@ impl Burst for Registers {
             return Ok(());
         }
         self.start();
-        Err(Stuck)
+        Err(SpiTimeout)
     }
 }

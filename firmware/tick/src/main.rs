@@ -26,7 +26,7 @@ use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, Config, INPUT_WORDS, Real, passes, triggers};
 use parts::{ADC_BITS, Bench, Bus, Delay, Line, Pin, REFERENCE, Rates, Role};
 use semihosting::{Exit, File, exit};
-use specgen_board::{Board, Exchange, Kept, Noticed, SampleMemory, catch_up, gather};
+use specgen_board::{Board, Exchange, MachineSnapshot, SampleMemory, TargetStatus, catch_up, gather};
 use specgen_hal::CHANNELS;
 use specgen_hal::ad5686r::Ad5686rPair;
 use specgen_hal::ad7606::Ad7606;
@@ -51,7 +51,7 @@ type Adc<'b> = Ad7606<ADC_BITS, Bus<'b>, Line<'b>, Pin<'b>, Pin<'b>, Delay<'b>>;
 type Dacs<'b> = Ad5686rPair<Bus<'b>, Bus<'b>, Line<'b>, Pin<'b>, Delay<'b>>;
 
 /// What a tick works on.
-struct Timed<'m> {
+struct Fixture<'m> {
     board: Board<'m, Adc<'m>, Dacs<'m>, [Option<Pin<'m>>; triggers::MOST]>,
     exchange: Exchange,
     /// Settings that a host wrote.
@@ -86,8 +86,14 @@ fn run() -> Result<(), Exit> {
     let mut lines = [(); triggers::LINES].into_iter();
     let lines = [(); triggers::MOST].map(|()| lines.next().map(|()| Pin { bench }));
     let board = Board::with_lines(adc(bench), dacs(bench), lines, &mut machine, true);
-    let mut timed =
-        Timed { board, exchange, settings: Config::new(), wave, waved: [0; COMMAND_WORDS], player: Player::new(knots) };
+    let mut timed = Fixture {
+        board,
+        exchange,
+        settings: Config::new(),
+        wave,
+        waved: [0; COMMAND_WORDS],
+        player: Player::new(knots),
+    };
     bench.codes.set(codes_of(&[0; INPUT_WORDS]));
     timed.board.start(&mut timed.exchange.report);
     bench.take();
@@ -114,7 +120,7 @@ fn run() -> Result<(), Exit> {
         specgen_timed_tick(&mut timed);
         specgen_timed_end();
         // As the background.
-        let Timed { board, exchange, .. } = &mut timed;
+        let Fixture { board, exchange, .. } = &mut timed;
         catch_up(&mut |action| action(exchange, board.machine_mut()), || true);
         gather(&mut |action| action(exchange, board.machine_mut()));
         if !output.write(&bench.take()) {
@@ -159,11 +165,11 @@ fn codes_of(row: &[u64; INPUT_WORDS]) -> [i32; CHANNELS] {
 #[unsafe(no_mangle)]
 #[inline(never)]
 #[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.
-fn specgen_timed_tick(timed: &mut Timed<'_>) {
+fn specgen_timed_tick(timed: &mut Fixture<'_>) {
     if let Some(motion) = timed.wave.advance() {
         waves::write(&motion, timed.wave.sequence(), &mut timed.waved);
     }
-    timed.board.tick(&mut timed.exchange, Noticed::default());
+    timed.board.tick(&mut timed.exchange, TargetStatus::default());
     // As the exchange does it: it shares its command, which the rows have here, with no wave.
     if passes::POSSIBLE {
         pass(timed);
@@ -171,8 +177,8 @@ fn specgen_timed_tick(timed: &mut Timed<'_>) {
 }
 
 #[inline(never)]
-fn pass(timed: &mut Timed<'_>) {
-    let Timed { player, board, waved, exchange, .. } = timed;
+fn pass(timed: &mut Fixture<'_>) {
+    let Fixture { player, board, waved, exchange, .. } = timed;
     if let Some([target, pose]) = passes::shown(&board.machine().state) {
         player.keep(&target, &pose, exchange.report.status);
     }
@@ -191,9 +197,9 @@ extern "C" fn specgen_timed_end() {
 
 /// The recorder's memories, for the one call that there is.
 #[allow(unsafe_code, clippy::deref_addrof)] // Statics that are written, to which no plain reference may be taken.
-fn memories() -> (&'static mut [u64], &'static mut Kept, &'static mut [Knot], &'static mut SampleMemory) {
+fn memories() -> (&'static mut [u64], &'static mut MachineSnapshot, &'static mut [Knot], &'static mut SampleMemory) {
     static mut MEMORY: [u64; RECORD] = [0; RECORD];
-    static mut KEPT: Kept = Kept::new();
+    static mut KEPT: MachineSnapshot = MachineSnapshot::new();
     static mut PLAYED: [Knot; 2 * KNOTS] = [[0; 6]; 2 * KNOTS];
     static mut SAMPLES: SampleMemory = SampleMemory::new();
     // SAFETY: called once, by `run`; no interrupt is enabled.

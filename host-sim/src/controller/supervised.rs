@@ -5,12 +5,12 @@ mod standing;
 
 use std::fmt;
 
-use specgen_runtime::supervisor::{Cause, Finding, Named, Phase};
+use specgen_runtime::supervisor::{Cause, Finding, FindingText, Phase};
 
 use super::{Controller, ControllerError, TickController};
 
 pub use snapshot::SnapshotError;
-pub use standing::Standing;
+pub use standing::RestingReadings;
 
 /// Words that the supervised tick takes beyond those of the control law: request, events.
 const MORE_INPUTS: usize = 2;
@@ -58,7 +58,7 @@ impl MachineWord {
         match Cause::from_word(u64::from(cause)) {
             Some(cause) => {
                 let finding = Finding::of_word(finding);
-                let parts = [cause.name().to_owned(), Named(finding, alike).to_string()];
+                let parts = [cause.name().to_owned(), FindingText(finding, alike).to_string()];
                 let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
                 if parts.is_empty() { of } else { format!("{of}: {}", parts.join(", ")) }
             }

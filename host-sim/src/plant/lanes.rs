@@ -6,7 +6,7 @@
 //!
 //! What drives a structure is the whole way within a step, not its end alone. A play that is taken along from somewhere
 //! within the step bends that way; left out, such bends ring the structure by some tenths of a nanometre. They are told as
-//! moments, see [`Way`].
+//! moments, see [`StepShape`].
 
 use super::Stack;
 use super::bouc_wen::BoucWen;
@@ -23,7 +23,7 @@ const AT_ONCE: f64 = 5.0;
 /// How something goes over a step of length 1, a lane a leg: to `end`, and on the way off the shape that the amplifier's lag
 /// gives by a `mean` and by a `skew`, its first moment about the middle of the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Way {
+pub(crate) struct StepShape {
     pub(crate) end: Lane,
     pub(crate) mean: Lane,
     pub(crate) skew: Lane,
@@ -32,12 +32,12 @@ pub(crate) struct Way {
 /// How the displacements of plays that are taken along only over the last part f of a way, of which they miss 1 − f, are off
 /// the shape of the way: mean and skew are `mean[0]` (1 − f) + `mean[1]` (1 − f²) of what they move, and likewise.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Late {
+pub(crate) struct LateShape {
     mean: [Lane; 2],
     skew: [Lane; 2],
 }
 
-impl Late {
+impl LateShape {
     /// Behind amplifiers whose voltage has so many lags in a step.
     pub(crate) fn behind(lags: &[f64; 6]) -> Self {
         // With r lags in a step the voltage has the last z of its way before it for ln(1 + z (e^r − 1))/r of the step. That
@@ -183,7 +183,7 @@ impl StackLanes {
     /// `late`; free displacements over it, µm.
     // Inlined into functions that are compiled for several instruction sets.
     #[inline(always)]
-    pub(crate) fn advance(&mut self, before: &Lane, voltage: &Way, mean: &Lane, late: &Late) -> Way {
+    pub(crate) fn advance(&mut self, before: &Lane, voltage: &StepShape, mean: &Lane, late: &LateShape) -> StepShape {
         let after = &voltage.end;
         for k in 0..LANES {
             let speed = (after[k] - before[k]) / self.step;
@@ -261,7 +261,7 @@ impl StackLanes {
                 crept[k] += weight[k] * state[k];
             }
         }
-        let mut out = Way { end: [0.0; LANES], mean: [0.0; LANES], skew: [0.0; LANES] };
+        let mut out = StepShape { end: [0.0; LANES], mean: [0.0; LANES], skew: [0.0; LANES] };
         for k in 0..LANES {
             let share = sum[k] / self.drive_max[k];
             let bent = sum[k] + self.asymmetry[k] * sum[k] * (1.0 - share);

@@ -19,7 +19,7 @@ use crate::closed_loop::Preparation;
 use crate::noise::{Gauge, Gaussian, amplifier};
 use crate::plant::NoiseParameters;
 
-pub use bench::{BUSY, Bench, Command, NOT_FOLLOWED, Paused, Request, Tick};
+pub use bench::{BUSY, Bench, BenchState, Command, NOT_FOLLOWED, Request, Tick};
 pub use run::{OnBoard, PlatformRun, PoseSample, Record, RunOptions};
 
 /// Noise around a plant.

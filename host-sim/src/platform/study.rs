@@ -6,7 +6,7 @@
 use std::ops::ControlFlow;
 
 use super::linear::Six;
-use super::rig::{Bench, Paused, PlatformRig, Request, Tick};
+use super::rig::{Bench, BenchState, PlatformRig, Request, Tick};
 use super::scenario::PlatformScenario;
 use crate::closed_loop::{RunError, ticks_within};
 use crate::controller::{Controller, TickController};
@@ -17,7 +17,7 @@ use crate::trajectory::{PoseTarget, PoseTrajectory};
 pub struct PlatformStudy {
     rig: PlatformRig,
     controller: Controller,
-    paused: Paused,
+    paused: BenchState,
     interval: f64,
     /// Set-points of each tick with the true pose that they ask for.
     targets: Vec<(PoseTarget, Six)>,

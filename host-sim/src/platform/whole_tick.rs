@@ -14,7 +14,7 @@ use super::contact::Wrench;
 use super::linear::Six;
 use super::structure::{Structure, StructureLanes};
 use crate::plant::Stack;
-use crate::plant::lanes::{LANES, Lane, Late, StackLanes, Way, lane};
+use crate::plant::lanes::{LANES, Lane, LateShape, StackLanes, StepShape, lane};
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct WholeTick {
@@ -28,7 +28,7 @@ pub(super) struct WholeTick {
     reach: Lane,
     slew: Lane,
     lag: Lane,
-    late: Late,
+    late: LateShape,
     stacks: StackLanes,
     rest: Lane,
     structure: StructureLanes,
@@ -71,7 +71,7 @@ impl WholeTick {
             reach: lane(|leg| amplifiers[leg].reach),
             slew: lane(|leg| amplifiers[leg].slew),
             lag: lane(|leg| lag[leg]),
-            late: Late::behind(&lag.map(|lag| if lag > 0.0 { step / lag } else { f64::INFINITY })),
+            late: LateShape::behind(&lag.map(|lag| if lag > 0.0 { step / lag } else { f64::INFINITY })),
             stacks: StackLanes::of(stacks, step)?,
             rest: lane(|leg| rest[leg]),
             structure: StructureLanes::of(structure, step, &lag),
@@ -104,7 +104,7 @@ impl WholeTick {
         let [a, b, c, d, e, f] = *voltages;
         let input: Lane = [a, b, c, d, e, f, 0.0, 0.0];
         let before = self.voltage;
-        let mut way = Way { end: [0.0; LANES], mean: [0.0; LANES], skew: [0.0; LANES] };
+        let mut way = StepShape { end: [0.0; LANES], mean: [0.0; LANES], skew: [0.0; LANES] };
         let mut mean = [0.0; LANES];
         let mut limited = false;
         for k in 0..LANES {
@@ -129,7 +129,7 @@ impl WholeTick {
 
     /// The legs whose amplifiers are at their current limit, see [`Amplifier::advance`]: straight on, and with the lag where
     /// the limit ends.
-    fn limited(&self, input: &Lane, way: &mut Way, mean: &mut Lane, late: &mut Late) {
+    fn limited(&self, input: &Lane, way: &mut StepShape, mean: &mut Lane, late: &mut LateShape) {
         for k in 0..6 {
             let before = self.voltage[k];
             let gap = before - input[k];

@@ -15,7 +15,7 @@ const OUTPUTS: &str = "dac_code[0],dac_code[1],dac_code[2],dac_code[3],dac_code[
 
 /// What a controller that runs a block again gives at each of its rows.
 #[derive(Debug, Clone, Copy)]
-pub struct Again<'a> {
+pub struct ReplayedRows<'a> {
     /// Names of its output words.
     pub names: &'a [String],
     /// Its output words, row by row; fewer rows than the block has where it was not run to the end.
@@ -30,7 +30,7 @@ pub fn write_csv(
     sink: &mut impl Write,
     header: &Header,
     block: &Block,
-    again: Option<Again>,
+    again: Option<ReplayedRows>,
     first: bool,
 ) -> io::Result<()> {
     let names = header.input_names();
@@ -73,14 +73,14 @@ pub fn write_csv(
         for column in &more {
             match (given, &column.of) {
                 (None, _) => write!(sink, ",")?,
-                (Some(given), Of::Output(place)) => real(sink, scalar, given[*place])?,
-                (Some(given), Of::Missed(place, line)) => {
+                (Some(given), ColumnSource::Output(place)) => real(sink, scalar, given[*place])?,
+                (Some(given), ColumnSource::Missed(place, line)) => {
                     write!(sink, ",{}", given[*place] >> (15 * line) & trigger::MOST_MISSED as u64)?;
                 }
-                (Some(given), Of::Difference(target, place)) => {
+                (Some(given), ColumnSource::Difference(target, place)) => {
                     write!(sink, ",{:.6e}", scalar.decode(given[*target]) - scalar.decode(given[*place]))?;
                 }
-                (Some(given), Of::FromInput(target, place)) => {
+                (Some(given), ColumnSource::FromInput(target, place)) => {
                     write!(sink, ",{:.6e}", scalar.decode(given[*target]) - scalar.decode(row.input[*place]))?;
                 }
             }
@@ -101,10 +101,10 @@ fn real(sink: &mut impl Write, scalar: Scalar, word: u64) -> io::Result<()> {
 /// A column of what was run again.
 struct Column {
     title: String,
-    of: Of,
+    of: ColumnSource,
 }
 
-enum Of {
+enum ColumnSource {
     /// An output word.
     Output(usize),
     /// Pulses that a line has missed, in this output word.
@@ -129,20 +129,20 @@ impl Column {
                 continue;
             }
             columns.extend((0..6).filter_map(|k| {
-                let of = Of::Output(place(outputs, stem, k)?);
+                let of = ColumnSource::Output(place(outputs, stem, k)?);
                 Some(Self { title: format!("{stem}[{k}]_{}", units[k / 3]), of })
             }));
         }
         if let Some(missed) = outputs.iter().position(|name| name == "missed") {
-            let column = |line| Self { title: format!("missed[{line}]"), of: Of::Missed(missed, line) };
+            let column = |line| Self { title: format!("missed[{line}]"), of: ColumnSource::Missed(missed, line) };
             columns.extend((0..lines).map(column));
         }
         for k in 0..6 {
             let platform = place(outputs, "target", k).zip(place(outputs, "pose", k));
             let leg = place(outputs, "demand", k).zip(place(inputs, "displacement", k));
             let (of, unit) = match (platform, leg) {
-                (Some((target, pose)), _) => (Of::Difference(target, pose), ["m", "rad"][k / 3]),
-                (None, Some((demand, gauge))) => (Of::FromInput(demand, gauge), "m"),
+                (Some((target, pose)), _) => (ColumnSource::Difference(target, pose), ["m", "rad"][k / 3]),
+                (None, Some((demand, gauge))) => (ColumnSource::FromInput(demand, gauge), "m"),
                 (None, None) => continue,
             };
             columns.push(Self { title: format!("error[{k}]_{unit}"), of });

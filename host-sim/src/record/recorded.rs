@@ -21,7 +21,7 @@ const RAMP_DOWN: u64 = 4;
 
 /// Why a recording ended early.
 #[derive(Debug)]
-pub enum Ended {
+pub enum RecordingEnd {
     /// The block cannot be kept.
     Io(io::Error),
     /// The machine cannot be saved.
@@ -38,8 +38,8 @@ pub enum Ended {
 /// A controller under its supervisor, with a recorder. After a reset the first tick is preceded by those that arm the machine, with
 /// the readings of that tick and what the legs add to them in the wiring check, by the controller's model; they are recorded too.
 ///
-/// Where something fails it gives voltages that are no numbers, which ends every scenario at once; [`Recorded::ended`] says why.
-pub struct Recorded<'r, 'm> {
+/// Where something fails it gives voltages that are no numbers, which ends every scenario at once; [`RecordedController::ended`] says why.
+pub struct RecordedController<'r, 'm> {
     machine: Supervised,
     recorder: &'r mut Recorder<'m>,
     taker: &'r mut dyn Taker,
@@ -51,10 +51,10 @@ pub struct Recorded<'r, 'm> {
     status: usize,
     supervisor: usize,
     fresh: bool,
-    ended: Option<Ended>,
+    ended: Option<RecordingEnd>,
 }
 
-impl<'r, 'm> Recorded<'r, 'm> {
+impl<'r, 'm> RecordedController<'r, 'm> {
     /// Records `machine`; `recorder` was started as a stream, and its blocks go to `taker`.
     ///
     /// # Errors
@@ -85,15 +85,15 @@ impl<'r, 'm> Recorded<'r, 'm> {
 
     /// Why it ended early, if it did.
     #[must_use]
-    pub fn ended(&self) -> Option<&Ended> {
+    pub fn ended(&self) -> Option<&RecordingEnd> {
         self.ended.as_ref()
     }
 
     /// Ramps down and disarms with the readings of the last tick, and ends the record.
     ///
     /// # Errors
-    /// As [`Recorded::ended`].
-    pub fn finish(mut self) -> Result<(), Ended> {
+    /// As [`RecordedController::ended`].
+    pub fn finish(mut self) -> Result<(), RecordingEnd> {
         if let Some(ended) = self.ended {
             return Err(ended);
         }
@@ -104,15 +104,15 @@ impl<'r, 'm> Recorded<'r, 'm> {
                 break;
             }
             if left == 0 || word.phase == FAULTED {
-                return Err(Ended::Supervisor { tick: self.recorder.tick(), word });
+                return Err(RecordingEnd::Supervisor { tick: self.recorder.tick(), word });
             }
         }
         self.recorder.stop();
-        self.taker.drain(self.recorder).map_err(Ended::Io)
+        self.taker.drain(self.recorder).map_err(RecordingEnd::Io)
     }
 
     /// One tick with this request.
-    fn tick(&mut self, input: &[u64], request: u64) -> Result<MachineWord, Ended> {
+    fn tick(&mut self, input: &[u64], request: u64) -> Result<MachineWord, RecordingEnd> {
         let law = self.machine.controller().description().input_names.len();
         for (slot, word) in self.input.iter_mut().zip(input.iter().take(law).chain(&[request, 0])) {
             *slot = *word;
@@ -135,20 +135,20 @@ impl<'r, 'm> Recorded<'r, 'm> {
         };
         let machine = &self.machine;
         self.recorder.push(&self.input, &row, || machine.digest());
-        self.taker.drain(self.recorder).map_err(Ended::Io)?;
+        self.taker.drain(self.recorder).map_err(RecordingEnd::Io)?;
         Ok(word)
     }
 
-    fn advance(&mut self, input: &[u64]) -> Result<(), Ended> {
+    fn advance(&mut self, input: &[u64]) -> Result<(), RecordingEnd> {
         if self.fresh {
             self.fresh = false;
             let mut input = input.to_vec();
-            let mut standing = self.machine.standing(&input).map_err(Ended::Controller)?;
+            let mut standing = self.machine.standing(&input).map_err(RecordingEnd::Controller)?;
             let mut word = self.tick(&input, ARM)?;
             let start = self.recorder.tick();
             while word.phase != RUNNING {
                 if self.recorder.tick() - start >= ARMING {
-                    return Err(Ended::Supervisor { tick: self.recorder.tick() - 1, word });
+                    return Err(RecordingEnd::Supervisor { tick: self.recorder.tick() - 1, word });
                 }
                 // A request to arm that could not be followed at once waits for as long as it is given.
                 standing.show(&self.machine, &self.output, &mut input);
@@ -156,11 +156,15 @@ impl<'r, 'm> Recorded<'r, 'm> {
             }
         }
         let word = self.tick(input, RUN)?;
-        if word.phase == RUNNING { Ok(()) } else { Err(Ended::Supervisor { tick: self.recorder.tick() - 1, word }) }
+        if word.phase == RUNNING {
+            Ok(())
+        } else {
+            Err(RecordingEnd::Supervisor { tick: self.recorder.tick() - 1, word })
+        }
     }
 }
 
-impl TickController for Recorded<'_, '_> {
+impl TickController for RecordedController<'_, '_> {
     fn description(&self) -> &Description {
         self.machine.controller().description()
     }

@@ -5,7 +5,7 @@ use std::io::Read;
 
 use specgen_runtime::record::Reason;
 
-use super::{Block, Header, Piece, Reader, RecordError, Row};
+use super::{Block, FileItem, Header, Reader, RecordError, Row};
 use crate::controller::{ControllerError, SnapshotError, Supervised};
 
 /// Words of an output row after those of the control law: the supervisor's comes first.
@@ -142,15 +142,15 @@ pub fn replay<R: Read>(
     let header = reader.header().clone();
     while let Some(piece) = reader.next_piece()? {
         match piece {
-            Piece::Block(block) => {
+            FileItem::Block(block) => {
                 run.given.clear();
                 run.block(&block)?;
                 each(&header, &block, &run.given);
             }
-            Piece::Damaged { block, reason } => {
+            FileItem::Damaged { block, reason } => {
                 run.found.damaged.push((block, reason));
             }
-            Piece::Cut { .. } => run.found.cut = Some(run.next.unwrap_or_default()),
+            FileItem::Cut { .. } => run.found.cut = Some(run.next.unwrap_or_default()),
         }
     }
     Ok(run.found)

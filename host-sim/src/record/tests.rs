@@ -2,7 +2,7 @@ use super::*;
 use crate::description::tests::six_legs;
 use crate::word::Scalar;
 use specgen_runtime::record::Layout;
-use specgen_runtime::recorder::{Activity, Recorder, Row as Out, Settings, Trigger, Unfit};
+use specgen_runtime::recorder::{Activity, MemoryError, Recorder, Row as Out, Settings, Trigger};
 
 const LAYOUT: Layout = Layout { config: 3, input: 14, state: 5 };
 
@@ -35,14 +35,14 @@ fn bytes(recorder: &Recorder<'_>) -> Vec<u8> {
     writer.finish().unwrap()
 }
 
-fn pieces(bytes: &[u8]) -> Vec<Piece> {
+fn pieces(bytes: &[u8]) -> Vec<FileItem> {
     let mut reader = Reader::new(bytes).unwrap();
     std::iter::from_fn(|| reader.next_piece().unwrap()).collect()
 }
 
 fn whole(bytes: &[u8]) -> Vec<Block> {
     let block = |piece| match piece {
-        Piece::Block(block) => block,
+        FileItem::Block(block) => block,
         other => panic!("{other:?}"),
     };
     pieces(bytes).into_iter().map(block).collect()
@@ -149,10 +149,10 @@ fn one_row_in_some_shows_more_time() {
 fn a_memory_that_is_too_small_is_refused_with_what_is_needed() {
     let needed = LAYOUT.preamble() + LAYOUT.longest_row();
     for (size, blocks, layout, expected) in [
-        (2 * needed - 1, 2, LAYOUT, Unfit::TooSmall(2 * needed)),
-        (100_000, 1, LAYOUT, Unfit::TooSmall(2 * needed)),
-        (100_000, 0, LAYOUT, Unfit::TooSmall(2 * needed)),
-        (100_000, 2, Layout { input: 61, ..LAYOUT }, Unfit::InputTooLong),
+        (2 * needed - 1, 2, LAYOUT, MemoryError::TooSmall(2 * needed)),
+        (100_000, 1, LAYOUT, MemoryError::TooSmall(2 * needed)),
+        (100_000, 0, LAYOUT, MemoryError::TooSmall(2 * needed)),
+        (100_000, 2, Layout { input: 61, ..LAYOUT }, MemoryError::InputTooLong),
     ] {
         let mut memory = vec![0; size];
         assert_eq!(Recorder::new(&mut memory, blocks, layout).err(), Some(expected));
@@ -184,10 +184,10 @@ fn a_changed_byte_is_always_said() {
             bytes[place] ^= change;
             let Ok(mut reader) = Reader::new(&bytes[..]) else { continue };
             read += 1;
-            let found: Vec<Piece> = std::iter::from_fn(|| reader.next_piece().unwrap()).collect();
-            assert!(found.iter().any(|piece| !matches!(piece, Piece::Block(_))), "byte {place}");
+            let found: Vec<FileItem> = std::iter::from_fn(|| reader.next_piece().unwrap()).collect();
+            assert!(found.iter().any(|piece| !matches!(piece, FileItem::Block(_))), "byte {place}");
             for piece in &found {
-                assert!(!matches!(piece, Piece::Block(_)) || expected.contains(piece), "byte {place}");
+                assert!(!matches!(piece, FileItem::Block(_)) || expected.contains(piece), "byte {place}");
             }
         }
     }
@@ -197,8 +197,8 @@ fn a_changed_byte_is_always_said() {
     for length in 0..good.len() {
         if let Ok(mut reader) = Reader::new(&good[..length]) {
             while let Some(piece) = reader.next_piece().unwrap() {
-                assert!(expected.contains(&piece) || matches!(piece, Piece::Cut { .. }), "{length} bytes");
-                cut += usize::from(matches!(piece, Piece::Cut { .. }));
+                assert!(expected.contains(&piece) || matches!(piece, FileItem::Cut { .. }), "{length} bytes");
+                cut += usize::from(matches!(piece, FileItem::Cut { .. }));
             }
         }
     }

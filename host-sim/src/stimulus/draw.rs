@@ -13,9 +13,9 @@ const SPECIAL_SHARE: u64 = 16;
 const STRETCH: (u64, u64) = (20, 200);
 
 /// A stream of random numbers.
-pub(super) struct Draw(ChaCha8Rng);
+pub(super) struct RandomSource(ChaCha8Rng);
 
-impl Draw {
+impl RandomSource {
     pub(super) fn new(seed: u64) -> Self {
         Self(ChaCha8Rng::seed_from_u64(seed))
     }

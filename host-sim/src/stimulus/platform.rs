@@ -3,7 +3,7 @@
 
 use core::f64::consts::TAU;
 
-use super::draw::Draw;
+use super::draw::RandomSource;
 use super::{InputRecording, in_stretches};
 use crate::description::{Description, DescriptionError};
 
@@ -101,7 +101,7 @@ pub fn record(
 }
 
 struct Generator<'a> {
-    draw: Draw,
+    draw: RandomSource,
     inputs: &'a PlatformInputs,
     sequence: u64,
     /// Smooth motion: amplitude, angular frequency (rad/s), phase of each axis.
@@ -119,7 +119,7 @@ struct Generator<'a> {
 impl<'a> Generator<'a> {
     fn new(inputs: &'a PlatformInputs, seed: u64) -> Self {
         Self {
-            draw: Draw::new(seed),
+            draw: RandomSource::new(seed),
             inputs,
             sequence: 0,
             amplitude: [0.0; 6],

@@ -7,7 +7,7 @@ use std::ffi::{CStr, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr::null_mut;
 
-use crate::{Description, Plant, Refused, SETTINGS, Settings};
+use crate::{Description, Plant, SETTINGS, Settings, UnitError};
 
 /// A machine, prepared or not yet.
 #[derive(Debug, Clone)]
@@ -17,35 +17,35 @@ pub struct Machine {
 }
 
 impl Machine {
-    fn prepare(&mut self, settings: &[u64; SETTINGS.len()], outputs: &mut [u64]) -> Result<(), Refused> {
+    fn prepare(&mut self, settings: &[u64; SETTINGS.len()], outputs: &mut [u64]) -> Result<(), UnitError> {
         self.plant = Some(self.description.prepared(&Settings::of(settings)?));
         self.read(outputs)
     }
 
-    fn step(&mut self, inputs: &[u64], outputs: &mut [u64]) -> Result<(), Refused> {
+    fn step(&mut self, inputs: &[u64], outputs: &mut [u64]) -> Result<(), UnitError> {
         let inputs: Vec<f64> = inputs.iter().map(|word| f64::from_bits(*word)).collect();
         let period = self.description.period;
         self.plant()?.hold(&inputs, period)?;
         self.read(outputs)
     }
 
-    fn read(&mut self, outputs: &mut [u64]) -> Result<(), Refused> {
+    fn read(&mut self, outputs: &mut [u64]) -> Result<(), UnitError> {
         let mut values = vec![0.0; outputs.len()];
         self.plant()?.read(&mut values);
         outputs.iter_mut().zip(values).for_each(|(word, value)| *word = value.to_bits());
         Ok(())
     }
 
-    fn plant(&mut self) -> Result<&mut Plant, Refused> {
-        self.plant.as_mut().ok_or(Refused(c"the machine is not prepared: leave the initialization mode first"))
+    fn plant(&mut self) -> Result<&mut Plant, UnitError> {
+        self.plant.as_mut().ok_or(UnitError(c"the machine is not prepared: leave the initialization mode first"))
     }
 }
 
 /// Null for what went well; a panic ends here, not in the program that loaded the unit.
-fn answer(work: impl FnOnce() -> Result<(), Refused>) -> *const c_char {
+fn answer(work: impl FnOnce() -> Result<(), UnitError>) -> *const c_char {
     let refused: &'static CStr = match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(())) => return std::ptr::null(),
-        Ok(Err(Refused(why))) => why,
+        Ok(Err(UnitError(why))) => why,
         Err(_) => c"the plant failed on these inputs: begin anew with smaller ones",
     };
     refused.as_ptr()

@@ -90,16 +90,16 @@ impl Settings {
     /// Settings of these words.
     ///
     /// # Errors
-    /// [`Refused`], if one is out of its range.
-    pub fn of(words: &[u64; SETTINGS.len()]) -> Result<Self, Refused> {
-        let flag = |word: u64, why| if word < 2 { Ok(word == 1) } else { Err(Refused(why)) };
+    /// [`UnitError`], if one is out of its range.
+    pub fn of(words: &[u64; SETTINGS.len()]) -> Result<Self, UnitError> {
+        let flag = |word: u64, why| if word < 2 { Ok(word == 1) } else { Err(UnitError(why)) };
         let ratio = |word, why| {
             let value = f64::from_bits(word);
-            if (RATIOS[0]..=RATIOS[1]).contains(&value) { Ok(value) } else { Err(Refused(why)) }
+            if (RATIOS[0]..=RATIOS[1]).contains(&value) { Ok(value) } else { Err(UnitError(why)) }
         };
         let seed = u32::try_from(words[0]).ok().filter(|seed| *seed <= i32::MAX as u32);
         Ok(Self {
-            seed: seed.ok_or(Refused(c"settings.seed is out of its range: expected 0 to 2147483647"))?,
+            seed: seed.ok_or(UnitError(c"settings.seed is out of its range: expected 0 to 2147483647"))?,
             noise: flag(words[1], c"settings.noise is out of its range: expected 0 or 1")?,
             tolerances: flag(words[2], c"settings.tolerances is out of its range: expected 0 or 1")?,
             stiffness_ratio: ratio(words[3], c"settings.stiffness_ratio is out of its range: expected 0.1 to 10")?,
@@ -110,15 +110,15 @@ impl Settings {
 
 /// Why something was not taken; for C as well.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Refused(pub &'static std::ffi::CStr);
+pub struct UnitError(pub &'static std::ffi::CStr);
 
-impl fmt::Display for Refused {
+impl fmt::Display for UnitError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0.to_string_lossy())
     }
 }
 
-impl std::error::Error for Refused {}
+impl std::error::Error for UnitError {}
 
 impl Description {
     /// Stems of the inputs: six reals each. `voltage` in V; `disturbance` is a force (N) and torque (N m) on the platform about P_C
@@ -201,15 +201,15 @@ impl Plant {
     /// Holds the inputs for `interval` (s): six reals for each of [`Description::inputs`].
     ///
     /// # Errors
-    /// [`Refused`], if one is missing or no number; nothing has moved then.
-    pub fn hold(&mut self, inputs: &[f64], interval: f64) -> Result<(), Refused> {
+    /// [`UnitError`], if one is missing or no number; nothing has moved then.
+    pub fn hold(&mut self, inputs: &[f64], interval: f64) -> Result<(), UnitError> {
         if !inputs.iter().all(|input| input.is_finite()) {
-            return Err(Refused(
+            return Err(UnitError(
                 c"an input is not a finite number: check what is connected to voltage and disturbance",
             ));
         }
         let six = |stem: usize| inputs.get(6 * stem..6 * stem + 6).and_then(|six| <[f64; 6]>::try_from(six).ok());
-        let missing = Refused(c"inputs are missing");
+        let missing = UnitError(c"inputs are missing");
         let voltages = six(0).ok_or(missing)?;
         match self {
             Self::Platform(rig) => {

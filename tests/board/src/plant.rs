@@ -13,10 +13,10 @@ pub enum Plant {
     /// Every gauge in the middle of its range.
     Still,
     /// A served one.
-    Served(Served),
+    BoardServer(BoardServer),
 }
 
-pub struct Served {
+pub struct BoardServer {
     client: Client,
     /// Control period.
     period: Time,
@@ -35,7 +35,7 @@ impl Plant {
     pub fn served(name: &str, digest: &str, period: Time) -> Result<Self, String> {
         let path = path_of(name)?;
         let client = Client::open(Path::new(&path), digest).map_err(|error| error.to_string())?;
-        Ok(Self::Served(Served { client, period, first: None, tick: 0, over: false }))
+        Ok(Self::Served(BoardServer { client, period, first: None, tick: 0, over: false }))
     }
 
     /// Codes of `bits` bits, 0 at the lower end of the range.

@@ -52,8 +52,8 @@ pub trait Guest {
 }
 
 type Uc = *mut c_void;
-type Hook<G> = unsafe extern "C" fn(Uc, u64, u32, *mut Attached<G>);
-type Data<G> = unsafe extern "C" fn(Uc, c_int, u64, c_int, i64, *mut Attached<G>);
+type Hook<G> = unsafe extern "C" fn(Uc, u64, u32, *mut Attachment<G>);
+type Data<G> = unsafe extern "C" fn(Uc, c_int, u64, c_int, i64, *mut Attachment<G>);
 type Read<G> = unsafe extern "C" fn(Uc, u64, u32, *mut Region<G>) -> u64;
 type Write<G> = unsafe extern "C" fn(Uc, u64, u32, u64, *mut Region<G>);
 
@@ -86,19 +86,19 @@ struct Api {
 /// The engine with its guest.
 pub struct Engine<G> {
     uc: Uc,
-    attached: *mut Attached<G>,
+    attached: *mut Attachment<G>,
     regions: Vec<*mut Region<G>>,
 }
 
 /// What a callback gets.
-struct Attached<G> {
+struct Attachment<G> {
     api: Api,
     guest: G,
 }
 
 /// An area that the guest answers for.
 struct Region<G> {
-    attached: *mut Attached<G>,
+    attached: *mut Attachment<G>,
     base: u32,
 }
 
@@ -128,7 +128,7 @@ impl<G: Guest> Engine<G> {
         }
         let open: unsafe extern "C" fn(c_int, c_int, *mut Uc) -> c_int = function!(b"uc_open\0");
         let control: unsafe extern "C" fn(Uc, c_int, ...) -> c_int = function!(b"uc_ctl\0");
-        let hook_add: unsafe extern "C" fn(Uc, *mut usize, c_int, Hook<G>, *mut Attached<G>, u64, u64, ...) -> c_int =
+        let hook_add: unsafe extern "C" fn(Uc, *mut usize, c_int, Hook<G>, *mut Attachment<G>, u64, u64, ...) -> c_int =
             function!(b"uc_hook_add\0");
         type MapDevices<G> =
             unsafe extern "C" fn(Uc, u64, usize, Read<G>, *mut Region<G>, Write<G>, *mut Region<G>) -> c_int;
@@ -148,7 +148,7 @@ impl<G: Guest> Engine<G> {
         let mut uc: Uc = std::ptr::null_mut();
         // SAFETY: it writes the handle.
         checked(unsafe { open(ARCH_ARM, MODE_THUMB, &raw mut uc) }, "uc_open")?;
-        let attached = Box::into_raw(Box::new(Attached { api, guest }));
+        let attached = Box::into_raw(Box::new(Attachment { api, guest }));
         let mut engine = Self { uc, attached, regions: Vec::new() };
         // SAFETY: one argument of type int, as this control has.
         checked(unsafe { control(uc, WRITE_CPU_MODEL, CORTEX_M7) }, "the model of a Cortex-M7")?;
@@ -177,7 +177,7 @@ impl<G: Guest> Engine<G> {
     /// In words: the engine refuses.
     pub fn watch(&mut self, [base, length]: [u32; 2]) -> Result<(), String> {
         type HookData<G> =
-            unsafe extern "C" fn(Uc, *mut usize, c_int, Data<G>, *mut Attached<G>, u64, u64, ...) -> c_int;
+            unsafe extern "C" fn(Uc, *mut usize, c_int, Data<G>, *mut Attachment<G>, u64, u64, ...) -> c_int;
         // SAFETY: `uc_hook_add`, whose third argument decides about the type of the fourth.
         let hook_add: HookData<G> = unsafe { std::mem::transmute(self.api().hook_add) };
         let (mut handle, end) = (0, u64::from(base) + u64::from(length) - 1);
@@ -275,7 +275,7 @@ fn checked(result: c_int, what: &str) -> Result<(), String> {
     if result == 0 { Ok(()) } else { Err(format!("the engine refuses {what}: error {result}")) }
 }
 
-unsafe extern "C" fn on_code<G: Guest>(uc: Uc, address: u64, size: u32, attached: *mut Attached<G>) {
+unsafe extern "C" fn on_code<G: Guest>(uc: Uc, address: u64, size: u32, attached: *mut Attachment<G>) {
     // SAFETY: from `open`; nobody else uses the guest while the core runs.
     let (api, guest) = unsafe { (&(*attached).api, &mut (*attached).guest) };
     let core = Core { uc, api, _here: PhantomData };
@@ -285,7 +285,14 @@ unsafe extern "C" fn on_code<G: Guest>(uc: Uc, address: u64, size: u32, attached
     }
 }
 
-unsafe extern "C" fn on_data<G: Guest>(_: Uc, kind: c_int, address: u64, _: c_int, _: i64, attached: *mut Attached<G>) {
+unsafe extern "C" fn on_data<G: Guest>(
+    _: Uc,
+    kind: c_int,
+    address: u64,
+    _: c_int,
+    _: i64,
+    attached: *mut Attachment<G>,
+) {
     // SAFETY: as in `on_code`.
     unsafe { (*attached).guest.data(address as u32, kind == WRITES) };
 }

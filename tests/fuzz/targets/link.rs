@@ -11,7 +11,10 @@ use controller::supervised::{Machine, machine_at_reset};
 use controller::supervision::READINGS_PER_LEG;
 use controller::{Config, LEGS, LegState};
 use specgen::operate::Session;
-use specgen_board::{Board, Desk, Exchange, Kept, Noticed, SampleMemory, Stopwatch, Visit, catch_up, gather};
+use specgen_board::{
+    Board, Exchange, LinkHandler, MachineSnapshot, RequestContext, SampleMemory, Stopwatch, TargetStatus, catch_up,
+    gather,
+};
 use specgen_hal::{Amplifiers, Fault, Gauges};
 use specgen_link::client::{Port, Timeout};
 use specgen_link::{Endpoint, Kind, Receiver, RecorderAction, VERSION};
@@ -119,17 +122,17 @@ impl Amplifiers for Parts {
 }
 
 /// Memories of a recorder and of samples. A board has them for ever; here they are given back after each input, of which there are millions.
-struct Tape(*mut [u64], *mut Kept, *mut SampleMemory);
+struct Tape(*mut [u64], *mut MachineSnapshot, *mut SampleMemory);
 
 #[allow(unsafe_code)]
 impl Tape {
     fn new() -> Self {
         let samples = Box::into_raw(Box::new(SampleMemory::new()));
-        Self(Box::into_raw(vec![0; 4000].into_boxed_slice()), Box::into_raw(Box::new(Kept::new())), samples)
+        Self(Box::into_raw(vec![0; 4000].into_boxed_slice()), Box::into_raw(Box::new(MachineSnapshot::new())), samples)
     }
 
     /// To be called once, by what is dropped before this is.
-    fn memories(&self) -> (&'static mut [u64], &'static mut Kept, &'static mut SampleMemory) {
+    fn memories(&self) -> (&'static mut [u64], &'static mut MachineSnapshot, &'static mut SampleMemory) {
         // SAFETY: they are there until this is dropped, and nobody else has them.
         unsafe { (&mut *self.0, &mut *self.1, &mut *self.2) }
     }
@@ -154,7 +157,7 @@ fn device(mut script: &[u8]) {
     exchange.record(words, kept);
     exchange.show(samples, 921_600);
     board.start(&mut exchange.report);
-    let (mut desk, mut endpoint, mut host) = (Desk::new(Stopwatch::NONE), Endpoint::new(), Receiver::new());
+    let (mut desk, mut endpoint, mut host) = (LinkHandler::new(Stopwatch::NONE), Endpoint::new(), Receiver::new());
     let (mut sequence, mut ticks) = (0, 0);
     while let Some((what, bytes)) = next(&mut script) {
         let sent = match what % 4 {
@@ -172,7 +175,7 @@ fn device(mut script: &[u8]) {
                 for _ in 0..count {
                     let off = i32::from(i16::from_le_bytes([low, high])) * 4;
                     parts.read(&board.machine().state.legs, off, fails == 1);
-                    board.tick(&mut exchange, Noticed::default());
+                    board.tick(&mut exchange, TargetStatus::default());
                 }
                 catch_up(&mut |action| action(&mut exchange, board.machine_mut()), || true);
                 gather(&mut |action| action(&mut exchange, board.machine_mut()));
@@ -183,7 +186,7 @@ fn device(mut script: &[u8]) {
         for byte in sent {
             let mut with =
                 |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(&mut exchange, board.machine_mut());
-            let reply = endpoint.push(byte, &mut Visit { desk: &mut desk, with: &mut with });
+            let reply = endpoint.push(byte, &mut RequestContext { desk: &mut desk, with: &mut with });
             for byte in reply.unwrap_or_default() {
                 if let Some(answer) = host.push(*byte) {
                     assert_eq!(answer.unwrap().0.kind, Kind::Reply);

@@ -1,6 +1,6 @@
 //! Files of records and of traces.
 
-use host_sim::record::{Piece, Reader, write_csv};
+use host_sim::record::{FileItem, Reader, write_csv};
 use host_sim::trace::Trace;
 use specgen_runtime::record::{FILE_MAGIC, FORMAT, HEADER_WORDS, checksum, write_header};
 
@@ -25,12 +25,12 @@ fn read(file: &[u8]) {
     while let Some(piece) = reader.next_piece().unwrap() {
         bytes += HEADER_WORDS * 8;
         match piece {
-            Piece::Block(block) => {
+            FileItem::Block(block) => {
                 assert!(block.rows.iter().all(|row| row.input.len() == header.input_names().len()));
                 write_csv(&mut Vec::new(), &header, &block, None, true).unwrap();
             }
-            Piece::Damaged { reason, .. } => assert!(!reason.is_empty()),
-            Piece::Cut { bytes } => assert!(bytes < file.len()),
+            FileItem::Damaged { reason, .. } => assert!(!reason.is_empty()),
+            FileItem::Cut { bytes } => assert!(bytes < file.len()),
         }
         assert!(bytes <= file.len() + HEADER_WORDS * 8, "more pieces than the file has room for");
     }

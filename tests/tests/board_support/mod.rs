@@ -16,7 +16,10 @@ use controller::supervision::READINGS_PER_LEG;
 use controller::{PLACE_WORDS, Real, place_words};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen_board::{Board, Desk, Exchange, Kept, Noticed, SampleMemory, Stopwatch, Visit, catch_up, gather, learn};
+use specgen_board::{
+    Board, Exchange, LinkHandler, MachineSnapshot, RequestContext, SampleMemory, Stopwatch, TargetStatus, catch_up,
+    gather, learn,
+};
 use specgen_hal::{Amplifiers, Fault, Gauges, Lines};
 use specgen_link::Endpoint;
 use specgen_link::client::{Client, ClientError, Port, Timeout};
@@ -95,7 +98,7 @@ pub struct Rig {
     pub board: Board<'static, Parts, Parts, Parts>,
     pub exchange: Exchange,
     pub parts: Parts,
-    desk: Desk,
+    desk: LinkHandler,
     endpoint: Endpoint,
     noise: ChaCha8Rng,
     answers: VecDeque<u8>,
@@ -106,11 +109,11 @@ pub struct Rig {
     /// The background has no time for samples.
     pub busy: bool,
     /// What every tick showed, where it is wanted.
-    pub shown: Option<Vec<Shown>>,
+    pub shown: Option<Vec<SampleKey>>,
 }
 
 /// A tick: its number, status, phase, and where the platform was.
-pub type Shown = (u64, u32, u8, [u64; PLACE_WORDS]);
+pub type SampleKey = (u64, u32, u8, [u64; PLACE_WORDS]);
 
 /// The rig as a line, and to look at.
 #[derive(Clone)]
@@ -123,7 +126,7 @@ impl Line {
         let machine = Box::leak(Box::new(machine_at_reset()));
         let mut board = Board::with_lines(parts.clone(), parts.clone(), parts.clone(), machine, true);
         let mut exchange = Exchange::new();
-        exchange.record(Box::leak(vec![0; record].into_boxed_slice()), Box::leak(Box::new(Kept::new())));
+        exchange.record(Box::leak(vec![0; record].into_boxed_slice()), Box::leak(Box::new(MachineSnapshot::new())));
         exchange.show(Box::leak(Box::new(SampleMemory::new())), 921_600);
         exchange.play(Box::leak(vec![[0; 6]; 2 * KNOTS_OF_A_PASS].into_boxed_slice()));
         board.start(&mut exchange.report);
@@ -132,7 +135,7 @@ impl Line {
             board,
             exchange,
             parts,
-            desk: Desk::new(Stopwatch::NONE),
+            desk: LinkHandler::new(Stopwatch::NONE),
             endpoint: Endpoint::new(),
             noise: ChaCha8Rng::seed_from_u64(3),
             answers: VecDeque::new(),
@@ -173,7 +176,7 @@ impl Rig {
     /// One tick; the gauges then read what the legs' models say, with a little noise.
     pub fn tick(&mut self) {
         let Self { board, exchange, .. } = self;
-        board.tick(exchange, Noticed::default());
+        board.tick(exchange, TargetStatus::default());
         // The background, as after every tick.
         catch_up(&mut |action| action(exchange, board.machine_mut()), || true);
         if !self.busy {
@@ -211,7 +214,7 @@ impl Port for Line {
             let Some(byte) = rig.spoil(*byte) else { continue };
             let Rig { board, exchange, desk, endpoint, .. } = &mut *rig;
             let mut with = |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(exchange, board.machine_mut());
-            let answer = endpoint.push(byte, &mut Visit { desk, with: &mut with }).map(<[u8]>::to_vec);
+            let answer = endpoint.push(byte, &mut RequestContext { desk, with: &mut with }).map(<[u8]>::to_vec);
             for byte in answer.unwrap_or_default() {
                 if let Some(byte) = rig.spoil(byte) {
                     rig.answers.push_back(byte);

@@ -34,10 +34,10 @@ fn replaced(text: &str, from: &str, to: &str) -> String {
 }
 
 /// What a base is reported for without any change, by its text and whether rounding was asked for: many rules share one.
-type Known = BTreeMap<(String, bool), BTreeSet<(String, String)>>;
+type Expectations = BTreeMap<(String, bool), BTreeSet<(String, String)>>;
 
 /// What is wrong with a rule of the table, if anything.
-fn broken(rule: &Rule, dir: &Path, bases: &mut Known) -> Option<String> {
+fn broken(rule: &Rule, dir: &Path, bases: &mut Expectations) -> Option<String> {
     let base = rule.with.iter().fold(spec(rule.base), |text, (from, to)| replaced(&text, from, to));
     let rounding = rule.code == specgen::diagnostic::codes::PRECISION_POOR;
     let known = &*bases.entry((base.clone(), rounding)).or_insert_with(|| {
@@ -76,7 +76,7 @@ fn broken(rule: &Rule, dir: &Path, bases: &mut Known) -> Option<String> {
 #[test]
 fn every_rule_has_its_boundary() {
     let dir = specgen_tests::repository().join("specs");
-    let mut bases = Known::new();
+    let mut bases = Expectations::new();
     let rules = RULES.iter().step_by(specgen_tests::length(8, 1));
     let broken: Vec<String> = rules.filter_map(|rule| broken(rule, &dir, &mut bases)).collect();
     assert!(broken.is_empty(), "{} of {}:\n{}", broken.len(), RULES.len(), broken.join("\n"));
@@ -91,7 +91,7 @@ fn every_rule_has_its_boundary() {
 fn the_test_of_rules_knows_a_wrong_one() {
     let dir = specgen_tests::repository().join("specs");
     let good = RULES.iter().find(|rule| rule.code == "W0832").expect("a rule");
-    let mut bases = Known::new();
+    let mut bases = Expectations::new();
     assert!(broken(good, &dir, &mut bases).is_none());
     let wrong = [
         Rule { code: "W0831", ..*good },

@@ -24,7 +24,7 @@ fn near(what: &str, figures: &Figures) -> Result<(), String> {
     Ok(())
 }
 
-fn compiled(name: &str) -> specgen::compile::Compiled {
+fn compiled(name: &str) -> specgen::compile::Compilation {
     let dir = specgen_tests::repository().join("specs");
     let source = SpecSource { display_name: name.to_owned(), text: spec(name), dir };
     specgen::compile::compile_source(source).expect("a good spec")

@@ -45,7 +45,7 @@ pub fn machine() -> PlatformRig {
 
 /// What a test does to the controller beside what the bench does.
 #[derive(Default)]
-pub struct Orders {
+pub struct Commands {
     /// Input words that are replaced while they stand here.
     words: Vec<(usize, u64)>,
     /// Settings to take before the next tick.
@@ -57,15 +57,15 @@ pub struct Orders {
 /// The controller, with the promises held against every tick: all numbers finite, codes within the voltage limits, no code
 /// further from the last than the slew rate allows, the target within the workspace and no further from the last than a
 /// stream may go.
-pub struct Guarded {
+pub struct GuardedMachine {
     inner: Controller,
-    orders: Rc<RefCell<Orders>>,
+    orders: Rc<RefCell<Commands>>,
     codes: [i64; 6],
     target: [f64; 6],
     tick: usize,
 }
 
-impl Guarded {
+impl GuardedMachine {
     fn number(&self, output: &[u64], name: &str, k: usize) -> f64 {
         let place = self.inner.description().output(&format!("{name}[{k}]")).expect("an output word");
         self.inner.description().scalar.decode(output[place])
@@ -97,7 +97,7 @@ impl Guarded {
     }
 }
 
-impl TickController for Guarded {
+impl TickController for GuardedMachine {
     fn description(&self) -> &Description {
         self.inner.description()
     }
@@ -135,7 +135,7 @@ impl TickController for Guarded {
 /// A machine under the controller, at its bias pose and settled.
 pub struct Run<'a> {
     pub bench: Bench<'a>,
-    pub orders: Rc<RefCell<Orders>>,
+    pub orders: Rc<RefCell<Commands>>,
     pub description: Description,
     pub config: Vec<u64>,
     /// Tick of the path, for streams.
@@ -145,8 +145,8 @@ pub struct Run<'a> {
 pub fn run(test: impl FnOnce(&mut Run)) {
     let inner = emitted().at_run_time();
     let (description, config) = (inner.description().clone(), inner.default_config());
-    let orders = Rc::<RefCell<Orders>>::default();
-    let mut guarded = Guarded { inner, orders: Rc::clone(&orders), codes: [0; 6], target: [0.0; 6], tick: 0 };
+    let orders = Rc::<RefCell<Commands>>::default();
+    let mut guarded = GuardedMachine { inner, orders: Rc::clone(&orders), codes: [0; 6], target: [0.0; 6], tick: 0 };
     let mut rig = machine();
     let mut bench = Bench::new(&mut rig, &mut guarded, PERIOD, 0).expect("the words of a platform");
     bench.arm(10.0).expect("the bias pose");

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use specgen::compile::compile;
 use specgen::diagnostic::{Diagnostic, Place, Severity, render};
-use specgen::outcome::Refused;
+use specgen::outcome::Refusal;
 use specgen_tests::repository;
 
 /// A spec that is wrong, and how what the finding says fixes it.
@@ -44,7 +44,7 @@ pub fn edited(text: &str, edits: &[(&'static str, String)]) -> String {
     })
 }
 
-pub fn verdict(folder: &Path, text: &str, table: Option<&str>) -> Result<Vec<Diagnostic>, Refused> {
+pub fn verdict(folder: &Path, text: &str, table: Option<&str>) -> Result<Vec<Diagnostic>, Refusal> {
     let path = folder.join("platform.toml");
     fs::write(&path, text).expect("written");
     if let Some(table) = table {

@@ -70,17 +70,17 @@ fn built_of(change: impl FnOnce(&mut LegParameters)) -> Specimen {
 
 /// What the compiler states of streams at their largest speed: way of the target in a stop, and by how much the platform may
 /// go beyond it, m.
-pub struct Stated {
+pub struct StatedLimits {
     pub way: f64,
     pub overshoot: f64,
 }
 
 impl Machine {
-    pub fn stated(&self) -> Stated {
+    pub fn stated(&self) -> StatedLimits {
         let stream = &self.bench.emitted.compiled.stops[0];
         assert_eq!(stream.what, "stream");
         let most = |of: &[f64; 6]| (0..6).map(|axis| of[axis] * lever(axis)).fold(0.0, worse);
-        Stated { way: most(&stream.way), overshoot: most(&stream.overshoot) }
+        StatedLimits { way: most(&stream.way), overshoot: most(&stream.overshoot) }
     }
 
     /// With the platform at rest at the bias.
@@ -107,7 +107,7 @@ pub struct Run<'a> {
 
 /// What became of a stream that ran dry. Lengths in m, turns times 0.1 m.
 #[derive(Debug, Clone, Copy)]
-pub struct Ran {
+pub struct StopRun {
     pub axis: usize,
     /// Speed over the largest one of streams, with its sign.
     pub share: f64,
@@ -130,15 +130,24 @@ impl Run<'_> {
     }
 
     /// A stream along `axis` that rises smoothly to `share` of the largest speed, goes on for a while and brings nothing more.
-    pub fn run_dry(&mut self, axis: usize, share: f64) -> Ran {
+    pub fn run_dry(&mut self, axis: usize, share: f64) -> StopRun {
         let speed = share * self.speed[axis];
         let cruise = ((LONGEST / lever(axis) / speed.abs() / PERIOD) as usize).min(CRUISE);
         let way = speed * PERIOD * (0.5 * RISE as f64 + cruise as f64 + 16.0);
         let mut start = MIDDLE;
         start[axis] -= 0.5 * way;
         self.go_to(start);
-        let mut ran =
-            Ran { axis, share, status: 0, time: 0.0, target: 0.0, pose: 0.0, worst: 0.0, at_15ms: 0.0, at_50ms: 0.0 };
+        let mut ran = StopRun {
+            axis,
+            share,
+            status: 0,
+            time: 0.0,
+            target: 0.0,
+            pose: 0.0,
+            worst: 0.0,
+            at_15ms: 0.0,
+            at_50ms: 0.0,
+        };
         let mut last = Request::default();
         for tick in 1..=RISE + cruise {
             last = Request::stream(rising(&start, axis, speed, tick));

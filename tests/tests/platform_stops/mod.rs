@@ -3,7 +3,7 @@
 
 mod bench;
 
-use bench::{Machine, Ran, machines};
+use bench::{Machine, StopRun, machines};
 use specgen_tests::{length, worse};
 
 use crate::platform_tables::bench::in_parallel;
@@ -15,7 +15,7 @@ const SPEEDS: [f64; 5] = [0.04, 0.1, 0.2, 0.4, 1.0];
 const UNMODELLED: f64 = 0.15e-6;
 
 /// Every axis, both ways, at every speed.
-fn stops(machine: &Machine) -> Vec<Ran> {
+fn stops(machine: &Machine) -> Vec<StopRun> {
     let mut ran = Vec::new();
     machine.run(|bench| {
         for share in SPEEDS {
@@ -36,8 +36,8 @@ fn a_dry_stream_stands_soon_near_and_with_no_leg_limited() {
     for (machine, ran) in machines.iter().zip(&all) {
         let stated = machine.stated();
         for share in SPEEDS {
-            let of: Vec<&Ran> = ran.iter().filter(|one| one.share.abs() == share).collect();
-            let most = |figure: &dyn Fn(&Ran) -> f64| of.iter().map(|one| figure(one)).fold(0.0, worse);
+            let of: Vec<&StopRun> = ran.iter().filter(|one| one.share.abs() == share).collect();
+            let most = |figure: &dyn Fn(&StopRun) -> f64| of.iter().map(|one| figure(one)).fold(0.0, worse);
             println!(
                 "{:<14} {:>4.1} mm/s: stands after {:>4.1} ms; from where it counts as stale target {:.3} um, platform {:.3} um; off by {:.3} um at most, {:.3} um 15 ms, {:.3} um 50 ms after the last set-point; limited {:x}",
                 machine.name,

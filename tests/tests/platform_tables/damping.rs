@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use host_sim::platform::rig::{Bench as Rig, Request};
 use host_sim::platform::{Specimen, WorkPart};
 use host_sim::trajectory::PoseTarget;
-use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, Tuning};
+use specgen::stability::platform::{ClosedLoop, Conditions, Estimator, Law, Tuning};
 use specgen::tuning::relay;
 use specgen_tests::{length, worse};
 
@@ -32,7 +32,7 @@ fn every_mode_is_damped_within_the_bounds_of_the_design() {
         assert!(found.slow[1] <= 0.5, "|S| at 50 Hz");
     }
     let closed_loop = closed_loop(bench);
-    for adapting in [Adapting::Invhys, Adapting::Ewma, Adapting::Pcc] {
+    for adapting in [Estimator::Invhys, Estimator::Ewma, Estimator::Pcc] {
         for step in (0..=20).step_by(length(5, 1)) {
             let stiffness = 0.6 + 0.05 * f64::from(step);
             let conditions = Conditions { stiffness, ..Conditions::NOMINAL };
@@ -114,7 +114,7 @@ fn damped_machines_follow_and_hold_better_than_undamped_ones() {
 
 /// Where the loop with a gain on one axis alone becomes unstable, over the stiffness of that axis, by eigenvalues.
 fn limit(closed_loop: &ClosedLoop, axis: usize) -> f64 {
-    let law = Law::Combined(Adapting::Invhys);
+    let law = Law::Combined(Estimator::Invhys);
     let stable = |gain: f64| {
         let mut tuning = Tuning::NONE;
         tuning.proportional[axis] = gain * closed_loop.basis.axis_stiffness[axis];

@@ -10,12 +10,12 @@ use host_sim::platform::rig::{Bench as Rig, Noise};
 use host_sim::platform::{PlatformScenario, Specimen};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTrajectory, Step};
 use specgen::learning::{
-    Convergence, Ending, LARGEST_RADIUS, Learnable, Learned, Learner, Motion, Plan, Repeating, Seen, Update, knots,
-    learn,
+    Convergence, Ending, LARGEST_RADIUS, Learnable, Learner, LearningResult, Motion, PassObservation, Plan,
+    RepeatableMachine, Update, knots, learn,
 };
 use specgen::machine;
 use specgen::robust::{Deviation, Factors};
-use specgen::stability::platform::{Adapting, Conditions, Law, Tuning};
+use specgen::stability::platform::{Conditions, Estimator, Law, Tuning};
 use specgen_runtime::playback::Knot;
 use specgen_tests::length;
 
@@ -62,7 +62,7 @@ fn passes(
     trajectory: &dyn PoseTrajectory,
     (learnable, convergence): &(Learnable, Convergence),
     count: usize,
-) -> Learned {
+) -> LearningResult {
     let motion = Motion::of(trajectory, PERIOD, &SPEED, RADIUS).unwrap();
     let update = Update::new(learnable, &motion, convergence, convergence.spacing(PERIOD));
     let mut controller = bench.controller();
@@ -129,7 +129,7 @@ fn a_path_with_corners_is_learned_to_nanometres_in_five_passes() {
 #[test]
 fn the_channel_of_a_correction_is_that_of_the_time_domain() {
     let closed_loop = closed_loop(plays());
-    let law = Law::Feedforward(Adapting::Invhys);
+    let law = Law::Feedforward(Estimator::Invhys);
     for hertz in [361.0, 20.0, 700.0].into_iter().take(length(1, 3)) {
         let angle = TAU * hertz * PERIOD;
         let ticks = 20_000_u32;
@@ -165,7 +165,7 @@ fn stepping(class: usize) -> &'static Bench {
 }
 
 /// So many passes of a motion, prepared by the model or not.
-fn made(bench: &Bench, motion: &Motion, prepared: bool, count: usize) -> Vec<Seen> {
+fn made(bench: &Bench, motion: &Motion, prepared: bool, count: usize) -> Vec<PassObservation> {
     let learnable = Learnable::of(&bench.emitted.compiled).unwrap();
     let spacing = 3;
     let table = if prepared { knots(&Update::prepared(&learnable, motion, WISH), spacing) } else { Vec::new() };
@@ -205,8 +205,8 @@ fn settled(bench: &Bench, [size, time]: [f64; 2], prepared: bool) -> [f64; 2] {
 #[test]
 #[ignore = "long: steps and a path on four machines"]
 fn what_lag_and_modes_would_leave_is_prepared_by_the_model() {
-    type Made = fn() -> &'static Bench;
-    let classes: [(&str, Made); 2] = [("plays", plays), ("Bouc-Wen", other)];
+    type MakeBench = fn() -> &'static Bench;
+    let classes: [(&str, MakeBench); 2] = [("plays", plays), ("Bouc-Wen", other)];
     for (class, (name, usual)) in classes.into_iter().enumerate().take(length(1, 2)) {
         let [bare, prepared] = [false, true].map(|with| case_1_error(usual(), with));
         println!("{name}: case 1 at 10 Hz {bare:.1} -> {prepared:.1} nm");
@@ -292,7 +292,7 @@ fn every_machine_within_the_intervals_learns() {
         let machine = machine::scenario(model, task, &specimen, &Noise::of(&specimen), u64::from(seed));
         passes(bench, &machine, deviation.delay_ticks as usize, &case_1(10.0), &design, 8)
     });
-    let errors = |which: fn(&Learned) -> usize| {
+    let errors = |which: fn(&LearningResult) -> usize| {
         let mut all: Vec<f64> = found.iter().map(|learned| learned.passes[which(learned)].translation_nm).collect();
         all.sort_by(f64::total_cmp);
         [all[50], all[99]]

@@ -5,7 +5,7 @@ use host_sim::platform::rig::{Noise, Record, RunOptions};
 use host_sim::platform::{PlatformScenario, Specimen};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 use specgen::lower::platform;
-use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDynamics, Tuning};
+use specgen::stability::platform::{ClosedLoop, Conditions, Estimator, Law, RestDynamics, Tuning};
 
 use specgen_tests::{length, worse};
 
@@ -117,9 +117,9 @@ fn limit(bench: &Bench, (mode, law): (u32, Law), tuning: &Tuning, latency: usize
     [predicted, (low * high).sqrt()]
 }
 
-const EWMA: (u32, Law) = (2, Law::Feedforward(Adapting::Ewma));
-const PCC: (u32, Law) = (3, Law::Feedforward(Adapting::Pcc));
-const COMBINED: (u32, Law) = (6, Law::Combined(Adapting::Pcc));
+const EWMA: (u32, Law) = (2, Law::Feedforward(Estimator::Ewma));
+const PCC: (u32, Law) = (3, Law::Feedforward(Estimator::Pcc));
+const COMBINED: (u32, Law) = (6, Law::Combined(Estimator::Pcc));
 
 #[test]
 fn predicted_limits_are_those_of_the_machine() {
@@ -189,7 +189,7 @@ fn no_start_rule_is_unstable_on_any_machine() {
         let mut bad = Vec::new();
         for (base, bench, tuning) in bases {
             let mut controller = bench.controller();
-            for (mode, law) in [(0, Law::Position), PCC, (5, Law::Combined(Adapting::Ewma)), COMBINED] {
+            for (mode, law) in [(0, Law::Position), PCC, (5, Law::Combined(Estimator::Ewma)), COMBINED] {
                 let position = &bench.design().position;
                 let setting = Setting { mode, tuning: &tuning, position, latency: 0 };
                 if !settles(&bench.specimen, &mut controller, &setting) {

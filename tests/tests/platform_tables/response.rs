@@ -6,10 +6,11 @@ use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{Bench as Rig, Noise};
 use host_sim::trajectory::{PaperPath, PaperPose};
 use specgen::learning::{
-    Convergence, Excitation, LearnError, Learnable, Learned, Learner, Motion, Repeating, Response, Seen, Update, learn,
+    Convergence, Excitation, LearnError, Learnable, Learner, LearningResult, Motion, PassObservation,
+    RepeatableMachine, Response, Update, learn,
 };
 use specgen::machine;
-use specgen::robust::factors::Given;
+use specgen::robust::factors::UserRange;
 use specgen::robust::{Deviation, Factor, Factors};
 use specgen_runtime::playback::Knot;
 use specgen_tests::{length, worse};
@@ -32,7 +33,7 @@ fn on<T>(
     bench: &Bench,
     leg: &LegParameters,
     (factor, times): (Factor, f64),
-    work: impl FnOnce(&mut dyn Repeating) -> T,
+    work: impl FnOnce(&mut dyn RepeatableMachine) -> T,
 ) -> T {
     let model = &bench.emitted.compiled.model;
     let task = model.task_space.as_ref().unwrap();
@@ -46,13 +47,18 @@ fn on<T>(
     work(&mut rig)
 }
 
-fn learned(machine: &mut dyn Repeating, learnable: &Learnable, convergence: &Convergence, count: usize) -> Learned {
+fn learned(
+    machine: &mut dyn RepeatableMachine,
+    learnable: &Learnable,
+    convergence: &Convergence,
+    count: usize,
+) -> LearningResult {
     let (motion, spacing) = (motion(), convergence.spacing(PERIOD));
     let update = Update::new(learnable, &motion, convergence, spacing);
     learn(machine, &motion, Learner::Host(&update), &[], spacing, count, |_, _| ControlFlow::Continue(())).unwrap()
 }
 
-fn measured(machine: &mut dyn Repeating, learnable: &Learnable) -> Response {
+fn measured(machine: &mut dyn RepeatableMachine, learnable: &Learnable) -> Response {
     let excitation = Excitation::new(learnable, &motion(), WISH, LIMITS);
     excitation.measure(machine, learnable, &motion(), ["digest", "machine"], |_| ControlFlow::Continue(())).unwrap()
 }
@@ -73,7 +79,7 @@ fn a_machine_that_is_not_its_spec_learns_with_its_own_response() {
         let usual = model.convergence(&Factors::of(&compiled.model, &[]), WISH).unwrap();
         // What somebody would declare who knows that much of the machine, and what comes of it if nobody does.
         let part = (times - 1.0).abs();
-        let declared = [Given { factor: *factor, range: [1.0 - part, 1.0 + part] }];
+        let declared = [UserRange { factor: *factor, range: [1.0 - part, 1.0 + part] }];
         let limited = model.convergence(&Factors::of(&compiled.model, &declared), WISH).map(|found| found.band[1]);
         let blind = on(bench, leg, off, |machine| learned(machine, &model, &usual, 6));
         let (heard, convergence, own) = on(bench, leg, off, |machine| {
@@ -88,7 +94,7 @@ fn a_machine_that_is_not_its_spec_learns_with_its_own_response() {
     });
     for (((legs, ..), (what, ..)), (limited, blind, heard, convergence, own)) in cases.iter().zip(&found) {
         let errors =
-            |learned: &Learned| -> Vec<f64> { learned.passes.iter().map(|pass| pass.translation_nm).collect() };
+            |learned: &LearningResult| -> Vec<f64> { learned.passes.iter().map(|pass| pass.translation_nm).collect() };
         let [low, high] = convergence.band;
         println!(
             "{legs}, {what}: model, declared: f_c {limited:.0?} Hz; model, not declared: {:.1?} nm, grew {}; measured {low:.1} to {high:.0} Hz, radius \
@@ -111,7 +117,7 @@ fn a_machine_that_is_not_its_spec_learns_with_its_own_response() {
 }
 
 /// A linear machine of a known response, with gauges that are late by the way that a pass keeps errors, and noise.
-struct Known {
+struct Reference {
     /// Ticks late, and how much of each pose is shown.
     late: usize,
     gain: f64,
@@ -119,8 +125,8 @@ struct Known {
     state: u64,
 }
 
-impl Repeating for Known {
-    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, LearnError> {
+impl RepeatableMachine for Reference {
+    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<PassObservation, LearnError> {
         let ticks = motion.corrected;
         let at = |tick: usize| specgen_runtime::playback::at::<f64>(knots, spacing, tick as u32);
         let error: Vec<[f64; 6]> = (0..ticks)
@@ -146,7 +152,7 @@ impl Repeating for Known {
                 std::iter::repeat_n(mean, chunk.len())
             })
             .collect();
-        Ok(Seen { measured, real: error, kept: Vec::new(), status: 0 })
+        Ok(PassObservation { measured, real: error, kept: Vec::new(), status: 0 })
     }
 }
 
@@ -154,7 +160,7 @@ impl Repeating for Known {
 #[test]
 fn a_known_response_is_found_within_its_errors() {
     let learnable = Learnable::of(&plays().emitted.compiled).unwrap();
-    let find = |noise: f64| measured(&mut Known { late: 2, gain: 0.7, noise, state: 1 }, &learnable);
+    let find = |noise: f64| measured(&mut Reference { late: 2, gain: 0.7, noise, state: 1 }, &learnable);
     for (noise, within) in [(0.0, 0.03), (2.2e-9, 0.15)] {
         let response = find(noise);
         let (mut squares, mut count, mut largest) = (0.0, 0.0, 0.0_f64);
@@ -187,7 +193,7 @@ fn a_known_response_is_found_within_its_errors() {
 #[test]
 fn a_response_is_refused_for_anything_else() {
     let learnable = Learnable::of(&plays().emitted.compiled).unwrap();
-    let response = measured(&mut Known { late: 0, gain: 1.0, noise: 1e-9, state: 2 }, &learnable);
+    let response = measured(&mut Reference { late: 0, gain: 1.0, noise: 1e-9, state: 2 }, &learnable);
     let text = response.to_json();
     let back = Response::read(&text).unwrap();
     assert_eq!(back, response);

@@ -7,7 +7,7 @@ mod random;
 use std::io::Cursor;
 
 use crate::rate_options::{CREEP, DYNAMIC, rate_table};
-use host_sim::controller::{Controller, Standing, Supervised, TickController as _};
+use host_sim::controller::{Controller, RestingReadings, Supervised, TickController as _};
 use host_sim::record::{Reader, Taker as _, Writer, replay};
 use host_sim::stimulus::InputRecording;
 use host_sim::trace::first_difference;
@@ -98,7 +98,7 @@ fn laws_alike(name: &str, emitted: &Emitted, library: &mut Controller, at_run_ti
 /// Inputs of a machine: hostile rows, requests that mostly make sense, events, settings that change, snapshots.
 struct Course {
     rows: InputRecording,
-    standing: Standing,
+    standing: RestingReadings,
     /// Input of a machine at rest.
     at_rest: Vec<u64>,
     draw: ChaCha8Rng,

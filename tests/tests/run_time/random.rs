@@ -7,14 +7,14 @@ use std::path::Path;
 use crate::physical_lint::support::plausible;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen::compile::{Compiled, compile_source};
+use specgen::compile::{Compilation, compile_source};
 use specgen::everett::EverettTable;
 use specgen::identify::rate::write_rate_csv;
 use specgen::spec::SpecSource;
 use specgen_tests::{Emitted, scratch};
 
 /// What a part adds: lines behind a header that the spec has, or a text of its own.
-enum Added {
+enum Addition {
     Behind(&'static str, String),
     Text(String),
 }
@@ -23,11 +23,11 @@ enum Added {
 struct Part {
     name: &'static str,
     quarters: u64,
-    added: Vec<Added>,
+    added: Vec<Addition>,
 }
 
 fn behind(name: &'static str, quarters: u64, header: &'static str, lines: impl Into<String>) -> Part {
-    Part { name, quarters, added: vec![Added::Behind(header, lines.into())] }
+    Part { name, quarters, added: vec![Addition::Behind(header, lines.into())] }
 }
 
 /// Uniform from 0 to 1.
@@ -44,18 +44,18 @@ fn with(text: &str, part: &Part) -> String {
     let mut text = text.to_owned();
     for added in &part.added {
         match added {
-            Added::Behind(header, lines) if text.contains(header) => {
+            Addition::Behind(header, lines) if text.contains(header) => {
                 text = text.replacen(&format!("{header}\n"), &format!("{header}\n{lines}\n"), 1);
             }
-            Added::Behind(header, lines) => text += &format!("\n{header}\n{lines}\n"),
-            Added::Text(more) => text += more,
+            Addition::Behind(header, lines) => text += &format!("\n{header}\n{lines}\n"),
+            Addition::Text(more) => text += more,
         }
     }
     text
 }
 
 /// Parts of both kinds of controller, with sizes that fit this one.
-fn common(random: &mut ChaCha8Rng, base: &Compiled, folder: &Path) -> Vec<Part> {
+fn common(random: &mut ChaCha8Rng, base: &Compilation, folder: &Path) -> Vec<Part> {
     let (model, grid) = (&base.model, base.ir.hysteresis.grid);
     let [low, high] = model.actuator.voltage;
     let file = "second-weight.csv";
@@ -101,7 +101,7 @@ fn common(random: &mut ChaCha8Rng, base: &Compiled, folder: &Path) -> Vec<Part> 
 }
 
 /// Parts of a controller in task space.
-fn platform(random: &mut ChaCha8Rng, base: &Compiled) -> Vec<Part> {
+fn platform(random: &mut ChaCha8Rng, base: &Compilation) -> Vec<Part> {
     let bound = base.ir.bounds.pose.map(|bound| bound * 1e6);
     let task = base.model.task_space.as_ref().expect("a platform");
     let [x, z] = [bound[0], bound[2] - 1e6 * task.setpoint.bias[2].abs()].map(|room| 0.3 * room);
@@ -133,7 +133,7 @@ fn platform(random: &mut ChaCha8Rng, base: &Compiled) -> Vec<Part> {
         "\n[[trajectory]]\nname = \"path\"\nkind = \"{}\"\nfrequency = \"1 Hz\"\n",
         one_of(random, &["case-1", "case-2", "machining"])
     );
-    let text = |name, quarters, text: &str| Part { name, quarters, added: vec![Added::Text(text.to_owned())] };
+    let text = |name, quarters, text: &str| Part { name, quarters, added: vec![Addition::Text(text.to_owned())] };
     vec![
         behind("mode", 2, "[control]", format!("mode = \"{}\"", one_of(random, &["p", "f", "p/f"]))),
         behind("active damping", 2, "[control]", "active_damping = true"),
@@ -145,8 +145,8 @@ fn platform(random: &mut ChaCha8Rng, base: &Compiled) -> Vec<Part> {
             name: "modelled force",
             quarters: 1,
             added: vec![
-                Added::Behind("[control]", "interaction = \"modelled\"".to_owned()),
-                Added::Behind(
+                Addition::Behind("[control]", "interaction = \"modelled\"".to_owned()),
+                Addition::Behind(
                     "[control.environment]",
                     "stiffness = [\"0 N/m\", \"0 N/m\", \"1e5 N/m\", \"0 N m/rad\", \"0 N m/rad\", \"0 N m/rad\"]"
                         .to_owned(),
@@ -176,7 +176,7 @@ fn legs(random: &mut ChaCha8Rng) -> Vec<Part> {
     ]
 }
 
-fn compiled(text: &str, folder: &Path) -> Option<Compiled> {
+fn compiled(text: &str, folder: &Path) -> Option<Compilation> {
     let source =
         SpecSource { display_name: "platform.toml".to_owned(), text: text.to_owned(), dir: folder.to_path_buf() };
     compile_source(source).ok()
@@ -215,7 +215,7 @@ pub struct Kinds(BTreeSet<String>);
 
 impl Kinds {
     /// Notes what a spec has.
-    pub fn add(&mut self, compiled: &Compiled, parts: &[&str]) {
+    pub fn add(&mut self, compiled: &Compilation, parts: &[&str]) {
         let kind = if compiled.ir.task_space.is_some() { "platform" } else { "legs" };
         let scalar = format!("f{}", compiled.ir.scalar.bits());
         self.0.extend([kind, &*scalar].into_iter().chain(parts.iter().copied()).map(str::to_owned));

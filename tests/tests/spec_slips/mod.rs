@@ -97,10 +97,10 @@ fn bases() -> BTreeMap<Of, Base> {
 }
 
 /// Slips, each with its text and what is found; every seventh of them in the short run. Two tests look at them.
-type Tried = Vec<(&'static Slip, (String, Vec<Diagnostic>))>;
+type SlipResults = Vec<(&'static Slip, (String, Vec<Diagnostic>))>;
 
-fn caught() -> &'static Tried {
-    static TRIED: OnceLock<Tried> = OnceLock::new();
+fn caught() -> &'static SlipResults {
+    static TRIED: OnceLock<SlipResults> = OnceLock::new();
     TRIED.get_or_init(|| {
         let bases = bases();
         let some = SET.iter().step_by(specgen_tests::length(7, 1));

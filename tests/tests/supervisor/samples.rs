@@ -10,7 +10,7 @@ use host_sim::platform::rig::Noise;
 use host_sim::word::Scalar;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen::compile::Compiled;
+use specgen::compile::Compilation;
 use specgen::machine;
 use specgen::model::{Mcu, SetpointKind};
 use specgen::target;
@@ -29,7 +29,7 @@ enum Plant {
 }
 
 impl Plant {
-    fn new(compiled: &Compiled, leg: &LegParameters, seed: u64) -> Self {
+    fn new(compiled: &Compilation, leg: &LegParameters, seed: u64) -> Self {
         let model = &compiled.model;
         let Some(task) = &model.task_space else {
             let leg = machine::leg(model, leg);

@@ -79,11 +79,11 @@ pub fn run(bench: &mut Bench, seed: u64, sequences: u32, mut each: impl FnMut(&B
 }
 
 /// Causes and phases that came.
-type Met = BTreeSet<(u8, u8)>;
+type VisitedEdges = BTreeSet<(u8, u8)>;
 
 /// Steps the oracle beside a controller; phase and cause of every tick must be the same.
-fn follow(bench: &mut Bench, mut oracle: Oracle, max_step: i64, sequences: u32) -> Met {
-    let mut met = Met::new();
+fn follow(bench: &mut Bench, mut oracle: Oracle, max_step: i64, sequences: u32) -> VisitedEdges {
+    let mut met = VisitedEdges::new();
     let mut ticks = 0_u64;
     let rest = bench.rest;
     run(bench, 5, sequences, |bench, before| {

@@ -11,11 +11,11 @@ use host_sim::platform::PlatformRig;
 use host_sim::platform::rig::Noise;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen::compile::Compiled;
+use specgen::compile::Compilation;
 use specgen::machine;
 use specgen::model::Mcu;
 use specgen::target;
-use specgen_runtime::supervisor::{Fault, Finding, Named, with};
+use specgen_runtime::supervisor::{Fault, Finding, FindingText, with};
 use specgen_tests::Emitted;
 use std::time::Duration;
 
@@ -42,7 +42,7 @@ trait Machine {
 }
 
 /// How a machine was armed, until it held or was faulted.
-struct Armed {
+struct ArmedMachine {
     /// The supervisor's last word.
     word: MachineWord,
     ticks: u32,
@@ -54,7 +54,7 @@ struct Armed {
     digests: Vec<u64>,
 }
 
-fn arm(supervised: &mut Supervised, machine: &mut dyn Machine, compiled: &Compiled) -> Armed {
+fn arm(supervised: &mut Supervised, machine: &mut dyn Machine, compiled: &Compilation) -> ArmedMachine {
     arm_until(supervised, machine, compiled, u32::MAX, ARM)
 }
 
@@ -62,10 +62,10 @@ fn arm(supervised: &mut Supervised, machine: &mut dyn Machine, compiled: &Compil
 fn arm_until(
     supervised: &mut Supervised,
     machine: &mut dyn Machine,
-    compiled: &Compiled,
+    compiled: &Compilation,
     until: u32,
     then: u64,
-) -> Armed {
+) -> ArmedMachine {
     supervised.reset();
     let scalar = supervised.controller().description().scalar;
     let (inputs, outputs) = (supervised.input_names(), supervised.output_names());
@@ -75,7 +75,7 @@ fn arm_until(
     let voltages = place(&outputs, "voltage[0]");
     let request = place(&inputs, "request");
     let (mut input, mut output) = (vec![0; inputs.len()], vec![0; outputs.len()]);
-    let mut armed = Armed {
+    let mut armed = ArmedMachine {
         word: MachineWord::of(0),
         ticks: 0,
         moved: 0.0,
@@ -230,7 +230,7 @@ fn every_single_fault_of_a_platform_is_refused_and_named() {
     let task = compiled.model.task_space.as_ref().unwrap();
     let specimen = machine::specimen(&compiled.model, task, &LegParameters::reference(), Some(5));
     let scenario = machine::scenario(&compiled.model, task, &specimen, &Noise::of(&specimen), 5);
-    let Armed { word, ticks, moved, .. } =
+    let ArmedMachine { word, ticks, moved, .. } =
         arm(&mut supervised, &mut Platform::new(scenario.rig(), Finding::None), compiled);
     assert_eq!((word.phase, word.cause, finding(word)), (HOLDING, 0, Finding::None));
     let stroke = compiled.model.actuator.stroke;
@@ -241,7 +241,8 @@ fn every_single_fault_of_a_platform_is_refused_and_named() {
     let mut most = 0.0_f64;
     let faults = tried();
     for &fault in &faults {
-        let Armed { word, moved, .. } = arm(&mut supervised, &mut Platform::new(scenario.rig(), fault), compiled);
+        let ArmedMachine { word, moved, .. } =
+            arm(&mut supervised, &mut Platform::new(scenario.rig(), fault), compiled);
         assert_eq!((word.phase, word.cause, word.amplifier_on), (FAULTED, 14, false), "{fault}: {}", finding(word));
         assert!(names(finding(word), fault), "{fault}: {}", finding(word));
         most = most.max(moved);
@@ -265,7 +266,7 @@ fn every_single_fault_of_six_legs_is_refused_and_named_with_what_looks_like_it()
     assert_eq!(run(&mut supervised, IDENTITY), Finding::None);
     for fault in tried() {
         let found = run(&mut supervised, with(&IDENTITY, fault));
-        let text = Named(found, alike).to_string();
+        let text = FindingText(found, alike).to_string();
         let set = alike.iter().find(|set| set.contains(&fault.word())).unwrap_or_else(|| panic!("{fault}: alone"));
         assert!(set.iter().any(|word| names(found, Finding::of_word(*word))), "{fault}: {text}");
         assert!(text.contains(", or "), "{text}");
@@ -274,9 +275,9 @@ fn every_single_fault_of_six_legs_is_refused_and_named_with_what_looks_like_it()
 }
 
 /// Uniform between two values.
-struct Draw(ChaCha8Rng);
+struct RandomSource(ChaCha8Rng);
 
-impl Draw {
+impl RandomSource {
     fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -315,9 +316,9 @@ fn class(model: &specgen::model::Model, number: usize) -> LegParameters {
 
 /// A machine without a fault, as the study draws it: gauge gains ±5 %, tilts of 20 mrad, gauges 2 mm off, stiffness ±20 %, joints of
 /// up to 5 % of the legs' stiffness in every axis, leg gains ±15 %, small motions of 0.5 to 0.95 of the spec's gain.
-fn random(compiled: &Compiled, number: u64) -> Legs {
+fn random(compiled: &Compilation, number: u64) -> Legs {
     let model = &compiled.model;
-    let mut draw = Draw(ChaCha8Rng::seed_from_u64(4600 + number));
+    let mut draw = RandomSource(ChaCha8Rng::seed_from_u64(4600 + number));
     let parameters = class(model, (number % 3) as usize);
     let small = {
         let mut leg = Legs::new(&parameters, &[1.0; 6], IDENTITY, number);
@@ -407,7 +408,8 @@ fn a_stop_ends_the_pulses_at_once() {
     for then in [HOLD, RAMP_DOWN] {
         for &until in specgen_tests::length(&[600, 1250][..], &[600, 1250, 1251, 1600, 3900]) {
             let mut legs = random(compiled, 1);
-            let Armed { word, ticks, outputs, .. } = arm_until(&mut supervised, &mut legs, compiled, until, then);
+            let ArmedMachine { word, ticks, outputs, .. } =
+                arm_until(&mut supervised, &mut legs, compiled, until, then);
             assert_eq!((word.phase, word.cause, word.amplifier_on), (DISARMED, 0, false), "{then} at {until}");
             let away = |tick: u32| -> i64 {
                 outputs[tick as usize][codes_at..][..6].iter().map(|code| (*code as i64 - rest).abs()).sum()

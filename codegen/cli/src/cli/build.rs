@@ -11,7 +11,7 @@ use super::check::describe;
 use super::firmware::{self, late};
 use super::named::{InputFile, OutputFolder};
 use super::spec;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::workspace;
 use specgen_language::model;
 use specgen_language::outcome::{Failure, Outcome};
@@ -150,7 +150,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 }
 
 /// Host library, image, and the exercise on both.
-fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> Result<(), Failure> {
+fn build(compiled: &Compilation, output: &Path, summary: &mut Summary, ui: &Ui) -> Result<(), Failure> {
     let target_dir = output.join("target");
     ui.runs(ControllerForm::Emitted);
     ui.progress("building the host library");
@@ -180,7 +180,7 @@ fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> 
 }
 
 impl Summary {
-    fn of(compiled: &Compiled, output: &Path, details: bool) -> Self {
+    fn of(compiled: &Compilation, output: &Path, details: bool) -> Self {
         let hysteresis = &compiled.ir.hysteresis;
         let nodes: usize = hysteresis.tables.iter().map(Vec::len).sum();
         Self {
@@ -334,7 +334,7 @@ fn next(spec: &Path, output: &Path, summary: &Summary, mcu: model::Mcu) -> Vec<S
 }
 
 /// What exceeds the spec's `[target.budget]` or the part, and what the image must not do, in words.
-fn over_budget(compiled: &Compiled, summary: &Summary) -> Vec<String> {
+fn over_budget(compiled: &Compilation, summary: &Summary) -> Vec<String> {
     let (used, checks) = match (&summary.measurement, &summary.image) {
         (Some(m), _) => (&m.used, &m.checks),
         (None, Some(i)) => (&i.used, &i.checks),

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::named::InputFile;
 use super::spec;
 use crate::{lint, precision, reach, stability};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::lint::paths::PathDemand;
 use specgen_compiler::lower::setpoint::{self, Stopping};
 use specgen_compiler::lower::{self, PoseNoise};
@@ -18,7 +18,7 @@ use specgen_compiler::rest::RestNoise;
 use specgen_compiler::stability::Margins;
 use specgen_compiler::stability::platform::Design;
 use specgen_identify::Report;
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::shell;
 use specgen_language::ui::Ui;
@@ -55,7 +55,7 @@ struct Checked<'a> {
     precision: &'a Precision,
     precision_ratio: Ratio,
     #[serde(skip)]
-    compiled: &'a Compiled,
+    compiled: &'a Compilation,
     #[serde(skip)]
     details: bool,
 }
@@ -74,7 +74,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let shown_whole = arguments.details || ui.is_json();
     let precision = if shown_whole { precision::of } else { precision::bounds };
     let precision = precision(&compiled.model, &compiled.ir)
-        .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
+        .map_err(|findings| Refusal { source: Some(compiled.source.clone()), findings })?;
     let mut findings = compiled.findings.clone();
     findings.extend(precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref()));
     findings.extend(lint::estimated(&compiled.model));
@@ -123,7 +123,7 @@ impl Outcome for Checked<'_> {
 }
 
 /// What identification and the stability check found, a line each.
-pub fn describe(compiled: &Compiled) -> String {
+pub fn describe(compiled: &Compilation) -> String {
     let mut text = String::new();
     let assumed = compiled.assumptions.list();
     if !assumed.is_empty() {

@@ -12,7 +12,7 @@ use super::sim::environment;
 use super::spec;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::ui::Ui;
-use specgen_operate::doctor::latency::{self, Figures, Measured};
+use specgen_operate::doctor::latency::{self, Figures, LatencyMeasurement};
 use specgen_operate::doctor::{Files, Finding, Grade, equipment, system};
 use specgen_report::chart::{Axis, Chart, LINE};
 
@@ -122,7 +122,7 @@ impl Outcome for Report {
     }
 }
 
-fn management(measured: &Measured) -> Finding {
+fn management(measured: &LatencyMeasurement) -> Finding {
     let subject = "firmware";
     match measured.management_interrupts {
         Some(0) => Finding {
@@ -151,7 +151,7 @@ fn management(measured: &Measured) -> Finding {
 }
 
 /// What the measurement means for a loop of this period.
-fn judge(measured: &Measured, period: u64) -> (Grade, String) {
+fn judge(measured: &LatencyMeasurement, period: u64) -> (Grade, String) {
     let hertz = 1e9 / period as f64;
     let Some(longest) = measured.delays.largest() else {
         return (Grade::Unknown, format!("{hertz:.0} Hz: no wake-up was measured; measure for longer, --seconds"));

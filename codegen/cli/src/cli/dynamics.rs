@@ -15,7 +15,7 @@ use specgen_compiler::lower;
 use specgen_identify::states;
 use specgen_language::files;
 use specgen_language::model::Model;
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::unread_file;
 use specgen_language::output::write_file;
@@ -59,7 +59,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let states = read_states(&arguments.states)?;
     let compiled = spec::compiled(&arguments.spec, ui)?;
     let platform = lower::platform(&compiled.model)
-        .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
+        .map_err(|findings| Refusal { source: Some(compiled.source.clone()), findings })?;
     let height = if arguments.from_rest { 0.0 } else { compiled.model.geometry.height };
     let mut vectors = Vec::with_capacity(states.len());
     for state in &states {
@@ -163,7 +163,7 @@ fn read_states(path: &Path) -> Result<Vec<State>, Failure> {
     let states = if text.trim_start().starts_with(['{', '[']) {
         from_json(&text).map_err(refuse)?
     } else {
-        let given = states::parse(&text, &shown.to_string()).map_err(|findings| Refused { source: None, findings })?;
+        let given = states::parse(&text, &shown.to_string()).map_err(|findings| Refusal { source: None, findings })?;
         given.into_iter().enumerate().map(|(k, given)| State { id: k.to_string(), given }).collect()
     };
     if states.is_empty() {

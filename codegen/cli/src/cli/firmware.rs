@@ -18,17 +18,17 @@ use super::named::{InputFile, OutputFolder};
 use super::spec;
 use crate::{emit, workspace};
 use specgen_compiler::assumed::Assumptions;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::diagnostic::{Diagnostic, Severity, codes};
 use specgen_language::files;
 use specgen_language::model::{self, BOARDS, Mcu};
 use specgen_language::outcome::Failure;
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::output::unread_file;
 use specgen_language::ui::Ui;
 use specgen_studies::verify::{self, Measurement};
-use specgen_toolchain::budget::{self, Used, group};
-use specgen_toolchain::checks::{self, Checked, Rules};
+use specgen_toolchain::budget::{self, ImageUsage, group};
+use specgen_toolchain::checks::{self, Rules, TickChecks};
 use specgen_toolchain::size::{Size, size as measure_size};
 use specgen_toolchain::stack::Reserve;
 use specgen_toolchain::targets::{Kind, NAMES, Target};
@@ -85,9 +85,9 @@ struct Made {
     /// `rustc --version` of the cross compiler.
     compiler: Option<String>,
     size: Option<Size>,
-    checks: Option<Checked>,
+    checks: Option<TickChecks>,
     measurement: Option<Measurement>,
-    used: Option<Used>,
+    used: Option<ImageUsage>,
     /// Of a board's whole program.
     stack: Option<Reserve>,
     /// What the controller rests on that nobody measured.
@@ -150,13 +150,13 @@ impl Purpose {
 }
 
 /// Refuses a board whose controller would rest on what nobody measured, unless that is accepted.
-fn accept_assumptions(target: Target, compiled: &Compiled, common: &Common) -> Result<(), Failure> {
+fn accept_assumptions(target: Target, compiled: &Compilation, common: &Common) -> Result<(), Failure> {
     let is_real = matches!(target.kind, Kind::Board(_));
     if !is_real || common.assumed_ok || compiled.assumptions.is_empty() {
         return Ok(());
     }
     let findings = vec![compiled.assumptions.refusal(&compiled.model)];
-    Err(Refused { source: Some(compiled.source.clone()), findings }.into())
+    Err(Refusal { source: Some(compiled.source.clone()), findings }.into())
 }
 
 /// Compiles, writes, builds, checks, measures. What does not do for the purpose is refused before anything is written.
@@ -171,7 +171,7 @@ fn make(spec: &Path, common: &Common, purpose: Purpose, ui: &mut Ui) -> Result<M
     if let Kind::Board(mcu) = target.kind
         && let Some(finding) = wrong_part(&compiled, mcu, target)
     {
-        return Err(Refused { source: Some(compiled.source), findings: vec![finding] }.into());
+        return Err(Refusal { source: Some(compiled.source), findings: vec![finding] }.into());
     }
     accept_assumptions(target, &compiled, common)?;
     if common.lockstep && !matches!(target.kind, Kind::Board(_)) {
@@ -196,7 +196,7 @@ fn make(spec: &Path, common: &Common, purpose: Purpose, ui: &mut Ui) -> Result<M
 }
 
 /// An image for another core than the spec's would compute other bits, or in software.
-fn wrong_part(compiled: &Compiled, mcu: Mcu, target: Target) -> Option<Diagnostic> {
+fn wrong_part(compiled: &Compilation, mcu: Mcu, target: Target) -> Option<Diagnostic> {
     let (declared, part) = (compiled.model.target.mcu.part(), mcu.part());
     if (declared.core, declared.double) == (part.core, part.double) {
         return None;
@@ -225,7 +225,7 @@ struct Folders<'a> {
 }
 
 fn build(
-    compiled: &Compiled,
+    compiled: &Compilation,
     target: Target,
     folders: &Folders<'_>,
     common: &Common,
@@ -313,7 +313,7 @@ fn build(
 }
 
 /// Says what is to be said about the time of a tick; why the controller must not be used, if it is too long.
-pub(super) fn late(compiled: &Compiled, measurement: Option<&Measurement>, ui: &mut Ui) -> Option<String> {
+pub(super) fn late(compiled: &Compilation, measurement: Option<&Measurement>, ui: &mut Ui) -> Option<String> {
     let finding = time::finding(compiled, measurement?.time.as_ref()?)?;
     let failure = format!("{}: {}; {}", finding.code, finding.message, finding.help);
     let fails = finding.severity == Severity::Error;
@@ -345,7 +345,7 @@ fn examine(made: &mut Made, image: &Image, whole_image: bool, output: &Path) -> 
 
 /// The exercise on the host and on the emulated machine of the same core, if there is an emulator.
 fn emulate(
-    compiled: &Compiled,
+    compiled: &Compilation,
     folders: &Folders<'_>,
     image: Option<&Image>,
     notes: &mut Vec<String>,
@@ -386,12 +386,12 @@ fn emulate(
 }
 
 /// Fills in what fails: budget, checks, bits.
-fn hold_against_budget(made: &mut Made, compiled: &Compiled, target: Target) {
+fn hold_against_budget(made: &mut Made, compiled: &Compilation, target: Target) {
     let measured = made.measurement.as_ref();
     let used = match (target.kind, &made.size, &made.checks) {
         // The image is the one that was measured.
         (Kind::Emulated, _, _) if measured.is_some() => measured.map(|m| m.used.clone()),
-        (_, Some(size), Some(checks)) => Some(Used {
+        (_, Some(size), Some(checks)) => Some(ImageUsage {
             flash: size.flash(),
             flash_by: size.owners.iter().map(|owner| (owner.name.clone(), owner.flash())).collect(),
             // State and settings of the image that is replayed are on its stack, and known only in a run.

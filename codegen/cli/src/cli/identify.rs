@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::outcome::Failure;
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::ui::Ui;
 
 pub(super) use everett::range;
@@ -108,5 +108,5 @@ impl Measured {
 }
 
 fn refused(findings: Vec<Diagnostic>) -> Failure {
-    Failure::from(Refused { source: None, findings })
+    Failure::from(Refusal { source: None, findings })
 }

@@ -21,7 +21,7 @@ use super::sim::{PlantArguments, at_run_time, frequency};
 use super::spec;
 use super::trajectory;
 use machine::{Own, Remote};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::interrupt;
 use specgen_language::model::TaskSpace;
 use specgen_language::outcome::{Failure, Outcome};
@@ -31,13 +31,13 @@ use specgen_language::ui::Ui;
 use specgen_report::learning::BANDWIDTH;
 use specgen_runtime::playback::Knot;
 use specgen_studies::learning::{
-    Convergence, Ending, LearnError, Learnable, Learned, Learner, Motion, Pass, Plan, Repeating, Response, Table,
-    Update, course, knots, learn,
+    Convergence, Ending, LearnError, Learnable, Learner, LearningResult, Motion, Pass, Plan, RepeatableMachine,
+    Response, Table, Update, course, knots, learn,
 };
 use specgen_studies::machine as plant;
 use specgen_studies::machine::run_failure;
 use specgen_studies::robust::Factors;
-use specgen_studies::robust::factors::Given;
+use specgen_studies::robust::factors::UserRange;
 
 /// Why nothing is learned with the model's response.
 pub(super) const NOWHERE: &str = "learning converges at no frequency on every machine within the declared intervals; narrow them in [robust] or by \
@@ -68,8 +68,8 @@ pub struct Arguments {
     #[arg(long, value_name = "HZ", value_parser = frequency, allow_negative_numbers = true, default_value_t = BANDWIDTH)]
     bandwidth: f64,
     /// Range of an uncertainty, in place of that of [robust] or the default: `stiffness=2%`, `gain=0.9:1.1`, `delay_ticks=0`.
-    #[arg(long, value_name = "NAME=RANGE", value_parser = Given::parse)]
-    vary: Vec<Given>,
+    #[arg(long, value_name = "NAME=RANGE", value_parser = UserRange::parse)]
+    vary: Vec<UserRange>,
     /// Begin with what the model says lag and modes would leave.
     #[arg(long, conflicts_with = "from")]
     prepare: bool,
@@ -108,7 +108,7 @@ enum Rule {
 
 /// What is learned, and how.
 struct Study {
-    compiled: Compiled,
+    compiled: Compilation,
     convergence: Convergence,
     motion: Motion,
     rule: Rule,
@@ -176,10 +176,10 @@ struct Done<F> {
 /// Does work on the machine at the end of the link, or on a simulated one, and keeps what it gives, however the machine ends.
 fn on<T, F>(
     arguments: &Arguments,
-    compiled: &Compiled,
+    compiled: &Compilation,
     own: Option<&Own>,
     ui: &mut Ui,
-    work: impl FnOnce(&mut dyn Repeating, &Ui) -> Result<T, LearnError>,
+    work: impl FnOnce(&mut dyn RepeatableMachine, &Ui) -> Result<T, LearnError>,
     keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
 ) -> Result<Done<F>, Failure> {
     match own {
@@ -189,7 +189,7 @@ fn on<T, F>(
 }
 
 /// The motion, and what it is called.
-fn motion_of(arguments: &Arguments, compiled: &Compiled) -> Result<(Motion, String), Failure> {
+fn motion_of(arguments: &Arguments, compiled: &Compilation) -> Result<(Motion, String), Failure> {
     let model = &compiled.model;
     let task = takes_correction(compiled)?;
     let followed =
@@ -212,12 +212,12 @@ fn machine_name(arguments: &Arguments) -> String {
     arguments.machine.clone().unwrap_or_else(|| format!("simulated, {shape}, seed {seed}"))
 }
 
-fn learnable_of(compiled: &Compiled) -> Result<Learnable, Failure> {
+fn learnable_of(compiled: &Compilation) -> Result<Learnable, Failure> {
     Learnable::of(compiled)
         .ok_or_else(|| Failure::Environment("the platform has no modes, which the spec was checked for".to_owned()))
 }
 
-fn study(arguments: &Arguments, compiled: Compiled) -> Result<Study, Failure> {
+fn study(arguments: &Arguments, compiled: Compilation) -> Result<Study, Failure> {
     let (motion, motion_name) = motion_of(arguments, &compiled)?;
     let machine_name = machine_name(arguments);
     let mut learnable = learnable_of(&compiled)?;
@@ -249,7 +249,12 @@ fn study(arguments: &Arguments, compiled: Compiled) -> Result<Study, Failure> {
 }
 
 /// Makes the passes; the reader sees each, and may end them.
-fn passes(arguments: &Arguments, study: &Study, machine: &mut dyn Repeating, ui: &Ui) -> Result<Learned, LearnError> {
+fn passes(
+    arguments: &Arguments,
+    study: &Study,
+    machine: &mut dyn RepeatableMachine,
+    ui: &Ui,
+) -> Result<LearningResult, LearnError> {
     let Study { motion, rule, begin, spacing, .. } = study;
     let learner = match rule {
         Rule::Host(update) => Learner::Host(update),
@@ -267,9 +272,9 @@ fn passes(arguments: &Arguments, study: &Study, machine: &mut dyn Repeating, ui:
 
 fn simulated<T, F>(
     arguments: &Arguments,
-    compiled: &Compiled,
+    compiled: &Compilation,
     ui: &mut Ui,
-    work: impl FnOnce(&mut dyn Repeating, &Ui) -> Result<T, LearnError>,
+    work: impl FnOnce(&mut dyn RepeatableMachine, &Ui) -> Result<T, LearnError>,
     keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
 ) -> Result<Done<F>, Failure> {
     let (leg, seed) = (arguments.plant.leg()?, arguments.plant.seed);
@@ -291,10 +296,10 @@ fn simulated<T, F>(
 
 fn on_machine<T, F>(
     arguments: &Arguments,
-    compiled: &Compiled,
+    compiled: &Compilation,
     own: &Own,
     ui: &mut Ui,
-    work: impl FnOnce(&mut dyn Repeating, &Ui) -> Result<T, LearnError>,
+    work: impl FnOnce(&mut dyn RepeatableMachine, &Ui) -> Result<T, LearnError>,
     keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
 ) -> Result<Done<F>, Failure> {
     interrupt::heed();
@@ -344,7 +349,13 @@ fn on_machine<T, F>(
 }
 
 /// Writes the table of the best pass, if a file is named.
-fn keep(arguments: &Arguments, study: &Study, learned: Learned, start: [f64; 6], ui: &Ui) -> Result<Found, Failure> {
+fn keep(
+    arguments: &Arguments,
+    study: &Study,
+    learned: LearningResult,
+    start: [f64; 6],
+    ui: &Ui,
+) -> Result<Found, Failure> {
     let Study { compiled, convergence, motion, motion_name, machine_name, spacing, .. } = study;
     if let Some(path) = &arguments.output {
         let names = [compiled.ir.digest.as_str(), machine_name, motion_name];
@@ -397,7 +408,7 @@ fn failure(error: &LearnError, message: String) -> Failure {
 }
 
 /// The `[control]` of a spec whose controller takes a correction.
-pub(super) fn takes_correction(compiled: &Compiled) -> Result<&TaskSpace, Failure> {
+pub(super) fn takes_correction(compiled: &Compilation) -> Result<&TaskSpace, Failure> {
     let task = compiled.model.task_space.as_ref().ok_or_else(|| {
         Failure::Gate(
             "learning is for a spec with [control]: legs with their own gauges learn from tick to tick by EWMA and PCC"
@@ -416,7 +427,7 @@ pub(super) fn takes_correction(compiled: &Compiled) -> Result<&TaskSpace, Failur
 /// The correction of the first pass, and the ticks from knot to knot.
 fn begin(
     arguments: &Arguments,
-    compiled: &Compiled,
+    compiled: &Compilation,
     learnable: &Learnable,
     motion: &Motion,
     convergence: &Convergence,
@@ -436,7 +447,7 @@ fn begin(
 }
 
 /// Why learning ended, and whose correction is kept.
-fn kept(learned: &Learned) -> Vec<String> {
+fn kept(learned: &LearningResult) -> Vec<String> {
     // Without passes to learn from there is nothing to say.
     let Some(noise) = learned.noise_nm else { return Vec::new() };
     let last = learned.passes.len() - 1;
@@ -462,7 +473,7 @@ struct Found {
     machine: String,
     convergence: Convergence,
     #[serde(flatten)]
-    learned: Learned,
+    learned: LearningResult,
     /// What lets it learn to higher frequencies, where it was asked to.
     #[serde(skip_serializing_if = "Option::is_none")]
     help: Option<String>,

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::{MapValueParser, PathBufValueParser, TypedValueParser, ValueParserFactory};
 use clap::{ArgMatches, ValueHint};
 
-use specgen_language::files::{self, Unwritten, Way};
+use specgen_language::files::{self, Destination, OutputError};
 use specgen_language::outcome::Failure;
 use specgen_language::output::refused_output;
 
@@ -72,9 +72,9 @@ pub fn check(matches: &ArgMatches) -> Result<(), Failure> {
     let mut seen = BTreeSet::new();
     for path in &outputs {
         let way = files::guard(path).map_err(|why| refused_output(path, &why))?;
-        let Way::File(target) = way else { continue };
+        let Destination::File(target) = way else { continue };
         if !seen.insert(whole(&target)) {
-            return Err(refused_output(path, &Unwritten::Twice));
+            return Err(refused_output(path, &OutputError::Twice));
         }
     }
     Ok(())

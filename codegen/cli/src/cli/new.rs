@@ -10,12 +10,12 @@ use std::path::Path;
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, ValueEnum};
 use serde::Serialize;
-use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::compile::{self, Compilation};
 use specgen_compiler::lower;
 use specgen_compiler::reach::{self, Reach};
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::interrupt::Scratch;
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::shell;
 use specgen_language::spec::quantity;
 use specgen_language::spec::{self, SpecSource, json_schema};
@@ -417,7 +417,7 @@ impl Outcome for Begun {
 }
 
 /// Says what was written, whether it is good, and what to do next.
-fn report(folder: &Path, draft: &Draft, compiled: Result<Compiled, Refused>, ui: &mut Ui) -> Result<(), Failure> {
+fn report(folder: &Path, draft: &Draft, compiled: Result<Compilation, Refusal>, ui: &mut Ui) -> Result<(), Failure> {
     let shown = folder.display().to_string();
     let spec = folder.join(SPEC);
     let check = shell::on("specgen check", &spec, "");

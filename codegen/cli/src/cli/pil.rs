@@ -11,7 +11,7 @@ use clap::Args;
 use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, Supervised};
 use serde_json::json;
-use specgen_link::Counted;
+use specgen_link::CostUnit;
 use specgen_link::client::{Port, Timeout};
 use specgen_studies::machine::run_failure;
 
@@ -20,7 +20,7 @@ use super::plot::Plot;
 use super::sim::{PlantArguments, environment, frequency};
 use super::spec;
 use report::Report;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::workspace;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::unread_file;
@@ -128,12 +128,12 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 /// The whole tick in the image.
 const SUPERVISE: &str = "specgen_supervise";
 
-fn given(path: &Path, compiled: &Compiled) -> Result<Image, Failure> {
+fn given(path: &Path, compiled: &Compilation) -> Result<Image, Failure> {
     let elf = files::read(path, files::MAX_BYTES).map_err(|unread| unread_file(path, &unread))?;
     Ok(Image { mcu: compiled.model.target.mcu, elf, path: path.to_owned(), compiler: String::new() })
 }
 
-fn built(compiled: &Compiled, output: &Path, target_dir: &Path, ui: &Ui) -> Result<Image, Failure> {
+fn built(compiled: &Compilation, output: &Path, target_dir: &Path, ui: &Ui) -> Result<Image, Failure> {
     let mcu = compiled.model.target.mcu;
     ui.progress(&format!("building the image for {}", mcu.part().emulated));
     Ok(target::build_pil(output, mcu, target_dir)?)
@@ -146,7 +146,7 @@ fn in_the_loop<P: Port>(
     timeout: Timeout,
     mut report: Report,
     plan: &scenario::Plan,
-    compiled: &Compiled,
+    compiled: &Compilation,
     arguments: &Arguments,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
@@ -156,9 +156,9 @@ fn in_the_loop<P: Port>(
         OpenError::Link(_) => Failure::Environment(format!("{}: {error}", report.device)),
     })?;
     report.counted = match lockstep.counted() {
-        Counted::Instructions => "instructions",
-        Counted::Cycles => "cycles",
-        Counted::Nothing => "",
+        CostUnit::Instructions => "instructions",
+        CostUnit::Cycles => "cycles",
+        CostUnit::Nothing => "",
     };
     let done = plan.run(&mut lockstep, &mut report, compiled, arguments, ui);
     report.ticks = lockstep.ticks();

@@ -13,12 +13,12 @@ use specgen_rt::scheduling;
 use super::named::InputFile;
 use super::sim::{PlantArguments, environment};
 use super::spec;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
 use specgen_language::interrupt;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::ui::Ui;
-use specgen_operate::served::{Plant, Served};
+use specgen_operate::served::{Plant, PlantServer};
 use specgen_runtime::supervisor::Finding;
 use specgen_studies::machine;
 
@@ -106,7 +106,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = spec::looked_up(&arguments.spec, ui)?;
     let plant = prepared(arguments, &compiled, ui)?;
     let faults = arguments.wrong.iter().flat_map(|faults| faults.0.clone()).collect();
-    let mut served = Served::new(plant, &compiled.model, &compiled.ir).with_faults(faults);
+    let mut served = PlantServer::new(plant, &compiled.model, &compiled.ir).with_faults(faults);
     for refused in
         [arguments.cpu.map_or(Ok(()), scheduling::pin), arguments.priority.map_or(Ok(()), scheduling::set_fifo)]
     {
@@ -158,7 +158,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 }
 
 /// The machine after its pre-cycle, with the gauges zeroed.
-fn prepared(arguments: &Arguments, compiled: &Compiled, ui: &Ui) -> Result<Plant, Failure> {
+fn prepared(arguments: &Arguments, compiled: &Compilation, ui: &Ui) -> Result<Plant, Failure> {
     let (seed, leg) = (arguments.plant.seed, arguments.plant.leg()?);
     ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
     Ok(match &compiled.model.task_space {

@@ -12,7 +12,7 @@ use std::path::Path;
 use clap::Args;
 use host_sim::controller::{MachineWord, Supervised};
 use host_sim::description::Description;
-use host_sim::record::{self, Again, Block, Header, PhaseChange, Piece, Reader, Replay};
+use host_sim::record::{self, Block, FileItem, Header, PhaseChange, Reader, Replay, ReplayedRows};
 use serde::Serialize;
 
 use super::named::{InputFile, OutputFile};
@@ -20,7 +20,7 @@ use super::plot::Plot;
 use super::sim;
 use super::spec;
 use export::Exports;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::files;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::unread_file;
@@ -87,7 +87,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             errors.add(header, block, &names, rows);
         }
         if trouble.is_none() {
-            trouble = exports.add(header, block, Some(Again { names: &names, rows })).err();
+            trouble = exports.add(header, block, Some(ReplayedRows { names: &names, rows })).err();
         }
     });
     let found = found.map_err(|error| refuse(&error))?;
@@ -108,7 +108,7 @@ pub(super) fn same_build(
     recording: &Path,
     spec: &Path,
     recorded: &Description,
-    compiled: &Compiled,
+    compiled: &Compilation,
 ) -> Result<(), Failure> {
     let version = env!("CARGO_PKG_VERSION");
     if recorded.digest == compiled.ir.digest && recorded.version == version {
@@ -291,9 +291,9 @@ fn export(
     let mut found = Exported::default();
     while let Some(piece) = reader.next_piece().map_err(|error| refuse(&error))? {
         match piece {
-            Piece::Block(block) => exports.add(&header, &block, None)?,
-            Piece::Damaged { block, reason } => found.damaged.push((block, reason)),
-            Piece::Cut { .. } => found.cut = true,
+            FileItem::Block(block) => exports.add(&header, &block, None)?,
+            FileItem::Damaged { block, reason } => found.damaged.push((block, reason)),
+            FileItem::Cut { .. } => found.cut = true,
         }
     }
     Ok(found)

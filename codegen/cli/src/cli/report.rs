@@ -16,10 +16,10 @@ use super::check::describe;
 use super::named::{InputFile, OutputFile};
 use super::sim::{at_run_time, environment};
 use crate::{precision, target, workspace};
-use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::compile::{self, Compilation};
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::interrupt::Scratch;
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::{check_place, write_file};
 use specgen_language::shell;
@@ -153,7 +153,7 @@ fn of_record(
     arguments: &Arguments,
     record: &Path,
     output: &Path,
-    compiled: &Compiled,
+    compiled: &Compilation,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
     let run = recorded::read(record, compiled, ui)?;
@@ -170,7 +170,7 @@ fn of_record(
 }
 
 /// Why a spec is refused, as a page.
-fn refused(arguments: &Arguments, refused: Refused, ui: &mut Ui) -> Result<(), Failure> {
+fn refused(arguments: &Arguments, refused: Refusal, ui: &mut Ui) -> Result<(), Failure> {
     let Some(source) = &refused.source else { return Err(refused.into()) };
     let (model, _) = spec::load_as_far(source);
     let name = arguments.spec.file_stem().map_or_else(|| "spec".to_owned(), |stem| stem.to_string_lossy().into_owned());
@@ -241,12 +241,12 @@ fn write(
 }
 
 /// What needs no simulation, to be opened at the end.
-fn evidence_of(compiled: &Compiled, built: &Built, name: &str) -> Result<Vec<Section>, Failure> {
+fn evidence_of(compiled: &Compilation, built: &Built, name: &str) -> Result<Vec<Section>, Failure> {
     let check = shell::on("specgen check", name, "");
     let main = shell::on("specgen", name, "-o DIR");
     let measured = built.measured.as_ref().map_err(String::as_str);
     let rounding = precision::of(&compiled.model, &compiled.ir)
-        .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
+        .map_err(|findings| Refusal { source: Some(compiled.source.clone()), findings })?;
     let bits = Bits { ticks: built.ticks, trace: built.trace.clone(), state: built.state, measured };
     let mut sections = vec![evidence::findings(compiled, &check)];
     if let Some(design) = &compiled.design {
@@ -265,7 +265,7 @@ fn evidence_of(compiled: &Compiled, built: &Built, name: &str) -> Result<Vec<Sec
 }
 
 /// The controller of the spec with a drive converter as fine as there is, for the error budget.
-fn fine(compiled: &Compiled) -> Result<Controller, Failure> {
+fn fine(compiled: &Compilation) -> Result<Controller, Failure> {
     let lost = |why: String| {
         Failure::Environment(format!(
             "the spec with dac.bits = {FINE_BITS} does not compile: {why}; report this as a defect of specgen with the spec"
@@ -312,7 +312,7 @@ fn file_name(path: &Path) -> String {
 }
 
 /// Host library, image, and the exercise on both; without a target the compiled spec, of which nothing is built.
-fn build(compiled: &Compiled, no_target: bool, ui: &Ui) -> Result<Built, Failure> {
+fn build(compiled: &Compilation, no_target: bool, ui: &Ui) -> Result<Built, Failure> {
     let scratch = Scratch::new().map_err(environment)?;
     let folder = scratch.path().join("controller");
     let cache = scratch.path().join("target");

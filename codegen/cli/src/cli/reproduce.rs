@@ -12,7 +12,7 @@ use host_sim::platform::table::{MachiningTable, PoseTable};
 use super::named::OutputFolder;
 use super::plot::Plot;
 use super::sim::{at_run_time, environment};
-use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::compile::{self, Compilation};
 use specgen_language::interrupt::Scratch;
 use specgen_language::outcome::Failure;
 use specgen_language::output::{claim, write_folder};
@@ -115,7 +115,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 }
 
 /// Tables 1 and 2, and Fig. 29 last.
-fn section_3(compiled: &Compiled, steps: &mut Steps) -> Result<Vec<Table>, Failure> {
+fn section_3(compiled: &Compilation, steps: &mut Steps) -> Result<Vec<Table>, Failure> {
     let mut controller = at_run_time(compiled, steps.ui)?;
     let scenario = legs::scenario(SEED);
     let actuator = &compiled.model.actuator;
@@ -129,7 +129,7 @@ fn section_3(compiled: &Compiled, steps: &mut Steps) -> Result<Vec<Table>, Failu
 }
 
 /// Tables 5 to 9.
-fn section_4(compiled: &Compiled, steps: &mut Steps) -> Result<(Vec<Table>, Controller), Failure> {
+fn section_4(compiled: &Compilation, steps: &mut Steps) -> Result<(Vec<Table>, Controller), Failure> {
     let mut controller = at_run_time(compiled, steps.ui)?;
     let scenario = machine_of(compiled)?;
     let mut free = PoseTable::default();
@@ -153,7 +153,7 @@ fn section_4(compiled: &Compiled, steps: &mut Steps) -> Result<(Vec<Table>, Cont
 }
 
 /// The machine of the platform's spec, out of tolerances, with noise.
-fn machine_of(compiled: &Compiled) -> Result<PlatformScenario, Failure> {
+fn machine_of(compiled: &Compilation) -> Result<PlatformScenario, Failure> {
     let Some(task) = &compiled.model.task_space else {
         return Err(Failure::Environment(
             "the embedded platform has no [control]; report this as a defect of specgen".to_owned(),
@@ -164,7 +164,7 @@ fn machine_of(compiled: &Compiled) -> Result<PlatformScenario, Failure> {
 }
 
 fn converge(
-    compiled: &Compiled,
+    compiled: &Compilation,
     controller: &Controller,
     generations: usize,
     ui: &Ui,

@@ -24,7 +24,7 @@ use specgen_language::spec::quantity::{self, Dimension};
 use specgen_language::ui::Ui;
 use specgen_report::learning::BANDWIDTH;
 use specgen_studies::machine::run_failure;
-use specgen_studies::robust::factors::Given;
+use specgen_studies::robust::factors::UserRange;
 use specgen_studies::robust::{Factors, Learning, Member, Outcome, Plan, Shard, Study};
 use work::{Part, Ran, Work};
 
@@ -63,8 +63,8 @@ struct StudyArguments {
     draws: u32,
     /// Range of an uncertainty, in place of that of [robust] or the default: `mass=5%`, `gain=0.9:1.1`, `delay_ticks=1`.
     /// Of mass, stiffness, damping, gain, hysteresis, creep, lag, noise (factors) and delay_ticks.
-    #[arg(long, value_name = "NAME=RANGE", value_parser = Given::parse)]
-    vary: Vec<Given>,
+    #[arg(long, value_name = "NAME=RANGE", value_parser = UserRange::parse)]
+    vary: Vec<UserRange>,
     /// What is followed: case-1, case-2, machining or multisine, or a trajectory of the spec by its name; without
     /// [control] leg or multisine. The first of them if not given.
     #[arg(long, value_name = "NAME")]

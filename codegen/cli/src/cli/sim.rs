@@ -190,12 +190,12 @@ impl TickController for Interruptible {
 }
 
 /// The controller that a command runs: the emitted one if the user asks for it.
-pub(super) fn controller(compiled: &compile::Compiled, is_emitted: bool, ui: &Ui) -> Result<Controller, Failure> {
+pub(super) fn controller(compiled: &compile::Compilation, is_emitted: bool, ui: &Ui) -> Result<Controller, Failure> {
     if is_emitted { emitted(compiled, ui) } else { at_run_time(compiled, ui) }
 }
 
 /// The law on the constants of a compiled spec: the bits of the emitted controller, and nothing is built.
-pub(super) fn at_run_time(compiled: &compile::Compiled, ui: &Ui) -> Result<Controller, Failure> {
+pub(super) fn at_run_time(compiled: &compile::Compilation, ui: &Ui) -> Result<Controller, Failure> {
     ui.runs(ControllerForm::RunTime);
     ui.progress("controller: the compiled spec, not built");
     specgen_run_time::controller(&compiled.ir).map_err(environment)
@@ -203,7 +203,7 @@ pub(super) fn at_run_time(compiled: &compile::Compiled, ui: &Ui) -> Result<Contr
 
 /// The emitted controller, built for this host from the same files that the main job writes. What it was built in is gone
 /// when this returns; the library stays loaded.
-fn emitted(compiled: &compile::Compiled, ui: &Ui) -> Result<Controller, Failure> {
+fn emitted(compiled: &compile::Compilation, ui: &Ui) -> Result<Controller, Failure> {
     let scratch = Scratch::new().map_err(environment)?;
     let workspace = scratch.path().join("controller");
     workspace::write_scratch(&workspace, &compiled.files)?;

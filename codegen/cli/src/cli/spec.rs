@@ -2,35 +2,35 @@
 
 use std::path::Path;
 
-use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::compile::{self, Compilation};
 use specgen_language::model::Model;
 use specgen_language::outcome::Failure;
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::spec::{self, SpecSource};
 use specgen_language::ui::Ui;
 
 /// Compiles the spec at `path`; its findings are shown.
-pub fn compiled(path: &Path, ui: &mut Ui) -> Result<Compiled, Failure> {
+pub fn compiled(path: &Path, ui: &mut Ui) -> Result<Compilation, Failure> {
     let compiled = quietly(path, ui)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
     Ok(compiled)
 }
 
 /// The same for a command that only looks things up in it: the findings in one line.
-pub fn looked_up(path: &Path, ui: &mut Ui) -> Result<Compiled, Failure> {
+pub fn looked_up(path: &Path, ui: &mut Ui) -> Result<Compilation, Failure> {
     let compiled = quietly(path, ui)?;
     ui.findings_in_brief(&compiled.source, &compiled.findings);
     Ok(compiled)
 }
 
 /// The same with no finding shown. Tables on a fine grid take seconds.
-pub fn quietly(path: &Path, ui: &Ui) -> Result<Compiled, Failure> {
+pub fn quietly(path: &Path, ui: &Ui) -> Result<Compilation, Failure> {
     Ok(ui.during("compiling the spec", || compile::compile(path))?)
 }
 
 /// What a spec says, whose records need not be there.
 pub fn model(path: &Path) -> Result<Model, Failure> {
-    let source = SpecSource::read(path).map_err(|finding| Refused { source: None, findings: vec![finding] })?;
+    let source = SpecSource::read(path).map_err(|finding| Refusal { source: None, findings: vec![finding] })?;
     let (model, findings) = spec::load_as_far(&source);
-    model.ok_or_else(|| Refused { source: Some(source), findings }.into())
+    model.ok_or_else(|| Refusal { source: Some(source), findings }.into())
 }

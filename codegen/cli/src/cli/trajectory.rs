@@ -2,7 +2,7 @@
 
 use host_sim::trajectory::{PaperPath, Step};
 
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::model::TrajectoryKind;
 use specgen_language::outcome::Failure;
 use specgen_language::shell;
@@ -29,7 +29,7 @@ pub(super) fn chosen(
     trajectory: Option<&str>,
     frequency: Option<f64>,
     seed: u64,
-    compiled: &Compiled,
+    compiled: &Compilation,
 ) -> Result<Followed, Failure> {
     let platform = compiled.model.task_space.as_ref();
     let asked = frequency;

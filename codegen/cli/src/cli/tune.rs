@@ -16,23 +16,23 @@ use super::named::{InputFile, OutputFolder};
 use super::plot::Plot;
 use super::sim::{PlantArguments, at_run_time, frequency};
 use super::spec;
-use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::compile::{self, Compilation};
 use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
 use specgen_language::interrupt;
 use specgen_language::outcome::Failure;
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::output::{check_edit, claim, edit_file, write_folder};
 use specgen_language::spec::SpecSource;
 use specgen_language::ui::Ui;
 use specgen_studies::machine::run_failure;
 use specgen_studies::tuning::cma::Cma;
-use specgen_studies::tuning::feasible::{Feasibility, Required};
+use specgen_studies::tuning::feasible::{Feasibility, RequiredMargins};
 use specgen_studies::tuning::genetic::{Genetic, Settings};
 use specgen_studies::tuning::search::Progress;
 use specgen_studies::tuning::space::GivenBounds;
 use specgen_studies::tuning::{
-    Candidate, Case, Conditions, Optimiser, Score, Search, SearchOptions, Setting, Space, TrajectoryChoice, What,
-    front, write,
+    Candidate, Case, Conditions, Optimiser, Score, Search, SearchOptions, Setting, Space, TrajectoryChoice,
+    TunedNumbers, front, write,
 };
 
 /// Arguments of `tune`.
@@ -157,7 +157,7 @@ fn bounds(text: &str) -> Result<GivenBounds, String> {
 /// Everything that tuning works on.
 struct Job<'a> {
     arguments: &'a Arguments,
-    compiled: Compiled,
+    compiled: Compilation,
     controller: Controller,
     leg: LegParameters,
     space: Space,
@@ -170,13 +170,13 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = spec::compiled(&arguments.spec, ui)?;
     check(arguments, &compiled)?;
     let what = match arguments.what {
-        WhatArgument::Gains => What::Gains,
-        WhatArgument::Weights => What::Weights,
-        WhatArgument::All => What::All,
+        WhatArgument::Gains => TunedNumbers::Gains,
+        WhatArgument::Weights => TunedNumbers::Weights,
+        WhatArgument::All => TunedNumbers::All,
     };
     let space = Space::of(&compiled, what, &arguments.bounds).map_err(|found| refused(&compiled, found))?;
     let asked = arguments.evaluate.as_deref().map(|file| evaluate::read(file, &space)).transpose()?;
-    let required = Required { gain: arguments.gain_margin, delay: arguments.delay_margin };
+    let required = RequiredMargins { gain: arguments.gain_margin, delay: arguments.delay_margin };
     let feasibility = Feasibility::of(&compiled, required);
     let threads = arguments.threads.map_or_else(
         || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
@@ -196,7 +196,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 }
 
 /// Arguments that do not go with the kind of the spec.
-fn check(arguments: &Arguments, compiled: &Compiled) -> Result<(), Failure> {
+fn check(arguments: &Arguments, compiled: &Compilation) -> Result<(), Failure> {
     let platform = compiled.model.task_space.is_some();
     let fits = match arguments.trajectory {
         TrajectoryArgument::Multisine | TrajectoryArgument::Zigzag => true,
@@ -215,8 +215,8 @@ fn check(arguments: &Arguments, compiled: &Compiled) -> Result<(), Failure> {
     Ok(())
 }
 
-fn refused(compiled: &Compiled, findings: Vec<Diagnostic>) -> Failure {
-    Failure::from(Refused { source: Some(compiled.source.clone()), findings })
+fn refused(compiled: &Compilation, findings: Vec<Diagnostic>) -> Failure {
+    Failure::from(Refusal { source: Some(compiled.source.clone()), findings })
 }
 
 impl Job<'_> {
@@ -377,7 +377,7 @@ impl Job<'_> {
         (best, interrupted)
     }
 
-    fn not_compiled(&self, refusal: &Refused) -> Failure {
+    fn not_compiled(&self, refusal: &Refusal) -> Failure {
         let errors = refusal.findings.iter().filter(|finding| finding.severity == Severity::Error);
         let why: Vec<String> = errors.map(|finding| format!("{}: {}", finding.code, finding.message)).collect();
         refused(

@@ -3,7 +3,7 @@
 use super::fixture::Workspace;
 use super::{build, tools};
 use specgen::model::Mcu;
-use specgen::target::checks::{Checked, Rule, Rules, check};
+use specgen::target::checks::{Rule, Rules, TickChecks, check};
 use specgen::target::size;
 
 const M7: Rules = Rules { single: false, whole_image: true };
@@ -33,7 +33,7 @@ const PLANTED: &str = "
     #[inline(never)] fn allocating(n: u32) -> f64 { malloc(n as usize) as usize as f64 }";
 const EXTRA: &str = "{ let x = input.setpoint[0]; unbounded_index(x) + by_pointer(x as u32) + allocating(x as u32) }";
 
-fn texts(checked: &Checked, rule: Rule) -> Vec<&str> {
+fn texts(checked: &TickChecks, rule: Rule) -> Vec<&str> {
     checked.faults.iter().filter(|fault| fault.rule == rule).map(|fault| fault.text.as_str()).collect()
 }
 

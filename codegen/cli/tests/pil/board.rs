@@ -14,7 +14,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use specgen_link::lockstep::{Lockstep, Machine};
-use specgen_link::{Counted, Counters, Endpoint, Stage};
+use specgen_link::{CostUnit, Counters, Endpoint, Stage};
 
 /// A controller as a board steps it.
 pub struct Stepped {
@@ -70,8 +70,8 @@ impl Machine for Stepped {
         1
     }
 
-    fn counted(&self) -> Counted {
-        Counted::Cycles
+    fn counted(&self) -> CostUnit {
+        CostUnit::Cycles
     }
 
     fn configure(&mut self, config: &[u64]) -> Result<(), usize> {

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use host_sim::controller::Supervised;
-use host_sim::record::{Piece, Reader, Replay, Row, replay};
+use host_sim::record::{FileItem, Reader, Replay, Row, replay};
 use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::{Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request, Status};
 use specgen_runtime::record::checksum;
@@ -124,7 +124,7 @@ impl Record {
         let (names, mut rows) = (reader.input_names(), Vec::new());
         while let Some(piece) = reader.next_piece().unwrap() {
             match piece {
-                Piece::Block(block) => rows.extend(block.rows),
+                FileItem::Block(block) => rows.extend(block.rows),
                 other => panic!("{other:?}"),
             }
         }

@@ -382,7 +382,7 @@ impl Exchanged {
         let noise = host_sim::platform::rig::Noise::of(&specimen);
         let scenario = machine::scenario(&compiled.model, task, &specimen, &noise, 1);
         let plant = served::Plant::Platform(Box::new(scenario.rig().clone()));
-        let mut served = served::Served::new(plant, &compiled.model, &compiled.ir);
+        let mut served = served::PlantServer::new(plant, &compiled.model, &compiled.ir);
         let server = Server::create(&path_of(name).unwrap(), digest).unwrap();
         let stop = Arc::new(AtomicBool::new(false));
         let ends = stop.clone();

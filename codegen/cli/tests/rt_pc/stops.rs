@@ -13,7 +13,7 @@ use rustix::process::Signal;
 use serde_json::json;
 use specgen::operate::{Place, Session, SocketLine};
 use specgen_link::client::{Client, Port, Timeout};
-use specgen_link::{Bytes, Counted, Device, Endpoint, Identity, Refusal, Reply, Request};
+use specgen_link::{Bytes, CostUnit, Device, Endpoint, Identity, Refusal, Reply, Request};
 
 use super::gcs::{self, Bridge};
 use super::host::Host;
@@ -222,7 +222,7 @@ impl Device for Willing {
     fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
         let [config_words, input_words, output_words] = [1; 3];
         let identity =
-            Identity { config_words, input_words, output_words, stages: 0, counted: Counted::Nothing, description: 0 };
+            Identity { config_words, input_words, output_words, stages: 0, counted: CostUnit::Nothing, description: 0 };
         if *request == Request::Hello { Reply::Identity(identity) } else { Reply::Done }
     }
 }

@@ -45,8 +45,8 @@ const MEANT: [(&str, &str); 11] = [
     ("amplifier_fault: ", "amplifier_fault: specgen_runtime::supervisor::Reaction::"),
     (" kind: ", " kind: specgen_runtime::trigger::Kind::"),
     (", direction: ", ", direction: specgen_runtime::trigger::Direction::"),
-    ("(Whole", "(Permitted::Whole"),
-    ("(Number", "(Permitted::Number"),
+    ("(Whole", "(PermittedRange::Whole"),
+    ("(Number", "(PermittedRange::Number"),
     ("Series { sine: [", "Series { sine: &["),
     (" versine: [", " versine: &["),
     (" root: [", " root: &["),
@@ -62,9 +62,9 @@ pub fn printed(constant: &impl Debug) -> TokenStream {
 }
 
 /// Rust within a constant, in place of a value.
-pub struct Within<'a>(pub &'a TokenStream);
+pub struct RustExpression<'a>(pub &'a TokenStream);
 
-impl Debug for Within<'_> {
+impl Debug for RustExpression<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(self.0, f)
     }

@@ -1,4 +1,4 @@
-//! `src/permitted.rs`: the table of what settings may be. Reads [`ir::Permitted`](crate::ir::Permitted).
+//! `src/permitted.rs`: the table of what settings may be. Reads [`ir::PermittedRanges`](crate::ir::PermittedRanges).
 
 use std::marker::PhantomData;
 
@@ -19,7 +19,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     quote! {
         #![doc = " What settings may be, and how large the numbers of a state may become: nothing beyond the limits of the spec."]
 
-        use specgen_runtime::Permitted;
+        use specgen_runtime::PermittedRange;
         use specgen_runtime::snapshot::Sizes;
 
         use crate::Real;
@@ -30,7 +30,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub(crate) const NAMES: [&str; WORDS] = [#(#names),*];
         /// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
         /// most `code_max`.
-        pub const SETTINGS: [(Permitted<Real>, usize); #count] = #settings;
+        pub const SETTINGS: [(PermittedRange<Real>, usize); #count] = #settings;
         /// Largest numbers of a state, under any of these settings.
         pub const STATE: Sizes = #state;
     }

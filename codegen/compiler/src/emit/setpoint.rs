@@ -10,7 +10,7 @@ use crate::ir::{Frames, Ir, Path, Scalar, Setpoints};
 pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
     let scalar = ir.scalar;
     let (frames_type, frames) = frames(scalar, &s.frames);
-    let setpoints = literal::constant!(scalar, setpoints, &ir.bounds.pose, s, literal::Within(&frames), &[]);
+    let setpoints = literal::constant!(scalar, setpoints, &ir.bounds.pose, s, literal::RustExpression(&frames), &[]);
     let count = literal::count(s.trajectories.len());
     let names = s.trajectories.iter().map(|trajectory| &trajectory.name);
     let (constants, entries): (Vec<_>, Vec<_>) = s

@@ -5,7 +5,7 @@ use specgen_runtime::trigger::LONGEST;
 
 use super::triggers;
 use crate::ir::{
-    Actuation, Bounds, ControlLaw, Defaults, Frames, Hysteresis, Kinematics, Notch, Permitted, Range, RateModel,
+    Actuation, Bounds, ControlLaw, Defaults, Frames, Hysteresis, Kinematics, Notch, PermittedRanges, Range, RateModel,
     Resonator, Scalar, Sensing, Setpoints, Setting, State, TaskSpace,
 };
 use specgen_language::model::{LARGEST_GAIN, LARGEST_RUN_INTERVAL, LARGEST_TRAVEL, LARGEST_TURN};
@@ -26,7 +26,7 @@ pub(super) fn lower(
     hysteresis: &Hysteresis,
     kinematics: &Kinematics,
     scalar: Scalar,
-) -> Permitted {
+) -> PermittedRanges {
     let codes = Range::Whole(actuation.code_min, actuation.code_max);
     let code_limits = [
         one(
@@ -99,7 +99,7 @@ pub(super) fn lower(
         }
     };
     let state = State { reading: scalar.round(state.reading), stiffness: scalar.round(LARGEST_GAIN), ..state };
-    Permitted { settings, state }
+    PermittedRanges { settings, state }
 }
 
 /// Largest displacement of a leg, m, and what a cell a tick adds to it: by the tables and what accounts for the rate, and as demanded.

@@ -14,7 +14,7 @@ mod stopping;
 mod table;
 
 pub use corners::step;
-pub use declared::{Declared, declared};
+pub use declared::{SpecSetpoints, declared};
 pub use poses::{Stretch, stretches};
 pub use stopping::{Stopping, check as check_stops, describe as describe_stops};
 

@@ -1,6 +1,6 @@
 //! Leg displacements of a pose.
 
-use specgen_numerics::{Double, Kernels, Traced, trace};
+use specgen_numerics::{Double, Kernels, TracedNumber, trace};
 use specgen_runtime::{Legs, Real, Series};
 
 use super::{Figures, boxes, keep};
@@ -106,13 +106,17 @@ impl FromReal<Self> for f64 {
 }
 
 /// A constant of the controller, with what it leaves out of what it stands for.
-pub(super) fn kept<const SINGLE: bool>(kept: f64, exact: Double) -> Traced<SINGLE> {
-    Traced::constant(kept, [(Double::from(kept) - exact).value(); 2])
+pub(super) fn kept<const SINGLE: bool>(kept: f64, exact: Double) -> TracedNumber<SINGLE> {
+    TracedNumber::constant(kept, [(Double::from(kept) - exact).value(); 2])
 }
 
 /// A series cut after the terms that are kept. What is left out, at arguments of which the square is at most `square`, counts
 /// as an error of its last coefficient: terms get smaller, so it lies between nothing and their first over 1 − `square`.
-pub(super) fn cut<const SINGLE: bool>(coefficients: &[f64], exact: &[Double], square: f64) -> Vec<Traced<SINGLE>> {
+pub(super) fn cut<const SINGLE: bool>(
+    coefficients: &[f64],
+    exact: &[Double],
+    square: f64,
+) -> Vec<TracedNumber<SINGLE>> {
     // Without any term that of the first is zero.
     let last = if coefficients.is_empty() { 0 } else { coefficients.len() - 1 };
     (0..=last)
@@ -121,16 +125,16 @@ pub(super) fn cut<const SINGLE: bool>(coefficients: &[f64], exact: &[Double], sq
             let off = (Double::from(value) - exact[k]).value();
             let beyond = if k == last { exact[k + 1].value() * square / (1.0 - square) } else { 0.0 };
             let (low, high) = if beyond > 0.0 { (off - beyond, off) } else { (off, off - beyond) };
-            Traced::constant(value, [low, high])
+            TracedNumber::constant(value, [low, high])
         })
         .collect()
 }
 
 /// The legs in numbers that remember their rounding.
 pub(super) struct TracedLegs<const SINGLE: bool> {
-    sine: Vec<Traced<SINGLE>>,
-    versine: Vec<Traced<SINGLE>>,
-    root: Vec<Traced<SINGLE>>,
+    sine: Vec<TracedNumber<SINGLE>>,
+    versine: Vec<TracedNumber<SINGLE>>,
+    root: Vec<TracedNumber<SINGLE>>,
 }
 
 impl<const SINGLE: bool> TracedLegs<SINGLE> {
@@ -141,11 +145,11 @@ impl<const SINGLE: bool> TracedLegs<SINGLE> {
             sine: cut(&constants.sine, &exact.sine, square),
             versine: cut(&constants.versine, &exact.versine, square),
             // Over powers of two: exact.
-            root: constants.root.iter().map(|c| Traced::constant(*c, [0.0; 2])).collect(),
+            root: constants.root.iter().map(|c| TracedNumber::constant(*c, [0.0; 2])).collect(),
         }
     }
 
-    pub(super) fn series(&self) -> Series<'_, Traced<SINGLE>> {
+    pub(super) fn series(&self) -> Series<'_, TracedNumber<SINGLE>> {
         Series { sine: &self.sine, versine: &self.versine }
     }
 }
@@ -187,7 +191,7 @@ fn bound<const SINGLE: bool>(
     inverse: &[[f64; 6]; 6],
 ) -> ([f64; 6], [f64; 6])
 where
-    Traced<SINGLE>: Kernels,
+    TracedNumber<SINGLE>: Kernels,
 {
     let bounds = model.workspace.bounds();
     let largest = bounds[3..].iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
@@ -206,8 +210,8 @@ where
                 root: &numbers.root,
                 newton_steps: constants.newton_steps as usize,
             };
-            let pose = core::array::from_fn(|axis| Traced::coordinate(axis, corner[axis][0], corner[axis][1]));
-            let found = Traced::displacements(&legs, &pose);
+            let pose = core::array::from_fn(|axis| TracedNumber::coordinate(axis, corner[axis][0], corner[axis][1]));
+            let found = TracedNumber::displacements(&legs, &pose);
             core::array::from_fn::<_, 6, _>(|leg| {
                 let left = left_by_root(constants, found[leg].magnitude(), constants.rest_length[leg]);
                 found[leg].off_by([-left, left])

@@ -1,6 +1,6 @@
 //! The pose from the gauges.
 
-use specgen_numerics::{Double, Kernels, Trace, Traced, cross, magnitude, trace};
+use specgen_numerics::{Double, Kernels, Trace, TracedNumber, cross, magnitude, trace};
 use specgen_runtime::{Gauges, Real};
 
 use super::kinematics::{Exact as ExactLegs, FromReal, TracedLegs, cut, kept};
@@ -167,7 +167,7 @@ fn bound<const SINGLE: bool>(
     legs: &ExactLegs,
 ) -> [f64; 6]
 where
-    Traced<SINGLE>: Kernels,
+    TracedNumber<SINGLE>: Kernels,
 {
     let bounds = model.workspace.bounds();
     let largest = bounds[3..].iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
@@ -177,12 +177,12 @@ where
             let gauges = Constants::<SINGLE>::of(constants, exact, largest);
             let gauges = gauges.gauges();
             let series = TracedLegs::of(kinematics, legs, largest);
-            let pose = core::array::from_fn(|axis| Traced::coordinate(axis, corner[axis][0], corner[axis][1]));
+            let pose = core::array::from_fn(|axis| TracedNumber::coordinate(axis, corner[axis][0], corner[axis][1]));
             // Readings are given numbers, of which it only counts where they lie.
-            let readings = Traced::readings(&gauges, &series.series(), &pose).map(Traced::given);
+            let readings = TracedNumber::readings(&gauges, &series.series(), &pose).map(TracedNumber::given);
             let guess = gauges.guess(&readings);
             let start = start(&gauges, &readings, &guess);
-            Traced::pose_from(&gauges, &readings, &guess, start)
+            TracedNumber::pose_from(&gauges, &readings, &guess, start)
         });
         keep(&mut bound, found.map(|axis| record.error(&[(axis, 1.0)])));
     }
@@ -195,21 +195,21 @@ where
 /// between the two. With ψ₁ one pass from ψ₀, and passes that contract by κ about there, ψ∞ − ψ₀ is off ψ₁ − ψ₀ by
 /// κ/(1 − κ) of that at most.
 fn start<const SINGLE: bool>(
-    gauges: &Gauges<'_, Traced<SINGLE>>,
-    readings: &[Traced<SINGLE>; 6],
-    guess: &[Traced<SINGLE>; 6],
-) -> [Traced<SINGLE>; 3]
+    gauges: &Gauges<'_, TracedNumber<SINGLE>>,
+    readings: &[TracedNumber<SINGLE>; 6],
+    guess: &[TracedNumber<SINGLE>; 6],
+) -> [TracedNumber<SINGLE>; 3]
 where
-    Traced<SINGLE>: Kernels,
+    TracedNumber<SINGLE>: Kernels,
 {
     let psi = [guess[3], guess[4], guess[5]];
-    let next = Traced::next_turn(gauges, readings, guess, &psi);
+    let next = TracedNumber::next_turn(gauges, readings, guess, &psi);
     // As it would be without rounding.
-    let step: [Traced<SINGLE>; 3] = core::array::from_fn(|k| (next[k] - psi[k]).given());
+    let step: [TracedNumber<SINGLE>; 3] = core::array::from_fn(|k| (next[k] - psi[k]).given());
     let longest = step.iter().fold(0.0, |a: f64, step| if step.magnitude() > a { step.magnitude() } else { a });
     // Where all passes lie if κ is below a half.
     let around = psi.map(|psi| psi.widened(2.0 * longest).given());
-    let after = Traced::next_turn(gauges, readings, guess, &around);
+    let after = TracedNumber::next_turn(gauges, readings, guess, &around);
     // The constants of the controller contract as those without rounding do, but for their last bits.
     let contraction = 1.001
         * Trace::peek(|record| {
@@ -228,15 +228,15 @@ where
 
 /// Constants of the controller that remember what they leave out.
 struct Constants<const SINGLE: bool> {
-    direction: [[Traced<SINGLE>; 3]; 6],
-    normal: [[Traced<SINGLE>; 3]; 6],
-    skew: [[Traced<SINGLE>; 3]; 6],
-    pierced: [[Traced<SINGLE>; 3]; 6],
-    inverse: [[Traced<SINGLE>; 6]; 6],
-    curvature: [[Traced<SINGLE>; 6]; 6],
+    direction: [[TracedNumber<SINGLE>; 3]; 6],
+    normal: [[TracedNumber<SINGLE>; 3]; 6],
+    skew: [[TracedNumber<SINGLE>; 3]; 6],
+    pierced: [[TracedNumber<SINGLE>; 3]; 6],
+    inverse: [[TracedNumber<SINGLE>; 6]; 6],
+    curvature: [[TracedNumber<SINGLE>; 6]; 6],
     passes: usize,
-    arc_sine: Vec<Traced<SINGLE>>,
-    arc_tangent: Vec<Traced<SINGLE>>,
+    arc_sine: Vec<TracedNumber<SINGLE>>,
+    arc_tangent: Vec<TracedNumber<SINGLE>>,
 }
 
 impl<const SINGLE: bool> Constants<SINGLE> {
@@ -263,7 +263,7 @@ impl<const SINGLE: bool> Constants<SINGLE> {
         }
     }
 
-    fn gauges(&self) -> Gauges<'_, Traced<SINGLE>> {
+    fn gauges(&self) -> Gauges<'_, TracedNumber<SINGLE>> {
         Gauges {
             direction: self.direction,
             normal: self.normal,

@@ -32,7 +32,7 @@ use specgen_numerics::{Matrix6, jacobian, mass_matrix};
 pub use super::LARGEST_RADIUS;
 pub use closed_loop::{ClosedLoop, Conditions};
 pub use damping::{ActiveDamping, DampedMode, SLOW};
-pub use law::{Adapting, Law, Tuning};
+pub use law::{Estimator, Law, Tuning};
 pub use margins::{ClosedMode, ModeMargins};
 pub use modes::ModalBasis;
 pub use notch::{Biquad, Notch};
@@ -116,7 +116,7 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
     let ratios = model.adaptation.gain_ratio;
     let limit = bandwidth_limit(&closed_loop);
     let given = task.gains.as_ref().map(gains);
-    let given = rule::Given { gains: given.as_ref(), bandwidths: task.adaptation };
+    let given = rule::TuningKeys { gains: given.as_ref(), bandwidths: task.adaptation };
     let damping = task.active_damping.then(|| rule::damped(&mut closed_loop, limit, adapting(model)));
     let start = damping.as_ref().map(|(_, tuning)| tuning);
     let combined = rule::combined(&closed_loop, limit, given, start, ratios);
@@ -207,11 +207,11 @@ pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> 
 }
 
 /// The run-to-run law that the spec starts with.
-fn adapting(model: &Model) -> Adapting {
+fn adapting(model: &Model) -> Estimator {
     match model.adaptation.mode {
-        AdaptationMode::Invhys => Adapting::Invhys,
-        AdaptationMode::Ewma => Adapting::Ewma,
-        AdaptationMode::Pcc => Adapting::Pcc,
+        AdaptationMode::Invhys => Estimator::Invhys,
+        AdaptationMode::Ewma => Estimator::Ewma,
+        AdaptationMode::Pcc => Estimator::Pcc,
     }
 }
 

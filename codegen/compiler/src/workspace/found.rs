@@ -110,7 +110,7 @@ pub(super) fn check_free(dir: &Path, manifest: &Manifest) -> Result<BTreeSet<Str
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(BTreeSet::new()),
         Err(error) => return Err(WriteError::io("read", dir, error)),
     }
-    let mut found = Found { manifest, ours: BTreeSet::new(), foreign: Vec::new() };
+    let mut found = FolderContents { manifest, ours: BTreeSet::new(), foreign: Vec::new() };
     found.walk(dir, "").map_err(|error| WriteError::io("read", dir, error))?;
     if found.foreign.is_empty() {
         return Ok(found.ours);
@@ -123,13 +123,13 @@ pub(super) fn check_free(dir: &Path, manifest: &Manifest) -> Result<BTreeSet<Str
     Err(WriteError::Occupied { dir: dir.to_owned(), files: found.foreign })
 }
 
-struct Found<'a> {
+struct FolderContents<'a> {
     manifest: &'a Manifest,
     ours: BTreeSet<String>,
     foreign: Vec<String>,
 }
 
-impl Found<'_> {
+impl FolderContents<'_> {
     fn walk(&mut self, root: &Path, below: &str) -> io::Result<()> {
         for (path, kind) in entries(root, below)? {
             if self.manifest.is_ours(root, &path, kind) {

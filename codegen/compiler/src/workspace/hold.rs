@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use super::error::WriteError;
-use specgen_language::interrupt::{self, Claimed, Guard};
+use specgen_language::interrupt::{self, Guard, ResultFolders};
 use specgen_language::lock;
 
 /// The lock in the work folder; its text names the owner.
@@ -22,7 +22,7 @@ pub struct Hold {
     _file: File,
     // An interrupt removes it with the process.
     _lock: Guard,
-    _made: Claimed,
+    _made: ResultFolders,
 }
 
 impl Hold {
@@ -44,7 +44,7 @@ impl Hold {
     }
 
     fn attempt(work: &Path) -> io::Result<Self> {
-        let made = Claimed::new(work)?;
+        let made = ResultFolders::new(work)?;
         check_own(work)?;
         let path = work.join(LOCK);
         let (mut file, lock) = Guard::file(|| lock::make(&path), |_| path.clone())?;

@@ -131,7 +131,7 @@ fn digest(text: &str) -> String {
 }
 
 /// What a spec compiles to.
-struct Built {
+struct GoldenOutput {
     ir: Ir,
     /// Margins, demands of the trajectories and lengths of the stops, noise of the pose.
     figures: Value,
@@ -165,7 +165,7 @@ fn waveforms(source: &SpecSource, model: &Model, table: Option<&str>) -> Vec<Opt
 
 /// The phases of the compiler that this crate computes in, without reading records and without emitting; with
 /// a table of poses, where the spec names one.
-fn build(source: &SpecSource, table_of_poses: Option<&str>) -> Result<Built, Vec<Diagnostic>> {
+fn build(source: &SpecSource, table_of_poses: Option<&str>) -> Result<GoldenOutput, Vec<Diagnostic>> {
     let (model, _) = spec::load_as_far(source);
     let Some(model) = model else { return Err(Vec::new()) };
     let mut findings = lint::check(&model);
@@ -223,7 +223,7 @@ fn build(source: &SpecSource, table_of_poses: Option<&str>) -> Result<Built, Vec
         findings.extend(rest::check(&model, rest));
     }
     figures["rest"] = json!(format!("{rest:?}"));
-    Ok(Built { ir, figures, findings })
+    Ok(GoldenOutput { ir, figures, findings })
 }
 
 /// One after the other: for a mutant, the first difference is enough.

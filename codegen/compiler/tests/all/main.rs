@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 
 use simulation::{Run, settles};
 use specgen_compiler::stability::platform::{
-    Adapting, ClosedLoop, Conditions, Law, ModalBasis, RestDynamics, Tuning, bandwidth_limit, closed_loop_of, design,
+    ClosedLoop, Conditions, Estimator, Law, ModalBasis, RestDynamics, Tuning, bandwidth_limit, closed_loop_of, design,
 };
 use study::{model, rest};
 
@@ -23,9 +23,9 @@ fn length<T>(short: T, long: T) -> T {
     if std::env::var_os("SPECGEN_FULL").is_some() { long } else { short }
 }
 
-const EWMA: Law = Law::Feedforward(Adapting::Ewma);
-const PCC: Law = Law::Feedforward(Adapting::Pcc);
-const COMBINED: Law = Law::Combined(Adapting::Pcc);
+const EWMA: Law = Law::Feedforward(Estimator::Ewma);
+const PCC: Law = Law::Feedforward(Estimator::Pcc);
+const COMBINED: Law = Law::Combined(Estimator::Pcc);
 
 /// First crossing of radius 1 along a factor, by a scan and bisection of its own.
 fn limit(low: f64, high: f64, radius: impl Fn(f64) -> f64) -> f64 {
@@ -171,7 +171,7 @@ fn damping_by_velocity_needs_a_fast_loop_without_delay() {
     };
     let radius = |rate: f64, factor: f64, delay: f64| {
         let conditions = Conditions { delay, ..Conditions::NOMINAL };
-        loop_at(rate, 0.02, None).spectral_radius(Law::Combined(Adapting::Ewma), &kv(factor), &conditions)
+        loop_at(rate, 0.02, None).spectral_radius(Law::Combined(Estimator::Ewma), &kv(factor), &conditions)
     };
     assert!(radius(1e4, 1.0, 0.0) < 1.0);
     assert!(radius(2e3, 1.0, 0.0) > 1.0);
@@ -182,7 +182,7 @@ fn damping_by_velocity_needs_a_fast_loop_without_delay() {
         limit(20.0, 5e3, |level| {
             let tuning = Tuning { level_bandwidth: level, ..kv(factor) };
             let conditions = Conditions { delay, ..Conditions::NOMINAL };
-            closed_loop.spectral_radius(Law::Combined(Adapting::Ewma), &tuning, &conditions)
+            closed_loop.spectral_radius(Law::Combined(Estimator::Ewma), &tuning, &conditions)
         })
     };
     let found =
@@ -198,7 +198,7 @@ fn run_of(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, conditions: &Cond
     let feeds_back = !matches!(law, Law::Feedforward(_));
     let gains = |gains: [f64; 6]| if feeds_back { gains } else { [0.0; 6] };
     let adapting = match law {
-        Law::Position => Adapting::Invhys,
+        Law::Position => Estimator::Invhys,
         Law::Feedforward(adapting) | Law::Combined(adapting) => adapting,
     };
     Run {
@@ -214,8 +214,8 @@ fn run_of(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, conditions: &Cond
         integral: gains(tuning.integral),
         derivative: gains(tuning.derivative),
         velocity_cutoff: closed_loop.velocity_cutoff,
-        level_weight: if adapting == Adapting::Invhys { 0.0 } else { tuning.level_bandwidth * closed_loop.period },
-        drift_weight: if adapting == Adapting::Pcc { tuning.drift_bandwidth * closed_loop.period } else { 0.0 },
+        level_weight: if adapting == Estimator::Invhys { 0.0 } else { tuning.level_bandwidth * closed_loop.period },
+        drift_weight: if adapting == Estimator::Pcc { tuning.drift_bandwidth * closed_loop.period } else { 0.0 },
         contact: if conditions.touching { closed_loop.environment } else { [0.0; 6] },
         measured: closed_loop.measured && conditions.touching,
         seconds: 2.0,

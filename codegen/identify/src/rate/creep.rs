@@ -10,7 +10,7 @@
 use nalgebra::DMatrix;
 
 use super::forward::{kept, parts};
-use super::prepare::Prepared;
+use super::prepare::PreparedRecord;
 use super::table::Tables;
 use super::{CreepTerm, RateModel, mixed};
 use crate::trend::Line;
@@ -59,7 +59,7 @@ pub(super) fn fit(tables: &Tables, start: &RateModel) -> Result<RateModel, Failu
 }
 
 /// Evenly spaced in their logarithm, slowest first, s; of one weight, as many as a controller takes.
-pub(super) fn time_constants(records: &[&Prepared], even: bool) -> Vec<f64> {
+pub(super) fn time_constants(records: &[&PreparedRecord], even: bool) -> Vec<f64> {
     let longest = records.iter().map(|p| p.duration()).fold(0.0, |a, b| if b > a { b } else { a }) * LONGEST;
     let shortest = records.iter().map(|p| p.interval).fold(longest, |a, b| if b < a { b } else { a }) * SHORTEST;
     let shortest = if shortest < longest { shortest } else { 0.1 * longest };
@@ -87,7 +87,7 @@ struct Linear {
 }
 
 /// `signals`: f and the creep states of each record.
-fn linear_part(records: &[&Prepared], signals: &[Vec<Vec<f64>>], dead_time: f64) -> Result<Linear, Failure> {
+fn linear_part(records: &[&PreparedRecord], signals: &[Vec<Vec<f64>>], dead_time: f64) -> Result<Linear, Failure> {
     // Unknowns: w_j ≥ 0, then s and −δτ.
     let terms = signals.first().map_or(0, |signals| signals.len() - 1);
     let unknowns = terms + 2;

@@ -2,7 +2,7 @@
 
 use super::joint::Shape;
 use super::normal::accumulate;
-use super::prepare::Prepared;
+use super::prepare::PreparedRecord;
 use super::table::Tables;
 use super::{RateModel, creep, joint, mixed, table};
 use crate::findings::Findings;
@@ -18,12 +18,12 @@ const RATE_SMOOTHNESS: f64 = 1e3;
 /// Every option fitted to the records `chosen`, in the order of [`super::RateOption::ALL`]; the last one if there is a `mode`.
 pub(super) fn all(
     plane: &Plane,
-    prepared: &[Prepared],
+    prepared: &[PreparedRecord],
     chosen: &[usize],
     mode: Option<Mode>,
     findings: &mut Findings,
 ) -> Option<Vec<RateModel>> {
-    let records: Vec<&Prepared> = chosen.iter().map(|k| &prepared[*k]).collect();
+    let records: Vec<&PreparedRecord> = chosen.iter().map(|k| &prepared[*k]).collect();
     let fitted = || -> Result<Vec<RateModel>, Failure> {
         let tables = Tables::new(plane, &records)?;
         let still = still(&tables, 0.0)?;
@@ -51,8 +51,8 @@ fn still(tables: &Tables, dead_time: f64) -> Result<RateModel, Failure> {
 }
 
 /// The dead time (s) with which one table fits all records best, bounds of the weights aside; zero if none helps.
-fn dead_time(plane: &Plane, records: &[&Prepared]) -> Result<f64, Failure> {
-    let longest = |p: &&Prepared| dead_time::longest(p.record, &p.branches);
+fn dead_time(plane: &Plane, records: &[&PreparedRecord]) -> Result<f64, Failure> {
+    let longest = |p: &&PreparedRecord| dead_time::longest(p.record, &p.branches);
     let longest = records.iter().map(longest).fold(f64::INFINITY, |least, s| if s < least { s } else { least });
     let found = dead_time::search(longest, |tried| {
         let each = records.iter().map(|p| {
@@ -68,7 +68,7 @@ fn dead_time(plane: &Plane, records: &[&Prepared]) -> Result<f64, Failure> {
 
 /// (6) behind that of the dead times (s) with which it fits better: μ₀ ≥ 0 and μ₁ of either sign in one fit. What all loops lag by is
 /// the dead time's, which a controller leads by; of what is left little is too much for the inverse.
-fn dynamic(plane: &Plane, records: &[&Prepared], dead_times: [f64; 2]) -> Result<RateModel, Failure> {
+fn dynamic(plane: &Plane, records: &[&PreparedRecord], dead_times: [f64; 2]) -> Result<RateModel, Failure> {
     // Rates of order one, so that both halves of the normal matrix are of one size.
     let unit = records.iter().fold(f64::MIN_POSITIVE, |most, p| if p.speed > most { p.speed } else { most });
     let each = records.iter().map(|p| accumulate(plane, p, &dead_times.map(|tau| p.delayed(tau)), Some(unit)));

@@ -76,13 +76,18 @@ pub(super) fn creep(time_constant: f64, time: &[f64], f: &[f64]) -> Vec<f64> {
 }
 
 /// Static displacement over the used part, m.
-pub(super) fn static_part(model: &RateModel, plane: &Plane, p: &super::prepare::Prepared) -> Vec<f64> {
+pub(super) fn static_part(model: &RateModel, plane: &Plane, p: &super::prepare::PreparedRecord) -> Vec<f64> {
     let memory = Staircase::negative_saturation(plane.range);
     still(model, plane, &p.record.time, &p.record.drive, p.first, memory).0
 }
 
 /// Static displacement and every creep state of `times` over the used part, m.
-pub(super) fn parts(still: &RateModel, times: &[f64], plane: &Plane, p: &super::prepare::Prepared) -> Vec<Vec<f64>> {
+pub(super) fn parts(
+    still: &RateModel,
+    times: &[f64],
+    plane: &Plane,
+    p: &super::prepare::PreparedRecord,
+) -> Vec<Vec<f64>> {
     let f = static_part(still, plane, p);
     let time = &p.record.time[p.first..];
     let states: Vec<Vec<f64>> = times.iter().map(|tau| creep(*tau, time, &f)).collect();

@@ -7,8 +7,8 @@
 use nalgebra::DMatrix;
 
 use super::forward::{self, kept};
-use super::prepare::Prepared;
-use super::start::Own;
+use super::prepare::PreparedRecord;
+use super::start::RecordColumns;
 use super::table::Tables;
 use super::{CreepTerm, Inertia, RateModel, creep, mixed};
 use crate::mode::Mode;
@@ -35,11 +35,11 @@ const PULL: f64 = 1e-4;
 const PASSES: usize = 2;
 
 /// Weights, gain and dead time that were tried, their model, and what it leaves.
-type Tried = (Vec<f64>, RateModel, Vec<f64>);
+type Attempt = (Vec<f64>, RateModel, Vec<f64>);
 
 struct Fit<'a> {
     tables: &'a Tables<'a>,
-    own: Vec<Own>,
+    own: Vec<RecordColumns>,
     times: Vec<f64>,
     shape: Shape,
     /// Mean gain of the table, m/V.
@@ -85,7 +85,7 @@ impl Fit<'_> {
         still.nodes.iter_mut().for_each(|node| *node *= factor);
         let mut model = RateModel { still, rate: None, creep, inertia, dead_time };
         for pass in 0..PASSES {
-            let target = |(p, own): (&&Prepared, &Own)| self.target(&model, p, own, pass > 0);
+            let target = |(p, own): (&&PreparedRecord, &RecordColumns)| self.target(&model, p, own, pass > 0);
             let targets: Vec<Vec<f64>> = self.tables.records.iter().zip(&self.own).map(target).collect();
             model.still = self.tables.fit(&targets)?;
         }
@@ -93,7 +93,7 @@ impl Fit<'_> {
     }
 
     /// What the table is to give for the rest of the model to meet the record, m.
-    fn target(&self, model: &RateModel, p: &Prepared, own: &Own, started: bool) -> Vec<f64> {
+    fn target(&self, model: &RateModel, p: &PreparedRecord, own: &RecordColumns, started: bool) -> Vec<f64> {
         let time = &p.record.time[p.first..];
         let plain = forward::static_part(model, self.tables.plane, p);
         let mut moved = vec![0.0; time.len()];
@@ -154,7 +154,7 @@ impl Fit<'_> {
     }
 
     /// The first of the whole way, a half, a quarter … to `wanted` that lowers the error.
-    fn along(&self, at: &[f64], wanted: &[f64], model: &RateModel, before: f64) -> Result<Option<Tried>, Failure> {
+    fn along(&self, at: &[f64], wanted: &[f64], model: &RateModel, before: f64) -> Result<Option<Attempt>, Failure> {
         for share in [1.0, 0.5, 0.25] {
             let mut next: Vec<f64> = at.iter().zip(wanted).map(|(a, b)| a + share * (b - a)).collect();
             if let Some(dead_time) = next.last_mut() {

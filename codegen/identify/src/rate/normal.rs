@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::prepare::Prepared;
+use super::prepare::PreparedRecord;
 use crate::normal::{Sums, each_row};
 use crate::regressor::Plane;
 
@@ -31,17 +31,17 @@ impl Normal {
 
 /// Over the branches of `p`. `targets` are over its used part (m). `rate_unit`: also the second table, with rates in this
 /// unit (V/s).
-pub(super) fn accumulate(plane: &Plane, p: &Prepared, targets: &[Vec<f64>], rate_unit: Option<f64>) -> Normal {
+pub(super) fn accumulate(plane: &Plane, p: &PreparedRecord, targets: &[Vec<f64>], rate_unit: Option<f64>) -> Normal {
     let unknowns = if rate_unit.is_some() { 2 * plane.nodes() } else { plane.nodes() };
     over(Sums::new(unknowns, targets.len()), plane, p, targets, rate_unit)
 }
 
 /// The right-hand sides alone, of one table.
-pub(super) fn right_sides(plane: &Plane, p: &Prepared, targets: &[Vec<f64>]) -> Vec<Vec<f64>> {
+pub(super) fn right_sides(plane: &Plane, p: &PreparedRecord, targets: &[Vec<f64>]) -> Vec<Vec<f64>> {
     over(Sums::without_gram(plane.nodes(), targets.len()), plane, p, targets, None).rhs
 }
 
-fn over(mut sums: Sums, plane: &Plane, p: &Prepared, targets: &[Vec<f64>], rate_unit: Option<f64>) -> Normal {
+fn over(mut sums: Sums, plane: &Plane, p: &PreparedRecord, targets: &[Vec<f64>], rate_unit: Option<f64>) -> Normal {
     let nodes = plane.nodes();
     let mut full = Vec::new();
     let mut values = vec![0.0; targets.len()];

@@ -7,7 +7,7 @@
 //! and its slopes are least squares within these bounds, with the offset and the line that the record has anyway, and with the start of creep and mode.
 //! Negative and positive saturation are the slopes 0 and 1, a demagnetised actuator is about ½.
 
-use super::start::Own;
+use super::start::RecordColumns;
 use crate::staircase::saturate;
 
 /// Parts of A.
@@ -30,7 +30,7 @@ pub(crate) fn parts(open: &[f64]) -> Vec<Vec<f64>> {
 }
 
 /// The slopes with which `rest` ≈ Σ slope·part + what the record has of its `own`.
-pub(crate) fn slopes(rest: &[f64], parts: &[Vec<f64>], own: &Own) -> Vec<f64> {
+pub(crate) fn slopes(rest: &[f64], parts: &[Vec<f64>], own: &RecordColumns) -> Vec<f64> {
     let without_own = |values: &[f64]| -> Vec<f64> {
         let mut values = values.to_vec();
         own.take_out(&mut values);
@@ -77,7 +77,7 @@ mod tests {
         let rest: Vec<f64> = (0..2000)
             .map(|k| 7.0 - 0.2 * time[k] + (0..PARTS).fold(0.0, |sum, part| sum + wanted(part) * parts[part][k]))
             .collect();
-        let own = Own::of(&time, vec![true; 2000], core::iter::empty(), None);
+        let own = RecordColumns::of(&time, vec![true; 2000], core::iter::empty(), None);
         let found = slopes(&rest, &parts, &own);
         // The lowest quarter of D is never reached.
         assert!(found[..3].iter().all(|s| (s - 0.5).abs() < 1e-3), "{found:?}");

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::open_weight;
-use super::start::Own;
+use super::start::RecordColumns;
 use super::{Inertia, RateModel, forward};
 use crate::cause::{self, Cause};
 use crate::distrust::{JUMP, SETTLING};
@@ -96,7 +96,7 @@ fn of_signals(signals: Signals) -> Drive {
 
 /// How far off a prediction is. Lengths in m; percentages are of `range`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Compared {
+pub struct PredictionError {
     /// Samples compared.
     pub samples: usize,
     /// Samples behind a jump of the drive that are not: the actuator is still ringing.
@@ -134,7 +134,7 @@ pub struct Prediction {
     /// drive, 1 after a fall from the highest. From the displacement; ½ without one.
     pub start_on: f64,
     /// Against the displacement of the record, if it has one.
-    pub compared: Option<Compared>,
+    pub compared: Option<PredictionError>,
     /// Time of each sample behind the skipped ones, s.
     #[serde(skip)]
     pub time: Vec<f64>,
@@ -222,7 +222,7 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
         }
     }
     let times = model.creep.iter().map(|term| term.time_constant);
-    let own = Own::of(&time, keep.clone(), times, model.inertia.map(|inertia| inertia.mode));
+    let own = RecordColumns::of(&time, keep.clone(), times, model.inertia.map(|inertia| inertia.mode));
     let slopes = match &measured {
         Some(y) => {
             open_weight::slopes(&y.iter().zip(&displacement).map(|(y, p)| y - p).collect::<Vec<_>>(), &parts, &own)
@@ -248,7 +248,7 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
         let (rms, max) = rms_and_max(&left);
         let gain = table.node(table.grid, 0) / (top - bottom);
         let noise = statistics::noise_floor(y);
-        Compared {
+        PredictionError {
             samples: of.len(),
             samples_after_jumps: settled.iter().filter(|s| !**s).count(),
             range,

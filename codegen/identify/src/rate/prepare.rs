@@ -1,6 +1,6 @@
 //! Records ready for the fits: the usable part, its branches and its rate.
 
-use super::start::Own;
+use super::start::RecordColumns;
 use crate::branches::Branch;
 use crate::findings::Findings;
 use crate::mode::Mode;
@@ -13,7 +13,7 @@ use specgen_language::diagnostic::codes;
 const RATE_RATIO: f64 = 1.2;
 
 /// A record, its usable part and its rate.
-pub(super) struct Prepared<'a> {
+pub(super) struct PreparedRecord<'a> {
     pub(super) record: &'a Record,
     /// First sample used.
     pub(super) first: usize,
@@ -28,7 +28,7 @@ pub(super) struct Prepared<'a> {
     pub(super) slope: Vec<f64>,
 }
 
-impl Prepared<'_> {
+impl PreparedRecord<'_> {
     pub(super) fn samples(&self) -> usize {
         self.record.time.len() - self.first
     }
@@ -39,9 +39,9 @@ impl Prepared<'_> {
     }
 
     /// What the record has of its own beside a model with creep of `times` (s) and a mode.
-    pub(super) fn own(&self, times: &[f64], mode: Option<Mode>) -> Own {
+    pub(super) fn own(&self, times: &[f64], mode: Option<Mode>) -> RecordColumns {
         let keep = self.record.weightless[self.first..].iter().map(|w| !w).collect();
-        Own::of(&self.record.time[self.first..], keep, times.iter().copied(), mode)
+        RecordColumns::of(&self.record.time[self.first..], keep, times.iter().copied(), mode)
     }
 
     /// y(t + `tau`) of the used part, m.
@@ -59,7 +59,7 @@ pub(super) fn slope(time: &[f64], drive: &[f64], range: [f64; 2]) -> Vec<f64> {
 }
 
 /// Refuses a record that cannot identify the plane.
-pub(super) fn prepare<'a>(record: &'a Record, plane: &Plane, findings: &mut Findings) -> Option<Prepared<'a>> {
+pub(super) fn prepare<'a>(record: &'a Record, plane: &Plane, findings: &mut Findings) -> Option<PreparedRecord<'a>> {
     coverage::check_range(record, plane, findings);
     if findings.any_error() {
         return None;
@@ -68,7 +68,7 @@ pub(super) fn prepare<'a>(record: &'a Record, plane: &Plane, findings: &mut Find
     let slope = slope(&record.time, &record.drive, plane.range);
     let mut speeds: Vec<f64> = used.branches.iter().flat_map(|b| &slope[b.first + 1..b.end]).map(|s| s.abs()).collect();
     let mut intervals: Vec<f64> = record.time.windows(2).map(|w| w[1] - w[0]).collect();
-    let mut prepared = Prepared {
+    let mut prepared = PreparedRecord {
         record,
         first: used.first,
         speed: statistics::median(&mut speeds),
@@ -83,7 +83,7 @@ pub(super) fn prepare<'a>(record: &'a Record, plane: &Plane, findings: &mut Find
 }
 
 /// Refuses records that all have one rate.
-pub(super) fn check_rates(prepared: &[Prepared], findings: &mut Findings) {
+pub(super) fn check_rates(prepared: &[PreparedRecord], findings: &mut Findings) {
     let help = "record the same sweep again at a rate at least twice as high or low, and name both records";
     let mut speeds: Vec<f64> = prepared.iter().map(|p| p.speed).collect();
     speeds.sort_unstable_by(f64::total_cmp);

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::period::Invertible;
 use super::predict::{Drive, predict};
-use super::prepare::Prepared;
+use super::prepare::PreparedRecord;
 use super::score::on;
 use super::{CreepTerm, RateModel, RateOption};
 use crate::mode::Mode;
@@ -18,7 +18,7 @@ const BEATS: f64 = 0.02;
 
 /// A record of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Measured {
+pub struct RateRecord {
     /// Name of the record.
     pub record: String,
     /// Whether a comment in it marks it as simulated.
@@ -35,7 +35,7 @@ pub struct Measured {
     pub noise_percent: f64,
 }
 
-impl Measured {
+impl RateRecord {
     /// The frequency to two digits, with its unit.
     #[must_use]
     pub fn frequency_text(&self) -> String {
@@ -87,7 +87,7 @@ pub struct RateReport {
     /// Intervals per axis of the tables.
     pub grid: usize,
     /// The records, in the order given.
-    pub records: Vec<Measured>,
+    pub records: Vec<RateRecord>,
     /// What of each dead time is the hold of the records' commands, s: half a sampling interval, on the mean of the records.
     pub held: f64,
     /// The mode behind the last option, given or from a ring.
@@ -103,7 +103,7 @@ pub struct RateReport {
 /// `left_out[k]` are the options fitted without record k.
 pub(super) fn report(
     plane: &Plane,
-    prepared: &[Prepared],
+    prepared: &[PreparedRecord],
     models: &[RateModel],
     left_out: &[Vec<RateModel>],
     mode: Option<Mode>,
@@ -129,17 +129,17 @@ pub(super) fn report(
             hold_out,
         })
         .collect();
-    let records: Vec<Measured> = prepared.iter().map(measured).collect();
+    let records: Vec<RateRecord> = prepared.iter().map(measured).collect();
     let verdict = verdict(&records, &options, hold_out);
     let hold_out = hold_out.map(|record| HoldOut { record: record.shown_as.clone() });
     let held = mean(&prepared.iter().map(|p| p.record.held()).collect::<Vec<_>>());
     Ok(RateReport { grid: plane.grid, records, held, mode, hold_out, options, verdict })
 }
 
-fn measured(p: &Prepared) -> Measured {
+fn measured(p: &PreparedRecord) -> RateRecord {
     let y = &p.record.displacement[p.first..];
     let (low, high) = statistics::extent(y);
-    Measured {
+    RateRecord {
         record: p.record.shown_as.clone(),
         simulated: p.record.simulated,
         frequency: p.frequency,
@@ -154,7 +154,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |sum, v| sum + v) / values.len() as f64
 }
 
-fn verdict(records: &[Measured], options: &[OptionReport], hold_out: Option<&Record>) -> Verdict {
+fn verdict(records: &[RateRecord], options: &[OptionReport], hold_out: Option<&Record>) -> Verdict {
     let plain = &options[0];
     let mut best = plain;
     let mut beats_static = Vec::new();

@@ -2,13 +2,13 @@
 
 use super::RateModel;
 use super::forward::predict;
-use super::prepare::Prepared;
+use super::prepare::PreparedRecord;
 use crate::regressor::Plane;
 use crate::staircase::Staircase;
 use crate::statistics;
 
 /// Root mean square error in % of the range, on a record whose start is known but for creep and mode.
-pub(super) fn on(model: &RateModel, plane: &Plane, p: &Prepared) -> f64 {
+pub(super) fn on(model: &RateModel, plane: &Plane, p: &PreparedRecord) -> f64 {
     let memory = Staircase::negative_saturation(plane.range);
     let predicted = predict(model, plane, p.record, p.first, memory);
     let y = p.delayed(model.dead_time);

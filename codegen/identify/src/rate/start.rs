@@ -7,7 +7,7 @@
 use crate::mode::Mode;
 
 /// Columns of a record, orthonormal over the samples that count.
-pub(crate) struct Own {
+pub(crate) struct RecordColumns {
     basis: Vec<Vec<f64>>,
     /// So many of them are offset and line.
     plain: usize,
@@ -17,7 +17,7 @@ pub(crate) struct Own {
 /// A column of which the ones before it leave less than this share (of the length) tells nothing more.
 const NEW: f64 = 1e-3;
 
-impl Own {
+impl RecordColumns {
     /// Over samples at `time` (s) of which those of `keep` count, for creep of `times` (s).
     pub(crate) fn of(time: &[f64], keep: Vec<bool>, times: impl Iterator<Item = f64>, mode: Option<Mode>) -> Self {
         let start = time.first().copied().unwrap_or(0.0);

@@ -5,7 +5,7 @@ use core::cell::RefCell;
 use nalgebra::DMatrix;
 
 use super::normal::{accumulate, right_sides};
-use super::prepare::Prepared;
+use super::prepare::PreparedRecord;
 use crate::everett::EverettTable;
 use crate::regressor::Plane;
 use crate::{normal, prior};
@@ -15,7 +15,7 @@ use specgen_numerics::nnls::{self, Failure};
 /// Tables for the same drives and one displacement after the other: what only depends on the drives is kept.
 pub(super) struct Tables<'a> {
     pub(super) plane: &'a Plane,
-    pub(super) records: &'a [&'a Prepared<'a>],
+    pub(super) records: &'a [&'a PreparedRecord<'a>],
     gram: DMatrix<f64>,
     /// The weights found last.
     near: RefCell<Vec<f64>>,
@@ -23,7 +23,7 @@ pub(super) struct Tables<'a> {
 
 impl<'a> Tables<'a> {
     /// Of these records.
-    pub(super) fn new(plane: &'a Plane, records: &'a [&'a Prepared<'a>]) -> Result<Self, Failure> {
+    pub(super) fn new(plane: &'a Plane, records: &'a [&'a PreparedRecord<'a>]) -> Result<Self, Failure> {
         let each = records.iter().map(|p| accumulate(plane, p, &[], None));
         let mut gram = each.reduce(|sum, more| sum.add(&more)).ok_or(Failure::Singular)?.gram;
         prior::add(plane.grid, &mut gram);

@@ -16,7 +16,7 @@ pub struct Estimate {
 
 /// A second-order resonance with a first-order lag and a dead time, as fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Fitted {
+pub struct ResonanceFit {
     /// Static gain K, m/V.
     pub gain: Estimate,
     /// Undamped resonance ω0/2π, Hz.
@@ -92,7 +92,7 @@ fn model(p: &[f64; N], unit: f64, f: f64) -> (f64, f64) {
 }
 
 /// Complex response of `fitted` at `f` (Hz): magnitude in m/V, phase in rad.
-pub fn response(fitted: &Fitted, f: f64) -> (f64, f64) {
+pub fn response(fitted: &ResonanceFit, f: f64) -> (f64, f64) {
     let p = [
         libm::log(fitted.gain.value),
         libm::log(fitted.resonance.value),
@@ -105,7 +105,7 @@ pub fn response(fitted: &Fitted, f: f64) -> (f64, f64) {
 }
 
 /// Fits to bins that are all to be believed; the reason if there is no fit.
-pub(super) fn fit(bins: &[Bin], averages: usize) -> Result<Fitted, String> {
+pub(super) fn fit(bins: &[Bin], averages: usize) -> Result<ResonanceFit, String> {
     let count = averages as f64 * OVERLAPPED;
     let weights: Vec<f64> = bins
         .iter()
@@ -202,7 +202,7 @@ fn normal(j: &DMatrix<f64>, r: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
     (gram, slope)
 }
 
-fn estimates(problem: &Problem, p: &[f64; N], free: &[usize]) -> Result<Fitted, String> {
+fn estimates(problem: &Problem, p: &[f64; N], free: &[usize]) -> Result<ResonanceFit, String> {
     let r = problem.residuals(p);
     let j = problem.jacobian(p, free);
     let (gram, _) = normal(&j, &r);
@@ -227,7 +227,7 @@ fn estimates(problem: &Problem, p: &[f64; N], free: &[usize]) -> Result<Fitted, 
     let (lag, dead_time) = (time(3), time(4));
     let sum = covariance(3, 3) + covariance(4, 4) + 2.0 * covariance(3, 4);
     let product = lag.error * dead_time.error;
-    Ok(Fitted {
+    Ok(ResonanceFit {
         gain: relative(0),
         resonance: relative(1),
         damping_ratio: relative(2),
@@ -239,7 +239,7 @@ fn estimates(problem: &Problem, p: &[f64; N], free: &[usize]) -> Result<Fitted, 
 }
 
 /// Weighted root mean square of |H1/H − 1|.
-pub(super) fn misfit(fitted: &Fitted, bins: &[Bin], averages: usize) -> f64 {
+pub(super) fn misfit(fitted: &ResonanceFit, bins: &[Bin], averages: usize) -> f64 {
     let (mut sum, mut weight) = (0.0, 0.0);
     for b in bins {
         let g = if b.coherence < CAP { b.coherence } else { CAP };

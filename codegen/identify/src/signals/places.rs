@@ -1,6 +1,6 @@
 //! Which column of a file holds what: as the user says, else by its name.
 
-use super::{TIME, Wanted};
+use super::{ColumnSpec, TIME};
 use crate::columns::names::{self, Quantity};
 use crate::columns::{Column, Header};
 use crate::findings::Findings;
@@ -22,7 +22,12 @@ pub(super) struct Places {
 }
 
 /// `None` after every problem was reported.
-pub(super) fn find(header: &Header, wanted: &[Wanted], reading: &Reading, findings: &mut Findings) -> Option<Places> {
+pub(super) fn find(
+    header: &Header,
+    wanted: &[ColumnSpec],
+    reading: &Reading,
+    findings: &mut Findings,
+) -> Option<Places> {
     let search = Search { header, wanted, reading };
     let line = Some(header.line);
     let names: Vec<&str> = wanted.iter().map(|w| w.name).collect();
@@ -47,7 +52,7 @@ pub(super) fn find(header: &Header, wanted: &[Wanted], reading: &Reading, findin
 
 struct Search<'a> {
     header: &'a Header,
-    wanted: &'a [Wanted],
+    wanted: &'a [ColumnSpec],
     reading: &'a Reading,
 }
 
@@ -186,11 +191,11 @@ mod tests {
     use super::*;
     use crate::columns::{self, RECORD};
 
-    const WANTED: [Wanted; 4] = [
-        Wanted { name: TIME, required: true },
-        Wanted { name: DRIVE, required: true },
-        Wanted { name: MONITOR, required: false },
-        Wanted { name: "displacement_um", required: true },
+    const WANTED: [ColumnSpec; 4] = [
+        ColumnSpec { name: TIME, required: true },
+        ColumnSpec { name: DRIVE, required: true },
+        ColumnSpec { name: MONITOR, required: false },
+        ColumnSpec { name: "displacement_um", required: true },
     ];
 
     fn found(text: &str, reading: &Reading) -> Result<Vec<Option<usize>>, Vec<String>> {

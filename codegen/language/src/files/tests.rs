@@ -30,9 +30,9 @@ fn an_input_is_no_output_whatever_its_name() {
     for name in ["read.csv", "./read.csv", "link.csv", "second.csv", "hard.csv"] {
         let path = at(name);
         assert!(refusal(&path).contains("an input of this command"), "{name}");
-        assert!(matches!(guard_edit(&path), Ok(Way::File(_))), "{name}");
+        assert!(matches!(guard_edit(&path), Ok(Destination::File(_))), "{name}");
     }
-    assert!(matches!(guard(&at("free.csv")), Ok(Way::File(target)) if target.ends_with("free.csv")));
+    assert!(matches!(guard(&at("free.csv")), Ok(Destination::File(target)) if target.ends_with("free.csv")));
     // Another command begins.
     forget_inputs();
     assert!(guard(&at("read.csv")).is_ok());
@@ -45,11 +45,11 @@ fn links_to_nothing_lead_to_what_is_to_be() {
     let (_folder, at) = folder();
     symlink("b", at("a")).unwrap();
     symlink("new.csv", at("b")).unwrap();
-    assert!(matches!(guard(&at("a")), Ok(Way::File(target)) if target.ends_with("new.csv")));
+    assert!(matches!(guard(&at("a")), Ok(Destination::File(target)) if target.ends_with("new.csv")));
     symlink("d", at("c")).unwrap();
     symlink("c", at("d")).unwrap();
     assert!(guard(&at("c")).is_err());
-    assert!(matches!(guard(&at("read.csv/below")), Ok(Way::File(_))));
+    assert!(matches!(guard(&at("read.csv/below")), Ok(Destination::File(_))));
 }
 
 /// Root may write to everything, and is refused all the same.
@@ -61,7 +61,7 @@ fn what_is_write_protected_stays_as_it_is() {
         protect(mode);
         assert_eq!(guard(&at("free.csv")).is_ok(), free, "{mode:o}");
     }
-    assert_eq!(refusal(&at("free.csv")), Unwritten::Protected.to_string());
+    assert_eq!(refusal(&at("free.csv")), OutputError::Protected.to_string());
 }
 
 /// Nothing waits for whoever is not there.
@@ -79,17 +79,17 @@ fn the_kind_is_seen_before_the_file_is_opened() {
     ];
     for (path, kind, output) in cases {
         for unread in [open(&path).map(|_| ()), open_file(&path).map(|_| ()), text(&path).map(|_| ())] {
-            assert!(matches!(unread, Err(Unread::Kind(found)) if found == kind), "{}", path.display());
+            assert!(matches!(unread, Err(ReadError::Kind(found)) if found == kind), "{}", path.display());
         }
         match (guard(&path), output) {
-            (Ok(Way::Device), None) => {}
-            (Err(Unwritten::Kind(found)), Some(expected)) => assert_eq!(found, expected),
+            (Ok(Destination::Device), None) => {}
+            (Err(OutputError::Kind(found)), Some(expected)) => assert_eq!(found, expected),
             (found, _) => panic!("{}: {found:?}", path.display()),
         }
     }
     assert_eq!(open(&at("absent")).unwrap_err().to_string(), "there is no such file");
     let start = Instant::now();
-    assert!(matches!(open_device(&at("pipe")), Err(Unwritten::Unheard)));
+    assert!(matches!(open_device(&at("pipe")), Err(OutputError::Unheard)));
     assert!(start.elapsed() < 3 * READER);
 }
 
@@ -100,7 +100,7 @@ fn a_pipe_that_the_process_was_given_is_read_and_written() {
     let (reader, mut writer) = io::pipe().unwrap();
     let name = |fd: &dyn std::os::fd::AsRawFd| PathBuf::from(format!("/dev/fd/{}", fd.as_raw_fd()));
     let mut file = open(&name(&reader)).unwrap();
-    assert!(matches!(open_file(&name(&reader)), Err(Unread::Kind(_))));
+    assert!(matches!(open_file(&name(&reader)), Err(ReadError::Kind(_))));
     // Reading waits for what is written later.
     let late = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_millis(50));
@@ -111,7 +111,7 @@ fn a_pipe_that_the_process_was_given_is_read_and_written() {
     late.join().unwrap();
     assert_eq!(found, "late");
     let (mut reader, writer) = io::pipe().unwrap();
-    assert!(matches!(guard(&name(&writer)), Ok(Way::Device)));
+    assert!(matches!(guard(&name(&writer)), Ok(Destination::Device)));
     io::Write::write_all(&mut open_device(&name(&writer)).unwrap(), b"out").unwrap();
     drop(writer);
     found.clear();
@@ -124,11 +124,11 @@ fn content_has_a_limit() {
     let (_folder, at) = folder();
     assert_eq!(read(&at("free.csv"), 4).unwrap(), b"1,2\n");
     let large = read(&at("free.csv"), 3).unwrap_err();
-    assert!(matches!(large, Unread::Large(3)) && large.to_string() == "it is larger than 3 bytes");
+    assert!(matches!(large, ReadError::Large(3)) && large.to_string() == "it is larger than 3 bytes");
     // Of a file with a hole nothing but the limit is read.
     File::create(at("huge")).unwrap().set_len(1 << 40).unwrap();
-    assert!(matches!(read(&at("huge"), 1 << 16), Err(Unread::Large(_))));
-    assert!(matches!(look(&at("huge")), Err(Unread::Large(MAX_BYTES))) && look(&at("free.csv")).is_ok());
+    assert!(matches!(read(&at("huge"), 1 << 16), Err(ReadError::Large(_))));
+    assert!(matches!(look(&at("huge")), Err(ReadError::Large(MAX_BYTES))) && look(&at("free.csv")).is_ok());
     fs::write(at("latin"), b"a\nb\xe9\n").unwrap();
     assert_eq!(text(&at("latin")).unwrap_err().to_string(), "it is no text in UTF-8: byte 3, in line 2");
 }

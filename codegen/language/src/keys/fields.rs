@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// A value that stands where its key wants it, of the right kind and in range.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Parsed {
+pub(crate) enum KeyValue {
     /// A quantity (SI) or a number; one or a list.
     Numbers(Vec<f64>),
     Integer(i64),
@@ -18,7 +18,7 @@ pub(crate) enum Parsed {
 /// One value and where it stands.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Field {
-    pub(crate) parsed: Parsed,
+    pub(crate) parsed: KeyValue,
     /// The value, or the section's name if the value is a default.
     pub(crate) span: Range<usize>,
     /// The values of a list.
@@ -89,7 +89,7 @@ impl Fields {
 
     pub(crate) fn list<const N: usize>(&self, path: &str) -> Option<[f64; N]> {
         match &self.get(path)?.parsed {
-            Parsed::Numbers(values) => values.as_slice().try_into().ok(),
+            KeyValue::Numbers(values) => values.as_slice().try_into().ok(),
             _ => None,
         }
     }
@@ -97,7 +97,7 @@ impl Fields {
     /// All numbers of a list whose length is not fixed.
     pub(crate) fn numbers(&self, path: &str) -> Option<&[f64]> {
         match &self.get(path)?.parsed {
-            Parsed::Numbers(values) => Some(values),
+            KeyValue::Numbers(values) => Some(values),
             _ => None,
         }
     }
@@ -117,14 +117,14 @@ impl Fields {
 
     pub(crate) fn flag(&self, path: &str) -> Option<bool> {
         match self.get(path)?.parsed {
-            Parsed::Flag(value) => Some(value),
+            KeyValue::Flag(value) => Some(value),
             _ => None,
         }
     }
 
     pub(crate) fn integer(&self, path: &str) -> Option<i64> {
         match self.get(path)?.parsed {
-            Parsed::Integer(value) => Some(value),
+            KeyValue::Integer(value) => Some(value),
             _ => None,
         }
     }
@@ -136,21 +136,21 @@ impl Fields {
 
     pub(crate) fn choice(&self, path: &str) -> Option<&'static str> {
         match self.get(path)?.parsed {
-            Parsed::Choice(word) => Some(word),
+            KeyValue::Choice(word) => Some(word),
             _ => None,
         }
     }
 
     pub(crate) fn name(&self, path: &str) -> Option<&str> {
         match &self.get(path)?.parsed {
-            Parsed::Name(text) => Some(text),
+            KeyValue::Name(text) => Some(text),
             _ => None,
         }
     }
 
     pub(crate) fn texts(&self, path: &str) -> Option<&[String]> {
         match &self.get(path)?.parsed {
-            Parsed::Texts(texts) => Some(texts),
+            KeyValue::Texts(texts) => Some(texts),
             _ => None,
         }
     }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::SpecSource;
 use crate::diagnostic::{Diagnostic, codes};
-use crate::files::{self, Unread};
+use crate::files::{self, ReadError};
 use crate::shell;
 
 /// Largest spec file, bytes.
@@ -45,14 +45,14 @@ fn note_files(text: &str, dir: &Path) {
 
 fn read_bytes(path: &Path, shown: &str) -> Result<Vec<u8>, Diagnostic> {
     files::read(path, MAX_BYTES as u64).map_err(|unread| match unread {
-        Unread::Large(_) => Diagnostic::in_file(
+        ReadError::Large(_) => Diagnostic::in_file(
             shown,
             None,
             codes::TOO_LARGE,
             "the spec file is larger than 1 MiB, expected a few kilobytes",
             "name the .toml spec; measurements belong in CSV files that the spec refers to",
         ),
-        Unread::Kind(kind) if path.is_dir() => {
+        ReadError::Kind(kind) if path.is_dir() => {
             let reason = format!("the spec file cannot be read: this is {kind}");
             Diagnostic::in_file(shown, None, codes::UNREADABLE, reason, "name the .toml file in it")
         }

@@ -13,14 +13,14 @@ use super::{keys, text};
 use crate::diagnostic::{Place, codes};
 
 /// A parsed file.
-pub(super) struct Parsed<'a> {
+pub(super) struct ParsedFile<'a> {
     pub(super) root: DeTable<'a>,
     /// Whether the tree is worth checking.
     pub(super) whole: bool,
 }
 
 /// Parses `source`, with one finding per syntax error.
-pub(super) fn parse<'a>(source: &'a str, findings: &mut Findings) -> Parsed<'a> {
+pub(super) fn parse<'a>(source: &'a str, findings: &mut Findings) -> ParsedFile<'a> {
     let (root, errors) = DeTable::parse_recoverable(source);
     let mut whole = true;
     for error in errors.iter().take(MAX_FINDINGS) {
@@ -29,7 +29,7 @@ pub(super) fn parse<'a>(source: &'a str, findings: &mut Findings) -> Parsed<'a> 
     }
     let left_out = errors.len().saturating_sub(MAX_FINDINGS);
     findings.leave_out(left_out);
-    Parsed { root: root.into_inner(), whole: whole && left_out == 0 }
+    ParsedFile { root: root.into_inner(), whole: whole && left_out == 0 }
 }
 
 /// Reports one syntax error; whether the tree is still whole.

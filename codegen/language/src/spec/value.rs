@@ -11,7 +11,7 @@ use super::findings::Findings;
 use super::keys::{self, Item, Key, MAX_NAME, Shape};
 use super::{messages, text};
 use crate::diagnostic::codes;
-use crate::keys::fields::{Field, Parsed};
+use crate::keys::fields::{Field, KeyValue};
 
 /// A value with its place: the file's own, or the parsed text of a default.
 pub(super) struct ValueReader<'a> {
@@ -37,21 +37,21 @@ impl ValueReader<'_> {
         let (parsed, items) = match self.key.shape {
             Shape::One(item) => {
                 let parsed = match self.scalar(item, self.path, value)? {
-                    Scalar::Number(number) => Parsed::Numbers(vec![number]),
-                    Scalar::Integer(integer) => Parsed::Integer(integer),
-                    Scalar::Flag(flag) => Parsed::Flag(flag),
-                    Scalar::Choice(word) => Parsed::Choice(word),
-                    Scalar::Name(name) => Parsed::Name(name),
+                    Scalar::Number(number) => KeyValue::Numbers(vec![number]),
+                    Scalar::Integer(integer) => KeyValue::Integer(integer),
+                    Scalar::Flag(flag) => KeyValue::Flag(flag),
+                    Scalar::Choice(word) => KeyValue::Choice(word),
+                    Scalar::Name(name) => KeyValue::Name(name),
                 };
                 (parsed, Vec::new())
             }
             Shape::List(items) => {
                 let (numbers, spans) = self.list(self.path, items, items.len(), value)?;
-                (Parsed::Numbers(numbers), spans)
+                (KeyValue::Numbers(numbers), spans)
             }
             Shape::Leading(least, items) => {
                 let (numbers, spans) = self.list(self.path, items, least, value)?;
-                (Parsed::Numbers(numbers), spans)
+                (KeyValue::Numbers(numbers), spans)
             }
             Shape::Rows(count, items) => self.rows(count, items, value)?,
             Shape::Records => self.texts("a file name", value)?,
@@ -93,7 +93,7 @@ impl ValueReader<'_> {
         count: usize,
         items: &'static [Item],
         value: &Spanned<DeValue<'_>>,
-    ) -> Option<(Parsed, Vec<Range<usize>>)> {
+    ) -> Option<(KeyValue, Vec<Range<usize>>)> {
         let DeValue::Array(array) = value.get_ref() else {
             return self.wrong_type(self.path, value, &format!("an array of {count} arrays"), None);
         };
@@ -109,7 +109,7 @@ impl ValueReader<'_> {
             self.wrong_count(self.path, value, array.len(), "row", &count.to_string());
             return None;
         }
-        (numbers.len() == count * items.len()).then_some((Parsed::Numbers(numbers), spans))
+        (numbers.len() == count * items.len()).then_some((KeyValue::Numbers(numbers), spans))
     }
 
     fn wrong_count(&mut self, path: &str, value: &Spanned<DeValue<'_>>, found: usize, what: &str, wanted: &str) {
@@ -122,7 +122,7 @@ impl ValueReader<'_> {
         );
     }
 
-    fn texts(&mut self, what: &str, value: &Spanned<DeValue<'_>>) -> Option<(Parsed, Vec<Range<usize>>)> {
+    fn texts(&mut self, what: &str, value: &Spanned<DeValue<'_>>) -> Option<(KeyValue, Vec<Range<usize>>)> {
         let DeValue::Array(array) = value.get_ref() else {
             return self.wrong_type(self.path, value, &format!("an array, each value {what}"), None);
         };
@@ -137,7 +137,7 @@ impl ValueReader<'_> {
                 _ => return self.wrong_type(&path, element, what, None),
             }
         }
-        Some((Parsed::Texts(texts), spans))
+        Some((KeyValue::Texts(texts), spans))
     }
 
     /// Reports a placeholder that nobody replaced; `None` if `value` is one.

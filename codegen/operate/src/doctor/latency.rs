@@ -6,7 +6,7 @@ use std::thread;
 use serde::Serialize;
 use specgen_rt::clock::{self, SECOND, Usage};
 use specgen_rt::histogram::Histogram;
-use specgen_rt::scheduling::{self, AwakeProcessors, Refused};
+use specgen_rt::scheduling::{self, AwakeProcessors, MissingPrivilege};
 
 /// Priority of the measurement, that of rt-pc.
 const PRIORITY: u8 = 80;
@@ -15,7 +15,7 @@ const LEAD: u64 = 10_000_000;
 
 /// A measurement, with the rights that could be had.
 #[derive(Debug)]
-pub struct Measured {
+pub struct LatencyMeasurement {
     /// From the planned time to running, ns.
     pub delays: Histogram,
     /// Ticks whose times came.
@@ -27,9 +27,9 @@ pub struct Measured {
     /// System management interrupts meanwhile, where they are counted.
     pub management_interrupts: Option<u64>,
     /// Whether SCHED_FIFO was granted.
-    pub priority: Result<(), Refused>,
+    pub priority: Result<(), MissingPrivilege>,
     /// Whether memory could be locked.
-    pub memory: Result<(), Refused>,
+    pub memory: Result<(), MissingPrivilege>,
     /// Whether processors could be kept awake.
     pub awake: bool,
 }
@@ -57,7 +57,7 @@ pub struct Figures {
 ///
 /// # Errors
 /// If there is no such processor, or no thread.
-pub fn measure(period: u64, seconds: f64, cpu: Option<usize>) -> Result<Measured, String> {
+pub fn measure(period: u64, seconds: f64, cpu: Option<usize>) -> Result<LatencyMeasurement, String> {
     // Nothing of this process is at stake: what is not granted is part of the result.
     let memory = scheduling::lock_memory();
     let awake = AwakeProcessors::request();
@@ -80,7 +80,7 @@ pub fn measure(period: u64, seconds: f64, cpu: Option<usize>) -> Result<Measured
             planned += (over + 1) * period;
         }
         let preempted = Usage::of_this_thread().since(usage).involuntary_switches;
-        Ok::<_, Refused>((delays, done, skipped, preempted, priority))
+        Ok::<_, MissingPrivilege>((delays, done, skipped, preempted, priority))
     });
     let measured = measured.map_err(|error| format!("no thread to measure with: {error}"))?.join();
     scheduling::unlock_memory();
@@ -88,10 +88,19 @@ pub fn measure(period: u64, seconds: f64, cpu: Option<usize>) -> Result<Measured
     let measured = measured.map_err(|_| "the measuring thread ended early".to_owned())?;
     let (delays, planned, skipped, preempted, priority) = measured.map_err(|error| error.to_string())?;
     let management_interrupts = before.zip(management_interrupts()).map(|(before, after)| after.wrapping_sub(before));
-    Ok(Measured { delays, planned, skipped, preempted, management_interrupts, priority, memory, awake: awake.is_ok() })
+    Ok(LatencyMeasurement {
+        delays,
+        planned,
+        skipped,
+        preempted,
+        management_interrupts,
+        priority,
+        memory,
+        awake: awake.is_ok(),
+    })
 }
 
-impl Measured {
+impl LatencyMeasurement {
     /// For programs.
     #[must_use]
     pub fn figures(&self) -> Figures {

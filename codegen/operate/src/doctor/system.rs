@@ -1,7 +1,7 @@
 //! Kernel, processors and rights.
 
 use specgen_rt::clock;
-use specgen_rt::scheduling::{FIX_MEMORY, FIX_PRIORITY, Refused};
+use specgen_rt::scheduling::{FIX_MEMORY, FIX_PRIORITY, MissingPrivilege};
 
 use super::Grade::{Bad, Unknown, Warning};
 use super::{Files, Finding};
@@ -25,8 +25,8 @@ pub fn findings(files: &Files) -> Vec<Finding> {
 
 /// What the system answered when it was asked for priority and for locked memory.
 #[must_use]
-pub fn rights(priority: Result<(), &Refused>, memory: Result<(), &Refused>) -> Vec<Finding> {
-    let of = |subject, answer: Result<(), &Refused>, granted: &str, fix: &str| match answer {
+pub fn rights(priority: Result<(), &MissingPrivilege>, memory: Result<(), &MissingPrivilege>) -> Vec<Finding> {
+    let of = |subject, answer: Result<(), &MissingPrivilege>, granted: &str, fix: &str| match answer {
         Ok(()) => Finding::good(subject, granted),
         Err(refused) => Finding::of(subject, Bad, format!("{}: {}", refused.what, refused.cause), fix),
     };

@@ -5,7 +5,7 @@ use specgen_link::client::Port;
 use super::axes::{Axes, from_wire, to_wire};
 use super::code::Code;
 use super::input::{Piece, STOP};
-use super::stage::{No, Stage};
+use super::stage::{Rejection, Stage};
 use crate::motion::{Motion, limits};
 
 /// Bits of the status that `#4` answers.
@@ -60,10 +60,10 @@ const HELP: &[&str] = &[
 ];
 
 /// What one command came to: an answer, if there is one, or why there is none.
-pub(super) type Outcome = Result<Option<String>, No>;
+pub(super) type Outcome = Result<Option<String>, Rejection>;
 
 /// Who asks, as far as commands care.
-pub(super) struct Asked<'a> {
+pub(super) struct ClientContext<'a> {
     pub(super) axes: &'a Axes,
     /// The error that waits to be asked for.
     pub(super) error: &'a mut Option<Code>,
@@ -72,7 +72,7 @@ pub(super) struct Asked<'a> {
 }
 
 /// Carries a command out.
-pub(super) fn execute<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, piece: &Piece) -> Outcome {
+pub(super) fn execute<P: Port>(stage: &mut Stage<P>, asked: &mut ClientContext<'_>, piece: &Piece) -> Outcome {
     match piece {
         Piece::TooLong => Err(Code::TooLong.into()),
         Piece::Single(byte) => single(stage, asked, *byte),
@@ -90,7 +90,7 @@ pub(super) fn execute<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, piec
     }
 }
 
-fn single<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, byte: u8) -> Outcome {
+fn single<P: Port>(stage: &mut Stage<P>, asked: &mut ClientContext<'_>, byte: u8) -> Outcome {
     if byte == STOP {
         return stop(stage);
     }
@@ -129,7 +129,7 @@ fn stop<P: Port>(stage: &mut Stage<P>) -> Outcome {
     Err(Code::Stopped.into())
 }
 
-fn order<P: Port>(stage: &mut Stage<P>, asked: &Asked<'_>, command: &str, rest: &[&str]) -> Outcome {
+fn order<P: Port>(stage: &mut Stage<P>, asked: &ClientContext<'_>, command: &str, rest: &[&str]) -> Outcome {
     match command {
         "MOV" | "MVR" => {
             let values = values(asked.axes, rest)?;
@@ -209,7 +209,7 @@ fn system_speed(motion: &Motion) -> f64 {
     to_wire([y, z].into_iter().fold(x, |least, speed| if speed < least { speed } else { least }))
 }
 
-fn query<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, command: &str, rest: &[&str]) -> Outcome {
+fn query<P: Port>(stage: &mut Stage<P>, asked: &mut ClientContext<'_>, command: &str, rest: &[&str]) -> Outcome {
     let axes = asked.axes;
     let text = match command {
         "*IDN" => {
@@ -225,7 +225,7 @@ fn query<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, command: &str, re
             if asked.may_order {
                 // What becomes of a move is known some ticks after it.
                 if !stage.is_answered() {
-                    return Err(No::Later);
+                    return Err(Rejection::Later);
                 }
                 if let Some(code) = stage.mishap() {
                     asked.error.get_or_insert(code);

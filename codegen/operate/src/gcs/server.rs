@@ -19,9 +19,9 @@ use specgen_link::client::{ClientError, Port};
 
 use super::axes::Axes;
 use super::code::Code;
-use super::commands::{Asked, execute};
+use super::commands::{ClientContext, execute};
 use super::input::{Input, Piece};
-use super::stage::{No, Stage};
+use super::stage::{Rejection, Stage};
 use crate::session::Session;
 
 /// Clients at a time that may do everything.
@@ -302,15 +302,17 @@ impl<P: Port> Bridge<P> {
         }
         let client = &mut self.clients[index];
         let is_crowd = index >= MOST && !piece.is_stop() && piece != Piece::Line("ERR?".to_owned());
-        let mut asked = Asked { axes: &self.axes, error: &mut client.error, may_order };
+        let mut asked = ClientContext { axes: &self.axes, error: &mut client.error, may_order };
         let done = if is_crowd { Err(Code::NotNow.into()) } else { execute(&mut self.stage, &mut asked, &piece) };
         match done {
-            Err(No::Link(error)) => return Err(error),
+            Err(Rejection::Link(error)) => return Err(error),
             // What it is not there to see is not done later.
-            Err(No::Later) if client.left.is_some() => client.error = Some(Code::NotNow),
-            Err(No::Later) if client.waits.get_or_insert_with(Instant::now).elapsed() < PATIENCE => return Ok(false),
-            Err(No::Later) => client.error = Some(Code::NotNow),
-            Err(No::Code(code)) => client.error = Some(code),
+            Err(Rejection::Later) if client.left.is_some() => client.error = Some(Code::NotNow),
+            Err(Rejection::Later) if client.waits.get_or_insert_with(Instant::now).elapsed() < PATIENCE => {
+                return Ok(false);
+            }
+            Err(Rejection::Later) => client.error = Some(Code::NotNow),
+            Err(Rejection::Code(code)) => client.error = Some(code),
             Ok(answer) => {
                 if may_order && piece.is_order() {
                     self.owner = Some(Owner { number: client.number, ordered: Instant::now() });

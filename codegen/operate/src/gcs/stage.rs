@@ -39,7 +39,7 @@ pub struct Stage<P> {
     /// The last order: a tick from which on the place shows what became of it, and when it was sent.
     ordered: (u64, Instant),
     /// On the way to a machine that runs.
-    rising: Option<Rising>,
+    rising: Option<StartUp>,
     /// It runs, and goes to its bias pose.
     to_bias: bool,
     /// It is to run no more, and that was asked for here.
@@ -55,26 +55,26 @@ pub struct Stage<P> {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Rising {
+struct StartUp {
     since: Instant,
     asked: Request,
 }
 
 /// Why an order is not carried out.
-pub(super) enum No {
+pub(super) enum Rejection {
     Code(Code),
     /// Not yet: the machine is coming up, or to rest.
     Later,
     Link(ClientError),
 }
 
-impl From<Code> for No {
+impl From<Code> for Rejection {
     fn from(code: Code) -> Self {
         Self::Code(code)
     }
 }
 
-impl From<ClientError> for No {
+impl From<ClientError> for Rejection {
     fn from(error: ClientError) -> Self {
         match error {
             ClientError::Refused(Refusal::State) => Self::Code(Code::WaveActive),
@@ -264,7 +264,7 @@ impl<P: Port> Stage<P> {
         match next.filter(|_| rising.since.elapsed() < UP) {
             Some(next) if next == asked => Ok(()),
             Some(next) => {
-                self.rising = Some(Rising { asked: next, ..rising });
+                self.rising = Some(StartUp { asked: next, ..rising });
                 self.ask(next)
             }
             None => {
@@ -276,18 +276,18 @@ impl<P: Port> Stage<P> {
     }
 
     /// Servo on: acknowledges a fault, arms and runs.
-    pub(super) fn start(&mut self) -> Result<(), No> {
+    pub(super) fn start(&mut self) -> Result<(), Rejection> {
         if !self.servo() {
             // A request counts when it begins to be given.
             self.ask(Request::None)?;
             self.goes_down = false;
-            self.rising = Some(Rising { since: Instant::now(), asked: Request::None });
+            self.rising = Some(StartUp { since: Instant::now(), asked: Request::None });
         }
         Ok(())
     }
 
     /// Servo off: ramps down.
-    pub(super) fn shut_down(&mut self) -> Result<(), No> {
+    pub(super) fn shut_down(&mut self) -> Result<(), Rejection> {
         (self.rising, self.goal, self.goes_down) = (None, None, true);
         Ok(self.ask(Request::RampDown)?)
     }
@@ -298,7 +298,7 @@ impl<P: Port> Stage<P> {
     }
 
     /// Stops, once for all stops that had been sent by then, whoever has the orders.
-    pub(super) fn stop(&mut self) -> Result<(), No> {
+    pub(super) fn stop(&mut self) -> Result<(), Rejection> {
         if !self.has_halted {
             self.refresh()?;
             self.come_to_rest()?;
@@ -308,7 +308,7 @@ impl<P: Port> Stage<P> {
     }
 
     /// Within the limits of stops. A machine that comes up comes no further, and its servo is off then.
-    fn come_to_rest(&mut self) -> Result<(), No> {
+    fn come_to_rest(&mut self) -> Result<(), Rejection> {
         let rises = self.rising.take().is_some();
         let request = match self.phase() {
             Some(Phase::Running) if !self.to_bias => None,
@@ -357,21 +357,21 @@ impl<P: Port> Stage<P> {
     }
 
     /// The goal that a move changes: only of a machine that runs, and that is going nowhere that is not known.
-    pub(super) fn standing(&self) -> Result<[f64; 6], No> {
+    pub(super) fn standing(&self) -> Result<[f64; 6], Rejection> {
         if self.is_rising() {
-            return Err(No::Later);
+            return Err(Rejection::Later);
         }
         if !self.runs() {
             return Err(Code::ServoOff.into());
         }
         if self.goal.is_none() && self.moves() {
-            return Err(No::Later);
+            return Err(Rejection::Later);
         }
         Ok(self.goal())
     }
 
     /// Goes to a pose, after the motion under way if there is one; refused before anything moves if it is out of reach.
-    pub(super) fn go(&mut self, pose: &[f64; 6]) -> Result<(), No> {
+    pub(super) fn go(&mut self, pose: &[f64; 6]) -> Result<(), Rejection> {
         let user = self.admitted(pose).ok_or(Code::Position)?;
         let words = self.session.move_words(&user).map_err(|_| Code::Position)?;
         match self.session.command(words) {
@@ -407,7 +407,7 @@ impl<P: Port> Stage<P> {
     }
 
     /// Another pivot point. Only at rest and not turned: no coordinate of a platform that stands still is to change.
-    pub(super) fn set_pivot(&mut self, pivot: [f64; 3]) -> Result<(), No> {
+    pub(super) fn set_pivot(&mut self, pivot: [f64; 3]) -> Result<(), Rejection> {
         if self.moves() {
             return Err(Code::InMotion.into());
         }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use specgen_link::client::{Port, Timeout};
 use specgen_link::{
-    Bytes, Counted, Counters, Device, Endpoint, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request,
+    Bytes, CostUnit, Counters, Device, Endpoint, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request,
     Status, put_words,
 };
 
@@ -64,7 +64,7 @@ impl Device for Machine {
                 input_words: 8,
                 output_words: 0,
                 stages: 0,
-                counted: Counted::Nothing,
+                counted: CostUnit::Nothing,
                 description: DESCRIPTION.len() as u32,
             }),
             Request::Describe { offset } => {

@@ -9,10 +9,10 @@ use host_sim::controller::{ControllerError, MachineWord, Supervised, TickControl
 use host_sim::description::Description;
 use serde::Serialize;
 use specgen_link::client::{Client, ClientError, Port, Timeout};
-use specgen_link::{Counted, Identity, Reply, Request, WORDS, put_words};
+use specgen_link::{CostUnit, Identity, Reply, Request, WORDS, put_words};
 
 use super::difference::Difference;
-use super::session::{self, OpenError, Opened};
+use super::session::{self, OpenError, OpenSession};
 
 /// Ticks that arming may take.
 const ARMING: u64 = 100_000;
@@ -111,7 +111,7 @@ impl<P: Port> Lockstep<P> {
         timeout: Timeout,
         interrupted: &'static AtomicBool,
     ) -> Result<Self, OpenError> {
-        let Opened { client, identity, description: theirs, .. } = session::open(port, timeout)?;
+        let OpenSession { client, identity, description: theirs, .. } = session::open(port, timeout)?;
         let ours = host.controller().description();
         if &theirs != ours {
             return Err(OpenError::Other(format!(
@@ -180,7 +180,7 @@ impl<P: Port> Lockstep<P> {
 
     /// In what the device counts costs.
     #[must_use]
-    pub fn counted(&self) -> Counted {
+    pub fn counted(&self) -> CostUnit {
         self.identity.counted
     }
 

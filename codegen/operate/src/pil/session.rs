@@ -31,7 +31,7 @@ impl From<ClientError> for OpenError {
 }
 
 /// A session that was opened, with the device's own description.
-pub struct Opened<P> {
+pub struct OpenSession<P> {
     /// The link.
     pub client: Client<P>,
     /// What the device says of itself first.
@@ -46,12 +46,12 @@ pub struct Opened<P> {
 ///
 /// # Errors
 /// No answer, or a description that cannot be read.
-pub fn open<P: Port>(port: P, timeout: Timeout) -> Result<Opened<P>, OpenError> {
+pub fn open<P: Port>(port: P, timeout: Timeout) -> Result<OpenSession<P>, OpenError> {
     let (mut client, identity) = Client::open(port, session_number(), timeout)?;
     let text = client.fetch(|offset| Request::Describe { offset })?;
     let text = String::from_utf8_lossy(&text).into_owned();
     let description = Description::parse(&text).map_err(|error| OpenError::Other(error.to_string()))?;
-    Ok(Opened { client, identity, text, description })
+    Ok(OpenSession { client, identity, text, description })
 }
 
 /// Another one in every run, so that frames of the last one are not taken for those of this.

@@ -4,7 +4,7 @@ use host_sim::controller::{ControllerError, TickController};
 
 use crate::chart::{Axis, Chart, DASHED, DOTS, LINE, pairs};
 use crate::section::{Grid, Section};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_studies::paper::region::{jury, limits, printed};
 use specgen_studies::reproduce::write::digits;
 
@@ -17,7 +17,10 @@ const POINTS: usize = 120;
 ///
 /// # Errors
 /// As [`limits`].
-pub fn section(compiled: &Compiled, controller: Option<&mut dyn TickController>) -> Result<Section, ControllerError> {
+pub fn section(
+    compiled: &Compilation,
+    controller: Option<&mut dyn TickController>,
+) -> Result<Section, ControllerError> {
     let mut chart = Chart::new(
         "region",
         "Fig. 29: largest stable λ = ρ/ρ̂ over ω1",

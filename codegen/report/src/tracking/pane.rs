@@ -7,7 +7,7 @@ use crate::section::{Group, Multiples, Part};
 
 /// A run as it is drawn: axis by axis, or leg by leg.
 #[derive(Debug, Clone)]
-pub struct Shown<'a> {
+pub struct PlottedRun<'a> {
     /// Name on the page.
     pub id: String,
     /// What was followed, and how fast.
@@ -28,7 +28,7 @@ pub struct Shown<'a> {
     pub corner: &'a str,
 }
 
-impl Shown<'_> {
+impl PlottedRun<'_> {
     /// rms of the error over all coordinates and ticks, nm.
     #[must_use]
     pub fn rms_nano(&self) -> f64 {
@@ -40,7 +40,7 @@ impl Shown<'_> {
 
 /// What a section shows of a run.
 #[must_use]
-pub fn pane(run: &Shown) -> Vec<Part> {
+pub fn pane(run: &PlottedRun) -> Vec<Part> {
     let of = |axis: usize| -> Vec<f64> {
         run.samples.iter().map(|[target, pose]| (target[axis] - pose[axis]) * 1e9).collect()
     };

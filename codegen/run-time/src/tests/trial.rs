@@ -1,10 +1,10 @@
 //! What is run to see a constant: the law and the machine under inputs that go everywhere that a constant is read.
 
-use host_sim::controller::{Controller, Standing, Supervised, TickController as _};
+use host_sim::controller::{Controller, RestingReadings, Supervised, TickController as _};
 use host_sim::description::Description;
 use host_sim::stimulus::platform::{self as platform_stimulus, PlatformInputs};
 use host_sim::stimulus::{self, Setpoints};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_ir::{Ir, Path, Range};
 use specgen_runtime::Digest;
 
@@ -18,9 +18,9 @@ const EVERY: usize = 20;
 const RUNNING: u8 = 2;
 
 /// Uniform from 0 to 1, the same everywhere.
-struct Draw(u64);
+struct RandomSource(u64);
 
-impl Draw {
+impl RandomSource {
     fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
         (self.0 >> 33) as f64 / (1_u64 << 31) as f64
@@ -48,7 +48,7 @@ pub struct Trial(Vec<Part>);
 
 impl Trial {
     /// Of a good controller.
-    pub fn of(compiled: &Compiled, controller: &Controller) -> Self {
+    pub fn of(compiled: &Compilation, controller: &Controller) -> Self {
         let make = Make { ir: &compiled.ir, compiled, controller, about: controller.description() };
         let mut parts = vec![make.settings(), make.hostile(), make.exact()];
         parts.extend(make.sweeps());
@@ -63,7 +63,7 @@ impl Trial {
 
     /// Digests on the way, until one is not the expected one.
     pub fn digests(&self, controller: &Controller, expected: Option<&[u64]>) -> Vec<u64> {
-        let mut seen = Seen { digests: Vec::new(), expected };
+        let mut seen = DigestTrail { digests: Vec::new(), expected };
         for part in &self.0 {
             if part.run(controller.fork(), &mut seen) {
                 break;
@@ -74,12 +74,12 @@ impl Trial {
 }
 
 /// Digests so far, and those that are expected.
-struct Seen<'a> {
+struct DigestTrail<'a> {
     digests: Vec<u64>,
     expected: Option<&'a [u64]>,
 }
 
-impl Seen<'_> {
+impl DigestTrail<'_> {
     /// Takes one; whether it is another than the expected one.
     fn differs(&mut self, digest: u64) -> bool {
         let place = self.digests.len();
@@ -96,7 +96,7 @@ fn of(words: &[u64]) -> u64 {
 
 impl Part {
     /// Whether a digest was not the expected one.
-    fn run(&self, mut controller: Controller, seen: &mut Seen<'_>) -> bool {
+    fn run(&self, mut controller: Controller, seen: &mut DigestTrail<'_>) -> bool {
         controller.reset();
         match self {
             Self::Settings(tried) => {
@@ -138,10 +138,15 @@ impl Part {
 
 /// Runs a machine, whose gauges show what its legs move, from power-up for [`TICKS`]: `first` while it is armed, `then` where it runs. Its
 /// snapshot after a thousand ticks in which it ran, or of the end, with its input there; none if a digest was not the expected one.
-fn machine(controller: Controller, first: &[u64], then: &[u64], seen: &mut Seen<'_>) -> Option<(Vec<u64>, Vec<u64>)> {
+fn machine(
+    controller: Controller,
+    first: &[u64],
+    then: &[u64],
+    seen: &mut DigestTrail<'_>,
+) -> Option<(Vec<u64>, Vec<u64>)> {
     let mut machine = Supervised::new(controller);
     let mut output = vec![0; machine.output_names().len()];
-    let mut standing: Standing = machine.standing(first).unwrap();
+    let mut standing: RestingReadings = machine.standing(first).unwrap();
     let request = first.len() - 2;
     let about = machine.controller().description();
     let gauges = about.input("gauge[0]").or_else(|_| about.input("displacement[0]")).unwrap();
@@ -172,7 +177,7 @@ fn machine(controller: Controller, first: &[u64], then: &[u64], seen: &mut Seen<
 /// Makes the parts.
 struct Make<'a> {
     ir: &'a Ir,
-    compiled: &'a Compiled,
+    compiled: &'a Compilation,
     controller: &'a Controller,
     about: &'a Description,
 }
@@ -280,7 +285,7 @@ impl Make<'_> {
     /// Legs that go up and down over their whole range and turn anywhere in it: a platform by its gauges in P, six legs by their set-points.
     fn sweeps(&self) -> Vec<Part> {
         let platform = self.ir.task_space.is_some();
-        let mut draw = Draw(5);
+        let mut draw = RandomSource(5);
         let place = if platform { self.gauges() } else { self.input("setpoint[0]") };
         (0..4)
             .map(|part| {
@@ -435,10 +440,10 @@ impl Make<'_> {
         }
         let bound = self.ir.bounds.pose;
         (0..6).for_each(|axis| then[setpoint + axis] = self.word(0.1 * bound[axis]));
-        let mut nothing = Seen { digests: Vec::new(), expected: None };
+        let mut nothing = DigestTrail { digests: Vec::new(), expected: None };
         let (state, last) = machine(self.controller.fork(), &first, &then, &mut nothing).unwrap();
         // Gauges that go on where they were, that stick, drift, leap and ring.
-        let mut draw = Draw(9);
+        let mut draw = RandomSource(9);
         let running = (0..6).map(|kind| {
             let mut rows = Vec::with_capacity(TICKS / 2);
             for tick in 0..TICKS / 2 {

@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use serde::Serialize;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
-use specgen_compiler::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDynamics, Tuning};
+use specgen_compiler::stability::platform::{ClosedLoop, Conditions, Estimator, Law, RestDynamics, Tuning};
 use specgen_language::model::{AdaptationMode, ControlMode};
 
 use super::matrix::{Matrix6c, inverse, larger, left, multiply, norm, spectral_radius};
@@ -140,14 +140,14 @@ impl Convergence {
 impl Learnable {
     /// The loop of a spec with `[control]` in the mode that it starts in; none for six legs.
     #[must_use]
-    pub fn of(compiled: &Compiled) -> Option<Self> {
+    pub fn of(compiled: &Compilation) -> Option<Self> {
         let (model, task) = (&compiled.model, compiled.model.task_space.as_ref()?);
         let design = compiled.design.as_ref()?;
         let closed_loop = design.closed_loop(model, task, &RestDynamics::of(&lower::platform(model).ok()?))?;
         let adapting = match model.adaptation.mode {
-            AdaptationMode::Invhys => Adapting::Invhys,
-            AdaptationMode::Ewma => Adapting::Ewma,
-            AdaptationMode::Pcc => Adapting::Pcc,
+            AdaptationMode::Invhys => Estimator::Invhys,
+            AdaptationMode::Ewma => Estimator::Ewma,
+            AdaptationMode::Pcc => Estimator::Pcc,
         };
         let (law, tuning) = match task.mode {
             ControlMode::P => (Law::Position, design.position),
@@ -191,7 +191,7 @@ impl Learnable {
 
     /// G, without feedback.
     pub(super) fn open_loop(&self, frequencies: &[f64]) -> Vec<Matrix6c> {
-        let law = Law::Feedforward(Adapting::Invhys);
+        let law = Law::Feedforward(Estimator::Invhys);
         let open = Self { closed_loop: self.closed_loop.clone(), law, tuning: Tuning::NONE, lead: 0.0, measured: None };
         open.nominal(frequencies)
     }

@@ -18,7 +18,7 @@ use specgen_runtime::playback::{self, Knot};
 use super::convergence::{Learnable, spacing};
 use super::matrix::{Matrix6c, inverse, multiply};
 use super::motion::Motion;
-use super::passes::{LearnError, Repeating, followed, unlimited};
+use super::passes::{LearnError, RepeatableMachine, followed, unlimited};
 use super::response::{Bin, Response};
 use super::table::knots;
 use super::update::{kept, mapped};
@@ -107,7 +107,7 @@ impl Excitation {
     /// If the machine does not make a pass, or limits hold back what it is excited with, or it was ended.
     pub fn measure(
         &self,
-        machine: &mut dyn Repeating,
+        machine: &mut dyn RepeatableMachine,
         learnable: &Learnable,
         motion: &Motion,
         names: [&str; 2],

@@ -12,7 +12,7 @@
 use std::cmp::Ordering;
 
 use super::motion::Motion;
-use super::seen::Seen;
+use super::seen::PassObservation;
 
 /// B: parts of a motion.
 const PARTS: usize = 16;
@@ -95,7 +95,7 @@ fn kinds(of: impl Fn(usize) -> f64) -> Kinds {
 
 impl Score {
     /// Of a pass.
-    pub(super) fn of(seen: &Seen, motion: &Motion) -> Self {
+    pub(super) fn of(seen: &PassObservation, motion: &Motion) -> Self {
         let scaled =
             |error: &[f64; 6]| std::array::from_fn(|axis| error[axis] * if axis < 3 { 1.0 } else { motion.radius });
         let error: Vec<[f64; 6]> = seen.measured[motion.scored.clone()].iter().map(scaled).collect();

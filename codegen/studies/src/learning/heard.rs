@@ -11,7 +11,7 @@ use super::response::Response;
 
 /// What was measured of a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Heard {
+pub struct ModeMeasurement {
     /// By the model, Hz.
     pub frequency: f64,
     /// Where (Hz) its response to its own correction is largest, and how large, between half and one and a half times that frequency.
@@ -25,7 +25,7 @@ pub struct Heard {
 impl Learnable {
     /// What a response says of each mode.
     #[must_use]
-    pub fn heard(&self, response: &Response) -> [Heard; 6] {
+    pub fn heard(&self, response: &Response) -> [ModeMeasurement; 6] {
         let frequencies: Vec<f64> = response.bins.iter().map(|bin| bin.hertz).collect();
         let model = self.nominal(&frequencies);
         std::array::from_fn(|mode| {
@@ -41,7 +41,12 @@ impl Learnable {
             };
             let (at, measured) = largest(&|k| gain(&response.bins[k].response));
             let (_, modelled) = largest(&|k| gain(&model[k]));
-            Heard { frequency, largest: measured, modelled, error: response.bins[at].error[mode][mode] / measured[1] }
+            ModeMeasurement {
+                frequency,
+                largest: measured,
+                modelled,
+                error: response.bins[at].error[mode][mode] / measured[1],
+            }
         })
     }
 }

@@ -15,7 +15,7 @@ use specgen_runtime::playback::{self, Knot, UNIT};
 use super::gain::{Judge, Score, Verdict};
 use super::motion::Motion;
 use super::plan::Plan;
-use super::seen::Seen;
+use super::seen::PassObservation;
 use super::table::knots;
 use super::update::Update;
 
@@ -88,9 +88,9 @@ impl Learner<'_> {
     /// The correction of the next pass, of the one that was `played` and what was `seen`.
     fn next(
         self,
-        machine: &mut dyn Repeating,
+        machine: &mut dyn RepeatableMachine,
         motion: &Motion,
-        (played, seen): (&[Knot], &Seen),
+        (played, seen): (&[Knot], &PassObservation),
         spacing: u32,
     ) -> Result<Vec<Knot>, LearnError> {
         match self {
@@ -105,18 +105,18 @@ impl Learner<'_> {
 }
 
 /// A machine that can repeat a motion.
-pub trait Repeating {
+pub trait RepeatableMachine {
     /// A pass of the motion under the correction of these knots, so many ticks apart.
     ///
     /// # Errors
     /// If the machine does not make it.
-    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, LearnError>;
+    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<PassObservation, LearnError>;
 
     /// The correction that its device makes of the one that was played and what was seen.
     ///
     /// # Errors
     /// If the device does not learn with this plan.
-    fn next(&mut self, plan: &Plan, played: &[Knot], seen: &Seen) -> Result<Vec<Knot>, LearnError> {
+    fn next(&mut self, plan: &Plan, played: &[Knot], seen: &PassObservation) -> Result<Vec<Knot>, LearnError> {
         plan.next(played, &seen.kept).ok_or(LearnError::Refused)
     }
 
@@ -150,8 +150,8 @@ pub fn translation_nm(errors: &[Knot]) -> f64 {
 }
 
 /// The same player as on a machine.
-impl Repeating for Bench<'_> {
-    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, LearnError> {
+impl RepeatableMachine for Bench<'_> {
+    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<PassObservation, LearnError> {
         let course = course(motion, spacing, 0);
         let count = course.knots() as usize;
         let mut memory = vec![[0; 6]; 2 * count];
@@ -168,7 +168,7 @@ impl Repeating for Bench<'_> {
             real.push(std::array::from_fn(|axis| done.target[axis] - done.pose[axis]));
         }
         let kept = player.errors().to_vec();
-        Ok(Seen { measured: held(&kept, spacing, motion.corrected), real, kept, status })
+        Ok(PassObservation { measured: held(&kept, spacing, motion.corrected), real, kept, status })
     }
 }
 
@@ -189,7 +189,7 @@ pub struct Pass {
 }
 
 impl Pass {
-    fn of(seen: &Seen, motion: &Motion) -> Result<Self, LearnError> {
+    fn of(seen: &PassObservation, motion: &Motion) -> Result<Self, LearnError> {
         let Motion { scored, radius, interval, .. } = motion;
         let shown = seen.real.len().min(seen.measured.len()).min(scored.end);
         let coverage = Coverage::new(shown.saturating_sub(scored.start), scored.len(), *interval);
@@ -237,7 +237,7 @@ pub enum Ending {
 
 /// What came of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Learned {
+pub struct LearningResult {
     /// The first is without correction, or with the one that learning began with.
     pub passes: Vec<Pass>,
     /// The pass whose correction is kept: the last one that was better than those before it by more than the noise; 0 if none was.
@@ -251,7 +251,7 @@ pub struct Learned {
     pub ending: Ending,
 }
 
-impl Learned {
+impl LearningResult {
     /// Whether the error grew in the last pass.
     #[must_use]
     pub fn grew(&self) -> bool {
@@ -268,21 +268,21 @@ impl Learned {
 /// # Errors
 /// If the machine does not make a pass, or not the motion.
 pub fn learn(
-    machine: &mut dyn Repeating,
+    machine: &mut dyn RepeatableMachine,
     motion: &Motion,
     learner: Learner<'_>,
     begin: &[Knot],
     spacing: u32,
     count: usize,
     mut watch: impl FnMut(usize, &Pass) -> ControlFlow<()>,
-) -> Result<Learned, LearnError> {
+) -> Result<LearningResult, LearnError> {
     let mut played: Vec<Knot> = begin.to_vec();
     let mut equal = || followed(machine.pass(motion, begin, spacing)?);
     equal()?;
     let repeated = if count > 0 { Some(Score::of(&equal()?, motion)) } else { None };
     let mut seen = equal()?;
     let mut judge = repeated.map(|before| Judge::new(Score::of(&seen, motion), &before));
-    let mut learned = Learned {
+    let mut learned = LearningResult {
         passes: vec![Pass::of(&seen, motion)?],
         best: 0,
         knots: played.clone(),
@@ -332,13 +332,13 @@ pub fn learn(
 }
 
 /// A pass in which the motion was made and seen.
-pub(super) fn followed(seen: Seen) -> Result<Seen, LearnError> {
+pub(super) fn followed(seen: PassObservation) -> Result<PassObservation, LearnError> {
     let bad = seen.status & (NOT_FOLLOWED | GAUGES);
     if bad == 0 { Ok(seen) } else { Err(LearnError::Status(bad)) }
 }
 
 /// A pass in which no limit held a leg or the correction back.
-pub(super) fn unlimited(seen: Seen) -> Result<Seen, LearnError> {
+pub(super) fn unlimited(seen: PassObservation) -> Result<PassObservation, LearnError> {
     let bad = seen.status & (LEGS | CORRECTION_LIMITED);
     if bad == 0 { Ok(seen) } else { Err(LearnError::Limited(bad)) }
 }

@@ -4,7 +4,7 @@ use specgen_runtime::playback::Knot;
 
 /// What a machine showed in a pass, tick by tick.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
+pub struct PassObservation {
     /// Set-point less what the gauges showed, at the end of each tick, m and rad: the mean over the ticks from knot to knot.
     pub measured: Vec<[f64; 6]>,
     /// Set-point less true pose; what was measured, where nothing else is known.

@@ -8,14 +8,16 @@ use host_sim::controller::Controller;
 use host_sim::plant::LegParameters;
 use serde::Serialize;
 
-use crate::tuning::feasible::{Feasibility, Required};
+use crate::tuning::feasible::{Feasibility, RequiredMargins};
 use crate::tuning::genetic::{Genetic, Settings};
 use crate::tuning::search::{Generation, Progress};
-use crate::tuning::{Candidate, Case, Conditions, Search, SearchOptions, Setting, Space, TrajectoryChoice, What};
-use specgen_compiler::compile::Compiled;
+use crate::tuning::{
+    Candidate, Case, Conditions, Search, SearchOptions, Setting, Space, TrajectoryChoice, TunedNumbers,
+};
+use specgen_compiler::compile::Compilation;
 
 /// As `specgen tune` has it: margins, and the multisine's highest frequency (Hz) and length (s).
-const REQUIRED: Required = Required { gain: 2.0, delay: 0.5 };
+const REQUIRED: RequiredMargins = RequiredMargins { gain: 2.0, delay: 0.5 };
 const MULTISINE: [f64; 2] = [10.0, 2.0];
 /// Factor on the spec's own numbers until they hold the margins, and how often.
 const SHRINK: f64 = 0.85;
@@ -58,14 +60,14 @@ impl std::fmt::Display for ConvergenceError {
 /// # Errors
 /// If nothing is tuned, or a run fails.
 pub fn run(
-    compiled: &Compiled,
+    compiled: &Compilation,
     controller: &Controller,
     leg: &LegParameters,
     seed: u64,
     generations: usize,
     progress: &dyn Fn(&Progress),
 ) -> Result<Convergence, ConvergenceError> {
-    let space = Space::of(compiled, What::All, &[]).map_err(|found| {
+    let space = Space::of(compiled, TunedNumbers::All, &[]).map_err(|found| {
         let why = found.into_iter().map(|finding| finding.message).collect::<Vec<_>>().join("; ");
         ConvergenceError::NothingToTune(why)
     })?;

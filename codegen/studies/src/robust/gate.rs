@@ -76,7 +76,7 @@ impl Gate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robust::{Deviation, Factor, Learnt};
+    use crate::robust::{Deviation, Factor, LearningFigures};
     use host_sim::coverage::Coverage;
 
     fn run(name: &str, drawn: bool, error_nm: Option<f64>) -> (Member, Outcome) {
@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn what_is_learned_has_a_limit_of_its_own_and_must_not_grow() {
         let with = |name: &str, error_nm: f64, grew: bool| {
-            let learned = Some(Learnt { error_nm, passes: 5, grew, coverage: Coverage::default() });
+            let learned = Some(LearningFigures { error_nm, passes: 5, grew, coverage: Coverage::default() });
             let (member, _) = run(name, true, None);
             (member, Outcome::Ran(Figures { error_nm: 20.0, learned, ..Figures::default() }))
         };

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::Factors;
 use crate::learning::{Convergence, Learnable, Motion, Update};
 use crate::tuning::TrajectoryChoice;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 
 /// How every machine learns: alike, for none knows what it is.
 pub struct Learning {
@@ -21,7 +21,7 @@ pub struct Learning {
 
 /// What a machine learned.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Learnt {
+pub struct LearningFigures {
     /// Root mean square of the translation's true error as a norm in the best pass, nm.
     pub error_nm: f64,
     /// Passes before it.
@@ -40,7 +40,7 @@ impl Learning {
     /// # Errors
     /// If the trajectory has no tick, or too many.
     pub fn of(
-        compiled: &Compiled,
+        compiled: &Compilation,
         trajectory: &TrajectoryChoice,
         factors: &Factors,
         bandwidth: f64,

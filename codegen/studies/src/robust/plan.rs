@@ -125,13 +125,13 @@ fn corners(factors: &Factors, seed: u64) -> Vec<Member> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robust::factors::Given;
+    use crate::robust::factors::UserRange;
     use specgen_compiler::compile::compile;
 
     /// Of the spec of six legs, with `given` in place of what it says.
     fn factors(given: &[&str]) -> Factors {
         let spec = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/legs.toml");
-        let given: Vec<Given> = given.iter().map(|text| Given::parse(text).unwrap()).collect();
+        let given: Vec<UserRange> = given.iter().map(|text| UserRange::parse(text).unwrap()).collect();
         Factors::of(&compile(&spec).unwrap().model, &given)
     }
 

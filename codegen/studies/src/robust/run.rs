@@ -12,12 +12,12 @@ use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{Bench, Noise};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::learning::{Learning, Learnt};
+use super::learning::{Learning, LearningFigures};
 use super::plan::{Member, Plan};
 use crate::learning::{LearnError, Learner, learn};
 use crate::machine;
 use crate::tuning::{Case, Conditions, Setting, TrajectoryChoice};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 
 /// Status bits of legs at a limit of voltage or slew.
 const LIMITS: u32 = 0x3f;
@@ -50,7 +50,7 @@ pub struct Figures {
     pub coverage: Coverage,
     /// What the machine learned, where it was asked to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub learned: Option<Learnt>,
+    pub learned: Option<LearningFigures>,
 }
 
 /// JSON has no infinity.
@@ -94,7 +94,7 @@ fn lost(why: &dyn fmt::Display) -> Outcome {
 /// What every member is run with.
 pub struct Study<'a> {
     /// The spec.
-    pub compiled: &'a Compiled,
+    pub compiled: &'a Compilation,
     /// Its host library.
     pub controller: &'a Controller,
     /// Shape of the hysteresis.
@@ -137,7 +137,7 @@ impl Study<'_> {
     ///
     /// # Errors
     /// If it does not come to its bias pose, or does not make the motion.
-    fn learn(&self, learning: &Learning, member: &Member) -> Result<Option<Learnt>, LearnError> {
+    fn learn(&self, learning: &Learning, member: &Member) -> Result<Option<LearningFigures>, LearnError> {
         let model = &self.compiled.model;
         let Some(task) = &model.task_space else { return Ok(None) };
         let specimen = member.deviation.specimen(model, task, self.leg);
@@ -153,7 +153,7 @@ impl Study<'_> {
         let learned =
             learn(&mut bench, motion, Learner::Host(update), &[], *spacing, *passes, |_, _| ControlFlow::Continue(()))?;
         let best = &learned.passes[learned.best];
-        Ok(Some(Learnt {
+        Ok(Some(LearningFigures {
             error_nm: best.translation_nm,
             passes: learned.best as u32,
             grew: learned.grew(),

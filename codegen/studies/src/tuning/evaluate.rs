@@ -21,12 +21,12 @@ use host_sim::scenario::LegScenario;
 use host_sim::trajectory::{LegTrajectory, Multisine, PaperLeg, PaperPath, PaperPose, PoseTrajectory, Reading, Step};
 use serde::Serialize;
 
-pub use observe::Observed;
+pub use observe::TickErrors;
 
 use super::Setting;
 use super::space::axis_stiffness;
 use crate::machine;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::stability::platform::Tuning;
 use specgen_language::model::{Model, TaskSpace};
 
@@ -171,7 +171,7 @@ impl Case {
     /// # Errors
     /// If the machine does not come to its bias pose, or the trajectory has no tick.
     pub fn new(
-        compiled: &Compiled,
+        compiled: &Compilation,
         controller: &Controller,
         leg: &LegParameters,
         start: &Setting,
@@ -222,7 +222,7 @@ impl Case {
     /// # Errors
     /// As [`Case::new`].
     pub fn of_machine(
-        compiled: &Compiled,
+        compiled: &Compilation,
         task: &TaskSpace,
         controller: &Controller,
         specimen: &Specimen,

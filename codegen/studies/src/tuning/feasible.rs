@@ -1,9 +1,9 @@
 //! Whether a setting is stable with the margins that are asked for: what is not is never simulated.
 
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower::platform;
 use specgen_compiler::stability::platform::{
-    Adapting, ClosedLoop, Conditions, LARGEST_RADIUS, Law, RestDynamics, Tuning,
+    ClosedLoop, Conditions, Estimator, LARGEST_RADIUS, Law, RestDynamics, Tuning,
 };
 use specgen_compiler::stability::{LegDynamics, ewma_limit, pcc_limit, spectral_radius};
 use specgen_language::model::{Adaptation, AdaptationMode, ControlMode};
@@ -16,7 +16,7 @@ const ENDS: usize = 2;
 
 /// Margins that a candidate must have.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Required {
+pub struct RequiredMargins {
     /// Factor on all gains and bandwidths, or weights, at which it is still stable; at least 1.
     pub gain: f64,
     /// Further delay at which it is still stable, ticks. For a platform.
@@ -33,7 +33,7 @@ pub enum Feasibility {
         /// The spec's, whose weights a candidate replaces.
         adaptation: Adaptation,
         /// What is asked for.
-        required: Required,
+        required: RequiredMargins,
     },
     /// A platform.
     Platform {
@@ -44,14 +44,14 @@ pub enum Feasibility {
         /// λ.
         ratios: [f64; 2],
         /// What is asked for.
-        required: Required,
+        required: RequiredMargins,
     },
 }
 
 impl Feasibility {
     /// For a compiled spec.
     #[must_use]
-    pub fn of(compiled: &Compiled, required: Required) -> Self {
+    pub fn of(compiled: &Compilation, required: RequiredMargins) -> Self {
         let model = &compiled.model;
         let legs = || Self::Legs { dynamics: LegDynamics::of(model), adaptation: model.adaptation.clone(), required };
         let Some(task) = &model.task_space else { return legs() };
@@ -63,9 +63,9 @@ impl Feasibility {
         };
         // A running controller may be switched to any of them; the one of the spec is asked first.
         let adapting = match model.adaptation.mode {
-            AdaptationMode::Invhys => Adapting::Invhys,
-            AdaptationMode::Ewma => Adapting::Ewma,
-            AdaptationMode::Pcc => Adapting::Pcc,
+            AdaptationMode::Invhys => Estimator::Invhys,
+            AdaptationMode::Ewma => Estimator::Ewma,
+            AdaptationMode::Pcc => Estimator::Pcc,
         };
         let mut laws = match task.mode {
             ControlMode::P => vec![Law::Position],
@@ -74,7 +74,7 @@ impl Feasibility {
         };
         if task.mode != ControlMode::P {
             for law in Law::ALL {
-                let used = law != Law::Position && law != Law::Feedforward(Adapting::Invhys);
+                let used = law != Law::Position && law != Law::Feedforward(Estimator::Invhys);
                 if used && !laws.contains(&law) {
                     laws.push(law);
                 }
@@ -102,7 +102,13 @@ impl Feasibility {
     }
 }
 
-fn leg_holds(dynamics: &LegDynamics, adaptation: &Adaptation, required: &Required, level: f64, drift: f64) -> bool {
+fn leg_holds(
+    dynamics: &LegDynamics,
+    adaptation: &Adaptation,
+    required: &RequiredMargins,
+    level: f64,
+    drift: f64,
+) -> bool {
     let with_drift = adaptation.mode == AdaptationMode::Pcc;
     let [low, high] = adaptation.gain_ratio;
     // Scaling the weights is what scales a loop's gain here.
@@ -128,7 +134,7 @@ fn platform_holds(
     law: Law,
     tuning: &Tuning,
     [low, high]: [f64; 2],
-    required: &Required,
+    required: &RequiredMargins,
     period: f64,
 ) -> bool {
     let most =

@@ -3,7 +3,7 @@
 use host_sim::controller::{Controller, TickController};
 use serde::Serialize;
 
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::stability::platform::Tuning;
 use specgen_language::model::AdaptationMode;
 
@@ -35,7 +35,7 @@ pub enum Setting {
 impl Setting {
     /// What the spec gives, or the compiler chose.
     #[must_use]
-    pub fn of(compiled: &Compiled) -> Self {
+    pub fn of(compiled: &Compilation) -> Self {
         let model = &compiled.model;
         match &compiled.design {
             Some(design) => {

@@ -9,7 +9,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::Setting;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower::platform;
 use specgen_compiler::stability::platform::RestDynamics;
 use specgen_language::diagnostic::{Diagnostic, codes};
@@ -17,7 +17,7 @@ use specgen_language::model::{AdaptationMode, ControlMode, Model};
 
 /// Which numbers are tuned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum What {
+pub enum TunedNumbers {
     /// Gains of the feedback.
     Gains,
     /// Weights or bandwidths of the adaptation.
@@ -26,7 +26,7 @@ pub enum What {
     All,
 }
 
-impl What {
+impl TunedNumbers {
     /// As `--what` has it.
     fn name(self) -> &'static str {
         match self {
@@ -115,7 +115,7 @@ impl Space {
     ///
     /// # Errors
     /// If the spec's mode uses nothing of it, or bounds are empty or for nothing that is tuned.
-    pub fn of(compiled: &Compiled, what: What, given: &[GivenBounds]) -> Result<Self, Vec<Diagnostic>> {
+    pub fn of(compiled: &Compilation, what: TunedNumbers, given: &[GivenBounds]) -> Result<Self, Vec<Diagnostic>> {
         let model = &compiled.model;
         let mode = model.task_space.as_ref().map(|task| task.mode);
         let base = Setting::of(compiled);
@@ -125,7 +125,7 @@ impl Space {
         let alone = mode == Some(ControlMode::P);
         if let Some(design) = &compiled.design {
             stiffness = axis_stiffness(model);
-            if what != What::Weights && mode != Some(ControlMode::F) {
+            if what != TunedNumbers::Weights && mode != Some(ControlMode::F) {
                 let damped = if alone { design.position } else { design.combined }.derivative != [0.0; 6];
                 (0..6).for_each(|axis| add(Role::Proportional(axis), PROPORTIONAL));
                 (0..6).for_each(|axis| add(Role::Integral(axis), INTEGRAL));
@@ -134,7 +134,7 @@ impl Space {
                 }
             }
         }
-        if what != What::Gains && !alone {
+        if what != TunedNumbers::Gains && !alone {
             let bandwidths = compiled.design.as_ref().map(|design| {
                 let most = design.bandwidth_limit;
                 [[0.01 * most, most], [1e-4 * most, 0.5 * most]]

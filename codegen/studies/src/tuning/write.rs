@@ -5,7 +5,7 @@ use toml_edit::{Array, DocumentMut, Item, Table, Value};
 
 use super::Setting;
 use super::space::{Role, Space};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::model::ControlMode;
 
 /// Units of gains along and about an axis.
@@ -20,7 +20,7 @@ const UNITS: [(&str, [&str; 2]); 3] = [
 ///
 /// # Errors
 /// What the editor says of a text that the compiler read, or of a section that is no table.
-pub fn edited(compiled: &Compiled, space: &Space, setting: &Setting, note: &str) -> Result<String, String> {
+pub fn edited(compiled: &Compilation, space: &Space, setting: &Setting, note: &str) -> Result<String, String> {
     // The editor would end every line with `\n`.
     let windows = compiled.source.text.contains("\r\n");
     let mut document: DocumentMut = compiled.source.text.parse().map_err(|error| format!("{error}"))?;

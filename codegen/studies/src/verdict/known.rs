@@ -1,16 +1,16 @@
 //! The figures of a spec that compiled, which need no build and no run.
 
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::requirements;
 
 use super::{AXES, Figure, LOOKED_AT, NOT_SIMULATED, Subject};
 
 /// Reach, noise, records and margins.
-pub(super) fn figures(compiled: &Compiled) -> impl Iterator<Item = Figure> {
+pub(super) fn figures(compiled: &Compilation) -> impl Iterator<Item = Figure> {
     [reach(compiled), noise(compiled), record(compiled), margins(compiled), tracking(compiled)].into_iter().flatten()
 }
 
-fn reach(compiled: &Compiled) -> Vec<Figure> {
+fn reach(compiled: &Compilation) -> Vec<Figure> {
     let Some(reach) = &compiled.reach else { return Vec::new() };
     let axes = reach.axes.iter().enumerate().map(|(axis, one)| {
         let [low, high] = one.from_middle.map(f64::abs);
@@ -26,7 +26,7 @@ fn reach(compiled: &Compiled) -> Vec<Figure> {
     axes.collect()
 }
 
-fn noise(compiled: &Compiled) -> Vec<Figure> {
+fn noise(compiled: &Compilation) -> Vec<Figure> {
     let noise = &compiled.rest_noise;
     let axes = noise.pose.iter().enumerate().map(|(axis, value)| {
         let figure = Figure::new(Subject::Noise, AXES[axis], 1e9 * value, if axis < 3 { "nm" } else { "nrad" });
@@ -47,7 +47,7 @@ fn noise(compiled: &Compiled) -> Vec<Figure> {
     figures
 }
 
-fn record(compiled: &Compiled) -> Vec<Figure> {
+fn record(compiled: &Compilation) -> Vec<Figure> {
     let worst = compiled.records.iter().flatten().max_by(|a, b| a.fit_rms_percent.total_cmp(&b.fit_rms_percent));
     let Some(worst) = worst else { return Vec::new() };
     vec![
@@ -57,7 +57,7 @@ fn record(compiled: &Compiled) -> Vec<Figure> {
     ]
 }
 
-fn margins(compiled: &Compiled) -> Vec<Figure> {
+fn margins(compiled: &Compilation) -> Vec<Figure> {
     let subject = Subject::Margins;
     let highest = compiled.model.adaptation.gain_ratio[1];
     let lambda = |limit: Option<f64>| {
@@ -89,7 +89,7 @@ fn margins(compiled: &Compiled) -> Vec<Figure> {
 }
 
 /// A run would have to be made: said in words, and not judged.
-fn tracking(compiled: &Compiled) -> Vec<Figure> {
+fn tracking(compiled: &Compilation) -> Vec<Figure> {
     let limits = compiled.model.requirements.tracking.len();
     let words = match limits {
         0 => return Vec::new(),

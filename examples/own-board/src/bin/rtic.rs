@@ -10,7 +10,7 @@ mod app {
     use controller::supervised::{Machine, machine_at_reset};
     use embassy_stm32::interrupt::{self, InterruptExt, Priority};
     use own_board::machine::{Link, RECORD, Running, start, stop};
-    use specgen_board::Kept;
+    use specgen_board::MachineSnapshot;
 
     #[shared]
     struct Shared {
@@ -25,7 +25,7 @@ mod app {
     #[init(local = [
         machine: Machine = machine_at_reset(),
         record: [u64; RECORD] = [0; RECORD],
-        kept: Kept = Kept::new(),
+        kept: MachineSnapshot = MachineSnapshot::new(),
         buffers: [[u8; 512]; 2] = [[0; 512]; 2],
     ])]
     fn init(mut context: init::Context) -> (Shared, Local) {

@@ -10,7 +10,7 @@ use critical_section::Mutex;
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use own_board::machine::{RECORD, Running, start, stop};
-use specgen_board::Kept;
+use specgen_board::MachineSnapshot;
 
 static RUNNING: Mutex<RefCell<Option<Running>>> = Mutex::new(RefCell::new(None));
 
@@ -29,7 +29,7 @@ fn with(action: impl FnOnce(&mut Running)) {
 fn main() -> ! {
     static mut MACHINE: Machine = machine_at_reset();
     static mut RECORDED: [u64; RECORD] = [0; RECORD];
-    static mut KEPT: Kept = Kept::new();
+    static mut KEPT: MachineSnapshot = MachineSnapshot::new();
     static mut BUFFERS: [[u8; 512]; 2] = [[0; 512]; 2];
     let Some(mut core) = cortex_m::Peripherals::take() else { stop() };
     core.SCB.enable_icache();

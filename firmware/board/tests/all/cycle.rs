@@ -16,12 +16,12 @@ use controller::supervision::READINGS_PER_LEG;
 use controller::{Command, CommandKind, Config, INPUT_WORDS, Real, Target, TickInput};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen_board::{Board, COMMAND_WORDS, Exchange, GAUGE_BITS, Noticed};
+use specgen_board::{Board, COMMAND_WORDS, Exchange, GAUGE_BITS, TargetStatus};
 use specgen_hal::{Amplifiers, Fault, Gauges};
 
 /// What a board did to its amplifiers, in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Done {
+enum AmplifierAction {
     Start,
     Enable(bool),
     Write([i32; 6]),
@@ -34,7 +34,7 @@ struct Bench {
     gauge_fault: Option<Fault>,
     write_fault: Option<Fault>,
     start_fault: Option<Fault>,
-    done: Vec<Done>,
+    done: Vec<AmplifierAction>,
     /// Legs that the codes move and the gauges see; none stand where they are.
     legs: Option<[Memory; 6]>,
 }
@@ -73,13 +73,13 @@ impl Amplifiers for Parts {
 
     fn start(&mut self) -> Result<(), Fault> {
         let mut bench = self.0.borrow_mut();
-        bench.done.push(Done::Start);
+        bench.done.push(AmplifierAction::Start);
         bench.start_fault.map_or(Ok(()), Err)
     }
 
     fn write(&mut self, codes: &[i32; 6]) -> Result<(), Fault> {
         let mut bench = self.0.borrow_mut();
-        bench.done.push(Done::Write(*codes));
+        bench.done.push(AmplifierAction::Write(*codes));
         if let Some(mut legs) = bench.legs.take() {
             bench.codes = follow(&mut legs, codes);
             bench.legs = Some(legs);
@@ -88,7 +88,7 @@ impl Amplifiers for Parts {
     }
 
     fn enable(&mut self, on: bool) -> Result<(), Fault> {
-        self.0.borrow_mut().done.push(Done::Enable(on));
+        self.0.borrow_mut().done.push(AmplifierAction::Enable(on));
         Ok(())
     }
 }
@@ -178,7 +178,7 @@ fn a_board_does_what_the_controller_says_whatever_happens() {
             bench.write_fault = write_fails.then_some(Fault::ReadBack);
         }
         let (orders, codes) = (exchange.orders, parts.0.borrow().codes);
-        let restarted = board.tick(&mut exchange, Noticed { missed, stop, amplifier });
+        let restarted = board.tick(&mut exchange, TargetStatus { missed, stop, amplifier });
 
         let mut events = carried;
         for (happened, event) in [
@@ -195,15 +195,16 @@ fn a_board_does_what_the_controller_says_whatever_happens() {
         // What the supervisor is asked for with converters that were just started is nothing.
         let request = if restarted { Request::None } else { orders.request };
         let output = by_hand.tick(&orders.command, gauge, request, if restarted { events & !carried } else { events });
-        let mut expected = if restarted { vec![Done::Enable(false), Done::Start] } else { Vec::new() };
+        let mut expected =
+            if restarted { vec![AmplifierAction::Enable(false), AmplifierAction::Start] } else { Vec::new() };
         if restarted && held != [0; 6] {
-            expected.push(Done::Write(held));
+            expected.push(AmplifierAction::Write(held));
         }
         if output.amplifier_on {
-            expected.extend([Done::Write(output.tick.dac_code), Done::Enable(true)]);
+            expected.extend([AmplifierAction::Write(output.tick.dac_code), AmplifierAction::Enable(true)]);
             enabled += 1;
         } else {
-            expected.extend([Done::Enable(false), Done::Write(output.tick.dac_code)]);
+            expected.extend([AmplifierAction::Enable(false), AmplifierAction::Write(output.tick.dac_code)]);
         }
         assert_eq!(std::mem::take(&mut parts.0.borrow_mut().done), expected, "tick {tick}");
         assert_eq!(board.machine().digest(), by_hand.machine.digest(), "tick {tick}");
@@ -228,7 +229,7 @@ fn a_code_taken_with_another_shift_is_seen() {
         exchange.orders.request = if k == 0 { Request::Arm } else { Request::Run };
         exchange.silence.heard();
         let orders = exchange.orders;
-        board.tick(&mut exchange, Noticed::default());
+        board.tick(&mut exchange, TargetStatus::default());
         let codes = parts.0.borrow().codes;
         by_hand.tick(&orders.command, codes.map(|code| sensing::CONVERTER.reading((code + 2) >> 1)), orders.request, 0);
         differs |= board.machine().digest() != by_hand.machine.digest();
@@ -242,16 +243,16 @@ fn a_link_without_a_frame_or_that_fell_silent_is_an_event() {
     let mut board = Board::new(parts.clone(), parts, at_reset(), true);
     let mut exchange = Exchange::new();
     board.start(&mut exchange.report);
-    board.tick(&mut exchange, Noticed::default());
+    board.tick(&mut exchange, TargetStatus::default());
     assert_eq!(exchange.report.health.events & LINK_LOST, LINK_LOST);
     exchange.silence.heard();
     exchange.report.health.events = 0;
     // 0.1 s at the reference's 100 µs.
     for _ in 0..1000 {
-        board.tick(&mut exchange, Noticed::default());
+        board.tick(&mut exchange, TargetStatus::default());
     }
     assert_eq!(exchange.report.health.events & LINK_LOST, 0);
-    board.tick(&mut exchange, Noticed::default());
+    board.tick(&mut exchange, TargetStatus::default());
     assert_eq!(exchange.report.health.events & LINK_LOST, LINK_LOST);
 }
 
@@ -260,11 +261,11 @@ fn a_damaged_flash_is_an_event_of_every_tick() {
     let (_, mut board, mut exchange) = started(false);
     for _ in 0..3 {
         exchange.report.health.events = 0;
-        board.tick(&mut exchange, Noticed::default());
+        board.tick(&mut exchange, TargetStatus::default());
         assert_eq!(exchange.report.health.events & INTEGRITY, INTEGRITY);
     }
     let (_, mut whole, mut exchange) = started(true);
-    whole.tick(&mut exchange, Noticed::default());
+    whole.tick(&mut exchange, TargetStatus::default());
     assert_eq!(exchange.report.health.events & INTEGRITY, 0);
 }
 
@@ -281,11 +282,11 @@ fn converters_that_did_not_start_never_get_power_until_a_new_acknowledgement_sta
         exchange.silence.heard();
         exchange.report.health.events = 0;
         exchange.orders.request = request;
-        board.tick(&mut exchange, Noticed::default());
+        board.tick(&mut exchange, TargetStatus::default());
         assert_eq!(exchange.report.health.events & CONVERTER, CONVERTER);
     }
-    let starts = |parts: &Parts| parts.0.borrow().done.iter().filter(|&&done| done == Done::Start).count();
-    assert!(!parts.0.borrow().done.contains(&Done::Enable(true)));
+    let starts = |parts: &Parts| parts.0.borrow().done.iter().filter(|&&done| done == AmplifierAction::Start).count();
+    assert!(!parts.0.borrow().done.contains(&AmplifierAction::Enable(true)));
     // Once at power-up, once for the one acknowledgement that was given twice, if the supervisor had the amplifiers off.
     let before = starts(&parts);
     assert!(before <= 2, "{before}");
@@ -295,12 +296,12 @@ fn converters_that_did_not_start_never_get_power_until_a_new_acknowledgement_sta
         for _ in 0..20_000 {
             exchange.silence.heard();
             exchange.orders.request = request;
-            board.tick(&mut exchange, Noticed::default());
+            board.tick(&mut exchange, TargetStatus::default());
         }
     }
     assert_eq!(starts(&parts), before + 1);
     exchange.report.health.events = 0;
-    board.tick(&mut exchange, Noticed::default());
+    board.tick(&mut exchange, TargetStatus::default());
     assert_eq!(exchange.report.health.events & CONVERTER, 0);
 }
 
@@ -322,7 +323,7 @@ fn a_converter_that_failed_names_the_cause_and_one_acknowledgement_is_enough_onc
             exchange.orders.request = request;
             for _ in 0..ticks {
                 exchange.silence.heard();
-                board.tick(exchange, Noticed { stop, ..Noticed::default() });
+                board.tick(exchange, TargetStatus { stop, ..TargetStatus::default() });
             }
         };
         run(&mut exchange, Request::Arm, ARMED, false);
@@ -345,7 +346,7 @@ fn a_converter_that_failed_names_the_cause_and_one_acknowledgement_is_enough_onc
         parts.0.borrow_mut().gauge_fault = None;
         run(&mut exchange, Request::Acknowledge, 2, false);
         assert_eq!(exchange.report.phase, Phase::Disarmed);
-        assert_eq!(parts.0.borrow().done.iter().filter(|&&done| done == Done::Start).count(), 2);
+        assert_eq!(parts.0.borrow().done.iter().filter(|&&done| done == AmplifierAction::Start).count(), 2);
         assert!(exchange.report.health.gauge_faults > 100);
     }
 }
@@ -363,7 +364,7 @@ fn a_machine_that_stood_still_ramps_down_and_its_record_says_so() {
         let (parts, mut board, mut exchange) = moving();
         let mut tick = |exchange: &mut Exchange, missed| {
             exchange.silence.heard();
-            board.tick(exchange, Noticed { missed, ..Noticed::default() });
+            board.tick(exchange, TargetStatus { missed, ..TargetStatus::default() });
         };
         exchange.orders.request = Request::Arm;
         (0..ARMED).for_each(|_| tick(&mut exchange, 0));
@@ -374,7 +375,11 @@ fn a_machine_that_stood_still_ramps_down_and_its_record_says_so() {
         assert_eq!(exchange.report.health.events, seen, "{missed}");
         (0..20_000).for_each(|_| tick(&mut exchange, 0));
         assert_eq!((exchange.report.phase, exchange.report.cause), (phase, cause), "{missed}");
-        assert_eq!(parts.0.borrow().done.last() == Some(&Done::Enable(true)), cause == Cause::None, "{missed}");
+        assert_eq!(
+            parts.0.borrow().done.last() == Some(&AmplifierAction::Enable(true)),
+            cause == Cause::None,
+            "{missed}"
+        );
     }
 }
 
@@ -387,7 +392,7 @@ fn a_fault_of_an_amplifier_switches_off_in_its_tick_and_is_shown_until_it_is_gon
         exchange.report.health.events = 0;
         for _ in 0..ticks {
             exchange.silence.heard();
-            board.tick(exchange, Noticed { amplifier, ..Noticed::default() });
+            board.tick(exchange, TargetStatus { amplifier, ..TargetStatus::default() });
         }
         let report = &exchange.report;
         (report.phase, report.cause, report.health.events & AMPLIFIER != 0)
@@ -399,11 +404,11 @@ fn a_fault_of_an_amplifier_switches_off_in_its_tick_and_is_shown_until_it_is_gon
     );
     run(&mut exchange, Request::None, 1, false);
     assert_eq!(run(&mut exchange, Request::Arm, ARMED, false), (Phase::Holding, Cause::None, false));
-    assert_eq!(parts.0.borrow().done.last(), Some(&Done::Enable(true)));
+    assert_eq!(parts.0.borrow().done.last(), Some(&AmplifierAction::Enable(true)));
     parts.0.borrow_mut().done.clear();
     assert_eq!(run(&mut exchange, Request::Arm, 1, true), (Phase::Faulted, Cause::AmplifierFault, true));
-    assert!(!exchange.report.amplifier_on && parts.0.borrow().done.contains(&Done::Enable(false)));
-    assert!(!parts.0.borrow().done.contains(&Done::Enable(true)));
+    assert!(!exchange.report.amplifier_on && parts.0.borrow().done.contains(&AmplifierAction::Enable(false)));
+    assert!(!parts.0.borrow().done.contains(&AmplifierAction::Enable(true)));
     run(&mut exchange, Request::None, 20_000, true);
     assert_eq!(run(&mut exchange, Request::Acknowledge, 100, true), (Phase::Faulted, Cause::AmplifierFault, true));
     assert_eq!(run(&mut exchange, Request::None, 1, false), (Phase::Faulted, Cause::AmplifierFault, false));
@@ -417,7 +422,7 @@ fn without_its_background_a_board_ramps_down_whatever_was_asked_for() {
         exchange.orders.request = request;
         for _ in 0..count {
             exchange.silence.heard();
-            board.tick(exchange, Noticed::default());
+            board.tick(exchange, TargetStatus::default());
         }
         exchange.report.phase
     };
@@ -433,7 +438,7 @@ fn times_of_a_tick_are_the_last_and_the_longest_and_overruns_are_counted() {
     use std::sync::atomic::{AtomicU32, Ordering};
     static COUNT: AtomicU32 = AtomicU32::new(u32::MAX - 1);
     let (_, mut board, mut exchange) = started(true);
-    board.timed_tick(&mut exchange, Noticed::default(), || COUNT.fetch_add(3, Ordering::Relaxed));
+    board.timed_tick(&mut exchange, TargetStatus::default(), || COUNT.fetch_add(3, Ordering::Relaxed));
     assert_eq!(exchange.report.health.output, [3, 3], "over the end of the counter");
     let report = &mut exchange.report;
     for (late, duration, overruns) in [(0, 100, 0), (1, 99, 0), (1, 100, 1), (40, 20, 1), (0, u32::MAX, 2)] {

@@ -4,8 +4,8 @@
 
 use controller::supervised::{Machine, Phase, Request as Wanted, machine_at_reset};
 use controller::{CONFIG_WORDS, Config, DESCRIPTION};
-use specgen_board::{COMMAND_WORDS, Desk, Exchange, Stopwatch, Visit};
-use specgen_link::{Bytes, Counted, Device, RecorderAction, Refusal, Reply, Request};
+use specgen_board::{COMMAND_WORDS, Exchange, LinkHandler, RequestContext, Stopwatch};
+use specgen_link::{Bytes, CostUnit, Device, RecorderAction, Refusal, Reply, Request};
 
 fn bytes(words: &[u64]) -> Vec<u8> {
     words.iter().flat_map(|word| word.to_le_bytes()).collect()
@@ -15,19 +15,23 @@ fn bytes(words: &[u64]) -> Vec<u8> {
 struct Bench {
     exchange: Exchange,
     machine: Box<Machine>,
-    desk: Desk,
+    desk: LinkHandler,
 }
 
 impl Bench {
     fn new() -> Self {
-        Self { exchange: Exchange::new(), machine: Box::new(machine_at_reset()), desk: Desk::new(Stopwatch::NONE) }
+        Self {
+            exchange: Exchange::new(),
+            machine: Box::new(machine_at_reset()),
+            desk: LinkHandler::new(Stopwatch::NONE),
+        }
     }
 
     /// Asks, and looks at the answer.
     fn ask<R>(&mut self, request: &Request<'_>, look: impl FnOnce(Reply<'_>) -> R) -> R {
         let Self { exchange, machine, desk } = self;
         let mut with = |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(exchange, machine);
-        look(Visit { desk, with: &mut with }.execute(request))
+        look(RequestContext { desk, with: &mut with }.execute(request))
     }
 
     fn expect(&mut self, request: &Request<'_>, expected: Reply<'_>) {
@@ -50,7 +54,7 @@ fn orders_reach_the_tick_all_at_once() {
     // A host that comes anew has not asked for anything.
     bench.ask(&Request::Hello, |reply| {
         let Reply::Identity(identity) = reply else { unreachable!() };
-        assert_eq!((identity.counted, identity.stages), (Counted::Nothing, 0));
+        assert_eq!((identity.counted, identity.stages), (CostUnit::Nothing, 0));
     });
     assert_eq!(bench.exchange.orders.request, Wanted::None);
 }
@@ -204,10 +208,10 @@ fn counter() -> u32 {
 #[test]
 fn what_the_steps_of_a_lock_step_cost_is_told() {
     let mut bench = Bench::new();
-    bench.desk = Desk::new(Stopwatch { counted: Counted::Cycles, now: counter });
+    bench.desk = LinkHandler::new(Stopwatch { counted: CostUnit::Cycles, now: counter });
     bench.ask(&Request::Hello, |reply| {
         let Reply::Identity(identity) = reply else { unreachable!() };
-        assert_eq!((identity.counted, identity.stages), (Counted::Cycles, 1));
+        assert_eq!((identity.counted, identity.stages), (CostUnit::Cycles, 1));
     });
     let stage = |bench: &mut Bench| {
         bench.ask(&Request::LockstepStage { index: 0 }, |reply| {

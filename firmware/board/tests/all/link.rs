@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen_link::client::{Client, ClientError};
 use specgen_link::{Bytes, Refusal, Reply, Request, WaveAction};
-use specgen_runtime::wave::{Refused, Settings};
+use specgen_runtime::wave::{self, Settings};
 
 /// Words of the recorder's memory.
 const RECORD: usize = 40_000;
@@ -35,12 +35,12 @@ fn a_wave_is_refused_with_its_reason_and_a_host_that_falls_silent_ends_it() {
     let mut far = wave(1e-6, 5.0);
     far.axes[2].offset = 1e-3;
     let why = |refusal: Option<Refusal>| match refusal {
-        Some(Refusal::Word { index }) => Refused::of_word(usize::from(index)),
+        Some(Refusal::Word { index }) => wave::Refusal::of_word(usize::from(index)),
         other => unreachable!("{other:?}"),
     };
-    assert_eq!(why(start(&mut client, &far)), Refused::Range(2));
-    assert_eq!(why(start(&mut client, &wave(2e-5, 60.0))), Refused::Rate(0));
-    assert_eq!(why(start(&mut client, &wave(2e-7, 2600.0))), Refused::Acceleration(0));
+    assert_eq!(why(start(&mut client, &far)), wave::Refusal::Range(2));
+    assert_eq!(why(start(&mut client, &wave(2e-5, 60.0))), wave::Refusal::Rate(0));
+    assert_eq!(why(start(&mut client, &wave(2e-7, 2600.0))), wave::Refusal::Acceleration(0));
     assert!(!line.with(|rig| rig.exchange.waves()));
     assert_eq!(start(&mut client, &wave(1e-6, 5.0)), None);
     line.tick(100);
@@ -97,7 +97,7 @@ fn a_lock_step_computes_what_the_host_computes_and_moves_nothing() {
     // An emergency stop is told all the same.
     line.with(|rig| {
         rig.exchange.report.health.events = 0;
-        rig.board.tick(&mut rig.exchange, specgen_board::Noticed { missed: 2, stop: true, amplifier: false });
+        rig.board.tick(&mut rig.exchange, specgen_board::TargetStatus { missed: 2, stop: true, amplifier: false });
         assert_eq!(rig.exchange.report.health.events, controller::supervised::STOP);
         let missed = core::mem::replace(&mut rig.exchange.report.missed, 0);
         assert_eq!(missed, 2);

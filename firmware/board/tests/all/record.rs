@@ -51,9 +51,9 @@ fn file(blocks: &[Vec<u64>]) -> Vec<u8> {
 }
 
 /// The machine after each tick, by its digest.
-type Known = BTreeMap<u64, (Vec<u64>, [u64; CONFIG_WORDS])>;
+type Digests = BTreeMap<u64, (Vec<u64>, [u64; CONFIG_WORDS])>;
 
-fn ticks(line: &Line, count: u32, known: &mut Known) {
+fn ticks(line: &Line, count: u32, known: &mut Digests) {
     for _ in 0..count {
         line.with(|rig| {
             let machine = rig.board.machine();
@@ -76,7 +76,7 @@ fn a_record_is_downloaded_as_the_bytes_of_its_file() {
     line.with(|rig| rig.pace = 0);
 
     assert!(act(&mut client, RecorderAction::Arm { after: 200 }).running);
-    let mut known = Known::new();
+    let mut known = Digests::new();
     ticks(&line, 600, &mut known);
     // Other settings in the middle.
     let config = Config::new().with(|settings| settings.mode = ControlMode::from_word(5).unwrap()).unwrap().to_words();

@@ -8,7 +8,7 @@ use controller::limits::CODES;
 use controller::supervision::SUPERVISION;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen_board::{BACKGROUND_SILENCE, Due, Health, RAMPED_DOWN, Schedule};
+use specgen_board::{BACKGROUND_SILENCE, DueTick, Health, RAMPED_DOWN, Schedule};
 use specgen_runtime::supervisor::toward;
 
 /// Against a counter that never wraps: the grid of due times is never left, and every grid point is a tick or is counted.
@@ -29,7 +29,7 @@ fn every_due_time_is_a_tick_or_is_counted_as_missed() {
             now = now.max(grid) + u64::from(delay);
             let due = schedule.begin(now as u32);
             let skipped = (now - grid) / u64::from(period);
-            let expected = Due {
+            let expected = DueTick {
                 late: ((now - grid) % u64::from(period)) as u32,
                 missed: skipped as u32,
                 next: (grid + (skipped + 1) * u64::from(period)) as u32,
@@ -47,11 +47,11 @@ fn every_due_time_is_a_tick_or_is_counted_as_missed() {
 #[test]
 fn a_tick_before_its_time_is_in_time_and_a_restart_counts_nothing() {
     let mut schedule = Schedule::new(NonZeroU32::new(100).unwrap(), 0);
-    assert_eq!(schedule.begin(90), Due { late: 0, missed: 0, next: 200 });
+    assert_eq!(schedule.begin(90), DueTick { late: 0, missed: 0, next: 200 });
     assert_eq!(schedule.next(), 200);
     assert_eq!(schedule.restart(1234), 1334);
-    assert_eq!(schedule.begin(1340), Due { late: 6, missed: 0, next: 1434 });
-    assert_eq!(schedule.begin(1734), Due { late: 0, missed: 3, next: 1834 });
+    assert_eq!(schedule.begin(1340), DueTick { late: 6, missed: 0, next: 1434 });
+    assert_eq!(schedule.begin(1734), DueTick { late: 0, missed: 3, next: 1834 });
 }
 
 /// Up to a turn of the counter less a period; half a turn is 9 s of 240 MHz.

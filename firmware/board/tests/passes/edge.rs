@@ -4,7 +4,7 @@
 
 use controller::supervised::{CONVERTER, Cause, Phase};
 use controller::{COMMAND_WORDS, CommandKind, GENERATOR_BUSY};
-use specgen_board::Noticed;
+use specgen_board::TargetStatus;
 use specgen_hal::Fault;
 use specgen_link::client::Client;
 use specgen_link::{Bytes, EdgeStatus, PassAction, Refusal, Reply, Request, Silence, WaveAction};
@@ -277,7 +277,7 @@ fn an_edge_hides_no_other_event_of_its_tick() {
     line.parts(|parts| parts.input = true);
     line.with(|rig| {
         assert_eq!(rig.exchange.report.cause, Cause::None);
-        rig.board.tick(&mut rig.exchange, Noticed { missed: 0, stop: true, amplifier: false });
+        rig.board.tick(&mut rig.exchange, TargetStatus { missed: 0, stop: true, amplifier: false });
         assert_eq!(rig.exchange.report.cause, Cause::EmergencyStop);
     });
 }

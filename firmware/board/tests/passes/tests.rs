@@ -13,7 +13,7 @@ mod record;
 mod samples;
 
 use controller::supervised::Machine;
-use specgen_board::{Desk, Exchange, Stopwatch, Visit};
+use specgen_board::{Exchange, LinkHandler, RequestContext, Stopwatch};
 use specgen_link::{Device, Reply, Request};
 
 /// Asks without the link, whoever has the session, and looks at the answer.
@@ -24,5 +24,5 @@ fn ask<R>(
     look: impl FnOnce(Reply<'_>) -> R,
 ) -> R {
     let mut with = |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(exchange, machine);
-    look(Visit { desk: &mut Desk::new(Stopwatch::NONE), with: &mut with }.execute(&request))
+    look(RequestContext { desk: &mut LinkHandler::new(Stopwatch::NONE), with: &mut with }.execute(&request))
 }

@@ -210,13 +210,13 @@ fn a_code_out_of_range_is_a_fault_and_nothing_is_written() {
 }
 
 /// An SPI that reports errors, and counts how often it was asked.
-struct Broken(u32);
+struct FailingSpi(u32);
 
-impl embedded_hal::spi::ErrorType for Broken {
+impl embedded_hal::spi::ErrorType for FailingSpi {
     type Error = ErrorKind;
 }
 
-impl embedded_hal::spi::SpiDevice for Broken {
+impl embedded_hal::spi::SpiDevice for FailingSpi {
     fn transaction(&mut self, _: &mut [embedded_hal::spi::Operation<'_, u8>]) -> Result<(), ErrorKind> {
         self.0 += 1;
         Err(ErrorKind::Overrun)
@@ -229,7 +229,8 @@ fn an_error_of_the_bus_is_a_fault_and_the_other_part_still_gets_its_codes() {
     // The registers of the first part are unknown, so nothing is read back.
     second.extend(write_words(None, [4, 5, 6]));
     let ldac = [low(), high()];
-    let mut dacs = Ad5686rPair::new(Broken(0), Spi::new(&frames(&second)), pulse(&ldac), Pin::new(&[low()]), NoopDelay);
+    let mut dacs =
+        Ad5686rPair::new(FailingSpi(0), Spi::new(&frames(&second)), pulse(&ldac), Pin::new(&[low()]), NoopDelay);
     assert_eq!(dacs.start(), Err(Fault::Bus));
     assert_eq!(dacs.ask(), Ok(()));
     assert_eq!(dacs.write(&[1, 2, 3, 4, 5, 6]), Err(Fault::Bus));

@@ -3,7 +3,7 @@
 use embedded_hal_mock::eh1::delay::NoopDelay;
 use embedded_hal_mock::eh1::digital::{Mock as Pin, State, Transaction as PinStep};
 use embedded_hal_mock::eh1::spi::{Mock as Spi, Transaction as SpiStep};
-use specgen_hal::ad7606::{Ad7606, Busy, CONVST_LOW, POLLS, Window};
+use specgen_hal::ad7606::{Ad7606, BusyLine, CONVST_LOW, POLLS, Window};
 use specgen_hal::{Fault, Gauges, Pulse};
 
 /// Two's complement codes of 16 bits as the part sends them.
@@ -99,7 +99,7 @@ fn a_conversion_that_does_not_end_is_given_up() {
 /// A line that latches a fall: what each look shows, whether it falls after it is watched, and whether it is.
 struct Latching(std::vec::IntoIter<bool>, bool, bool);
 
-impl Busy for Latching {
+impl BusyLine for Latching {
     fn is_high(&mut self) -> Result<bool, Fault> {
         self.0.next().ok_or(Fault::Pin)
     }

@@ -8,7 +8,7 @@ use super::step::{self, take_setpoint};
 use super::tick::TickInput;
 use crate::kinematics::leg_displacements;
 use crate::memory::LegMemory as _;
-use crate::spec::{Compiled, Config, LEGS};
+use crate::spec::{Config, ConstSpec, LEGS};
 use crate::stage::{Stage, stages};
 
 /// Brings a copy of the state to where the stages find it; not measured.

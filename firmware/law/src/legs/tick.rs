@@ -6,7 +6,7 @@ use specgen_runtime::snapshot::Writer;
 
 use super::constants::SixLegs;
 use super::state::State;
-use crate::spec::{Compiled, Input, LEGS, TickOutput};
+use crate::spec::{ConstSpec, Input, LEGS, TickOutput};
 use crate::words::{names, six};
 
 /// Words of a tick's input.
@@ -64,7 +64,7 @@ impl<P: SixLegs> Input<P> for TickInput<P> {
     }
 }
 
-impl<P: SixLegs + Compiled> TickInput<P> {
+impl<P: SixLegs + ConstSpec> TickInput<P> {
     /// From words in the order of [`INPUT_NAMES`].
     #[must_use]
     pub fn from_words(words: &P::InputWords) -> Self {

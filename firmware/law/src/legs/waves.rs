@@ -5,7 +5,7 @@ use specgen_runtime::{Motion, Real, SetpointKind};
 
 use super::constants::SixLegs;
 use crate::kinematics::leg_displacements;
-use crate::spec::{Compiled, Config};
+use crate::spec::{Config, ConstSpec};
 
 /// No limit of the spec: the slew rate of the amplifiers is what a leg has to keep to, m/s².
 const ACCELERATION: f64 = 1e6;
@@ -13,7 +13,7 @@ const ACCELERATION: f64 = 1e6;
 /// Range from `actuator.stroke` or, where set-points are poses, `workspace`; the rate is what the slew limit in force
 /// leaves a leg, shared by the six axes of a pose.
 #[must_use]
-pub fn limits<P: SixLegs + Compiled>(config: &Config<P>) -> Limits<P::Real> {
+pub fn limits<P: SixLegs + ConstSpec>(config: &Config<P>) -> Limits<P::Real> {
     let p = P::CONSTANTS;
     let ticks_per_second = P::Real::from_f64(1.0 / p.period_seconds());
     let codes = P::Real::from_i32(config.code_limits.max_step);

@@ -1,7 +1,7 @@
 //! A pass of a motion that repeats: what it writes into the words of a command, and what a tick shows of it.
 
 use specgen_runtime::Real;
-use specgen_runtime::pass::Given;
+use specgen_runtime::pass::PassInput;
 use specgen_runtime::setpoint::CommandKind;
 
 use super::tick::command_words;
@@ -16,7 +16,7 @@ pub fn may_begin(status: u32, words: &[u64]) -> bool {
 }
 
 /// Writes the correction into the command's words, and the trajectory that begins.
-pub fn write<T: Real>(given: &Given<T>, words: &mut [u64]) {
+pub fn write<T: Real>(given: &PassInput<T>, words: &mut [u64]) {
     for (slot, number) in words.iter_mut().skip(command_words(0)).zip(&given.correction) {
         *slot = number.to_word();
     }

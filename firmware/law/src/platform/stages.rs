@@ -9,7 +9,7 @@ use super::state::State;
 use super::step::{self, known_load, reaction};
 use super::tick::TickInput;
 use crate::memory::LegMemory as _;
-use crate::spec::{Compiled, Config, LEGS};
+use crate::spec::{Config, ConstSpec, LEGS};
 use crate::stage::{Stage, stages};
 
 /// Brings a copy of the state to where the stages find it, with each leg's request in place of its excess; not measured.

@@ -9,7 +9,7 @@ use specgen_runtime::{Real as _, RequestCorrection};
 
 use super::constants::Platform;
 use super::state::State;
-use crate::spec::{Compiled, Input, LEGS, TickOutput};
+use crate::spec::{ConstSpec, Input, LEGS, TickOutput};
 use crate::words::{fill, names, six};
 
 /// Words of a command without a correction.
@@ -70,7 +70,7 @@ pub const fn output_names<const N: usize>() -> [&'static str; N] {
 }
 
 /// What is wanted of a platform's correction.
-type Wanted<P> = <<P as Platform>::Correction as RequestCorrection<<P as crate::Spec>::Real>>::Wanted;
+type Offsets<P> = <<P as Platform>::Correction as RequestCorrection<<P as crate::Spec>::Real>>::Offsets;
 
 /// What a tick reads.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,7 +78,7 @@ pub struct TickInput<P: Platform> {
     /// What the platform is to do.
     pub command: Command<P::Real>,
     /// c, what was learned or prepared for the motion, added to the request: m and rad.
-    pub correction: Wanted<P>,
+    pub correction: Offsets<P>,
     /// Reading of each gauge: V if the spec gives a calibration, else m from rest.
     pub gauge: [P::Real; 6],
     /// Measured force (N) and torque (N m) of the work piece ON the platform, about P_C, base axes.
@@ -119,7 +119,7 @@ impl<P: Platform> Input<P> for TickInput<P> {
     }
 }
 
-impl<P: Platform + Compiled> TickInput<P> {
+impl<P: Platform + ConstSpec> TickInput<P> {
     /// From words in the order of the controller's `INPUT_NAMES`.
     #[must_use]
     pub fn from_words(words: &P::InputWords) -> Self {
@@ -128,7 +128,7 @@ impl<P: Platform + Compiled> TickInput<P> {
 }
 
 /// The correction of a command's words.
-fn wanted<P: Platform>(p: P, words: &[u64]) -> Wanted<P> {
+fn wanted<P: Platform>(p: P, words: &[u64]) -> Offsets<P> {
     let mut wanted = P::Correction::nothing(p.correction());
     fill(wanted.as_mut(), words, MOTION_WORDS);
     wanted

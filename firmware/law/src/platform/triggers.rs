@@ -2,7 +2,7 @@
 
 use specgen_runtime::setpoint::CommandKind;
 use specgen_runtime::supervisor::Phase;
-use specgen_runtime::trigger::{OutputLines as _, Seen};
+use specgen_runtime::trigger::{Observation, OutputLines as _};
 
 use super::constants::Platform;
 use super::state::State;
@@ -29,7 +29,7 @@ pub(crate) fn fire<P: Platform>(
     }
     let command = &input.command;
     let follows = status & (SETPOINT_FAULT | SETPOINT_STALE | GENERATOR_BUSY) == 0;
-    let seen = Seen {
+    let seen = Observation {
         pose,
         moves: status & GENERATOR_BUSY != 0 || generator.can_stop(),
         streams: command.kind == CommandKind::Stream && follows,

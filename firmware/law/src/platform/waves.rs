@@ -5,12 +5,12 @@ use specgen_runtime::wave::Limits;
 use specgen_runtime::{Motion, Real};
 
 use super::constants::Platform;
-use crate::spec::{Compiled, Config};
+use crate::spec::{Config, ConstSpec};
 use crate::status::GENERATOR_BUSY;
 
 /// Those of streams; from `control.setpoint` and `workspace`.
 #[must_use]
-pub fn limits<P: Platform + Compiled>(_config: &Config<P>) -> Limits<P::Real> {
+pub fn limits<P: Platform + ConstSpec>(_config: &Config<P>) -> Limits<P::Real> {
     Limits::of(P::CONSTANTS.setpoints())
 }
 

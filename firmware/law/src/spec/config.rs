@@ -2,10 +2,10 @@
 
 use core::ops::Deref;
 
-use specgen_runtime::Permitted;
+use specgen_runtime::PermittedRange;
 use specgen_runtime::snapshot::Writer;
 
-use super::{Compiled, Settings as _, SettingsOf, Spec};
+use super::{ConstSpec, Settings as _, SettingsOf, Spec};
 use crate::words::{WordArray as _, word};
 
 /// What may change while running. Every value it holds keeps the tick within its promises.
@@ -35,7 +35,7 @@ impl<P: Spec> Config<P> {
     /// The first word that is out of range.
     pub fn read(p: P, words: &[u64]) -> Result<Self, ConfigError> {
         for (word, value) in words.iter().enumerate() {
-            match Permitted::of(p.permitted(), word) {
+            match PermittedRange::of(p.permitted(), word) {
                 Some(permitted) if permitted.takes(*value) => {}
                 _ => return Err(ConfigError { word }),
             }
@@ -48,7 +48,7 @@ impl<P: Spec> Config<P> {
     }
 }
 
-impl<P: Compiled> Config<P> {
+impl<P: ConstSpec> Config<P> {
     /// The spec's settings.
     #[must_use]
     pub const fn new() -> Self {
@@ -84,7 +84,7 @@ impl<P: Compiled> Config<P> {
     }
 }
 
-impl<P: Compiled> Default for Config<P> {
+impl<P: ConstSpec> Default for Config<P> {
     fn default() -> Self {
         Self::new()
     }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::lockstep::{Lockstep, Machine};
 use specgen_link::{
-    Bytes, Counted, Device, Endpoint, FRAME, Header, KNOT, Kind, MESSAGE, Receiver, Refusal, Reply, Request, Stage,
+    Bytes, CostUnit, Device, Endpoint, FRAME, Header, KNOT, Kind, MESSAGE, Receiver, Refusal, Reply, Request, Stage,
     VERSION, WORDS, put_knots, reset_cause,
 };
 
@@ -279,8 +279,8 @@ impl Machine for Adder {
         2
     }
 
-    fn counted(&self) -> Counted {
-        Counted::Instructions
+    fn counted(&self) -> CostUnit {
+        CostUnit::Instructions
     }
 
     fn configure(&mut self, config: &[u64]) -> Result<(), usize> {
@@ -337,7 +337,7 @@ fn a_lock_step_steps_from_a_reset_on_and_refuses_what_does_not_fit() {
     assert!(matches!(device.execute(&step), Reply::Stepped { digest: 113, .. }));
     let Reply::Identity(identity) = device.execute(&Request::Hello) else { panic!("no identity") };
     assert_eq!([identity.config_words, identity.input_words, identity.output_words], [2, 1, 2]);
-    assert_eq!((identity.stages, identity.counted, identity.description), (2, Counted::Instructions, 11));
+    assert_eq!((identity.stages, identity.counted, identity.description), (2, CostUnit::Instructions, 11));
     let piece = Reply::Chunk { offset: 5, total: 11, bytes: Bytes(b"adder\n") };
     assert_eq!(device.execute(&Request::Describe { offset: 5 }), piece);
     assert!(matches!(device.execute(&Request::LockstepStage { index: 1 }), Reply::Stage(_)));

@@ -4,11 +4,11 @@ use controller::supervised::{Phase, Request};
 use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, Config, Real, State, passes};
 use specgen_link::EdgeStatus;
-use specgen_runtime::pending::Pending;
+use specgen_runtime::pending::EdgeWait;
 use specgen_runtime::setpoint::BUSY;
 use specgen_runtime::wave::{Settings, Stage};
 
-use crate::handover::{Awaited, Player, Wish};
+use crate::handover::{EdgeCommand, OperatorRequest, Player};
 use crate::words::Command;
 
 /// Command, wave and pass of the loop.
@@ -22,7 +22,7 @@ pub struct Setpoints {
     /// Of the pass under way; or one that is over, until it is handed back.
     player: Option<Player>,
     /// The input line, and what waits for it.
-    pending: Pending<Awaited>,
+    pending: EdgeWait<EdgeCommand>,
 }
 
 impl Setpoints {
@@ -34,12 +34,12 @@ impl Setpoints {
             sequence: 0,
             waving: false,
             player: None,
-            pending: Pending::new(),
+            pending: EdgeWait::new(),
         }
     }
 
     /// During a pass the command is its own: only the request is taken.
-    pub fn wish(&mut self, wish: Wish) {
+    pub fn wish(&mut self, wish: OperatorRequest) {
         if let Some(command) = wish.command.filter(|_| !self.passes()) {
             self.pending.cancel();
             self.command = command;
@@ -47,12 +47,12 @@ impl Setpoints {
         self.request = wish.request;
     }
 
-    /// The input line in a tick, as [`Pending::sense`].
+    /// The input line in a tick, as [`EdgeWait::sense`].
     pub fn sense<E>(&mut self, high: Result<bool, E>) -> bool {
         self.pending.sense(high)
     }
 
-    pub fn wait_for_edge(&mut self, awaited: Awaited) {
+    pub fn wait_for_edge(&mut self, awaited: EdgeCommand) {
         self.pending.wait(awaited);
     }
 
@@ -76,11 +76,11 @@ impl Setpoints {
         let free = self.wave.stage() == Stage::Idle && !self.passes() && status & BUSY == 0;
         let begun = free
             && match awaited {
-                Awaited::Command(command) => {
+                EdgeCommand::Command(command) => {
                     self.command = command;
                     true
                 }
-                Awaited::Wave(settings) => {
+                EdgeCommand::Wave(settings) => {
                     let limits = waves::limits(config);
                     let may = waves::may_begin(status, &self.command, &settings.center, &limits).is_ok();
                     if may {
@@ -200,7 +200,7 @@ mod tests {
     fn setpoints() -> (Setpoints, Config) {
         let config = Config::new();
         let mut setpoints = Setpoints::new(&config);
-        setpoints.wish(Wish { command: Some([5; COMMAND_WORDS]), request: Request::Run });
+        setpoints.wish(OperatorRequest { command: Some([5; COMMAND_WORDS]), request: Request::Run });
         (setpoints, config)
     }
 
@@ -253,7 +253,7 @@ mod tests {
     #[test]
     fn a_wish_keeps_what_it_does_not_name() {
         let (mut setpoints, config) = setpoints();
-        setpoints.wish(Wish { command: None, request: Request::Hold });
+        setpoints.wish(OperatorRequest { command: None, request: Request::Hold });
         assert_eq!((setpoints.request(), setpoints.next(Phase::Running, &config)), (Request::Hold, [5; COMMAND_WORDS]));
     }
 
@@ -261,7 +261,7 @@ mod tests {
     fn a_command_begins_behind_the_tick_in_which_the_line_rises() {
         let (mut setpoints, config) = setpoints();
         assert_eq!(stage(&setpoints), Some(pending::Stage::None));
-        setpoints.wait_for_edge(Awaited::Command([8; COMMAND_WORDS]));
+        setpoints.wait_for_edge(EdgeCommand::Command([8; COMMAND_WORDS]));
         assert_eq!([HIGH, LOW, LOW].map(|line| tick(&mut setpoints, 1, line, 0)), [false; 3]);
         assert_eq!(stage(&setpoints), Some(pending::Stage::Waiting));
         assert_eq!(setpoints.next(Phase::Running, &config), [5; COMMAND_WORDS]);
@@ -279,7 +279,7 @@ mod tests {
             (setpoints, config)
         };
         let await_it = |setpoints: &mut Setpoints| {
-            setpoints.wait_for_edge(Awaited::Command([8; COMMAND_WORDS]));
+            setpoints.wait_for_edge(EdgeCommand::Command([8; COMMAND_WORDS]));
         };
         // A motion, a wave, a pass.
         let (mut setpoints, config) = waits();
@@ -299,7 +299,7 @@ mod tests {
         // Other orders, and a machine that does not run.
         let orders: [fn(&mut Setpoints); 6] = [
             |setpoints| setpoints.stop_waiting(),
-            |setpoints| setpoints.wish(Wish { command: Some([1; COMMAND_WORDS]), request: Request::None }),
+            |setpoints| setpoints.wish(OperatorRequest { command: Some([1; COMMAND_WORDS]), request: Request::None }),
             |setpoints| setpoints.start(&wave(9), &Config::new()),
             |setpoints| setpoints.stop(),
             |setpoints| setpoints.pass(player()),
@@ -324,8 +324,8 @@ mod tests {
             (0, Settings { center: [1.0; 6], ..wave(10) }, pending::Stage::Refused),
         ] {
             let (mut setpoints, config) = setpoints();
-            setpoints.wish(Wish { command: Some([command; COMMAND_WORDS]), request: Request::None });
-            setpoints.wait_for_edge(Awaited::Wave(settings));
+            setpoints.wish(OperatorRequest { command: Some([command; COMMAND_WORDS]), request: Request::None });
+            setpoints.wait_for_edge(EdgeCommand::Wave(settings));
             tick(&mut setpoints, 1, LOW, 0);
             tick(&mut setpoints, 2, HIGH, 0);
             assert_eq!(stage(&setpoints), Some(stage_then));
@@ -339,7 +339,7 @@ mod tests {
         let (mut setpoints, config) = setpoints();
         setpoints.pass(player());
         assert!(setpoints.take_player().is_none(), "under way");
-        setpoints.wish(Wish { command: Some([7; COMMAND_WORDS]), request: Request::Hold });
+        setpoints.wish(OperatorRequest { command: Some([7; COMMAND_WORDS]), request: Request::Hold });
         assert_eq!(setpoints.request(), Request::Hold);
         let state = controller::state_at_reset();
         for number in 0..6 {

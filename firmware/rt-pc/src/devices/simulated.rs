@@ -13,7 +13,7 @@ use super::{Contacts, Device};
 /// How long the first reading may take, ns: the machine may be pre-cycling.
 const FIRST: u64 = 60_000_000_000;
 
-pub struct Simulated {
+pub struct SimulatedDevices {
     client: Client,
     path: String,
     tick: u64,
@@ -27,7 +27,7 @@ pub struct Simulated {
     edges: Option<u64>,
 }
 
-impl Simulated {
+impl SimulatedDevices {
     /// Opens it and waits until it gives its first reading. Later ones may take `timeout`, ns. Its input line rises every `edges` ticks.
     ///
     /// # Errors
@@ -61,7 +61,7 @@ impl Simulated {
     }
 }
 
-impl Gauges for Simulated {
+impl Gauges for SimulatedDevices {
     /// Those of the spec.
     const BITS: u32 = u32::BITS - CONVERTER.highest.leading_zeros();
 
@@ -81,7 +81,7 @@ impl Gauges for Simulated {
     }
 }
 
-impl Amplifiers for Simulated {
+impl Amplifiers for SimulatedDevices {
     /// Those of the largest converter; the controller keeps codes within its own.
     const BITS: u32 = 31;
 
@@ -99,7 +99,7 @@ impl Amplifiers for Simulated {
 }
 
 /// A simulated machine has nothing that outputs lead to: they stand in the record.
-impl Lines for Simulated {
+impl Lines for SimulatedDevices {
     const COUNT: usize = LINES;
     const INPUT: bool = true;
 
@@ -113,7 +113,7 @@ impl Lines for Simulated {
     }
 }
 
-impl Device for Simulated {
+impl Device for SimulatedDevices {
     fn tick(&mut self, tick: u64) {
         self.tick = tick;
     }
@@ -197,7 +197,7 @@ mod tests {
     fn readings_are_those_of_their_tick_and_a_silent_machine_is_not_waited_for_twice() {
         let machine = Machine::new("read", 700_000_000);
         // Its first reading may take long.
-        let mut device = Simulated::open(&machine.path, TIMEOUT, None).unwrap();
+        let mut device = SimulatedDevices::open(&machine.path, TIMEOUT, None).unwrap();
         assert_eq!((device.wrench(), device.beat()), ([0.0; CHANNELS], Ok(Contacts::default())));
         for tick in [0, 1, 5] {
             device.tick(tick);
@@ -223,13 +223,13 @@ mod tests {
         device.tick(9);
         assert!(device.read().is_err() && clock::now() - start >= TIMEOUT, "a machine that answered is waited for");
         assert_eq!(device.describe(), format!("simulated machine {}", machine.path.display()));
-        assert_eq!(<Simulated as Gauges>::BITS, 17);
+        assert_eq!(<SimulatedDevices as Gauges>::BITS, 17);
     }
 
     #[test]
     fn codes_and_the_enable_line_go_out_with_their_tick() {
         let machine = Machine::new("write", 0);
-        let mut device = Simulated::open(&machine.path, TIMEOUT, None).unwrap();
+        let mut device = SimulatedDevices::open(&machine.path, TIMEOUT, None).unwrap();
         let mut expected = Vec::new();
         device.tick(3);
         device.write(&[9; CHANNELS]).unwrap();
@@ -251,7 +251,7 @@ mod tests {
         for (edges, high) in
             [(None, &[][..]), (Some(4), &[4, 5, 8, 9, 12, 13][..]), (Some(5), &[5, 6, 7, 10, 11, 12][..])]
         {
-            let mut device = Simulated::open(&machine.path, TIMEOUT, edges).unwrap();
+            let mut device = SimulatedDevices::open(&machine.path, TIMEOUT, edges).unwrap();
             let found: Vec<u64> = (0..14)
                 .filter(|tick| {
                     device.tick(*tick);
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn a_machine_of_another_spec_or_of_nobody_is_refused() {
         let path = std::env::temp_dir().join(format!("rt-pc-machine-other-{}", std::process::id()));
-        let open = |path: &Path| Simulated::open(path, TIMEOUT, None).err().unwrap();
+        let open = |path: &Path| SimulatedDevices::open(path, TIMEOUT, None).err().unwrap();
         assert!(open(&path).contains("no simulated machine there"));
         let other = Server::create(&path, "0123456789abcdef0123456789abcdef").unwrap();
         assert!(open(&path).contains("the machine of another spec"));

@@ -119,13 +119,13 @@ mod tests {
     use std::path::PathBuf;
 
     /// A listener, and clients that come at times 0, 1, 2 …, each with its number as state.
-    struct Hall {
+    struct TestClients {
         clients: Clients<usize>,
         path: PathBuf,
         lines: Vec<UnixStream>,
     }
 
-    impl Hall {
+    impl TestClients {
         fn new(name: &str) -> Self {
             let path = std::env::temp_dir().join(format!("rt-pc-clients-{name}-{}", std::process::id()));
             Self { clients: Clients::new(Listener::open(&path).unwrap()), path, lines: Vec::new() }
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn the_client_that_was_silent_for_longest_makes_room_unless_it_keeps_its_place() {
-        let mut hall = Hall::new("silent");
+        let mut hall = TestClients::new("silent");
         for number in 0..MOST {
             assert_eq!(hall.come(|_| false), [] as [usize; 0]);
             assert_eq!(hall.clients.descriptors().count(), number + 2);
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_client_that_hangs_up_is_given_back_and_one_that_floods_is_read_in_pieces() {
-        let mut hall = Hall::new("gone");
+        let mut hall = TestClients::new("gone");
         for _ in 0..3 {
             hall.come(|_| false);
         }
@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn no_more_come_in_a_round_than_can_be_served() {
-        let mut hall = Hall::new("many");
+        let mut hall = TestClients::new("many");
         let path = hall.path.clone();
         hall.lines.extend((0..TAKEN + 4).map(|_| UnixStream::connect(&path).unwrap()));
         assert_eq!(hall.clients.accept(0, || 0, |_| false).len(), TAKEN - MOST);

@@ -3,7 +3,7 @@
 use controller::supervised::{Cause, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
 use controller::{COMMAND_WORDS, CONFIG_WORDS, Config, DESCRIPTION, PLACE_WORDS, Real, passes, triggers};
 use specgen_link::{
-    Bytes, Counted, Counters, Device, Health, Identity, KNOT, KNOTS, PassAction, RecorderAction, RecorderStatus,
+    Bytes, CostUnit, Counters, Device, Health, Identity, KNOT, KNOTS, PassAction, RecorderAction, RecorderStatus,
     Refusal, Reply, Request, Status, WaveAction, put_knots, put_words,
 };
 use specgen_runtime::learning;
@@ -12,8 +12,8 @@ use specgen_runtime::playback::Knot;
 use specgen_runtime::wave::{self, Settings};
 
 use crate::capture::CAPACITY;
-use crate::console::{Console, No};
-use crate::operator::{Denied, HostId};
+use crate::console::{Console, Rejection};
+use crate::operator::{ControlRefusal, HostId};
 use crate::passes::Passes;
 use crate::samples::Stream;
 
@@ -22,7 +22,7 @@ const CHUNK: usize = 960;
 const _: () = assert!(CHUNK + 24 < specgen_link::MESSAGE);
 
 /// The console as the device of a link.
-pub struct Desk<'a> {
+pub struct LinkHandler<'a> {
     /// What is asked of the run.
     pub console: &'a mut Console,
     pub host: HostId,
@@ -38,7 +38,7 @@ pub struct Desk<'a> {
     pub knots: [u8; KNOTS * KNOT],
 }
 
-impl<'a> Desk<'a> {
+impl<'a> LinkHandler<'a> {
     pub fn new(
         console: &'a mut Console,
         host: HostId,
@@ -101,8 +101,8 @@ impl<'a> Desk<'a> {
             return Err(Refusal::Busy);
         }
         self.console.operator.take_for_host(self.host, self.now).map_err(|denied| match denied {
-            Denied::Ending => Refusal::State,
-            Denied::Others => Refusal::Busy,
+            ControlRefusal::Ending => Refusal::State,
+            ControlRefusal::Others => Refusal::Busy,
         })
     }
 
@@ -259,10 +259,10 @@ impl<'a> Desk<'a> {
     }
 }
 
-fn refusal(no: No) -> Refusal {
+fn refusal(no: Rejection) -> Refusal {
     match no {
-        No::State => Refusal::State,
-        No::Word(index) => Refusal::Word { index: index as u16 },
+        Rejection::State => Refusal::State,
+        Rejection::Word(index) => Refusal::Word { index: index as u16 },
     }
 }
 
@@ -273,7 +273,7 @@ fn piece(whole: &[u8], offset: u32) -> Reply<'_> {
     Reply::Chunk { offset, total: u32::try_from(whole.len()).unwrap_or(u32::MAX), bytes: Bytes(piece) }
 }
 
-impl Device for Desk<'_> {
+impl Device for LinkHandler<'_> {
     fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
         self.console.operator.seen(self.host, self.now);
         match *request {
@@ -284,7 +284,7 @@ impl Device for Desk<'_> {
                     input_words: MACHINE_INPUT_WORDS as u16,
                     output_words: MACHINE_OUTPUT_WORDS as u16,
                     stages: 0,
-                    counted: Counted::Nothing,
+                    counted: CostUnit::Nothing,
                     description: DESCRIPTION.len() as u32,
                 })
             }
@@ -338,7 +338,7 @@ mod tests {
     use super::*;
     use crate::bench::{row, said};
     use crate::capture::Capture;
-    use crate::handover::Order;
+    use crate::handover::LoopCommand;
     use crate::operator::{Operator, Timeout};
     use controller::CONFIG_NAMES;
 
@@ -356,7 +356,7 @@ mod tests {
     /// What a host is answered, as text; a piece of something longer as its bytes.
     fn ask_as(console: &mut Console, host: HostId, is_late: bool, request: &Request<'_>) -> String {
         let (mut events, mut stream) = (0, Stream::default());
-        let mut desk = Desk::new(console, host, is_late, &mut events, &mut stream, NOW);
+        let mut desk = LinkHandler::new(console, host, is_late, &mut events, &mut stream, NOW);
         format!("{:?}", desk.execute(request))
     }
 
@@ -376,7 +376,7 @@ mod tests {
         let mut all = Vec::new();
         loop {
             let (mut events, mut stream) = (0, Stream::default());
-            let mut desk = Desk::new(console, A, false, &mut events, &mut stream, NOW);
+            let mut desk = LinkHandler::new(console, A, false, &mut events, &mut stream, NOW);
             let Reply::Chunk { offset, total, bytes } = desk.execute(&request(all.len() as u32)) else {
                 panic!("no piece")
             };
@@ -415,10 +415,10 @@ mod tests {
         let mut console = console(Phase::Running);
         let mut shown = row(9);
         shown.place = core::array::from_fn(|k| k as u64 + 70);
-        let blind = crate::operator::Said { status: controller::GAUGE_FAULT, ..said(Phase::Running) };
+        let blind = crate::operator::SupervisorReport { status: controller::GAUGE_FAULT, ..said(Phase::Running) };
         console.update(&shown, blind, NOW);
         let (mut events, mut stream) = (0, Stream::default());
-        let mut desk = Desk::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let mut desk = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
         let Reply::Place { tick, phase, status, measured, words } = desk.execute(&Request::Place) else {
             panic!("no place")
         };
@@ -432,7 +432,7 @@ mod tests {
         let mut console = console(Phase::Holding);
         console.health.overruns = Some(5);
         let (mut events, mut stream) = (6, Stream::default());
-        let mut desk = Desk::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let mut desk = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
         for expected in [6, 0] {
             let Reply::Health(health) = desk.execute(&Request::Health) else { panic!("no health") };
             assert_eq!((health.events, health.overruns), (expected, Some(5)));
@@ -476,7 +476,7 @@ mod tests {
         assert_eq!(ask(&mut console, &setpoint), DONE);
         assert_eq!(console.operator.wish().unwrap().command, Some([3; COMMAND_WORDS]));
         // A wave commands in its place.
-        assert_eq!(console.start_wave(&Settings::still(), false), Err(No::State), "under a trajectory");
+        assert_eq!(console.start_wave(&Settings::still(), false), Err(Rejection::State), "under a trajectory");
         console.operator.set_by_link([0; COMMAND_WORDS]);
         console.start_wave(&Settings::still(), false).unwrap();
         assert_eq!(ask(&mut console, &setpoint), refused(Refusal::State));
@@ -496,9 +496,11 @@ mod tests {
         assert!(console.outgoing().0.is_empty() && *console.config() == Config::new());
         words[place] = crate::words::word(0.0);
         assert_eq!(write(&mut console, &words), DONE);
-        assert!(matches!(console.outgoing().0.back(), Some(Order::Configure(config)) if config.to_words() == words));
+        assert!(
+            matches!(console.outgoing().0.back(), Some(LoopCommand::Configure(config)) if config.to_words() == words)
+        );
         let (mut events, mut stream) = (0, Stream::default());
-        let mut desk = Desk::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let mut desk = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
         let Reply::Config { words: found } = desk.execute(&Request::ReadConfig) else { panic!("no settings") };
         assert_eq!(found.0, bytes(&words));
     }
@@ -533,7 +535,7 @@ mod tests {
         }
         let orders: Vec<_> = console.outgoing().0.iter().collect();
         assert!(
-            matches!(orders[..], [Order::Record(settings), Order::Trigger, Order::StopRecorder] if settings.after == 1)
+            matches!(orders[..], [LoopCommand::Record(settings), LoopCommand::Trigger, LoopCommand::StopRecorder] if settings.after == 1)
         );
         let arm = |after| Request::Recorder { action: RecorderAction::Arm { after } };
         assert_eq!(ask(&mut console, &arm(CAPACITY + 1)), refused(Refusal::Word { index: 0 }));
@@ -564,10 +566,10 @@ mod tests {
         assert_eq!(wave(&mut console, start, &good), DONE);
         assert!(console.is_engaged());
         let orders: Vec<_> = console.outgoing().0.iter().collect();
-        assert!(matches!(orders[..], [Order::Wish(_), Order::Wave(wave)] if wave.ticks == 50));
+        assert!(matches!(orders[..], [LoopCommand::Wish(_), LoopCommand::Wave(wave)] if wave.ticks == 50));
         assert_eq!(wave(&mut console, start, &good), refused(Refusal::State));
         assert_eq!(wave(&mut console, WaveAction::Stop, &[]), DONE);
-        assert!(matches!(console.outgoing().0.back(), Some(Order::StopWave)));
+        assert!(matches!(console.outgoing().0.back(), Some(LoopCommand::StopWave)));
     }
 
     #[test]
@@ -598,18 +600,18 @@ mod tests {
         console.operator.wish();
         let (mut events, mut stream) = (0, Stream::default());
         let words = bytes(&[1; COMMAND_WORDS]);
-        let mut desk = Desk::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let mut desk = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
         let expected = COMMAND_WORDS as u16;
         assert_eq!(desk.command_on_edge(Bytes(&words[8..])), Err(Refusal::Length { expected }));
         assert_eq!(desk.command_on_edge(Bytes(&words)), Ok(()));
         assert!(matches!(desk.edge(false), Reply::Edge(_)));
         assert_eq!(desk.console.outgoing().0.len(), 1);
         assert!(matches!(desk.edge(true), Reply::Edge(_)));
-        assert!(matches!(desk.console.outgoing().0.back(), Some(Order::StopWaiting)));
+        assert!(matches!(desk.console.outgoing().0.back(), Some(LoopCommand::StopWaiting)));
         desk.is_late = true;
         assert_eq!(desk.edge(true), Reply::Refused(Refusal::Busy));
         let mut resting = self::console(Phase::Holding);
-        let mut desk = Desk::new(&mut resting, A, false, &mut events, &mut stream, NOW);
+        let mut desk = LinkHandler::new(&mut resting, A, false, &mut events, &mut stream, NOW);
         assert_eq!(desk.command_on_edge(Bytes(&words)), Err(Refusal::State));
     }
 
@@ -618,7 +620,7 @@ mod tests {
         let mut console = console(Phase::Running);
         console.passes = Passes::with(8);
         let (mut events, mut stream) = (0, Stream::default());
-        let mut desk = Desk::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let mut desk = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
         let whole = (KNOTS * KNOT / size_of::<u64>()) as u16;
         let knots: Vec<u8> = (1..=12_i32).flat_map(i32::to_le_bytes).collect();
         assert_eq!(desk.knots(0, Bytes(&knots[1..])), Err(Refusal::Length { expected: whole }));
@@ -633,7 +635,7 @@ mod tests {
         let done = Reply::Refused(Refusal::Unsupported);
         assert_eq!(desk.pass(PassAction::Look), done);
         assert_eq!(desk.pass(PassAction::Abort), done);
-        assert!(matches!(desk.console.outgoing().0.back(), Some(Order::AbortPass)));
+        assert!(matches!(desk.console.outgoing().0.back(), Some(LoopCommand::AbortPass)));
         assert_eq!(desk.pass(PassAction::Learn { reach: 1, fade: [0, 0] }), Reply::Refused(Refusal::State));
         let begin = PassAction::Begin { spacing: 1, before: 0, ticks: 2, trajectory: 0 };
         assert_eq!(desk.pass(begin), Reply::Refused(Refusal::State));
@@ -641,7 +643,7 @@ mod tests {
         assert_eq!(desk.pass(PassAction::Abort), Reply::Refused(Refusal::Busy));
         assert_eq!(desk.pass(PassAction::Look), done);
         let mut away = self::console(Phase::Running);
-        let mut desk = Desk::new(&mut away, A, false, &mut events, &mut stream, NOW);
+        let mut desk = LinkHandler::new(&mut away, A, false, &mut events, &mut stream, NOW);
         assert_eq!(desk.fetched(0, Passes::errors), Reply::Refused(Refusal::State));
     }
 }

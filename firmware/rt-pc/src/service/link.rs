@@ -8,7 +8,7 @@ use rustix::io::ioctl_fionread;
 use specgen_link::{Counters, Endpoint};
 
 use super::clients::{Client, Clients, room};
-use super::desk::Desk;
+use super::desk::LinkHandler;
 use super::listener::Listener;
 use crate::console::Console;
 use crate::handover::Row;
@@ -149,7 +149,7 @@ fn obey(client: &mut Client<Line>, console: &mut Console, now: u64) -> io::Resul
         let said = client.read(&mut bytes, now)?;
         let Line { id, endpoint, unsent, is_late, events, stream } = &mut client.state;
         *is_late &= !said.is_empty();
-        let mut desk = Desk::new(console, *id, *is_late, events, stream, now);
+        let mut desk = LinkHandler::new(console, *id, *is_late, events, stream, now);
         for byte in said {
             if let Some(answer) = endpoint.push(*byte, &mut desk) {
                 unsent.extend_from_slice(answer);
@@ -279,7 +279,7 @@ mod tests {
                     input_words: 1,
                     output_words: 1,
                     stages: 0,
-                    counted: specgen_link::Counted::Nothing,
+                    counted: specgen_link::CostUnit::Nothing,
                     description: 0,
                 }),
                 _ => Reply::Done,

@@ -29,7 +29,7 @@ const MODE: u32 = 0o600;
 
 /// Why a file is not mapped.
 #[derive(Debug)]
-pub(super) enum Unfit {
+pub(super) enum MapError {
     /// Somebody else can change it, or what it leads to.
     NotOwn(String),
     /// It has another size than a `T`.
@@ -38,7 +38,7 @@ pub(super) enum Unfit {
     File(io::Error),
 }
 
-impl Unfit {
+impl MapError {
     fn of(error: io::Error, path: &Path) -> Self {
         match std::fs::read_link(path) {
             Ok(target) => Self::NotOwn(format!("it is a symbolic link to {}", target.display())),
@@ -47,7 +47,7 @@ impl Unfit {
     }
 }
 
-impl From<io::Error> for Unfit {
+impl From<io::Error> for MapError {
     fn from(error: io::Error) -> Self {
         Self::File(error)
     }
@@ -70,28 +70,28 @@ impl<T> Mapping<T> {
 
     /// A file that is there. It has to be as [`Mapping::create`] makes it: whoever else may write it may make it shorter too, and
     /// then reading the mapping ends the process.
-    pub(super) fn open(path: &Path) -> Result<Self, Unfit> {
+    pub(super) fn open(path: &Path) -> Result<Self, MapError> {
         let file = OpenOptions::new()
             .read(true)
             .write(true)
             .custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK)
             .open(path)
-            .map_err(|error| Unfit::of(error, path))?;
+            .map_err(|error| MapError::of(error, path))?;
         let found = file.metadata()?;
         // SAFETY: has no arguments and touches no memory.
         let user = unsafe { libc::geteuid() };
         if !found.is_file() {
-            return Err(Unfit::NotOwn("it is no regular file".to_owned()));
+            return Err(MapError::NotOwn("it is no regular file".to_owned()));
         }
         if found.uid() != user {
-            return Err(Unfit::NotOwn(format!("it belongs to user {}, and this is user {user}", found.uid())));
+            return Err(MapError::NotOwn(format!("it belongs to user {}, and this is user {user}", found.uid())));
         }
         if found.mode() & 0o777 != MODE {
             let mode = found.mode() & 0o777;
-            return Err(Unfit::NotOwn(format!("its mode is {mode:03o}, expected {MODE:03o}")));
+            return Err(MapError::NotOwn(format!("its mode is {mode:03o}, expected {MODE:03o}")));
         }
         if found.len() != size_of::<T>() as u64 {
-            return Err(Unfit::Size);
+            return Err(MapError::Size);
         }
         Ok(Self::of(&file)?)
     }

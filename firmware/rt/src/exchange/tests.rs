@@ -104,7 +104,7 @@ fn what_cannot_be_opened_says_what_to_do() {
     drop(server);
     put(&path, b"short", 0o600);
     assert!(refusal(&path, DIGEST).contains("not a simulated machine"));
-    put(&path, &[0; size_of::<Words>()], 0o600);
+    put(&path, &[0; size_of::<SharedWords>()], 0o600);
     assert!(refusal(&path, DIGEST).contains("not a simulated machine"));
     // What is left of a machine that was killed does not stand in the way.
     drop(Server::create(&path, DIGEST).unwrap());
@@ -131,7 +131,7 @@ fn refused(path: &Path, place: &Path, why: &str) {
 fn a_link_that_somebody_planted_is_not_followed() {
     let path = name("link");
     let victim = name("victim");
-    let precious = [7; size_of::<Words>()];
+    let precious = [7; size_of::<SharedWords>()];
     let part = path.with_extension(format!("{}.part", std::process::id()));
     for place in [&part, &path] {
         put(&victim, &precious, 0o600);
@@ -149,9 +149,9 @@ fn a_link_that_somebody_planted_is_not_followed() {
 fn a_file_that_others_may_write_or_own_is_refused() {
     use std::os::unix::fs::{MetadataExt, chown};
     let path = name("others");
-    put(&path, &[0; size_of::<Words>()], 0o666);
+    put(&path, &[0; size_of::<SharedWords>()], 0o666);
     refused(&path, &path, "its mode is 666, expected 600");
-    put(&path, &[0; size_of::<Words>()], 0o600);
+    put(&path, &[0; size_of::<SharedWords>()], 0o600);
     let owner = std::fs::metadata(&path).unwrap().uid();
     match chown(&path, Some(owner + 1), None) {
         Ok(()) => refused(&path, &path, &format!("it belongs to user {}, and this is user {owner}", owner + 1)),
@@ -169,11 +169,11 @@ fn a_file_that_is_mapped_is_never_made_shorter() {
     let path = name("mapped");
     let part = path.with_extension(format!("{}.part", std::process::id()));
     for (place, removed) in [(&part, true), (&path, false)] {
-        let left = Mapping::<Words>::create(place).unwrap();
+        let left = Mapping::<SharedWords>::create(place).unwrap();
         let kept = std::fs::File::open(place).unwrap();
         left.words().version.store(42, Ordering::Relaxed);
         let server = Server::create(&path, DIGEST).unwrap();
-        assert_eq!(kept.metadata().unwrap().len(), size_of::<Words>() as u64);
+        assert_eq!(kept.metadata().unwrap().len(), size_of::<SharedWords>() as u64);
         assert_eq!(left.words().version.load(Ordering::Relaxed), 42, "the old one is as it was");
         assert_eq!(place.exists(), !removed);
         drop(server);

@@ -35,7 +35,7 @@ pub struct Sensing {
 /// Words of the file, in order.
 #[derive(Default)]
 #[repr(C)]
-pub(super) struct Words {
+pub(super) struct SharedWords {
     pub(super) magic: AtomicU64,
     pub(super) version: AtomicU64,
     /// First half of the SHA-256 of the spec.
@@ -60,7 +60,7 @@ struct Bell {
     sleepers: AtomicU32,
 }
 
-impl Words {
+impl SharedWords {
     /// For the machine: the latest actuation and what the controller waits for (session, tick), once the counter of either has
     /// moved on from `seen`; none after `timeout` (ns). It looks for `look` (ns) before it sleeps.
     pub(super) fn wait(&self, seen: &mut u32, look: u64, timeout: u64) -> Option<(Actuation, [u64; 2])> {

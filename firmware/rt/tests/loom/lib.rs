@@ -120,7 +120,7 @@ mod tests {
     use loom::sync::Arc;
     use loom::thread;
 
-    use super::words::{Sensing, Words};
+    use super::words::{Sensing, SharedWords};
     use super::{PREEMPTIONS, WEAKENED};
 
     const SESSION: u64 = 7;
@@ -148,7 +148,7 @@ mod tests {
 
     /// A controller looks, without waiting, while readings are given out.
     fn looking() {
-        let words = Arc::new(Words::default());
+        let words = Arc::new(SharedWords::default());
         let machine = {
             let words = words.clone();
             thread::spawn(move || (1..=2).for_each(|tick| words.publish(&reading(tick))))
@@ -163,7 +163,7 @@ mod tests {
 
     /// A machine waits for the second of two orders: it sees it, and each that it sees is whole.
     fn waiting() {
-        let words = Arc::new(Words::default());
+        let words = Arc::new(SharedWords::default());
         let controller = {
             let words = words.clone();
             thread::spawn(move || (1..=2).for_each(|tick| words.actuate(SESSION, tick, true, &[tick as i32])))
@@ -182,7 +182,7 @@ mod tests {
 
     /// A controller gives two orders out and asks for the tick after them: no machine goes through that tick under an older order.
     fn asking() {
-        let words = Arc::new(Words::default());
+        let words = Arc::new(SharedWords::default());
         let controller = {
             let words = words.clone();
             thread::spawn(move || {
@@ -202,7 +202,7 @@ mod tests {
 
     /// Two ticks of a controller on a machine: each waits for the other, and nobody sleeps for ever.
     fn ticking() {
-        let words = Arc::new(Words::default());
+        let words = Arc::new(SharedWords::default());
         let machine = {
             let words = words.clone();
             thread::spawn(move || {

@@ -79,7 +79,7 @@ pub struct Tool<T> {
 impl<T: Real> Frames<T> for Tool<T> {
     #[inline]
     fn to_platform(&self, user: &Target<T>) -> Option<Target<T>> {
-        let turn = Turn::of(user, self.largest_angle)?;
+        let turn = Rotation::of(user, self.largest_angle)?;
         let mut target = *user;
         let shift = pivot(&turn.less_identity, &turn.velocity, &turn.acceleration, &self.point);
         subtract(&mut target, &shift);
@@ -101,7 +101,7 @@ pub struct Work<T> {
 impl<T: Real> Frames<T> for Work<T> {
     #[inline]
     fn to_platform(&self, user: &Target<T>) -> Option<Target<T>> {
-        let turn = Turn::of(user, self.largest_angle)?;
+        let turn = Rotation::of(user, self.largest_angle)?;
         let w = &self.axes;
         let less_identity = product_with_transpose(&product(w, &turn.less_identity), w);
         let velocity = apply(w, &turn.velocity);
@@ -141,7 +141,7 @@ impl<T: Real> Frames<T> for Work<T> {
 }
 
 /// A rotation with its angular velocity and acceleration.
-struct Turn<T> {
+struct Rotation<T> {
     /// R − I.
     less_identity: [[T; 3]; 3],
     /// ω, rad/s.
@@ -150,7 +150,7 @@ struct Turn<T> {
     acceleration: [T; 3],
 }
 
-impl<T: Real> Turn<T> {
+impl<T: Real> Rotation<T> {
     /// None if an angle is larger than `largest` or not a number.
     #[inline]
     fn of(user: &Target<T>, largest: T) -> Option<Self> {

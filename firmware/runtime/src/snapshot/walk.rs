@@ -2,17 +2,17 @@
 
 use core::convert::Infallible;
 
-use super::{Choice, Invalid, LARGEST, Piece, Reader, Sizes, Snapshot, Writer};
+use super::{Choice, InvalidState, LARGEST, Reader, Sizes, Snapshot, StatePart, Writer};
 use crate::digest::Digest;
 use crate::field::Field;
 use crate::real::Real;
 
 /// Declares a state in one list. Each field has its type, its value at reset, and how its word or words are walked over: a method of
-/// [`Words`], which [`Reader`] has under the same name, with its bounds. Behind `if` stands what must hold of the fields restored so
+/// [`WordSink`], which [`Reader`] has under the same name, with its bounds. Behind `if` stands what must hold of the fields restored so
 /// far, which are references there.
 ///
 /// From it come the struct, `new`, and [`Snapshot`], whose words are in the order of the fields. The name between bars is what bounds
-/// call the walk, for [`Words::sizes`]. Generic parameters are named behind the state, and declared in brackets.
+/// call the walk, for [`WordSink::sizes`]. Generic parameters are named behind the state, and declared in brackets.
 #[macro_export]
 macro_rules! state {
     (
@@ -46,7 +46,7 @@ macro_rules! state {
         }
 
         impl $(<$($declared)+>)? $crate::Snapshot for $name $(<$($generic),+>)? {
-            fn show(&self, $words: &mut impl $crate::snapshot::Words) -> Result<(), ::core::convert::Infallible> {
+            fn show(&self, $words: &mut impl $crate::snapshot::WordSink) -> Result<(), ::core::convert::Infallible> {
                 let Self { $($field),+ } = self;
                 $(
                     $words.$walk($field $($(, $bound)+)?)?;
@@ -58,7 +58,7 @@ macro_rules! state {
             fn restore(
                 &mut self,
                 $words: &mut $crate::snapshot::Reader<'_>,
-            ) -> Result<(), $crate::snapshot::Invalid> {
+            ) -> Result<(), $crate::snapshot::InvalidState> {
                 let Self { $($field),+ } = self;
                 $(
                     $words.$walk($field $($(, $bound)+)?)?;
@@ -81,7 +81,7 @@ macro_rules! state {
 
 /// What a state is shown to, word by word: a writer or a digest. No method fails; they return what the methods of [`Reader`] do, so
 /// that a walk does for both.
-pub trait Words: Sized {
+pub trait WordSink: Sized {
     /// A word.
     fn put(&mut self, word: u64);
 
@@ -92,8 +92,8 @@ pub trait Words: Sized {
     }
 
     /// The same for a state of these sizes, known at run time: what [`Reader::within`] reads.
-    fn within(&mut self, sizes: Sizes) -> Within<'_, Self> {
-        Within { words: self, sizes }
+    fn within(&mut self, sizes: Sizes) -> SizedSink<'_, Self> {
+        SizedSink { words: self, sizes }
     }
 
     /// A number within ±`largest`.
@@ -206,12 +206,12 @@ pub trait Words: Sized {
 
 /// A walk over a state of sizes that are known at run time: a memory has words for the extrema that it keeps, not for its room.
 #[derive(Debug)]
-pub struct Within<'a, W> {
+pub struct SizedSink<'a, W> {
     words: &'a mut W,
     sizes: Sizes,
 }
 
-impl<W: Words> Words for Within<'_, W> {
+impl<W: WordSink> WordSink for SizedSink<'_, W> {
     fn put(&mut self, word: u64) {
         self.words.put(word);
     }
@@ -225,7 +225,7 @@ impl<W: Words> Words for Within<'_, W> {
     }
 }
 
-impl Words for Digest {
+impl WordSink for Digest {
     #[inline]
     fn put(&mut self, word: u64) {
         self.word(word);
@@ -241,7 +241,7 @@ impl Words for Digest {
     }
 }
 
-impl Words for Writer<'_> {
+impl WordSink for Writer<'_> {
     #[inline]
     fn put(&mut self, word: u64) {
         self.word(word);
@@ -260,7 +260,7 @@ impl Words for Writer<'_> {
     }
 }
 
-impl Words for Piece<'_> {
+impl WordSink for StatePart<'_> {
     fn put(&mut self, word: u64) {
         self.word(word);
     }
@@ -271,154 +271,154 @@ impl Words for Piece<'_> {
     }
 }
 
-/// The methods of [`Words`], for a state that is restored.
+/// The methods of [`WordSink`], for a state that is restored.
 impl Reader<'_> {
-    /// [`Words::number`], restored.
+    /// [`WordSink::number`], restored.
     ///
     /// # Errors
     /// No state holds the word.
     #[inline]
-    pub fn number<T: Real>(&mut self, value: &mut T, largest: f64) -> Result<(), Invalid> {
+    pub fn number<T: Real>(&mut self, value: &mut T, largest: f64) -> Result<(), InvalidState> {
         *value = self.real(largest)?;
         Ok(())
     }
 
-    /// [`Words::numbers`], restored.
+    /// [`WordSink::numbers`], restored.
     ///
     /// # Errors
     /// No state holds the word.
-    pub fn numbers<T: Real>(&mut self, values: &mut [T], largest: f64) -> Result<(), Invalid> {
+    pub fn numbers<T: Real>(&mut self, values: &mut [T], largest: f64) -> Result<(), InvalidState> {
         self.reals(values, largest)
     }
 
-    /// [`Words::axes`], restored.
+    /// [`WordSink::axes`], restored.
     ///
     /// # Errors
     /// No state holds the word.
-    pub fn axes<T: Real>(&mut self, values: &mut [T; 6], largest: [f64; 6]) -> Result<(), Invalid> {
+    pub fn axes<T: Real>(&mut self, values: &mut [T; 6], largest: [f64; 6]) -> Result<(), InvalidState> {
         values.iter_mut().zip(largest).try_for_each(|(value, largest)| self.number(value, largest))
     }
 
-    /// [`Words::rows`], restored.
+    /// [`WordSink::rows`], restored.
     ///
     /// # Errors
     /// No state holds the word.
     #[inline]
-    pub fn rows<T: Real, const N: usize>(&mut self, rows: &mut [[T; N]], largest: f64) -> Result<(), Invalid> {
+    pub fn rows<T: Real, const N: usize>(&mut self, rows: &mut [[T; N]], largest: f64) -> Result<(), InvalidState> {
         rows.iter_mut().try_for_each(|row| self.numbers(row, largest))
     }
 
-    /// [`Words::stored`], restored.
+    /// [`WordSink::stored`], restored.
     ///
     /// # Errors
     /// No state holds the word.
-    pub fn stored<T: Real>(&mut self, values: &mut [T], _count: usize, largest: f64) -> Result<(), Invalid> {
+    pub fn stored<T: Real>(&mut self, values: &mut [T], _count: usize, largest: f64) -> Result<(), InvalidState> {
         let kept = self.sizes().kept(values.len());
         self.reals(values.get_mut(..kept).unwrap_or_default(), largest)
     }
 
-    /// [`Words::ticks`], restored.
+    /// [`WordSink::ticks`], restored.
     ///
     /// # Errors
     /// No state holds the word.
     #[inline]
-    pub fn ticks(&mut self, value: &mut i32, largest: i32) -> Result<(), Invalid> {
+    pub fn ticks(&mut self, value: &mut i32, largest: i32) -> Result<(), InvalidState> {
         *value = self.count_to(largest)?;
         Ok(())
     }
 
-    /// [`Words::place`], restored.
+    /// [`WordSink::place`], restored.
     ///
     /// # Errors
     /// No state holds the word.
     #[inline]
-    pub fn place(&mut self, value: &mut usize, largest: usize) -> Result<(), Invalid> {
+    pub fn place(&mut self, value: &mut usize, largest: usize) -> Result<(), InvalidState> {
         *value = self.word(largest as u64)? as usize;
         Ok(())
     }
 
-    /// [`Words::tally`], restored.
+    /// [`WordSink::tally`], restored.
     ///
     /// # Errors
     /// No state holds the word.
     #[inline]
-    pub fn tally(&mut self, value: &mut u32) -> Result<(), Invalid> {
+    pub fn tally(&mut self, value: &mut u32) -> Result<(), InvalidState> {
         *value = self.counter()?;
         Ok(())
     }
 
-    /// [`Words::tallies`], restored.
+    /// [`WordSink::tallies`], restored.
     ///
     /// # Errors
     /// No state holds the word.
     #[inline]
-    pub fn tallies(&mut self, values: &mut [u32]) -> Result<(), Invalid> {
+    pub fn tallies(&mut self, values: &mut [u32]) -> Result<(), InvalidState> {
         values.iter_mut().try_for_each(|value| self.tally(value))
     }
 
-    /// [`Words::set`], restored.
+    /// [`WordSink::set`], restored.
     ///
     /// # Errors
     /// No state holds the word.
     #[inline]
-    pub fn set(&mut self, value: &mut bool) -> Result<(), Invalid> {
+    pub fn set(&mut self, value: &mut bool) -> Result<(), InvalidState> {
         *value = self.flag()?;
         Ok(())
     }
 
-    /// [`Words::choice`], restored.
+    /// [`WordSink::choice`], restored.
     ///
     /// # Errors
     /// No state holds the word.
     #[inline]
-    pub fn choice<C: Choice>(&mut self, value: &mut C) -> Result<(), Invalid> {
+    pub fn choice<C: Choice>(&mut self, value: &mut C) -> Result<(), InvalidState> {
         *value = C::of_word(self.word(u64::MAX)?).ok_or(self.refused())?;
         Ok(())
     }
 
-    /// [`Words::derived`], left as it is.
+    /// [`WordSink::derived`], left as it is.
     ///
     /// # Errors
     /// Never.
     #[inline]
-    pub fn derived<F: Field>(&mut self, _value: &mut F) -> Result<(), Invalid> {
+    pub fn derived<F: Field>(&mut self, _value: &mut F) -> Result<(), InvalidState> {
         const { assert!(F::WORDS == 0) };
         Ok(())
     }
 
-    /// [`Words::blank`], restored.
+    /// [`WordSink::blank`], restored.
     ///
     /// # Errors
     /// No state holds the word.
     #[inline]
-    pub fn blank(&mut self) -> Result<(), Invalid> {
+    pub fn blank(&mut self) -> Result<(), InvalidState> {
         self.counter().map(|_| ())
     }
 
-    /// [`Words::part`], restored.
+    /// [`WordSink::part`], restored.
     ///
     /// # Errors
     /// No state holds the word.
     #[inline]
-    pub fn part(&mut self, part: &mut impl Snapshot) -> Result<(), Invalid> {
+    pub fn part(&mut self, part: &mut impl Snapshot) -> Result<(), InvalidState> {
         part.restore(self)
     }
 
-    /// [`Words::parts`], restored.
+    /// [`WordSink::parts`], restored.
     ///
     /// # Errors
     /// No state holds the word.
     #[inline]
-    pub fn parts(&mut self, parts: &mut [impl Snapshot]) -> Result<(), Invalid> {
+    pub fn parts(&mut self, parts: &mut [impl Snapshot]) -> Result<(), InvalidState> {
         parts.iter_mut().try_for_each(|part| self.part(part))
     }
 
-    /// [`Words::check`], restored.
+    /// [`WordSink::check`], restored.
     ///
     /// # Errors
     /// It does not.
     #[inline]
-    pub fn check(&self, fits: impl FnOnce() -> bool) -> Result<(), Invalid> {
+    pub fn check(&self, fits: impl FnOnce() -> bool) -> Result<(), InvalidState> {
         if fits() { Ok(()) } else { Err(self.refused()) }
     }
 }

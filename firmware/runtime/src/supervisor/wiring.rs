@@ -213,9 +213,9 @@ impl fmt::Display for Finding {
 
 /// A finding, and what looks like it on a geometry with these sets of alike faults, in words for people.
 #[derive(Debug, Clone, Copy)]
-pub struct Named<'a, S>(pub Finding, pub &'a [S]);
+pub struct FindingText<'a, S>(pub Finding, pub &'a [S]);
 
-impl<S: AsRef<[u32]>> fmt::Display for Named<'_, S> {
+impl<S: AsRef<[u32]>> fmt::Display for FindingText<'_, S> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(finding, alike) = self;
         fmt::Display::fmt(finding, f)?;
@@ -230,7 +230,7 @@ impl<S: AsRef<[u32]>> fmt::Display for Named<'_, S> {
     }
 }
 
-impl<S> Named<'_, S> {
+impl<S> FindingText<'_, S> {
     /// What looks like it, with the gain that was found.
     fn of_gain(finding: Finding, other: Finding) -> Finding {
         match (finding, other) {

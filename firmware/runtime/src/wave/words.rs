@@ -1,9 +1,9 @@
 //! Settings of a wave as 64-bit words, for links and files.
 
 use super::shape::{AxisWave, Shape, TONES, Tone};
-use super::{Refused, Settings};
+use super::{Refusal, Settings};
 use crate::real::Real;
-use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Writer};
+use crate::snapshot::{InvalidState, LARGEST_PLACE, Reader, Writer};
 
 /// Words of an axis: kind (the shape's place in [`Shape`]), offset, amplitude, and four: steps before phases, levels before
 /// ticks.
@@ -15,9 +15,9 @@ const MOST: i32 = 1 << 30;
 /// Steps stay below half a turn.
 const HALF_TURN: u64 = (1 << 63) - 1;
 
-impl Refused {
+impl Refusal {
     /// The word to name when a wave is refused over a link; none if one is under way. What an axis cannot do is told by the words
-    /// of its offset (range), amplitude (rate) and the one behind (acceleration), for [`Refused::of_word`].
+    /// of its offset (range), amplitude (rate) and the one behind (acceleration), for [`Refusal::of_word`].
     #[must_use]
     pub const fn word(self) -> Option<usize> {
         let (axis, behind) = match self {
@@ -67,14 +67,14 @@ impl<T: Real> Settings<T> {
     /// From words.
     ///
     /// # Errors
-    /// [`Refused::Word`]: the first word that its place cannot hold.
-    pub fn from_words(words: &[u64; WORDS]) -> Result<Self, Refused> {
+    /// [`Refusal::Word`]: the first word that its place cannot hold.
+    pub fn from_words(words: &[u64; WORDS]) -> Result<Self, Refusal> {
         let mut settings = Self::still();
-        settings.read(&mut Reader::new(words)).map_err(|Invalid { word }| Refused::Word(word))?;
+        settings.read(&mut Reader::new(words)).map_err(|InvalidState { word }| Refusal::Word(word))?;
         Ok(settings)
     }
 
-    fn read(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+    fn read(&mut self, words: &mut Reader<'_>) -> Result<(), InvalidState> {
         words.reals(&mut self.center, LARGEST_PLACE)?;
         for axis in &mut self.axes {
             *axis = AxisWave::load(words)?;
@@ -88,7 +88,7 @@ impl<T: Real> Settings<T> {
     }
 }
 
-fn positive(words: &mut Reader<'_>) -> Result<i32, Invalid> {
+fn positive(words: &mut Reader<'_>) -> Result<i32, InvalidState> {
     let count = words.count_to(MOST)?;
     if count == 0 { Err(words.refused()) } else { Ok(count) }
 }
@@ -100,7 +100,7 @@ impl<T: Real> Tone<T> {
         words.word(self.step);
     }
 
-    fn load(words: &mut Reader<'_>) -> Result<Self, Invalid> {
+    fn load(words: &mut Reader<'_>) -> Result<Self, InvalidState> {
         let amplitude: T = words.real(LARGEST_PLACE)?;
         if amplitude < T::ZERO {
             return Err(words.refused());
@@ -132,7 +132,7 @@ impl<T: Real> AxisWave<T> {
         }
     }
 
-    fn load(words: &mut Reader<'_>) -> Result<Self, Invalid> {
+    fn load(words: &mut Reader<'_>) -> Result<Self, InvalidState> {
         let kind = words.word(6)?;
         let offset = words.real(LARGEST_PLACE)?;
         let amplitude: T = words.real(LARGEST_PLACE)?;
@@ -166,12 +166,12 @@ impl<T: Real> AxisWave<T> {
     }
 }
 
-fn tone<T: Real>(words: &mut Reader<'_>, amplitude: T) -> Result<Tone<T>, Invalid> {
+fn tone<T: Real>(words: &mut Reader<'_>, amplitude: T) -> Result<Tone<T>, InvalidState> {
     Ok(Tone { amplitude, step: words.word(HALF_TURN)?, phase: words.word(u64::MAX)? })
 }
 
 /// A chirp whose step stays below half a turn to its end.
-fn chirp<T: Real>(words: &mut Reader<'_>, amplitude: T) -> Result<Shape<T>, Invalid> {
+fn chirp<T: Real>(words: &mut Reader<'_>, amplitude: T) -> Result<Shape<T>, InvalidState> {
     let tone = tone(words, amplitude)?;
     let sweep = words.word(u64::MAX)? as i64;
     let ticks = positive(words)?;

@@ -1,7 +1,7 @@
 //! Tables and memories of sizes that are known at run time against those that a compiler wrote: every bit, digest and word.
 
 use crate::common::*;
-use specgen_runtime::snapshot::{Invalid, Piece, Reader, Sizes, Words, Writer};
+use specgen_runtime::snapshot::{InvalidState, Reader, Sizes, StatePart, WordSink, Writer};
 use specgen_runtime::{
     Creep, CreepEverett, CreepMemory, Digest, DynamicEverett, DynamicMemory, Everett, LastLine, Nodes, Real,
     ReversalMemory, Snapshot,
@@ -90,12 +90,12 @@ fn words_of(state: &impl Snapshot, sizes: Sizes) -> Vec<u64> {
     assert_eq!(writer.count(), words.len());
     // A part of it, as a record is written on a board.
     let mut piece = [0; 5];
-    let Ok(()) = state.show(&mut Piece::new(&mut piece, words.len() - 5).within(sizes));
+    let Ok(()) = state.show(&mut StatePart::new(&mut piece, words.len() - 5).within(sizes));
     assert_eq!(piece, words[words.len() - 5..]);
     words
 }
 
-fn restored<S: Snapshot + Copy>(fresh: S, words: &[u64], sizes: Sizes) -> Result<S, Invalid> {
+fn restored<S: Snapshot + Copy>(fresh: S, words: &[u64], sizes: Sizes) -> Result<S, InvalidState> {
     let mut state = fresh;
     let mut reader = Reader::new(words).within(sizes);
     state.restore(&mut reader)?;
@@ -278,7 +278,7 @@ fn words_of_more_extrema_than_the_table_keeps_are_refused() {
         restored(memory, &words, sizes(N, 8)).map(|memory| memory.depth())
     };
     assert_eq!([with_depth(1), with_depth(8)], [Ok(1), Ok(8)]);
-    assert_eq!([with_depth(0), with_depth(9), with_depth(67)], [Err(Invalid { word: 0 }); 3]);
+    assert_eq!([with_depth(0), with_depth(9), with_depth(67)], [Err(InvalidState { word: 0 }); 3]);
     let words = words_of(&memory, sizes(N, 8));
-    assert_eq!(restored(memory, &words[..19], sizes(N, 8)).err(), Some(Invalid { word: 19 }));
+    assert_eq!(restored(memory, &words[..19], sizes(N, 8)).err(), Some(InvalidState { word: 19 }));
 }

@@ -9,13 +9,13 @@ const REACH: usize = 7;
 const SETTINGS: Settings = Settings { reach: REACH as u32, fade: [3, 5] };
 
 /// A plan, a correction and errors without a pattern.
-struct Given {
+struct Plan {
     rows: Vec<[f32; 6]>,
     played: Vec<Knot>,
     errors: Vec<Knot>,
 }
 
-fn given() -> Given {
+fn given() -> Plan {
     let mut state = 1_u32;
     let mut draw = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -23,14 +23,14 @@ fn given() -> Given {
     };
     let rows = (0..plan_rows(REACH)).map(|_| std::array::from_fn(|_| draw())).collect();
     let mut knots = || (0..KNOTS).map(|_| std::array::from_fn(|_| (2e6 * draw()) as i32)).collect();
-    Given { rows, played: knots(), errors: knots() }
+    Plan { rows, played: knots(), errors: knots() }
 }
 
 fn words(rows: &[[f32; 6]]) -> Vec<Knot> {
     rows.iter().map(|row| row.map(|value| value.to_bits().cast_signed())).collect()
 }
 
-impl Given {
+impl Plan {
     fn memory(&self) -> [Vec<Knot>; 2] {
         let table = [self.played.clone(), words(&self.rows)].concat();
         let mut errors = self.errors.clone();
@@ -92,7 +92,7 @@ fn a_device_learns_by_its_formula_in_pieces_of_any_size() {
         // A hundred sums of f32 of some 10⁶, and the rounding to whole numbers.
         assert!((f64::from(*found) - expected).abs() < 4.0, "{found} {expected}");
     }
-    let mut off = Given { rows: given.rows.clone(), ..given };
+    let mut off = Plan { rows: given.rows.clone(), ..given };
     off.rows[HEAD + REACH][2] = f32::from_bits(off.rows[HEAD + REACH][2].to_bits() + 64);
     assert_ne!(off.learned(u32::MAX), learned, "a tap that is off by some ulp is seen");
 }
@@ -144,7 +144,7 @@ fn a_player_learns_between_passes_only() {
     assert!(!player.learn(SETTINGS) && !player.begin(course) && !player.put(0, [[0; 6]].into_iter()));
     while player.work(3) {}
     assert_eq!(player.stage(), Stage::Complete);
-    assert_eq!(player.correction(), Given { errors, ..given }.learned(u32::MAX));
+    assert_eq!(player.correction(), Plan { errors, ..given }.learned(u32::MAX));
     assert!(!player.learn(SETTINGS), "what the pass kept is used up");
     assert!(player.begin(course));
 }

@@ -1,7 +1,7 @@
 //! A recorder that owes snapshots and digests, beside one that is given them at once.
 
 use specgen_runtime::record::{HAS_DIGEST, Layout, Reason};
-use specgen_runtime::recorder::{Recorder, Row, Settings, Trigger, Want};
+use specgen_runtime::recorder::{Recorder, Row, Settings, SnapshotPurpose, Trigger};
 
 use crate::common::Random;
 
@@ -76,7 +76,7 @@ fn what_is_handed_in_before_the_next_tick_is_what_another_has_at_once() {
             plain.settings_changed();
         }
         // As early as the other one, that is before it is full.
-        if plain.opens() || found.wants() == Some(Want::Block) {
+        if plain.opens() || found.wants() == Some(SnapshotPurpose::Block) {
             let (words, digest) = machine(after);
             plain.open(&words[..3], digest, |state| state.copy_from_slice(&words[3..]));
         }

@@ -6,7 +6,7 @@ use specgen_runtime::Crc32;
 use specgen_runtime::record::{
     BLOCK_MAGIC, FILE_MAGIC, FORMAT, LARGEST_INPUT, Layout, NO_TRIGGER, Reason, checksum, write_block, write_header,
 };
-use specgen_runtime::recorder::{Activity, Recorder, Row, Settings, Trigger, Unfit};
+use specgen_runtime::recorder::{Activity, MemoryError, Recorder, Row, Settings, Trigger};
 
 use crate::common::Random;
 
@@ -282,14 +282,14 @@ fn a_memory_that_is_too_small_is_refused_with_what_is_needed() {
     let refused =
         |words: usize, blocks: usize, layout: Layout| Recorder::new(&mut vec![0; words], blocks, layout).err();
     assert_eq!(refused(2 * least, 2, LAYOUT), None);
-    assert_eq!(refused(2 * least - 1, 2, LAYOUT), Some(Unfit::TooSmall(2 * least)));
-    assert_eq!(refused(3 * least - 1, 3, LAYOUT), Some(Unfit::TooSmall(3 * least)));
+    assert_eq!(refused(2 * least - 1, 2, LAYOUT), Some(MemoryError::TooSmall(2 * least)));
+    assert_eq!(refused(3 * least - 1, 3, LAYOUT), Some(MemoryError::TooSmall(3 * least)));
     for blocks in [0, 1] {
-        assert_eq!(refused(1000, blocks, LAYOUT), Some(Unfit::TooSmall(2 * least)));
+        assert_eq!(refused(1000, blocks, LAYOUT), Some(MemoryError::TooSmall(2 * least)));
     }
     let wide = |input| Layout { input, ..LAYOUT };
     assert_eq!(refused(1000, 2, wide(LARGEST_INPUT)), None);
-    assert_eq!(refused(1000, 2, wide(LARGEST_INPUT + 1)), Some(Unfit::InputTooLong));
+    assert_eq!(refused(1000, 2, wide(LARGEST_INPUT + 1)), Some(MemoryError::InputTooLong));
 }
 
 /// CRC-32 of words in little-endian order.

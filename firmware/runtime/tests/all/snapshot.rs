@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 
 use specgen_runtime::setpoint::{Generator, LONGEST, Profile, Stop};
-use specgen_runtime::snapshot::{Field, Invalid, LARGEST, Piece, Reader, Sizes, Snapshot, Writer};
+use specgen_runtime::snapshot::{Field, InvalidState, LARGEST, Reader, Sizes, Snapshot, StatePart, Writer};
 use specgen_runtime::supervisor::{Approach, Supervisor, TIMERS};
 use specgen_runtime::{
     CreepMemory, Damping, Digest, DynamicMemory, Estimate, Integral, Motion, NotchState, Rate, ReversalMemory, Transfer,
@@ -42,7 +42,7 @@ fn save<S: Snapshot>(state: &S) -> Vec<u64> {
     words
 }
 
-fn restore<S: Snapshot + Clone>(fresh: &S, words: &[u64]) -> Result<S, Invalid> {
+fn restore<S: Snapshot + Clone>(fresh: &S, words: &[u64]) -> Result<S, InvalidState> {
     let mut state = fresh.clone();
     let mut reader = Reader::new(words).within(SIZES);
     state.restore(&mut reader)?;
@@ -101,11 +101,11 @@ fn every_word_counts<S: Snapshot + Clone + Debug>(fresh: &S, Words(words): Words
                     assert_eq!(save(&changed)[place], other[place], "word {place}, bit {bit}");
                     assert_ne!(of(&changed), of(&state), "word {place}, bit {bit}: {changed:?}");
                 }
-                Err(Invalid { word }) => assert!(word >= place, "word {place}, bit {bit}: refused at {word}"),
+                Err(InvalidState { word }) => assert!(word >= place, "word {place}, bit {bit}: refused at {word}"),
             }
         }
         assert!(taken > 0, "word {place}");
-        assert_eq!(restore(fresh, &words[..place]).err(), Some(Invalid { word: place }));
+        assert_eq!(restore(fresh, &words[..place]).err(), Some(InvalidState { word: place }));
     }
 }
 
@@ -123,7 +123,7 @@ fn numbers_within<S: Snapshot + Clone + Debug>(state: &S, places: impl IntoItera
             assert_eq!(with(good), None, "word {place}: {good}");
         }
         for bad in [beyond, -beyond, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            assert_eq!(with(bad), Some(Invalid { word: place }), "word {place}: {bad}");
+            assert_eq!(with(bad), Some(InvalidState { word: place }), "word {place}: {bad}");
         }
     }
 }
@@ -147,7 +147,7 @@ fn whole_within<S: Snapshot + Clone + Debug>(state: &S, place: usize, least: u64
         assert_eq!(with(good), None, "word {place}: {good}");
     }
     for bad in [least.wrapping_sub(1), most + 1, u64::MAX] {
-        assert_eq!(with(bad), Some(Invalid { word: place }), "word {place}: {bad}");
+        assert_eq!(with(bad), Some(InvalidState { word: place }), "word {place}: {bad}");
     }
 }
 
@@ -208,7 +208,7 @@ fn every_word_of_a_supervisor_counts() {
     let leg = samples + 24;
     let mut quiet = save(&fresh);
     quiet[leg - 1] = 1;
-    assert_eq!(restore(&fresh, &quiet).err(), Some(Invalid { word: leg - 1 }), "quiet without two samples");
+    assert_eq!(restore(&fresh, &quiet).err(), Some(InvalidState { word: leg - 1 }), "quiet without two samples");
     let [turned, response, gauges, least, stage] = [leg + 2, leg + 6, leg + 42, leg + 48, leg + 51];
     let approach = stage + 1 + 19 + 14;
     numbers_within(&fresh, (turned..response).chain([least]), 2.0);
@@ -272,7 +272,7 @@ fn every_word_of_a_generator_counts() {
     }
     let finished = |word: u64| restore(&fresh, &words(6, 0, word).0).err();
     assert_eq!([finished(u32::MAX.into()), finished(u64::MAX)], [None; 2]);
-    assert_eq!([1 << 32, u64::MAX - 1].map(finished), [Some(Invalid { word: 73 }); 2]);
+    assert_eq!([1 << 32, u64::MAX - 1].map(finished), [Some(InvalidState { word: 73 }); 2]);
 }
 
 /// Room for 24 extrema, five of them used.
@@ -317,7 +317,7 @@ fn every_word_of_the_reversal_memories_counts() {
             } else if place > 0 {
                 assert_eq!(changed, Ok((of(&state), 0)), "word {place} is room");
             }
-            assert_eq!(restore(fresh, &words.0[..place]).err(), Some(Invalid { word: place }));
+            assert_eq!(restore(fresh, &words.0[..place]).err(), Some(InvalidState { word: place }));
         }
     }
     let plain = || staircase(USED as u64, 10.0, &STAIRS);
@@ -346,7 +346,8 @@ fn every_word_of_the_reversal_memories_counts() {
 #[test]
 fn only_a_staircase_is_taken_for_one() {
     let taken = |len: u64, drive: f64, extrema: &[f64]| {
-        restore(&ReversalMemory::<f64, CAP>::new(), &staircase(len, drive, extrema).0).map_err(|Invalid { word }| word)
+        restore(&ReversalMemory::<f64, CAP>::new(), &staircase(len, drive, extrema).0)
+            .map_err(|InvalidState { word }| word)
     };
     let refused = 4 + CAP - 1;
     // Steps may be of no height.
@@ -404,7 +405,7 @@ fn a_way_to_a_set_point_reads_back_from_its_words_and_nothing_else_does() {
 
 #[test]
 fn pieces_of_a_state_make_the_whole() {
-    fn show(words: &mut impl specgen_runtime::snapshot::Words) {
+    fn show(words: &mut impl specgen_runtime::snapshot::WordSink) {
         words.put(9);
         let Ok(()) = words.numbers(&[1.0_f64, 2.0, 3.0], 1.0);
         let Ok(()) = words.stored(&[5.0_f32, 6.0, 7.0, 8.0], 2, 1.0);
@@ -416,7 +417,7 @@ fn pieces_of_a_state_make_the_whole() {
         let mut found = Vec::new();
         for first in (0..whole.len()).step_by(length) {
             let mut piece = vec![GARBAGE; length.min(whole.len() - first)];
-            show(&mut Piece::new(&mut piece, first));
+            show(&mut StatePart::new(&mut piece, first));
             found.extend(piece);
         }
         assert_eq!(found, whole, "in pieces of {length}");
@@ -452,14 +453,14 @@ fn a_reader_takes_what_is_asked_for_and_names_what_is_not() {
     let words = [7, 7, 1, 2, u64::from(u32::MAX), 1 << 32, half, half | 1 << 40, 3, 0];
     let mut reader = Reader::new(&words);
     assert_eq!(reader.sizes(), Sizes::ANY);
-    assert_eq!(reader.refused(), Invalid { word: 0 });
-    assert_eq!((reader.word(7), reader.word(6)), (Ok(7), Err(Invalid { word: 1 })));
-    assert_eq!((reader.flag(), reader.flag()), (Ok(true), Err(Invalid { word: 3 })));
-    assert_eq!((reader.counter(), reader.counter()), (Ok(u32::MAX), Err(Invalid { word: 5 })));
-    assert_eq!((reader.real::<f32>(0.5), reader.real::<f32>(1.0)), (Ok(0.5), Err(Invalid { word: 7 })));
+    assert_eq!(reader.refused(), InvalidState { word: 0 });
+    assert_eq!((reader.word(7), reader.word(6)), (Ok(7), Err(InvalidState { word: 1 })));
+    assert_eq!((reader.flag(), reader.flag()), (Ok(true), Err(InvalidState { word: 3 })));
+    assert_eq!((reader.counter(), reader.counter()), (Ok(u32::MAX), Err(InvalidState { word: 5 })));
+    assert_eq!((reader.real::<f32>(0.5), reader.real::<f32>(1.0)), (Ok(0.5), Err(InvalidState { word: 7 })));
     assert_eq!((reader.count_to(3), reader.count_to(-1)), (Ok(3), Ok(0)));
-    assert_eq!((reader.count(), reader.refused()), (10, Invalid { word: 9 }));
-    assert_eq!((reader.flag(), reader.count()), (Err(Invalid { word: 10 }), 11));
+    assert_eq!((reader.count(), reader.refused()), (10, InvalidState { word: 9 }));
+    assert_eq!((reader.flag(), reader.count()), (Err(InvalidState { word: 10 }), 11));
     assert_eq!(Reader::new(&words).within(SIZES).sizes(), SIZES);
-    assert_eq!([6, 0, -1].map(|most| Reader::new(&words).count_to(most)), [Err(Invalid { word: 0 }); 3]);
+    assert_eq!([6, 0, -1].map(|most| Reader::new(&words).count_to(most)), [Err(InvalidState { word: 0 }); 3]);
 }

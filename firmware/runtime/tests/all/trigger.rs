@@ -2,7 +2,7 @@
 
 use crate::common::Random;
 use specgen_runtime::Real;
-use specgen_runtime::trigger::{Direction, HIGH, Kind, Line, MISSED, OutputLines as _, Seen, Triggers, lines};
+use specgen_runtime::trigger::{Direction, HIGH, Kind, Line, MISSED, Observation, OutputLines as _, Triggers, lines};
 
 /// Positions of a line, each below or above the pose, armed or not.
 struct Oracle<T: Real> {
@@ -49,8 +49,8 @@ impl<T: Real> Oracle<T> {
     }
 }
 
-fn seen<T: Real>(pose: &[T; 6]) -> Seen<'_, T> {
-    Seen { pose, moves: false, streams: false, sequence: 0 }
+fn seen<T: Real>(pose: &[T; 6]) -> Observation<'_, T> {
+    Observation { pose, moves: false, streams: false, sequence: 0 }
 }
 
 fn position<T: Real>([start, stop, step, hysteresis]: [f64; 4], direction: Direction, width: i32) -> Line<T> {
@@ -148,7 +148,8 @@ fn levels_motion_points_and_ticks_show_what_they_say() {
     for (turn, sequence) in course {
         let pose = [0.0, 0.0, 0.0, 0.0, 0.0, turn];
         let (moves, streams) = (turn < 0.0, sequence.is_some());
-        let status = triggers.tick(&all, &Seen { pose: &pose, moves, streams, sequence: sequence.unwrap_or_default() });
+        let status =
+            triggers.tick(&all, &Observation { pose: &pose, moves, streams, sequence: sequence.unwrap_or_default() });
         shown.push(lines(status));
     }
     let line = |k: u32| shown.iter().map(|high| (high >> k & 1) as u8).collect::<Vec<_>>();

@@ -3,7 +3,7 @@
 use crate::common::worse;
 use specgen_runtime::Motion;
 use specgen_runtime::setpoint::{MoveLimits, Parallel, Setpoints, StopLimits};
-use specgen_runtime::wave::{AxisWave, Limits, Refused, Settings, Shape, Stage, TONES, Tone, WORDS, Wave, step_of};
+use specgen_runtime::wave::{AxisWave, Limits, Refusal, Settings, Shape, Stage, TONES, Tone, WORDS, Wave, step_of};
 
 const PERIOD: f64 = 1e-4;
 
@@ -124,16 +124,16 @@ fn limits_hold_and_are_not_wasted() {
             change(&mut limits);
             Wave::new(limits).set(&settings)
         };
-        assert_eq!(with(&|limits| limits.high[axis] = high - 1e-12 + 0.0), Err(Refused::Range(axis)), "axis {axis}");
+        assert_eq!(with(&|limits| limits.high[axis] = high - 1e-12 + 0.0), Err(Refusal::Range(axis)), "axis {axis}");
         assert_eq!(
             with(&|limits| limits.low[axis] = settings.center[axis] + 1e-9),
-            Err(Refused::Range(axis)),
+            Err(Refusal::Range(axis)),
             "axis {axis}"
         );
-        assert_eq!(with(&|limits| limits.rate[axis] = rate * 0.999), Err(Refused::Rate(axis)), "axis {axis}");
+        assert_eq!(with(&|limits| limits.rate[axis] = rate * 0.999), Err(Refusal::Rate(axis)), "axis {axis}");
         assert_eq!(with(&|limits| limits.rate[axis] = rate * 2.0 + 1e-9), Ok(()), "axis {axis}");
         let refused = with(&|limits| limits.acceleration[axis] = acceleration * 0.999);
-        assert_eq!(refused, Err(Refused::Acceleration(axis)), "axis {axis}");
+        assert_eq!(refused, Err(Refusal::Acceleration(axis)), "axis {axis}");
         assert_eq!(with(&|limits| limits.acceleration[axis] = acceleration * 3.0 + 1.0), Ok(()), "axis {axis}");
     }
 }
@@ -166,7 +166,7 @@ fn a_wave_is_stopped_smoothly_and_changed_only_at_rest() {
     for _ in 0..10_000 {
         assert!(wave.advance().is_some());
     }
-    assert_eq!(wave.set(&settings), Err(Refused::Busy));
+    assert_eq!(wave.set(&settings), Err(Refusal::Busy));
     wave.stop();
     let rest: Vec<_> = std::iter::from_fn(|| wave.advance()).collect();
     assert_eq!((rest.len(), rest[999].pose), (1000, settings.center));
@@ -196,7 +196,7 @@ fn words_read_back_and_any_words_are_refused_or_keep_their_limits() {
     // One word is the wrong number of tones.
     let mut bad = words;
     bad[6 + 5 * 7 + 4] = TONES as u64;
-    assert_eq!(Settings::<f64>::from_words(&bad), Err(Refused::Word(6 + 5 * 7 + 4)));
+    assert_eq!(Settings::<f64>::from_words(&bad), Err(Refusal::Word(6 + 5 * 7 + 4)));
 
     let limits = Limits {
         low: [-5e-5; 6],
@@ -241,21 +241,21 @@ const AXIS: usize = 7;
 
 #[test]
 fn what_is_refused_is_named_by_a_word_and_told_from_it() {
-    assert_eq!(Refused::Busy.word(), None);
+    assert_eq!(Refusal::Busy.word(), None);
     for axis in 0..6 {
         let first = 6 + axis * AXIS;
-        for (behind, refused) in [(1, Refused::Range(axis)), (2, Refused::Rate(axis)), (3, Refused::Acceleration(axis))]
+        for (behind, refused) in [(1, Refusal::Range(axis)), (2, Refusal::Rate(axis)), (3, Refusal::Acceleration(axis))]
         {
             assert_eq!(refused.word(), Some(first + behind));
-            assert_eq!(Refused::of_word(first + behind), refused);
+            assert_eq!(Refusal::of_word(first + behind), refused);
         }
         for behind in [0, 4, 5, 6] {
-            assert_eq!(Refused::of_word(first + behind), Refused::Word(first + behind));
+            assert_eq!(Refusal::of_word(first + behind), Refusal::Word(first + behind));
         }
     }
     for word in [0, 5, 6 + 6 * AXIS + 1, 6 + 6 * AXIS + 2, 6 + 6 * AXIS + 3, WORDS] {
-        assert_eq!(Refused::of_word(word), Refused::Word(word));
-        assert_eq!(Refused::Word(word).word(), Some(word));
+        assert_eq!(Refusal::of_word(word), Refusal::Word(word));
+        assert_eq!(Refusal::Word(word).word(), Some(word));
     }
 }
 
@@ -280,7 +280,7 @@ fn every_word_of_a_shape_has_its_bounds() {
             settings.axes[0].shape
         })
     };
-    let refused = |word: usize| Err(Refused::Word(6 + word));
+    let refused = |word: usize| Err(Refusal::Word(6 + word));
     assert_eq!(with(0, 0.0, [0; 4]), Ok(Shape::Constant));
     assert_eq!(with(1, -2e-6, [most, 0, 0, 0]), Ok(Shape::Ramp { amplitude: -2e-6, ticks: 1 << 30 }));
     assert_eq!(with(2, 2e-6, [half, 0, 0, 0]), Ok(Shape::Triangle { amplitude: 2e-6, step: half }));
@@ -331,7 +331,7 @@ fn every_word_of_a_shape_has_its_bounds() {
         (WORDS - 1, most + 1),
     ] {
         let good = std::mem::replace(&mut words[place], bad);
-        assert_eq!(Settings::<f64>::from_words(&words), Err(Refused::Word(place)));
+        assert_eq!(Settings::<f64>::from_words(&words), Err(Refusal::Word(place)));
         words[place] = good;
     }
 }

@@ -5,7 +5,7 @@ use crate::controller::{ControllerError, TickController};
 
 /// Readings that stand but for what the legs move by the controller's own model.
 #[derive(Debug, Clone)]
-pub struct Standing {
+pub struct RestingReadings {
     /// Places of the gauges' words in an input, and of the legs' displacements in an output.
     gauges: usize,
     requested: usize,
@@ -20,7 +20,7 @@ impl Supervised {
     ///
     /// # Errors
     /// A word is missing.
-    pub fn standing(&self, input: &[u64]) -> Result<Standing, ControllerError> {
+    pub fn standing(&self, input: &[u64]) -> Result<RestingReadings, ControllerError> {
         let description = self.controller.description();
         let gauges = description.input("gauge[0]").or_else(|_| description.input("displacement[0]"))?;
         let [requested, ..] = description.outputs("requested")?;
@@ -31,11 +31,11 @@ impl Supervised {
         let rows = self.controller.engine.words_per_leg(&bits);
         let scalar = description.scalar;
         let per_leg = rows.map(|row| row.map(|word| scalar.decode(word)));
-        Ok(Standing { gauges, requested, words: bits.map(|word| scalar.decode(word)), per_leg, rest: None })
+        Ok(RestingReadings { gauges, requested, words: bits.map(|word| scalar.decode(word)), per_leg, rest: None })
     }
 }
 
-impl Standing {
+impl RestingReadings {
     /// Puts what the gauges show after a tick with this output into an input.
     pub fn show(&mut self, machine: &Supervised, output: &[u64], input: &mut [u64]) {
         let scalar = machine.controller.description().scalar;

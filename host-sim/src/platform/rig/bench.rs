@@ -90,7 +90,7 @@ pub struct Tick {
 
 /// Where a bench stopped: what [`Bench::resume`] needs besides rig and controller.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Paused {
+pub struct BenchState {
     sequence: u64,
     ticks: usize,
     underway: VecDeque<Six>,
@@ -125,7 +125,7 @@ impl<'a> Bench<'a> {
     ) -> Result<Self, RunError> {
         controller.reset();
         let underway = VecDeque::from(vec![[rig.rest_voltage; 6]; latency]);
-        Self::resume(rig, controller, interval, &Paused { sequence: 0, ticks: 0, underway })
+        Self::resume(rig, controller, interval, &BenchState { sequence: 0, ticks: 0, underway })
     }
 
     /// Goes on from where a bench stopped, with clones of its rig and controller.
@@ -136,7 +136,7 @@ impl<'a> Bench<'a> {
         rig: &'a mut PlatformRig,
         controller: &'a mut dyn TickController,
         interval: f64,
-        paused: &Paused,
+        paused: &BenchState,
     ) -> Result<Self, RunError> {
         let wiring = Wiring::of(controller)?;
         let description = controller.description();
@@ -157,8 +157,8 @@ impl<'a> Bench<'a> {
 
     /// Ends it where [`Bench::resume`] can go on.
     #[must_use]
-    pub fn pause(self) -> Paused {
-        Paused { sequence: self.sequence, ticks: self.ticks, underway: self.underway }
+    pub fn pause(self) -> BenchState {
+        BenchState { sequence: self.sequence, ticks: self.ticks, underway: self.underway }
     }
 
     /// Keeps every word from here on.

@@ -2,11 +2,11 @@
 //!
 //! Behind amplifiers that hold their inputs a free displacement goes, over one step, along the exponential of its
 //! amplifier's lag and not along a straight line. Here each leg has that shape, and by how much it is off that on the way as
-//! a mean and a first moment ([`Way`]): those of 6 s (1 − s) and 120 s (1 − s) (s − 1/2), the response to which is exact.
+//! a mean and a first moment ([`StepShape`]): those of 6 s (1 − s) and 120 s (1 − s) (s − 1/2), the response to which is exact.
 //! What the exact forces differ from the linear ones is extrapolated over the step as ever.
 
 use super::{STATES, Structure, sum};
-use crate::plant::lanes::{LANES, Lane, Way};
+use crate::plant::lanes::{LANES, Lane, StepShape};
 use crate::platform::contact::Contact;
 use crate::platform::geometry::{angles, attitude, rate_matrix};
 use crate::platform::linear::{Matrix6, Six, apply, exponential, inverse, product};
@@ -147,7 +147,7 @@ impl StructureLanes {
 
     /// One step, over which the free displacements go along `free` (m).
     #[inline(always)]
-    pub(in crate::platform) fn advance(&mut self, free: &Way) {
+    pub(in crate::platform) fn advance(&mut self, free: &StepShape) {
         let mut of_state = [0.0; STATES];
         let mut of_legs = [0.0; STATES];
         let mut of_forces = [0.0; STATES];

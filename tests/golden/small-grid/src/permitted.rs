@@ -3,7 +3,7 @@
 
 //! What settings may be, and how large the numbers of a state may become: nothing beyond the limits of the spec.
 
-use specgen_runtime::Permitted;
+use specgen_runtime::PermittedRange;
 use specgen_runtime::snapshot::Sizes;
 use crate::Real;
 
@@ -24,13 +24,13 @@ pub(crate) const NAMES: [&str; WORDS] = [
 
 /// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
 /// most `code_max`.
-pub const SETTINGS: [(Permitted<Real>, usize); 6] = [
-    (Permitted::Whole(0, 2), 1),
-    (Permitted::Whole(0, 1), 1),
-    (Permitted::Number(0.0, 1.0), 2),
-    (Permitted::Whole(1, 1000000), 1),
-    (Permitted::Whole(1, 3495), 1),
-    (Permitted::Whole(0, 43690), 2),
+pub const SETTINGS: [(PermittedRange<Real>, usize); 6] = [
+    (PermittedRange::Whole(0, 2), 1),
+    (PermittedRange::Whole(0, 1), 1),
+    (PermittedRange::Number(0.0, 1.0), 2),
+    (PermittedRange::Whole(1, 1000000), 1),
+    (PermittedRange::Whole(1, 3495), 1),
+    (PermittedRange::Whole(0, 43690), 2),
 ];
 
 /// Largest numbers of a state, under any of these settings.

@@ -300,7 +300,7 @@ fn has_triggers(path: &Path, such: impl Fn(&Trigger) -> bool) -> Result<bool, St
 }
 
 /// A motion that is learned.
-struct Repeated {
+struct LearnedMotion {
     name: String,
     /// Ticks after which its record ends.
     record: u32,
@@ -309,21 +309,22 @@ struct Repeated {
 }
 
 /// The first trajectory that a machine of this spec learns, if its controller takes a correction.
-fn learnable(path: &Path) -> Result<Option<Repeated>, String> {
+fn learnable(path: &Path) -> Result<Option<LearnedMotion>, String> {
     let source = SpecSource::read(path).map_err(|finding| finding.message)?;
     let (model, _) = spec::load(&source);
     let model = model.ok_or_else(|| format!("{} is refused", path.display()))?;
     let task = model.task_space.filter(|task| task.correction.is_some());
     let record = (RECORD / model.timing.period) as u32;
     let noise = model.sensor.noise * 1e9;
-    Ok(task
-        .and_then(|task| task.trajectories.first().map(|first| Repeated { name: first.name.clone(), record, noise })))
+    Ok(task.and_then(|task| {
+        task.trajectories.first().map(|first| LearnedMotion { name: first.name.clone(), record, noise })
+    }))
 }
 
 /// Learns a motion over the link, on the host and in the background of the board, which has to take a good part of its error, and plays it
 /// with a record.
-fn learn(trial: &Trial, session: &mut Session, motion: &Repeated) -> Result<(), String> {
-    let Repeated { name: motion, record, noise } = motion;
+fn learn(trial: &Trial, session: &mut Session, motion: &LearnedMotion) -> Result<(), String> {
+    let LearnedMotion { name: motion, record, noise } = motion;
     let room = if trial.target.ends_with("f4") { "768" } else { "4096" };
     for (who, more) in [("board", &["--on-device", room][..]), ("host", &[])] {
         let mut command = session.command_of(trial, "learn");

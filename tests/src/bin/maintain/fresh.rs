@@ -63,7 +63,7 @@ const SCENARIOS: [Scenario; 7] = [
 ];
 
 /// A command that was run.
-struct Ran {
+struct CommandResult {
     code: i32,
     took: Duration,
     printed: String,
@@ -72,8 +72,8 @@ struct Ran {
 /// What a scenario came to.
 struct Line {
     name: &'static str,
-    job: Option<Ran>,
-    tests: Option<Ran>,
+    job: Option<CommandResult>,
+    tests: Option<CommandResult>,
     /// Why it is not as it should be.
     wrong: Option<String>,
 }
@@ -112,8 +112,8 @@ pub fn fresh(repository: &Path, arguments: &[&str]) -> ExitCode {
     }
     println!("\n=== summary\n{:20}{:>9}{:>9}  {:34}{:>6}{:>9}", "scenario", "main job", "s", "bits", "tests", "s");
     for line in &lines {
-        let of = |ran: &Option<Ran>| {
-            let text = |ran: &Ran| (ran.code.to_string(), format!("{:.0}", ran.took.as_secs_f64()));
+        let of = |ran: &Option<CommandResult>| {
+            let text = |ran: &CommandResult| (ran.code.to_string(), format!("{:.0}", ran.took.as_secs_f64()));
             ran.as_ref().map_or(("-".to_owned(), "-".to_owned()), text)
         };
         let ((job, job_s), (tests, tests_s)) = (of(&line.job), of(&line.tests));
@@ -161,7 +161,7 @@ fn go(scenario: &Scenario, caller: &Caller, repository: &Path, job_only: bool, l
         home.expect_success("cargo fetch --locked")?;
     }
     let kept = repository.join(KEPT);
-    let command = |words: &str, offline: bool, name: &str| -> Result<Ran, String> {
+    let command = |words: &str, offline: bool, name: &str| -> Result<CommandResult, String> {
         println!("running: {words}");
         let start = Instant::now();
         let (code, printed) = home.run(words, offline)?;
@@ -170,7 +170,7 @@ fn go(scenario: &Scenario, caller: &Caller, repository: &Path, job_only: bool, l
         let written = std::fs::create_dir_all(&kept).and_then(|()| std::fs::write(&file, &printed));
         written.map_err(|error| format!("{}: {error}", file.display()))?;
         println!("exit code {code} after {:.0} s; all that it printed: {}", took.as_secs_f64(), file.display());
-        Ok(Ran { code, took, printed })
+        Ok(CommandResult { code, took, printed })
     };
 
     let job = line.job.insert(command(MAIN_JOB, scenario.offline, "main-job")?);

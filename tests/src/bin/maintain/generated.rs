@@ -10,11 +10,11 @@ mod help;
 mod make;
 mod trace;
 
-/// Files by path relative to [`Generated::folder`], with `/` between the parts.
+/// Files by path relative to [`GeneratedFolder::folder`], with `/` between the parts.
 pub type Files = BTreeMap<String, String>;
 
 /// A folder of generated files.
-pub struct Generated {
+pub struct GeneratedFolder {
     /// Relative to the repository.
     pub folder: &'static str,
     /// Whether every file in it is generated, so that any other is an error.
@@ -24,13 +24,17 @@ pub struct Generated {
 }
 
 /// All of them. `cargo xtask test` compares, `cargo xtask bless` writes.
-const GENERATED: &[Generated] = &[
+const GENERATED: &[GeneratedFolder] = &[
     // Records first: what is compiled below reads them.
-    Generated { folder: "specs/records", whole: true, make: make::records },
-    Generated { folder: "specs", whole: false, make: make::schema },
-    Generated { folder: "firmware/controller", whole: true, make: make::reference_controller },
-    Generated { folder: "firmware/board/tests/passes/controller/src", whole: true, make: make::controller_with_passes },
-    Generated { folder: "tests/golden", whole: true, make: make::goldens },
+    GeneratedFolder { folder: "specs/records", whole: true, make: make::records },
+    GeneratedFolder { folder: "specs", whole: false, make: make::schema },
+    GeneratedFolder { folder: "firmware/controller", whole: true, make: make::reference_controller },
+    GeneratedFolder {
+        folder: "firmware/board/tests/passes/controller/src",
+        whole: true,
+        make: make::controller_with_passes,
+    },
+    GeneratedFolder { folder: "tests/golden", whole: true, make: make::goldens },
 ];
 
 /// In a folder of generated files, the sources of some of them.
@@ -75,8 +79,8 @@ pub fn bless(root: &Path) -> Outcome {
 /// Generates each folder and hands it to `act`; gathers what that says.
 fn all(
     root: &Path,
-    list: &[Generated],
-    act: fn(&Path, &Generated, &Files) -> io::Result<Vec<String>>,
+    list: &[GeneratedFolder],
+    act: fn(&Path, &GeneratedFolder, &Files) -> io::Result<Vec<String>>,
 ) -> Result<Vec<String>, String> {
     let mut lines = Vec::new();
     for generated in list {
@@ -87,7 +91,7 @@ fn all(
 }
 
 /// One line per file that is missing, has another text, or should not be there.
-fn differences(root: &Path, generated: &Generated, files: &Files) -> io::Result<Vec<String>> {
+fn differences(root: &Path, generated: &GeneratedFolder, files: &Files) -> io::Result<Vec<String>> {
     let folder = generated.folder;
     let mut lines = Vec::new();
     let mut present = committed(&root.join(folder))?;
@@ -107,7 +111,7 @@ fn differences(root: &Path, generated: &Generated, files: &Files) -> io::Result<
 }
 
 /// Makes the folder hold exactly these files; one line per change.
-fn replace(root: &Path, generated: &Generated, files: &Files) -> io::Result<Vec<String>> {
+fn replace(root: &Path, generated: &GeneratedFolder, files: &Files) -> io::Result<Vec<String>> {
     let lines = differences(root, generated, files)?;
     let base = root.join(generated.folder);
     if generated.whole {
@@ -169,7 +173,7 @@ mod tests {
             .map(|(path, text)| (path.to_owned(), text.to_owned()))
             .into();
 
-        let made = Generated { folder: "made", whole: true, make: |_| Ok(Files::new()) };
+        let made = GeneratedFolder { folder: "made", whole: true, make: |_| Ok(Files::new()) };
         let found = differences(root.path(), &made, &files).unwrap();
         let expected = [
             "missing: made/new/missing.rs",

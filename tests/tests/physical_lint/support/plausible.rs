@@ -9,9 +9,9 @@ use rand_chacha::rand_core::Rng;
 use specgen::everett::EverettTable;
 use specgen::identify::write_table_csv;
 
-struct Draw<'a>(&'a mut ChaCha8Rng);
+struct RandomSource<'a>(&'a mut ChaCha8Rng);
 
-impl Draw<'_> {
+impl RandomSource<'_> {
     fn unit(&mut self) -> f64 {
         f64::from(self.0.next_u32()) / f64::from(u32::MAX)
     }
@@ -82,7 +82,7 @@ fn table(grid: usize, volts: [f64; 2], travel: f64, width: f64) -> EverettTable 
 
 /// A spec in `folder`, with the table of its stacks beside it.
 pub fn platform(random: &mut ChaCha8Rng, folder: &Path, index: usize) -> String {
-    let mut draw = Draw(random);
+    let mut draw = RandomSource(random);
     let control = index % 4 != 3;
     // Sizes, m.
     let radius = draw.order(0.03, 0.3);

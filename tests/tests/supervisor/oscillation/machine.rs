@@ -5,7 +5,7 @@ use host_sim::plant::LegParameters;
 use host_sim::platform::PlatformRig;
 use host_sim::platform::rig::Noise;
 use host_sim::word::Scalar;
-use specgen::compile::Compiled;
+use specgen::compile::Compilation;
 use specgen::machine;
 use specgen_tests::Emitted;
 
@@ -95,7 +95,7 @@ impl Machine {
         Self::with(Supervised::new(emitted.at_run_time()), &emitted.compiled, leg, seed)
     }
 
-    pub fn with(supervised: Supervised, compiled: &Compiled, leg: &LegParameters, seed: u64) -> Self {
+    pub fn with(supervised: Supervised, compiled: &Compilation, leg: &LegParameters, seed: u64) -> Self {
         let model = &compiled.model;
         let task = model.task_space.as_ref().expect("a platform");
         let specimen = machine::specimen(model, task, leg, Some(seed));
@@ -140,7 +140,7 @@ impl Machine {
     }
 
     /// Another machine that goes on from where this one was with that rig and controller.
-    pub fn like(&self, supervised: &Supervised, rig: &PlatformRig, compiled: &Compiled) -> Self {
+    pub fn like(&self, supervised: &Supervised, rig: &PlatformRig, compiled: &Compilation) -> Self {
         let mut other = Self::with(supervised.fork(), compiled, &LegParameters::reference(), 5);
         other.supervised = supervised.fork();
         other.rig = rig.clone();

@@ -14,9 +14,9 @@ use super::machine::{Machine, Six};
 use super::{DAMPED, OSCILLATION, in_micrometres};
 
 /// Random numbers.
-struct Draw(ChaCha8Rng);
+struct RandomSource(ChaCha8Rng);
 
-impl Draw {
+impl RandomSource {
     fn below(&mut self, count: u64) -> u64 {
         self.0.next_u64() % count
     }
@@ -46,7 +46,7 @@ pub fn class(number: u64) -> LegParameters {
 struct Usage<'a> {
     machine: Machine,
     emitted: &'a Emitted,
-    draw: Draw,
+    draw: RandomSource,
     what: String,
     alarms: Vec<String>,
     trajectories: u64,
@@ -278,9 +278,9 @@ impl Usage<'_> {
 }
 
 /// Of one spec: ticks, and what was taken for an oscillation.
-type Found = (u64, Vec<String>);
+type QuietResult = (u64, Vec<String>);
 
-fn platform(emitted: &Emitted, spec: &str, ticks: u64, number: u64) -> Found {
+fn platform(emitted: &Emitted, spec: &str, ticks: u64, number: u64) -> QuietResult {
     let supervised = Supervised::new(emitted.at_run_time());
     let (mut made, mut alarms) = (0, Vec::new());
     for class in 0..3 {
@@ -291,7 +291,7 @@ fn platform(emitted: &Emitted, spec: &str, ticks: u64, number: u64) -> Found {
             machine.vibration = Some(Box::new(|time| [2e-9 * time, -1e-9 * time, 2e-9 * time, 0.0, 0.0, 0.0]));
         }
         let trajectories = emitted.compiled.model.task_space.as_ref().unwrap().trajectories.len() as u64;
-        let draw = Draw(ChaCha8Rng::seed_from_u64(1000 * number + class));
+        let draw = RandomSource(ChaCha8Rng::seed_from_u64(1000 * number + class));
         let mut usage = Usage { machine, emitted, draw, what: String::new(), alarms: Vec::new(), trajectories };
         while usage.machine.ticks < ticks / 3 {
             usage.act();
@@ -306,7 +306,7 @@ fn platform(emitted: &Emitted, spec: &str, ticks: u64, number: u64) -> Found {
 }
 
 /// Six legs with their own gauges, whose set-points rest, step and go to and fro.
-fn legs(emitted: &Emitted, spec: &str, ticks: u64, number: u64) -> Found {
+fn legs(emitted: &Emitted, spec: &str, ticks: u64, number: u64) -> QuietResult {
     let model = &emitted.compiled.model;
     let mut supervised = Supervised::new(emitted.at_run_time());
     let (scalar, period) = (supervised.controller().description().scalar, model.timing.period);
@@ -318,7 +318,7 @@ fn legs(emitted: &Emitted, spec: &str, ticks: u64, number: u64) -> Found {
     let (mut made, mut alarms) = (0, Vec::new());
     for class in 0..3 {
         supervised.reset();
-        let mut draw = Draw(ChaCha8Rng::seed_from_u64(1000 * number + class));
+        let mut draw = RandomSource(ChaCha8Rng::seed_from_u64(1000 * number + class));
         let parameters = simulated::leg(model, &self::class(class));
         let mut scenario =
             simulated::legs(model, &std::array::from_fn(|_| parameters.clone()), &parameters.noise, class, 60);
@@ -388,7 +388,7 @@ fn nothing_that_a_sound_machine_does_is_taken_for_an_oscillation() {
     }
     let each = 10_500_000 / (names.len() as u64 + 1);
     let ticks = specgen_tests::length(24_000, each);
-    let mut all: Found = (0, Vec::new());
+    let mut all: QuietResult = (0, Vec::new());
     let mut used = 0;
     for (number, (spec, edits)) in
         names.iter().map(|name| (name.as_str(), &[][..])).chain([("reference.toml", &[DAMPED][..])]).enumerate()

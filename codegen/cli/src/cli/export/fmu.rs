@@ -13,7 +13,7 @@ use clap::Args;
 use host_sim::word::{Scalar, WordKind};
 use rawzip::ZipArchiveWriter;
 use serde::Serialize;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 
 use crate::cli::named::{InputFile, OutputFolder};
 use crate::cli::sim::environment;
@@ -121,7 +121,7 @@ struct Variable {
 
 /// What is said of a unit.
 struct Unit<'a> {
-    compiled: &'a Compiled,
+    compiled: &'a Compilation,
     /// Name of the platform, and what kind of unit it is, as an identifier of C.
     identifier: String,
     /// What it is, before the name of the platform.
@@ -135,7 +135,7 @@ struct Unit<'a> {
 
 impl<'a> Unit<'a> {
     fn new(
-        compiled: &'a Compiled,
+        compiled: &'a Compilation,
         suffix: &str,
         what: &'static str,
         scalar: Scalar,

@@ -14,7 +14,7 @@ use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::shell;
 use specgen_language::ui::Ui;
 use specgen_toolchain::budget;
-use specgen_toolchain::checks::{self, Checked, Rules};
+use specgen_toolchain::checks::{self, Rules, TickChecks};
 use specgen_toolchain::find_program;
 use specgen_toolchain::size::{Size, size};
 use specgen_toolchain::targets::{Kind, Target};
@@ -117,7 +117,7 @@ struct Examined {
     #[serde(skip)]
     size: Size,
     #[serde(skip)]
-    checks: Checked,
+    checks: TickChecks,
 }
 
 impl Outcome for Examined {
@@ -152,12 +152,12 @@ fn of_image(arguments: &Arguments, elf: &[u8], ui: &mut Ui) -> Result<Ready, Fai
     let part = mcu.part();
     let checked = checks::check(elf, None, Rules { single: !part.double, whole_image: false })?;
     let limits = model::Target { mcu, budget: model::Budget::NONE };
-    let used = budget::Used {
+    let used = budget::ImageUsage {
         flash: size.flash(),
         ram: checked.stack.map(|stack| size.ram() + stack),
         ram_least: size.ram(),
         stack: checked.stack,
-        ..budget::Used::default()
+        ..budget::ImageUsage::default()
     };
     let mut failures: Vec<String> = checked.faults.iter().map(|fault| fault.text.clone()).collect();
     failures.extend(budget::over(&limits, &used));

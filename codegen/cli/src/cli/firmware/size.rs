@@ -9,7 +9,7 @@ use crate::cli::named::InputFile;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::ui::Ui;
 use specgen_toolchain::TargetError;
-use specgen_toolchain::checks::{self, Checked, Rules};
+use specgen_toolchain::checks::{self, Rules, TickChecks};
 use specgen_toolchain::size::{Size, has_tick, size};
 
 /// Arguments of `size`.
@@ -46,7 +46,7 @@ impl Outcome for Built {
 struct Examined {
     file: String,
     size: Size,
-    checks: Option<Checked>,
+    checks: Option<TickChecks>,
     /// Only Thumb code is followed; on a PC the operating system's own checks apply.
     #[serde(skip)]
     is_thumb: bool,

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use super::{Made, time};
 use specgen_language::outcome::Outcome;
 use specgen_language::table::{left, right, row};
-use specgen_toolchain::budget::{Used, group};
-use specgen_toolchain::checks::Checked;
+use specgen_toolchain::budget::{ImageUsage, group};
+use specgen_toolchain::checks::TickChecks;
 use specgen_toolchain::size::Size;
 
 /// As many owners and variables as are listed.
@@ -57,7 +57,7 @@ impl Outcome for Made {
 
 impl Made {
     /// Memory and instructions against their budgets.
-    fn usage(&self, used: &Used, out: &mut String) {
+    fn usage(&self, used: &ImageUsage, out: &mut String) {
         let of = |budget: Option<u64>| budget.map_or(String::new(), |budget| format!(" of {}", group(budget)));
         let limits = &self.limits.budget;
         let _ = writeln!(out, "  flash         {}{} bytes", group(used.flash), of(limits.flash));
@@ -142,7 +142,7 @@ pub fn sections(size: &Size) -> String {
 }
 
 /// What was looked for in the tick.
-pub fn checked(checks: &Checked) -> String {
+pub fn checked(checks: &TickChecks) -> String {
     let mut out = String::new();
     let _ = writeln!(
         out,

@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_toolchain::time::Estimate;
 
 /// What is to be said about it.
-pub fn finding(compiled: &Compiled, estimate: &Estimate) -> Option<Diagnostic> {
+pub fn finding(compiled: &Compilation, estimate: &Estimate) -> Option<Diagnostic> {
     let Estimate { board, worst, period, shortest, parts, .. } = estimate;
     let most = parts.iter().max_by(|a, b| a.1.total_cmp(&b.1));
     let most = most.map_or(String::new(), |(name, time)| format!("; most of it: {name}, {time:.1} us"));
@@ -72,9 +72,9 @@ mod tests {
     use specgen_language::SpecSource;
     use specgen_language::diagnostic::Severity;
     use specgen_toolchain::time::Law;
-    use specgen_toolchain::trace::Moved;
+    use specgen_toolchain::trace::Transfers;
 
-    fn spec(budget: &str) -> Compiled {
+    fn spec(budget: &str) -> Compilation {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/reference.toml");
         let mut source = SpecSource::read(&path).unwrap();
         source.text = source.text.replace("[target.budget]\n", &format!("[target.budget]\n{budget}\n"));
@@ -83,7 +83,7 @@ mod tests {
 
     fn estimate(worst: f64, shortest: f64) -> Estimate {
         let parts = vec![("law", worst)];
-        let (law, moved) = (Law::default(), Moved::default());
+        let (law, moved) = (Law::default(), Transfers::default());
         Estimate { board: "board", period: 100.0, core: 400.0, worst, parts, law, moved, shortest }
     }
 

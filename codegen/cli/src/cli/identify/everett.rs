@@ -139,7 +139,7 @@ impl Outcome for Table<'_> {
 
 fn validate(
     path: &Path,
-    identified: &identify::Identified,
+    identified: &identify::Identification,
     reading: &identify::Reading,
 ) -> Result<Prediction, Vec<Diagnostic>> {
     let record = identify::read_record(path, &path.display().to_string(), reading)?;

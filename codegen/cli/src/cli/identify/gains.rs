@@ -10,12 +10,12 @@ use serde::Serialize;
 use super::{Measured, refused};
 use crate::cli::named::InputFile;
 use crate::cli::{replay, sim, spec};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
 use specgen_identify::gains::{self, LegGain};
 use specgen_identify::{declared, marked_as_simulated, write_table_csv};
 use specgen_language::model::RateDependence;
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::write_folder;
 use specgen_language::table::{right, row};
@@ -142,9 +142,9 @@ struct Moves {
 }
 
 impl Moves {
-    fn new(compiled: &Compiled, names: &[String]) -> Result<Self, Failure> {
+    fn new(compiled: &Compilation, names: &[String]) -> Result<Self, Failure> {
         let platform = lower::platform(&compiled.model)
-            .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
+            .map_err(|findings| Refusal { source: Some(compiled.source.clone()), findings })?;
         let place = |name: &str| {
             let found = names.iter().position(|other| other == name);
             found.ok_or_else(|| Failure::Environment(format!("the controller has no output {name}")))

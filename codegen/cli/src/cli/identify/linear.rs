@@ -16,7 +16,7 @@ use specgen_identify as identify;
 use specgen_identify::linear::{self, LinearReport, PAPER_PROPORTION};
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::Adaptation;
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::spec::{self, SpecSource};
 use specgen_language::table::{left, right, row};
@@ -207,7 +207,7 @@ fn judge(path: &Path, report: &LinearReport) -> Result<Judged, Failure> {
     let source = SpecSource::read(path).map_err(|finding| refused(vec![finding]))?;
     let (model, findings) = spec::load(&source);
     let Some(mut model) = model else {
-        return Err(Failure::from(Refused { source: Some(source), findings }));
+        return Err(Failure::from(Refusal { source: Some(source), findings }));
     };
     model.adaptation.gain_ratio = report.gain_ratio_for_spec();
     let verdict = match compile::check_stability(&model) {

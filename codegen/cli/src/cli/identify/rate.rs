@@ -10,9 +10,9 @@ use super::reading::ReadingArguments;
 use super::{Identified, Measured};
 use crate::cli::named::{InputFile, OutputFolder};
 use crate::cli::plot::{Plot, wrote};
-use specgen_identify::rate::{RateIdentified, RateOption, RateReport, identify_rate, spec_lines, write_rate_csv};
+use specgen_identify::rate::{RateIdentification, RateOption, RateReport, identify_rate, spec_lines, write_rate_csv};
 use specgen_identify::{Options, marked_as_simulated, read_record, write_table_csv};
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::write_folder;
 use specgen_language::table::{left, right, row};
@@ -45,7 +45,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let refused = |findings| Failure::from(Refused { source: None, findings });
+    let refused = |findings| Failure::from(Refusal { source: None, findings });
     let reading = arguments.reading.reading()?;
     let read = |path: &InputFile| read_record(path, &path.display().to_string(), &reading);
     let mut records = Vec::new();
@@ -98,7 +98,7 @@ fn keys(report: &RateReport) -> Vec<&'static str> {
 }
 
 /// Tables first, then the lines that name them.
-fn write(output: &Path, identified: &RateIdentified) -> Result<Vec<PathBuf>, Failure> {
+fn write(output: &Path, identified: &RateIdentification) -> Result<Vec<PathBuf>, Failure> {
     let name = output.file_name().map(|name| name.to_string_lossy().into_owned()).ok_or_else(|| {
         Failure::Usage(format!("`{}` names no file: give a name such as models/leg1", output.display()))
     })?;

@@ -9,20 +9,20 @@ use serde::Serialize;
 
 use super::machine::Own;
 use super::{Arguments, Done, learnable_of, machine_name, motion_of, on, takes_correction};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::interrupt;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::write_file;
 use specgen_language::table::{right, row};
 use specgen_language::ui::Ui;
-use specgen_studies::learning::{Convergence, Excitation, Heard, PASSES};
+use specgen_studies::learning::{Convergence, Excitation, ModeMeasurement, PASSES};
 use specgen_studies::robust::Factors;
 
 /// Measures and writes the response.
 pub(super) fn run(
     arguments: &Arguments,
     path: &Path,
-    compiled: &Compiled,
+    compiled: &Compilation,
     own: Option<&Own>,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
@@ -77,7 +77,7 @@ struct Found {
     band: [f64; 2],
     /// At the joints, along the axis that moves most, nm.
     amplitude_nm: f64,
-    modes: [Heard; 6],
+    modes: [ModeMeasurement; 6],
     /// How far up learning converges with it, if anywhere.
     convergence: Option<Convergence>,
     file: String,
@@ -91,7 +91,7 @@ impl Outcome for Found {
         );
         let columns = [right(10), right(20), right(20), right(14)];
         row(&mut text, &columns, &[&"mode, Hz", &"largest", &"by the model", &"known to"]);
-        for Heard { frequency, largest, modelled, error } in modes {
+        for ModeMeasurement { frequency, largest, modelled, error } in modes {
             let at = |[hertz, gain]: &[f64; 2]| format!("{gain:.2} at {hertz:.0} Hz");
             let cells = [format!("{frequency:.1}"), at(largest), at(modelled), format!("{:.1} %", 100.0 * error)];
             row(&mut text, &columns, &[&cells[0], &cells[1], &cells[2], &cells[3]]);

@@ -2,13 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::ir::Path as Poses;
 use specgen_link::client::Port;
-use specgen_operate::{ALIVE, Order, Until};
+use specgen_operate::{ALIVE, Order, WaitCondition};
 use specgen_runtime::playback::Knot;
 use specgen_runtime::supervisor::{Phase, Request};
-use specgen_studies::learning::{LearnError, Motion, Plan, Repeating, Seen, course, held};
+use specgen_studies::learning::{LearnError, Motion, PassObservation, Plan, RepeatableMachine, course, held};
 
 use crate::cli::operate::{Ended, Operator};
 use specgen_language::outcome::Failure;
@@ -30,7 +30,7 @@ impl Own {
     ///
     /// # Errors
     /// There is none, or not one with an end.
-    pub fn named(name: Option<&str>, compiled: &Compiled) -> Result<Self, Failure> {
+    pub fn named(name: Option<&str>, compiled: &Compilation) -> Result<Self, Failure> {
         let known = compiled.ir.task_space.iter().flat_map(|task| &task.setpoints.trajectories);
         let names: Vec<&str> = known.clone().map(|one| one.name.as_str()).collect();
         let found = known.enumerate().find(|(_, one)| Some(one.name.as_str()) == name);
@@ -74,22 +74,22 @@ impl<P: Port> Remote<'_, P> {
                         "the machine does not arm; `specgen operate` with `status` says why".to_owned(),
                     ));
                 }
-                self.operator.obey(&wait(Until::Passed(ALIVE)), self.ui)?;
+                self.operator.obey(&wait(WaitCondition::Passed(ALIVE)), self.ui)?;
             }
             self.operator.obey(&Order::Ask(Request::Run), self.ui)?;
-            self.operator.obey(&wait(Until::Phase(Phase::Running)), self.ui)?;
+            self.operator.obey(&wait(WaitCondition::Phase(Phase::Running)), self.ui)?;
         } else if stands != Phase::Running.word() {
             return Err(Ended::Refused(format!(
                 "the machine is {}; learning begins with one that is disarmed or runs",
                 self.operator.stands()
             )));
         }
-        self.operator.obey(&wait(Until::Arrived), self.ui)
+        self.operator.obey(&wait(WaitCondition::Arrived), self.ui)
     }
 }
 
-impl<P: Port> Repeating for Remote<'_, P> {
-    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, LearnError> {
+impl<P: Port> RepeatableMachine for Remote<'_, P> {
+    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<PassObservation, LearnError> {
         let course = course(motion, spacing, self.own.number);
         // What the device has stays there.
         let sent = if self.has.as_deref() == Some(knots) { None } else { Some(knots) };
@@ -97,7 +97,7 @@ impl<P: Port> Repeating for Remote<'_, P> {
             Ok(passed) => {
                 self.has = Some(knots.to_vec());
                 let measured = held(&passed.errors, spacing, motion.corrected);
-                Ok(Seen { real: measured.clone(), measured, kept: passed.errors, status: passed.status })
+                Ok(PassObservation { real: measured.clone(), measured, kept: passed.errors, status: passed.status })
             }
             Err(ended) => {
                 self.ended = Some(ended);
@@ -107,7 +107,7 @@ impl<P: Port> Repeating for Remote<'_, P> {
     }
 
     /// The device makes it, and the same kernel here finds whether it made it to the bit.
-    fn next(&mut self, plan: &Plan, played: &[Knot], seen: &Seen) -> Result<Vec<Knot>, LearnError> {
+    fn next(&mut self, plan: &Plan, played: &[Knot], seen: &PassObservation) -> Result<Vec<Knot>, LearnError> {
         let expected = plan.next(played, &seen.kept).ok_or(LearnError::Refused)?;
         let made =
             self.operator.plan(seen.kept.len(), &plan.rows).and_then(|()| self.operator.learn(plan.settings, self.ui));

@@ -22,7 +22,7 @@ use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::{check_input, check_place, write_file};
 use specgen_language::ui::Ui;
 use specgen_operate::frame::Frame;
-use specgen_operate::{Order, Session, Until};
+use specgen_operate::{Order, Session, WaitCondition};
 
 /// How long ramping down may take.
 const DOWN: Duration = Duration::from_secs(60);
@@ -367,18 +367,18 @@ impl<P: Port> Operator<P> {
         self.look()
     }
 
-    pub(super) fn wait(&mut self, until: Until, limit: Duration, ui: &Ui) -> Result<(), Ended> {
+    pub(super) fn wait(&mut self, until: WaitCondition, limit: Duration, ui: &Ui) -> Result<(), Ended> {
         let start = Instant::now();
         // Whoever waits for another phase expects it.
-        self.goes_down |= matches!(until, Until::Phase(phase) if phase != Phase::Running);
+        self.goes_down |= matches!(until, WaitCondition::Phase(phase) if phase != Phase::Running);
         self.was_stopped = false;
         loop {
-            if until == Until::Arrived && self.was_stopped {
+            if until == WaitCondition::Arrived && self.was_stopped {
                 return Err(self.stopped_by_others());
             }
             let there = match until {
-                Until::Phase(phase) => u64::from(self.session.status().phase) == phase.word(),
-                Until::Arrived => {
+                WaitCondition::Phase(phase) => u64::from(self.session.status().phase) == phase.word(),
+                WaitCondition::Arrived => {
                     let Status { phase, status, .. } = *self.session.status();
                     let runs = u64::from(phase) == Phase::Running.word();
                     if runs && status & REFUSED != 0 {
@@ -386,15 +386,15 @@ impl<P: Port> Operator<P> {
                     }
                     runs && status & BUSY == 0
                 }
-                Until::Passed(time) => start.elapsed() >= time,
+                WaitCondition::Passed(time) => start.elapsed() >= time,
             };
             if there {
                 return Ok(());
             }
             let expected = match until {
-                Until::Phase(phase) => phase.name(),
-                Until::Arrived => "arrived",
-                Until::Passed(_) => "",
+                WaitCondition::Phase(phase) => phase.name(),
+                WaitCondition::Arrived => "arrived",
+                WaitCondition::Passed(_) => "",
             };
             if !expected.is_empty() && start.elapsed() >= limit {
                 return Err(Ended::Fault(format!(

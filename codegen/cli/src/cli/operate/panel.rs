@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 
 use clap::{ArgGroup, Args};
 use serde_json::{Value, json};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::interrupt;
 use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
@@ -75,7 +75,7 @@ pub struct Arguments {
 /// What the panel knows and tells.
 struct Panel {
     hall: Hall,
-    compiled: Compiled,
+    compiled: Compilation,
     blocks: Vec<Block>,
     /// Number of the next block, and its first tick.
     next: Option<(u32, u64)>,
@@ -233,7 +233,7 @@ fn pulse<P: Port + 'static>(panel: Rc<RefCell<Panel>>) -> Pulse<P> {
 }
 
 impl Panel {
-    fn new(hall: Hall, compiled: Compiled) -> Self {
+    fn new(hall: Hall, compiled: Compilation) -> Self {
         let begun = Instant::now();
         Self {
             hall,

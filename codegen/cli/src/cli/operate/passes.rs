@@ -9,7 +9,7 @@ use host_sim::word::status_words;
 use serde::Serialize;
 use specgen_link::client::{ClientError, Port};
 use specgen_link::{PassAction, Refusal};
-use specgen_operate::Until;
+use specgen_operate::WaitCondition;
 use specgen_runtime::learning::Settings;
 use specgen_runtime::pass::{Course, Stage};
 use specgen_runtime::playback::Knot;
@@ -142,7 +142,7 @@ impl<P: Port> Operator<P> {
             )));
         }
         self.go(*start)?;
-        self.wait(Until::Arrived, Duration::from_secs(60), ui)?;
+        self.wait(WaitCondition::Arrived, Duration::from_secs(60), ui)?;
         let rested = self.session.status().tick + (REST / self.session.period()) as u64;
         while self.session.status().tick < rested {
             std::thread::sleep(LOOK);

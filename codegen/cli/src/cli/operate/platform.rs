@@ -10,8 +10,8 @@ use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
 use specgen_operate::frame::Frame;
 use specgen_operate::motion::{self, Motion};
-use specgen_operate::place::{self, AXES, Named, Pace, amount, meant};
-use specgen_operate::{Framed, Order, Place, Wanted};
+use specgen_operate::place::{self, AXES, AxisValues, Pace, amount, meant};
+use specgen_operate::{FrameChoice, ModeRequest, Order, Place};
 use specgen_runtime::setpoint::{BUSY, REFUSED, STALE};
 use specgen_runtime::supervisor::{Cause, Phase};
 
@@ -224,9 +224,9 @@ impl<P: Port> Operator<P> {
             Order::Frame(frame) => {
                 self.frame = match frame {
                     None => self.frame,
-                    Some(Framed::None) => Frame::default(),
-                    Some(Framed::Work(work)) => Frame::new(*work, *self.frame.tool()),
-                    Some(Framed::Tool(tool)) => Frame::new(*self.frame.work(), *tool),
+                    Some(FrameChoice::None) => Frame::default(),
+                    Some(FrameChoice::Work(work)) => Frame::new(*work, *self.frame.tool()),
+                    Some(FrameChoice::Tool(tool)) => Frame::new(*self.frame.work(), *tool),
                 };
                 let (work, tool) =
                     (self.frame.work().map(|value| value * 1e6), self.frame.tool().map(|value| value * 1e6));
@@ -258,7 +258,7 @@ impl<P: Port> Operator<P> {
     }
 
     /// What keeps it from going there so fast; none if it can.
-    fn binds(&self, from: &[f64; 6], axes: &Named, [along, about]: &Pace) -> Result<Option<String>, String> {
+    fn binds(&self, from: &[f64; 6], axes: &AxisValues, [along, about]: &Pace) -> Result<Option<String>, String> {
         let (motion, to) = (self.motion()?, meant(from, false, axes));
         let Some(user) = self.frame.user(&to) else { return Ok(Some(BEYOND.to_owned())) };
         if let Some(binding) = motion.binding(&user) {
@@ -299,7 +299,7 @@ impl<P: Port> Operator<P> {
     }
 
     /// Every mode of the law is stable with the spec's gains, or the spec was refused.
-    fn set_mode(&mut self, wanted: Wanted) -> Result<(), Ended> {
+    fn set_mode(&mut self, wanted: ModeRequest) -> Result<(), Ended> {
         let mut words = self.session.config()?;
         let now = self.word_of(&words, "mode").unwrap_or_default();
         let mode = wanted.word(now).map_err(Ended::Refused)?;

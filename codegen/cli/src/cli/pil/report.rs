@@ -10,7 +10,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::cli::sim::platform::Played;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::outcome::Outcome;
 use specgen_language::table::{left, right, row};
 use specgen_operate::pil::{Cost, Difference};
@@ -70,7 +70,7 @@ fn rows<S: serde::Serializer>(table: &PoseTable, serializer: S) -> Result<S::Ok,
 }
 
 impl Report {
-    pub fn new(compiled: &Compiled, device: String, stack_bound: Option<u64>) -> Self {
+    pub fn new(compiled: &Compilation, device: String, stack_bound: Option<u64>) -> Self {
         Self {
             name: compiled.ir.name.clone(),
             digest: compiled.ir.digest.clone(),

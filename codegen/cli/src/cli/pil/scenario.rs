@@ -14,7 +14,7 @@ use specgen_link::client::Port;
 use super::report::Report;
 use super::{Arguments, Broken, timed};
 use crate::cli::sim;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::model::TaskSpace;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
@@ -52,14 +52,14 @@ impl Plan {
     ///
     /// # Errors
     /// Arguments that make no sense for the spec.
-    pub fn of(arguments: &Arguments, compiled: &Compiled) -> Result<Self, Failure> {
+    pub fn of(arguments: &Arguments, compiled: &Compilation) -> Result<Self, Failure> {
         match &compiled.model.task_space {
             Some(task) => Self::platform(arguments, compiled, task),
             None => Self::legs(arguments, compiled),
         }
     }
 
-    fn legs(arguments: &Arguments, compiled: &Compiled) -> Result<Self, Failure> {
+    fn legs(arguments: &Arguments, compiled: &Compilation) -> Result<Self, Failure> {
         if arguments.scenario.is_some() || arguments.trajectory.is_some() {
             return Err(Failure::Usage(
                 "--scenario and --trajectory are for a platform that six gauges see; this spec has no [control]: its one scenario is the leg trajectory"
@@ -76,7 +76,7 @@ impl Plan {
         Ok(Self::Legs { modes, frequency, samples })
     }
 
-    fn platform(arguments: &Arguments, compiled: &Compiled, task: &TaskSpace) -> Result<Self, Failure> {
+    fn platform(arguments: &Arguments, compiled: &Compilation, task: &TaskSpace) -> Result<Self, Failure> {
         if arguments.samples.is_some() {
             return Err(Failure::Usage(
                 "--samples is for legs with their own gauges; a spec with [control] runs at its timing.period"
@@ -119,7 +119,7 @@ impl Plan {
         &self,
         lockstep: &mut Lockstep<P>,
         report: &mut Report,
-        compiled: &Compiled,
+        compiled: &Compilation,
         arguments: &Arguments,
         ui: &Ui,
     ) -> Result<(), Broken> {
@@ -197,7 +197,7 @@ fn mode(name: &str, known: &[(&'static str, u32)]) -> Result<(&'static str, u32)
 }
 
 /// Six legs at rest, with their gauges zeroed.
-fn legs(compiled: &Compiled, samples: u32, arguments: &Arguments, ui: &Ui) -> Result<Rig<LegPlant>, Broken> {
+fn legs(compiled: &Compilation, samples: u32, arguments: &Arguments, ui: &Ui) -> Result<Rig<LegPlant>, Broken> {
     let parameters = arguments.plant.leg()?;
     let noise = if arguments.plant.no_noise { NoiseParameters::NONE } else { parameters.noise };
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
@@ -206,7 +206,7 @@ fn legs(compiled: &Compiled, samples: u32, arguments: &Arguments, ui: &Ui) -> Re
     Ok(scenario.rig_mut().clone())
 }
 
-fn platform(compiled: &Compiled, arguments: &Arguments, ui: &Ui) -> Result<PlatformScenario, Broken> {
+fn platform(compiled: &Compilation, arguments: &Arguments, ui: &Ui) -> Result<PlatformScenario, Broken> {
     let model = &compiled.model;
     // A plan of a platform is made of a spec that has one.
     let Some(task) = &model.task_space else {

@@ -3,7 +3,7 @@
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use host_sim::record::{self, Again, Block, Header};
+use host_sim::record::{self, Block, Header, ReplayedRows};
 
 use super::messages::Messages;
 use specgen_language::outcome::Failure;
@@ -22,7 +22,7 @@ impl Exports {
         Ok(Self { csv: csv.map(Csv::new).transpose()?, mcap: mcap.map(Messages::new).transpose()?, rows: 0 })
     }
 
-    pub fn add(&mut self, header: &Header, block: &Block, again: Option<Again>) -> Result<(), Failure> {
+    pub fn add(&mut self, header: &Header, block: &Block, again: Option<ReplayedRows>) -> Result<(), Failure> {
         if let Some(csv) = &mut self.csv {
             csv.add(header, block, again, self.rows == 0)?;
         }
@@ -52,7 +52,7 @@ impl Csv {
         Ok(Self { file: BufWriter::new(PendingFile::create(path)?), path: path.to_owned() })
     }
 
-    fn add(&mut self, header: &Header, block: &Block, again: Option<Again>, first: bool) -> Result<(), Failure> {
+    fn add(&mut self, header: &Header, block: &Block, again: Option<ReplayedRows>, first: bool) -> Result<(), Failure> {
         record::write_csv(&mut self.file, header, block, again, first).map_err(|error| unwritten(&self.path, &error))
     }
 

@@ -6,7 +6,7 @@ use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use host_sim::controller::MachineWord;
-use host_sim::record::{Again, Block, Header, Row};
+use host_sim::record::{Block, Header, ReplayedRows, Row};
 use host_sim::word::{Scalar, WordKind, status_words};
 use serde_json::{Value, json};
 
@@ -38,7 +38,7 @@ impl Messages {
         Ok(Self { writer, path: path.to_owned(), channels: BTreeMap::new(), said: None, text: String::new() })
     }
 
-    pub fn add(&mut self, header: &Header, block: &Block, again: Option<Again>) -> Result<(), Failure> {
+    pub fn add(&mut self, header: &Header, block: &Block, again: Option<ReplayedRows>) -> Result<(), Failure> {
         self.put(header, block, again).map_err(|error| unwritten(&self.path, &error))
     }
 
@@ -48,7 +48,7 @@ impl Messages {
         file.into_inner().map_err(|error| unwritten(&self.path, &error))?.keep()
     }
 
-    fn put(&mut self, header: &Header, block: &Block, again: Option<Again>) -> io::Result<()> {
+    fn put(&mut self, header: &Header, block: &Block, again: Option<ReplayedRows>) -> io::Result<()> {
         let scalar = header.description.scalar;
         let signals = Signals::new(header, again);
         if self.channels.is_empty() {
@@ -185,7 +185,7 @@ enum Of {
 struct Signals(Vec<(&'static str, Of)>, bool);
 
 impl Signals {
-    fn new(header: &Header, again: Option<Again>) -> Self {
+    fn new(header: &Header, again: Option<ReplayedRows>) -> Self {
         let place = |names: &[String], stem: &str| names.iter().position(|name| *name == format!("{stem}[0]"));
         let inputs = header.input_names();
         let gauges = place(&inputs, "gauge").or_else(|| place(&inputs, "displacement"));

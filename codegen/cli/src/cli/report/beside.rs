@@ -5,7 +5,7 @@ use host_sim::controller::Supervised;
 use host_sim::plant::{LegParameters, LegPlant};
 use host_sim::platform::rig::{Noise, PlatformRig};
 use host_sim::record::Block;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::model::Model;
 use specgen_report::record::Sample;
 use specgen_runtime::record::Reason;
@@ -117,7 +117,7 @@ pub(super) fn simulate(
     controller: &mut Supervised,
     blocks: &[Block],
     words: &Words,
-    compiled: &Compiled,
+    compiled: &Compilation,
     recorded: &mut [Sample],
 ) -> Result<Vec<Sample>, String> {
     let period = compiled.model.timing.period;

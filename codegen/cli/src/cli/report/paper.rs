@@ -4,7 +4,7 @@ use host_sim::closed_loop::LEGS;
 use host_sim::controller::Controller;
 use host_sim::plant::LegParameters;
 use host_sim::platform::rig::Noise;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::model::TaskSpace;
 use specgen_language::shell;
 use specgen_report::hysteresis;
@@ -20,7 +20,7 @@ use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 
 pub fn sections(
-    compiled: &Compiled,
+    compiled: &Compilation,
     controller: &mut Controller,
     generations: u32,
     name: &str,
@@ -35,7 +35,7 @@ pub fn sections(
 }
 
 fn of_platform(
-    compiled: &Compiled,
+    compiled: &Compilation,
     task: &TaskSpace,
     controller: &mut Controller,
     name: &str,
@@ -58,7 +58,7 @@ fn of_platform(
     Ok(sections)
 }
 
-fn of_legs(compiled: &Compiled, controller: &mut Controller, name: &str, ui: &Ui) -> Result<Vec<Section>, Failure> {
+fn of_legs(compiled: &Compilation, controller: &mut Controller, name: &str, ui: &Ui) -> Result<Vec<Section>, Failure> {
     let model = &compiled.model;
     let leg = LegParameters::reference();
     let all: [LegParameters; LEGS] = std::array::from_fn(|_| leg.clone());
@@ -83,7 +83,7 @@ fn of_legs(compiled: &Compiled, controller: &mut Controller, name: &str, ui: &Ui
 
 /// The genetic algorithm, or why it was not run: left out, or the spec's mode has nothing to tune.
 fn converge(
-    compiled: &Compiled,
+    compiled: &Compilation,
     controller: &Controller,
     generations: u32,
     name: &str,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use host_sim::controller::{MachineWord, Supervised};
 use host_sim::record::{self, Block};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_report::record::{Run, Sample};
 use specgen_runtime::record::Reason;
 
@@ -19,7 +19,7 @@ use specgen_language::ui::Ui;
 const FAULTED: u8 = 5;
 
 /// Reads a record and runs its ticks again, with its own readings and with those of a simulated machine.
-pub fn read(path: &Path, compiled: &Compiled, ui: &Ui) -> Result<Run, Failure> {
+pub fn read(path: &Path, compiled: &Compilation, ui: &Ui) -> Result<Run, Failure> {
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{}: {error}", path.display()));
     let mut reader = replay::open(path)?;
     let recorded = &reader.header().description;

@@ -5,7 +5,7 @@ use host_sim::controller::Controller;
 use host_sim::plant::LegParameters;
 use host_sim::platform::rig::Noise;
 use host_sim::scenario::{MODES, select};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::stability::platform::Law;
 use specgen_language::diagnostic::codes;
 use specgen_language::model::TaskSpace;
@@ -14,7 +14,7 @@ use specgen_report::budget::{self, Pair};
 use specgen_report::first::Errors;
 use specgen_report::platform::{self, Motion};
 use specgen_report::section::Section;
-use specgen_report::tracking::{self, Followed, Line, Shown, norm, short};
+use specgen_report::tracking::{self, Line, PlottedRun, TrackedPath, norm, short};
 use specgen_report::{hysteresis, learning, margins};
 use specgen_studies::machine::run_failure;
 use specgen_studies::verdict::Figure;
@@ -36,7 +36,12 @@ pub struct Simulated {
     pub judged: Vec<Figure>,
 }
 
-pub fn of(compiled: &Compiled, controllers: [&mut Controller; 2], name: &str, ui: &Ui) -> Result<Simulated, Failure> {
+pub fn of(
+    compiled: &Compilation,
+    controllers: [&mut Controller; 2],
+    name: &str,
+    ui: &Ui,
+) -> Result<Simulated, Failure> {
     match &compiled.model.task_space {
         Some(task) => of_platform(compiled, task, controllers, name, ui),
         None => of_legs(compiled, controllers, name, ui),
@@ -44,7 +49,7 @@ pub fn of(compiled: &Compiled, controllers: [&mut Controller; 2], name: &str, ui
 }
 
 fn of_platform(
-    compiled: &Compiled,
+    compiled: &Compilation,
     task: &TaskSpace,
     [controller, fine]: [&mut Controller; 2],
     name: &str,
@@ -93,7 +98,7 @@ fn of_platform(
         hysteresis::of_platform(&scenario, controller, &platform, &model.actuator, legs, &compiled.records, &all);
     sections.push(behind.map_err(run_failure)?);
     let noise = compiled.pose_noise.as_ref().map(|noise| noise.pose);
-    let speed = |own: bool| all.iter().find(|one| one.own == own && one.frequency.is_some()).map(Followed::speed);
+    let speed = |own: bool| all.iter().find(|one| one.own == own && one.frequency.is_some()).map(TrackedPath::speed);
     let picture = |turning: bool, unit: &'static str| {
         let lines = tracking::lines(model, noise.as_ref(), &all, turning);
         (unit, tracking::dumbbell(&lines, [speed(true), speed(false)], unit))
@@ -116,7 +121,7 @@ fn of_platform(
 }
 
 fn of_legs(
-    compiled: &Compiled,
+    compiled: &Compilation,
     [controller, fine]: [&mut Controller; 2],
     name: &str,
     ui: &Ui,
@@ -137,7 +142,7 @@ fn of_legs(
         select(controller, word).map_err(environment)?;
         let run = scenario.run(controller, frequency).map_err(run_failure)?.tracking;
         let speed = format!("{frequency}\u{2009}Hz");
-        let shown = Shown {
+        let shown = PlottedRun {
             id: format!("legs-{frequency}hz"),
             what: format!("the leg trajectory at {speed}"),
             law,

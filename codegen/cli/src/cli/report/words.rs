@@ -3,7 +3,7 @@
 use host_sim::controller::{MachineWord, Supervised, TickController};
 use host_sim::record::{Block, Header};
 use host_sim::word::Scalar;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
 use specgen_numerics::jacobian;
 use specgen_report::record::Sample;
@@ -34,7 +34,7 @@ pub(super) struct Words {
 }
 
 impl Words {
-    pub(super) fn of(header: &Header, machine: &Supervised, compiled: &Compiled) -> Result<Self, Failure> {
+    pub(super) fn of(header: &Header, machine: &Supervised, compiled: &Compilation) -> Result<Self, Failure> {
         let names = header.input_names();
         let description = machine.controller().description();
         let inputs = |stem: &str| -> Option<[usize; 6]> {

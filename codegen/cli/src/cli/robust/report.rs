@@ -11,7 +11,7 @@ use super::work::{Lessons, Work};
 use specgen_language::outcome::Outcome as Shown;
 use specgen_language::table::{left, right, row};
 use specgen_studies::robust::quantiles::quantile;
-use specgen_studies::robust::{Deviation, Factor, Factors, Figures, Gate, Learnt, Member, Outcome};
+use specgen_studies::robust::{Deviation, Factor, Factors, Figures, Gate, LearningFigures, Member, Outcome};
 
 /// Quantiles of the draws that are shown, %; 100 is the largest.
 const QUANTILES: [f64; 4] = [5.0, 50.0, 95.0, 100.0];
@@ -231,7 +231,7 @@ impl<'a> Found<'a> {
                     let _ = write!(out, ", {rms:.1} nrad rms, {peak:.1} nrad peak");
                 }
                 let _ = write!(out, ", over {}", f.coverage.brief());
-                if let Some(Learnt { error_nm, passes, grew, coverage }) = f.learned {
+                if let Some(LearningFigures { error_nm, passes, grew, coverage }) = f.learned {
                     let _ = write!(out, ", {error_nm:.2} nm learned in {passes} passes over {}", coverage.brief());
                     out.push_str(if grew { ", then it grew" } else { "" });
                 }

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::StudyArguments;
 use crate::cli::trajectory::Followed;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::outcome::{Failure, Outcome as Shown};
 use specgen_language::output::write_file;
 use specgen_language::shell;
@@ -75,7 +75,7 @@ impl Work {
     pub(super) fn of(
         arguments: &StudyArguments,
         path: &Path,
-        compiled: &Compiled,
+        compiled: &Compilation,
         followed: &Followed,
         leg: &LegParameters,
         learning: Option<&Learning>,

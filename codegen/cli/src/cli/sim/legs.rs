@@ -13,7 +13,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{Arguments, environment, write_files};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::stability;
 use specgen_language::model::{Adaptation, Model};
 use specgen_language::outcome::{Failure, Outcome};
@@ -34,7 +34,7 @@ const PERIODS: f64 = 3.0;
 const LOST: f64 = 0.1;
 
 /// Refuses arguments that are for a platform alone, and an interval at which the laws are unstable.
-pub(super) fn check(arguments: &Arguments, compiled: &Compiled) -> Result<(), Failure> {
+pub(super) fn check(arguments: &Arguments, compiled: &Compilation) -> Result<(), Failure> {
     if arguments.trajectory.is_some()
         || arguments.latency != 0
         || arguments.small_steps
@@ -57,7 +57,7 @@ pub(super) fn check(arguments: &Arguments, compiled: &Compiled) -> Result<(), Fa
 
 /// Refuses `samples` ticks a period at `hertz` if a law of the spec is unstable at that interval: the check of the spec is for
 /// its own period.
-pub(in crate::cli) fn judge(compiled: &Compiled, hertz: f64, samples: u32) -> Result<(), Failure> {
+pub(in crate::cli) fn judge(compiled: &Compilation, hertz: f64, samples: u32) -> Result<(), Failure> {
     let period = compiled.model.timing.period;
     let mut model = compiled.model.clone();
     model.timing.period = 1.0 / hertz / f64::from(samples);
@@ -84,7 +84,7 @@ fn range(model: &Model) -> [f64; 2] {
 /// Tracking of the spec's own legs: the shape of their hysteresis is that of the plant file, all else the spec's.
 fn own(
     arguments: &Arguments,
-    compiled: &Compiled,
+    compiled: &Compilation,
     controller: &mut dyn TickController,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
@@ -172,7 +172,7 @@ impl Outcome for Own<'_> {
 
 pub(super) fn run(
     arguments: &Arguments,
-    compiled: &Compiled,
+    compiled: &Compilation,
     controller: &mut dyn TickController,
     ui: &mut Ui,
 ) -> Result<(), Failure> {

@@ -20,7 +20,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{Arguments, File, environment, record, write_files};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::model::{AdaptationMode, ControlMode, TaskSpace};
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::spec::nearest;
@@ -81,7 +81,7 @@ pub(in crate::cli) fn selector(task: &TaskSpace, name: &str) -> Result<u32, Fail
 
 pub(super) fn run(
     arguments: &Arguments,
-    compiled: &Compiled,
+    compiled: &Compilation,
     task: &TaskSpace,
     controller: &mut dyn TickController,
     ui: &mut Ui,
@@ -392,7 +392,7 @@ impl Experiment<'_> {
     }
 
     /// At rest, waves at `frequencies` (Hz), every trajectory of the spec; in the mode of the spec.
-    fn motions(&mut self, compiled: &Compiled, task: &TaskSpace, frequencies: &[f64]) -> Result<Found, Failure> {
+    fn motions(&mut self, compiled: &Compilation, task: &TaskSpace, frequencies: &[f64]) -> Result<Found, Failure> {
         let mut motions = Vec::new();
         self.ui.progress("at rest");
         let run = self.scenario.run(self.controller, &Rest);
@@ -429,7 +429,7 @@ impl Experiment<'_> {
     }
 
     /// A trajectory of the spec, in the mode of the spec.
-    fn own(&mut self, name: &str, compiled: &Compiled, selector: u32) -> Result<Found, Failure> {
+    fn own(&mut self, name: &str, compiled: &Compilation, selector: u32) -> Result<Found, Failure> {
         self.ui.progress(&format!("playing {name} on board"));
         let Some(path) = machine::on_board(compiled, selector) else { return Ok(Found::Nothing {}) };
         let run = self.scenario.play(self.controller, &path, None);

@@ -8,7 +8,7 @@ use std::path::Path;
 use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, Supervised, TickController};
 use host_sim::platform::rig::{Bench, Noise, Request};
-use host_sim::record::{Ended, Recorded, Writer};
+use host_sim::record::{RecordedController, RecordingEnd, Writer};
 use host_sim::scenario::select;
 use host_sim::trajectory::{LegTrajectory, PoseTarget};
 use serde::Serialize;
@@ -17,7 +17,7 @@ use specgen_runtime::recorder::{Recorder, Settings as Recording};
 use specgen_runtime::wave::{AxisWave, Limits, Settings, Shape, Tone, Wave, step_of};
 
 use super::{Arguments, environment};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_language::model::TaskSpace;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::{PendingFile, unwritten};
@@ -61,7 +61,7 @@ impl Outcome for Written {
 pub(super) fn run(
     arguments: &Arguments,
     path: &Path,
-    compiled: &Compiled,
+    compiled: &Compilation,
     controller: Controller,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
@@ -88,7 +88,7 @@ pub(super) fn run(
     recorder.start(Recording::STREAM);
     let file = BufWriter::with_capacity(1 << 20, PendingFile::create(path)?);
     let mut writer = Writer::new(file, &text).map_err(|error| unwritten(path, &error))?;
-    let mut recorded = Recorded::new(machine, &mut recorder, &mut writer).map_err(environment)?;
+    let mut recorded = RecordedController::new(machine, &mut recorder, &mut writer).map_err(environment)?;
     recorded.reset();
     ui.progress(&format!("recording {seconds} s of a wave on all axes under the supervisor"));
     let (wave, _) = wave(compiled, ticks as i32, FREQUENCIES, SHARES)?;
@@ -102,9 +102,9 @@ pub(super) fn run(
         (false, Err(error)) => return Err(environment(error)),
     };
     ended.map_err(|ended| match ended {
-        Ended::Io(error) => unwritten(path, &error),
-        Ended::Controller(error) => environment(error),
-        Ended::Supervisor { tick, word } => {
+        RecordingEnd::Io(error) => unwritten(path, &error),
+        RecordingEnd::Controller(error) => environment(error),
+        RecordingEnd::Supervisor { tick, word } => {
             Failure::Gate(format!("tick {tick}: instead of running the machine is {word}; nothing was written"))
         }
     })?;
@@ -120,7 +120,7 @@ pub(super) fn run(
 /// A wave of all axes, each at its frequency (Hz), within the limits of the spec; smaller where it would be too fast. `shares`:
 /// of the room, of the third axis and of the others. With the amplitude of the third axis, m.
 pub(super) fn wave(
-    compiled: &Compiled,
+    compiled: &Compilation,
     ticks: i32,
     frequencies: [f64; 6],
     shares: [f64; 2],
@@ -186,9 +186,9 @@ pub(super) fn wave(
 
 fn platform(
     arguments: &Arguments,
-    compiled: &Compiled,
+    compiled: &Compilation,
     task: &TaskSpace,
-    controller: &mut Recorded<'_, '_>,
+    controller: &mut RecordedController<'_, '_>,
     mut wave: Wave<f64>,
     ticks: u64,
 ) -> Result<(), RunError> {
@@ -213,8 +213,8 @@ fn platform(
 
 fn legs(
     arguments: &Arguments,
-    compiled: &Compiled,
-    controller: &mut Recorded<'_, '_>,
+    compiled: &Compilation,
+    controller: &mut RecordedController<'_, '_>,
     wave: Wave<f64>,
     seconds: f64,
 ) -> Result<(), RunError> {

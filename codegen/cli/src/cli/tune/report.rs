@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::Job;
 use super::start::Starts;
-use specgen_compiler::compile::Compiled;
-use specgen_compiler::stability::platform::{Adapting, Conditions, Law, ModeMargins};
+use specgen_compiler::compile::Compilation;
+use specgen_compiler::stability::platform::{Conditions, Estimator, Law, ModeMargins};
 use specgen_compiler::stability::{LegDynamics, phase_margin, transition};
 use specgen_language::model::{AdaptationMode, ControlMode};
 use specgen_language::outcome::{Failure, Outcome};
@@ -90,7 +90,7 @@ impl<'a> Report<'a> {
         settings: &[(&'static str, Setting)],
         starts: &'a Starts,
         searches: &'a [(&'static str, Search)],
-        tuned: &Compiled,
+        tuned: &Compilation,
         patch: &'a str,
     ) -> Result<Self, Failure> {
         let (mut here, mut there) = (case.worker(), other.worker());
@@ -243,12 +243,12 @@ impl Outcome for Report<'_> {
 }
 
 /// Margins of the spec's own mode.
-fn margins_of(job: &Job, tuned: &Compiled) -> Margins {
+fn margins_of(job: &Job, tuned: &Compilation) -> Margins {
     let model = &tuned.model;
     let adapting = match model.adaptation.mode {
-        AdaptationMode::Invhys => Adapting::Invhys,
-        AdaptationMode::Ewma => Adapting::Ewma,
-        AdaptationMode::Pcc => Adapting::Pcc,
+        AdaptationMode::Invhys => Estimator::Invhys,
+        AdaptationMode::Ewma => Estimator::Ewma,
+        AdaptationMode::Pcc => Estimator::Pcc,
     };
     let degrees = |phase: Option<f64>| phase.map(f64::to_degrees);
     if let (Some(task), Some(design), Feasibility::Platform { closed_loop, .. }) =

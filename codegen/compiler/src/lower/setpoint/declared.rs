@@ -11,7 +11,7 @@ use specgen_language::model::{Model, TrajectoryKind};
 
 /// What the set-points of a spec yield.
 #[derive(Debug, Default)]
-pub struct Declared {
+pub struct SpecSetpoints {
     /// The constants of the generator; none for six legs with their own gauges.
     pub setpoints: Option<Setpoints>,
     /// Warnings, none of which refuses anything.
@@ -24,8 +24,8 @@ pub struct Declared {
 ///
 /// # Errors
 /// All findings of the tables, and those of [`super::lower`].
-pub fn declared(model: &Model, dir: &Path) -> Result<Declared, Vec<Diagnostic>> {
-    let Some(task) = &model.task_space else { return Ok(Declared::default()) };
+pub fn declared(model: &Model, dir: &Path) -> Result<SpecSetpoints, Vec<Diagnostic>> {
+    let Some(task) = &model.task_space else { return Ok(SpecSetpoints::default()) };
     let mut texts = Vec::new();
     let mut errors = Vec::new();
     let mut waveforms = Vec::new();
@@ -42,9 +42,11 @@ pub fn declared(model: &Model, dir: &Path) -> Result<Declared, Vec<Diagnostic>> 
     }
     let steps = waveforms.iter().flatten().filter_map(corners::step);
     match super::lower(model, task, &waveforms, scalar(model)) {
-        Ok((setpoints, warnings)) if errors.is_empty() => {
-            Ok(Declared { setpoints: Some(setpoints), warnings: warnings.into_iter().chain(steps).collect(), texts })
-        }
+        Ok((setpoints, warnings)) if errors.is_empty() => Ok(SpecSetpoints {
+            setpoints: Some(setpoints),
+            warnings: warnings.into_iter().chain(steps).collect(),
+            texts,
+        }),
         Ok((_, found)) | Err(found) => Err(errors.into_iter().chain(found).chain(steps).collect()),
     }
 }

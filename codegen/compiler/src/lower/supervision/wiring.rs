@@ -92,7 +92,7 @@ pub(super) fn lower(
     let signed = if up { height } else { -height };
     // Where the pulse goes down the gauges do, too, and u is its depth.
     let per_leg = legs(hysteresis, actuation, [rest, rest + signed]);
-    let mut wiring = Wiring {
+    let constants = supervisor::Wiring {
         ticks,
         height: signed,
         turn: regression.turn.map(|turn| turn.map(round)),
@@ -102,15 +102,11 @@ pub(super) fn lower(
         gauge_gain: spec.gauge_gain.map(round),
         leg_gain: compares.then(|| spec.leg_gain.map(round)),
         residual: round(spec.residual * spec.residual),
-        alike: Vec::new(),
-        unseen: Vec::new(),
-        turned: Vec::new(),
     };
-    let constants = runtime(&wiring);
-    (wiring.alike, wiring.unseen) = alike(&constants, readings);
-    wiring.turned = turned(&constants, readings);
-    findings.extend(odd_bounds(model, identified, &constants, &wiring.unseen, readings));
-    Some(wiring)
+    let (alike, unseen) = alike(&constants, readings);
+    let turned = turned(&constants, readings);
+    findings.extend(odd_bounds(model, identified, &constants, &unseen, readings));
+    Some(Wiring { constants, alike, unseen, turned })
 }
 
 /// Bounds that a fault-free machine leaves, or that let a fault pass which the usual residual shows.
@@ -244,21 +240,6 @@ fn larger_or_longer(
             "write wiring_check = { off = \"the gauges are too noisy\" } in [supervisor]: nothing then proves the signs"
                 .to_owned()
         }
-    }
-}
-
-/// As the controller has them.
-fn runtime(wiring: &Wiring) -> supervisor::Wiring<f64> {
-    supervisor::Wiring {
-        ticks: wiring.ticks,
-        height: wiring.height,
-        turn: wiring.turn,
-        lag: wiring.lag,
-        weights: wiring.weights,
-        per_metre: wiring.per_metre,
-        gauge_gain: wiring.gauge_gain,
-        leg_gain: wiring.leg_gain,
-        residual: wiring.residual,
     }
 }
 

@@ -13,7 +13,7 @@
 
 mod driven;
 
-use super::law::{Adapting, Law, Tuning};
+use super::law::{Estimator, Law, Tuning};
 use super::modes::ModalBasis;
 use super::notch::{Biquad, Notch};
 use super::sampled::{PLACE, Plant, shown, states};
@@ -146,8 +146,8 @@ struct Assembly<'a> {
 impl<'a> Assembly<'a> {
     fn new(of: &'a ClosedLoop, law: Law, tuning: &'a Tuning, conditions: &'a Conditions) -> Self {
         let feeds_back = law.feeds_back();
-        let adapts = law.adapting() != Adapting::Invhys && tuning.level_bandwidth != 0.0;
-        let drifts = adapts && law.adapting() == Adapting::Pcc && tuning.drift_bandwidth != 0.0;
+        let adapts = law.adapting() != Estimator::Invhys && tuning.level_bandwidth != 0.0;
+        let drifts = adapts && law.adapting() == Estimator::Pcc && tuning.drift_bandwidth != 0.0;
         let integrating = if feeds_back { used(&tuning.integral) } else { Vec::new() };
         let damped = if feeds_back { used(&tuning.derivative) } else { Vec::new() };
         let notch = |wanted: bool| if wanted && of.notch.is_some() { 12 } else { 0 };

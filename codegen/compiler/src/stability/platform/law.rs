@@ -4,7 +4,7 @@ use serde::{Serialize, Serializer};
 
 /// The estimates of F that are in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Adapting {
+pub enum Estimator {
     /// None: inverse Preisach model alone.
     Invhys,
     /// δ̂.
@@ -19,21 +19,21 @@ pub enum Law {
     /// P alone.
     Position,
     /// F alone.
-    Feedforward(Adapting),
+    Feedforward(Estimator),
     /// P/F.
-    Combined(Adapting),
+    Combined(Estimator),
 }
 
 impl Law {
     /// Every mode, in the order of the word `mode`.
     pub const ALL: [Self; 7] = [
         Self::Position,
-        Self::Feedforward(Adapting::Invhys),
-        Self::Feedforward(Adapting::Ewma),
-        Self::Feedforward(Adapting::Pcc),
-        Self::Combined(Adapting::Invhys),
-        Self::Combined(Adapting::Ewma),
-        Self::Combined(Adapting::Pcc),
+        Self::Feedforward(Estimator::Invhys),
+        Self::Feedforward(Estimator::Ewma),
+        Self::Feedforward(Estimator::Pcc),
+        Self::Combined(Estimator::Invhys),
+        Self::Combined(Estimator::Ewma),
+        Self::Combined(Estimator::Pcc),
     ];
 
     /// As users write it.
@@ -41,12 +41,12 @@ impl Law {
     pub fn name(self) -> &'static str {
         match self {
             Self::Position => "P",
-            Self::Feedforward(Adapting::Invhys) => "F invhys",
-            Self::Feedforward(Adapting::Ewma) => "F ewma",
-            Self::Feedforward(Adapting::Pcc) => "F pcc",
-            Self::Combined(Adapting::Invhys) => "P/F invhys",
-            Self::Combined(Adapting::Ewma) => "P/F ewma",
-            Self::Combined(Adapting::Pcc) => "P/F pcc",
+            Self::Feedforward(Estimator::Invhys) => "F invhys",
+            Self::Feedforward(Estimator::Ewma) => "F ewma",
+            Self::Feedforward(Estimator::Pcc) => "F pcc",
+            Self::Combined(Estimator::Invhys) => "P/F invhys",
+            Self::Combined(Estimator::Ewma) => "P/F ewma",
+            Self::Combined(Estimator::Pcc) => "P/F pcc",
         }
     }
 
@@ -61,9 +61,9 @@ impl Law {
     }
 
     /// The estimates in use.
-    pub(super) fn adapting(self) -> Adapting {
+    pub(super) fn adapting(self) -> Estimator {
         match self {
-            Self::Position => Adapting::Invhys,
+            Self::Position => Estimator::Invhys,
             Self::Feedforward(adapting) | Self::Combined(adapting) => adapting,
         }
     }

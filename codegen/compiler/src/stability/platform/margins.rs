@@ -120,6 +120,6 @@ fn closed_modes(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning) -> (Option<
         }
     }
     modes.sort_by(|a, b| a.frequency.total_cmp(&b.frequency).then(a.damping_ratio.total_cmp(&b.damping_ratio)));
-    let closed = law != Law::Feedforward(super::law::Adapting::Invhys) && slowest > 0.0;
+    let closed = law != Law::Feedforward(super::law::Estimator::Invhys) && slowest > 0.0;
     (closed.then_some(slowest), modes)
 }

@@ -4,16 +4,16 @@ use core::f64::consts::{PI, TAU};
 
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::damping::ActiveDamping;
-use super::law::{Adapting, Law, Tuning};
+use super::law::{Estimator, Law, Tuning};
 use super::margins::ModeMargins;
 use super::search::largest_stable;
 use super::{LARGEST_RADIUS, nominal_conditions, notch, worst_radius};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{AdaptationMode, ControlMode, Model, TaskSpace};
 
-const ADAPTED: [Law; 2] = [Law::Feedforward(Adapting::Ewma), Law::Feedforward(Adapting::Pcc)];
+const ADAPTED: [Law; 2] = [Law::Feedforward(Estimator::Ewma), Law::Feedforward(Estimator::Pcc)];
 const COMBINED: [Law; 3] =
-    [Law::Combined(Adapting::Invhys), Law::Combined(Adapting::Ewma), Law::Combined(Adapting::Pcc)];
+    [Law::Combined(Estimator::Invhys), Law::Combined(Estimator::Ewma), Law::Combined(Estimator::Pcc)];
 /// Lowest factor looked at.
 const LOWEST: f64 = 1e-4;
 /// What is offered is this part of the limit: at the limit itself nothing could be stable beside it.
@@ -119,7 +119,7 @@ impl Case<'_> {
 
     /// The measured interaction force closes a loop of its own, whatever the gains.
     fn interaction(&self) -> Option<Diagnostic> {
-        const BARE: [Law; 1] = [Law::Feedforward(Adapting::Invhys)];
+        const BARE: [Law; 1] = [Law::Feedforward(Estimator::Invhys)];
         let unstable = self.unstable(&BARE, &Tuning::NONE)?;
         let stable_with = |factor: f64| {
             let softer = ClosedLoop {

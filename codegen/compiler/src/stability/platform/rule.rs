@@ -7,7 +7,7 @@
 
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::damping::{self, ActiveDamping};
-use super::law::{Adapting, Law, Tuning};
+use super::law::{Estimator, Law, Tuning};
 use super::search::largest_stable;
 use super::{LARGEST_RADIUS, nominal_conditions};
 
@@ -40,7 +40,7 @@ pub fn bandwidth_limit(closed_loop: &ClosedLoop) -> f64 {
     let fastest = 1.0 / closed_loop.period;
     largest_stable(1e-4 * fastest, fastest, 1.15, |bandwidth| {
         let tuning = Tuning { level_bandwidth: bandwidth, ..Tuning::NONE };
-        is_stable(closed_loop, Law::Feedforward(Adapting::Ewma), &tuning, &Conditions::NOMINAL)
+        is_stable(closed_loop, Law::Feedforward(Estimator::Ewma), &tuning, &Conditions::NOMINAL)
     })
     .unwrap_or(0.0)
 }
@@ -51,13 +51,13 @@ pub fn bandwidth_limit(closed_loop: &ClosedLoop) -> f64 {
 pub(super) fn combined(
     closed_loop: &ClosedLoop,
     limit: f64,
-    given: Given,
+    given: TuningKeys,
     damped: Option<&Tuning>,
     ratios: [f64; 2],
 ) -> Tuning {
-    const ADAPTED: [Law; 2] = [Law::Feedforward(Adapting::Ewma), Law::Feedforward(Adapting::Pcc)];
+    const ADAPTED: [Law; 2] = [Law::Feedforward(Estimator::Ewma), Law::Feedforward(Estimator::Pcc)];
     const CLOSED: [Law; 3] =
-        [Law::Combined(Adapting::Invhys), Law::Combined(Adapting::Ewma), Law::Combined(Adapting::Pcc)];
+        [Law::Combined(Estimator::Invhys), Law::Combined(Estimator::Ewma), Law::Combined(Estimator::Pcc)];
     let start = damped.copied().unwrap_or_else(|| start(closed_loop, limit));
     let fixed: &[Law] = match (given.gains.is_some(), given.bandwidths.is_some()) {
         (true, true) => return given.over(&start),
@@ -83,7 +83,7 @@ fn start(closed_loop: &ClosedLoop, limit: f64) -> Tuning {
 }
 
 /// Puts active damping into the loop; what it is, and the gains and bandwidths that it was designed beside.
-pub(super) fn damped(closed_loop: &mut ClosedLoop, limit: f64, adapting: Adapting) -> (ActiveDamping, Tuning) {
+pub(super) fn damped(closed_loop: &mut ClosedLoop, limit: f64, adapting: Estimator) -> (ActiveDamping, Tuning) {
     let (damping, tuning) = damping::design(closed_loop, adapting, &start(closed_loop, limit));
     closed_loop.active_damping = Some(damping.sections);
     (damping, tuning)
@@ -102,13 +102,13 @@ pub(super) fn alone(closed_loop: &ClosedLoop, limit: f64, ratios: [f64; 2]) -> T
 
 /// What the spec gives of a tuning.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Given<'a> {
+pub(super) struct TuningKeys<'a> {
     pub(super) gains: Option<&'a Tuning>,
     /// Ω1, Ω2.
     pub(super) bandwidths: Option<[f64; 2]>,
 }
 
-impl Given<'_> {
+impl TuningKeys<'_> {
     /// What is given, in place of the rule's.
     fn over(&self, rule: &Tuning) -> Tuning {
         let mut tuning = *rule;

@@ -65,19 +65,19 @@ impl Plant {
     }
 
     /// State transition over `time` with the input held, and the response to that input (six columns).
-    pub(super) fn sample(&self, time: f64) -> Sampled {
+    pub(super) fn sample(&self, time: f64) -> DiscreteModel {
         let states = states(self.gauge_lag);
         let discrete = exponential(&self.continuous.scaled(time));
         let part = |first: usize, count: usize| {
             (0..states).map(|row| discrete.row(row)[first..first + count].to_vec()).collect()
         };
-        Sampled { transition: part(0, states), input: part(states, 6) }
+        DiscreteModel { transition: part(0, states), input: part(states, 6) }
     }
 }
 
 /// x ← transition · x + input · d.
 #[derive(Debug, Clone)]
-pub(super) struct Sampled {
+pub(super) struct DiscreteModel {
     pub(super) transition: Vec<Vec<f64>>,
     pub(super) input: Vec<Vec<f64>>,
 }

@@ -117,7 +117,7 @@ fn every_kind_of_text_gives_the_same_record() {
 }
 
 /// A file, the code and a word of the help of its refusal, and with what it is then taken.
-type Refused<'a> = (&'a str, &'a str, &'a str, String, &'a [&'a str], Option<f64>);
+type RefusalCase<'a> = (&'a str, &'a str, &'a str, String, &'a [&'a str], Option<f64>);
 
 /// Each with the code, a word of the help, and the file as the help would have it.
 #[test]
@@ -127,7 +127,7 @@ fn what_is_refused_says_what_is_then_taken() {
     let mended = file("time_s,drive_V,displacement_um", |row| row.map(comma).join(";"));
     let first = mended.lines().nth(1).unwrap();
     let mixed = file("time_s;drive_V;displacement_um", |[t, u, y]| format!("{};{u:.3};{}", comma(t), comma(y)));
-    let cases: [Refused; 7] = [
+    let cases: [RefusalCase; 7] = [
         (&commas, "E0506", first, mended.clone(), &[], None),
         (&mixed, "E0506", "same decimal sign", mixed.replace(',', "."), &[], None),
         (

@@ -41,22 +41,22 @@ struct Problem {
 }
 
 /// What an entry names.
-enum Named {
+enum EntryKind {
     Key,
     /// Every table of a repeated section, or one of them.
     Tables,
 }
 
 /// The key or repeated section that `entry` names; none of the keys before the first section.
-fn of(entry: &str) -> Option<Named> {
+fn of(entry: &str) -> Option<EntryKind> {
     let bare = without_indices(entry)?;
     if keys::section(&bare).is_some_and(|section| matches!(section.kind, Kind::Repeated(..))) {
-        return Some(Named::Tables);
+        return Some(EntryKind::Tables);
     }
-    (bare.contains('.') && keys::key(&bare).is_some()).then_some(Named::Key)
+    (bare.contains('.') && keys::key(&bare).is_some()).then_some(EntryKind::Key)
 }
 
-impl Named {
+impl EntryKind {
     /// Whether the spec has what `entry` names, as a default too.
     fn stands_in(&self, f: &Fields, entry: &str) -> bool {
         let has = |path: &str| match split_index(path) {

@@ -10,7 +10,7 @@ use super::{AT_REST, Case, Kind, Setting};
 
 /// The end of one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Observed {
+pub struct TickErrors {
     /// Since the start of the trajectory, s.
     pub time: f64,
     /// Error of the translation as a norm, m; of legs the root mean square over them.
@@ -33,7 +33,7 @@ impl Case {
         &self,
         worker: &mut Controller,
         setting: &Setting,
-        mut watch: impl FnMut(&Observed) -> ControlFlow<()>,
+        mut watch: impl FnMut(&TickErrors) -> ControlFlow<()>,
     ) -> Result<Coverage, RunError> {
         match &self.kind {
             Kind::Platform { study, .. } => study.run(worker, &setting.words(worker), |moment| {
@@ -44,7 +44,7 @@ impl Case {
                 }
                 let [translation, orientation] = parts.map(libm::sqrt);
                 let status = moment.tick.status;
-                watch(&Observed { time: moment.time, translation, orientation, largest: translation, status })
+                watch(&TickErrors { time: moment.time, translation, orientation, largest: translation, status })
             }),
             Kind::Legs { scenario, trajectory, .. } => {
                 worker.configure(&setting.words(worker))?;
@@ -64,7 +64,7 @@ impl Case {
                         }
                     }
                     let translation = libm::sqrt(square);
-                    watch(&Observed { time: sample.time, translation, orientation: 0.0, largest, status })
+                    watch(&TickErrors { time: sample.time, translation, orientation: 0.0, largest, status })
                 })
             }
         }

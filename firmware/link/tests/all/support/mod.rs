@@ -3,7 +3,7 @@
 #![allow(dead_code)] // Each test uses its part.
 
 use specgen_link::client::{Client, Port, Timeout};
-use specgen_link::{Bytes, Counted, Device, Identity, Reply, Request};
+use specgen_link::{Bytes, CostUnit, Device, Identity, Reply, Request};
 use std::io;
 use std::time::Duration;
 
@@ -28,7 +28,7 @@ pub const IDENTITY: Identity = Identity {
     input_words: 35,
     output_words: 57,
     stages: 10,
-    counted: Counted::Instructions,
+    counted: CostUnit::Instructions,
     description: 4000,
 };
 

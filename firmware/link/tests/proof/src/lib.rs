@@ -4,7 +4,7 @@
 
 use specgen_link::lockstep::{Lockstep, Machine};
 use specgen_link::samples::{Block, Collector, Sample};
-use specgen_link::{Bytes, Counted, Device, Endpoint, FRAME, Receiver, Reply, Request, Stage, Status, telemetry};
+use specgen_link::{Bytes, CostUnit, Device, Endpoint, FRAME, Receiver, Reply, Request, Stage, Status, telemetry};
 
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo) -> ! {
@@ -32,8 +32,8 @@ impl Machine for Adder {
         1
     }
 
-    fn counted(&self) -> Counted {
-        Counted::Cycles
+    fn counted(&self) -> CostUnit {
+        CostUnit::Cycles
     }
 
     fn configure(&mut self, config: &[u64]) -> Result<(), usize> {

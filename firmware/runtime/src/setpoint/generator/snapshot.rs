@@ -3,7 +3,7 @@
 use core::convert::Infallible;
 
 use super::Phase;
-use crate::snapshot::{Field, Invalid, Reader, Snapshot, Words};
+use crate::snapshot::{Field, InvalidState, Reader, Snapshot, WordSink};
 
 impl Phase {
     fn number(self) -> u64 {
@@ -25,7 +25,7 @@ impl Field for Phase {
 }
 
 impl Snapshot for Phase {
-    fn show(&self, words: &mut impl Words) -> Result<(), Infallible> {
+    fn show(&self, words: &mut impl WordSink) -> Result<(), Infallible> {
         words.put(self.number());
         match self {
             Self::Approach(index) | Self::Play(index) => words.tally(index),
@@ -33,7 +33,7 @@ impl Snapshot for Phase {
         }
     }
 
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), InvalidState> {
         let number = words.word(u64::MAX)?;
         let all = [
             Self::Reset,

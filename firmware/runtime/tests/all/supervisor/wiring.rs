@@ -2,7 +2,8 @@
 
 use specgen_runtime::CodeLimits;
 use specgen_runtime::supervisor::{
-    Cause, Check, Fault, Finding, Named, Phase, Request, Response, Supervision, Supervisor, Wiring, explains, with,
+    Cause, Check, Fault, Finding, FindingText, Phase, Request, Response, Supervision, Supervisor, Wiring, explains,
+    with,
 };
 
 use super::SUPERVISION;
@@ -113,7 +114,7 @@ fn a_finding_is_named_with_what_looks_like_it() {
     let half = [Finding::Gauge(1, Fault::Gain(50)), Finding::Leg(1, Fault::Gain(50))];
     let twice = [Finding::Gauge(1, Fault::Gain(200)), Finding::Leg(1, Fault::Gain(200))];
     let alike = [inverted, half, twice].map(|set| set.map(word));
-    let named = |finding| Named(finding, &alike).to_string();
+    let named = |finding| FindingText(finding, &alike).to_string();
     assert_eq!(named(inverted[1]), "leg 1 inverted, or gauge 1 inverted");
     assert_eq!(named(Finding::Leg(1, Fault::Gain(48))), "leg 1 gain × 0.48, or gauge 1 gain × 0.48");
     assert_eq!(named(Finding::Gauge(1, Fault::Gain(190))), "gauge 1 gain × 1.90, or leg 1 gain × 1.90");

@@ -4,7 +4,7 @@ use std::process::Stdio;
 
 use specgen_compiler::compile;
 use specgen_compiler::ir::Ir;
-use specgen_language::model::FaultAction;
+use specgen_runtime::supervisor::Reaction;
 
 use super::Trial;
 use super::session::{Host, Session};
@@ -39,7 +39,7 @@ struct Times {
     /// To come to rest, and down from the highest code.
     down: f64,
     /// What a fault of an amplifier leads to.
-    amplifier: FaultAction,
+    amplifier: Reaction,
 }
 
 impl Times {
@@ -146,9 +146,9 @@ fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, St
     };
     // Read once a tick.
     let end = match (end, times.amplifier) {
-        (End::Amplifier, FaultAction::Off) => &End::Off(|times| 2.0 * times.period),
-        (End::Amplifier, FaultAction::RampDown) => &End::Off(|times| 2.0 * times.period + times.down),
-        (End::Amplifier, FaultAction::Hold) => &End::Holds,
+        (End::Amplifier, Reaction::Off) => &End::Off(|times| 2.0 * times.period),
+        (End::Amplifier, Reaction::RampDown) => &End::Off(|times| 2.0 * times.period + times.down),
+        (End::Amplifier, Reaction::Hold) => &End::Holds,
         (other, _) => other,
     };
     let text = match end {

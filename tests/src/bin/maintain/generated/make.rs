@@ -4,9 +4,9 @@ use super::{Files, help, trace};
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
-use specgen_compiler::compile::{Compiled, compile, compile_source};
+use specgen_compiler::compile::{Compilation, compile, compile_source};
 use specgen_compiler::{emit, findings, settings, workspace};
-use specgen_language::outcome::Refused;
+use specgen_language::outcome::Refusal;
 use specgen_language::{SpecSource, spec};
 use std::path::Path;
 
@@ -89,7 +89,7 @@ pub fn controller_with_passes(root: &Path) -> Result<Files, String> {
     for (name, kind) in [("motion", "motion"), ("start", "input")] {
         source.text += &format!("\n[[trigger]]\nname = \"{name}\"\nkind = \"{kind}\"\n");
     }
-    let emitted = |compiled: Result<Compiled, Refused>| compiled.map(|compiled| emit::emit(&compiled.ir));
+    let emitted = |compiled: Result<Compilation, Refusal>| compiled.map(|compiled| emit::emit(&compiled.ir));
     let reference = emitted(compile(&path)).map_err(|refused| said(&path, &refused))?;
     let mut files = Files::new();
     let mut shared = Vec::new();
@@ -130,11 +130,11 @@ pub fn goldens(root: &Path) -> Result<Files, String> {
     Ok(files)
 }
 
-fn compiled(path: &Path) -> Result<Compiled, String> {
+fn compiled(path: &Path) -> Result<Compilation, String> {
     compile(path).map_err(|refused| said(path, &refused))
 }
 
-fn said(path: &Path, refused: &Refused) -> String {
+fn said(path: &Path, refused: &Refusal) -> String {
     let first = refused.findings.first().map(|finding| finding.message.clone());
     format!("{} is refused: {}", path.display(), first.unwrap_or_default())
 }

@@ -2,7 +2,7 @@
 
 use host_sim::controller::{Controller, Supervised, TickController};
 use host_sim::word::WordKind;
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::workspace;
 use specgen_language::interrupt::Scratch;
 use specgen_toolchain::host::{build_loadable, build_unit};
@@ -15,7 +15,7 @@ use specgen_language::ui::{ControllerForm, Ui};
 
 const MODEL: &str = include_str!("controller_model.h");
 
-pub(super) fn built(compiled: &Compiled, ui: &Ui) -> Result<Built, Failure> {
+pub(super) fn built(compiled: &Compilation, ui: &Ui) -> Result<Built, Failure> {
     let scratch = Scratch::new().map_err(environment)?;
     let sources = scratch.path().join("sources");
     let rust = sources.join("rust");
@@ -34,7 +34,7 @@ pub(super) fn built(compiled: &Compiled, ui: &Ui) -> Result<Built, Failure> {
     unit.packed(&binary, own.into_iter().chain(rust))
 }
 
-fn unit<'a>(compiled: &'a Compiled, machine: &Supervised) -> Unit<'a> {
+fn unit<'a>(compiled: &'a Compilation, machine: &Supervised) -> Unit<'a> {
     let controller = machine.controller();
     let about = controller.description();
     let mut variables = Vec::new();

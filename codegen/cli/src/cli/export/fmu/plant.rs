@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use host_sim::plant::LegParameters;
 use host_sim::word::{Scalar, WordKind};
 use plant_unit::{Description, Kind, SETTINGS, Settings};
-use specgen_compiler::compile::Compiled;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::workspace::parts::{HOST_SIM, UNIT};
 use specgen_language::interrupt::Scratch;
 use specgen_studies::machine;
@@ -26,7 +26,7 @@ const PACKAGE: (&str, &str) = ("plant-unit", "unit");
 /// Of the workspace that the sources are.
 const MEMBERS: [&str; 3] = [PACKAGE.1, "host-sim", "firmware/runtime"];
 
-pub(super) fn built(compiled: &Compiled, ui: &Ui) -> Result<Built, Failure> {
+pub(super) fn built(compiled: &Compilation, ui: &Ui) -> Result<Built, Failure> {
     let description = description(compiled);
     let text = serde_json::to_string(&description).map_err(environment)?;
     let unit = unit(compiled, &description);
@@ -48,7 +48,7 @@ pub(super) fn built(compiled: &Compiled, ui: &Ui) -> Result<Built, Failure> {
 }
 
 /// What the machine of `specgen sim` is made of.
-fn description(compiled: &Compiled) -> Description {
+fn description(compiled: &Compilation) -> Description {
     let (model, leg) = (&compiled.model, LegParameters::reference());
     let period = model.timing.period;
     match &model.task_space {
@@ -65,7 +65,7 @@ fn description(compiled: &Compiled) -> Description {
     }
 }
 
-fn unit<'a>(compiled: &'a Compiled, description: &Description) -> Unit<'a> {
+fn unit<'a>(compiled: &'a Compilation, description: &Description) -> Unit<'a> {
     let mut variables = Vec::new();
     let mut add = |name: String, causality, kind, start| variables.push(Variable { name, causality, kind, start });
     for stem in description.inputs() {
@@ -83,7 +83,7 @@ fn unit<'a>(compiled: &'a Compiled, description: &Description) -> Unit<'a> {
 }
 
 /// A workspace of the plant's crates, with the versions and flags of specgen's own.
-fn rust(compiled: &Compiled) -> Result<BTreeMap<String, String>, Failure> {
+fn rust(compiled: &Compilation) -> Result<BTreeMap<String, String>, Failure> {
     let ours = HOST_SIM.iter().chain(UNIT).map(|(name, text)| ((*name).to_owned(), (*text).to_owned()));
     let mut files: BTreeMap<String, String> = ours.collect();
     if let Some(manifest) = files.get_mut("unit/Cargo.toml") {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use serde_json::{Value, json};
 use specgen_link::client::Port;
-use specgen_runtime::supervisor::{Cause, Finding, Named, Phase, Request};
+use specgen_runtime::supervisor::{Cause, Finding, FindingText, Phase, Request};
 
 use super::ask::begin;
 use super::{Panel, said};
@@ -65,7 +65,7 @@ pub(super) fn run<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefC
             }
             Some(Phase::Faulted | Phase::RampingDown) if u64::from(status.cause) == Cause::Wiring.word() => {
                 let finding = Finding::of_word(u32::from(status.finding));
-                let what = format!("{}.", Named(finding, rules.alike()));
+                let what = format!("{}.", FindingText(finding, rules.alike()));
                 break Verdict { good: false, what, advice: said::advice(finding) };
             }
             Some(Phase::Faulted) => return Err(Ended::Fault(format!("the machine is {}", operator.stands()))),

@@ -5,7 +5,7 @@ use specgen_language::model::Model;
 use specgen_link::Status;
 use specgen_operate::GAUGES;
 use specgen_runtime::setpoint::{BUSY, REFUSED, STALE};
-use specgen_runtime::supervisor::{Cause, Fault, Finding, Named, Phase};
+use specgen_runtime::supervisor::{Cause, Fault, Finding, FindingText, Phase};
 
 /// Kind of a mark (`ok`, `note`, `warning`, `error`), what is so, what to do, and the number of the cause with its limit.
 pub struct Said {
@@ -112,7 +112,7 @@ pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
         // It was asked to hold, and the stage stays.
         (_, Finding::Fallback(_)) => (format!("It oscillated; fallen back: {finding}."), cause(Cause::Oscillation).1),
         ((what, _), _) => {
-            (format!("{what} The wiring check found: {}.", Named(finding, rules.alike())), advice(finding))
+            (format!("{what} The wiring check found: {}.", FindingText(finding, rules.alike())), advice(finding))
         }
     };
     let what = what.as_str();

@@ -1,6 +1,6 @@
 //! What six inputs do to the loop: a correction of the request, or an error of the motion.
 
-use super::{Adapting, Assembly, ClosedLoop, Conditions, Law, Tuning, shown};
+use super::{Assembly, ClosedLoop, Conditions, Estimator, Law, Tuning, shown};
 use specgen_numerics::nyquist::{Complex, times};
 use specgen_numerics::{Matrix, Resolvent};
 
@@ -44,7 +44,7 @@ impl ClosedLoop {
     /// What the gauges show at the end of each interval of requests that nothing is fed back to, all in modal coordinates, from rest.
     #[must_use]
     pub fn without_feedback(&self, requests: &[[f64; 6]]) -> Vec<[f64; 6]> {
-        let law = Law::Feedforward(Adapting::Invhys);
+        let law = Law::Feedforward(Estimator::Invhys);
         let (transition, input) = self.driven(law, &Tuning::NONE, &Conditions::NOMINAL, false);
         let shown = shown(self.lags_used()[1]);
         let mut found = Vec::with_capacity(requests.len());

@@ -3,7 +3,7 @@
 
 //! What settings may be, and how large the numbers of a state may become: nothing beyond the limits of the spec.
 
-use specgen_runtime::Permitted;
+use specgen_runtime::PermittedRange;
 use specgen_runtime::snapshot::Sizes;
 use crate::Real;
 
@@ -82,23 +82,23 @@ pub(crate) const NAMES: [&str; WORDS] = [
 
 /// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
 /// most `code_max`.
-pub const SETTINGS: [(Permitted<Real>, usize); 16] = [
-    (Permitted::Whole(0, 6), 1),
-    (Permitted::Whole(0, 2), 1),
-    (Permitted::Number(0.0, 1.0), 2),
-    (Permitted::Whole(1, 1747), 1),
-    (Permitted::Whole(0, 43690), 2),
-    (Permitted::Number(0.0, 1000000000000000.0), 42),
-    (Permitted::Number(-0.1, 0.1), 3),
-    (Permitted::Number(-0.5, 0.5), 3),
-    (Permitted::Whole(0, 5), 2),
-    (Permitted::Whole(0, 2), 1),
-    (Permitted::Number(-0.0005, 0.0005), 2),
-    (Permitted::Number(9.5367431640625e-10, 0.001), 1),
-    (Permitted::Number(0.0, 0.001), 1),
-    (Permitted::Whole(1, 2147483647), 2),
-    (Permitted::Whole(0, 2147483647), 1),
-    (Permitted::Whole(1, 1000000), 1),
+pub const SETTINGS: [(PermittedRange<Real>, usize); 16] = [
+    (PermittedRange::Whole(0, 6), 1),
+    (PermittedRange::Whole(0, 2), 1),
+    (PermittedRange::Number(0.0, 1.0), 2),
+    (PermittedRange::Whole(1, 1747), 1),
+    (PermittedRange::Whole(0, 43690), 2),
+    (PermittedRange::Number(0.0, 1000000000000000.0), 42),
+    (PermittedRange::Number(-0.1, 0.1), 3),
+    (PermittedRange::Number(-0.5, 0.5), 3),
+    (PermittedRange::Whole(0, 5), 2),
+    (PermittedRange::Whole(0, 2), 1),
+    (PermittedRange::Number(-0.0005, 0.0005), 2),
+    (PermittedRange::Number(9.5367431640625e-10, 0.001), 1),
+    (PermittedRange::Number(0.0, 0.001), 1),
+    (PermittedRange::Whole(1, 2147483647), 2),
+    (PermittedRange::Whole(0, 2147483647), 1),
+    (PermittedRange::Whole(1, 1000000), 1),
 ];
 
 /// Largest numbers of a state, under any of these settings.
