@@ -6,6 +6,7 @@
 pub mod constants;
 pub mod description;
 mod permitted;
+pub mod scalar;
 mod supervision;
 mod task_space;
 

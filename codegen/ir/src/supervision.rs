@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 use specgen_runtime::supervisor;
 
 use super::LEGS;
-use super::constants::{Constant, Written};
+use super::scalar::{Constant, Written};
 
 /// The supervisor.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,8 +2,9 @@
 
 use std::fmt::Debug;
 
-use specgen_ir::constants::{self, Numbers as _};
+use specgen_ir::constants;
 use specgen_ir::description::description;
+use specgen_ir::scalar::Numbers as _;
 use specgen_ir::{Ir, LEGS};
 use specgen_law::{ControlLaw, Reset, Spec, StateOf};
 use specgen_runtime::snapshot::Sizes;

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::marker::PhantomData;
 
-use specgen_ir::constants::Numbers;
+use specgen_ir::scalar::Numbers;
 use specgen_runtime::Real;
 
 use crate::InvalidIr;

@@ -1,6 +1,6 @@
 //! Six legs with their own gauges whose constants are read at run time.
 
-use specgen_ir::constants::Numbers as _;
+use specgen_ir::scalar::Numbers as _;
 use specgen_ir::{self as ir, Ir};
 use specgen_law::legs::{Lead, LegSpace, SixLegs, State};
 use specgen_runtime::Real;

@@ -22,7 +22,8 @@ mod tests;
 use std::fmt;
 
 use host_sim::controller::{Controller, ControllerError, Engine};
-use specgen_ir::constants::{self, Numbers as _};
+use specgen_ir::constants;
+use specgen_ir::scalar::Numbers as _;
 use specgen_ir::{Ir, Scalar};
 use specgen_runtime::Motion;
 

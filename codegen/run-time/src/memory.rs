@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::fmt::Debug;
 
-use specgen_ir::constants::Numbers as _;
+use specgen_ir::scalar::Numbers as _;
 use specgen_ir::{Hysteresis, LEGS, RateModel};
 use specgen_law::LegMemory;
 use specgen_runtime::snapshot::{Field, InvalidState, Reader, WordSink};

@@ -1,6 +1,7 @@
 //! A platform in task space whose constants are read at run time.
 
-use specgen_ir::constants::{self, Numbers as _, kept};
+use specgen_ir::constants;
+use specgen_ir::scalar::{Numbers as _, kept};
 use specgen_ir::{self as ir, Frames, Ir, LEGS, Path, TaskSpace as Task};
 use specgen_law::platform::{Platform, State, TaskSpace};
 use specgen_runtime::setpoint::{Setpoints, Table as Rows, Tool, Trajectory, Work};

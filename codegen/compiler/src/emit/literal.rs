@@ -30,7 +30,8 @@ pub fn real(scalar: Scalar, value: f64) -> TokenStream {
 macro_rules! constant {
     ($scalar:expr, $make:ident $(, $part:expr)+) => {{
         use std::marker::PhantomData;
-        use $crate::constants::{Rounding, $make};
+        use $crate::constants::$make;
+        use $crate::ir::scalar::Rounding;
         use $crate::emit::literal::printed;
         match $scalar {
             $crate::ir::Scalar::F32 => printed(&$make(&Rounding::<f32>(PhantomData) $(, $part)+)),

@@ -6,8 +6,9 @@ use proc_macro2::TokenStream;
 use quote::quote;
 
 use super::literal;
-use crate::constants::{self, Rounding};
+use crate::constants;
 use crate::ir::Ir;
+use crate::ir::scalar::Rounding;
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let table = &ir.permitted;
