@@ -31,8 +31,6 @@ mod report;
 mod reproduce;
 mod robust;
 mod sim;
-mod spec;
-mod trajectory;
 mod tune;
 
 use std::ffi::OsString;
@@ -47,10 +45,9 @@ use serde::Serialize;
 use serde_json::Value;
 
 pub use named::{Role, role};
-use specgen_compiler::compile::Compilation;
 use specgen_compiler::ir::Ir;
-use specgen_language::diagnostic::{Diagnostic, Severity};
-use specgen_language::outcome::{Failure, Outcome, Refusal};
+use specgen_compiler::spec_file;
+use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::spec::nearest;
 use specgen_language::ui::{Message, Ui};
 use specgen_language::{files, interrupt};
@@ -92,16 +89,6 @@ struct Strictness {
     /// Refuse a spec with warnings, as one with errors. A key that is meant is named in `[lint] allow`, with the reason.
     #[arg(long)]
     deny_warnings: bool,
-}
-
-impl Strictness {
-    /// Refuses `compiled` if warnings are denied and there is one among `findings`.
-    fn accept(self, compiled: &Compilation, findings: &[Diagnostic]) -> Result<(), Failure> {
-        if !self.deny_warnings || findings.iter().all(|one| one.severity < Severity::Warning) {
-            return Ok(());
-        }
-        Err(Refusal { source: Some(compiled.source.clone()), findings: findings.to_vec() }.into())
-    }
 }
 
 #[derive(Subcommand, Debug)]
@@ -336,7 +323,7 @@ impl Outcome for Constants<'_> {
 }
 
 fn dump_ir(path: &std::path::Path, ui: &mut Ui) -> Result<(), Failure> {
-    let compiled = spec::compiled(path, ui)?;
+    let compiled = spec_file::compiled(path, ui)?;
     ui.result(&Constants(&compiled.ir));
     Ok(())
 }

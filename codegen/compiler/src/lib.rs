@@ -33,6 +33,7 @@ pub mod reach;
 pub mod requirements;
 pub mod rest;
 pub mod settings;
+pub mod spec_file;
 pub mod stability;
 pub mod workspace;
 

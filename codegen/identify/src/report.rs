@@ -85,3 +85,26 @@ pub struct Report {
     /// Largest relative violation of the optimality conditions.
     pub kkt_violation: f64,
 }
+
+impl Report {
+    /// In one line.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let simulated = if self.simulated { "simulated: " } else { "" };
+        format!(
+            "{simulated}{} reversal curves, fit {:.2} nm rms ({:.3} % of {:.2} µm; {:.2} nm within branches), noise {:.2} nm, drift {:.3} nm/s, dead time {:.3} ms, \
+         {} of {} weights zero, {:.1} % of the plane excited",
+            self.reversal_curves,
+            self.fit_rms * 1e9,
+            self.fit_rms_percent,
+            self.displacement_range * 1e6,
+            self.branch_rms * 1e9,
+            self.noise_floor * 1e9,
+            self.drift * 1e9,
+            self.dead_time * 1e3,
+            self.zero_weights,
+            self.weights,
+            self.excited_share * 100.0
+        )
+    }
+}

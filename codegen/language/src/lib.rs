@@ -8,9 +8,10 @@
 //! [`spec`] follow from these declarations; `keys/declare.rs` has their form. The pages of the findings are in `findings/`.
 //!
 //! The one crate that reads TOML. What every crate above needs is here, too: [`files`], [`output`], [`interrupt`] and [`lock`] to read
-//! and write files, [`outcome`], [`ui`] and [`table`] for the results of commands, [`shell`] for lines of a shell in messages.
+//! and write files, [`outcome`], [`ui`] and [`table`] for the results of commands, [`editor`] for what editors ask, [`shell`] for lines of a shell in messages.
 
 pub mod diagnostic;
+pub mod editor;
 pub mod files;
 pub mod interrupt;
 mod keys;

@@ -1,5 +1,7 @@
 //! Results and failures that every command has in common.
 
+use std::fmt::Display;
+
 use serde::Serialize;
 use serde_json::Value;
 
@@ -144,6 +146,11 @@ impl Failure {
             _ => Value::Null,
         }
     }
+}
+
+/// The file system or the simulator reported an error.
+pub fn environment(error: impl Display) -> Failure {
+    Failure::Environment(error.to_string())
 }
 
 impl From<Refusal> for Failure {

@@ -17,6 +17,7 @@ mod matrix;
 mod motion;
 mod passes;
 mod plan;
+mod refusal;
 mod response;
 mod seen;
 mod table;
@@ -30,6 +31,7 @@ pub use passes::{
     Ending, LearnError, Learner, LearningResult, Pass, RepeatableMachine, course, held, learn, translation_nm,
 };
 pub use plan::Plan;
+pub use refusal::{NOWHERE, takes_correction};
 pub use response::{Bin, Response};
 pub use seen::PassObservation;
 pub use table::{Table, TableError, knots};

@@ -4,6 +4,7 @@
 //! declared leg gain and voltages; the force sensor. A machine is not its data sheet: its legs are out of tolerance.
 
 use core::array::from_fn;
+use std::path::PathBuf;
 
 use host_sim::closed_loop::{LEGS, RunError};
 use host_sim::plant::{LegParameters, NoiseParameters};
@@ -12,6 +13,7 @@ use host_sim::platform::{GaugeSignal, Joints, PlatformParameters, PlatformScenar
 use host_sim::scenario::LegScenario;
 
 use specgen_compiler::compile::Compilation;
+use specgen_language::files;
 use specgen_language::model::{Model, TaskSpace};
 use specgen_language::outcome::Failure;
 
@@ -33,6 +35,57 @@ pub fn run_failure(error: RunError) -> Failure {
             Failure::EndedEarly { message, result: serde_json::Value::Null }
         }
         _ => Failure::Environment(message),
+    }
+}
+
+/// The simulated legs that a user asks for.
+#[derive(Debug, Clone)]
+pub struct PlantOptions {
+    /// A known leg, or a file of leg parameters: the shape of the hysteresis. The reference leg without it.
+    pub plant: Option<PathBuf>,
+    /// Without noise and quantisation of gauge and amplifier.
+    pub no_noise: bool,
+    /// Of the noise, and of the tolerances of a platform.
+    pub seed: u64,
+}
+
+impl PlantOptions {
+    /// Parameters of the leg.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn leg(&self) -> Result<LegParameters, Failure> {
+        match &self.plant {
+            Some(path) => LegParameters::named(path, files::text).map_err(|error| Failure::Gate(error.to_string())),
+            None => Ok(LegParameters::reference()),
+        }
+    }
+
+    /// The leg and its noise.
+    ///
+    /// # Errors
+    /// As [`Self::leg`].
+    pub fn read(&self) -> Result<(LegParameters, NoiseParameters), Failure> {
+        let leg = self.leg()?;
+        let noise = if self.no_noise { NoiseParameters::NONE } else { leg.noise };
+        Ok((leg, noise))
+    }
+
+    /// A platform of such legs, out of tolerance, prepared.
+    ///
+    /// # Errors
+    /// As [`Self::leg`].
+    pub fn platform(&self, model: &Model, task: &TaskSpace) -> Result<(Specimen, PlatformScenario), Failure> {
+        Ok(self.platform_of(model, task, &self.leg()?))
+    }
+
+    /// The same of other legs.
+    #[must_use]
+    pub fn platform_of(&self, model: &Model, task: &TaskSpace, leg: &LegParameters) -> (Specimen, PlatformScenario) {
+        let specimen = specimen(model, task, leg, Some(self.seed));
+        let noise = if self.no_noise { Noise::NONE } else { Noise::of(&specimen) };
+        let scenario = scenario(model, task, &specimen, &noise, self.seed);
+        (specimen, scenario)
     }
 }
 

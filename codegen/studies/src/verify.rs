@@ -8,12 +8,14 @@ use std::path::Path;
 use std::time::Duration;
 
 use host_sim::closed_loop::RunError;
-use host_sim::controller::TickController;
+use host_sim::controller::{Controller, TickController};
 use host_sim::trace::{Trace, first_difference};
 use serde::Serialize;
 
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::ir::Ir;
 use specgen_language::model::{Mcu, Model};
+use specgen_language::outcome::{Failure, environment};
 use specgen_toolchain::budget::ImageUsage;
 use specgen_toolchain::checks::{self, Rules, TickChecks};
 use specgen_toolchain::targets::{Kind, Target};
@@ -39,6 +41,16 @@ pub fn exercise(controller: &mut dyn TickController, model: &Model, ir: &Ir, tic
         Some(task) => platform::exercise(controller, model, task, ticks),
         None => Ok(legs::exercise(controller, model, ir, ticks)?),
     }
+}
+
+/// The controller in a library of this host, exercised, and what it did.
+///
+/// # Errors
+/// It cannot be loaded, or as [`exercise`].
+pub fn exercised(library: &Path, compiled: &Compilation) -> Result<(Controller, Trace), Failure> {
+    let mut controller = Controller::load(library).map_err(environment)?;
+    let trace = exercise(&mut controller, &compiled.model, &compiled.ir, TICKS).map_err(environment)?;
+    Ok((controller, trace))
 }
 
 /// What the image costs and whether it computes the same bits.

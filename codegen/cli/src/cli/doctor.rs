@@ -8,9 +8,8 @@ use specgen_rt::histogram::{Histogram, known_text, time_text};
 
 use super::named::InputFile;
 use super::plot::Plot;
-use super::sim::environment;
-use super::spec;
-use specgen_language::outcome::{Failure, Outcome};
+use specgen_compiler::spec_file;
+use specgen_language::outcome::{Failure, Outcome, environment};
 use specgen_language::ui::Ui;
 use specgen_operate::doctor::latency::{self, Figures, LatencyMeasurement};
 use specgen_operate::doctor::{Files, Finding, Grade, equipment, system};
@@ -43,7 +42,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut period = PERIOD;
     if let Some(spec) = &arguments.spec {
-        let compiled = spec::looked_up(spec, ui)?;
+        let compiled = spec_file::looked_up(spec, ui)?;
         period = (compiled.model.timing.period * 1e9) as u64;
     }
     ui.progress(&format!("measuring wake-ups every {} for {} s", time_text(period), arguments.seconds));
@@ -74,7 +73,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             LINE,
             counts.map(|(below, count)| [*below as f64 / 1e3, *count as f64]).collect(),
         );
-    if let Some(line) = arguments.plot.charts("wake-ups of this computer", &report.verdict.text, &[chart])? {
+    if let Some(line) = arguments.plot.place().charts("wake-ups of this computer", &report.verdict.text, &[chart])? {
         ui.progress(line.trim_end());
     }
     // Without a spec nothing is asked for that could be refused.

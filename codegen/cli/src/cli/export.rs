@@ -1,55 +1,11 @@
 //! `specgen export`: the controller for programs that are not ours.
 
-mod fmu;
-
-use std::collections::BTreeSet;
-use std::fmt::Write as _;
-use std::fs;
-
 use clap::{Args, Subcommand};
-use std::alloc::Layout;
-
-use host_sim::controller::{ABI_VERSION, Controller, Supervised, TickController};
-use host_sim::word::WordKind;
-use serde::Serialize;
-use specgen_language::interrupt::Scratch;
-use specgen_runtime::supervisor::{self, Request};
-use specgen_toolchain::host::build_loadable;
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
+use specgen_studies::export;
 
 use super::named::{InputFile, OutputFolder};
-use super::sim::environment;
-use super::spec;
-use specgen_compiler::workspace;
-use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::{claim, write_folder};
-use specgen_language::ui::{ControllerForm, Ui};
-
-/// Requests to the supervisor, by their words.
-const REQUESTS: [(&str, u32); 6] = [
-    ("NONE", Request::None as u32),
-    ("ARM", Request::Arm as u32),
-    ("RUN", Request::Run as u32),
-    ("HOLD", Request::Hold as u32),
-    ("RAMP_DOWN", Request::RampDown as u32),
-    ("ACKNOWLEDGE", Request::Acknowledge as u32),
-];
-/// Bits of its events.
-const EVENTS: [(&str, u32); 7] = [
-    ("MISSED_TICK", supervisor::MISSED_TICK),
-    ("LINK_LOST", supervisor::LINK_LOST),
-    ("INTEGRITY", supervisor::INTEGRITY),
-    ("CONVERTER", supervisor::CONVERTER),
-    ("STOP", supervisor::STOP),
-    ("AMPLIFIER", supervisor::AMPLIFIER),
-    ("STALLED", supervisor::STALLED),
-];
-/// Of the words that the caller's memory is made of, bytes.
-const ALIGNMENT: usize = 8;
-const TICK: &str = include_str!("export/tick.c");
-const EXAMPLE: &str = include_str!("export/example.c");
-const PYTHON: &str = include_str!("export/controller.py");
-/// What compiles the example in C.
-const COMPILE: &str = "cc -std=c11 -Wall example.c tick.c -L. -lcontroller -Wl,-rpath,'$ORIGIN' -o example";
 
 /// Arguments of `export`.
 #[derive(Args, Debug)]
@@ -68,7 +24,7 @@ enum Kind {
     #[command(after_help = super::examples::EXPORT_PYTHON)]
     Python(Folder),
     /// FMI 2.0 co-simulation units of the controller under its supervisor and of the simulated machine, sources included.
-    Fmu(fmu::Arguments),
+    Fmu(FmuArguments),
 }
 
 /// Arguments of `export c` and `export python`.
@@ -81,227 +37,24 @@ struct Folder {
     output: OutputFolder,
 }
 
+/// Arguments of `export fmu`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::EXPORT_FMU)]
+struct FmuArguments {
+    /// The spec file.
+    spec: InputFile,
+    /// Folder for the units, which are called after the platform.
+    #[arg(short, long, value_name = "DIR")]
+    output: OutputFolder,
+    /// Write the simulated machine of `specgen sim`, too, as NAME_plant.fmu.
+    #[arg(long)]
+    plant: bool,
+}
+
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     match &arguments.kind {
-        Kind::C(folder) => export(folder, ui, |machine| {
-            fits(machine)?;
-            let [tick, example] = [TICK, EXAMPLE].map(str::to_owned);
-            Ok((vec![("controller.h", header(machine)), ("tick.c", tick), ("example.c", example)], COMPILE))
-        }),
-        Kind::Python(folder) => {
-            export(folder, ui, |machine| Ok((vec![("controller.py", python(machine))], "python3 -i controller.py")))
-        }
-        Kind::Fmu(arguments) => fmu::run(arguments, ui),
+        Kind::C(Folder { spec, output }) => export::c(spec, output, ui),
+        Kind::Python(Folder { spec, output }) => export::python(spec, output, ui),
+        Kind::Fmu(FmuArguments { spec, output, plant }) => export::fmu::run(spec, output, *plant, ui),
     }
 }
-
-/// Name of the library.
-fn library_name() -> String {
-    format!("{}controller{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX)
-}
-
-/// Builds the library of a spec, and writes it beside texts that use it; those come with the line that begins with them.
-fn export(
-    Folder { spec, output }: &Folder,
-    ui: &mut Ui,
-    texts: impl FnOnce(&Supervised) -> Result<(Vec<(&'static str, String)>, &'static str), Failure>,
-) -> Result<(), Failure> {
-    let compiled = spec::compiled(spec, ui)?;
-    let _claimed = claim(output)?;
-    let scratch = Scratch::new().map_err(environment)?;
-    let folder = scratch.path().join("controller");
-    workspace::write_scratch(&folder, &compiled.files)?;
-    ui.runs(ControllerForm::Emitted);
-    ui.progress("building the emitted controller for this host");
-    let library = build_loadable(&folder, &scratch.path().join("target"))?;
-    let bytes = fs::read(&library).map_err(environment)?;
-    let machine = Supervised::new(Controller::load(&library).map_err(environment)?);
-    let (texts, next) = texts(&machine)?;
-    let mut files: Vec<(String, Vec<u8>)> =
-        texts.into_iter().map(|(name, text)| (name.to_owned(), text.into_bytes())).collect();
-    files.push((library_name(), bytes));
-    write_folder(output, &files)?;
-    let names = files.iter().map(|(name, _)| name.clone()).collect();
-    ui.result(&Exported { folder: output.display().to_string(), files: names, next });
-    Ok(())
-}
-
-/// `controller.py`.
-fn python(machine: &Supervised) -> String {
-    let about = machine.controller().description();
-    let (inputs, outputs) = (machine.input_names(), machine.output_names());
-    let list = |names: &[String]| {
-        let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
-        format!("[{}]", quoted.join(", "))
-    };
-    let more = [&inputs[about.input_names.len()..], &outputs[about.output_names.len()..]].map(list);
-    let names = about.config_names.iter().chain(&inputs).chain(&outputs);
-    let whole: BTreeSet<&str> = names
-        .filter(|name| WordKind::of(name) == WordKind::Integer)
-        .filter_map(|name| name.split('[').next())
-        .collect();
-    let whole: Vec<String> = whole.into_iter().map(str::to_owned).collect();
-    PYTHON
-        .replace("@library@", &library_name())
-        .replace("@digest@", &about.digest)
-        .replace("@abi@", &ABI_VERSION.to_string())
-        .replace("@supervised@", &format!("({})", more.join(", ")))
-        .replace("@whole@", &list(&whole))
-}
-
-/// Whether its memory can be that of a C header.
-fn fits(machine: &Supervised) -> Result<(), Failure> {
-    match machine.controller().layouts().iter().find(|layout| layout.align() > ALIGNMENT) {
-        None => Ok(()),
-        Some(layout) => Err(Failure::Environment(format!(
-            "the controller's memory is aligned to {} bytes, that of a C header to {ALIGNMENT}",
-            layout.align()
-        ))),
-    }
-}
-
-/// Files that were written.
-#[derive(Serialize)]
-struct Exported {
-    folder: String,
-    files: Vec<String>,
-    /// The line that begins with them.
-    #[serde(skip)]
-    next: &'static str,
-}
-
-impl Outcome for Exported {
-    fn text(&self) -> String {
-        format!("wrote {} to {}\n  {}\n", self.files.join(", "), self.folder, self.next)
-    }
-}
-
-/// `controller.h`.
-fn header(machine: &Supervised) -> String {
-    let controller = machine.controller();
-    let about = controller.description();
-    let [state, config, whole] = controller.layouts();
-    let real = if about.scalar.bits() == 32 { ("float", "uint32_t") } else { ("double", "uint64_t") };
-    let mut text = format!(
-        "/* Controller of `{}`, spec digest {}, specgen {}. Written by `specgen export c`.\n   \
-         All numbers travel as words of 64 bits: whole numbers as they are, reals by their bit pattern ({}), zero-extended. Units: m, \
-         rad,\n   N, V, s. Nothing here allocates, and nothing panics. */\n\
-         #ifndef SPECGEN_CONTROLLER_H\n#define SPECGEN_CONTROLLER_H\n\n\
-         #include <stddef.h>\n#include <stdint.h>\n#include <string.h>\n\n\
-         #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
-         #define SPECGEN_ABI_VERSION {ABI_VERSION}u\n#define SPECGEN_NAME \"{}\"\n#define SPECGEN_DIGEST \"{}\"\n\
-         #define SPECGEN_VERSION \"{}\"\n\ntypedef {} specgen_real;\n\n",
-        about.name, about.digest, about.version, real.0, about.name, about.digest, about.version, real.0,
-    );
-    // Writing to a String cannot fail.
-    let _ = write!(
-        text,
-        "/* What the caller keeps: enough for targets whose pointers have at most 64 bits. */\n\
-         typedef struct {{ uint64_t memory[{}]; }} specgen_config;\n\
-         typedef struct {{ uint64_t memory[{}]; }} specgen_state;\n\
-         typedef struct {{ uint64_t memory[{}]; }} specgen_machine;\n\n",
-        words(config),
-        words(state),
-        words(whole)
-    );
-    for (what, names) in
-        [("CONFIG", about.config_names.clone()), ("INPUT", machine.input_names()), ("OUTPUT", machine.output_names())]
-    {
-        let _ = writeln!(text, "enum {{");
-        let mut gauges = None;
-        for (place, name) in names.iter().enumerate() {
-            let _ = writeln!(text, "    SPECGEN_{what}_{} = {place},", identifier(name));
-            if what == "INPUT" && (name == "gauge[0]" || name == "displacement[0]") {
-                gauges = Some(place);
-            }
-        }
-        if let Some(place) = gauges {
-            let _ = writeln!(text, "    SPECGEN_INPUT_GAUGES = {place},");
-        }
-        let own = if what == "CONFIG" { names.len() } else { names.len() - 2 };
-        let _ = writeln!(text, "    SPECGEN_{what}_WORDS = {own}{}", if what == "CONFIG" { "" } else { "," });
-        if what != "CONFIG" {
-            let _ = writeln!(text, "    SPECGEN_MACHINE_{what}_WORDS = {}", names.len());
-        }
-        text += "};\n\n";
-    }
-    for (what, values) in [("REQUEST", &REQUESTS[..]), ("EVENT", &EVENTS[..])] {
-        let lines: Vec<String> =
-            values.iter().map(|(name, value)| format!("    SPECGEN_{what}_{name} = {value}")).collect();
-        let _ = write!(text, "enum {{\n{}\n}};\n\n", lines.join(",\n"));
-    }
-    text += DECLARATIONS;
-    let _ = write!(
-        text,
-        "static inline uint64_t specgen_of_real(specgen_real value) {{\n    {bits} bits;\n    memcpy(&bits, &value, sizeof bits);\n    \
-         return bits;\n}}\n\n\
-         static inline specgen_real specgen_to_real(uint64_t word) {{\n    {bits} bits = ({bits})word;\n    specgen_real value;\n    \
-         memcpy(&value, &bits, sizeof value);\n    return value;\n}}\n\n{CHECK}",
-        bits = real.1,
-    );
-    text
-}
-
-/// Words of 64 bits that hold it.
-fn words(layout: Layout) -> usize {
-    layout.size().div_ceil(ALIGNMENT)
-}
-
-/// `gauge[3]` as `GAUGE_3`.
-fn identifier(name: &str) -> String {
-    name.replace('[', "_").replace(']', "").to_ascii_uppercase()
-}
-
-const DECLARATIONS: &str = "\
-/* Version of the library's interface: SPECGEN_ABI_VERSION, or it is not for this header. */
-uint32_t specgen_abi_version(void);
-/* Lines `key=value` in UTF-8 about the library, not ended by a zero. */
-void specgen_describe(const uint8_t **text, size_t *length);
-size_t specgen_machine_bytes(void);
-
-/* Settings of the spec: SPECGEN_CONFIG_WORDS words. */
-void specgen_config_default(uint64_t *words);
-/* 0, or one more than the index of the first word that is out of range; `config` is then as it was. */
-int32_t specgen_config_check(const uint64_t *words);
-int32_t specgen_config_load(specgen_config *config, const uint64_t *words);
-
-/* A tick under the supervisor, which decides about amplifiers and codes: SPECGEN_MACHINE_INPUT_WORDS words in,
-   SPECGEN_MACHINE_OUTPUT_WORDS out. A request is taken when it begins to be given. One machine is stepped by one thread at a time. */
-void specgen_machine_reset(specgen_machine *machine);
-void specgen_machine_step(const specgen_config *config, specgen_machine *machine, const uint64_t *input, uint64_t *output);
-uint64_t specgen_machine_digest(const specgen_machine *machine);
-
-/* The law alone, for simulators: SPECGEN_INPUT_WORDS in, SPECGEN_OUTPUT_WORDS out. Nothing watches over it. */
-void specgen_state_reset(specgen_state *state);
-void specgen_step(const specgen_config *config, specgen_state *state, const uint64_t *input, uint64_t *output);
-uint64_t specgen_state_digest(const specgen_state *state);
-
-";
-
-const CHECK: &str = "\
-/* 0 if the library is the one that this header was written for: interface, digest of the spec, memory. */
-static inline int specgen_check(void) {
-    const char *wanted = \"\\ndigest=\" SPECGEN_DIGEST \"\\n\";
-    const uint8_t *text = NULL;
-    size_t length = 0, at, count = strlen(wanted);
-    if (specgen_abi_version() != SPECGEN_ABI_VERSION) {
-        return 1;
-    }
-    if (specgen_machine_bytes() > sizeof(specgen_machine)) {
-        return 2;
-    }
-    specgen_describe(&text, &length);
-    for (at = 0; at + count <= length; at++) {
-        if (memcmp(text + at, wanted, count) == 0) {
-            return 0;
-        }
-    }
-    return 3;
-}
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif
-";

@@ -3,13 +3,13 @@
 use std::net::{SocketAddr, TcpListener};
 
 use clap::{ArgGroup, Args};
+use specgen_compiler::spec_file;
 use specgen_language::interrupt;
 use specgen_operate::gcs::{Axes, Bridge, Stage};
 
 use super::line::Line;
 use super::named::InputFile;
 use super::operate::{Operator, Served};
-use super::spec;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 
@@ -33,7 +33,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let axes = Axes::named(&arguments.axes).map_err(|error| Failure::Usage(format!("--axis: {error}")))?;
-    let compiled = arguments.spec.as_deref().map(|spec| spec::looked_up(spec, ui)).transpose()?;
+    let compiled = arguments.spec.as_deref().map(|spec| spec_file::looked_up(spec, ui)).transpose()?;
     let digest = compiled.as_ref().map(|compiled| compiled.ir.digest.as_str());
     interrupt::heed();
     let (session, name) = arguments.line.open(digest)?;

@@ -3,27 +3,15 @@
 //! `specgen identify RECORD` identifies the Everett table; other kinds have a command of their own. A record that has the
 //! name of such a command is given as `./linear`.
 
-mod cause;
-mod everett;
-mod gains;
-mod gauge;
-mod linear;
-mod predict;
-mod rate;
-mod reading;
-mod response;
-mod stiffness;
-
 use clap::{Args, Subcommand};
-use serde::Serialize;
-
-use specgen_language::diagnostic::Diagnostic;
+use specgen_identify::Reading;
+use specgen_identify::mode::Mode;
 use specgen_language::outcome::Failure;
-use specgen_language::outcome::Refusal;
 use specgen_language::ui::Ui;
+use specgen_report::identify::{Bench, everett, gains, gauge, linear, predict, rate, response, stiffness};
 
-pub(super) use everett::range;
-pub use everett::summary;
+use super::named::{InputFile, OutputFile, OutputFolder};
+use super::plot::Plot;
 
 /// Arguments of `identify`.
 #[derive(Args, Debug)]
@@ -37,76 +25,295 @@ pub struct Arguments {
     #[command(subcommand)]
     kind: Option<Kind>,
     #[command(flatten)]
-    everett: everett::EverettArguments,
+    everett: EverettArguments,
 }
 
 #[derive(Subcommand, Debug)]
 enum Kind {
     /// The linear relation Y = ρX + δ of records at several frequencies, λ and the weights that are stable over it.
-    Linear(linear::Arguments),
+    Linear(LinearArguments),
     /// Frequency response from a swept sine, multisine or noise: resonance, damping, lag, dead time.
-    Response(response::Arguments),
+    Response(ResponseArguments),
     /// Gain of each leg of a platform over its table, from a recorded run; writes the six tables.
-    Gains(gains::Arguments),
+    Gains(GainsArguments),
     /// Calibration of a gauge from its voltage and a reference.
-    Gauge(gauge::Arguments),
+    Gauge(GaugeArguments),
     /// Displacement that a table or a spec predicts for a drive, beside the measured one.
-    Predict(predict::Arguments),
+    Predict(PredictArguments),
     /// Axial stiffness from force and displacement at constant drive.
-    Stiffness(stiffness::Arguments),
+    Stiffness(StiffnessArguments),
     /// Compare rate-dependent models on records of one leg at several rates.
-    Rate(rate::Arguments),
+    Rate(RateArguments),
+}
+
+/// Arguments of `identify RECORD`.
+#[derive(Args, Debug)]
+struct EverettArguments {
+    /// Reversal-curve record: CSV with columns time_s, drive_V, displacement_um.
+    #[arg(required = true)]
+    record: Option<InputFile>,
+    /// Voltage range of the table, V, such as 0:100 or -90:90.
+    #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true, required = true)]
+    drive: Option<[f64; 2]>,
+    /// Cells per axis of the Preisach grid; chosen by cross-validation over whole curves if not given.
+    #[arg(long, value_name = "N", value_parser = grid, allow_negative_numbers = true)]
+    grid: Option<usize>,
+    /// A second record of the leg, not used for the fit, to judge the table by.
+    #[arg(long, value_name = "RECORD")]
+    validate: Option<InputFile>,
+    /// Write the table (CSV: up_V, down_V, everett_um) here.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<OutputFile>,
+    #[command(flatten)]
+    bench: BenchArguments,
+}
+
+/// Arguments of `identify linear`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::LINEAR)]
+struct LinearArguments {
+    /// Records at one frequency each: CSV with columns time_s, drive_V, displacement_um. The drive may be that of an
+    /// inverse hysteresis model, as in the paper.
+    #[arg(required = true)]
+    records: Vec<InputFile>,
+    /// Frequencies of the records, Hz, in their order; found in the records if not given.
+    #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = frequency)]
+    frequency: Vec<f64>,
+    /// Frequency at which the model's gain ρ̂ is taken, Hz; the lowest one if not given.
+    #[arg(long, value_name = "HZ", value_parser = frequency)]
+    reference: Option<f64>,
+    /// Judge the weights of this spec, on its sampled loop, over the λ found.
+    #[arg(long, value_name = "SPEC")]
+    spec: Option<InputFile>,
+    #[command(flatten)]
+    bench: BenchArguments,
+}
+
+/// Arguments of `identify response`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::RESPONSE)]
+struct ResponseArguments {
+    /// Swept sine, multisine or noise: CSV with columns time_s, drive_V, displacement_um, evenly sampled.
+    record: InputFile,
+    /// Samples in a segment; a power of two near an eighth of the record if not given.
+    #[arg(long, value_name = "N")]
+    segment: Option<usize>,
+    #[command(flatten)]
+    bench: BenchArguments,
+}
+
+/// Arguments of `identify gains`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::GAINS)]
+struct GainsArguments {
+    /// The recording of a run in which every leg moves slowly by a good part of its stroke: a wave on all axes.
+    recording: InputFile,
+    /// The spec that the target was built from.
+    #[arg(long, value_name = "SPEC")]
+    spec: InputFile,
+    /// Folder for the six tables, leg1.csv to leg6.csv, in that of the spec.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<String>,
+}
+
+/// Arguments of `identify gauge`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::GAUGE)]
+struct GaugeArguments {
+    /// CSV with columns gauge_V and reference_um, and time_s if there is one.
+    record: InputFile,
+    /// Degree of the polynomial, 1 to 5; chosen by cross-validation if not given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=5))]
+    degree: Option<u8>,
+    /// Write the calibration as a table (CSV: gauge_V, reference_um, means over even steps) here, for other programs.
+    #[arg(long, value_name = "FILE")]
+    table: Option<OutputFile>,
+    #[command(flatten)]
+    bench: BenchArguments,
+}
+
+/// Arguments of `identify predict`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::PREDICT)]
+struct PredictArguments {
+    /// A table as `specgen identify -o` writes it, or a spec (.toml): the tables of its records, with its creep, second weight and
+    /// dead time.
+    #[arg(value_name = "TABLE|SPEC")]
+    model: InputFile,
+    /// Drive: CSV with time_s, drive_V (the command) or monitor_V (the measured voltage); compared if it has displacement_um.
+    drive: InputFile,
+    /// Leg of the spec, 0 to 5.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=5), allow_negative_numbers = true)]
+    leg: u8,
+    /// Time by which the displacement lags the voltage, ms; that of the spec, or none, if not given.
+    #[arg(long, value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
+    dead_time: Option<f64>,
+    /// Resonance behind the model, frequency in Hz and damping ratio, such as 735:0.015, or `none`; if not given that of the
+    /// spec, or with a table that of a ring in the record.
+    #[arg(long, value_name = "HZ:ZETA", value_parser = mode)]
+    mode: Option<Given>,
+    /// Write time_s, drive_V, displacement_um (predicted) and, where it was measured, measured_um and error_um here.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<OutputFile>,
+    #[command(flatten)]
+    bench: BenchArguments,
+}
+
+/// Arguments of `identify stiffness`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::STIFFNESS)]
+struct StiffnessArguments {
+    /// CSV with columns time_s, force_N (positive where it pushes the displacement up), displacement_um, and drive_V if
+    /// there is one, which must be constant.
+    record: InputFile,
+    #[command(flatten)]
+    bench: BenchArguments,
+}
+
+/// Arguments of `identify rate`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::RATE)]
+struct RateArguments {
+    /// Records of one leg at different rates, at least two: CSV with columns time_s, drive_V, displacement_um.
+    #[arg(required = true, value_name = "RECORD")]
+    records: Vec<InputFile>,
+    /// Voltage range of the tables, V, such as 0:100 or -90:90.
+    #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true)]
+    drive: [f64; 2],
+    /// Cells per axis of the Preisach grid.
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = grid, allow_negative_numbers = true)]
+    grid: usize,
+    /// A further record, in no fit, to judge the options by.
+    #[arg(long, value_name = "RECORD")]
+    hold_out: Option<InputFile>,
+    /// Write NAME.toml (lines of a spec) and the tables NAME-static.csv, NAME-mu0.csv and so on beside it.
+    #[arg(short, long, value_name = "NAME")]
+    output: Option<OutputFolder>,
+    #[command(flatten)]
+    bench: BenchArguments,
+}
+
+/// Arguments of every kind of record.
+#[derive(Args, Debug)]
+struct BenchArguments {
+    /// Columns by their headers or numbers (from 1), named with their units: drive_mV=Voltage,time_s=1. Without it, by their
+    /// headers.
+    #[arg(long, value_name = "NAME=COLUMN,…", value_delimiter = ',')]
+    columns: Vec<String>,
+    /// Samples per second, Hz: counts the time from sample numbers, or from the rows of a file.
+    #[arg(long, value_name = "HZ", value_parser = sampling, allow_negative_numbers = true)]
+    rate: Option<f64>,
+    #[command(flatten)]
+    plot: Plot,
+}
+
+impl BenchArguments {
+    fn bench(&self) -> Result<Bench, Failure> {
+        let reading = Reading::new(&self.columns, self.rate);
+        let reading = reading.map_err(|why| Failure::Usage(format!("--columns: {why}")))?;
+        Ok(Bench { reading, plot: self.plot.place() })
+    }
+}
+
+fn sampling(text: &str) -> Result<f64, String> {
+    match text.trim().trim_end_matches("Hz").trim().parse::<f64>() {
+        Ok(rate) if (1e-3..=1e9).contains(&rate) => Ok(rate),
+        _ => Err(format!("expected samples per second above zero, found `{text}`")),
+    }
+}
+
+/// Voltages that make sense; `actuator.voltage` of a spec has the same range.
+const VOLTS: std::ops::RangeInclusive<f64> = -1e4..=1e4;
+
+pub(super) fn range(text: &str) -> Result<[f64; 2], String> {
+    let expected = || format!("expected two voltages LOW:HIGH in V, found `{text}`");
+    let (low, high) = text.split_once(':').ok_or_else(expected)?;
+    let number = |part: &str| part.trim().trim_end_matches('V').trim().parse::<f64>().map_err(|_| expected());
+    let (low, high) = (number(low)?, number(high)?);
+    if ![low, high].iter().all(|volts| VOLTS.contains(volts)) {
+        Err(format!("expected voltages from {} to {} V, found `{text}`", VOLTS.start(), VOLTS.end()))
+    } else if low < high {
+        Ok([low, high])
+    } else {
+        Err(format!("the lower voltage must be below the upper one, found `{text}`"))
+    }
+}
+
+/// Any whole number: which sizes can be identified is for identification to say.
+fn grid(text: &str) -> Result<usize, String> {
+    text.parse().map_err(|_| format!("expected a whole number, found `{text}`"))
+}
+
+fn frequency(text: &str) -> Result<f64, String> {
+    match text.trim().trim_end_matches("Hz").trim().parse::<f64>() {
+        Ok(f) if (1e-6..=1e6).contains(&f) => Ok(f),
+        _ => Err(format!("expected a frequency in Hz above zero, found `{text}`")),
+    }
+}
+
+/// Up to the 10 ms that `hysteresis.dead_time` may be; in s.
+fn milliseconds(text: &str) -> Result<f64, String> {
+    let expected = || format!("expected milliseconds from 0 to 10, found `{text}`");
+    text.parse::<f64>().ok().filter(|ms| (0.0..=10.0).contains(ms)).map(|ms| ms * 1e-3).ok_or_else(expected)
+}
+
+/// A mode, or that there is none.
+#[derive(Debug, Clone, Copy)]
+struct Given(Option<Mode>);
+
+fn mode(text: &str) -> Result<Given, String> {
+    if text == "none" {
+        return Ok(Given(None));
+    }
+    let found = text.split_once(':').and_then(|(hz, zeta)| Some((hz.parse::<f64>().ok()?, zeta.parse::<f64>().ok()?)));
+    match found {
+        Some((frequency, damping)) if (0.1..=1e7).contains(&frequency) && damping > 0.0 && damping < 1.0 => {
+            Ok(Given(Some(Mode { frequency, damping })))
+        }
+        _ => Err(format!(
+            "expected FREQUENCY:DAMPING, a frequency in Hz and a damping ratio below 1, or none; found `{text}`"
+        )),
+    }
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     match &arguments.kind {
-        Some(Kind::Linear(arguments)) => linear::run(arguments, ui),
-        Some(Kind::Response(arguments)) => response::run(arguments, ui),
-        Some(Kind::Gains(arguments)) => gains::run(arguments, ui),
-        Some(Kind::Gauge(arguments)) => gauge::run(arguments, ui),
-        Some(Kind::Stiffness(arguments)) => stiffness::run(arguments, ui),
-        Some(Kind::Predict(arguments)) => predict::run(arguments, ui),
-        Some(Kind::Rate(arguments)) => rate::run(arguments, ui),
-        None => everett::run(&arguments.everett, ui),
-    }
-}
-
-/// What was identified, by its report.
-#[derive(Serialize)]
-pub(super) struct Identified<R> {
-    /// As it was named.
-    #[serde(skip)]
-    pub record: String,
-    pub report: R,
-    /// Keys of a spec whose values are measured now; none where the record is simulated.
-    pub measured: Measured,
-    /// A line for each file that was written.
-    #[serde(skip)]
-    pub files: String,
-}
-
-/// Keys of a spec whose values a record gives.
-#[derive(Debug, Clone, Serialize)]
-#[serde(transparent)]
-pub(super) struct Measured(Vec<String>);
-
-impl Measured {
-    /// These; none if the record is `simulated`, which measures nothing.
-    fn of(keys: &[&str], simulated: bool) -> Self {
-        let keys: &[&str] = if simulated { &[] } else { keys };
-        Self(keys.iter().map(|key| (*key).to_owned()).collect())
-    }
-
-    /// What becomes of the spec's list of assumed values once the lines stand in it: a comment, so that it may be pasted with them.
-    fn text(&self) -> String {
-        if self.0.is_empty() {
-            return "# simulated, not measured: the spec's `assumed` stays as it is\n".to_owned();
+        Some(Kind::Linear(LinearArguments { records, frequency, reference, spec, bench })) => {
+            linear::run(records, frequency, *reference, spec.as_deref(), &bench.bench()?, ui)
         }
-        let list: Vec<String> = self.0.iter().map(|key| format!("\"{key}\"")).collect();
-        format!("# measured: take out of the spec's `assumed`, where they are in it: {}\n", list.join(", "))
+        Some(Kind::Response(ResponseArguments { record, segment, bench })) => {
+            response::run(record, *segment, &bench.bench()?, ui)
+        }
+        Some(Kind::Gains(GainsArguments { recording, spec, output })) => {
+            gains::run(recording, spec, output.as_deref(), ui)
+        }
+        Some(Kind::Gauge(GaugeArguments { record, degree, table, bench })) => {
+            gauge::run(record, *degree, table.as_deref(), &bench.bench()?, ui)
+        }
+        Some(Kind::Stiffness(StiffnessArguments { record, bench })) => stiffness::run(record, &bench.bench()?, ui),
+        Some(Kind::Predict(one)) => {
+            let options = predict::Options {
+                model: one.model.to_path_buf(),
+                drive: one.drive.to_path_buf(),
+                leg: one.leg,
+                dead_time: one.dead_time,
+                mode: one.mode.map(|Given(mode)| mode),
+                output: one.output.as_deref().map(Into::into),
+            };
+            predict::run(&options, &one.bench.bench()?, ui)
+        }
+        Some(Kind::Rate(RateArguments { records, drive, grid, hold_out, output, bench })) => {
+            rate::run(records, *drive, *grid, hold_out.as_deref(), output.as_deref(), &bench.bench()?, ui)
+        }
+        None => {
+            let EverettArguments { record, drive, grid, validate, output, bench } = &arguments.everett;
+            // Both are required unless a command is named: the option is for clap's sake.
+            let (Some(record), Some(drive)) = (record, drive) else {
+                return Err(Failure::Usage(
+                    "a record and --drive are expected, or one of linear, response, gauge, stiffness".to_owned(),
+                ));
+            };
+            everett::run(record, *drive, *grid, validate.as_deref(), output.as_deref(), &bench.bench()?, ui)
+        }
     }
-}
-
-fn refused(findings: Vec<Diagnostic>) -> Failure {
-    Failure::from(Refusal { source: None, findings })
 }

@@ -1,9 +1,6 @@
 //! `specgen lsp`: findings, meanings and completions of a spec in an editor, by the Language Server Protocol on standard input and
 //! output. What it says comes from the compiler and the key table, as what `specgen check` says does.
 
-mod complete;
-mod text;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -14,9 +11,9 @@ use serde_json::{Value, json};
 
 use specgen_compiler::compile;
 use specgen_language::diagnostic::{Diagnostic, Place, Severity};
+use specgen_language::editor::{Lines, Part, Spot, complete, decoded};
 use specgen_language::outcome::Failure;
 use specgen_language::spec::{SpecSource, key_markdown};
-use text::{Lines, Part, Spot};
 
 /// Arguments of `lsp`.
 #[derive(Args, Debug)]
@@ -76,7 +73,7 @@ impl Server<'_> {
             if self.take(message)? {
                 return Ok(());
             }
-            // Who types fast is answered once for all that has come.
+            // CodeOwner types fast is answered once for all that has come.
             while let Ok(message) = self.connection.receiver.try_recv() {
                 if self.take(message)? {
                     return Ok(());
@@ -227,7 +224,7 @@ fn is_spec(text: &str) -> bool {
 
 /// Folder of the file that `uri` names.
 fn folder(uri: &str) -> PathBuf {
-    let path = text::decoded(uri.strip_prefix("file://").unwrap_or_default());
+    let path = decoded(uri.strip_prefix("file://").unwrap_or_default());
     Path::new(&path).parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf)
 }
 

@@ -18,16 +18,15 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 
 use clap::{ArgGroup, Args};
 use serde::Serialize;
+use specgen_compiler::{compile, spec_file};
 use specgen_link::client::Port;
 
 use super::line::Line;
 use super::named::InputFile;
-use super::spec;
 use answer::{Mistake, Report};
 pub use ended::Ended;
 pub use operator::Operator;
 pub use passes::motion_name;
-use specgen_compiler::compile;
 use specgen_language::interrupt;
 use specgen_language::model::Model;
 use specgen_language::outcome::{Failure, Outcome};
@@ -91,7 +90,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let commands = arguments.words.get(usize::from(spec.is_some())..).unwrap_or_default();
     let source = source(arguments, commands)?;
     let compiled = match spec {
-        Some(spec) => Some(spec::looked_up(spec.as_ref(), ui)?),
+        Some(spec) => Some(spec_file::looked_up(spec.as_ref(), ui)?),
         None => None,
     };
     if let Source::List(orders) = &source {

@@ -17,12 +17,11 @@ use specgen_studies::machine::run_failure;
 
 use super::named::{Endpoint, InputFile, OutputFolder};
 use super::plot::Plot;
-use super::sim::{PlantArguments, environment, frequency};
-use super::spec;
+use super::sim::{PlantArguments, frequency};
 use report::Report;
 use specgen_compiler::compile::Compilation;
-use specgen_compiler::workspace;
-use specgen_language::outcome::{Failure, Outcome};
+use specgen_compiler::{spec_file, workspace};
+use specgen_language::outcome::{Failure, Outcome, environment};
 use specgen_language::output::unread_file;
 use specgen_language::ui::{ControllerForm, Ui};
 use specgen_language::{files, interrupt};
@@ -80,9 +79,9 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     // What is wrong with the arguments, or missing on the machine, is reported before the minutes of the rest.
-    arguments.plant.leg()?;
-    arguments.plot.wanted()?;
-    let compiled = spec::compiled(&arguments.spec, ui)?;
+    arguments.plant.options().leg()?;
+    arguments.plot.place().wanted()?;
+    let compiled = spec_file::compiled(&arguments.spec, ui)?;
     let plan = scenario::Plan::of(arguments, &compiled)?;
     let line = match &arguments.port {
         Some(path) => Some(SerialLine::open(path, arguments.baud).map_err(Failure::Environment)?),
@@ -175,7 +174,7 @@ fn in_the_loop<P: Port>(
     match (done, stop) {
         (Ok(()), None) => {
             let below = if compiled.model.task_space.is_some() { "target less true pose" } else { "target less gauge" };
-            report.plot = arguments.plot.charts(&report.name, below, &report.charts)?;
+            report.plot = arguments.plot.place().charts(&report.name, below, &report.charts)?;
             ui.scored(&report, &report.ended_early)
         }
         (_, Some(stop)) => Err(stopped(stop, report, ui)),

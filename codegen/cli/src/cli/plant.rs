@@ -3,20 +3,18 @@
 use std::sync::atomic::Ordering;
 
 use clap::Args;
-use host_sim::platform::rig::Noise;
 use serde::Serialize;
+use specgen_compiler::{lower, spec_file};
 use specgen_rt::clock::{self, SECOND};
 use specgen_rt::exchange::{self, OpenError, Server};
 use specgen_rt::histogram::{Histogram, known_text, time_text};
 use specgen_rt::scheduling;
 
 use super::named::InputFile;
-use super::sim::{PlantArguments, environment};
-use super::spec;
+use super::sim::PlantArguments;
 use specgen_compiler::compile::Compilation;
-use specgen_compiler::lower;
 use specgen_language::interrupt;
-use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::outcome::{Failure, Outcome, environment};
 use specgen_language::ui::Ui;
 use specgen_operate::served::{Plant, PlantServer};
 use specgen_runtime::supervisor::Finding;
@@ -103,7 +101,7 @@ impl Outcome for Summary {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let path = exchange::path_of(&arguments.name).map_err(|error| Failure::Usage(format!("--name: {error}")))?;
-    let compiled = spec::looked_up(&arguments.spec, ui)?;
+    let compiled = spec_file::looked_up(&arguments.spec, ui)?;
     let plant = prepared(arguments, &compiled, ui)?;
     let faults = arguments.wrong.iter().flat_map(|faults| faults.0.clone()).collect();
     let mut served = PlantServer::new(plant, &compiled.model, &compiled.ir).with_faults(faults);
@@ -159,19 +157,15 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 
 /// The machine after its pre-cycle, with the gauges zeroed.
 fn prepared(arguments: &Arguments, compiled: &Compilation, ui: &Ui) -> Result<Plant, Failure> {
-    let (seed, leg) = (arguments.plant.seed, arguments.plant.leg()?);
+    let plant = arguments.plant.options();
     ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
     Ok(match &compiled.model.task_space {
-        Some(task) => {
-            let specimen = machine::specimen(&compiled.model, task, &leg, Some(seed));
-            let noise = if arguments.plant.no_noise { Noise::NONE } else { Noise::of(&specimen) };
-            let scenario = machine::scenario(&compiled.model, task, &specimen, &noise, seed);
-            Plant::Platform(Box::new(scenario.rig().clone()))
-        }
+        Some(task) => Plant::Platform(Box::new(plant.platform(&compiled.model, task)?.1.rig().clone())),
         None => {
-            let (leg, noise) = arguments.plant.read()?;
+            let (leg, noise) = plant.read()?;
             let legs = std::array::from_fn(|_| leg.clone());
-            Plant::Legs(Box::new(machine::legs(&compiled.model, &legs, &noise, seed, NO_TRAJECTORY).rig().clone()))
+            let scenario = machine::legs(&compiled.model, &legs, &noise, plant.seed, NO_TRAJECTORY);
+            Plant::Legs(Box::new(scenario.rig().clone()))
         }
     })
 }

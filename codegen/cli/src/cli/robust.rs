@@ -1,35 +1,17 @@
 //! `specgen robust`: corners and random draws of declared uncertainties, quantiles of the error, a gate for builds; in parts on
 //! many computers, which `specgen robust merge` puts together.
 
-mod merge;
-mod report;
-mod work;
-
-use std::path::Path;
-use std::time::Instant;
-
 use clap::{Args, Subcommand};
-use serde_json::json;
-
-use super::learn::{NOWHERE, takes_correction};
-use super::named::{InputFile, OutputFolder};
-use super::plot::Plot;
-use super::sim::{PlantArguments, at_run_time, frequency};
-use super::spec;
-use super::trajectory;
-use specgen_language::interrupt;
 use specgen_language::outcome::Failure;
-use specgen_language::output::{check_place, claim, write_folder};
 use specgen_language::spec::quantity::{self, Dimension};
 use specgen_language::ui::Ui;
-use specgen_report::learning::BANDWIDTH;
-use specgen_studies::machine::run_failure;
+use specgen_report::robust::{self, Options};
+use specgen_studies::robust::Shard;
 use specgen_studies::robust::factors::UserRange;
-use specgen_studies::robust::{Factors, Learning, Member, Outcome, Plan, Shard, Study};
-use work::{Part, Ran, Work};
 
-/// Lines of progress of a run whose output is not looked at.
-const LINES: usize = 20;
+use super::named::{InputFile, OutputFolder};
+use super::plot::Plot;
+use super::sim::{PlantArguments, frequency};
 
 /// Arguments of `robust`.
 #[derive(Args, Debug)]
@@ -49,7 +31,21 @@ pub struct Arguments {
 #[derive(Subcommand, Debug)]
 enum Kind {
     /// Put the parts of a study together that were run with --shard; the report is that of a single run, byte for byte.
-    Merge(merge::Arguments),
+    Merge(MergeArguments),
+}
+
+/// Arguments of `robust merge`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::MERGE)]
+struct MergeArguments {
+    /// Files that --shard wrote, all of one study, in any order.
+    #[arg(value_name = "PART", required = true)]
+    parts: Vec<InputFile>,
+    /// Write runs (CSV) and report (JSON) here.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<OutputFolder>,
+    #[command(flatten)]
+    plot: Plot,
 }
 
 /// Arguments of a study, or of a part of one.
@@ -131,129 +127,33 @@ fn percent(text: &str) -> Result<f64, String> {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    match &arguments.kind {
-        Some(Kind::Merge(arguments)) => merge::run(arguments, ui),
-        None => study(&arguments.study, ui),
-    }
-}
-
-fn study(arguments: &StudyArguments, ui: &mut Ui) -> Result<(), Failure> {
-    let begun = Instant::now();
-    let Some(path) = &arguments.spec else {
+    let arguments = match &arguments.kind {
+        None => &arguments.study,
+        Some(Kind::Merge(MergeArguments { parts, output, plot })) => {
+            return robust::merge(parts, output.as_deref(), &plot.place(), ui);
+        }
+    };
+    let Some(spec) = arguments.spec.as_deref() else {
         return Err(Failure::Usage("a spec file is expected, or merge".to_owned()));
     };
-    let leg = arguments.plant.leg()?;
-    let compiled = spec::compiled(path, ui)?;
-    let followed =
-        trajectory::chosen(arguments.trajectory.as_deref(), arguments.frequency, arguments.plant.seed, &compiled)?;
-    let factors = Factors::of(&compiled.model, &arguments.vary);
-    let learning = match arguments.learn {
-        Some(passes) => {
-            takes_correction(&compiled)?;
-            let learning =
-                Learning::of(&compiled, &followed.choice, &factors, BANDWIDTH, passes).map_err(run_failure)?;
-            Some(learning.ok_or_else(|| Failure::Gate(NOWHERE.to_owned()))?)
-        }
-        None => None,
+    let options = Options {
+        spec: spec.to_owned(),
+        draws: arguments.draws,
+        vary: arguments.vary.clone(),
+        trajectory: arguments.trajectory.clone(),
+        frequency: arguments.frequency,
+        replay: arguments.replay.clone(),
+        max_error: arguments.max_error,
+        max_orientation: arguments.max_orientation,
+        learn: arguments.learn,
+        max_learned: arguments.max_learned,
+        quantile: arguments.quantile,
+        diverged_above: arguments.diverged_above,
+        threads: arguments.threads,
+        shard: arguments.shard,
+        output: arguments.output.as_deref().map(Into::into),
+        plot: arguments.plot.place(),
+        plant: arguments.plant.options(),
     };
-    let work = Work::of(arguments, path, &compiled, &followed, &leg, learning.as_ref())?;
-    let whole = match &arguments.replay {
-        Some(name) => Plan::alone(&work.factors, name, work.seed).map_err(Failure::Usage)?,
-        None => work.plan(),
-    };
-    let plan = arguments.shard.map_or_else(|| whole.clone(), |shard| shard.of(&whole));
-    let threads = arguments.threads.map_or_else(
-        || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-        |threads| threads as usize,
-    );
-    let _claimed = match (&arguments.output, arguments.shard) {
-        (Some(file), Some(_)) => check_place(file).map(|()| None)?,
-        (folder, _) => folder.as_deref().map(claim).transpose()?,
-    };
-    arguments.plot.wanted()?;
-    let controller = at_run_time(&compiled, ui)?;
-    let study = Study {
-        compiled: &compiled,
-        controller: &controller,
-        leg: &leg,
-        trajectory: followed.choice,
-        learning,
-        noise: work.noise,
-        bound: work.bound,
-    };
-    // The machines that are done make a result.
-    let stop = interrupt::heed();
-    let all = plan.members.len();
-    let started = Instant::now();
-    let mut shown = 0;
-    let runs = study.run_all(&plan, threads, stop, |done| {
-        let lines = done * LINES / all;
-        if lines > shown || ui.is_terminal() {
-            shown = lines;
-            let elapsed = started.elapsed().as_secs_f64();
-            let left = elapsed * (all - done) as f64 / done as f64;
-            let rate = done as f64 / elapsed.max(1e-9);
-            ui.rate(&format!("robust: {done} of {all} machines, {rate:.1} a second, {left:.0} s left"));
-        }
-    });
-    ui.rate_done();
-    let runs = runs.map_err(run_failure)?;
-    if let (Some(shard), Some(file)) = (arguments.shard, &arguments.output) {
-        if runs.len() < all {
-            // A part is whole or not there.
-            return Err(Failure::interrupted());
-        }
-        Part { shard, planned: whole.members.len(), work, runs: runs.into_iter().map(Ran::from).collect() }
-            .write(file, ui)?;
-        ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));
-        return Ok(());
-    }
-    let results = Results { output: arguments.output.as_deref(), plot: &arguments.plot };
-    results.put(&work, arguments.replay.is_some(), all, &runs, ui, || {
-        ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));
-    })
-}
-
-/// Where a report goes.
-struct Results<'a> {
-    output: Option<&'a Path>,
-    plot: &'a Plot,
-}
-
-impl Results<'_> {
-    /// Writes and shows what `runs` of `planned` machines found; `alone` if it was one that was named. `last` is called
-    /// before the report is shown.
-    fn put(
-        &self,
-        work: &Work,
-        alone: bool,
-        planned: usize,
-        runs: &[(Member, Outcome)],
-        ui: &Ui,
-        last: impl FnOnce(),
-    ) -> Result<(), Failure> {
-        let gate = work.gate(alone);
-        let reasons = gate.reasons(runs);
-        let found = report::Found { work, gate: &gate, reasons: &reasons, alone, planned, runs };
-        let report = found.report();
-        let below = "rms error by share of the machines";
-        if let Some(line) = self.plot.charts(&work.name, below, &found.charts())? {
-            ui.progress(line.trim_end());
-        }
-        if let Some(folder) = self.output {
-            let files = [
-                ("runs.csv".to_owned(), found.csv().into_bytes()),
-                ("report.json".to_owned(), format!("{:#}\n", json!(report)).into_bytes()),
-            ];
-            write_folder(folder, &files)?;
-            ui.progress(&format!("wrote {} files to {}", files.len(), folder.display()));
-        }
-        last();
-        if runs.len() < planned {
-            let message =
-                format!("interrupted: the figures are of {} of {planned} machines, and no gate is passed", runs.len());
-            return Err(Failure::Interrupted { message, result: ui.shown(&report) });
-        }
-        ui.judged(&report, (!reasons.is_empty()).then(|| format!("not robust: {}", reasons.join("; "))))
-    }
+    robust::run(&options, ui)
 }

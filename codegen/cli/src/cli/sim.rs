@@ -1,28 +1,15 @@
 //! `specgen sim`: a spec's controller on simulated machines that are not of its model class: the motions of the user's own
 //! platform, or the paper's experiments.
 
-pub(super) mod legs;
-pub(super) mod platform;
-mod record;
-
-use std::fmt::Display;
-
 use clap::Args;
-use host_sim::controller::{Controller, ControllerError, TickController};
-use host_sim::description::Description;
-use host_sim::plant::{LegParameters, NoiseParameters};
+use specgen_compiler::spec_file;
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
+use specgen_report::sim::{self as report, Options};
+use specgen_studies::machine::PlantOptions;
 
 use super::named::{InputFile, OutputFile, OutputFolder};
 use super::plot::Plot;
-use super::spec;
-use specgen_compiler::compile;
-use specgen_compiler::workspace;
-use specgen_language::files;
-use specgen_language::interrupt::{self, Scratch};
-use specgen_language::outcome::Failure;
-use specgen_language::output::{check_place, claim, write_folder};
-use specgen_language::ui::{ControllerForm, Ui};
-use specgen_toolchain as target;
 
 /// Arguments of `sim`.
 #[derive(Args, Debug)]
@@ -73,32 +60,6 @@ pub struct Arguments {
     seconds: f64,
 }
 
-/// Frequencies of motions, Hz, unless asked otherwise.
-const FREQUENCIES: [f64; 2] = [1.0, 10.0];
-
-impl Arguments {
-    fn frequencies(&self) -> &[f64] {
-        self.frequency.as_deref().unwrap_or(&FREQUENCIES)
-    }
-}
-
-/// Writes tables, and traces if they are asked for, whose size is said before.
-fn write_files(arguments: &Arguments, tables: Vec<File>, traces: Vec<File>, ui: &Ui) -> Result<(), Failure> {
-    let Some(folder) = &arguments.output else { return Ok(()) };
-    let mut files = tables;
-    if arguments.traces {
-        let megabytes = traces.iter().map(|(_, bytes)| bytes.len()).sum::<usize>() as f64 / 1e6;
-        ui.progress(&format!("writing {} traces, {megabytes:.1} MB, to {}", traces.len(), folder.display()));
-        files.extend(traces);
-    }
-    write_folder(folder, &files)?;
-    ui.progress(&format!("wrote {} files to {}", files.len(), folder.display()));
-    Ok(())
-}
-
-/// Name and bytes.
-type File = (String, Vec<u8>);
-
 /// A frequency at which a trajectory has a sensible length.
 pub(super) fn frequency(text: &str) -> Result<f64, String> {
     let expected = || format!("expected a frequency from 0.001 to 1000 Hz, found `{text}`");
@@ -122,93 +83,30 @@ pub struct PlantArguments {
 }
 
 impl PlantArguments {
-    pub(super) fn leg(&self) -> Result<LegParameters, Failure> {
-        match &self.plant {
-            Some(path) => LegParameters::named(path, files::text).map_err(|error| Failure::Gate(error.to_string())),
-            None => Ok(LegParameters::reference()),
-        }
+    pub(super) fn options(&self) -> PlantOptions {
+        PlantOptions { plant: self.plant.as_deref().map(Into::into), no_noise: self.no_noise, seed: self.seed }
     }
-
-    pub(super) fn read(&self) -> Result<(LegParameters, NoiseParameters), Failure> {
-        let parameters = self.leg()?;
-        let noise = if self.no_noise { NoiseParameters::NONE } else { parameters.noise };
-        Ok((parameters, noise))
-    }
-}
-
-pub(super) fn environment(error: impl Display) -> Failure {
-    Failure::Environment(error.to_string())
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let plant = arguments.plant.options();
     // A bad plant file is refused before the minutes of the rest.
-    arguments.plant.read()?;
-    let compiled = spec::compiled(&arguments.spec, ui)?;
-    let task = compiled.model.task_space.as_ref();
-    match task {
-        Some(task) => platform::check(arguments, task)?,
-        None => legs::check(arguments, &compiled)?,
-    }
-    arguments.plot.wanted()?;
-    // A place that cannot be is refused before the minutes of the rest, too.
-    let _claimed = arguments.output.as_deref().map(claim).transpose()?;
-    arguments.record.as_deref().map_or(Ok(()), check_place)?;
-    let controller = controller(&compiled, arguments.emitted, ui)?;
-    if let Some(path) = &arguments.record {
-        return record::run(arguments, path, &compiled, controller, ui);
-    }
-    let mut controller = Interruptible(controller);
-    match task {
-        Some(task) => platform::run(arguments, &compiled, task, &mut controller, ui),
-        None => legs::run(arguments, &compiled, &mut controller, ui),
-    }
-}
-
-/// A controller whose runs end with the command.
-struct Interruptible(Controller);
-
-impl TickController for Interruptible {
-    fn description(&self) -> &Description {
-        self.0.description()
-    }
-    fn default_config(&self) -> Vec<u64> {
-        self.0.default_config()
-    }
-    fn configure(&mut self, words: &[u64]) -> Result<(), ControllerError> {
-        self.0.configure(words)
-    }
-    fn reset(&mut self) {
-        self.0.reset();
-    }
-    fn step(&mut self, input: &[u64], output: &mut [u64]) {
-        interrupt::point();
-        self.0.step(input, output);
-    }
-    fn state_digest(&self) -> u64 {
-        self.0.state_digest()
-    }
-}
-
-/// The controller that a command runs: the emitted one if the user asks for it.
-pub(super) fn controller(compiled: &compile::Compilation, is_emitted: bool, ui: &Ui) -> Result<Controller, Failure> {
-    if is_emitted { emitted(compiled, ui) } else { at_run_time(compiled, ui) }
-}
-
-/// The law on the constants of a compiled spec: the bits of the emitted controller, and nothing is built.
-pub(super) fn at_run_time(compiled: &compile::Compilation, ui: &Ui) -> Result<Controller, Failure> {
-    ui.runs(ControllerForm::RunTime);
-    ui.progress("controller: the compiled spec, not built");
-    specgen_run_time::controller(&compiled.ir).map_err(environment)
-}
-
-/// The emitted controller, built for this host from the same files that the main job writes. What it was built in is gone
-/// when this returns; the library stays loaded.
-fn emitted(compiled: &compile::Compilation, ui: &Ui) -> Result<Controller, Failure> {
-    let scratch = Scratch::new().map_err(environment)?;
-    let workspace = scratch.path().join("controller");
-    workspace::write_scratch(&workspace, &compiled.files)?;
-    ui.runs(ControllerForm::Emitted);
-    ui.progress("controller: the emitted one, built for this host");
-    let library = target::host::build_loadable(&workspace, &scratch.path().join("target"))?;
-    Controller::load(&library).map_err(environment)
+    plant.leg()?;
+    let compiled = spec_file::compiled(&arguments.spec, ui)?;
+    let options = Options {
+        output: arguments.output.as_deref().map(Into::into),
+        traces: arguments.traces,
+        plot: arguments.plot.place(),
+        paper: arguments.paper,
+        plant,
+        samples: arguments.samples,
+        frequency: arguments.frequency.clone(),
+        trajectory: arguments.trajectory.clone(),
+        latency: arguments.latency,
+        small_steps: arguments.small_steps,
+        record: arguments.record.as_deref().map(Into::into),
+        emitted: arguments.emitted,
+        seconds: arguments.seconds,
+    };
+    report::run(&options, &compiled, ui)
 }

@@ -25,6 +25,7 @@ use std::time::{Duration, Instant};
 use clap::{ArgGroup, Args};
 use serde_json::{Value, json};
 use specgen_compiler::compile::Compilation;
+use specgen_compiler::spec_file;
 use specgen_language::interrupt;
 use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
@@ -36,7 +37,6 @@ use super::operator::Pulse;
 use super::{Ended, Operator, Served, mistake};
 use crate::cli::line::Line;
 use crate::cli::named::InputFile;
-use crate::cli::spec;
 use hall::{Hall, now};
 use orders::{carry_out, question};
 use specgen_language::outcome::Failure;
@@ -96,7 +96,7 @@ struct Panel {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let compiled = spec::looked_up(&arguments.spec, ui)?;
+    let compiled = spec_file::looked_up(&arguments.spec, ui)?;
     interrupt::heed();
     let (session, name) = arguments.line.open(Some(&compiled.ir.digest))?;
     let Some(motion) = session.motion() else {
@@ -167,7 +167,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Until it is to end.
+/// WaitCondition it is to end.
 fn serve<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Panel>>, ui: &Ui) -> Ended {
     // Answers go to pages; nothing is printed.
     let mut quiet = Ui::called(|_| (), None);

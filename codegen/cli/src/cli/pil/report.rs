@@ -9,12 +9,12 @@ use host_sim::table::TrackingTable;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::cli::sim::platform::Played;
 use specgen_compiler::compile::Compilation;
 use specgen_language::outcome::Outcome;
 use specgen_language::table::{left, right, row};
 use specgen_operate::pil::{Cost, Difference};
 use specgen_report::chart::Chart;
+use specgen_studies::runs::Played;
 
 #[derive(Debug, Serialize)]
 pub struct Report {

@@ -1,8 +1,8 @@
 //! What is run in the loop: the scenarios of `sim`, with a lock-step for a controller.
 
 use host_sim::closed_loop::Rig;
-use host_sim::plant::{LegPlant, NoiseParameters};
-use host_sim::platform::rig::{Noise, OnBoard};
+use host_sim::plant::LegPlant;
+use host_sim::platform::rig::OnBoard;
 use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select as select_platform};
 use host_sim::platform::table::{MachiningTable, PoseRow};
 use host_sim::platform::{PlatformScenario, WorkPart};
@@ -13,13 +13,13 @@ use specgen_link::client::Port;
 
 use super::report::Report;
 use super::{Arguments, Broken, timed};
-use crate::cli::sim;
 use specgen_compiler::compile::Compilation;
 use specgen_language::model::TaskSpace;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_operate::pil::Lockstep;
-use specgen_studies::machine;
+use specgen_report::sim::{chart_of_legs, chart_of_platform};
+use specgen_studies::{machine, runs};
 
 /// Operating frequency unless asked otherwise, Hz.
 const FREQUENCY: f64 = 10.0;
@@ -68,11 +68,11 @@ impl Plan {
         }
         let modes = match &arguments.mode {
             Some(name) => vec![mode(name, &MODES)?],
-            None => sim::legs::modes(&compiled.model.adaptation),
+            None => runs::modes(&compiled.model.adaptation),
         };
         let frequency = arguments.frequency.unwrap_or(FREQUENCY);
         let samples = arguments.samples.unwrap_or(SAMPLES);
-        sim::legs::judge(compiled, frequency, samples)?;
+        runs::judge(compiled, frequency, samples)?;
         Ok(Self::Legs { modes, frequency, samples })
     }
 
@@ -91,7 +91,7 @@ impl Plan {
                         .to_owned(),
                 ));
             }
-            let path = machine::on_board(compiled, sim::platform::selector(task, name)?);
+            let path = machine::on_board(compiled, runs::selector(task, name)?);
             let path = path.ok_or_else(|| Failure::Usage(format!("the controller has no trajectory `{name}`")))?;
             return Ok(Self::Board { name: name.clone(), path, mode: wanted });
         }
@@ -134,7 +134,7 @@ impl Plan {
                     select_legs(lockstep, word).map_err(host_sim::closed_loop::RunError::from)?;
                     let mut rig = rig.clone();
                     let run = timed(&mut report.seconds, || rig.run(lockstep, &trajectory, interval))?;
-                    report.charts.push(sim::legs::chart(&run.tracking, &format!("{mode} at {frequency} Hz")));
+                    report.charts.push(chart_of_legs(&run.tracking, &format!("{mode} at {frequency} Hz")));
                     report.tracking.rows.push(TrackingRow::of(mode, *frequency, &run.tracking));
                 }
                 report.errors = format!("tracking error of the leg trajectory, T − Y\n{}", report.tracking.to_text());
@@ -153,7 +153,7 @@ impl Plan {
                         Some(part) => scenario.against(lockstep, &trajectory, *part),
                     })?;
                     let title = format!("{name} at {frequency} Hz, {mode}");
-                    report.charts.push(sim::platform::chart(&title, scenario.options.interval, &run));
+                    report.charts.push(chart_of_platform(&title, scenario.options.interval, &run));
                     match (run.scored(), part) {
                         (Err(error), _) => report.ended(&title, &error),
                         (Ok(found), None) => report.free_motion.rows.push(PoseRow::of(name, mode, *frequency, found)),
@@ -174,10 +174,10 @@ impl Plan {
                 }
                 ui.progress(&format!("playing {name} on board"));
                 let run = timed(&mut report.seconds, || scenario.play(lockstep, path, arguments.seconds))?;
-                report.charts.push(sim::platform::chart(name, scenario.options.interval, &run));
+                report.charts.push(chart_of_platform(name, scenario.options.interval, &run));
                 match run.scored() {
                     Ok(errors) => {
-                        let played = sim::platform::Played::of(name, errors);
+                        let played = runs::Played::of(name, errors);
                         report.errors = played.text();
                         report.on_board = Some(played);
                     }
@@ -198,8 +198,7 @@ fn mode(name: &str, known: &[(&'static str, u32)]) -> Result<(&'static str, u32)
 
 /// Six legs at rest, with their gauges zeroed.
 fn legs(compiled: &Compilation, samples: u32, arguments: &Arguments, ui: &Ui) -> Result<Rig<LegPlant>, Broken> {
-    let parameters = arguments.plant.leg()?;
-    let noise = if arguments.plant.no_noise { NoiseParameters::NONE } else { parameters.noise };
+    let (parameters, noise) = arguments.plant.options().read()?;
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
     let legs = std::array::from_fn(|_| parameters.clone());
     let mut scenario = machine::legs(&compiled.model, &legs, &noise, arguments.plant.seed, samples);
@@ -212,11 +211,8 @@ fn platform(compiled: &Compilation, arguments: &Arguments, ui: &Ui) -> Result<Pl
     let Some(task) = &model.task_space else {
         return Err(Failure::Usage("this spec has no [control]".to_owned()).into());
     };
-    let seed = arguments.plant.seed;
-    let specimen = machine::specimen(model, task, &arguments.plant.leg()?, Some(seed));
-    let noise = if arguments.plant.no_noise { Noise::NONE } else { Noise::of(&specimen) };
     ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
-    Ok(machine::scenario(model, task, &specimen, &noise, seed))
+    Ok(arguments.plant.options().platform(model, task)?.1)
 }
 
 /// The start of a trajectory, or all of it.

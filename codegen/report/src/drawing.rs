@@ -1,0 +1,89 @@
+//! Pictures and folders of results.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde_json::json;
+use specgen_language::outcome::Failure;
+use specgen_language::output::{check_place, write_file, write_folder};
+use specgen_language::ui::Ui;
+
+use crate::chart::Chart;
+use crate::plot::{figure, html};
+
+/// Where a picture goes, if one is wanted: .svg, or .html for a page.
+#[derive(Debug, Clone)]
+pub struct Plot(pub Option<PathBuf>);
+
+/// Whether it is a page; none for neither.
+pub fn is_page(path: &Path) -> Option<bool> {
+    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    match extension.as_str() {
+        "svg" => Some(false),
+        "html" => Some(true),
+        _ => None,
+    }
+}
+
+impl Plot {
+    /// Whether there is something to draw for; a place that cannot be is refused before the minutes that the rest takes.
+    ///
+    /// # Errors
+    /// The file cannot be there.
+    pub fn wanted(&self) -> Result<bool, Failure> {
+        self.0.as_deref().map_or(Ok(()), check_place)?;
+        Ok(self.0.is_some())
+    }
+
+    /// Writes charts in two columns, one that is alone in one, if a plot is wanted; then a line about it.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn charts(&self, title: &str, below: &str, charts: &[Chart]) -> Result<Option<String>, Failure> {
+        self.write(title, || figure(title, below, charts, charts.len().clamp(1, 2)))
+    }
+
+    /// The same with the line as progress.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn show(&self, title: &str, below: &str, charts: &[Chart], ui: &Ui) -> Result<(), Failure> {
+        self.charts(title, below, charts)?.iter().for_each(|line| ui.progress(line.trim_end()));
+        Ok(())
+    }
+
+    /// Writes what `draw` draws, if a plot is wanted; then a line about it.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, title: &str, draw: impl FnOnce() -> String) -> Result<Option<String>, Failure> {
+        let Some(path) = &self.0 else { return Ok(None) };
+        let svg = draw();
+        let text = if is_page(path) == Some(true) { html(title, &svg) } else { svg };
+        write_file(path, text.as_bytes())?;
+        Ok(Some(wrote(path)))
+    }
+}
+
+/// Name and bytes of a file of results.
+pub type File = (String, Vec<u8>);
+
+/// A value as JSON.
+pub fn json(name: &str, value: &impl Serialize) -> File {
+    (name.to_owned(), format!("{:#}\n", json!(value)).into_bytes())
+}
+
+/// Writes a folder of results, and says so.
+///
+/// # Errors
+/// The folder cannot be written.
+pub fn write(folder: &Path, files: &[File], ui: &Ui) -> Result<(), Failure> {
+    write_folder(folder, files)?;
+    ui.progress(&format!("wrote {} files to {}", files.len(), folder.display()));
+    Ok(())
+}
+
+/// The line that says so.
+pub fn wrote(path: &Path) -> String {
+    format!("wrote {}\n", path.display())
+}

@@ -1,0 +1,159 @@
+//! `specgen identify RECORD`: a reversal-curve record in, an Everett table and its figures out.
+
+use crate::drawing::wrote;
+use specgen_identify::{self as identify, DeadTime, GridChoice, Prediction, Reading, Report};
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::cause::account;
+use super::{Bench, Measured, predict, refused};
+use crate::identification as figure;
+use specgen_language::diagnostic::Diagnostic;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::write_file;
+use specgen_language::table::{right, row};
+use specgen_language::ui::Ui;
+
+/// Reads, identifies, writes what is asked for and shows the result.
+///
+/// # Errors
+/// A file cannot be read or written, or its data do not do.
+pub fn run(
+    path: &Path,
+    drive: [f64; 2],
+    grid: Option<usize>,
+    validation: Option<&Path>,
+    output: Option<&Path>,
+    bench: &Bench,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    let reading = &bench.reading;
+    let shown = path.display().to_string();
+    let record = identify::read_record(path, &shown, reading).map_err(refused)?;
+    let choice = match grid {
+        Some(_) => None,
+        None => Some(identify::choose_grid(&record, drive, DeadTime::Estimate).map_err(refused)?),
+    };
+    let grid = grid.or(choice.as_ref().map(|c| c.chosen)).unwrap_or_default();
+    let identified = identify::identify(&record, &identify::Options::new(grid, drive)).map_err(refused)?;
+    ui.findings(None, &identified.warnings);
+    let validation = match validation {
+        Some(path) => Some(validate(path, &identified, reading).map_err(refused)?),
+        None => None,
+    };
+    if let Some(output) = output {
+        let text = identify::write_table_csv(&identified.table);
+        let text = if record.simulated { identify::marked_as_simulated(&text) } else { text };
+        write_file(output, text.as_bytes())?;
+    }
+    let draw = || figure::everett(&identified, choice.as_ref(), validation.as_ref());
+    let plot = bench.plot.write("Everett table", draw)?;
+    let table = output.map(wrote);
+    ui.result(&Table {
+        record: shown,
+        grid,
+        report: &identified.report,
+        validation: validation.as_ref(),
+        grid_choice: choice.as_ref(),
+        measured: Measured::of(&["hysteresis.grid", "hysteresis.records"], record.simulated),
+        files: table.into_iter().chain(plot).collect(),
+    });
+    Ok(())
+}
+
+/// An Everett table that was identified.
+#[derive(Serialize)]
+struct Table<'a> {
+    #[serde(skip)]
+    record: String,
+    #[serde(skip)]
+    grid: usize,
+    report: &'a Report,
+    validation: Option<&'a Prediction>,
+    grid_choice: Option<&'a GridChoice>,
+    measured: Measured,
+    /// A line for each file that was written.
+    #[serde(skip)]
+    files: String,
+}
+
+impl Outcome for Table<'_> {
+    fn text(&self) -> String {
+        let mut text = self.grid_choice.map(curve).unwrap_or_default();
+        // Writing to a String cannot fail, here and below.
+        let _ = writeln!(text, "{}: {}", self.record, self.report.summary());
+        details(self.report, &mut text);
+        if let Some(validation) = self.validation {
+            let _ = writeln!(text, "{}: {}", validation.record, predict::summary(validation));
+        }
+        let _ = writeln!(text, "lines for the spec:\n[hysteresis]\ngrid = {}", self.grid);
+        text + &self.measured.text() + &self.files
+    }
+}
+
+fn validate(
+    path: &Path,
+    identified: &identify::Identification,
+    reading: &Reading,
+) -> Result<Prediction, Vec<Diagnostic>> {
+    let record = identify::read_record(path, &path.display().to_string(), reading)?;
+    identify::validate(&identified.table, &record, identified.report.dead_time)
+}
+
+/// The held-out error of every grid.
+fn curve(choice: &GridChoice) -> String {
+    let mut text = format!(
+        "grid by cross-validation: whole curves of {} reversal voltages held out in {} folds\n",
+        choice.levels, choice.folds
+    );
+    let columns = [4, 14, 5, 11].map(|width| right(width).behind("  "));
+    row(&mut text, &columns, &[&"N", &"held-out error", &"%", &"± std err to the best"]);
+    for s in &choice.scores {
+        let mark = match (s.grid == choice.chosen, s.grid == choice.best) {
+            (true, true) => "  <- chosen and best",
+            (true, false) => "  <- chosen",
+            (false, true) => "  <- best",
+            (false, false) => "",
+        };
+        // The mark stands behind the columns.
+        let error = format_args!("{:>8.3} nm{mark}", s.standard_error * 1e9);
+        let held_out = format_args!("{:.3} nm", s.held_out_rms * 1e9);
+        row(&mut text, &columns, &[&s.grid, &held_out, &format_args!("{:.3}", s.held_out_percent), &error]);
+    }
+    let _ = writeln!(text, "  N = {}: {} (one-standard-error rule)", choice.chosen, choice.rule);
+    text
+}
+
+/// What the summary has no room for.
+fn details(report: &Report, text: &mut String) {
+    let _ = writeln!(text, "  residual: {}", account(&report.cause));
+    let _ = writeln!(text, "  dead time {}", report.dead_time_basis);
+    if report.dead_time > report.held && report.held > 0.0 {
+        let _ = writeln!(
+            text,
+            "  of it {:.3} ms is the hold of a command, as `drive_V` is taken to be; from the voltage it is {:.3} ms (a measured voltage is named `monitor_V`)",
+            report.held * 1e3,
+            (report.dead_time - report.held) * 1e3
+        );
+    }
+    if report.weightless > 0 {
+        let _ = writeln!(text, "  {} samples got no weight (see the warnings)", report.weightless);
+    }
+    if report.unexcited.is_empty() {
+        let _ = writeln!(text, "  every cell of the plane was excited");
+    }
+    for region in report.unexcited.iter().take(5) {
+        let _ = writeln!(
+            text,
+            "  not excited: {} cells ({:.1} %), up_threshold {:.3} to {:.3} V, down_threshold {:.3} to {:.3} V; the table divides the measured sum evenly there",
+            region.cells,
+            region.share * 100.0,
+            region.up[0],
+            region.up[1],
+            region.down[0],
+            region.down[1]
+        );
+    }
+}

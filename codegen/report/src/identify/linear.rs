@@ -1,0 +1,233 @@
+//! `specgen identify linear`.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::{Bench, Measured, refused};
+use crate::identification as figure;
+use specgen_compiler::compile;
+use specgen_compiler::stability::Margins;
+use specgen_identify as identify;
+use specgen_identify::linear::{self, LinearReport, PAPER_PROPORTION};
+use specgen_language::diagnostic::Diagnostic;
+use specgen_language::model::Adaptation;
+use specgen_language::outcome::{Failure, Outcome, Refusal};
+use specgen_language::spec::{self, SpecSource};
+use specgen_language::table::{left, right, row};
+use specgen_language::ui::Ui;
+
+/// Weights per run that the paper prints.
+const PAPER: [f64; 2] = [0.252, 0.011];
+
+/// Reads, identifies, writes what is asked for and shows the result.
+///
+/// # Errors
+/// A file cannot be read or written, or its data do not do.
+pub fn run(
+    records: &[impl AsRef<Path>],
+    frequencies: &[f64],
+    reference: Option<f64>,
+    spec: Option<&Path>,
+    bench: &Bench,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    if !frequencies.is_empty() && frequencies.len() != records.len() {
+        return Err(Failure::Usage(format!(
+            "--frequency names {} frequencies for {} records",
+            frequencies.len(),
+            records.len()
+        )));
+    }
+    let mut read = Vec::new();
+    let mut relations = Vec::new();
+    let mut bad = Vec::new();
+    for (k, path) in records.iter().map(AsRef::as_ref).enumerate() {
+        let shown = path.display().to_string();
+        let found = identify::read_record(path, &shown, &bench.reading).and_then(|record| {
+            let relation = linear::relation(&record, frequencies.get(k).copied())?;
+            Ok((record, relation))
+        });
+        match found {
+            Ok((record, relation)) => {
+                ui.findings(None, &record.warnings);
+                read.push(record);
+                relations.push(relation);
+            }
+            Err(findings) => bad.extend(findings),
+        }
+    }
+    if !bad.is_empty() {
+        return Err(refused(bad));
+    }
+    let report = linear::together(relations, reference).map_err(refused)?;
+    let spec = spec.map(|path| judge(path, &report)).transpose()?;
+    let plot = bench.plot.write("Linear relation", || figure::linear(&report, &read))?.unwrap_or_default();
+    let simulated = report.relations.iter().any(|relation| relation.simulated);
+    let measured = Measured::of(&["actuator.stack_gain", "adaptation.gain_ratio"], simulated);
+    ui.result(&Related { gain_ratio: report.gain_ratio_for_spec(), report, measured, spec, plot });
+    Ok(())
+}
+
+/// A linear relation that was found.
+#[derive(Serialize)]
+struct Related {
+    report: LinearReport,
+    gain_ratio: [f64; 2],
+    measured: Measured,
+    spec: Option<Judged>,
+    #[serde(skip)]
+    plot: String,
+}
+
+/// What the sampled loop of a spec makes of the relation.
+#[derive(Serialize)]
+struct Judged {
+    stacks: f64,
+    verdict: Verdict,
+    #[serde(skip)]
+    name: String,
+    #[serde(skip)]
+    adaptation: Adaptation,
+}
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Verdict {
+    Stable { stable: bool, margins: Option<Margins>, design: bool },
+    Unstable { stable: bool, findings: Vec<Reason> },
+}
+
+#[derive(Serialize)]
+struct Reason {
+    code: &'static str,
+    message: String,
+    help: String,
+}
+
+impl Outcome for Related {
+    fn text(&self) -> String {
+        let mut text = table(&self.report);
+        match &self.spec {
+            None => static_verdict(&self.report, &mut text),
+            Some(judged) => judged.write(&mut text),
+        }
+        lines(&self.report, self.spec.as_ref().map(|judged| judged.stacks), &mut text);
+        text + &self.measured.text() + &self.plot
+    }
+}
+
+fn table(report: &LinearReport) -> String {
+    let mut text = "Y = ρX + δ\n".to_owned();
+    let columns = [12, 10, 10, 10, 8, 4, 11, 6].map(|width| right(width).behind("  "));
+    let columns = [&columns[..], &[left(0).behind("  ")]].concat();
+    row(
+        &mut text,
+        &columns,
+        &[&"frequency Hz", &"ρ µm/V", &"± std err", &"δ µm", &"loop µm", &"%", &"correlation", &"cycles", &"record"],
+    );
+    for r in &report.relations {
+        row(
+            &mut text,
+            &columns,
+            &[
+                &format_args!("{:.4}", r.frequency),
+                &format_args!("{:.6}", r.gain * 1e6),
+                &format_args!("{:.6}", r.gain_error * 1e6),
+                &format_args!("{:.4}", r.offset * 1e6),
+                &format_args!("{:.4}", r.loop_width * 1e6),
+                &format_args!("{:.1}", r.loop_percent),
+                &format_args!("{:.5}", r.correlation),
+                &r.cycles,
+                &r.record,
+            ],
+        );
+    }
+    // Writing to a String cannot fail, here and below.
+    let _ = writeln!(
+        text,
+        "reference: ρ̂ = {:.6} µm/V, at {:.4} Hz; λ = ρ/ρ̂ from {:.4} to {:.4} (two standard errors included)",
+        report.reference_gain * 1e6,
+        report.reference_frequency,
+        report.gain_ratio[0],
+        report.gain_ratio[1]
+    );
+    text
+}
+
+fn static_verdict(report: &LinearReport, text: &mut String) {
+    let yes = |stable: bool| if stable { "stable" } else { "not stable" };
+    let _ = writeln!(
+        text,
+        "on a leg without dynamics: EWMA (AII.18, corrected to 0 < λω < 2) up to ω = {:.4}, ω = {} is {}; \
+         PCC (AII.19) up to ω1 = {:.4} with ω2 = {:.4} ω1, ω1 = {}, ω2 = {} is {}",
+        report.largest_ewma_weight,
+        PAPER[0],
+        yes(report.ewma_is_stable(PAPER[0])),
+        report.largest_pcc_weight,
+        PAPER_PROPORTION,
+        PAPER[0],
+        PAPER[1],
+        yes(report.pcc_is_stable(PAPER[0], PAPER[1]))
+    );
+    text.push_str(
+        "the resonance and lag of the leg lower these limits: --spec judges the sampled loop of a platform\n",
+    );
+}
+
+/// Stability of the spec's own weights over the λ found.
+fn judge(path: &Path, report: &LinearReport) -> Result<Judged, Failure> {
+    let source = SpecSource::read(path).map_err(|finding| refused(vec![finding]))?;
+    let (model, findings) = spec::load(&source);
+    let Some(mut model) = model else {
+        return Err(Failure::from(Refusal { source: Some(source), findings }));
+    };
+    model.adaptation.gain_ratio = report.gain_ratio_for_spec();
+    let verdict = match compile::check_stability(&model) {
+        Ok((margins, design)) => Verdict::Stable { stable: true, margins, design: design.is_some() },
+        Err(found) => {
+            let reason = |f: Diagnostic| Reason { code: f.code, message: f.message, help: f.help };
+            Verdict::Unstable { stable: false, findings: found.into_iter().map(reason).collect() }
+        }
+    };
+    let stacks = f64::from(model.actuator.stacks);
+    Ok(Judged { stacks, verdict, name: path.display().to_string(), adaptation: model.adaptation })
+}
+
+impl Judged {
+    fn write(&self, text: &mut String) {
+        let Self { name, adaptation, .. } = self;
+        let _ = match &self.verdict {
+            Verdict::Stable { margins: Some(margins), .. } if adaptation.level_weight > 0.0 => {
+                let largest = margins
+                    .largest_level_weight
+                    .map_or_else(String::new, |w| format!("; stable up to level weight {w:.4}"));
+                writeln!(
+                    text,
+                    "{name}: its weights (level {}, drift {}) are stable over this λ; spectral radius {:.4}{largest}",
+                    adaptation.level_weight, adaptation.drift_weight, margins.spectral_radius
+                )
+            }
+            Verdict::Stable { .. } => writeln!(text, "{name}: its adaptation is stable over this λ"),
+            Verdict::Unstable { findings, .. } => {
+                let _ = writeln!(text, "{name}: its weights are NOT stable over this λ");
+                findings.iter().try_for_each(|f| writeln!(text, "  {}: {}\n    help: {}", f.code, f.message, f.help))
+            }
+        };
+    }
+}
+
+fn lines(report: &LinearReport, stacks: Option<f64>, text: &mut String) {
+    let [low, high] = report.gain_ratio_for_spec();
+    let gain = report.reference_gain * 1e6 / stacks.unwrap_or(1.0);
+    let note = match stacks {
+        Some(n) if n > 1.0 => format!("of one stack: the record's, divided by {n}"),
+        Some(_) => "of one stack".to_owned(),
+        None => "if the record is of one stack; divide by actuator.stacks if it is of a leg".to_owned(),
+    };
+    let _ = write!(
+        text,
+        "lines for the spec:\n[actuator]\nstack_gain = \"{gain:.6} um/V\"  # {note}\n[adaptation]\ngain_ratio = [{low:.3}, {high:.3}]\n"
+    );
+}

@@ -1,0 +1,136 @@
+//! `specgen identify predict`: a table or a spec and a drive in, the displacement out, beside the measured one where there is one.
+
+use crate::drawing::wrote;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::cause::account;
+use super::{Bench, Identified, Measured, refused};
+use crate::identification as figure;
+use specgen_compiler::spec_file;
+use specgen_identify::mode::{self, Mode};
+use specgen_identify::rate::{Inertia, RateModel};
+use specgen_identify::{Drive, Prediction, declared, predict, read_drive, read_file, read_table_csv};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::write_file;
+use specgen_language::ui::Ui;
+
+/// What is read and written.
+#[derive(Debug)]
+pub struct Options {
+    /// A table or a spec.
+    pub model: PathBuf,
+    /// The drive, and what was measured.
+    pub drive: PathBuf,
+    /// Leg of the spec.
+    pub leg: u8,
+    /// Lag of the displacement, s.
+    pub dead_time: Option<f64>,
+    /// The mode behind the model, or that there is none.
+    pub mode: Option<Option<Mode>>,
+    /// File of the prediction.
+    pub output: Option<PathBuf>,
+}
+
+/// What a mode adds: that given, else that of the model, else that of a ring in the record.
+fn inertia(options: &Options, model: &RateModel, drive: &Drive) -> Option<Inertia> {
+    let ring = || mode::ring(&drive.time, &drive.drive, drive.displacement.as_ref()?).map(|ring| ring.mode);
+    let found = match (options.mode, model.inertia) {
+        (Some(mode), _) => mode,
+        (None, Some(own)) => Some(own.mode),
+        (None, None) => ring(),
+    };
+    found.map(|mode| Inertia { mode, gain: model.still.mean_gain() })
+}
+
+/// Reads, identifies, writes what is asked for and shows the result.
+///
+/// # Errors
+/// A file cannot be read or written, or its data do not do.
+pub fn run(options: &Options, bench: &Bench, ui: &mut Ui) -> Result<(), Failure> {
+    let shown = options.drive.display().to_string();
+    let drive = read_drive(&options.drive, &shown, &bench.reading).map_err(refused)?;
+    let mut model = model(&options.model, usize::from(options.leg), ui)?;
+    // In a spec it counts from the voltage; a command is held on its way there.
+    model.dead_time = options.dead_time.unwrap_or(model.dead_time) + drive.held;
+    model.inertia = inertia(options, &model, &drive);
+    let prediction = predict(&model, &drive).map_err(refused)?;
+    if let Some(output) = &options.output {
+        write_file(output, csv(&prediction).as_bytes())?;
+    }
+    let plot = bench.plot.write("Prediction", || figure::prediction(&prediction))?;
+    let files = options.output.as_ref().map(|path| wrote(path)).into_iter().chain(plot).collect();
+    ui.result(&Identified { record: shown, report: prediction, measured: Measured::of(&[], false), files });
+    Ok(())
+}
+
+fn model(path: &Path, leg: usize, ui: &mut Ui) -> Result<RateModel, Failure> {
+    if path.extension().is_some_and(|extension| extension == "toml") {
+        let model = spec_file::model(path)?;
+        let dir = path.parent().unwrap_or(Path::new(""));
+        let declared = declared::records(&model, dir).map_err(refused)?;
+        ui.findings(None, &declared.warnings);
+        return declared
+            .leg(&model, leg)
+            .ok_or_else(|| Failure::Usage(format!("`{}` names no record in hysteresis.records", path.display())));
+    }
+    let shown = path.display().to_string();
+    let text = read_file(path, &shown).map_err(refused)?;
+    Ok(RateModel::of_table(read_table_csv(&text, &shown).map_err(refused)?, 0.0))
+}
+
+/// Numbers are the shortest that read back.
+fn csv(prediction: &Prediction) -> String {
+    let measured = prediction.measured.as_ref();
+    let mut text = String::from("time_s,drive_V,displacement_um");
+    text += if measured.is_some() { ",measured_um,error_um\n" } else { "\n" };
+    for (k, y) in prediction.displacement.iter().enumerate() {
+        // Writing to a String cannot fail.
+        let _ = write!(text, "{:?},{:?},{:?}", prediction.time[k], prediction.drive[k], y * 1e6);
+        let _ = match measured {
+            Some(measured) => writeln!(text, ",{:?},{:?}", measured[k] * 1e6, (measured[k] - y) * 1e6),
+            None => writeln!(text),
+        };
+    }
+    text
+}
+
+/// What stands behind the name of the record: how well it was predicted.
+pub fn summary(prediction: &Prediction) -> String {
+    let start = format!("start: {:.0} % of the open weight on", prediction.start_on * 100.0);
+    let Some(compared) = &prediction.compared else {
+        return format!("{} samples predicted; the file has no displacement_um to compare with", prediction.time.len());
+    };
+    let clipped = match prediction.samples_clipped {
+        0 => String::new(),
+        clipped => format!("; {clipped} samples outside the table's range are held at its end"),
+    };
+    format!(
+        "predicted to {:.3} % rms, {:.3} % at worst, of {:.3} µm ({start}{clipped})\n  this residual: {}",
+        compared.rms_percent,
+        compared.max_percent,
+        compared.range * 1e6,
+        account(&compared.cause)
+    )
+}
+
+impl Outcome for Identified<Prediction> {
+    fn text(&self) -> String {
+        let report = &self.report;
+        let mut text = format!("{}: {}\n", self.record, summary(report));
+        let _ = write!(
+            text,
+            "  displacement {:.3} ms behind the drive column; {} samples before the drive moves are left out",
+            report.dead_time * 1e3,
+            report.samples_skipped
+        );
+        if let Some(inertia) = report.inertia {
+            let _ =
+                write!(text, "\n  mode at {:.1} Hz, damping ratio {:.4}", inertia.mode.frequency, inertia.mode.damping);
+        }
+        if report.compared.is_none() && report.samples_clipped > 0 {
+            let _ = write!(text, "; {} samples outside the table's range are held at its end", report.samples_clipped);
+        }
+        text + "\n" + &self.files
+    }
+}

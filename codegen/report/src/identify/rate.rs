@@ -1,0 +1,195 @@
+//! `specgen identify rate`: records at several rates in, a comparison of rate-dependent models and spec lines out.
+
+use crate::drawing::wrote;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::{Bench, Identified, Measured, refused};
+use crate::identification as figure;
+use specgen_identify::rate::{RateIdentification, RateOption, RateReport, identify_rate, spec_lines, write_rate_csv};
+use specgen_identify::{marked_as_simulated, read_record, write_table_csv};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::write_folder;
+use specgen_language::table::{left, right, row};
+use specgen_language::ui::Ui;
+
+/// Reads, identifies, writes what is asked for and shows the result.
+///
+/// # Errors
+/// A file cannot be read or written, or its data do not do.
+pub fn run(
+    paths: &[impl AsRef<Path>],
+    drive: [f64; 2],
+    grid: usize,
+    hold_out: Option<&Path>,
+    output: Option<&Path>,
+    bench: &Bench,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    let read = |path: &Path| read_record(path, &path.display().to_string(), &bench.reading);
+    let mut records = Vec::new();
+    let mut errors = Vec::new();
+    for path in paths {
+        match read(path.as_ref()) {
+            Ok(record) => records.push(record),
+            Err(found) => errors.extend(found),
+        }
+    }
+    let hold_out = match hold_out.map(read).transpose() {
+        Ok(record) => record,
+        Err(found) => {
+            errors.extend(found);
+            None
+        }
+    };
+    if !errors.is_empty() {
+        return Err(refused(errors));
+    }
+    ui.progress(&format!("{} fits of {} records", RateOption::ALL.len() * (records.len() + 1), records.len()));
+    let fit = specgen_identify::Options::new(grid, drive);
+    let identified = identify_rate(&records, hold_out.as_ref(), &fit).map_err(refused)?;
+    ui.findings(None, &identified.warnings);
+    let files = output.map(|output| write(output, &identified)).transpose()?.unwrap_or_default();
+    let plot = bench.plot.write("Rate dependence", || figure::rate(&identified.report))?;
+    let files = files.iter().map(|path| wrote(path)).chain(plot).collect();
+    let keys = keys(&identified.report);
+    let measured = Measured::of(&keys, is_simulated(&identified.report));
+    ui.result(&Identified { record: String::new(), report: identified.report, measured, files });
+    Ok(())
+}
+
+impl Outcome for Identified<RateReport> {
+    fn text(&self) -> String {
+        table(&self.report) + &self.files
+    }
+}
+
+/// Whether any of the records is simulated: what is fitted to all of them is then no measurement.
+fn is_simulated(report: &RateReport) -> bool {
+    report.records.iter().any(|record| record.simulated)
+}
+
+/// What the lines of the best option give.
+fn keys(report: &RateReport) -> Vec<&'static str> {
+    let of_mode = ["actuator.resonance", "actuator.damping_ratio"];
+    let own = ["hysteresis.grid", "hysteresis.records", "hysteresis.rate", "hysteresis.dead_time"];
+    own.into_iter().chain(report.mode.iter().flat_map(|_| of_mode)).collect()
+}
+
+/// Tables first, then the lines that name them.
+fn write(output: &Path, identified: &RateIdentification) -> Result<Vec<PathBuf>, Failure> {
+    let name = output.file_name().map(|name| name.to_string_lossy().into_owned()).ok_or_else(|| {
+        Failure::Usage(format!("`{}` names no file: give a name such as models/leg1", output.display()))
+    })?;
+    let best = identified.report.verdict.best;
+    let simulated = is_simulated(&identified.report);
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+    let mut lines = format!(
+        "# Rate dependence of the leg, from `specgen identify rate`. The option in force has the lowest error on rates that it was\n\
+         # not fitted on. Tables are named relative to the spec.\n[hysteresis]\n# {}\n",
+        identified.report.verdict.text.replace('\n', "\n# ")
+    );
+    for (option, model) in &identified.models {
+        let table = match option {
+            RateOption::Static => format!("{name}-static.csv"),
+            RateOption::DeadTime => format!("{name}-dead-time.csv"),
+            RateOption::DynamicPreisach => format!("{name}-mu0.csv"),
+            RateOption::Creep => format!("{name}-creep.csv"),
+            RateOption::EvenCreep => format!("{name}-creep-one.csv"),
+            RateOption::CreepMode => format!("{name}-creep-mode.csv"),
+        };
+        let rate_table = format!("{name}-mu1.csv");
+        let mark = |text: String| if simulated { marked_as_simulated(&text) } else { text };
+        files.push((table.clone(), mark(write_table_csv(&model.still)).into_bytes()));
+        if let Some(rate) = &model.rate {
+            files.push((rate_table.clone(), mark(write_rate_csv(rate)).into_bytes()));
+        }
+        let block = spec_lines(*option, model, identified.report.held, &table, &rate_table);
+        let prefix = if *option == best { "" } else { "# " };
+        let only = if option.runs() {
+            ""
+        } else {
+            ": for `specgen identify predict`; the controller does not take the mode out"
+        };
+        let _ = writeln!(lines, "\n# {}{only}", option.name());
+        for line in block.lines() {
+            let _ = writeln!(lines, "{prefix}{line}");
+        }
+    }
+    lines += &format!("\n{}", Measured::of(&keys(&identified.report), simulated).text());
+    files.push((format!("{name}.toml"), lines.into_bytes()));
+    let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    write_folder(folder, &files)?;
+    Ok(files.into_iter().map(|(file, _)| output.with_file_name(file)).collect())
+}
+
+fn table(report: &RateReport) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    for record in &report.records {
+        let _ = writeln!(
+            text,
+            "{}: {} curves, median {:.0} V/s, {} samples, range {:.3} µm, noise {:.3} % of it",
+            record.record,
+            record.frequency_text(),
+            record.speed,
+            record.samples,
+            record.range * 1e6,
+            record.noise_percent
+        );
+    }
+    if let Some(held) = &report.hold_out {
+        let _ = writeln!(text, "{}: held out of every fit", held.record);
+    }
+    let _ = writeln!(text, "\nrms error in % of the range, grid {}", report.grid);
+    // Nine characters for each record, twice; the last column is there where a record was held out.
+    let width = 9 * report.records.len();
+    let held = if report.hold_out.is_some() { "  held out" } else { "" };
+    let heads = [left(20), right(width), right(width).behind("   "), left(0)];
+    row(&mut text, &heads, &[&"", &"fitted on all", &"fitted on the others", &held]);
+    let frequencies: String = report.records.iter().map(|record| format!("{:>9}", record.frequency_text())).collect();
+    row(&mut text, &heads, &[&"model", &frequencies, &frequencies, &""]);
+    for option in &report.options {
+        let numbers = |values: &[f64]| values.iter().map(|v| format!("{v:>9.3}")).collect::<String>();
+        let held = option.hold_out.map(|v| format!("{v:>10.3}")).unwrap_or_default();
+        row(&mut text, &heads, &[&option.option.name(), &numbers(&option.fitted), &numbers(&option.left_out), &held]);
+    }
+    text.push('\n');
+    for option in report.options.iter().filter(|o| o.dead_time > 0.0 || !o.creep.is_empty()) {
+        let creep: Vec<String> =
+            option.creep.iter().map(|c| format!("{:.4} at {:.4} s", c.weight, c.time_constant)).collect();
+        let creep = match option.option {
+            _ if option.creep.is_empty() && option.option >= RateOption::Creep => "; no creep weight helps".to_owned(),
+            _ if creep.is_empty() => String::new(),
+            RateOption::EvenCreep => format!(
+                "; creep {:.4} at each of {} time constants from {:.4} to {:.4} s",
+                option.creep[0].weight,
+                creep.len(),
+                option.creep[creep.len() - 1].time_constant,
+                option.creep[0].time_constant
+            ),
+            _ => format!("; creep {}", creep.join(", ")),
+        };
+        let _ = writeln!(text, "{}: dead time {:.3} ms{creep}", option.option.name(), option.dead_time * 1e3);
+    }
+    for (option, period) in report.options.iter().filter_map(|o| Some((o.option, o.period?))) {
+        let when = match period > 0.0 {
+            true => format!("at periods of {:.3} ms and longer; at shorter ones check refuses it", period * 1e3),
+            false => "at any period".to_owned(),
+        };
+        let _ = writeln!(text, "{}: a controller inverts it {when}", option.name());
+    }
+    if let Some(mode) = report.mode {
+        let _ = writeln!(text, "mode: {:.1} Hz, damping ratio {:.4}", mode.frequency, mode.damping);
+    }
+    if report.held > 0.0 {
+        let _ = writeln!(
+            text,
+            "of each dead time {:.3} ms is the hold of the commands; the lines of the spec have the rest",
+            report.held * 1e3
+        );
+    }
+    let _ = writeln!(text, "{}", report.verdict.text);
+    let _ = writeln!(text, "lowest error on rates not fitted on: {}", report.verdict.best.name());
+    text
+}

@@ -1,0 +1,180 @@
+//! The commands of a record with a simulated machine in the place of the one that was recorded.
+
+use crate::record::Sample;
+use host_sim::closed_loop::Rig;
+use host_sim::controller::Supervised;
+use host_sim::plant::{LegParameters, LegPlant};
+use host_sim::platform::rig::{Noise, PlatformRig};
+use host_sim::record::Block;
+use specgen_compiler::compile::Compilation;
+use specgen_language::model::Model;
+use specgen_runtime::record::Reason;
+use specgen_runtime::supervisor::MISSED_TICK;
+
+use super::SEED;
+use super::words::Words;
+use specgen_studies::machine;
+
+/// How long a machine takes that is led to where a record goes on, and until what that set swinging is over, s.
+const SETTLE: f64 = 0.2;
+/// Steps in which it is led.
+const STEPS: u32 = 50;
+/// Halvings of the room in which a peak is sought: to 6 mV of 100 V.
+const HALVINGS: u32 = 14;
+
+/// The simulated machine of a spec, as a controller sees it.
+#[derive(Clone)]
+enum Simulated {
+    Platform(Box<PlatformRig>),
+    Legs(Box<Rig<LegPlant>>),
+}
+
+impl Simulated {
+    /// Prepared: pre-cycled, at rest, gauges zeroed.
+    fn of(model: &Model) -> Self {
+        let leg = LegParameters::reference();
+        match &model.task_space {
+            Some(task) => {
+                let specimen = machine::specimen(model, task, &leg, Some(SEED));
+                let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED);
+                Self::Platform(Box::new(scenario.rig().clone()))
+            }
+            None => {
+                let leg = machine::leg(model, &leg);
+                let legs = std::array::from_fn(|_| leg.clone());
+                Self::Legs(Box::new(machine::legs(model, &legs, &leg.noise, SEED, 1).rig().clone()))
+            }
+        }
+    }
+
+    fn read(&mut self) -> [f64; 6] {
+        match self {
+            Self::Platform(rig) => rig.read_gauges(),
+            Self::Legs(rig) => rig.read(),
+        }
+    }
+
+    /// Of the force sensor; legs have none.
+    fn wrench(&mut self) -> [f64; 6] {
+        match self {
+            Self::Platform(rig) => rig.read_wrench(),
+            Self::Legs(_) => [0.0; 6],
+        }
+    }
+
+    fn hold(&mut self, voltages: &[f64; 6], interval: f64) {
+        match self {
+            Self::Platform(rig) => rig.hold(voltages, interval),
+            Self::Legs(rig) => rig.hold(voltages, interval),
+        }
+    }
+
+    /// This one, at rest, led to the voltages of a tick, where the gauges read `reading`. A leg goes there through a peak that
+    /// makes its gauge read so; which one it was, nobody knows. Each gauge of a platform sees all legs, which go there straight.
+    fn led(&self, model: &Model, voltages: &[f64; 6], reading: &[f64; 6]) -> Self {
+        let rest = [model.rest_voltage(); 6];
+        let through = |peaks: &[f64; 6]| {
+            let mut machine = self.clone();
+            for (from, to) in [(&rest, peaks), (peaks, voltages), (voltages, voltages)] {
+                for step in 1..=STEPS {
+                    let share = f64::from(step) / f64::from(STEPS);
+                    let between = std::array::from_fn(|leg| from[leg] + share * (to[leg] - from[leg]));
+                    machine.hold(&between, SETTLE / f64::from(STEPS));
+                }
+            }
+            machine
+        };
+        let mut low = *voltages;
+        if matches!(self, Self::Legs(_)) {
+            let mut high = [model.actuator.voltage[1]; 6];
+            for _ in 0..HALVINGS {
+                let middle: [f64; 6] = std::array::from_fn(|leg| 0.5 * (low[leg] + high[leg]));
+                let found = through(&middle).read();
+                for leg in 0..6 {
+                    // The higher the peak, the longer the leg behind it.
+                    if found[leg] < reading[leg] {
+                        low[leg] = middle[leg];
+                    } else {
+                        high[leg] = middle[leg];
+                    }
+                }
+            }
+        }
+        through(&low)
+    }
+}
+
+/// Runs the commands of `blocks` with a simulated machine. `recorded` are the same ticks as they were; in both only those stay
+/// scored that can be compared: the law is at work in both, and the simulated machine has settled.
+///
+/// At power-up both begin alike. Where a record begins in the middle of a run, or goes on behind a gap, the controller is that of
+/// the record's snapshot, and the simulated machine is led to the voltages of the first tick, with its gauges set to the readings
+/// of that tick: what led to them is not in the record, so the offset of the hysteresis, creep and speed are not known.
+///
+/// # Errors
+/// Why there is nothing to compare.
+pub(super) fn simulate(
+    controller: &mut Supervised,
+    blocks: &[Block],
+    words: &Words,
+    compiled: &Compilation,
+    recorded: &mut [Sample],
+) -> Result<Vec<Sample>, String> {
+    let period = compiled.model.timing.period;
+    let settle = (SETTLE / period) as u64;
+    controller.reset();
+    let power_up = controller.save();
+    let prepared = Simulated::of(&compiled.model);
+    let (mut machine, mut offset) = (prepared.clone(), [0.0; 6]);
+    let mut output = vec![0; controller.output_names().len()];
+    let mut samples: Vec<Sample> = Vec::with_capacity(recorded.len());
+    // Tick that follows the last one; the first that is scored.
+    let (mut next, mut settled) = (None, 0);
+    for block in blocks {
+        controller.configure(&block.config).map_err(|error| error.to_string())?;
+        if next != Some(block.first) || block.reason == Reason::Started {
+            controller.load(&block.state).map_err(|_| "a snapshot in the record does not fit".to_owned())?;
+            (machine, offset) = (prepared.clone(), [0.0; 6]);
+            if let (true, Some(first), Some(row)) =
+                (block.state != power_up, recorded.get(samples.len()), block.rows.first())
+            {
+                let reading = words.gauge.map(|place| words.scalar.decode(row.input[place]));
+                machine = prepared.led(&compiled.model, &first.voltage, &reading);
+                let found = machine.read();
+                offset = std::array::from_fn(|k| reading[k] - found[k]);
+                settled = block.first + settle;
+            }
+        }
+        for row in &block.rows {
+            let mut input = row.input.clone();
+            for ((place, value), offset) in words.gauge.iter().zip(machine.read()).zip(offset) {
+                input[*place] = words.scalar.encode(value + offset);
+            }
+            for (place, value) in words.wrench.iter().flatten().zip(machine.wrench()) {
+                input[*place] = words.scalar.encode(value);
+            }
+            // What was late at the machine is not late here.
+            input[words.events] &= !u64::from(MISSED_TICK);
+            let word = controller.step(&input, &mut output);
+            let mut sample = words.sample(row.tick, word, &input, &output);
+            machine.hold(&sample.voltage, period);
+            if let Some(beside) = recorded.get_mut(samples.len()) {
+                sample.scored = sample.running && beside.running && row.tick >= settled;
+                beside.scored = sample.scored;
+            }
+            samples.push(sample);
+        }
+        next = Some(block.first + block.rows.len() as u64);
+    }
+    if samples.iter().any(|sample| sample.scored) {
+        return Ok(samples);
+    }
+    recorded.iter_mut().for_each(|sample| sample.scored = sample.running);
+    Err(if recorded.iter().any(|sample| sample.running) {
+        format!(
+            "the record does not begin at power-up and has no {SETTLE} s in one piece, which the simulated machine takes to settle"
+        )
+    } else {
+        "the law was never at work".to_owned()
+    })
+}

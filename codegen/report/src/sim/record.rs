@@ -1,0 +1,260 @@
+//! `specgen sim --record`: a run under the supervisor with every tick recorded. The set-points come from the wave generator
+//! that the targets have.
+
+use std::cell::RefCell;
+use std::io::BufWriter;
+use std::path::Path;
+
+use host_sim::closed_loop::RunError;
+use host_sim::controller::{Controller, Supervised, TickController};
+use host_sim::plant::{LegParameters, NoiseParameters};
+use host_sim::platform::rig::{Bench, Request};
+use host_sim::record::{RecordedController, RecordingEnd, Writer};
+use host_sim::scenario::select;
+use host_sim::trajectory::{LegTrajectory, PoseTarget, PoseTrajectory};
+use serde::Serialize;
+use specgen_runtime::Motion;
+use specgen_runtime::record::Layout;
+use specgen_runtime::recorder::{Recorder, Settings as Recording};
+use specgen_runtime::wave::{AxisWave, Limits, Settings, Shape, Tone, Wave, step_of};
+
+use super::Options;
+use specgen_compiler::compile::Compilation;
+use specgen_language::model::TaskSpace;
+use specgen_language::outcome::{Failure, Outcome, environment};
+use specgen_language::output::{PendingFile, unwritten};
+use specgen_language::ui::Ui;
+use specgen_studies::machine;
+
+/// Blocks of the recorder, and words of each: a tenth of a second at 10 kHz.
+const BLOCKS: usize = 2;
+const BLOCK: usize = 1 << 15;
+/// Frequencies of the axes, Hz: none is a multiple of another.
+const FREQUENCIES: [f64; 6] = [1.0, 1.3, 1.7, 2.1, 2.3, 2.9];
+/// Share of the room that an axis swings by: the third axis (z, or a leg), the others. The legs share their stroke.
+const SHARES: [f64; 2] = [0.2, 0.03];
+/// Way to the bias pose, at most, s.
+const ARMING: f64 = 60.0;
+
+/// A recording that was written.
+#[derive(Serialize)]
+struct Written {
+    ticks: u64,
+    bytes: u64,
+    file: String,
+    /// s.
+    #[serde(skip)]
+    seconds: f64,
+}
+
+impl Outcome for Written {
+    fn text(&self) -> String {
+        let (bytes, ticks) = (self.bytes as f64, self.ticks as f64);
+        format!(
+            "wrote {ticks} ticks, {:.3} s, to {}: {:.1} MB, {:.0} bytes a tick\n",
+            self.seconds,
+            self.file,
+            bytes / 1e6,
+            bytes / ticks
+        )
+    }
+}
+
+pub(super) fn run(
+    options: &Options,
+    path: &Path,
+    compiled: &Compilation,
+    controller: Controller,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    let period = compiled.model.timing.period;
+    let seconds = options.seconds;
+    let ticks = (seconds / period).round();
+    if !(1.0..1e9).contains(&ticks) {
+        return Err(Failure::Usage(format!(
+            "--seconds {seconds} is {ticks} ticks of {period} s; expected 1 to 10^9 ticks"
+        )));
+    }
+    let text = controller.text().to_owned();
+    let machine = Supervised::new(controller);
+    let layout = Layout {
+        config: machine.controller().description().config_names.len(),
+        input: machine.input_names().len(),
+        state: machine.state_words(),
+    };
+    // A machine of long memory needs longer blocks.
+    let block = if BLOCK < 2 * layout.preamble() { 2 * layout.preamble() } else { BLOCK };
+    let mut memory = vec![0; BLOCKS * block];
+    let mut recorder = Recorder::new(&mut memory, BLOCKS, layout)
+        .map_err(|unfit| Failure::Environment(format!("the recorder does not fit this controller: {unfit:?}")))?;
+    recorder.start(Recording::STREAM);
+    let file = BufWriter::with_capacity(1 << 20, PendingFile::create(path)?);
+    let mut writer = Writer::new(file, &text).map_err(|error| unwritten(path, &error))?;
+    let mut recorded = RecordedController::new(machine, &mut recorder, &mut writer).map_err(environment)?;
+    recorded.reset();
+    ui.progress(&format!("recording {seconds} s of a wave on all axes under the supervisor"));
+    let (wave, _) = wave(compiled, ticks as i32, FREQUENCIES, SHARES)?;
+    let ran = match &compiled.model.task_space {
+        Some(task) => platform(options, compiled, task, &mut recorded, wave, ticks as u64),
+        None => legs(options, compiled, &mut recorded, wave, seconds),
+    };
+    let ended = match (recorded.ended().is_some(), ran) {
+        // It ended the run by itself, and says why.
+        (true, _) | (false, Ok(())) => recorded.finish(),
+        (false, Err(error)) => return Err(environment(error)),
+    };
+    ended.map_err(|ended| match ended {
+        RecordingEnd::Io(error) => unwritten(path, &error),
+        RecordingEnd::Controller(error) => environment(error),
+        RecordingEnd::Supervisor { tick, word } => {
+            Failure::Gate(format!("tick {tick}: instead of running the machine is {word}; nothing was written"))
+        }
+    })?;
+    let file = writer.finish().map_err(|error| unwritten(path, &error))?;
+    let file = file.into_inner().map_err(|error| unwritten(path, &error))?;
+    file.keep()?;
+    let bytes = std::fs::metadata(path).map(|found| found.len()).unwrap_or_default();
+    let ticks = recorder.tick();
+    ui.result(&Written { ticks, bytes, file: path.display().to_string(), seconds: ticks as f64 * period });
+    Ok(())
+}
+
+/// A wave of all axes, each at its frequency (Hz), within the limits of the spec; smaller where it would be too fast. `shares`:
+/// of the room, of the third axis and of the others. With the amplitude of the third axis, m.
+pub(super) fn wave(
+    compiled: &Compilation,
+    ticks: i32,
+    frequencies: [f64; 6],
+    shares: [f64; 2],
+) -> Result<(Wave<f64>, f64), Failure> {
+    let (ir, period) = (&compiled.ir, compiled.model.timing.period);
+    let mut settings = Settings::still();
+    let limits = match &ir.task_space {
+        Some(task) => {
+            let setpoints = &task.setpoints;
+            settings.center = setpoints.home;
+            let range = |sign: f64| std::array::from_fn(|axis| sign * ir.bounds.pose[axis] - setpoints.bias[axis]);
+            Limits {
+                low: range(-1.0),
+                high: range(1.0),
+                rate: setpoints.stream_rate,
+                acceleration: setpoints.stream_acceleration,
+                ticks_per_second: setpoints.rate,
+            }
+        }
+        None => {
+            // Where the gauge sees the leg and the stack moves it; the bounds of set-points are wider than both.
+            let high = compiled.model.actuator.stroke.min(ir.bounds.sensor[1]).min(ir.bounds.leg[1]);
+            let low = ir.bounds.sensor[0].max(ir.bounds.leg[0]);
+            // A leg follows no faster than its amplifier lets it; what accelerates it is not limited by the spec.
+            let rate = compiled.model.actuator.slew_rate * compiled.model.actuator.leg_gain();
+            Limits {
+                low: [low; 6],
+                high: [high; 6],
+                rate: [rate; 6],
+                acceleration: [1e6; 6],
+                ticks_per_second: 1.0 / period,
+            }
+        }
+    };
+    settings.ticks = ticks;
+    settings.ramp_ticks = if ticks < 20 { 1 } else { ticks / 10 };
+    let on_legs = ir.task_space.is_none();
+    let (mut share, mut third) = (1.0, 0.0);
+    for _ in 0..20 {
+        for axis in 0..6 {
+            let room = limits.high[axis] - settings.center[axis];
+            let below = settings.center[axis] - limits.low[axis];
+            let room = if on_legs || room < below { room } else { below };
+            let amplitude = share * shares[usize::from(axis != 2 && !on_legs)] * room;
+            if axis == 2 {
+                third = amplitude;
+            }
+            let tone = Tone { amplitude, phase: 0, step: step_of(frequencies[axis], period) };
+            let offset = if on_legs { 0.4 * room } else { 0.0 };
+            settings.axes[axis] = AxisWave { offset, shape: Shape::Sine { tone } };
+        }
+        let mut wave = Wave::new(limits);
+        if wave.set(&settings).is_ok() {
+            wave.start();
+            return Ok((wave, third));
+        }
+        share /= 2.0;
+    }
+    Err(Failure::Gate(
+        "no wave fits between the bias pose and the limits of the workspace and of streams; widen control.setpoint.stream_speed".to_owned(),
+    ))
+}
+
+fn platform(
+    options: &Options,
+    compiled: &Compilation,
+    task: &TaskSpace,
+    controller: &mut RecordedController<'_, '_>,
+    mut wave: Wave<f64>,
+    ticks: u64,
+) -> Result<(), RunError> {
+    let mut rig = options.plant.platform_of(&compiled.model, task, &LegParameters::reference()).1.rig().clone();
+    let mut bench = Bench::new(&mut rig, controller, compiled.model.timing.period, options.latency as usize)?;
+    bench.arm(ARMING)?;
+    for _ in 0..ticks {
+        let request = match wave.advance() {
+            Some(motion) => Request::stream(target_of(motion)),
+            None => Request::default(),
+        };
+        bench.tick(&request)?;
+    }
+    Ok(())
+}
+
+fn legs(
+    options: &Options,
+    compiled: &Compilation,
+    controller: &mut RecordedController<'_, '_>,
+    wave: Wave<f64>,
+    seconds: f64,
+) -> Result<(), RunError> {
+    let leg = machine::leg(&compiled.model, &LegParameters::reference());
+    let noise = if options.plant.no_noise { NoiseParameters::NONE } else { leg.noise };
+    let legs = std::array::from_fn(|_| leg.clone());
+    let scenario = machine::legs(&compiled.model, &legs, &noise, options.plant.seed, 1);
+    let law = controller.default_config().first().copied().unwrap_or_default();
+    select(controller, u32::try_from(law).unwrap_or_default())?;
+    let wave = WavePath { wave: RefCell::new(wave), seconds };
+    scenario
+        .rig()
+        .clone()
+        .follow(controller, &wave, compiled.model.timing.period, |_, _| std::ops::ControlFlow::Continue(()))
+        .map(|_| ())
+}
+
+/// A wave as a trajectory that is asked once a tick.
+pub(super) struct WavePath {
+    pub(super) wave: RefCell<Wave<f64>>,
+    pub(super) seconds: f64,
+}
+
+impl LegTrajectory for WavePath {
+    fn duration(&self) -> f64 {
+        self.seconds
+    }
+
+    fn displacements(&self, _time: f64) -> [f64; 6] {
+        self.wave.borrow_mut().advance().map_or([0.0; 6], |motion| motion.pose)
+    }
+}
+
+impl PoseTrajectory for WavePath {
+    fn duration(&self) -> f64 {
+        self.seconds
+    }
+
+    fn target(&self, _time: f64) -> PoseTarget {
+        self.wave.borrow_mut().advance().map_or_else(PoseTarget::default, target_of)
+    }
+}
+
+/// A motion as a set-point.
+fn target_of(motion: Motion<f64>) -> PoseTarget {
+    PoseTarget { pose: motion.pose, rate: motion.rate, acceleration: motion.acceleration }
+}

@@ -1,0 +1,125 @@
+//! `specgen tune --evaluate`: scores of candidates that someone else proposes.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use host_sim::controller::Controller;
+use serde::Serialize;
+
+use super::Job;
+use specgen_language::interrupt;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::read_text;
+use specgen_language::ui::Ui;
+use specgen_studies::machine::run_failure;
+use specgen_studies::tuning::search::{Verdict, evaluate};
+use specgen_studies::tuning::{self, Evaluation, Setting, Space};
+
+/// The candidates of a file; every name and number is looked at before any is run.
+pub(super) fn read(file: &Path, space: &Space) -> Result<Vec<Setting>, Failure> {
+    let shown = file.display();
+    let text = read_text(file)?;
+    let asked: Vec<BTreeMap<String, f64>> = serde_json::from_str(&text).map_err(|error| {
+        Failure::Gate(format!("`{shown}`: expected an array of objects such as [{{\"level\": 0.2}}]: {error}"))
+    })?;
+    let one = |(index, values)| {
+        space.named(values).map_err(|why| Failure::Gate(format!("`{shown}`: candidate {index}, from 0: {why}")))
+    };
+    asked.iter().enumerate().map(one).collect()
+}
+
+/// A number that candidates may have.
+#[derive(Serialize)]
+struct Parameter {
+    name: String,
+    bounds: [f64; 2],
+    /// As in the spec.
+    spec: f64,
+}
+
+/// A candidate as it was run: rounded to the digits that a spec would have.
+#[derive(Serialize)]
+struct Candidate {
+    values: BTreeMap<String, f64>,
+    /// What a search makes least, µm s²; none for what is rejected.
+    cost: Option<f64>,
+    verdict: Verdict,
+}
+
+#[derive(Serialize)]
+struct Evaluated<'a> {
+    name: &'a str,
+    digest: &'a str,
+    seed: u64,
+    tuned_on: tuning::Conditions,
+    parameters: Vec<Parameter>,
+    /// In the order of the file.
+    candidates: Vec<Candidate>,
+}
+
+pub(super) fn run(job: &Job, asked: &[Setting], ui: &Ui) -> Result<(), Failure> {
+    let own = Setting::of(&job.compiled);
+    let value = |setting: &Setting| -> BTreeMap<String, f64> {
+        let parameters = job.space.parameters.iter();
+        parameters.map(|one| (one.role.to_string(), job.space.value(setting, one.role))).collect()
+    };
+    let mut candidates = Vec::new();
+    if !asked.is_empty() {
+        ui.progress("preparing the machine: pre-cycle, settling, arming");
+        let case = job.case(&own, &job.tuned_on())?;
+        let mut workers: Vec<Controller> = (0..job.threads.clamp(1, asked.len())).map(|_| case.worker()).collect();
+        let settings: Vec<&Setting> = asked.iter().collect();
+        let verdicts = evaluate(&settings, &job.feasibility, &case, &mut workers, interrupt::heed());
+        for (setting, verdict) in asked.iter().zip(verdicts) {
+            // A list that lacks some is not what was asked for.
+            let Some(verdict) = verdict else { return Err(Failure::interrupted()) };
+            let verdict = verdict.map_err(run_failure)?;
+            let cost = match verdict {
+                Verdict::Run(Evaluation::Scored(score)) => Some(score.cost),
+                _ => None,
+            };
+            candidates.push(Candidate { values: value(setting), cost, verdict });
+        }
+    }
+    let parameters = job.space.parameters.iter().map(|one| Parameter {
+        name: one.role.to_string(),
+        bounds: one.bounds,
+        spec: job.space.value(&own, one.role),
+    });
+    ui.result(&Evaluated {
+        name: &job.compiled.ir.name,
+        digest: &job.compiled.ir.digest,
+        seed: job.options.plant.seed,
+        tuned_on: job.tuned_on(),
+        parameters: parameters.collect(),
+        candidates,
+    });
+    Ok(())
+}
+
+impl Outcome for Evaluated<'_> {
+    fn text(&self) -> String {
+        let mut text = String::new();
+        // Writing to a String cannot fail, here and below.
+        for Parameter { name, bounds: [low, high], spec } in &self.parameters {
+            let _ = writeln!(text, "{name:<8} {low:.3e} to {high:.3e}, {spec:.3e} in the spec");
+        }
+        for (index, Candidate { verdict, .. }) in self.candidates.iter().enumerate() {
+            let said = match verdict {
+                Verdict::Unstable => "unstable, or without the margins".to_owned(),
+                Verdict::Run(Evaluation::Limited { time, .. }) => format!("at a limit after {time:.4} s"),
+                Verdict::Run(Evaluation::Scored(score)) => format!(
+                    "cost {:.5} µm s², {:.2} nm rms, {:.2} nrad rms, effort {:.2} nm over {}",
+                    score.cost,
+                    score.translation_nm,
+                    score.orientation_nrad,
+                    score.effort_nm,
+                    score.coverage.brief()
+                ),
+            };
+            let _ = writeln!(text, "candidate {index}: {said}");
+        }
+        text
+    }
+}

@@ -1,0 +1,102 @@
+//! Everything that is known of a compiled spec, a line each: below the verdict of `check` and of the main job, and on the page.
+
+use std::fmt::Write as _;
+
+use specgen_compiler::compile::Compilation;
+use specgen_compiler::lower::{self, setpoint};
+use specgen_compiler::{reach, stability};
+use specgen_identify::Report;
+
+use crate::lead::{self, LeadOf};
+
+/// What identification and the stability check found, a line each.
+pub fn of(compiled: &Compilation) -> String {
+    let mut text = String::new();
+    let assumed = compiled.assumptions.list();
+    if !assumed.is_empty() {
+        // Writing to a String cannot fail, here and below.
+        let _ = writeln!(text, "  nobody measured {}:", compiled.assumptions.summary());
+        assumed.iter().for_each(|one| text.push_str(&format!("    {one}\n")));
+    }
+    for (name, report) in compiled.model.hysteresis.records.iter().zip(&compiled.records) {
+        let what = report.as_ref().map_or_else(|| "a table, taken as it is".to_owned(), Report::summary);
+        let _ = writeln!(text, "  record {name}: {what}");
+    }
+    if let Some(margins) = &compiled.margins
+        && let (Some(limit), Some(largest)) = (margins.static_gain_limit, margins.largest_level_weight)
+    {
+        let _ = writeln!(
+            text,
+            "  adaptation: λ < {limit:.3} without leg dynamics; sampled leg has spectral radius {:.4}; \
+             stable up to level weight {largest:.4} (here {})",
+            margins.spectral_radius, compiled.model.adaptation.level_weight
+        );
+    }
+    if let Some(design) = &compiled.design {
+        text.push_str(&stability::platform::describe(design));
+    }
+    for one in lead::of(compiled) {
+        let LeadOf { name, lead, best, errors: [error, least] } = &one;
+        let _ = write!(
+            text,
+            "  trajectory {name}: lead {:.4} ms leaves {:.1} nm rms by the model",
+            lead * 1e3,
+            error * 1e9
+        );
+        let _ = if one.is_proposed() {
+            writeln!(
+                text,
+                ";\n    its corners ask for less: lead = \"{:.3} ms\" in its [[trajectory]] leaves {:.1} nm",
+                best * 1e3,
+                least * 1e9
+            )
+        } else {
+            writeln!(text, ", the best {:.1} nm", least * 1e9)
+        };
+    }
+    if let Some(reach) = &compiled.reach {
+        text.push_str(&reach::describe(reach, compiled.design.is_some()));
+    }
+    text.push_str(&lower::describe_wiring(&compiled.model, &compiled.ir.supervision));
+    for demand in &compiled.demands {
+        let current = demand.current.map_or_else(String::new, |amperes| format!(", {:.3} A", amperes));
+        let _ = writeln!(
+            text,
+            "  trajectory {}: legs at up to {:.1} um/s, which takes {:.3} of {:.3} V/ms{current}; inertia bends them by {:.2} nm",
+            demand.name,
+            demand.leg_speed * 1e6,
+            demand.slew * 1e-3,
+            compiled.model.actuator.slew_rate * 1e-3,
+            demand.deflection * 1e9
+        );
+    }
+    if let Some(task) = &compiled.ir.task_space {
+        text.push_str(&lower::describe_load(&task.load));
+    }
+    if !compiled.stops.is_empty() {
+        text.push_str(&setpoint::describe_stops(&compiled.stops));
+    }
+    let list = |values: &[f64]| values.iter().map(|v| format!("{:.1}", v * 1e9)).collect::<Vec<_>>().join("/");
+    let rest = &compiled.rest_noise;
+    let parts = [&rest.pose, &rest.gauges, &rest.amplifiers].map(|part| [list(&part[..3]), list(&part[3..])]);
+    let [[pose, turned], [by_gauges, turned_by_gauges], [by_amplifiers, turned_by_amplifiers]] = parts;
+    let _ = writeln!(
+        text,
+        "  pose at rest: {pose} nm and {turned} nrad rms as the gauges show it; {by_gauges} nm and {turned_by_gauges} nrad by the gauges, \
+         {by_amplifiers} nm and {turned_by_amplifiers} nrad by the amplifiers"
+    );
+    if let (Some(noise), Some(task)) = (&compiled.pose_noise, &compiled.ir.task_space) {
+        let _ = writeln!(
+            text,
+            "  gauges: {:.2} nm rms each with quantisation; pose {} nm and {} nrad rms; legs {} nm rms; found in {} passes to {:.1e} m, {:.1e} rad",
+            noise.reading * 1e9,
+            list(&noise.pose[..3]),
+            list(&noise.pose[3..]),
+            list(&noise.leg),
+            task.sensing.passes,
+            task.sensing.remainder[0],
+            task.sensing.remainder[1]
+        );
+    }
+    text
+}

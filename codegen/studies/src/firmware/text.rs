@@ -1,0 +1,166 @@
+//! What was built, in words.
+
+use std::fmt::Write as _;
+
+use super::{Made, time};
+use specgen_language::outcome::Outcome;
+use specgen_language::table::{left, right, row};
+use specgen_toolchain::budget::{ImageUsage, group};
+use specgen_toolchain::checks::TickChecks;
+use specgen_toolchain::size::Size;
+
+/// As many owners and variables as are listed.
+const LISTED: usize = 12;
+
+impl Outcome for Made {
+    fn text(&self) -> String {
+        let mut out = format!(
+            "{} → {} for {} (f{}, digest {})\n",
+            self.name,
+            self.artifact,
+            self.board,
+            self.bits,
+            &self.digest[..16]
+        );
+        // Writing to a String cannot fail, here and below.
+        if let Some(compiler) = &self.compiler {
+            let _ = writeln!(out, "  compiler      {compiler}");
+        }
+        if let Some(used) = &self.used {
+            self.usage(used, &mut out);
+        }
+        if let Some(stack) = &self.stack {
+            let [startup, running, reserved] = [stack.startup, stack.running, stack.reserved].map(group);
+            let _ = writeln!(
+                out,
+                "  stack in all  {startup} bytes of {reserved} to start, {running} with tick and interrupts on each other"
+            );
+        }
+        if let Some(estimate) = self.measurement.as_ref().and_then(|m| m.time.as_ref()) {
+            out.push_str(&time::text(estimate));
+        }
+        if let Some(size) = &self.size {
+            out.push_str(&owners(size));
+        }
+        if let Some(checks) = &self.checks {
+            out.push_str(&checked(checks));
+        }
+        if let Some(m) = self.measurement.as_ref().filter(|m| m.first_difference.is_none()) {
+            let _ = writeln!(out, "  host and {} agree in every bit over {} ticks", m.machine, group(m.ticks));
+        }
+        for note in &self.notes {
+            let _ = writeln!(out, "  note: {note}");
+        }
+        out
+    }
+}
+
+impl Made {
+    /// Memory and instructions against their budgets.
+    fn usage(&self, used: &ImageUsage, out: &mut String) {
+        let of = |budget: Option<u64>| budget.map_or(String::new(), |budget| format!(" of {}", group(budget)));
+        let limits = &self.limits.budget;
+        let _ = writeln!(out, "  flash         {}{} bytes", group(used.flash), of(limits.flash));
+        let ram = match used.ram {
+            Some(ram) => format!("{}{} bytes, the stack of a tick included", group(ram), of(limits.ram)),
+            None if used.stack.is_none() => "not known: the stack of a tick has no bound".to_owned(),
+            None => "not measured: State and settings are known only in a run".to_owned(),
+        };
+        let _ = writeln!(out, "  RAM           {ram}");
+        let bound = used
+            .stack
+            .map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes at most", group(bytes), of(limits.stack)));
+        let _ = writeln!(out, "  stack a tick  {bound} (static)");
+        if let Some(instructions) = used.instructions {
+            let counted = self.measurement.as_ref().map_or(String::new(), |m| {
+                format!(
+                    "; counted on {}, the same core and code: flash wait states and caches are not in it",
+                    m.machine
+                )
+            });
+            let of = of(limits.instructions);
+            let _ = writeln!(out, "  instructions  {}{of} a tick, mean{counted}", group(instructions));
+        }
+    }
+}
+
+/// CodeOwner takes the flash.
+pub fn owners(size: &Size) -> String {
+    let columns = [left(26).behind("  "), right(10).behind(" "), right(10).behind(" "), right(10).behind(" ")];
+    let mut out = String::new();
+    row(&mut out, &columns, &[&"flash by owner, bytes", &"code", &"constants", &"all"]);
+    let (shown, rest) = size.owners.split_at(LISTED.min(size.owners.len()));
+    let mut line = |name: &str, code: u64, constants: u64| {
+        row(
+            &mut out,
+            &columns,
+            &[&format_args!("  {name}"), &group(code), &group(constants), &group(code + constants)],
+        );
+    };
+    for owner in shown {
+        line(&owner.name, owner.code, owner.constants);
+    }
+    if !rest.is_empty() {
+        let sum = |of: fn(&specgen_toolchain::size::Owner) -> u64| rest.iter().map(of).sum();
+        line(&format!("{} more", rest.len()), sum(|owner| owner.code), sum(|owner| owner.constants));
+    }
+    out
+}
+
+pub fn sections(size: &Size) -> String {
+    let mut out = String::new();
+    if let Some(identity) = &size.identity {
+        let target = size.target.map_or(String::new(), |target| format!(", for {target}"));
+        let _ = writeln!(out, "  made by {identity}{target}");
+    }
+    if !size.assumed.is_empty() {
+        let _ = writeln!(out, "  assumed: {}", size.assumed.join(", "));
+    }
+    let recorder = match size.recorder() {
+        0 => String::new(),
+        bytes => format!(", and {} bytes for the recorder", group(bytes)),
+    };
+    let _ = writeln!(out, "  flash {} bytes, RAM {} bytes static{recorder}", group(size.flash()), group(size.ram()));
+    for section in &size.sections {
+        let place = match (section.flash, section.ram) {
+            (true, true) => "flash and RAM",
+            (true, false) => "flash",
+            _ => "RAM",
+        };
+        let _ = writeln!(
+            out,
+            "    {:<22} {:#010x} {:>10} bytes {place}",
+            section.name,
+            section.address,
+            group(section.bytes)
+        );
+    }
+    for (name, bytes) in size.variables.iter().take(LISTED) {
+        let _ = writeln!(out, "    variable {name}: {} bytes", group(*bytes));
+    }
+    out
+}
+
+/// What was looked for in the tick.
+pub fn checked(checks: &TickChecks) -> String {
+    let mut out = String::new();
+    let _ = writeln!(
+        out,
+        "  {} reaches {} functions, {} bytes of code; {}",
+        checks.tick,
+        checks.functions,
+        group(checks.code),
+        if checks.faults.is_empty() {
+            "no panic, no allocation, no call through a register, no f64 in software where the core has none".to_owned()
+        } else {
+            format!("{} faults", checks.faults.len())
+        }
+    );
+    let path: Vec<String> = checks.path.iter().map(|(name, frame)| format!("{name} {frame}")).collect();
+    let bound = checks.stack.map_or("not bounded".to_owned(), |bytes| format!("{} bytes at most", group(bytes)));
+    let _ = writeln!(out, "  stack: {bound}: {}", path.join(" → "));
+    for fault in &checks.faults {
+        let _ = writeln!(out, "  FAULT {}", fault.text);
+    }
+    out
+}

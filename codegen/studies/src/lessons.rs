@@ -1,0 +1,438 @@
+//! A motion that repeats, learned between passes: what is asked for, the correction that is kept, and what came of it.
+
+mod excite;
+
+use std::fmt::Write as _;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+use host_sim::closed_loop::RunError;
+use host_sim::platform::rig::Bench;
+use host_sim::word::status_words;
+use serde::Serialize;
+use serde_json::Value;
+
+use specgen_compiler::compile::Compilation;
+use specgen_language::interrupt;
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::{check_input, check_place, write_file};
+use specgen_language::table::{left, right, row};
+use specgen_language::ui::Ui;
+use specgen_runtime::playback::Knot;
+
+use crate::controllers::at_run_time;
+use crate::factors::{Factors, UserRange};
+use crate::learning::{
+    Convergence, Ending, LearnError, Learnable, Learner, LearningResult, Motion, NOWHERE, Pass, Plan,
+    RepeatableMachine, Response, Table, Update, course, knots, learn, takes_correction,
+};
+use crate::machine::{PlantOptions, run_failure};
+use crate::trajectory::{self, Followed};
+
+/// Why nothing is learned with a measured response.
+const UNKNOWN: &str =
+    "too little is known of the measured response for learning; measure it along a longer motion by --excite";
+/// How long the machine may take to its bias pose, s.
+const ARMING: f64 = 60.0;
+
+/// What is learned, and how.
+#[derive(Debug)]
+pub struct Options {
+    /// Name of the motion.
+    pub trajectory: Option<String>,
+    /// Hz.
+    pub frequency: Option<f64>,
+    /// Passes that are learned from.
+    pub passes: u32,
+    /// Highest frequency, Hz.
+    pub bandwidth: f64,
+    /// Ranges in place of those of the spec.
+    pub vary: Vec<UserRange>,
+    /// Begin with what the model says.
+    pub prepare: bool,
+    /// Begin with this correction.
+    pub from: Option<PathBuf>,
+    /// File of a measured response: nothing is learned.
+    pub excite: Option<PathBuf>,
+    /// A response that was measured.
+    pub response: Option<PathBuf>,
+    /// Knots of the device, if it makes the corrections.
+    pub on_device: Option<u32>,
+    /// File of the correction.
+    pub output: Option<PathBuf>,
+    /// What a machine at the end of a link is called.
+    pub machine: Option<String>,
+    /// The simulated machine.
+    pub plant: PlantOptions,
+}
+
+impl Options {
+    /// Refuses files that cannot be read or written, before the minutes of the rest.
+    ///
+    /// # Errors
+    /// There is such a file.
+    pub fn check(&self) -> Result<(), Failure> {
+        self.plant.leg()?;
+        [&self.from, &self.response].into_iter().flatten().try_for_each(|path| check_input(path))?;
+        [&self.output, &self.excite].into_iter().flatten().try_for_each(|path| check_place(path))
+    }
+}
+
+/// CodeOwner makes the corrections, and by what.
+enum Rule {
+    Host(Box<Update>),
+    Device(Plan),
+}
+
+/// What is learned, and how.
+struct Study {
+    compiled: Compilation,
+    convergence: Convergence,
+    motion: Motion,
+    rule: Rule,
+    motion_name: String,
+    machine_name: String,
+    begin: Vec<Knot>,
+    spacing: u32,
+}
+
+/// Learns on the simulated machine of a spec, and shows what came of it.
+///
+/// # Errors
+/// The spec or an option is refused, a run fails, or a file cannot be written.
+pub fn simulated(options: &Options, compiled: Compilation, ui: &mut Ui) -> Result<(), Failure> {
+    run(options, compiled, &mut Simulated(&options.plant), ui)
+}
+
+/// The same on a machine.
+///
+/// # Errors
+/// As [`simulated`], or the machine ends before it is asked to.
+pub fn run(options: &Options, compiled: Compilation, bed: &mut impl Bed, ui: &mut Ui) -> Result<(), Failure> {
+    if let Some(path) = &options.excite {
+        return excite::run(options, path, &compiled, bed, ui);
+    }
+    let study = study(options, bed, compiled)?;
+    let start = bed.start().unwrap_or(study.motion.targets[0].pose);
+    let Done { found, why, down } = bed.work(
+        &study.compiled,
+        ui,
+        |machine, ui| passes(options, &study, machine, ui),
+        |learned, ui| keep(options, &study, learned, start, ui),
+    )?;
+    match (found, why) {
+        (Some(found), Some(why)) => ui.judged(&found, Some(why)),
+        (None, Some(why)) => Err(Failure::Gate(why)),
+        (Some(found), None) if !matches!(found.learned.ending, Ending::Interruption | Ending::Machine) => {
+            ui.result(&found);
+            Ok(())
+        }
+        (Some(found), None) => {
+            let message = format!("interrupted: what was learned so far is kept{down}");
+            Err(Failure::Interrupted { message, result: ui.shown(&found) })
+        }
+        (None, None) => Err(Failure::Gate(format!("interrupted before the first pass was over{down}"))),
+    }
+}
+
+/// What came of work on a machine.
+pub struct Done<F> {
+    /// What was found, if the machine made its passes.
+    pub found: Option<F>,
+    /// Why it ended before it was asked to.
+    pub why: Option<String>,
+    /// How a machine at the end of a link was left, behind "; ".
+    pub down: String,
+}
+
+/// What makes the passes: a simulated machine, or one at the end of a link.
+pub trait Bed {
+    /// What it calls a motion.
+    fn motion_name(&self, followed: &Followed) -> String;
+
+    /// Where it begins a motion that it has, in the user's coordinates, m and rad.
+    fn start(&self) -> Option<[f64; 6]>;
+
+    /// Does work on the machine, and keeps what it gives, however the machine ends.
+    ///
+    /// # Errors
+    /// The machine cannot be reached, or the work fails.
+    fn work<T, F>(
+        &mut self,
+        compiled: &Compilation,
+        ui: &mut Ui,
+        work: impl FnOnce(&mut dyn RepeatableMachine, &Ui) -> Result<T, LearnError>,
+        keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
+    ) -> Result<Done<F>, Failure>;
+}
+
+/// The simulated machine of the spec.
+struct Simulated<'a>(&'a PlantOptions);
+
+impl Bed for Simulated<'_> {
+    fn motion_name(&self, followed: &Followed) -> String {
+        format!("{} at {} Hz", followed.name, followed.frequency)
+    }
+
+    fn start(&self) -> Option<[f64; 6]> {
+        None
+    }
+
+    fn work<T, F>(
+        &mut self,
+        compiled: &Compilation,
+        ui: &mut Ui,
+        work: impl FnOnce(&mut dyn RepeatableMachine, &Ui) -> Result<T, LearnError>,
+        keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
+    ) -> Result<Done<F>, Failure> {
+        let (model, task) = (&compiled.model, takes_correction(compiled)?);
+        let mut controller = at_run_time(compiled, ui)?;
+        let mut rig = self.0.platform(model, task)?.1.rig().clone();
+        let mut bench = Bench::new(&mut rig, &mut controller, model.timing.period, 0).map_err(run_failure)?;
+        bench.arm(ARMING).map_err(gate)?;
+        let found = match work(&mut bench, ui) {
+            Ok(done) => Some(keep(done, ui)?),
+            Err(LearnError::Ended) => None,
+            Err(error) => return Err(gate(error)),
+        };
+        Ok(Done { found, why: None, down: String::new() })
+    }
+}
+
+/// The motion, and what it is called.
+fn motion_of(options: &Options, bed: &impl Bed, compiled: &Compilation) -> Result<(Motion, String), Failure> {
+    let model = &compiled.model;
+    let task = takes_correction(compiled)?;
+    let followed = trajectory::chosen(options.trajectory.as_deref(), options.frequency, options.plant.seed, compiled)?;
+    let name = bed.motion_name(&followed);
+    let trajectory = followed.choice.of_platform(model, task);
+    let speed = task.setpoint.speed;
+    let motion =
+        Motion::of(trajectory.as_ref(), model.timing.period, &speed, model.geometry.joint_radius()).map_err(gate)?;
+    Ok((motion, name))
+}
+
+/// What the machine is called.
+fn machine_name(options: &Options) -> String {
+    let PlantOptions { plant, seed, .. } = &options.plant;
+    let shape = plant.as_ref().map_or_else(|| "plays".to_owned(), |path| path.display().to_string());
+    options.machine.clone().unwrap_or_else(|| format!("simulated, {shape}, seed {seed}"))
+}
+
+fn learnable_of(compiled: &Compilation) -> Result<Learnable, Failure> {
+    Learnable::of(compiled)
+        .ok_or_else(|| Failure::Environment("the platform has no modes, which the spec was checked for".to_owned()))
+}
+
+fn study(options: &Options, bed: &impl Bed, compiled: Compilation) -> Result<Study, Failure> {
+    let (motion, motion_name) = motion_of(options, bed, &compiled)?;
+    let machine_name = machine_name(options);
+    let mut learnable = learnable_of(&compiled)?;
+    let mut refused = format!("{NOWHERE}, or measure the response of the machine by --excite");
+    if let Some(path) = &options.response {
+        let named = |error| Failure::Gate(format!("{}: {error}", path.display()));
+        let response = Response::of_file(path).map_err(named)?;
+        response.is_for(&compiled.ir.digest, &machine_name).map_err(named)?;
+        learnable = learnable.with(response);
+        refused = UNKNOWN.to_owned();
+    }
+    let factors = Factors::of(&compiled.model, &options.vary);
+    let convergence = learnable.convergence(&factors, options.bandwidth).ok_or(Failure::Gate(refused))?;
+    let plan = options.on_device.map(|room| {
+        Plan::new(&learnable, &motion, &convergence, &factors, room as usize).ok_or_else(|| {
+            Failure::Gate(format!(
+                "no plan of this motion fits into {room} knots and converges on every machine within the declared intervals; learn without \
+                 --on-device, or a shorter motion"
+            ))
+        })
+    });
+    let plan = plan.transpose()?;
+    let convergence = plan.as_ref().map_or(convergence, |plan| plan.convergence.clone());
+    let (begin, spacing) = begin(options, &compiled, &learnable, &motion, &convergence, [&machine_name, &motion_name])?;
+    let rule = plan
+        .map_or_else(|| Rule::Host(Box::new(Update::new(&learnable, &motion, &convergence, spacing))), Rule::Device);
+    Ok(Study { compiled, convergence, motion, rule, motion_name, machine_name, begin, spacing })
+}
+
+/// Makes the passes; the reader sees each, and may end them.
+fn passes(
+    options: &Options,
+    study: &Study,
+    machine: &mut dyn RepeatableMachine,
+    ui: &Ui,
+) -> Result<LearningResult, LearnError> {
+    let Study { motion, rule, begin, spacing, .. } = study;
+    let learner = match rule {
+        Rule::Host(update) => Learner::Host(update),
+        Rule::Device(plan) => Learner::Device(plan),
+    };
+    let stop = interrupt::heed();
+    let count = options.passes as usize;
+    let learned = learn(machine, motion, learner, begin, *spacing, count, |number, pass| {
+        ui.rate(&format!("learn: pass {number} of {count}, {:.1} nm", pass.translation_nm));
+        if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    ui.rate_done();
+    learned
+}
+
+/// Writes the table of the best pass, if a file is named.
+fn keep(options: &Options, study: &Study, learned: LearningResult, start: [f64; 6], ui: &Ui) -> Result<Found, Failure> {
+    let Study { compiled, convergence, motion, motion_name, machine_name, spacing, .. } = study;
+    if let Some(path) = &options.output {
+        let names = [compiled.ir.digest.as_str(), machine_name, motion_name];
+        let mut knots = learned.knots.clone();
+        // Nothing learned, from nothing: a correction of zeros, which plays as none.
+        knots.resize(course(motion, *spacing, 0).knots() as usize, [0; 6]);
+        let zeros = if knots.iter().all(|knot| *knot == [0; 6]) { ", all of them zero," } else { "" };
+        let table = Table::new(names, [*spacing, motion.scored.start as u32], start, knots);
+        write_file(path, table.to_json().as_bytes())?;
+        ui.progress(&format!("wrote {} knots{zeros} to {}", table.knots.len(), path.display()));
+    }
+    Ok(Found {
+        name: compiled.ir.name.clone(),
+        motion: motion_name.clone(),
+        machine: machine_name.clone(),
+        convergence: convergence.clone(),
+        learned,
+        help: help(options, study),
+    })
+}
+
+/// What lets a machine learn up to the bandwidth that was asked for, where not every one within the intervals would converge.
+fn help(options: &Options, study: &Study) -> Option<String> {
+    let Study { compiled, convergence, .. } = study;
+    let [_, highest] = convergence.band;
+    let damped = compiled.model.task_space.as_ref().is_some_and(|task| task.active_damping);
+    let mend = match (damped, convergence.measured) {
+        // Its room for knots may be what ends it, and it takes no measured response.
+        _ if options.on_device.is_some() => return None,
+        (false, _) => "damp the modes: `control.active_damping = true`",
+        (true, false) => "measure the response: --excite, then --response",
+        (true, true) => return None,
+    };
+    (highest < options.bandwidth).then(|| format!("to learn beyond {highest:.0} Hz, {mend}"))
+}
+
+fn gate(error: impl Into<LearnError>) -> Failure {
+    let error = error.into();
+    failure(&error, error.to_string())
+}
+
+/// A motion that was not made to its end has no figure.
+pub fn failure(error: &LearnError, message: String) -> Failure {
+    match error {
+        LearnError::Run(RunError::EndedEarly { .. }) | LearnError::Status(_) => {
+            Failure::EndedEarly { message, result: Value::Null }
+        }
+        _ => Failure::Gate(message),
+    }
+}
+
+/// The correction of the first pass, and the ticks from knot to knot.
+fn begin(
+    options: &Options,
+    compiled: &Compilation,
+    learnable: &Learnable,
+    motion: &Motion,
+    convergence: &Convergence,
+    [machine, motion_name]: [&str; 2],
+) -> Result<(Vec<Knot>, u32), Failure> {
+    let period = compiled.model.timing.period;
+    let spacing = convergence.spacing(period);
+    if options.prepare {
+        return Ok((knots(&Update::prepared(learnable, motion, convergence.band[1]), spacing), spacing));
+    }
+    let Some(path) = &options.from else { return Ok((Vec::new(), spacing)) };
+    let table = Table::of_file(path).map_err(|error| Failure::Gate(format!("{}: {error}", path.display())))?;
+    table
+        .is_for(&compiled.ir.digest, machine, motion_name)
+        .map_err(|error| Failure::Gate(format!("{}: {error}", path.display())))?;
+    Ok((table.knots, table.spacing))
+}
+
+/// Why learning ended, and whose correction is kept.
+fn kept(learned: &LearningResult) -> Vec<String> {
+    // Without passes to learn from there is nothing to say.
+    let Some(noise) = learned.noise_nm else { return Vec::new() };
+    let last = learned.passes.len() - 1;
+    let why = match learned.ending {
+        Ending::NoGain => Some(format!("pass {last} gained nothing: learning ended")),
+        Ending::Growth => Some(format!("the error grew in pass {last}: learning ended")),
+        Ending::AllPasses | Ending::Interruption | Ending::Machine => None,
+    };
+    let which = match learned.best {
+        0 => "kept: the correction of pass 0, which learning began with".to_owned(),
+        best => format!("kept: the correction of pass {best}"),
+    };
+    let noise =
+        format!("passes under one correction differ by {noise:.2} nm by the gauges, and a gain is more than that");
+    why.into_iter().chain([which, noise]).collect()
+}
+
+/// What came of it.
+#[derive(Serialize)]
+struct Found {
+    name: String,
+    motion: String,
+    machine: String,
+    convergence: Convergence,
+    #[serde(flatten)]
+    learned: LearningResult,
+    /// What lets it learn to higher frequencies, where it was asked to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    help: Option<String>,
+}
+
+impl Outcome for Found {
+    fn text(&self) -> String {
+        let Self { name, motion, machine, convergence, learned, help } = self;
+        let [low, high] = convergence.band;
+        let (first, best) = (&learned.passes[0], &learned.passes[learned.best]);
+        let gained = match learned.best {
+            0 => format!("{:.1} nm rms", first.translation_nm),
+            1 => format!("{:.1} -> {:.1} nm rms in 1 pass", first.translation_nm, best.translation_nm),
+            many => format!("{:.1} -> {:.1} nm rms in {many} passes", first.translation_nm, best.translation_nm),
+        };
+        let mut text = format!("{name}: {motion}, {gained} ({machine})\n");
+        text.push_str(&format!("  each pass measured over {}\n", best.coverage));
+        // Writing to a String cannot fail, here and below.
+        let _ = writeln!(
+            text,
+            "  learned {low:.1} to {high:.0} Hz; error times {:.2} a pass or less {}, worst at {:.0} Hz",
+            convergence.radius,
+            if convergence.measured {
+                "by the response\n  as it was measured"
+            } else {
+                "on every machine within\n  the intervals"
+            },
+            convergence.at
+        );
+        let columns = [right(6), right(10), right(10), right(12), left(0).behind("  ")];
+        row(&mut text, &columns, &[&"pass", &"nm rms", &"nrad rms", &"gauges, nm", &""]);
+        for (number, pass) in learned.passes.iter().enumerate() {
+            let Pass { translation_nm, orientation_nrad, measured_nm, status, .. } = pass;
+            let said = [if number == learned.best { "kept" } else { "" }.to_owned(), status_words(*status)];
+            let said: Vec<String> = said.into_iter().filter(|text| !text.is_empty()).collect();
+            row(
+                &mut text,
+                &columns,
+                &[
+                    &number,
+                    &format_args!("{translation_nm:.1}"),
+                    &format_args!("{orientation_nrad:.0}"),
+                    &format_args!("{measured_nm:.1}"),
+                    &said.join(", "),
+                ],
+            );
+        }
+        for line in kept(learned) {
+            let _ = writeln!(text, "  {line}");
+        }
+        if let Some(help) = help {
+            let _ = writeln!(text, "help: {help}");
+        }
+        text.lines().map(|line| format!("{}\n", line.trim_end())).collect()
+    }
+}

@@ -1,0 +1,105 @@
+//! Runs of a spec's own controller: which laws and trajectories it has, and the errors of a trajectory on board.
+
+use std::fmt::Write as _;
+
+use host_sim::coverage::Coverage;
+use host_sim::platform::table::{AXES, PoseErrors};
+use host_sim::scenario::MODES;
+use serde::Serialize;
+
+use specgen_compiler::compile::Compilation;
+use specgen_compiler::stability;
+use specgen_language::model::{Adaptation, TaskSpace};
+use specgen_language::outcome::Failure;
+use specgen_language::spec::nearest;
+
+/// Bits of the status that say that a leg was limited.
+pub const LEG_LIMITED: u32 = 0x3f;
+
+/// Refuses `samples` ticks a period at `hertz` if a law of the spec is unstable at that interval: the check of the spec is for
+/// its own period.
+///
+/// # Errors
+/// A law is unstable.
+pub fn judge(compiled: &Compilation, hertz: f64, samples: u32) -> Result<(), Failure> {
+    let period = compiled.model.timing.period;
+    let mut model = compiled.model.clone();
+    model.timing.period = 1.0 / hertz / f64::from(samples);
+    let Err(findings) = stability::check(&model) else { return Ok(()) };
+    let why = findings.first().map_or("", |finding| finding.message.as_str());
+    Err(Failure::Gate(format!(
+        "--samples {samples} at {hertz} Hz is an interval of {:.1} µs, not the {:.1} µs of timing.period: there {why}. Take \
+         --samples {:.0}, which is timing.period",
+        model.timing.period * 1e6,
+        period * 1e6,
+        1.0 / hertz / period
+    )))
+}
+
+/// The laws that the spec gives weights for: with a weight of zero a law adapts nothing, and its row would say nothing.
+pub fn modes(adaptation: &Adaptation) -> Vec<(&'static str, u32)> {
+    let given = |mode: &str| match mode {
+        "ewma" => adaptation.level_weight > 0.0,
+        "pcc" => adaptation.level_weight > 0.0 && adaptation.drift_weight > 0.0,
+        _ => true,
+    };
+    MODES.into_iter().filter(|(mode, _)| given(mode)).collect()
+}
+
+/// Number of a trajectory of the spec.
+///
+/// # Errors
+/// There is none of that name.
+pub fn selector(task: &TaskSpace, name: &str) -> Result<u32, Failure> {
+    let names: Vec<&str> = task.trajectories.iter().map(|trajectory| trajectory.name.as_str()).collect();
+    let place = names.iter().position(|known| *known == name);
+    place.and_then(|place| u32::try_from(place).ok()).ok_or_else(|| {
+        let meant =
+            nearest(name, names.iter().copied()).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
+        Failure::Usage(if names.is_empty() {
+            format!("the spec has no trajectory, so no `{name}`: add a [[trajectory]], or leave --trajectory out")
+        } else {
+            format!("the spec has {}, but not `{name}`{meant}", names.join(", "))
+        })
+    })
+}
+
+/// A trajectory on board: the true pose against the controller's target, axis by axis.
+#[derive(Debug, Serialize)]
+pub struct Played {
+    trajectory: String,
+    #[serde(flatten)]
+    coverage: Coverage,
+    /// Root mean square error of x, y, z (nm) and of the angles (nrad).
+    rms_nano: [f64; 6],
+    peak_nano: [f64; 6],
+    /// Norm of the root mean squares of x, y and z, nm.
+    translation_nm: f64,
+}
+
+impl Played {
+    /// Errors of a run.
+    pub fn of(trajectory: &str, errors: &PoseErrors) -> Self {
+        Self {
+            trajectory: trajectory.to_owned(),
+            coverage: errors.coverage(),
+            rms_nano: errors.rms_nano(),
+            peak_nano: errors.peak_nano(),
+            translation_nm: errors.rms_translation_nm(),
+        }
+    }
+
+    /// Whole lines.
+    pub fn text(&self) -> String {
+        let Self { trajectory, coverage, rms_nano, peak_nano, translation_nm } = self;
+        let mut out = format!("{trajectory}, on board, {coverage}: true pose against the controller's target\n");
+        for (axis, name) in AXES.iter().enumerate() {
+            let unit = if axis < 3 { "nm" } else { "nrad" };
+            // Writing to a String cannot fail, here and below.
+            let _ =
+                writeln!(out, "  {name:<5}{:>10.2} {unit} rms{:>10.2} {unit} peak", rms_nano[axis], peak_nano[axis]);
+        }
+        let _ = writeln!(out, "  x,y,z{translation_nm:>10.2} nm rms, norm of the three");
+        out
+    }
+}
