@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use host_sim::controller::{Controller, TickController};
 use host_sim::description::Description;
@@ -75,7 +76,7 @@ fn builds() -> PathBuf {
 /// A compiled spec with its workspace on disk.
 pub struct Emitted {
     /// What compiled.
-    pub compiled: Compilation,
+    pub compiled: Arc<Compilation>,
     /// The workspace.
     pub dir: PathBuf,
 }
@@ -148,7 +149,15 @@ impl Emitted {
     /// As [`Emitted::new`].
     #[must_use]
     pub fn with_records(name: &str, spec: &str, edits: &[(&str, &str)], records: &[(&str, String)]) -> Self {
-        Self::of(name, compile_edited(name, spec, edits, records))
+        // Tests of a module share specs.
+        static COMPILED: Mutex<BTreeMap<String, Arc<Compilation>>> = Mutex::new(BTreeMap::new());
+        let compiled = || COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = format!("{spec} {edits:?} {records:?}");
+        let known = compiled().get(&key).cloned();
+        let made = || Arc::new(compile_edited(name, spec, edits, records));
+        let one = known.unwrap_or_else(made);
+        compiled().insert(key, one.clone());
+        Self::of(name, one)
     }
 
     /// The reference as it stands in `specs/`: the same digest as that of `firmware/controller`.
@@ -158,7 +167,8 @@ impl Emitted {
     #[must_use]
     pub fn reference(name: &str) -> Self {
         let path = repository().join("specs/reference.toml");
-        Self::of(name, compile(&path).unwrap_or_else(|refused| panic!("{name} is refused: {:#?}", refused.findings)))
+        let compiled = compile(&path).unwrap_or_else(|refused| panic!("{name} is refused: {:#?}", refused.findings));
+        Self::of(name, compiled.into())
     }
 
     /// A spec that was compiled, with its workspace on disk.
@@ -166,7 +176,7 @@ impl Emitted {
     /// # Panics
     /// If it cannot be written.
     #[must_use]
-    pub fn of(name: &str, compiled: Compilation) -> Self {
+    pub fn of(name: &str, compiled: Arc<Compilation>) -> Self {
         let dir = scratch(name);
         workspace::write_scratch(&dir, &compiled.files).expect("an empty folder");
         Self { compiled, dir }

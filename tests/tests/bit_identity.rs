@@ -7,7 +7,7 @@ use host_sim::trace::{Trace, first_difference};
 use specgen::ir::Ir;
 use specgen::model::Mcu;
 use specgen::verify;
-use specgen_tests::{Emitted, assert_same_bits, column, host_trace, integers};
+use specgen_tests::{Emitted, assert_same_bits, column, compile_edited, host_trace, integers};
 
 /// Ticks of each comparison.
 fn ticks() -> usize {
@@ -114,9 +114,10 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
         ("volts per code", |ir, _| &mut ir.actuation.volts_per_code, false, "voltage"),
     ];
     for (what, constant, pose, signal) in cases {
-        let mut bad = Emitted::new("ulp-bad", "legs.toml", &[SUPERVISED, ALIGNED]);
-        let value = constant(&mut bad.compiled.ir, grid);
+        let mut bad = compile_edited("ulp-bad", "legs.toml", &[SUPERVISED, ALIGNED], &[]);
+        let value = constant(&mut bad.ir, grid);
         *value = f64::from_bits(value.to_bits() + 1);
+        let bad = Emitted::of("ulp-bad", bad.into());
         let mut controller = bad.at_run_time();
         let inputs = bad.stimulus(&controller.description().clone(), pose, 3000, 7);
         let kind = if pose { 0.0 } else { 1.0 };

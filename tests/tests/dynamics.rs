@@ -180,13 +180,12 @@ fn every_field_agrees_with_the_reference_vectors_and_with_the_lagrangian_of_anot
 
 #[test]
 fn the_controller_agrees_with_the_reference_vectors() {
-    let double = Emitted::new("dynamics-f64", "reference.toml", &[]).compiled.ir;
-    let single =
-        Emitted::new("dynamics-f32", "reference.toml", &[("scalar = \"f64\"", "scalar = \"f32\"")]).compiled.ir;
+    let double = Emitted::new("dynamics-f64", "reference.toml", &[]).compiled;
+    let single = Emitted::new("dynamics-f32", "reference.toml", &[("scalar = \"f64\"", "scalar = \"f32\"")]).compiled;
     let platform = lower::platform(&reference_model()).unwrap();
     let (mut worst, mut worst_single) = (0.0_f64, 0.0_f64);
     for vector in reference_vectors() {
-        let found = dynamics(&double, &vector.motion);
+        let found = dynamics(&double.ir, &vector.motion);
         let of = |key: &str| &vector.fields[FIELDS.iter().position(|field| *field == key).unwrap()];
         for (values, key) in [
             (found.jacobian.concat(), "J"),
@@ -205,7 +204,7 @@ fn the_controller_agrees_with_the_reference_vectors() {
             found.displacements.map(f64::to_bits),
             platform.displacements(&vector.motion.pose).map(f64::to_bits)
         );
-        let error = relative(&dynamics(&single, &vector.motion).leg_forces, of("leg_forces"));
+        let error = relative(&dynamics(&single.ir, &vector.motion).leg_forces, of("leg_forces"));
         assert!(error <= 5e-6, "{} f32: {error:e}", vector.id);
         worst_single = worse(worst_single, error);
     }

@@ -59,7 +59,7 @@ fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
         let (hostile, config) = host_trace(&mut controller, &settings, &inputs);
         covers(&hostile, what, interaction == MEASURED);
         // The controller keeps these settings.
-        let Compilation { model, ir, .. } = &emitted.compiled;
+        let Compilation { model, ir, .. } = &*emitted.compiled;
         let tracking = verify::exercise(&mut controller, model, ir, tracked()).unwrap();
         tracks(&tracking, what, edits.contains(&PARTS) || edits.contains(&DAMPED));
         for image in &images {

@@ -206,7 +206,7 @@ pub fn emitted(index: usize) -> (Emitted, Vec<&'static str>) {
             names.push(part.name);
         }
     }
-    (Emitted::of(&format!("random-{index}"), accepted), names)
+    (Emitted::of(&format!("random-{index}"), accepted.into()), names)
 }
 
 /// What was drawn, to be held against what has to occur.

@@ -4,7 +4,7 @@ use super::bench::*;
 use super::sequences;
 use specgen::model::Mcu;
 use specgen::target;
-use specgen_tests::Emitted;
+use specgen_tests::{Emitted, compile_edited};
 use std::time::Duration;
 
 const LIMIT: Duration = Duration::from_secs(600);
@@ -80,9 +80,10 @@ fn sequences_in_f32_have_the_same_bits_on_the_m4f() {
 fn one_ulp_of_a_constant_of_the_supervisor_is_found() {
     let good = emitted("supervisor-ulp-good", "legs.toml", &[ALIGNED]);
     let Some(image) = good.image(Mcu::Mps2An500) else { return };
-    let mut bad = emitted("supervisor-ulp-bad", "legs.toml", &[ALIGNED]);
-    let keep = &mut bad.compiled.ir.supervision.approach_keep;
+    let mut bad = compile_edited("supervisor-ulp-bad", "legs.toml", &[("[timing]\n", SECTION), ALIGNED], &[]);
+    let keep = &mut bad.ir.supervision.approach_keep;
     *keep = keep.next_up();
+    let bad = Emitted::of("supervisor-ulp-bad", bad.into());
     let host = record(Kind::Legs, &bad, 200);
     let result = target::replay_machine(&image, &host.config, &host.inputs, LIMIT).unwrap_or_else(|e| panic!("{e}"));
     let found = difference(&host, &result.outputs, &result.digests);

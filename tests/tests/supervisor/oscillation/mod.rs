@@ -260,8 +260,8 @@ fn without_the_detection_it_goes_on() {
     let mut machine = Machine::new(&emitted, &LegParameters::reference(), 5);
     machine.start();
     machine.structure = Some(LEG(1200.0, 0.01));
-    let Course { times, left, .. } = observe(&mut machine, 1.0);
-    println!("without: {:.2} um after 1 s: {}", left * 1e6, machine.word);
+    let Course { times, left, .. } = observe(&mut machine, specgen_tests::length(0.5, 1.0));
+    println!("without: {:.2} um at its end: {}", left * 1e6, machine.word);
     assert!(times == [None; 3] && left > 1e-6, "{times:?}, {left}");
 }
 
