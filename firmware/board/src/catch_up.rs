@@ -10,11 +10,11 @@ pub fn catch_up(with: &mut Access<'_>, calm: impl Fn() -> bool) {
     let (mut taken, mut block) = (None, false);
     with(&mut |exchange, machine| {
         let Exchange { recorder: Some(recorder), kept, config, .. } = exchange else { return };
-        if let (Some(want), Some(kept)) = (recorder.wants(), &mut *kept)
-            && calm()
-        {
-            kept.keep(config, machine);
-            recorder.owe(want);
+        if let (Some(want), Some(kept)) = (recorder.wants(), &mut *kept) {
+            if calm() {
+                kept.keep(config, machine);
+                recorder.owe(want);
+            }
         }
         if recorder.owes() {
             block = recorder.owes_block();

@@ -249,11 +249,11 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
     /// Sets the output lines; a fault is an event of the next tick.
     #[inline]
     fn show(&mut self, report: &mut Report, high: u32) {
-        if triggers::LINES != 0
-            && let Err(fault) = self.lines.set(high)
-        {
-            report.converter(fault);
-            self.carried |= CONVERTER;
+        if triggers::LINES != 0 {
+            if let Err(fault) = self.lines.set(high) {
+                report.converter(fault);
+                self.carried |= CONVERTER;
+            }
         }
     }
 

@@ -364,7 +364,7 @@ impl RequestContext<'_, '_> {
         let (mut taken, mut count, mut total) = ([[0; 6]; KNOTS], 0, 0);
         let mut refusal = Some(Refusal::Unsupported);
         let first = offset as usize / KNOT;
-        for few in taken.as_chunks_mut::<KNOTS_AT_ONCE>().0 {
+        for few in taken.chunks_exact_mut(KNOTS_AT_ONCE) {
             let before = count;
             (self.with)(&mut |exchange, _| {
                 if exchange.away.is_some() {

@@ -137,13 +137,13 @@ fn find(recorder: &Recorder<'static>, offset: usize) -> (Place, usize) {
     for index in 0..recorder.blocks() {
         let words = recorder.block(index).unwrap_or_default().len();
         let bytes = words * WORD;
-        if let Some(byte) = offset.checked_sub(start)
-            && byte < bytes + WORD
-        {
-            place = match byte.checked_sub(bytes) {
-                None => Place::Block(index, words, byte),
-                Some(byte) => Place::Checksum(index, words, byte),
-            };
+        if let Some(byte) = offset.checked_sub(start) {
+            if byte < bytes + WORD {
+                place = match byte.checked_sub(bytes) {
+                    None => Place::Block(index, words, byte),
+                    Some(byte) => Place::Checksum(index, words, byte),
+                };
+            }
         }
         start += bytes + WORD;
     }
@@ -153,7 +153,7 @@ fn find(recorder: &Recorder<'static>, offset: usize) -> (Place, usize) {
 /// Copies words of a block, a few at a time; how many. None if it records again.
 fn copied(block: usize, first: usize, out: &mut [u64; WORDS], look: &mut impl RecorderAccess) -> Option<usize> {
     let mut count = 0;
-    for few in out.as_chunks_mut::<AT_ONCE>().0 {
+    for few in out.chunks_exact_mut(AT_ONCE) {
         let before = count;
         if !look(&mut |recorder| count += copy(recorder, block, first + before, few)) {
             return None;
@@ -166,7 +166,7 @@ fn copied(block: usize, first: usize, out: &mut [u64; WORDS], look: &mut impl Re
 }
 
 /// Copies words of a block; how many.
-fn copy(recorder: &Recorder<'static>, block: usize, first: usize, out: &mut [u64; AT_ONCE]) -> usize {
+fn copy(recorder: &Recorder<'static>, block: usize, first: usize, out: &mut [u64]) -> usize {
     let words = recorder.block(block).and_then(|words| words.get(first..)).unwrap_or_default();
     let mut count = 0;
     for (slot, word) in out.iter_mut().zip(words) {

@@ -178,13 +178,13 @@ impl Exchange {
     pub fn prepare(&mut self) {
         // A block begins with settings: not before the one that is owed is written.
         let owes = self.recorder.as_ref().is_some_and(Recorder::owes);
-        if let Some(next) = &self.next
-            && !owes
-        {
-            self.config = *next;
-            self.next = None;
-            if let Some(recorder) = &mut self.recorder {
-                recorder.settings_changed();
+        if let Some(next) = &self.next {
+            if !owes {
+                self.config = *next;
+                self.next = None;
+                if let Some(recorder) = &mut self.recorder {
+                    recorder.settings_changed();
+                }
             }
         }
         if triggers::INPUT {
@@ -299,23 +299,23 @@ impl Exchange {
     /// Keeps what a tick of a pass showed; after the last one nothing is corrected.
     #[inline(never)]
     pub(crate) fn keep_pass(&mut self, machine: &Machine, status: u32) {
-        if let (Some(player), Some([target, pose])) = (&mut self.player, passes::shown(&machine.state))
-            && player.is_running()
-        {
-            player.keep(&target, &pose, status);
-            if !player.is_running() {
-                passes::end(&mut self.orders.command);
+        if let (Some(player), Some([target, pose])) = (&mut self.player, passes::shown(&machine.state)) {
+            if player.is_running() {
+                player.keep(&target, &pose, status);
+                if !player.is_running() {
+                    passes::end(&mut self.orders.command);
+                }
             }
         }
     }
 
     /// Ends the pass under way, if there is one: nothing is corrected from here on.
     pub(crate) fn abort_pass(&mut self) {
-        if let Some(player) = &mut self.player
-            && player.is_running()
-        {
-            player.abort();
-            passes::end(&mut self.orders.command);
+        if let Some(player) = &mut self.player {
+            if player.is_running() {
+                player.abort();
+                passes::end(&mut self.orders.command);
+            }
         }
     }
 

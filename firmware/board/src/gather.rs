@@ -12,10 +12,10 @@ pub fn gather(with: &mut Access<'_>) {
 pub(crate) fn with_rows(with: &mut Access<'_>, action: impl FnOnce(&mut Rows)) {
     let mut taken = None;
     with(&mut |exchange, _| {
-        if let Some(samples) = &mut exchange.samples
-            && (samples.every > 0 || samples.anew)
-        {
-            taken = samples.rows.take();
+        if let Some(samples) = &mut exchange.samples {
+            if samples.every > 0 || samples.anew {
+                taken = samples.rows.take();
+            }
         }
     });
     let Some(rows) = taken else { return };

@@ -23,8 +23,9 @@ impl<'a> Bytes<'a> {
     /// Words, if the bytes are `count` of them.
     #[must_use]
     pub fn words(self, count: usize) -> Option<impl Iterator<Item = u64> + 'a> {
-        let (words, rest) = self.0.as_chunks::<WORD>();
-        (rest.is_empty() && words.len() == count).then(|| words.iter().map(|word| u64::from_le_bytes(*word)))
+        let words = self.0.chunks_exact(WORD);
+        let whole = words.remainder().is_empty() && words.len() == count;
+        whole.then(|| words.map(|word| u64::from_le_bytes(word.try_into().unwrap_or_default())))
     }
 
     /// Fills `words`; false, with nothing written, if the bytes are not as many words.
@@ -40,15 +41,15 @@ impl<'a> Bytes<'a> {
     /// Knots, if the bytes are whole ones.
     #[must_use]
     pub fn knots(self) -> Option<impl ExactSizeIterator<Item = [i32; 6]> + 'a> {
-        let (knots, rest) = self.0.as_chunks::<KNOT>();
-        rest.is_empty().then(|| knots.iter().map(knot))
+        let knots = self.0.chunks_exact(KNOT);
+        knots.remainder().is_empty().then(|| knots.map(knot))
     }
 }
 
-fn knot(bytes: &[u8; KNOT]) -> [i32; 6] {
+fn knot(bytes: &[u8]) -> [i32; 6] {
     let mut knot = [0; 6];
-    for (slot, number) in knot.iter_mut().zip(bytes.as_chunks::<NUMBER>().0) {
-        *slot = i32::from_le_bytes(*number);
+    for (slot, number) in knot.iter_mut().zip(bytes.chunks_exact(NUMBER)) {
+        *slot = i32::from_le_bytes(number.try_into().unwrap_or_default());
     }
     knot
 }

@@ -63,7 +63,7 @@ impl<const N: usize> Session<N> {
     }
 
     /// Room for the bytes of an answer, while it is made.
-    pub const fn buffer(&mut self) -> &mut [u8] {
+    pub fn buffer(&mut self) -> &mut [u8] {
         self.bytes.as_flattened_mut()
     }
 

@@ -24,9 +24,8 @@ pub const BLOCK: usize = 5 * ROW;
 const NUMBER: usize = size_of::<f32>();
 /// Values of a row that are spread over its ticks.
 const SPREADS: usize = 2 * AXES;
-/// What else a reply with a block holds: variant, number, tick, ticks a row, whether there are more, length.
-const OVERHEAD: usize = 1 + 5 + 10 + 3 + 1 + 2;
-const _: () = assert!(BLOCK + OVERHEAD <= crate::MESSAGE);
+// What else a reply with a block holds: variant, number, tick, ticks a row, whether there are more, length.
+const _: () = assert!(BLOCK + (1 + 5 + 10 + 3 + 1 + 2) <= crate::MESSAGE);
 const _: () = assert!(MOST_EVERY < 1 << 21, "three bytes in a message");
 
 /// What a tick showed. Poses are the platform's own: from rest and with the bias.
@@ -121,7 +120,7 @@ impl Row {
     fn read(every: u32, bytes: &[u8]) -> Self {
         let (status, rest) = bytes.split_first_chunk().unwrap_or((&[0; 4], &[]));
         let (phase, rest) = rest.split_first().unwrap_or((&0, &[]));
-        let mut numbers = rest.as_chunks().0.iter().map(|number| f32::from_le_bytes(*number));
+        let mut numbers = rest.chunks_exact(4).map(|number| f32::from_le_bytes(number.try_into().unwrap_or_default()));
         let mut next = || numbers.next().unwrap_or(0.0);
         let (pose, target) = ([(); AXES].map(|()| next()), [(); AXES].map(|()| next()));
         let mut spread = || {

@@ -49,10 +49,10 @@ fn serve() -> Result<(), Exit> {
             return Ok(());
         }
         for byte in bytes.iter().take(count) {
-            if let Some(reply) = endpoint.push(*byte, &mut device)
-                && !output.send(reply)
-            {
-                return Err(Exit::CannotWrite);
+            if let Some(reply) = endpoint.push(*byte, &mut device) {
+                if !output.send(reply) {
+                    return Err(Exit::CannotWrite);
+                }
             }
         }
     }

@@ -80,10 +80,10 @@ impl Capture {
 
     /// The loop said how its recorder stands.
     pub fn update(&mut self, recorded: Option<u64>, triggered: bool) {
-        if let Some(ticks) = recorded
-            && self.here.is_none()
-        {
-            self.standing = CaptureState { running: true, triggered, ticks };
+        if let Some(ticks) = recorded {
+            if self.here.is_none() {
+                self.standing = CaptureState { running: true, triggered, ticks };
+            }
         }
     }
 
@@ -107,7 +107,7 @@ impl Capture {
     /// The recorder came back after the loop had taken `taken` orders. An order, if it is to go again: it was started anew when
     /// it was already on its way.
     pub fn receive(&mut self, mut tape: Tape, taken: u32) -> Option<LoopCommand> {
-        if self.restarted.take().is_some_and(|number| number.wrapping_sub(taken).cast_signed() > 0) {
+        if self.restarted.take().is_some_and(|number| (number.wrapping_sub(taken) as i32) > 0) {
             tape.start(self.settings);
             return Some(LoopCommand::Tape(tape));
         }

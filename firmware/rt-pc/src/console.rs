@@ -93,7 +93,7 @@ impl Console {
         self.events |= row.input.events & !EDGE;
         self.edge = row.edge;
         self.capture.update(row.recorded, row.triggered);
-        let taken = |number: u32| said.orders.wrapping_sub(number).cast_signed() >= 0;
+        let taken = |number: u32| (said.orders.wrapping_sub(number) as i32) >= 0;
         if let Some((number, command)) = self.awaited.filter(|(number, _)| taken(*number)) {
             let stage = pending::Stage::from_word(u64::from(row.edge.stage));
             match (stage, command) {
@@ -240,10 +240,10 @@ impl Console {
 
     /// Takes the player back: what its pass began is what is commanded, while the machine runs.
     pub fn receive_player(&mut self, player: Player) {
-        if let Some(trajectory) = self.passes.receive(player)
-            && self.runs()
-        {
-            self.operator.has_begun(trajectory);
+        if let Some(trajectory) = self.passes.receive(player) {
+            if self.runs() {
+                self.operator.has_begun(trajectory);
+            }
         }
     }
 

@@ -262,11 +262,11 @@ impl Operator {
 
     /// A host sent a request.
     pub fn seen(&mut self, host: HostId, now: u64) {
-        if let Owner::Host { id, seen, .. } = &mut self.owner
-            && *id == host
-        {
-            *seen = now;
-            self.requests += 1;
+        if let Owner::Host { id, seen, .. } = &mut self.owner {
+            if *id == host {
+                *seen = now;
+                self.requests += 1;
+            }
         }
     }
 
@@ -279,12 +279,12 @@ impl Operator {
 
     /// A host has gone. A machine that is off does not miss it.
     pub fn left(&mut self, host: HostId, last: Option<&SupervisorReport>) {
-        if let Owner::Host { id, left, .. } = &mut self.owner
-            && *id == host
-        {
-            *left = true;
-            if last.is_none_or(|said| said.phase == Phase::Disarmed && !said.on) {
-                self.owner = Owner::Here;
+        if let Owner::Host { id, left, .. } = &mut self.owner {
+            if *id == host {
+                *left = true;
+                if last.is_none_or(|said| said.phase == Phase::Disarmed && !said.on) {
+                    self.owner = Owner::Here;
+                }
             }
         }
     }

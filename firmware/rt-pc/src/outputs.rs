@@ -60,7 +60,7 @@ fn found(path: Option<&Path>) -> Option<(&Path, Metadata)> {
 /// # Errors
 /// What the system says.
 pub fn create(path: &Path) -> io::Result<File> {
-    let flags = OFlags::NONBLOCK.bits().cast_signed();
+    let flags = OFlags::NONBLOCK.bits() as i32;
     let file = OpenOptions::new().write(true).create(true).truncate(true).custom_flags(flags).open(path)?;
     fcntl_setfl(&file, OFlags::empty())?;
     Ok(file)

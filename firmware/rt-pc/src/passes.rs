@@ -145,7 +145,7 @@ mod tests {
                 _ => row[0] = 1.0,
             }
         }
-        let rows = plan.map(|row| row.map(|number| number.to_bits().cast_signed()));
+        let rows = plan.map(|row| row.map(|number| number.to_bits() as i32));
         assert!(passes.put(0, [[1; 6], [2; 6], [3; 6]].into_iter()) && passes.put(3, rows.into_iter()));
         let mut player = passes.begin(COURSE).unwrap();
         for _ in 0..4 {

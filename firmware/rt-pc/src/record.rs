@@ -89,9 +89,10 @@ impl Writer {
             };
             let mut changed = false;
             // Order numbers wrap around.
-            let taken = |order: u32| row.orders.wrapping_sub(order).cast_signed() >= 0;
-            while let Some((_, config)) = self.configs.pop_front_if(|(order, _)| taken(*order)) {
-                (self.config, changed) = (config, true);
+            let taken = |order: u32| (row.orders.wrapping_sub(order) as i32) >= 0;
+            while let Some((_, config)) = self.configs.front().filter(|(order, _)| taken(*order)) {
+                (self.config, changed) = (*config, true);
+                self.configs.pop_front();
             }
             if changed {
                 self.recorder.settings_changed();

@@ -119,9 +119,8 @@ impl Service<'_> {
     fn send(&mut self) {
         self.console.wish();
         let (orders, mut number) = self.console.outgoing();
-        while self.rings.orders.slots() > 0
-            && let Some(order) = orders.pop_front()
-        {
+        while self.rings.orders.slots() > 0 {
+            let Some(order) = orders.pop_front() else { break };
             if let (LoopCommand::Configure(config), Some((_, writer))) = (&order, &mut self.record) {
                 writer.configured(number, config);
             }

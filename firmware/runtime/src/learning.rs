@@ -178,12 +178,12 @@ fn mapped(plan: &[Knot], first: usize, vector: &[f32; 6]) -> [f32; 6] {
 
 /// The word of a plan.
 const fn word(number: f32) -> i32 {
-    number.to_bits().cast_signed()
+    number.to_bits() as i32
 }
 
 /// The number of a word.
 const fn number(word: i32) -> f32 {
-    f32::from_bits(word.cast_unsigned())
+    f32::from_bits(word as u32)
 }
 
 /// To the nearest whole number, saturated; a NaN gives 0.

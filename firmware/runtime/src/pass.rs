@@ -262,14 +262,16 @@ impl<'m, T: Real> Player<'m, T> {
                 *sum = *sum + (last - *pose);
             }
             // One tick is behind: of tick n − 1.
-            let next = tick.is_multiple_of(self.course.spacing) || tick >= self.course.ticks;
-            if next && let Some(slot) = self.errors.get_mut(self.kept as usize) {
-                let first = self.kept * self.course.spacing;
-                let count = T::from_i32(tick.saturating_sub(first) as i32);
-                let scale = T::ONE / T::from_f64(UNIT);
-                *slot = self.sum.map(|sum| (sum / count * scale).truncate());
-                self.sum = [T::ZERO; 6];
-                self.kept += 1;
+            let next = tick.checked_rem(self.course.spacing).unwrap_or(tick) == 0 || tick >= self.course.ticks;
+            if next {
+                if let Some(slot) = self.errors.get_mut(self.kept as usize) {
+                    let first = self.kept * self.course.spacing;
+                    let count = T::from_i32(tick.saturating_sub(first) as i32);
+                    let scale = T::ONE / T::from_f64(UNIT);
+                    *slot = self.sum.map(|sum| (sum / count * scale).truncate());
+                    self.sum = [T::ZERO; 6];
+                    self.kept += 1;
+                }
             }
         }
         if tick >= self.course.ticks {

@@ -338,10 +338,10 @@ impl<'m> Recorder<'m> {
     /// Words of what an owed block begins with, settings and then state, from the `first`-th on.
     #[cold]
     pub fn hand_in(&mut self, first: usize, words: &[u64]) {
-        if let Some(PendingWrite::Block(place)) = self.owed
-            && first + words.len() <= self.layout.config + self.layout.state
-        {
-            self.ring.write(place, HEADER_WORDS + first, words);
+        if let Some(PendingWrite::Block(place)) = self.owed {
+            if first + words.len() <= self.layout.config + self.layout.state {
+                self.ring.write(place, HEADER_WORDS + first, words);
+            }
         }
     }
 

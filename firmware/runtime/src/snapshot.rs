@@ -240,11 +240,13 @@ impl<'a> StatePart<'a> {
 #[inline]
 fn clear(words: &mut [u64]) {
     let zero = core::hint::black_box(0);
-    let (chunks, rest) = words.as_chunks_mut::<8>();
-    for chunk in chunks {
-        *chunk = [zero; 8];
+    let mut chunks = words.chunks_exact_mut(8);
+    for chunk in &mut chunks {
+        if let Some(chunk) = chunk.first_chunk_mut::<8>() {
+            *chunk = [zero; 8];
+        }
     }
-    for word in rest {
+    for word in chunks.into_remainder() {
         *word = zero;
     }
 }

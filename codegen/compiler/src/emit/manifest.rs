@@ -10,7 +10,7 @@ name = \"controller\"
 description = \"Controller of platform {name}\"
 version = \"{version}\"
 edition = \"2024\"
-rust-version = \"1.95\"
+rust-version = \"1.85\"
 publish = false
 
 [features]

@@ -216,7 +216,7 @@ impl Noisy {
     fn damage(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut out = Vec::new();
         for byte in bytes {
-            let hit = self.random.next_u32().is_multiple_of(self.rate);
+            let hit = self.random.next_u32() % self.rate == 0;
             match (hit, self.random.next_u32() % 4) {
                 (false, _) => out.push(*byte),
                 (true, 0) => {}

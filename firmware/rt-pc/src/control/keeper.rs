@@ -51,11 +51,11 @@ impl<'a> Keeper<'a> {
     /// Takes a recorder. The loop never has two.
     pub fn take(&mut self, mut tape: Tape, count: u64) {
         tape.begin(count);
-        if let Some(other) = self.tape.replace(tape)
-            && let Err(rtrb::PushError::Full(other)) = self.outlets.tapes.push((other, self.taken))
-        {
-            // Not reached: there is one tape. Released here it would be by the real-time thread.
-            core::mem::forget(other);
+        if let Some(other) = self.tape.replace(tape) {
+            if let Err(rtrb::PushError::Full(other)) = self.outlets.tapes.push((other, self.taken)) {
+                // Not reached: there is one tape. Released here it would be by the real-time thread.
+                core::mem::forget(other);
+            }
         }
     }
 
@@ -104,26 +104,27 @@ impl<'a> Keeper<'a> {
             record_before(config, machine, tape);
         }
         (self.opens, self.lost) = (false, false);
-        if let Some(snapshots) = &mut self.outlets.snapshots
-            && (changed || self.since >= SNAPSHOT_EVERY)
-        {
-            // With room for both the row cannot fail to follow.
-            if self.outlets.rows.slots() > 0 && snapshots.slots() > 0 {
-                let mut snapshot = Snapshot { count, digest: machine.digest(), state: [0; MACHINE_STATE_WORDS] };
-                machine.save(&mut snapshot.state);
-                self.opens = snapshots.push(snapshot).is_ok();
-                self.since = 0;
+        if let Some(snapshots) = &mut self.outlets.snapshots {
+            if changed || self.since >= SNAPSHOT_EVERY {
+                // With room for both the row cannot fail to follow.
+                if self.outlets.rows.slots() > 0 && snapshots.slots() > 0 {
+                    let mut snapshot = Snapshot { count, digest: machine.digest(), state: [0; MACHINE_STATE_WORDS] };
+                    machine.save(&mut snapshot.state);
+                    self.opens = snapshots.push(snapshot).is_ok();
+                    self.since = 0;
+                }
+                self.lost = !self.opens;
             }
-            self.lost = !self.opens;
         }
     }
 
     fn give_back(&mut self) {
         if let Some(tape) = self.tape.take_if(|tape| matches!(tape.activity(), Activity::Complete | Activity::Stopped))
-            && let Err(rtrb::PushError::Full((tape, _))) = self.outlets.tapes.push((tape, self.taken))
         {
-            // With the next tick.
-            self.tape = Some(tape);
+            if let Err(rtrb::PushError::Full((tape, _))) = self.outlets.tapes.push((tape, self.taken)) {
+                // With the next tick.
+                self.tape = Some(tape);
+            }
         }
     }
 

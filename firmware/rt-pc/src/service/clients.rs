@@ -46,10 +46,10 @@ impl<T> Clients<T> {
             let Some(stream) = self.listener.accept() else { break };
             let process = socket_peercred(&stream).map_or(0, |credentials| credentials.pid.as_raw_nonzero().get());
             self.all.push(Client { stream, state: fresh(), process, last: now });
-            if self.all.len() > MOST
-                && let Some(least) = self.least(now, &keeps)
-            {
-                gone.push(self.all.remove(least).state);
+            if self.all.len() > MOST {
+                if let Some(least) = self.least(now, &keeps) {
+                    gone.push(self.all.remove(least).state);
+                }
             }
         }
         gone
@@ -67,8 +67,15 @@ impl<T> Clients<T> {
 
     /// Lets each be served; gives back those whose service failed.
     pub fn serve(&mut self, mut service: impl FnMut(&mut Client<T>) -> io::Result<()>) -> Vec<T> {
-        let gone = self.all.extract_if(.., |client| service(client).is_err());
-        gone.map(|client| client.state).collect()
+        let (mut gone, mut index) = (Vec::new(), 0);
+        while let Some(client) = self.all.get_mut(index) {
+            if service(client).is_err() {
+                gone.push(self.all.remove(index).state);
+            } else {
+                index += 1;
+            }
+        }
+        gone
     }
 
     /// All, in the order in which they came.
@@ -159,7 +166,7 @@ mod tests {
             assert_eq!(hall.come(|_| false), [] as [usize; 0]);
             assert_eq!(hall.clients.descriptors().count(), number + 2);
         }
-        assert!(hall.clients.iter().all(|client| client.process == std::process::id().cast_signed()));
+        assert!(hall.clients.iter().all(|client| client.process == std::process::id() as i32));
         // The first two say something, and the third has the orders.
         for number in [0, 1] {
             hall.lines[number].write_all(b"here").unwrap();

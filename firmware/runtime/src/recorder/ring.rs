@@ -172,10 +172,10 @@ impl<'m> Ring<'m> {
 
     /// Marks the tick of the trigger.
     pub(super) fn mark(&mut self, tick: u64) {
-        if self.used > 0
-            && let Some(slot) = self.newest().and_then(|block| block.get_mut(TRIGGER))
-        {
-            *slot = tick;
+        if self.used > 0 {
+            if let Some(slot) = self.newest().and_then(|block| block.get_mut(TRIGGER)) {
+                *slot = tick;
+            }
         }
     }
 

@@ -139,10 +139,10 @@ impl<T: Real> Trajectory<T> {
         match self {
             Self::Segments { segments, ticks, end, .. } => {
                 cursor.tick += 1;
-                if let Some(following) = segments.get(cursor.part + 1)
-                    && cursor.tick >= following.first
-                {
-                    cursor.part += 1;
+                if let Some(following) = segments.get(cursor.part + 1) {
+                    if cursor.tick >= following.first {
+                        cursor.part += 1;
+                    }
                 }
                 match segments.get(cursor.part) {
                     Some(segment) if cursor.tick < *ticks => (segment.at(cursor.tick - segment.first), false),

@@ -256,22 +256,22 @@ impl<T: Real> Supervisor<T> {
         readings: &[T; 6],
         limits: CodeLimits,
     ) {
-        if self.is_checking(supervision)
-            && let Some(wiring) = &supervision.wiring
-        {
-            let highest = supervision.rest.saturating_add(wiring.height);
-            let refused = if highest < limits.min || highest > limits.max {
-                Finding::NoRoom
-            } else if !wiring.can_follow(limits.max_step) {
-                Finding::TooSlow
-            } else {
-                Finding::None
-            };
-            if refused != Finding::None {
-                self.check.done = true;
-                self.check.finding = refused.word();
+        if self.is_checking(supervision) {
+            if let Some(wiring) = &supervision.wiring {
+                let highest = supervision.rest.saturating_add(wiring.height);
+                let refused = if highest < limits.min || highest > limits.max {
+                    Finding::NoRoom
+                } else if !wiring.can_follow(limits.max_step) {
+                    Finding::TooSlow
+                } else {
+                    Finding::None
+                };
+                if refused != Finding::None {
+                    self.check.done = true;
+                    self.check.finding = refused.word();
+                }
+                self.check.tick(wiring, expected, readings, self.ticks.saturating_sub(supervision.arm_ticks));
             }
-            self.check.tick(wiring, expected, readings, self.ticks.saturating_sub(supervision.arm_ticks));
         }
     }
 

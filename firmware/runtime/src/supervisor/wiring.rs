@@ -155,10 +155,10 @@ impl Finding {
             COMMON..=LARGEST_COMMON => return Self::Common(word - COMMON),
             _ => {}
         }
-        if word > FALLBACK
-            && let Some(stage) = Fallback::from_word((word - FALLBACK) as u64)
-        {
-            return Self::Fallback(stage);
+        if word > FALLBACK {
+            if let Some(stage) = Fallback::from_word((word - FALLBACK) as u64) {
+                return Self::Fallback(stage);
+            }
         }
         let (subject, kind) = ((word - 1) % SUBJECTS, (word - 1) / SUBJECTS);
         let fault = match kind {

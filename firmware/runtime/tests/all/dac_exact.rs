@@ -100,7 +100,7 @@ fn numbers_of_the_same_order_have_the_same_code_up_to_both_ends_of_the_integers(
                 let rank = five.map(|number| 2 * sorted.partition_point(|other| *other < number) as i32);
                 let [small_wanted, small_min, small_max, low, high] = rank;
                 let limits = CodeLimits { min: small_min, max: small_max, max_step: (high - low) / 2 };
-                let (small, _) = plain(small_wanted, i32::midpoint(low, high), limits);
+                let (small, _) = plain(small_wanted, (low + high) / 2, limits);
                 let (code, held_back) = plain(wanted, previous, CodeLimits { min, max, max_step });
                 let same = five[rank.iter().position(|number| *number == small).unwrap()];
                 assert_eq!((code, held_back), (same, same != wanted), "{wanted} {previous} {min} {max} {max_step}");
@@ -139,7 +139,7 @@ struct Walk<T> {
 
 impl<T: Real + Into<f64> + std::fmt::LowerExp> Walk<T> {
     fn new(constants: [f64; 5]) -> Self {
-        let previous = LIMITS.map(|limits| [limits.min, i32::midpoint(limits.min, limits.max), limits.max]);
+        let previous = LIMITS.map(|limits| [limits.min, (limits.min + limits.max) / 2, limits.max]);
         Self { dac: dac(constants), previous, last: i32::MIN, tried: 0 }
     }
 

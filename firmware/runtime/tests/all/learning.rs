@@ -27,7 +27,7 @@ fn given() -> Plan {
 }
 
 fn words(rows: &[[f32; 6]]) -> Vec<Knot> {
-    rows.iter().map(|row| row.map(|value| value.to_bits().cast_signed())).collect()
+    rows.iter().map(|row| row.map(|value| value.to_bits() as i32)).collect()
 }
 
 impl Plan {
@@ -113,12 +113,12 @@ fn a_plan_that_is_none_is_refused() {
     }
     for bad in [f32::NAN, f32::INFINITY] {
         let mut table = table.clone();
-        table[KNOTS + HEAD][4] = bad.to_bits().cast_signed();
+        table[KNOTS + HEAD][4] = bad.to_bits() as i32;
         assert!(refused(&table, &errors, SETTINGS, KNOTS), "{bad}");
     }
     // Numbers that overflow on the way give a correction all the same, which the tick limits.
     let mut huge = table.clone();
-    huge[KNOTS..].fill([f32::MAX.to_bits().cast_signed(); 6]);
+    huge[KNOTS..].fill([f32::MAX.to_bits() as i32; 6]);
     let mut errors = errors;
     let mut learning = Learning::new(SETTINGS, KNOTS, &huge, &errors).unwrap();
     while learning.work(100, &mut huge, &mut errors) {}

@@ -196,7 +196,7 @@ impl World {
     }
 
     fn tick(&mut self, bounds: &Bounds, phase: u8, number: u32, towards: bool) -> Tick {
-        if number.is_multiple_of(8) {
+        if number % 8 == 0 {
             self.request = match (towards, phase) {
                 (true, DISARMED) => self.choose(&[ARM, NOTHING]),
                 (true, ARMING | HOLDING | RUNNING) => self.choose(&[RUN, RUN, NOTHING]),
@@ -252,7 +252,7 @@ impl World {
             }
             Wrong::Slew => {
                 tick.limited |= 1 << index;
-                tick.moved[index] = if number.is_multiple_of(2) { MAX_STEP } else { -MAX_STEP };
+                tick.moved[index] = if number % 2 == 0 { MAX_STEP } else { -MAX_STEP };
             }
         }
     }

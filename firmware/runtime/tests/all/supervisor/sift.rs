@@ -391,7 +391,7 @@ fn hostile_samples_are_sifted_as_by_the_oracle_and_nothing_that_is_not_believed_
         for tick in 0..300 {
             let along = f64::from(tick) * 0.15e-6;
             let mut words: [f64; 6] = core::array::from_fn(|_| along + 20e-9 * dice.unit());
-            if dice.next().is_multiple_of(rate) {
+            if dice.next() % rate == 0 {
                 let gauge = (dice.next() % 6) as usize;
                 match dice.next() % 8 {
                     0 => words[gauge] = f64::from_bits(dice.next()),
