@@ -1,5 +1,5 @@
-//! Lists the files that are copied verbatim into outputs: all that lie in these folders and in those of boards, but for tests and
-//! for packages of their own.
+//! Lists the files that are copied into outputs, each source behind a line with its licence: all in these folders and in those of
+//! boards, but for tests and for packages of their own.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -27,6 +27,9 @@ const FIRMWARE: &str = "../../firmware";
 
 /// What files there are: not those that an editor leaves.
 const KINDS: [&str; 6] = ["json", "lock", "md", "rs", "toml", "x"];
+
+/// First line of a copied source file.
+const LICENCE: &str = "SPDX-License-Identifier: MIT OR Apache-2.0";
 
 fn main() -> io::Result<()> {
     let mut text = String::new();
@@ -58,7 +61,12 @@ fn main() -> io::Result<()> {
         let _ = writeln!(text, "pub const {constant}: &[(&str, &str)] = &[");
         for file in &files {
             let inner = Path::new(&name).join(file.strip_prefix(&folder).unwrap_or(file));
-            let _ = writeln!(text, "({inner:?}, include_str!({file:?})),");
+            let head = match inner.extension().and_then(|kind| kind.to_str()) {
+                Some("rs") => format!("// {LICENCE}\n"),
+                Some("x") => format!("/* {LICENCE} */\n"),
+                _ => String::new(),
+            };
+            let _ = writeln!(text, "({inner:?}, concat!({head:?}, include_str!({file:?}))),");
         }
         text.push_str("];\n");
         let _ = writeln!(arms, "{name:?} => {constant},");

@@ -29,6 +29,8 @@ use proc_macro2::TokenStream;
 
 use crate::ir::{Ir, TaskSpace};
 
+pub use crate_root::calling;
+
 /// Files of the emitted crate: path relative to the crate, text.
 pub type EmittedCrate = BTreeMap<String, String>;
 

@@ -152,7 +152,8 @@ pub fn install_command() -> String {
     format!("rustup target add {TRIPLE}{debian}")
 }
 
-/// Whether a compiler is older than what the emitted code is written for; Debian without its updates has one.
+/// Whether a compiler is older than the one that images are measured with; Debian without its updates has one. Emitted code itself
+/// builds with Rust 1.85.
 fn is_old(version: &str) -> bool {
     let numbers = |text: &str| -> Option<(u32, u32)> {
         let mut parts = text.split('.').map(str::parse);

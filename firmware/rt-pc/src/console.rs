@@ -138,7 +138,7 @@ impl Console {
         for order in &mut self.orders {
             number = number.wrapping_add(1);
             match order {
-                LoopCommand::Wish(wish) => wish.command = None,
+                LoopCommand::OperatorRequest(wish) => wish.command = None,
                 LoopCommand::Wave(_) | LoopCommand::Await(_) => {
                     // In its place, so that numbers stay.
                     *order = LoopCommand::StopWave;
@@ -283,7 +283,7 @@ impl Console {
     /// Puts the operator's wish behind the other orders, if it changed.
     pub fn wish(&mut self) {
         if let Some(wish) = self.operator.wish() {
-            self.order(LoopCommand::Wish(wish));
+            self.order(LoopCommand::OperatorRequest(wish));
         }
     }
 
@@ -342,7 +342,7 @@ mod tests {
         let mut console = console(Phase::Running);
         console.operator.wish();
         console.order(LoopCommand::Trigger);
-        console.order(LoopCommand::Wish(OperatorRequest { command: Some([7; COMMAND_WORDS]), request: Request::Run }));
+        console.order(LoopCommand::OperatorRequest(OperatorRequest { command: Some([7; COMMAND_WORDS]), request: Request::Run }));
         console.start_wave(&Settings::still(), true).unwrap();
         console.start_wave(&Settings::still(), false).unwrap();
         assert_eq!(console.command_on_edge([1; COMMAND_WORDS]), Err(Rejection::State), "under a wave");
@@ -353,7 +353,7 @@ mod tests {
         assert_eq!((console.outgoing().0.len(), console.outgoing().1), numbers);
         for order in console.outgoing().0.iter() {
             let moves = match order {
-                LoopCommand::Wish(wish) => wish.command.is_some(),
+                LoopCommand::OperatorRequest(wish) => wish.command.is_some(),
                 LoopCommand::Wave(_) | LoopCommand::Await(_) => true,
                 _ => false,
             };
@@ -401,7 +401,7 @@ mod tests {
         // What is wanted once it is over goes first: to hold.
         let orders = console.outgoing().0;
         assert!(
-            matches!(orders[0], LoopCommand::Wish(OperatorRequest { command: Some(command), .. }) if command[0] == 0)
+            matches!(orders[0], LoopCommand::OperatorRequest(OperatorRequest { command: Some(command), .. }) if command[0] == 0)
         );
         assert!(matches!(orders[1], LoopCommand::Wave(_)));
         console.stop_wave();

@@ -70,7 +70,7 @@ whole, the book does not balance or a card would be driven on assumptions,
 /// What the controller runs on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Hardware {
-    SimulatedDevices(String),
+    Simulated(String),
     /// A card, by device file.
     Comedi(PathBuf),
 }

@@ -13,7 +13,7 @@ pub enum Plant {
     /// Every gauge in the middle of its range.
     Still,
     /// A served one.
-    BoardServer(BoardServer),
+    Served(BoardServer),
 }
 
 pub struct BoardServer {

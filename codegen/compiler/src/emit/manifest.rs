@@ -11,6 +11,7 @@ description = \"Controller of platform {name}\"
 version = \"{version}\"
 edition = \"2024\"
 rust-version = \"1.85\"
+license = \"0BSD\"
 publish = false
 
 [features]

@@ -1,4 +1,4 @@
-//! The folders that are copied verbatim into a workspace, each with what it needs beside it. The build script lists their files: a new
+//! The folders that are copied into a workspace, each with what it needs beside it. The build script lists their files: a new
 //! file is in by being there, and so is a new board; another new folder is one more entry of [`PARTS`] and one more line of the script.
 
 use std::collections::BTreeSet;
@@ -39,7 +39,7 @@ const PARTS: [Part; 11] = [
     Part {
         folder: "law",
         member: true,
-        what: "the control law and its supervised tick: start at `src/platform/step.rs`, or `src/legs/step.rs` for six legs",
+        what: "the control law and its supervised tick, of platforms and of six legs",
         needs: "nothing",
         with: &[],
     },
@@ -48,63 +48,63 @@ const PARTS: [Part; 11] = [
         folder: "host",
         member: true,
         what: "the same controller as a shared library: `cargo build --release`",
-        needs: "a host toolchain",
+        needs: "nothing",
         with: &[],
     },
     Part {
         folder: "qemu",
         member: false,
         what: "the same controller on an emulated Cortex-M: see its README",
-        needs: "target `thumbv7em-none-eabihf`, QEMU",
+        needs: "target `thumbv7em-none-eabihf`, QEMU, Rust 1.88, packages of `link`",
         with: &["link"],
     },
     Part {
         folder: "link",
         member: false,
         what: "the protocol between a board and the host",
-        needs: "nothing",
+        needs: "packages `cobs`, `crc`, `postcard`, `serde`",
         with: &[],
     },
     Part {
         folder: "hal",
         member: false,
         what: "gauges and amplifiers: traits and drivers",
-        needs: "nothing",
+        needs: "package `embedded-hal`",
         with: &[],
     },
     Part {
         folder: "board",
         member: false,
-        what: "what all boards have in common: one tick on real converters, what is said over the link",
-        needs: "nothing",
+        what: "what all boards have in common: one tick on real converters, the messages of the link",
+        needs: "packages of `hal` and `link`",
         with: &["hal", "link"],
     },
     Part {
         folder: "stm32",
         member: false,
         what: "what the STM32 boards have in common",
-        needs: "nothing by itself",
+        needs: "packages of `hal` and `link`, `cortex-m`, `cortex-m-rt`, `stm32-metapac`",
         with: &["board", "hal", "link"],
     },
     Part {
         folder: "tick",
         member: false,
         what: "a board's tick between stand-ins for its converters, on an emulated Cortex-M: what its time is estimated from",
-        needs: "target `thumbv7em-none-eabihf`, QEMU",
+        needs: "target `thumbv7em-none-eabihf`, QEMU, Rust 1.88, packages of `hal` and `link`",
         with: &["board", "hal", "link", "qemu", "stm32"],
     },
     Part {
         folder: "rt",
         member: false,
         what: "what a control loop needs of Linux: clock, rights, book of late ticks, shared memory",
-        needs: "Linux",
+        needs: "Linux, package `libc`",
         with: &[],
     },
     Part {
         folder: "rt-pc",
         member: false,
         what: "the controller on a real-time Linux PC",
-        needs: "a host toolchain, Linux",
+        needs: "Linux, packages of its `Cargo.toml`; feature `comedi`: Rust 1.88",
         with: &["hal", "link", "rt"],
     },
 ];

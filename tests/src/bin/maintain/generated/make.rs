@@ -95,8 +95,8 @@ pub fn controller_with_passes(root: &Path) -> Result<Files, String> {
     let mut shared = Vec::new();
     for (path, text) in emitted(compile_source(source)).map_err(|refused| said(&path, &refused))? {
         let Some(name) = path.strip_prefix("src/") else { continue };
-        // The first line of an emitted file names the spec.
-        let body = |text: &str| text.split_once('\n').map(|(_, body)| body.to_owned());
+        // The second line of an emitted file names the spec.
+        let body = |text: &str| text.splitn(3, '\n').nth(2).map(str::to_owned);
         let same = reference.get(&path).is_some_and(|reference| body(reference) == body(&text));
         if same && name != "lib.rs" {
             shared.extend(name.strip_suffix(".rs").map(str::to_owned));
