@@ -23,6 +23,7 @@ mod lsp;
 mod named;
 mod new;
 mod operate;
+mod panel;
 mod pil;
 mod plant;
 mod plot;
@@ -121,8 +122,8 @@ enum Command {
     Pil(pil::Arguments),
     /// Operate a machine over the link: arm, run, set-points, settings, waves, records; from a script or line by line.
     Operate(operate::Arguments),
-    /// Show a machine on one page in the browser, and operate it there: pose, strips, spectrum, events; one page has the orders.
-    Panel(operate::panel::Arguments),
+    /// Show a machine on one page in the browser, and operate it there: pose, strips, spectrum, events; one page is in control.
+    Panel(panel::Arguments),
     /// Let programs that speak the General Command Set 2.0 of piezo stages and hexapods move a machine: a bridge on the link.
     Gcs(gcs::Arguments),
     /// Run a recording of a target again on the host and compare every tick by bits; export it as CSV.
@@ -251,7 +252,7 @@ fn perform(cli: &Cli, matches: &ArgMatches, ui: &mut Ui) -> Result<(), Failure> 
         Some(Command::Reproduce(arguments)) => reproduce::run(arguments, ui),
         Some(Command::Pil(arguments)) => pil::run(arguments, ui),
         Some(Command::Operate(arguments)) => operate::run(arguments, ui),
-        Some(Command::Panel(arguments)) => operate::panel::run(arguments, ui),
+        Some(Command::Panel(arguments)) => panel::run(arguments, ui),
         Some(Command::Gcs(arguments)) => gcs::run(arguments, ui),
         Some(Command::Replay(arguments)) => replay::run(arguments, ui),
         Some(Command::Export(arguments)) => export::run(arguments, ui),

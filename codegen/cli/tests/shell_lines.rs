@@ -26,7 +26,7 @@ const BUILT: &[(&str, usize, &str)] = &[
     ("codegen/report/src/robust/figures.rs", 1, "a_machine_is_run_again_by_its_line"),
     ("codegen/studies/src/trajectory.rs", 1, "a_machine_is_run_again_by_its_line"),
     ("codegen/report/src/robust/work.rs", 1, "a_machine_is_run_again_by_its_line"),
-    ("codegen/cli/src/cli/ui.rs", 1, "next_commands_name_the_files_that_were_named"),
+    ("codegen/language/src/ui.rs", 1, "next_commands_name_the_files_that_were_named"),
     ("codegen/identify/src/columns/foreign.rs", 4, "records_in_other_forms_become_text_and_stay"),
     ("codegen/identify/src/coverage.rs", 1, "a_drive_is_written_beside_the_record"),
     ("codegen/language/src/spec/source.rs", 1, "specs_in_other_encodings_become_text_and_stay"),

@@ -4,11 +4,14 @@
 
 pub mod equipment;
 pub mod latency;
+mod report;
 pub mod system;
 
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+
+pub use report::{Report, Verdict, examine};
 
 /// How a finding bears on real time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]

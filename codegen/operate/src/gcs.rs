@@ -4,7 +4,7 @@
 //! clients ─ TCP ─► Input ─ lines, single bytes ─► commands ─► Stage ─ Session ─ link ─► device
 //!                                                              └─ asked at least every 20 ms, whatever clients do
 //! ```
-//! What is understood, and how it differs, is in `docs/gcs.md`. One client has the orders; every client may look, and stop.
+//! What is understood, and how it differs, is in `docs/gcs.md`. One client is in control; every client may watch, and stop.
 
 mod axes;
 mod code;
@@ -15,6 +15,56 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
+use std::net::{SocketAddr, TcpListener};
+
+use specgen_language::interrupt;
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
+use specgen_link::client::Port;
+
+use crate::commands::{Operator, Service, lost_link};
+use crate::session::Session;
 pub use axes::Axes;
-pub use server::Bridge;
-pub use stage::Stage;
+use server::Bridge;
+use stage::Stage;
+
+/// Serves clients at an address until Ctrl-C, then ramps down. `alike` are the sets of faults that look alike to the wiring check.
+///
+/// # Errors
+/// The device is no platform, the address is not free, or the link broke.
+pub fn serve<P: Port>(
+    session: Session<P>,
+    name: &str,
+    axes: Axes,
+    alike: Vec<Vec<u32>>,
+    listen: SocketAddr,
+    ui: &Ui,
+) -> Result<Service, Failure> {
+    let stage = Stage::new(session).map_err(|error| Failure::Gate(format!("{name}: {error}")))?;
+    let refused = |error: std::io::Error| Failure::Environment(format!("cannot listen at {listen}: {error}"));
+    let listener = TcpListener::bind(listen).map_err(refused)?;
+    let address = listener.local_addr().map_err(refused)?;
+    let stop = interrupt::heed();
+    let mut bridge = Bridge::new(stage, axes, listener).map_err(refused)?;
+    if !address.ip().is_loopback() {
+        ui.progress("warning: whoever reaches this address can move the machine");
+    }
+    ui.progress(&format!("{name}: GCS at {address}; Ctrl-C ramps down and ends"));
+    let mut shown = String::new();
+    let ending = bridge.run(stop, |session| {
+        let state = session.stands(&alike);
+        if state != shown {
+            ui.progress(&format!("tick {}: {state}", session.status().tick));
+            shown = state;
+        }
+    });
+    ending.map_err(|error| lost_link(name, &error))?;
+    let mut operator = Operator::new(bridge.into_session(), stop);
+    operator.alike = alike;
+    let stands = if operator.is_powered() {
+        operator.ramp_down(ui).map_err(|error| lost_link(name, &error))?
+    } else {
+        operator.state()
+    };
+    Ok(Service { device: name.to_owned(), listened: address.to_string(), stands })
+}

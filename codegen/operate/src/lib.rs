@@ -1,18 +1,22 @@
 //! A host that operates a machine over the link: commands in, requests out, and the link kept alive in between.
 //!
 //! ```text
-//! line ─► Order ─► Session ─ link ─► device (a board at a serial port, a program at a socket)
-//!                     └─ status, every 20 ms: after 0.1 s of silence a device holds
+//! line ─► Command ─► Operator ─► Session ─ link ─► device (a board at a serial port, a program at a socket)
+//!                                    └─ status, every 20 ms: after 0.1 s of silence a device holds
 //! ```
-//! [`pil`] runs host library and device in lock-step. [`gcs`] serves the General Command Set: `input` (bytes to commands), `commands`,
+//! [`commands`] carries out the commands of `specgen operate`, [`panel`] those of a page in the browser. [`pil`] runs host library and device in lock-step. [`gcs`] serves the General Command Set: `input` (bytes to commands), `commands`,
 //! `stage` (servo, target, limits), `server` (clients, one of which is in control). [`served`] is the simulated machine behind converters,
 //! and [`doctor`] checks a PC for real time.
 
+mod command;
+pub mod commands;
 pub mod doctor;
 pub mod frame;
 pub mod gcs;
+pub mod learning;
+mod line;
 pub mod motion;
-mod order;
+pub mod panel;
 pub mod pil;
 pub mod place;
 pub mod samples;
@@ -21,7 +25,8 @@ mod session;
 mod socket;
 mod wave;
 
-pub use order::{FrameChoice, ModeRequest, Order, WaitCondition};
+pub use command::{Command, FrameRequest, ModeRequest, WaitCondition};
+pub use line::Line;
 pub use session::{ALIVE, FRESH, GAUGES, Place, Session};
 pub use socket::SocketLine;
 pub use wave::{read_wave, refused_wave};

@@ -10,6 +10,9 @@
 mod difference;
 mod lockstep;
 mod pipes;
+mod plan;
+mod report;
+mod run;
 mod serial;
 mod session;
 pub(crate) mod wait;
@@ -17,5 +20,8 @@ pub(crate) mod wait;
 pub use difference::Difference;
 pub use lockstep::{Cost, Lockstep, Stop};
 pub use pipes::Pipes;
+pub use plan::{Options, Run};
+pub use report::Report;
+pub use run::run;
 pub use serial::{BAUD, SerialLine};
 pub use session::{OpenError, OpenSession, open};

@@ -5,6 +5,8 @@
 //! Time is the controller's ticks. What the machine does while no controller speaks is left out; what it does while a
 //! controller skips ticks is not.
 
+mod serve;
+
 use host_sim::closed_loop::Rig;
 use host_sim::plant::LegPlant;
 use host_sim::platform::PlatformRig;
@@ -13,6 +15,8 @@ use specgen_runtime::supervisor::{Finding, with};
 
 use specgen_compiler::ir::{self, Ir};
 use specgen_language::model::Model;
+
+pub use serve::{Options, Summary, serve};
 
 /// Ticks that are simulated at once at most: of a controller that was away for longer the rest is left out.
 const MOST_TICKS: u64 = 200_000;

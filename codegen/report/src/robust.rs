@@ -157,7 +157,7 @@ pub fn merge(parts: &[impl AsRef<Path>], output: Option<&Path>, plot: &Plot, ui:
     // That of the parts: a study has no other.
     ui.runs(ControllerForm::RunTime);
     let _claimed = output.map(claim).transpose()?;
-    let results = Results { output: output, plot };
+    let results = Results { output, plot };
     results.put(&work, false, plan.members.len(), &runs, ui, || {})
 }
 

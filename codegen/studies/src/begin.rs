@@ -243,7 +243,7 @@ fn compute(draft: &mut Draft) {
     if !draft.has("gauge[0].point") {
         draft.set("sensor.range", format!("[{}, {}]", um(-0.05 * stroke), um(1.15 * stroke)), Origin::Computed);
     }
-    // WaitCondition it is known what the legs reach: what any platform reaches, and gauges that see it.
+    // Until it is known what the legs reach: what any platform reaches, and gauges that see it.
     draft.compute("workspace.translation", REACH_FROM, format!("[\"1 um\", \"1 um\", {}]", um(stroke / 5.0)));
     draft.compute("workspace.rotation", REACH_FROM, "[\"1 urad\", \"1 urad\", \"1 urad\"]".to_owned());
     draft.compute("control.setpoint.bias", REACH_FROM, bias(stroke / 6.0));

@@ -79,7 +79,7 @@ impl Options {
     }
 }
 
-/// CodeOwner makes the corrections, and by what.
+/// Who makes the corrections, and by what.
 enum Rule {
     Host(Box<Update>),
     Device(Plan),

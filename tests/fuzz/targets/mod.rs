@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use specgen::diagnostic::{Diagnostic, Place, Severity, render, to_json};
 use specgen::findings;
 use specgen::identify::{gauge, parse_record, read_table_csv, response, stiffness, write_table_csv};
-use specgen::operate::{Order, read_wave};
+use specgen::operate::{Command, read_wave};
 use specgen::spec::{self, SpecSource};
 use specgen::{lint, waveform};
 
@@ -105,7 +105,7 @@ fn accepted<T>(outcome: Result<T, Vec<Diagnostic>>) -> Option<T> {
 fn operator(input: &[u8]) {
     let text = String::from_utf8_lossy(input);
     for line in text.lines() {
-        if let Err(why) = Order::parse(line) {
+        if let Err(why) = Command::parse(line) {
             assert!(!why.is_empty());
         }
     }

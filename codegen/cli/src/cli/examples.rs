@@ -187,7 +187,7 @@ Examples:
       for others on the network who know the token
 
 The address that it prints has the token in it: whoever has it may look, and take
-the orders. One page has them at a time; hold and ramp down work from every page.
+control. One page is in control at a time; hold and ramp down work from every page.
 A page that has them and is closed is a host that is lost: the machine holds, then
 ramps down. Ctrl-C ramps down first. docs/panel.md has the rest.";
 

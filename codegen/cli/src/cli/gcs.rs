@@ -1,17 +1,16 @@
 //! `specgen gcs`: programs that speak the General Command Set move a machine over the link.
 
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 
 use clap::{ArgGroup, Args};
 use specgen_compiler::spec_file;
 use specgen_language::interrupt;
-use specgen_operate::gcs::{Axes, Bridge, Stage};
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
+use specgen_operate::gcs::{self, Axes};
 
 use super::line::Line;
 use super::named::InputFile;
-use super::operate::{Operator, Served};
-use specgen_language::outcome::Failure;
-use specgen_language::ui::Ui;
 
 /// Arguments of `gcs`.
 #[derive(Args, Debug)]
@@ -37,37 +36,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let digest = compiled.as_ref().map(|compiled| compiled.ir.digest.as_str());
     interrupt::heed();
     let (session, name) = arguments.line.open(digest)?;
-    let listen = arguments.listen;
-    let stage = Stage::new(session).map_err(|error| Failure::Gate(format!("{name}: {error}")))?;
-    let no = |error: std::io::Error| Failure::Environment(format!("cannot listen at {listen}: {error}"));
-    let listener = TcpListener::bind(listen).map_err(no)?;
-    let address = listener.local_addr().map_err(no)?;
-    let stop = interrupt::heed();
-    let mut bridge = Bridge::new(stage, axes, listener).map_err(no)?;
-    if !address.ip().is_loopback() {
-        ui.progress("warning: whoever reaches this address can move the machine");
-    }
-    ui.progress(&format!("{name}: GCS at {address}; Ctrl-C ramps down and ends"));
     let alike = compiled.as_ref().map(|compiled| compiled.ir.supervision.alike().to_vec()).unwrap_or_default();
-    let mut shown = String::new();
-    let ended = bridge.run(stop, |session| {
-        let status = session.status();
-        let stands = session.stands(&alike);
-        if stands != shown {
-            ui.progress(&format!("tick {}: {stands}", status.tick));
-            shown = stands;
-        }
-    });
-    let lost = |error: &dyn std::fmt::Display| {
-        Failure::Environment(format!(
-            "{name}: {error}; a machine that lost its host holds, then ramps down (supervisor.host_lost)"
-        ))
-    };
-    ended.map_err(|error| lost(&error))?;
-    let mut operator = Operator::new(bridge.into_session(), stop);
-    operator.alike = alike;
-    let stands =
-        if operator.is_powered() { operator.ramp_down(ui).map_err(|error| lost(&error))? } else { operator.stands() };
-    ui.result(&Served { device: name, listened: address.to_string(), stands });
+    ui.result(&gcs::serve(session, &name, axes, alike, arguments.listen, ui)?);
     Ok(())
 }

@@ -1,26 +1,19 @@
 //! `specgen learn`: a motion that repeats, learned between passes, on the simulated machine of a spec or over the link on a real one.
 
-mod machine;
-
 use std::path::Path;
 
 use clap::Args;
-use specgen_compiler::compile::Compilation;
 use specgen_compiler::spec_file;
-use specgen_language::interrupt;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
+use specgen_operate::learning;
 use specgen_report::learning::BANDWIDTH;
 use specgen_studies::factors::UserRange;
-use specgen_studies::learning::{LearnError, RepeatableMachine};
-use specgen_studies::lessons::{self, Bed, Done, Options, failure};
-use specgen_studies::trajectory::Followed;
+use specgen_studies::lessons::{self, Options};
 
 use super::line::Line;
 use super::named::{InputFile, OutputFile};
-use super::operate::{Ended, Operator, motion_name};
 use super::sim::{PlantArguments, frequency};
-use machine::{Own, Remote};
 
 /// Arguments of `learn`.
 #[derive(Args, Debug)]
@@ -106,77 +99,5 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         return lessons::simulated(&options, spec_file::compiled(spec, ui)?, ui);
     }
     let compiled = spec_file::looked_up(spec, ui)?;
-    let own = Own::named(arguments.trajectory.as_deref(), &compiled)?;
-    lessons::run(&options, compiled, &mut OnLine { line: &arguments.line, spec, own }, ui)
-}
-
-/// A machine at the end of a link.
-struct OnLine<'a> {
-    line: &'a Line,
-    /// Of the command, for a message.
-    spec: &'a Path,
-    own: Own,
-}
-
-impl Bed for OnLine<'_> {
-    fn motion_name(&self, followed: &Followed) -> String {
-        motion_name(&followed.name)
-    }
-
-    fn start(&self) -> Option<[f64; 6]> {
-        Some(self.own.start)
-    }
-
-    fn work<T, F>(
-        &mut self,
-        compiled: &Compilation,
-        ui: &mut Ui,
-        work: impl FnOnce(&mut dyn RepeatableMachine, &Ui) -> Result<T, LearnError>,
-        keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
-    ) -> Result<Done<F>, Failure> {
-        interrupt::heed();
-        let ir = &compiled.ir;
-        let (session, name) = self.line.open(Some(&ir.digest))?;
-        let lost = |error: &dyn std::fmt::Display| {
-            Failure::Environment(format!(
-                "{name}: {error}; a machine that lost its host holds, then ramps down (supervisor.host_lost)"
-            ))
-        };
-        let mut operator = Operator::new(session, interrupt::heed());
-        if !operator.is_set_to(&ir.integrity.settings).map_err(|error| lost(&error))? {
-            return Err(Failure::Gate(format!(
-                "{name}: its settings are not those of the spec, for which learning is proven to converge; `config write {}` in \
-                 specgen operate restores them",
-                self.spec.display()
-            )));
-        }
-        let mut remote = Remote { operator: &mut operator, ui, own: &self.own, has: None, ended: None };
-        let done = match remote.arm() {
-            Ok(()) => work(&mut remote, ui),
-            Err(ended) => {
-                remote.ended = Some(ended);
-                Err(LearnError::Ended)
-            }
-        };
-        let ended = remote.ended;
-        let down = match &ended {
-            Some(Ended::Link(error)) => Err(lost(error)),
-            _ if operator.is_powered() => operator.ramp_down(ui).map_err(|error| lost(&error)),
-            _ => Ok(format!("the machine is {}, amplifiers off", operator.stands())),
-        };
-        // What was found is kept, however the machine ended.
-        let found = match done {
-            Ok(done) => Some(keep(done, ui)?),
-            Err(LearnError::Ended) => None,
-            Err(error) => return Err(down.err().unwrap_or_else(|| failure(&error, format!("{name}: {error}")))),
-        };
-        let down = format!("; {}", down?);
-        let why = match ended {
-            Some(Ended::Refused(text) | Ended::Fault(text)) => Some(format!("{name}: {text}")),
-            Some(Ended::Failed(failure)) => return Err(failure),
-            Some(Ended::Stopped) => Some(format!("{name}: the program that serves the link has ended")),
-            Some(Ended::Link(_) | Ended::Interrupted) | None => None,
-        };
-        Ok(Done { found, why, down })
-    }
+    learning::run(arguments.line.end()?, spec, &options, compiled, ui)
 }

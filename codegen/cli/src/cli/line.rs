@@ -1,12 +1,12 @@
 //! Where the device of a command is.
 
 use clap::Args;
-use specgen_link::client::{Port, Timeout};
-use specgen_operate::pil::{BAUD, OpenError, SerialLine};
-use specgen_operate::{Session, SocketLine};
+use specgen_language::outcome::Failure;
+use specgen_link::client::Port;
+use specgen_operate::Session;
+use specgen_operate::pil::BAUD;
 
 use super::named::Endpoint;
-use specgen_language::outcome::Failure;
 
 /// A serial port or a socket.
 #[derive(Args, Debug)]
@@ -28,23 +28,17 @@ impl Line {
         self.port.is_some() || self.socket.is_some()
     }
 
-    /// Opens a session with the device, and its name. With a `digest` only the controller of that spec will do.
+    /// The end of the link that the device is at.
+    pub fn end(&self) -> Result<specgen_operate::Line<'_>, Failure> {
+        match (&self.port, &self.socket) {
+            (Some(path), _) => Ok(specgen_operate::Line::Serial(path, self.baud)),
+            (None, Some(path)) => Ok(specgen_operate::Line::Socket(path)),
+            (None, None) => Err(Failure::Usage("name the device with --port or --socket".to_owned())),
+        }
+    }
+
+    /// Opens a session with the device, and returns its name. With a `digest` only the controller of that spec is accepted.
     pub fn open(&self, digest: Option<&str>) -> Result<(Session<Box<dyn Port>>, String), Failure> {
-        let (line, timeout, path): (Box<dyn Port>, _, _) = match (&self.port, &self.socket) {
-            (Some(path), _) => {
-                let line = SerialLine::open(path, self.baud).map_err(Failure::Environment)?;
-                (Box::new(line), Timeout::SERIAL, path)
-            }
-            (None, Some(path)) => {
-                (Box::new(SocketLine::open(path).map_err(Failure::Environment)?), Timeout::SOCKET, path)
-            }
-            (None, None) => return Err(Failure::Usage("name the device with --port or --socket".to_owned())),
-        };
-        let name = path.display().to_string();
-        let session = Session::open(line, timeout, digest).map_err(|error| match error {
-            OpenError::Other(text) => Failure::Gate(format!("{name}: {text}")),
-            OpenError::Link(_) => Failure::Environment(format!("{name}: {error}")),
-        })?;
-        Ok((session, name))
+        self.end()?.open(digest)
     }
 }

@@ -73,7 +73,7 @@ impl Server<'_> {
             if self.take(message)? {
                 return Ok(());
             }
-            // CodeOwner types fast is answered once for all that has come.
+            // Who types fast is answered once for all that has come.
             while let Ok(message) = self.connection.receiver.try_recv() {
                 if self.take(message)? {
                     return Ok(());

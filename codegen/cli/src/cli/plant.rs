@@ -1,27 +1,18 @@
 //! `specgen plant`: the simulated machine of a spec in shared memory, for the real-time target on the same computer.
 
-use std::sync::atomic::Ordering;
-
 use clap::Args;
-use serde::Serialize;
 use specgen_compiler::{lower, spec_file};
-use specgen_rt::clock::{self, SECOND};
-use specgen_rt::exchange::{self, OpenError, Server};
-use specgen_rt::histogram::{Histogram, known_text, time_text};
-use specgen_rt::scheduling;
+use specgen_rt::exchange;
 
 use super::named::InputFile;
 use super::sim::PlantArguments;
 use specgen_compiler::compile::Compilation;
-use specgen_language::interrupt;
-use specgen_language::outcome::{Failure, Outcome, environment};
+use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
-use specgen_operate::served::{Plant, PlantServer};
+use specgen_operate::served::{Options, Plant, serve};
 use specgen_runtime::supervisor::Finding;
 use specgen_studies::machine;
 
-/// How long it waits for a controller before it looks whether it is to end, ns.
-const TIMEOUT: u64 = SECOND / 10;
 /// Samples per period of the paper's trajectory, which is not run here.
 const NO_TRAJECTORY: u32 = 1;
 
@@ -72,86 +63,18 @@ fn seconds(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|time| (0.01..=1e7).contains(time)).ok_or_else(expected)
 }
 
-/// What was served, and the times of a tick.
-#[derive(Serialize)]
-struct Summary {
-    #[serde(skip)]
-    name: String,
-    #[serde(skip)]
-    period_ns: u64,
-    digest: String,
-    ticks: u64,
-    controllers: u64,
-    /// None of these where no tick was asked for.
-    p50_ns: Option<u64>,
-    p99_ns: Option<u64>,
-    max_ns: Option<u64>,
-}
-
-impl Outcome for Summary {
-    fn text(&self) -> String {
-        let Self { name, ticks, controllers, .. } = self;
-        let [median, most, longest] = [self.p50_ns, self.p99_ns, self.max_ns].map(known_text);
-        let period = time_text(self.period_ns);
-        format!(
-            "{name}: {ticks} ticks for {controllers} controllers; a tick took {median} (median), {most} (99 %), {longest} (longest) of {period}\n"
-        )
-    }
-}
-
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let path = exchange::path_of(&arguments.name).map_err(|error| Failure::Usage(format!("--name: {error}")))?;
     let compiled = spec_file::looked_up(&arguments.spec, ui)?;
     let plant = prepared(arguments, &compiled, ui)?;
-    let faults = arguments.wrong.iter().flat_map(|faults| faults.0.clone()).collect();
-    let mut served = PlantServer::new(plant, &compiled.model, &compiled.ir).with_faults(faults);
-    for refused in
-        [arguments.cpu.map_or(Ok(()), scheduling::pin), arguments.priority.map_or(Ok(()), scheduling::set_fifo)]
-    {
-        refused.map_err(environment)?;
-    }
-    // Whatever ends it, the file is to go, and what was served is shown.
-    let stop = interrupt::heed();
-    let server = Server::create(&path, &compiled.ir.digest).map_err(|error| match error {
-        OpenError::Served { .. } => Failure::Usage(error.to_string()),
-        error => environment(error),
-    })?;
-    let [name, own] = [&compiled.ir.name, &arguments.name];
-    ui.progress(&format!("machine of {name} at {}: start rt-pc --sim {own}; Ctrl-C ends it", path.display()));
-
-    // Where there is a processor to spare it does not sleep between two ticks: waking it costs the controller time. Under
-    // SCHED_FIFO it has to, or the kernel stops it for 50 ms in every second.
-    let period = (compiled.model.timing.period * 1e9) as u64;
-    let spare = std::thread::available_parallelism().map_or(1, usize::from) > 1;
-    let look = if spare && arguments.priority.is_none() { 2 * period } else { 0 };
-    let mut times = Histogram::new();
-    let end = arguments.seconds.map(|seconds| clock::now() + (seconds * SECOND as f64) as u64);
-    let mut seen = 0;
-    while !stop.load(Ordering::Relaxed) && end.is_none_or(|end| clock::now() < end) {
-        let heard = server.wait(&mut seen, look, TIMEOUT);
-        if server.is_lost() {
-            return Err(Failure::Environment(format!(
-                "{}: the memory that machine and controller share has lost its mark: the file was made shorter, or overwritten; start both again",
-                path.display()
-            )));
-        }
-        if let Some((actuation, wanted)) = heard {
-            let start = clock::now();
-            let sensing = served.answer(&actuation, wanted);
-            server.publish(&sensing);
-            times.add(clock::now() - start);
-        }
-    }
-    ui.result(&Summary {
-        name: compiled.ir.name.clone(),
-        period_ns: period,
-        digest: compiled.ir.digest.clone(),
-        ticks: served.ticks,
-        controllers: served.sessions,
-        p50_ns: times.quantile(0.5),
-        p99_ns: times.quantile(0.99),
-        max_ns: times.largest(),
-    });
+    let options = Options {
+        name: &arguments.name,
+        faults: arguments.wrong.iter().flat_map(|faults| faults.0.clone()).collect(),
+        processor: arguments.cpu,
+        priority: arguments.priority,
+        seconds: arguments.seconds,
+    };
+    ui.result(&serve(plant, &compiled, &path, options, ui)?);
     Ok(())
 }
 

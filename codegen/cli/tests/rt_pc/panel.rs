@@ -153,8 +153,8 @@ impl Page {
         self.wait(phase, |state| state["phase"] == phase);
     }
 
-    /// An order's answer.
-    fn order(&mut self, mut what: Value) -> Value {
+    /// A command's answer.
+    fn command(&mut self, mut what: Value) -> Value {
         self.asked += 1;
         what["id"] = json!(self.asked);
         self.say(&what);
@@ -171,25 +171,25 @@ impl Page {
     }
 
     fn line(&mut self, line: &str) -> Value {
-        self.order(json!({ "do": "order", "line": line }))
+        self.command(json!({ "do": "command", "line": line }))
     }
 
     #[track_caller]
     fn done(&mut self, what: Value) -> Value {
-        let answer = self.order(what);
+        let answer = self.command(what);
         assert_eq!(answer["ok"], true, "{answer}");
         answer["value"].clone()
     }
 
     #[track_caller]
     fn refused(&mut self, what: Value, why: &str) {
-        let answer = self.order(what);
+        let answer = self.command(what);
         assert!(answer["ok"] == false && answer["why"].as_str().unwrap().contains(why), "{why}: {answer}");
     }
 
-    pub fn takes_the_orders(&mut self) {
-        self.say(&json!({ "do": "ask" }));
-        self.wait("the orders", |state| state["mine"] == true);
+    pub fn takes_control(&mut self) {
+        self.say(&json!({ "do": "request-control" }));
+        self.wait("control", |state| state["mine"] == true);
     }
 
     /// Armed and running at its bias.
@@ -222,7 +222,7 @@ fn program(bench: &Bench, name: &str, plant: &str, link: &Path) -> Running {
 }
 
 #[test]
-fn pages_operate_a_machine_one_has_the_orders_and_a_page_that_leaves_is_a_host_that_is_lost() {
+fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_that_is_lost() {
     let bench = Bench::named("reference.toml", "panel");
     let link = bench.path("panel.link");
     let running = program(&bench, "panel.rec", &bench.name, &link);
@@ -231,14 +231,14 @@ fn pages_operate_a_machine_one_has_the_orders_and_a_page_that_leaves_is_a_host_t
 
     let mut first = panel.page();
     first.phase("disarmed");
-    first.refused(json!({ "do": "begin", "request": "arm" }), "does not have the orders");
-    first.takes_the_orders();
+    first.refused(json!({ "do": "begin", "request": "arm" }), "is not in control");
+    first.takes_control();
     first.runs();
 
-    // The other looks; hold works from there, moving does not, and the orders come when nobody answers in ten seconds or at once.
+    // The other looks; hold works from there, moving does not, and control comes when nobody answers in ten seconds or at once.
     let mut second = panel.page();
-    second.wait("somebody else's orders", |state| state["holder"] == "page 1" || state["holder"].is_string());
-    second.refused(json!({ "do": "order", "line": "jog x=100nm" }), "does not have the orders");
+    second.wait("another page in control", |state| state["holder"] == "page 1" || state["holder"].is_string());
+    second.refused(json!({ "do": "command", "line": "jog x=100nm" }), "is not in control");
     let answer = first.line("jog z=1um");
     assert_eq!(answer["ok"], true, "{answer}");
     second.say(&json!({ "do": "hold" }));
@@ -247,8 +247,8 @@ fn pages_operate_a_machine_one_has_the_orders_and_a_page_that_leaves_is_a_host_t
     first.phase("running");
     drop(second);
 
-    // What is unstable is not sent; what is no order does nothing.
-    let answer = first.order(json!({ "do": "gain", "factor": 30.0 }));
+    // What is unstable is not sent; what is no command does nothing.
+    let answer = first.command(json!({ "do": "gain", "factor": 30.0 }));
     assert!(answer["ok"] == false && answer["why"].as_str().unwrap().starts_with("not sent: E"), "{answer}");
     let gains = first.done(json!({ "do": "gain", "factor": 0.5 }));
     assert!(gains["gain_ratio_limit"].as_f64().unwrap() > 1.1, "{gains}");
@@ -260,16 +260,16 @@ fn pages_operate_a_machine_one_has_the_orders_and_a_page_that_leaves_is_a_host_t
     // A wave by the text of its file, a record over the socket.
     let wave = "ramp = 0.1\n[[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-7, frequency = 5.0 }\n";
     first.refused(json!({ "do": "wave", "name": "w", "text": "ramp = 1" }), "axis");
-    first.done(json!({ "do": "order", "line": "goto zero" }));
-    first.done(json!({ "do": "order", "line": "record arm 500" }));
+    first.done(json!({ "do": "command", "line": "goto zero" }));
+    first.done(json!({ "do": "command", "line": "record arm 500" }));
     // It begins at its center.
     let start = Instant::now();
-    while first.order(json!({ "do": "wave", "name": "small.toml", "text": wave }))["ok"] == false {
+    while first.command(json!({ "do": "wave", "name": "small.toml", "text": wave }))["ok"] == false {
         assert!(start.elapsed() < LONG, "no wave: {:#}", first.state);
     }
-    first.refused(json!({ "do": "order", "line": "jog z=100nm" }), "under way");
-    first.done(json!({ "do": "order", "line": "wave stop" }));
-    first.done(json!({ "do": "order", "line": "record stop" }));
+    first.refused(json!({ "do": "command", "line": "jog z=100nm" }), "under way");
+    first.done(json!({ "do": "command", "line": "wave stop" }));
+    first.done(json!({ "do": "command", "line": "record stop" }));
     first.say(&json!({ "do": "download", "id": 999 }));
     let bytes = loop {
         if let Some(Message::Binary(bytes)) = first.hear() {
@@ -284,10 +284,10 @@ fn pages_operate_a_machine_one_has_the_orders_and_a_page_that_leaves_is_a_host_t
 
     // Handed over, then the page is closed: the machine holds.
     let mut second = panel.page();
-    second.say(&json!({ "do": "ask" }));
+    second.say(&json!({ "do": "request-control" }));
     first.wait("asked", |state| state["asked"]["by"].is_string());
-    first.say(&json!({ "do": "give" }));
-    second.wait("the orders", |state| state["mine"] == true);
+    first.say(&json!({ "do": "grant-control" }));
+    second.wait("control", |state| state["mine"] == true);
     first.wait("without them", |state| state["mine"] == false);
     drop(second);
     first.wait("left alone", |state| state["k"] == "left");
@@ -295,7 +295,7 @@ fn pages_operate_a_machine_one_has_the_orders_and_a_page_that_leaves_is_a_host_t
     let mut watcher = Host::open(&link, 1).unwrap();
     let is_lost = |status: &Status| (status.phase, status.cause) == (HOLDING, LINK_LOST);
     watcher.wait("the loss", is_lost);
-    first.takes_the_orders();
+    first.takes_control();
     first.wait("held for the lost host", |state| state["status"]["phase"] == HOLDING);
     assert_eq!(first.state["said"]["what"], "Holding. The host was silent.");
     // A page that says nothing any more is gone, too.
@@ -308,7 +308,7 @@ fn pages_operate_a_machine_one_has_the_orders_and_a_page_that_leaves_is_a_host_t
     drop(watcher);
     third.say(&json!({ "do": "ramp-down" }));
     third.phase("faulted");
-    assert!(third.events.iter().any(|text| text.contains("asked to ramp down")), "{:?}", third.events);
+    assert!(third.events.iter().any(|text| text.contains("requested: ramp down")), "{:?}", third.events);
     drop((first, third));
     if crate::support::length(false, true) {
         browser::a_browser_draws_it(&panel);
@@ -343,7 +343,7 @@ fn garbage_disturbs_nothing(panel: &Panel, page: &mut Page) {
         let mut stream = TcpStream::connect(&panel.address).unwrap();
         let _ = stream.write_all(bytes);
     }
-    // Frames that are none, texts that are no orders, numbers beyond what was sent, a message that is too long.
+    // Frames that are none, texts that are no commands, numbers beyond what was sent, a message that is too long.
     let mut stranger = panel.page();
     for text in [
         "",
@@ -438,8 +438,8 @@ fn the_wiring_check_names_gauges_that_are_exchanged_or_turned_and_lets_a_good_ma
         let panel = Panel::new(&bench.spec, &link);
         let mut page = panel.page();
         page.phase("disarmed");
-        page.takes_the_orders();
-        let answer = page.order(json!({ "do": "check" }));
+        page.takes_control();
+        let answer = page.command(json!({ "do": "check" }));
         assert_eq!(answer["ok"], true, "{answer}");
         let verdict = &answer["value"];
         assert_eq!(verdict["good"], expected.is_none(), "{verdict:#}");

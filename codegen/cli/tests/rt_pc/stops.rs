@@ -414,12 +414,12 @@ fn crowds(bridge: &Bridge, look: &mut Look) {
 fn pages(bench: &Bench, link: &Path, look: &mut Look) {
     let panel = Panel::new(&bench.spec, link);
     let (mut first, mut second) = (panel.page(), panel.page());
-    first.takes_the_orders();
+    first.takes_control();
     for request in ["arm", "run"] {
         first.say(&json!({ "do": "begin", "request": request, "id": 900 }));
     }
     for count in 0..8 {
-        first.say(&json!({ "do": "order", "line": format!("jog x={}um", 1 + count), "id": 901 + count }));
+        first.say(&json!({ "do": "command", "line": format!("jog x={}um", 1 + count), "id": 901 + count }));
     }
     look.wait("arming", |place| place.phase == ARMING);
     second.say(&json!({ "do": "hold" }));
@@ -450,7 +450,7 @@ fn pages(bench: &Bench, link: &Path, look: &mut Look) {
         let page = panel.get(&format!("/?token={}", panel.token), "");
         assert!(page.starts_with("HTTP/1.1 200"), "load {load}: {page:.60}");
     }
-    second.say(&json!({ "do": "ask" }));
+    second.say(&json!({ "do": "request-control" }));
     over.store(true, Ordering::Relaxed);
     for thread in crowd {
         thread.join().unwrap();

@@ -20,7 +20,7 @@ pub(super) enum Code {
     ParameterRange = 17,
     AxisTwice = 22,
     ParameterCount = 24,
-    /// Another client or another host has the orders.
+    /// Another client or another host is in control.
     NotNow = 89,
     InMotion = 93,
     WaveActive = 73,

@@ -34,7 +34,7 @@ impl Piece {
         }
     }
 
-    /// Whether it wants the orders: it moves something, or lets it move.
+    /// Whether it needs control: it moves something, or lets it move.
     pub(super) fn is_order(&self) -> bool {
         self.is_move() || matches!(self.words().next(), Some("SVO" | "FRF" | "SPI" | "VEL" | "VLS"))
     }

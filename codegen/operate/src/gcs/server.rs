@@ -1,4 +1,4 @@
-//! Clients over TCP: many may ask, one has the orders, any may stop the machine, and none keeps it waiting.
+//! Clients over TCP: many may query, one is in control, any may stop the machine, and none keeps it waiting.
 //!
 //! ```text
 //! round: look at the machine, if it is due ─► read a part from each client ─► stops ─► commands, one of each client in turn
@@ -42,7 +42,7 @@ const EARLY: Duration = Duration::from_millis(5);
 const UNREAD: usize = 1 << 16;
 /// How long a command may wait for a machine that comes up or to rest.
 const PATIENCE: Duration = Duration::from_secs(12);
-/// A client that has ordered nothing for so long loses the orders to the next that orders.
+/// A client in control that has sent no command for so long loses control to the next that sends one.
 const IDLE: Duration = Duration::from_secs(60);
 /// A client that has been silent for so long makes room for one for whom there is none.
 const SILENT: Duration = Duration::from_secs(5);
@@ -75,7 +75,7 @@ struct Client {
     left: Option<Instant>,
 }
 
-/// Who gave the last order, and when.
+/// The client in control, and its last command.
 struct Owner {
     number: u64,
     ordered: Instant,
@@ -212,7 +212,7 @@ impl<P: Port> Bridge<P> {
         Ok(())
     }
 
-    /// Of those that may do everything, but for the one with the orders.
+    /// Of those that may do everything, but for the one in control.
     fn longest_silent(&self) -> Option<usize> {
         let has_orders = |client: &Client| self.owner.as_ref().is_some_and(|owner| owner.number == client.number);
         let silent = self.clients.iter().take(MOST).enumerate();
@@ -328,7 +328,7 @@ impl<P: Port> Bridge<P> {
         Ok(true)
     }
 
-    /// Clients that have gone leave the orders; what they asked for is done, and the platform stays there.
+    /// Clients that have gone give up control; what they asked for is done, and the platform stays there.
     fn part(&mut self) {
         self.clients.retain(Client::is_there);
         let is_there = |owner: &Owner| self.clients.iter().any(|client| client.number == owner.number);

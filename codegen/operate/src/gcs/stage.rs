@@ -297,7 +297,7 @@ impl<P: Port> Stage<P> {
         self.has_halted = false;
     }
 
-    /// Stops, once for all stops that had been sent by then, whoever has the orders.
+    /// Stops, once for all stops that had been sent by then, whoever is in control.
     pub(super) fn stop(&mut self) -> Result<(), Rejection> {
         if !self.has_halted {
             self.refresh()?;

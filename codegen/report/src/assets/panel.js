@@ -1,4 +1,4 @@
-// The page: what comes over the socket to what draws it, what is pressed to orders. A number is never older than it looks.
+// The page: data from the socket to what draws it, buttons to commands. A number is never older than it looks.
 (function () {
   counted();
   const root = document.documentElement, facts = JSON.parse(by("facts").textContent);
@@ -44,8 +44,8 @@
 
   function say(what) { if (socket && socket.readyState === 1) socket.send(JSON.stringify(what)); else note("error", "Not sent: no link to the panel."); }
 
-  // An order with an answer; what is refused is an event of this page.
-  function order(what, then) {
+  // A command with an answer; a refusal is an event of this page.
+  function command(what, then) {
     const id = ++asked;
     answers[id] = then || (() => {});
     say(Object.assign({ id }, what));
@@ -204,15 +204,15 @@
     if (!link) blank();
     if (ended) put("error", "The panel has ended.", ended);
     else if (!link) put("error", "No link to the panel.", "Use the hardware stop if the machine must stop.", state ? "" : "connecting");
-    else if (left) put("warning", "The page that had the orders is gone.", "The machine holds" + (left.left > 0 ? ", and ramps down in " + left.left.toFixed(0) + "\u2009s" : " or is at rest") + ". Hold, Ramp down and Ask for orders work from here.");
+    else if (left) put("warning", "The page in control is gone.", "The machine holds" + (left.left > 0 ? ", and ramps down in " + left.left.toFixed(0) + "\u2009s" : " or is at rest") + ". Hold, Ramp down and Request control work from here.");
     else if (age > STALE) put("error", "No data for " + (isFinite(age) ? duration(age / 1000) : "any time") + ".", "Readouts are blank until it comes.");
     else if (state) {
       const said = state.said, watch = !state.mine && state.holder;
       let more = said.do;
       if (state.phase === "running" && wave && state.wave) more = "Wave " + state.wave.name + " has the set-point.";
-      else if (watch && said.kind !== "error") more = state.holder + " has the orders. Hold and Ramp down work from here, too.";
-      else if (!state.holder && said.kind !== "error") more = (more ? more + " " : "") + "Ask for orders first.";
-      if (state.asked && state.mine) put("warning", state.asked.by + " asks for the orders.", "Hand over or keep: " + state.asked.left.toFixed(0) + "\u2009s left.", said.code || events);
+      else if (watch && said.kind !== "error") more = state.holder + " is in control. Hold and Ramp down work from here, too.";
+      else if (!state.holder && said.kind !== "error") more = (more ? more + " " : "") + "Request control first.";
+      if (state.asked && state.mine) put("warning", state.asked.by + " requests control.", "Hand over or keep control: " + state.asked.left.toFixed(0) + "\u2009s left.", said.code || events);
       else put(said.kind, watch && said.kind === "ok" ? "You watch." : said.what, more, [row && row.status & GAUGES ? by("pose-age").textContent : "", said.code, events].filter(Boolean).join(" · ") || "no condition present");
     }
     const down = by("down").querySelector("span"), volts = shown5.volts ? Math.max(...shown5.volts.map(Math.abs)) : NaN;
@@ -235,7 +235,7 @@
   function controls() {
     if (!state || !state.status) return;
     const { status, phase, mine, holder, known } = state, on = status.amplifiers_on, cause = state.said.code;
-    const orders = mine ? "" : holder ? "orders: " + holder : "ask for orders";
+    const control = mine ? "" : holder ? "in control: " + holder : "request control";
     by("amplifiers").textContent = !ticks(status) ? "–" : on ? "on" : "off";
     const mode = known.gains && known.gains.mode || "–";
     by("mode").textContent = mode.toUpperCase().replace("PF", "P/F").replace("-", " with ").replace("INVHYS", "Invhys");
@@ -243,26 +243,26 @@
     by("pages").textContent = mine ? state.pages - 1 + " other" + (state.pages === 2 ? "" : "s") : "this page, " + (state.pages - 1) + " other" + (state.pages === 2 ? "" : "s");
     by("link").textContent = "20\u2009ms, " + (status.link_errors + status.damaged_frames) + " lost";
     by("late").textContent = shown(status.late);
-    const button = by("orders");
-    button.textContent = mine ? (state.asked ? "Hand over" : state.offered !== null ? "Offered" : "Hand over") : state.asked && state.asked.mine ? "Asked, " + state.asked.left.toFixed(0) + "\u2009s" : holder && state.offered === null ? "Ask for orders" : "Take the orders";
+    const button = by("control");
+    button.textContent = mine ? (state.asked ? "Hand over" : state.offered !== null ? "Offered" : "Hand over") : state.asked && state.asked.mine ? "Requested, " + state.asked.left.toFixed(0) + "\u2009s" : holder && state.offered === null ? "Request control" : "Take control";
     button.disabled = !mine && !!state.asked;
     by("keep").hidden = !(mine && (state.asked || state.offered !== null));
     const steps = ["disarmed", "arming", "holding", "running"], step = steps.indexOf(phase);
     [...by("steps").children].forEach((span, k) => { span.className = k === step ? "on" : k < step ? "past" : ""; });
     const held = ["running", "arming", "holding"].includes(phase);
     allow(by("hold"), held ? "" : "not armed", "acts at once · key H");
-    allow(by("arm"), phase === "faulted" ? "acknowledge first" : phase !== "disarmed" ? "armed" : orders, "press 1\u2009s");
-    allow(by("run"), phase === "running" ? "running" : phase !== "holding" && phase !== "arming" ? "not armed" : orders, "press 1\u2009s");
-    allow(by("acknowledge"), phase !== "faulted" && status.cause !== 16 ? "no fault" : orders, "press 1\u2009s");
+    allow(by("arm"), phase === "faulted" ? "acknowledge first" : phase !== "disarmed" ? "armed" : control, "press 1\u2009s");
+    allow(by("run"), phase === "running" ? "running" : phase !== "holding" && phase !== "arming" ? "not armed" : control, "press 1\u2009s");
+    allow(by("acknowledge"), phase !== "faulted" && status.cause !== 16 ? "no fault" : control, "press 1\u2009s");
     for (const [id, next] of [["arm", "disarmed"], ["run", "holding"], ["acknowledge", "faulted"]]) by(id).classList.toggle("next", phase === next && !by(id).disabled);
     const events = known.standing && known.standing.health ? known.standing.health.events_in_words : null;
     by("stop").textContent = "Hardware stop: " + (events ? (events.includes("emergency stop") ? "pressed" : "not pressed") : "–") + ".";
     const busy = row && (row.status & 1 << 18), waving = wave && state.wave;
-    const move = phase !== "running" ? "not running" : orders || (waving ? "the wave moves it" : "");
+    const move = phase !== "running" ? "not running" : control || (waving ? "the wave moves it" : "");
     by("move-note").textContent = move || "press, or arrow keys";
     moves.forEach(one => { one.disabled = move !== ""; one.title = move; });
     by("bias").textContent = waving ? "Take from wave" : "Go to bias";
-    allow(by("bias"), phase !== "running" ? "not running" : orders);
+    allow(by("bias"), phase !== "running" ? "not running" : control);
     if (known.reach) by("reach").innerHTML = "Reach left, each alone, µm, µrad:<br>" + known.reach.limits.map(([low, high], k) => (k < 3 ? NAMES[k] : "θ<sub>" + NAMES[k][1] + "</sub>") + "\u2009" + number(Number(Math.max(0, Math.min(high - known.reach.from[k], known.reach.from[k] - low)).toPrecision(2)))).join(", ");
     // Wave: what the panel started, and for how long it goes.
     if (!state.wave) wave = wave && wave.trajectory && busy ? wave : null;
@@ -273,7 +273,7 @@
     by("wave-bar").style.width = Math.min(100, 100 * played) + "%";
     if (wave && wave.seconds) by("wave-note").textContent = (played * wave.seconds).toFixed(1) + " of " + number(wave.seconds) + "\u2009s";
     by("play").textContent = wave ? "Stop" : "Play";
-    allow(by("play"), orders || (wave ? (wave.trajectory ? "a trajectory ends by itself; Hold stops it" : "") : phase !== "running" ? "not running" : chosen ? "" : "choose one first"));
+    allow(by("play"), control || (wave ? (wave.trajectory ? "a trajectory ends by itself; Hold stops it" : "") : phase !== "running" ? "not running" : chosen ? "" : "choose one first"));
     allow(by("choose"), "");
     // Recorder.
     const recorder = known.recorder;
@@ -283,21 +283,21 @@
       by("record-note").textContent = recorder.running ? (recorder.triggered ? "after the trigger" : "waits for a fault") : recorder.triggered ? "complete: holds the trigger" : "stopped";
       by("record").textContent = recorder.running ? "Stop" : "Record";
     }
-    allow(by("record"), recorder ? orders : "no recorder");
-    allow(by("download"), !recorder ? "no recorder" : recorder.running ? "it records: stop it first" : orders);
+    allow(by("record"), recorder ? control : "no recorder");
+    allow(by("download"), !recorder ? "no recorder" : recorder.running ? "it records: stop it first" : control);
     // Gain.
     by("gain-note").textContent = "all axes; computed margin " + (facts.gain_margin ? "×" + number(Number(facts.gain_margin.toPrecision(3))) : "beyond what is looked at");
-    allow(by("apply"), orders || (facts.gain_margin && gain.factor >= facts.gain_margin ? "unstable: beyond the computed margin" : state.busy ? "an order is under way" : ""));
-    checked(state.check, phase, orders);
+    allow(by("apply"), control || (facts.gain_margin && gain.factor >= facts.gain_margin ? "unstable: beyond the computed margin" : state.busy ? "a command is under way" : ""));
+    checked(state.check, phase, control);
   }
 
-  function checked(check, phase, orders) {
+  function checked(check, phase, control) {
     allow(by("check"), "");
     const runs = check && check.runs;
     by("check-bar").style.width = (check ? (check.runs ? 100 * check.done / 6 : check.verdict ? 100 : 0) : 0) + "%";
     by("check-note").textContent = runs ? "leg " + Math.min(check.done, 5) + " moves" : "";
-    allow(by("check-begin"), runs ? "under way" : phase !== "disarmed" ? "ramp down first" : orders, "press 1\u2009s");
-    allow(by("check-end"), runs ? orders : "not under way");
+    allow(by("check-begin"), runs ? "under way" : phase !== "disarmed" ? "ramp down first" : control, "press 1\u2009s");
+    allow(by("check-end"), runs ? control : "not under way");
     const verdict = check && check.verdict, text = JSON.stringify(verdict || null);
     if (checked.shown === text) return;
     checked.shown = text;
@@ -322,7 +322,7 @@
     if (arrow && !moves[0].disabled && !e.target.closest("svg, input, dialog")) { e.preventDefault(); step(...arrow); }
   });
   let size = 100;
-  const step = (axis, sign) => order({ do: "order", line: "jog " + axis + "=" + sign * size * (axis[0] === "r" ? 10 : 1) + (axis[0] === "r" ? "nrad" : "nm") });
+  const step = (axis, sign) => command({ do: "command", line: "jog " + axis + "=" + sign * size * (axis[0] === "r" ? 10 : 1) + (axis[0] === "r" ? "nrad" : "nm") });
   moves = jog(by("jog"), step);
   choose(by("step"), value => { size = Number(value); });
   choose(by("unit"), value => { strips.first = Number(value); strips.bound = 0; wake(); });
@@ -330,15 +330,15 @@
   choose(axisBox, value => { spectrum.choose(Number(value)); spectra = 0; wake(); });
   const spanNote = () => { by("strip-note").textContent = "line: mean, band: least and largest of " + duration(SPANS[strips.span] / BINS); };
   spanNote();
-  for (const request of ["arm", "run", "acknowledge"]) slow(by(request), () => order({ do: "begin", request }));
-  by("orders").addEventListener("click", () => { if (!state) return; say({ do: state.mine ? (state.asked ? "give" : "offer") : "ask" }); });
-  by("keep").addEventListener("click", () => say({ do: "keep" }));
-  by("bias").addEventListener("click", () => order({ do: "order", line: wave && state.wave ? "wave stop" : "goto zero" }));
-  by("record").addEventListener("click", () => order({ do: "order", line: state.known.recorder.running ? "record stop" : "record arm" }));
-  by("download").addEventListener("click", () => order({ do: "download" }));
+  for (const request of ["arm", "run", "acknowledge"]) slow(by(request), () => command({ do: "begin", request }));
+  by("control").addEventListener("click", () => { if (!state) return; say({ do: state.mine ? (state.asked ? "grant-control" : "offer-control") : "request-control" }); });
+  by("keep").addEventListener("click", () => say({ do: "keep-control" }));
+  by("bias").addEventListener("click", () => command({ do: "command", line: wave && state.wave ? "wave stop" : "goto zero" }));
+  by("record").addEventListener("click", () => command({ do: "command", line: state.known.recorder.running ? "record stop" : "record arm" }));
+  by("download").addEventListener("click", () => command({ do: "download" }));
   const gain = new Gain(by("gain"), facts.gain_margin);
   gain.changed = controls;
-  by("apply").addEventListener("click", () => order({ do: "gain", factor: gain.factor }));
+  by("apply").addEventListener("click", () => command({ do: "gain", factor: gain.factor }));
 
   // What is played: a trajectory of the spec, or a wave from a file of this computer.
   let chosen = null;
@@ -352,13 +352,13 @@
     e.target.value = "";
   });
   by("play").addEventListener("click", () => {
-    if (wave) order({ do: "order", line: "wave stop" }, () => { wave = null; });
-    else if (chosen.trajectory) order({ do: "order", line: "play " + chosen.name }, done => { if (done.ok) wave = { trajectory: true }; });
-    else order({ do: "wave", name: chosen.name, text: chosen.text }, done => { if (done.ok) wave = { seconds: chosen.seconds }; });
+    if (wave) command({ do: "command", line: "wave stop" }, () => { wave = null; });
+    else if (chosen.trajectory) command({ do: "command", line: "play " + chosen.name }, done => { if (done.ok) wave = { trajectory: true }; });
+    else command({ do: "wave", name: chosen.name, text: chosen.text }, done => { if (done.ok) wave = { seconds: chosen.seconds }; });
   });
   by("choose").addEventListener("click", () => by("panel-choose").show());
   by("check").addEventListener("click", () => by("panel-check").show());
-  slow(by("check-begin"), () => order({ do: "check" }));
+  slow(by("check-begin"), () => command({ do: "check" }));
   by("check-end").addEventListener("click", () => say({ do: "end-check" }));
   for (const button of document.querySelectorAll("[data-close]")) button.addEventListener("click", () => button.closest("dialog").close());
 

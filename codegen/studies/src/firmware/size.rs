@@ -1,4 +1,4 @@
-//! CodeOwner takes the memory of an image, and what its tick reaches.
+//! Who takes the memory of an image, and what its tick reaches.
 
 use std::path::Path;
 
@@ -61,7 +61,7 @@ pub fn run(path: &Path, options: &Options, tick: Option<&str>, single: bool, ui:
     let is_thumb = object::File::parse(&*bytes).map_err(malformed)?.architecture() == Architecture::Arm;
     let size = size(&bytes)?;
     let follows = is_thumb && (tick.is_some() || has_tick(&bytes));
-    let rules = Rules { single: single, whole_image: false };
+    let rules = Rules { single, whole_image: false };
     let checks = if follows { Some(checks::check(&bytes, tick, rules)?) } else { None };
     let faults = checks.as_ref().map_or(0, |checks| checks.faults.len());
     let file = path.display().to_string();

@@ -84,7 +84,7 @@ impl Made {
     }
 }
 
-/// CodeOwner takes the flash.
+/// Who takes the flash.
 pub fn owners(size: &Size) -> String {
     let columns = [left(26).behind("  "), right(10).behind(" "), right(10).behind(" "), right(10).behind(" ")];
     let mut out = String::new();

@@ -120,9 +120,9 @@ impl Window {
     }
 
     /// A browser that gets no processor for a while has them no more: it asks until it is told that it has them.
-    fn takes_the_orders(&mut self) {
+    fn takes_control(&mut self) {
         self.wait(
-            "document.getElementById('holder').textContent.startsWith('this page') || (document.getElementById('orders').click(), false)",
+            "document.getElementById('holder').textContent.startsWith('this page') || (document.getElementById('control').click(), false)",
         );
     }
 
@@ -185,7 +185,7 @@ pub fn a_browser_draws_it(panel: &Panel) {
         return support::skipped("no chromium: the panel is not drawn");
     };
     page.wait(&chip("faulted"));
-    page.takes_the_orders();
+    page.takes_control();
     page.wait("Number(document.documentElement.dataset.shown) > 40");
     page.picture("faulted-dark");
     page.press("acknowledge");
@@ -212,10 +212,10 @@ pub fn a_browser_draws_it(panel: &Panel) {
     other.wait("document.getElementById('arm').disabled && !document.getElementById('hold').disabled");
     other.wait("Number(document.documentElement.dataset.shown) > 40");
     other.picture("watching-light");
-    // The orders change hands.
-    other.click("orders");
-    page.wait("document.getElementById('message').textContent.includes('asks for the orders')");
-    page.click("orders");
+    // Control changes hands.
+    other.click("control");
+    page.wait("document.getElementById('message').textContent.includes('requests control')");
+    page.click("control");
     other.wait("document.getElementById('holder').textContent.startsWith('this page')");
     other.value("document.querySelector('#jog button').click()");
     other.wait("document.getElementById('events').textContent.split('jog y=100nm').length > 2");

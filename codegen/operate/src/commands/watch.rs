@@ -4,13 +4,13 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use crate::place::AXES;
+use crate::samples::{Block, Row, Spread};
 use serde::Serialize;
 use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
-use specgen_operate::place::AXES;
-use specgen_operate::samples::{Block, Row, Spread};
 
-use super::ended::Ended;
+use super::error::SessionError;
 use super::operator::Operator;
 use specgen_language::outcome::Outcome;
 use specgen_language::output::{PendingFile, unwritten};
@@ -26,7 +26,7 @@ const SILENT: Duration = Duration::from_secs(2);
 
 /// What was watched.
 #[derive(Serialize)]
-struct Watched {
+struct WatchReport {
     /// Ticks of a row.
     every: u32,
     rows: u64,
@@ -59,7 +59,7 @@ struct Sample {
     row: Row,
 }
 
-impl Outcome for Watched {
+impl Outcome for WatchReport {
     fn text(&self) -> String {
         let ticks = if self.every == 1 { "tick" } else { "ticks" };
         let mut text = format!("{} rows of {} {ticks}", self.rows, self.every);
@@ -82,12 +82,12 @@ enum Sink {
 }
 
 impl Sink {
-    fn new(path: Option<&Path>, ui: &Ui) -> Result<Self, Ended> {
+    fn new(path: Option<&Path>, ui: &Ui) -> Result<Self, SessionError> {
         let Some(path) = path else { return Ok(if ui.is_json() { Self::Kept } else { Self::Shown }) };
         let as_json = path.extension().is_some_and(|extension| extension == "jsonl");
-        let mut file = BufWriter::new(PendingFile::create(path).map_err(Ended::Failed)?);
+        let mut file = BufWriter::new(PendingFile::create(path).map_err(SessionError::Failed)?);
         if !as_json {
-            writeln!(file, "{}", titles()).map_err(|error| Ended::Failed(unwritten(path, &error)))?;
+            writeln!(file, "{}", titles()).map_err(|error| SessionError::Failed(unwritten(path, &error)))?;
         }
         Ok(Self::File { file, path: path.to_owned(), as_json })
     }
@@ -107,7 +107,7 @@ impl Sink {
         }
     }
 
-    fn put(&mut self, sample: Sample, kept: &mut Vec<Sample>, ui: &Ui) -> Result<(), Ended> {
+    fn put(&mut self, sample: Sample, kept: &mut Vec<Sample>, ui: &Ui) -> Result<(), SessionError> {
         match self {
             Self::Shown => ui.out(&line(&sample)),
             Self::Kept => kept.push(sample),
@@ -117,24 +117,26 @@ impl Sink {
                 } else {
                     writeln!(file, "{}", values(&sample))
                 };
-                written.map_err(|error| Ended::Failed(unwritten(path, &error)))?;
+                written.map_err(|error| SessionError::Failed(unwritten(path, &error)))?;
             }
         }
         Ok(())
     }
 
     /// A pipe has a reader who looks on, too.
-    fn flush(&mut self) -> Result<(), Ended> {
+    fn flush(&mut self) -> Result<(), SessionError> {
         match self {
-            Self::File { file, path, .. } => file.flush().map_err(|error| Ended::Failed(unwritten(path, &error))),
+            Self::File { file, path, .. } => {
+                file.flush().map_err(|error| SessionError::Failed(unwritten(path, &error)))
+            }
             Self::Shown | Self::Kept => Ok(()),
         }
     }
 
-    fn finish(self) -> Result<(), Ended> {
+    fn finish(self) -> Result<(), SessionError> {
         let Self::File { file, path, .. } = self else { return Ok(()) };
-        let file = file.into_inner().map_err(|error| Ended::Failed(unwritten(&path, &error.into_error())))?;
-        file.keep().map_err(Ended::Failed)
+        let file = file.into_inner().map_err(|error| SessionError::Failed(unwritten(&path, &error.into_error())))?;
+        file.keep().map_err(SessionError::Failed)
     }
 }
 
@@ -197,21 +199,21 @@ impl<P: Port> Operator<P> {
         path: Option<&Path>,
         line: &str,
         ui: &Ui,
-    ) -> Result<(), Ended> {
-        self.motion().map_err(Ended::Refused)?;
+    ) -> Result<(), SessionError> {
+        self.motion().map_err(SessionError::Refused)?;
         let period = self.session.period();
         // As much as a message of the link counts to.
         let every = every.unwrap_or((ROW / period).ceil() as u32);
         let mut sink = Sink::new(path, ui)?;
         self.session.stream(every).map_err(|error| match error {
-            ClientError::Refused(Refusal::Word { .. }) => Ended::Refused(format!(
+            ClientError::Refused(Refusal::Word { .. }) => SessionError::Refused(format!(
                 "rows of {every} ticks are longer than the device makes them: {} at most",
                 specgen_link::samples::MOST_EVERY
             )),
             other => other.into(),
         })?;
         let file = path.map(|path| path.display().to_string());
-        let mut watched = Watched { every, rows: 0, gaps: Vec::new(), file, kept: Vec::new() };
+        let mut watched = WatchReport { every, rows: 0, gaps: Vec::new(), file, kept: Vec::new() };
         sink.begin(ui);
         let ticks = (seconds / period).ceil() as u64;
         let ended = self.take(ticks, &mut watched, &mut sink, ui);
@@ -223,7 +225,7 @@ impl<P: Port> Operator<P> {
         Ok(())
     }
 
-    fn take(&mut self, ticks: u64, watched: &mut Watched, sink: &mut Sink, ui: &Ui) -> Result<(), Ended> {
+    fn take(&mut self, ticks: u64, watched: &mut WatchReport, sink: &mut Sink, ui: &Ui) -> Result<(), SessionError> {
         let (mut next, mut number, mut end) = (None, 0_u32, None);
         let mut heard = Instant::now();
         loop {
@@ -250,7 +252,7 @@ impl<P: Port> Operator<P> {
             }
             let most = SILENT + Duration::from_secs_f64(f64::from(watched.every) * self.session.period());
             if heard.elapsed() > most {
-                return Err(Ended::Fault(format!("the machine makes no ticks, and is {}", self.stands())));
+                return Err(SessionError::Fault(format!("the machine makes no ticks, and is {}", self.state())));
             }
             self.look()?;
             self.show(ui);

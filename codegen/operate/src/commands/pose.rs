@@ -1,7 +1,7 @@
 //! Poses in words: their units, and what keeps a platform from going somewhere.
 
-use specgen_operate::motion::Binding;
-use specgen_operate::place::{AXES, amount};
+use crate::motion::Binding;
+use crate::place::{AXES, amount};
 
 /// The name that the user's zero always has.
 pub const ZERO: &str = "zero";

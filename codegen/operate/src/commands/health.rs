@@ -1,4 +1,4 @@
-//! What a machine noticed of itself, as text and as JSON.
+//! Health of a machine, as text and as JSON.
 
 use std::fmt::Write as _;
 
@@ -8,22 +8,22 @@ use specgen_link::{Health, reset_cause};
 use specgen_runtime::supervisor::{AMPLIFIER, Cause, EVENTS, FIRST_EVENT};
 
 use super::answer::MachineStatus;
-use super::located::Located;
+use super::location::Location;
 use specgen_language::outcome::Outcome;
 
-/// Answer to `status`: how the machine stands, and what it noticed.
+/// Answer to `status`: state and health of the machine.
 #[derive(Serialize)]
-pub struct Standing {
+pub struct StatusReport {
     #[serde(flatten)]
     pub status: MachineStatus,
     /// Of a platform.
-    pub place: Option<Located>,
+    pub place: Option<Location>,
     /// What to do, where something is to be done.
     pub advice: Option<String>,
-    pub health: Noticed,
+    pub health: HealthReport,
 }
 
-impl Outcome for Standing {
+impl Outcome for StatusReport {
     fn text(&self) -> String {
         let mut text = self.status.text();
         if let Some(place) = &self.place {
@@ -38,7 +38,7 @@ impl Outcome for Standing {
 
 /// [`Health`] with units. Times are the last and the longest, µs; none where nothing is measured.
 #[derive(Serialize)]
-pub struct Noticed {
+pub struct HealthReport {
     events: u32,
     events_in_words: Vec<&'static str>,
     converter_faults: u32,
@@ -54,7 +54,7 @@ pub struct Noticed {
     reset_cause: Vec<&'static str>,
 }
 
-impl From<Health> for Noticed {
+impl From<Health> for HealthReport {
     fn from(health: Health) -> Self {
         let microseconds = |counts: u64| counts as f64 * 1e6 / f64::from(health.clock);
         let timed = |times: Option<[u64; 2]>| times.filter(|_| health.clock > 0).map(|times| times.map(microseconds));
@@ -78,7 +78,7 @@ impl From<Health> for Noticed {
     }
 }
 
-impl Noticed {
+impl HealthReport {
     fn text(&self, period: f64) -> String {
         let events = if self.events == 0 { "none".to_owned() } else { self.events_in_words.join(", ") };
         let mut text = format!("  events since asked last: {events}\n");
@@ -138,7 +138,7 @@ mod tests {
             reset_cause: 0b1001_0100,
             ..Health::default()
         };
-        let text = Noticed::from(health).text(1e-4);
+        let text = HealthReport::from(health).text(1e-4);
         for part in [
             "asked last: missed tick, converter, stalled, amplifier fault\n",
             "50.0 us, longest 100.0 us of 100 us",
@@ -151,12 +151,12 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part}: {text}");
         }
-        let bare = Noticed::from(Health::default()).text(1e-4);
+        let bare = HealthReport::from(Health::default()).text(1e-4);
         assert!(!bare.contains("stack") && !bare.contains("reset") && bare.contains("none"), "{bare}");
         // A zero that nothing counted is no figure, and neither is the end of a word.
         assert!(bare.contains("times of a tick: not measured") && bare.contains("overruns not measured"), "{bare}");
         let waits = Health { clock: 1_000_000_000, tick: Some([12_300, 6_000_000_000]), ..Health::default() };
-        let text = Noticed::from(waits).text(1e-4);
+        let text = HealthReport::from(waits).text(1e-4);
         assert!(text.contains("longest 6000000.0 us of 100 us, when it begins is not measured"), "{text}");
     }
 }

@@ -3,15 +3,15 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
+use crate::session::FRESH;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
-use specgen_operate::FRESH;
 
-use super::located::ago;
+use super::location::ago;
 use specgen_language::outcome::Outcome;
 
-/// A session: every order with its answer, and how the machine stood at the end. Answers were shown as they came.
+/// A session: every command with its answer, and the final state of the machine. Answers were shown as they came.
 #[derive(Serialize)]
 pub struct Report<'a> {
     pub device: &'a str,
@@ -31,23 +31,23 @@ pub struct Answer {
     pub answer: Value,
 }
 
-/// A word that needs no text: that it is done, or how the machine stands by now.
+/// An answer without text: done, or the state of the machine.
 #[derive(Serialize)]
-pub struct Plain(pub String);
+pub struct Acknowledgement(pub String);
 
-impl Outcome for Plain {
+impl Outcome for Acknowledgement {
     fn text(&self) -> String {
         String::new()
     }
 }
 
-/// Why a line was not carried out.
+/// The error of a line.
 #[derive(Serialize)]
-pub struct Mistake {
+pub struct CommandError {
     pub error: String,
 }
 
-impl Outcome for Mistake {
+impl Outcome for CommandError {
     fn text(&self) -> String {
         format!("error: {}\n", self.error.trim_end())
     }
@@ -94,15 +94,15 @@ impl Outcome for MachineStatus {
     }
 }
 
-/// Where a move or a step goes, m and rad.
+/// Destination of a move or a step, m and rad.
 #[derive(Serialize)]
-pub struct Moves {
+pub struct Destination {
     pub pose: [f64; 6],
 }
 
-impl Outcome for Moves {
+impl Outcome for Destination {
     fn text(&self) -> String {
-        format!("moves to {}\n", specgen_operate::place::in_words(&self.pose))
+        format!("moves to {}\n", crate::place::in_words(&self.pose))
     }
 }
 
@@ -130,12 +130,12 @@ impl Outcome for Settings {
 }
 
 #[derive(Serialize)]
-pub struct Downloaded {
+pub struct DownloadReport {
     pub file: String,
     pub bytes: usize,
 }
 
-impl Outcome for Downloaded {
+impl Outcome for DownloadReport {
     fn text(&self) -> String {
         format!("wrote {} bytes to {}\n", self.bytes, self.file)
     }

@@ -5,12 +5,13 @@ use std::time::{Duration, Instant};
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::ir::Path as Poses;
 use specgen_link::client::Port;
-use specgen_operate::{ALIVE, Order, WaitCondition};
 use specgen_runtime::playback::Knot;
 use specgen_runtime::supervisor::{Phase, Request};
 use specgen_studies::learning::{LearnError, Motion, PassObservation, Plan, RepeatableMachine, course, held};
 
-use crate::cli::operate::{Ended, Operator};
+use crate::command::{Command, WaitCondition};
+use crate::commands::{Operator, SessionError};
+use crate::session::ALIVE;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 
@@ -18,14 +19,14 @@ use specgen_language::ui::Ui;
 const ARMING: Duration = Duration::from_secs(120);
 
 /// A trajectory of the spec, as its machine plays it.
-pub struct Own {
+pub(super) struct OwnTrajectory {
     /// Its number.
     number: u32,
     /// Where it begins, as the controller has it, in the user's coordinates, m and rad.
     pub start: [f64; 6],
 }
 
-impl Own {
+impl OwnTrajectory {
     /// Of a name.
     ///
     /// # Errors
@@ -49,46 +50,46 @@ impl Own {
     }
 }
 
-/// A machine, and whoever operates it.
-pub struct Remote<'a, P> {
+/// A machine, and its operator.
+pub(super) struct LinkedMachine<'a, P> {
     pub operator: &'a mut Operator<P>,
     pub ui: &'a Ui,
-    pub own: &'a Own,
+    pub own: &'a OwnTrajectory,
     /// The correction that its device has in its memory, once that is known.
     pub has: Option<Vec<Knot>>,
-    /// Why it ended a pass.
-    pub ended: Option<Ended>,
+    /// The error that ended a pass.
+    pub error: Option<SessionError>,
 }
 
-impl<P: Port> Remote<'_, P> {
+impl<P: Port> LinkedMachine<'_, P> {
     /// Brings it to its bias pose. One that runs already is taken as it is.
-    pub fn arm(&mut self) -> Result<(), Ended> {
-        let wait = |until| Order::Wait { until, limit: ARMING };
+    pub fn arm(&mut self) -> Result<(), SessionError> {
+        let wait = |until| Command::Wait { until, limit: ARMING };
         let stands = u64::from(self.operator.phase());
         if stands == Phase::Disarmed.word() {
-            self.operator.obey(&Order::Ask(Request::Arm), self.ui)?;
+            self.operator.execute(&Command::Ask(Request::Arm), self.ui)?;
             let start = Instant::now();
             while u64::from(self.operator.phase()) == Phase::Disarmed.word() {
                 if start.elapsed() > ARMING {
-                    return Err(Ended::Fault(
+                    return Err(SessionError::Fault(
                         "the machine does not arm; `specgen operate` with `status` says why".to_owned(),
                     ));
                 }
-                self.operator.obey(&wait(WaitCondition::Passed(ALIVE)), self.ui)?;
+                self.operator.execute(&wait(WaitCondition::Passed(ALIVE)), self.ui)?;
             }
-            self.operator.obey(&Order::Ask(Request::Run), self.ui)?;
-            self.operator.obey(&wait(WaitCondition::Phase(Phase::Running)), self.ui)?;
+            self.operator.execute(&Command::Ask(Request::Run), self.ui)?;
+            self.operator.execute(&wait(WaitCondition::Phase(Phase::Running)), self.ui)?;
         } else if stands != Phase::Running.word() {
-            return Err(Ended::Refused(format!(
+            return Err(SessionError::Refused(format!(
                 "the machine is {}; learning begins with one that is disarmed or runs",
-                self.operator.stands()
+                self.operator.state()
             )));
         }
-        self.operator.obey(&wait(WaitCondition::Arrived), self.ui)
+        self.operator.execute(&wait(WaitCondition::Arrived), self.ui)
     }
 }
 
-impl<P: Port> RepeatableMachine for Remote<'_, P> {
+impl<P: Port> RepeatableMachine for LinkedMachine<'_, P> {
     fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<PassObservation, LearnError> {
         let course = course(motion, spacing, self.own.number);
         // What the device has stays there.
@@ -99,8 +100,8 @@ impl<P: Port> RepeatableMachine for Remote<'_, P> {
                 let measured = held(&passed.errors, spacing, motion.corrected);
                 Ok(PassObservation { real: measured.clone(), measured, kept: passed.errors, status: passed.status })
             }
-            Err(ended) => {
-                self.ended = Some(ended);
+            Err(error) => {
+                self.error = Some(error);
                 Err(LearnError::Ended)
             }
         }
@@ -117,8 +118,8 @@ impl<P: Port> RepeatableMachine for Remote<'_, P> {
                 Ok(made)
             }
             Ok(_) => Err(LearnError::Refused),
-            Err(ended) => {
-                self.ended = Some(ended);
+            Err(error) => {
+                self.error = Some(error);
                 Err(LearnError::Ended)
             }
         }
@@ -129,8 +130,8 @@ impl<P: Port> RepeatableMachine for Remote<'_, P> {
         if self.has.as_deref() == Some(knots) {
             return Ok(());
         }
-        self.operator.correct(knots, course(motion, spacing, self.own.number)).map_err(|ended| {
-            self.ended = Some(ended);
+        self.operator.correct(knots, course(motion, spacing, self.own.number)).map_err(|error| {
+            self.error = Some(error);
             LearnError::Ended
         })
     }

@@ -1,4 +1,4 @@
-//! One browser: what it says goes to the thread that has the machine, what that publishes goes to it. A slow one is left behind.
+//! Browsers: a thread each passes messages to the thread that has the machine, and back. A slow browser is left behind.
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -15,7 +15,7 @@ use tungstenite::{Error, Message, WebSocket};
 
 use super::http::Guard;
 
-/// Pages at a time; one more is turned away.
+/// Most pages at a time; one more is refused.
 const MOST: usize = 32;
 /// Connections at a time that have not shown the token; the oldest makes room for the next.
 const STRANGERS: usize = 64;
@@ -30,14 +30,14 @@ const IDLE: Timespec = Timespec { tv_sec: 1, tv_nsec: 0 };
 /// How long reading waits for the rest of a frame.
 const REST: Duration = Duration::from_millis(1);
 
-/// What the thread that has the machine hears of pages.
-pub enum Heard {
-    Came { page: u64, to: Outbox },
-    Said { page: u64, text: String },
-    Left { page: u64 },
+/// An event of a page, for the thread that has the machine.
+pub enum ClientEvent {
+    Connected { page: u64, to: Outbox },
+    Received { page: u64, text: String },
+    Disconnected { page: u64 },
 }
 
-/// The way to a page.
+/// The queue of messages to a page.
 pub struct Outbox {
     messages: SyncSender<Message>,
     wake: UnixStream,
@@ -57,7 +57,7 @@ impl Outbox {
 type Strangers = Arc<Mutex<VecDeque<(u64, TcpStream)>>>;
 
 /// Lets browsers in, until the process ends. Each has a thread. One that is slow to say what it wants keeps nobody out.
-pub fn serve(listener: TcpListener, guard: Guard, page: String, heard: SyncSender<Heard>) {
+pub fn serve(listener: TcpListener, guard: Guard, page: String, events: SyncSender<ClientEvent>) {
     let (guard, page) = (Arc::new(guard), Arc::<str>::from(page));
     let (there, strangers) = (Arc::new(AtomicUsize::new(0)), Strangers::default());
     std::thread::spawn(move || {
@@ -75,7 +75,7 @@ pub fn serve(listener: TcpListener, guard: Guard, page: String, heard: SyncSende
                     let _ = oldest.shutdown(Shutdown::Both);
                 }
             }
-            let (guard, page, heard) = (guard.clone(), page.clone(), heard.clone());
+            let (guard, page, events) = (guard.clone(), page.clone(), events.clone());
             let (there, strangers) = (there.clone(), strangers.clone());
             std::thread::spawn(move || {
                 let admitted = guard.admit(stream, &page, || {
@@ -84,8 +84,8 @@ pub fn serve(listener: TcpListener, guard: Guard, page: String, heard: SyncSende
                 // A browser that goes away is no news but to the one who has the machine.
                 if let Ok(Some(stream)) = admitted {
                     if there.fetch_add(1, Ordering::Relaxed) < MOST {
-                        let _ = talk(stream, number, &heard);
-                        let _ = heard.send(Heard::Left { page: number });
+                        let _ = talk(stream, number, &events);
+                        let _ = events.send(ClientEvent::Disconnected { page: number });
                     }
                     there.fetch_sub(1, Ordering::Relaxed);
                 }
@@ -95,14 +95,14 @@ pub fn serve(listener: TcpListener, guard: Guard, page: String, heard: SyncSende
 }
 
 /// Until either side ends it.
-fn talk(stream: TcpStream, page: u64, heard: &SyncSender<Heard>) -> Result<(), Error> {
+fn talk(stream: TcpStream, page: u64, events: &SyncSender<ClientEvent>) -> Result<(), Error> {
     let (woken, wake) = UnixStream::pair()?;
     woken.set_nonblocking(true)?;
     wake.set_nonblocking(true)?;
     stream.set_read_timeout(Some(REST))?;
     let (messages, queue) = sync_channel(QUEUE);
     let gone = || Error::Io(ErrorKind::BrokenPipe.into());
-    heard.send(Heard::Came { page, to: Outbox { messages, wake } }).map_err(|_| gone())?;
+    events.send(ClientEvent::Connected { page, to: Outbox { messages, wake } }).map_err(|_| gone())?;
     let config = WebSocketConfig::default().max_message_size(Some(LARGEST)).max_frame_size(Some(LARGEST));
     let mut socket = WebSocket::from_raw_socket(stream, Role::Server, Some(config));
     loop {
@@ -114,8 +114,8 @@ fn talk(stream: TcpStream, page: u64, heard: &SyncSender<Heard>) -> Result<(), E
         for _ in 0..ROUND {
             match socket.read() {
                 Ok(Message::Text(text)) => {
-                    let said = Heard::Said { page, text: text.as_str().to_owned() };
-                    heard.send(said).map_err(|_| gone())?;
+                    let event = ClientEvent::Received { page, text: text.as_str().to_owned() };
+                    events.send(event).map_err(|_| gone())?;
                 }
                 Ok(Message::Close(_)) => return Ok(()),
                 Ok(_) => {}

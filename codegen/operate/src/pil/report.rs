@@ -1,4 +1,4 @@
-//! What a run found, for people and for programs.
+//! The result of a run in the loop.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -12,13 +12,17 @@ use serde_json::Value;
 use specgen_compiler::compile::Compilation;
 use specgen_language::outcome::Outcome;
 use specgen_language::table::{left, right, row};
-use specgen_operate::pil::{Cost, Difference};
-use specgen_report::chart::Chart;
 use specgen_studies::runs::Played;
 
+use super::difference::Difference;
+use super::lockstep::Cost;
+
+/// The result of a run in the loop.
 #[derive(Debug, Serialize)]
 pub struct Report {
+    /// Name of the spec.
     pub name: String,
+    /// Digest of the spec.
     pub digest: String,
     /// What was in the loop.
     pub device: String,
@@ -37,11 +41,13 @@ pub struct Report {
     pub damaged_frames: u32,
     /// What costs are counted in; empty if they are not.
     pub counted: &'static str,
+    /// Costs of the parts of a tick.
     pub costs: Vec<Cost>,
     /// Static bound of a tick's stack, bytes; none for a board, or if the call graph cannot be bounded.
     pub stack_bound: Option<u64>,
     /// Legs: errors of the trajectory.
     pub tracking: TrackingTable,
+    /// Platform, without a work part.
     #[serde(serialize_with = "rows")]
     pub free_motion: PoseTable,
     /// Platform, against a work part.
@@ -53,9 +59,6 @@ pub struct Report {
     /// Errors in words.
     #[serde(skip)]
     pub errors: String,
-    /// Errors over time, a chart a run.
-    #[serde(skip)]
-    pub charts: Vec<Chart>,
     /// The line about the picture of them.
     #[serde(skip)]
     pub plot: Option<String>,
@@ -70,7 +73,7 @@ fn rows<S: serde::Serializer>(table: &PoseTable, serializer: S) -> Result<S::Ok,
 }
 
 impl Report {
-    pub fn new(compiled: &Compilation, device: String, stack_bound: Option<u64>) -> Self {
+    pub(super) fn new(compiled: &Compilation, device: String, stack_bound: Option<u64>) -> Self {
         Self {
             name: compiled.ir.name.clone(),
             digest: compiled.ir.digest.clone(),
@@ -90,26 +93,25 @@ impl Report {
             on_board: None,
             ended_early: Vec::new(),
             errors: String::new(),
-            charts: Vec::new(),
             plot: None,
         }
     }
 
     /// A run that did not come to the end of its path: no figure.
-    pub fn ended(&mut self, name: &str, error: &RunError) {
+    pub(super) fn ended(&mut self, name: &str, error: &RunError) {
         // Writing to a String cannot fail.
         let _ = writeln!(self.errors, "{name}: not scored: {error}, as on the host");
         self.ended_early.push(name.to_owned());
     }
 
     /// Puts the table of free motion before what else is said of errors.
-    pub fn write_free_motion(&mut self) {
+    pub(super) fn write_free_motion(&mut self) {
         let text = self.free_motion.ours_to_text();
         self.errors.insert_str(0, &text);
     }
 
     /// The same of work parts.
-    pub fn write_machining(&mut self, table: &MachiningTable) {
+    pub(super) fn write_machining(&mut self, table: &MachiningTable) {
         self.errors.insert_str(0, &table.ours_to_text());
         self.machining = serde_json::json!(table);
     }

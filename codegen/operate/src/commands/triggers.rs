@@ -1,25 +1,25 @@
 //! Digital lines: other settings of outputs while the machine runs, and what waits for the edge of the input.
 
+use crate::command::Command;
 use host_sim::word::WordKind;
 use serde::Serialize;
 use specgen_link::client::{ClientError, Port};
 use specgen_link::{EdgeStatus, Refusal};
-use specgen_operate::Order;
 use specgen_runtime::pending::Stage;
 
-use super::ended::{Ended, no_input};
+use super::error::{SessionError, no_input};
 use super::operator::Operator;
 use specgen_language::outcome::Outcome;
 
-/// How it stands with the input line.
+/// State of the input line.
 #[derive(Serialize)]
 pub struct EdgeState {
-    /// Number of the stage of the last order.
+    /// Number of the stage of the last command.
     stage: u8,
     stands: &'static str,
     /// Rising edges since power-up.
     edges: u32,
-    /// Tick of the edge at which that order began or was refused.
+    /// Tick of the edge at which that command began or was refused.
     tick: Option<u64>,
 }
 
@@ -65,8 +65,8 @@ impl<P: Port> Operator<P> {
     }
 
     /// Other settings of a trigger. Each is in force with the next tick, where the line begins anew.
-    pub(super) fn set_trigger(&mut self, line: usize, settings: &[(String, f64)]) -> Result<(), Ended> {
-        let places = self.places_of(line, settings).map_err(Ended::Refused)?;
+    pub(super) fn set_trigger(&mut self, line: usize, settings: &[(String, f64)]) -> Result<(), SessionError> {
+        let places = self.places_of(line, settings).map_err(SessionError::Refused)?;
         let mut words = self.session.config()?;
         for (place, word) in places {
             if let Some(slot) = words.get_mut(place) {
@@ -77,38 +77,40 @@ impl<P: Port> Operator<P> {
             Err(ClientError::Refused(Refusal::Word { index })) => {
                 let names = &self.session.description().config_names;
                 let name = names.get(usize::from(index)).map_or("?", String::as_str);
-                Err(Ended::Refused(format!("`{name}` is out of its range (docs/triggers.md); the settings stay")))
+                Err(SessionError::Refused(format!(
+                    "`{name}` is out of its range (docs/triggers.md); the settings stay"
+                )))
             }
             other => Ok(other?),
         }
     }
 
     /// Has a move, a trajectory or a wave wait for the edge of the input line.
-    pub(super) fn on_edge(&mut self, order: &Order) -> Result<(), Ended> {
-        let words = match order {
-            Order::Wave(path) => return self.wave(path, true),
-            Order::Play { name, .. } => {
-                let number = self.trajectory(name).map_err(Ended::Refused)?;
+    pub(super) fn on_edge(&mut self, command: &Command) -> Result<(), SessionError> {
+        let words = match command {
+            Command::Wave(path) => return self.wave(path, true),
+            Command::Play { name, .. } => {
+                let number = self.trajectory(name).map_err(SessionError::Refused)?;
                 self.words_of_trajectory(number)?
             }
-            order => {
-                let user = self.user_of(order)?;
+            command => {
+                let user = self.user_of(command)?;
                 self.words_of_move(&user)?
             }
         };
-        self.ordered = true;
+        self.in_control = true;
         self.session.command_on_edge(&words).map_err(|error| match error {
             ClientError::Refused(Refusal::Unsupported) => no_input(),
             ClientError::Refused(Refusal::State) => {
-                Ended::Refused(format!("not now; the machine must run, at rest: {}", self.stands()))
+                SessionError::Refused(format!("not now; the machine must run, at rest: {}", self.state()))
             }
             other => other.into(),
         })
     }
 
     /// How it stands with the input line; what waits is dropped first, if that is asked for.
-    pub(super) fn edge(&mut self, drop: bool) -> Result<EdgeState, Ended> {
-        self.ordered |= drop;
+    pub(super) fn edge(&mut self, drop: bool) -> Result<EdgeState, SessionError> {
+        self.in_control |= drop;
         let EdgeStatus { stage, edges, tick } = self.session.edge(drop).map_err(|error| match error {
             ClientError::Refused(Refusal::Unsupported) => no_input(),
             other => other.into(),

@@ -1,4 +1,4 @@
-//! The operator of a session: carries orders out one after the other, notices faults, keeps the link alive.
+//! The operator of a session: executes commands one after the other, notices faults, keeps the link alive.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,18 +11,19 @@ use specgen_link::{RecorderStatus, Refusal, Status};
 use specgen_runtime::setpoint::{BUSY, REFUSED};
 use specgen_runtime::supervisor::{Phase, Request};
 
-use super::answer::{Answer, Downloaded, MachineStatus, Moves, Plain, RecorderState, Settings};
-use super::ended::{Ended, unsupported, waving};
-use super::health::Standing;
+use super::answer::{Acknowledgement, Answer, Destination, DownloadReport, MachineStatus, RecorderState, Settings};
+use super::error::{SessionError, unsupported, waving};
+use super::health::StatusReport;
 use super::pose::{ZERO, in_words};
+use crate::command::{Command, WaitCondition};
+use crate::frame::Frame;
+use crate::session::{ALIVE, Session};
 use specgen_compiler::compile;
 use specgen_language::files;
 use specgen_language::model::Model;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::{check_input, check_place, write_file};
 use specgen_language::ui::Ui;
-use specgen_operate::frame::Frame;
-use specgen_operate::{Order, Session, WaitCondition};
 
 /// How long ramping down may take.
 const DOWN: Duration = Duration::from_secs(60);
@@ -31,38 +32,39 @@ const SEEN: u64 = 10;
 /// How long these may take.
 const ANSWERED: Duration = Duration::from_secs(2);
 
-/// What is done whenever a machine is looked at. An error ends what is under way.
-pub type Pulse<P> = Box<dyn FnMut(&mut Operator<P>) -> Result<(), Ended>>;
+/// Called whenever a machine is looked at. An error ends the command under way.
+pub type Pulse<P> = Box<dyn FnMut(&mut Operator<P>) -> Result<(), SessionError>>;
 
-/// One host's hands on a machine.
+/// One host that operates a machine.
 pub struct Operator<P> {
-    pub(super) session: Session<P>,
+    pub(crate) session: Session<P>,
     /// What the device was built from, where that is known.
     pub model: Option<Model>,
     /// Sets of faults that look alike to its wiring check.
     pub alike: Vec<Vec<u32>>,
     /// Poses by the names that this session gave them.
     pub(super) marks: BTreeMap<String, [f64; 6]>,
-    /// What poses are said in.
+    /// The frame of poses in this session.
     pub(super) frame: Frame,
-    /// Whether anything was ordered, so that this host is missed when it leaves.
-    pub ordered: bool,
-    /// This host asked it to run no more.
-    goes_down: bool,
-    /// It ran, and another host, a fault or the emergency contact ended that.
+    /// Whether this host is in control: the machine misses it when it leaves.
+    pub in_control: bool,
+    /// This host has requested a stop.
+    is_stopping: bool,
+    /// It ran, and another host, a fault or the emergency contact stopped it.
     pub(super) was_stopped: bool,
     interrupted: &'static AtomicBool,
     /// Phase, cause and finding that were shown last.
     shown: (u8, u8, u16),
     /// A person looks at it: a fault is shown, and ends nothing.
     pub attended: bool,
-    /// Done at every look, however long an order takes.
-    pub(super) pulse: Option<Pulse<P>>,
-    /// Answers to the orders so far, for the JSON document.
+    /// Called at every look, however long a command takes.
+    pub(crate) pulse: Option<Pulse<P>>,
+    /// Answers to the commands so far, for the JSON document.
     pub answers: Vec<Answer>,
 }
 
 impl<P: Port> Operator<P> {
+    /// Operates the machine of this session until `interrupted` is set.
     pub fn new(session: Session<P>, interrupted: &'static AtomicBool) -> Self {
         let shown = (session.status().phase, session.status().cause, session.status().finding);
         Self {
@@ -71,8 +73,8 @@ impl<P: Port> Operator<P> {
             alike: Vec::new(),
             marks: BTreeMap::new(),
             frame: Frame::default(),
-            ordered: false,
-            goes_down: false,
+            in_control: false,
+            is_stopping: false,
             was_stopped: false,
             interrupted,
             shown,
@@ -83,7 +85,7 @@ impl<P: Port> Operator<P> {
     }
 
     /// Phase and cause in words.
-    pub fn stands(&self) -> String {
+    pub fn state(&self) -> String {
         self.session.stands(&self.alike)
     }
 
@@ -97,17 +99,19 @@ impl<P: Port> Operator<P> {
         Ok(self.session.config()? == settings)
     }
 
+    /// Whether the amplifiers are on.
     pub fn is_powered(&self) -> bool {
         self.session.status().amplifier_on
     }
 
+    /// State of the machine at the last look.
     pub fn status(&self) -> MachineStatus {
         let status = *self.session.status();
         MachineStatus {
             tick: status.tick,
             phase: status.phase,
             cause: status.cause,
-            stands: self.stands(),
+            stands: self.state(),
             amplifiers_on: status.amplifier_on,
             status: status.status,
             status_in_words: host_sim::word::status_words(status.status).replace('+', ", "),
@@ -120,24 +124,24 @@ impl<P: Port> Operator<P> {
         }
     }
 
-    /// Whether the user wants it to end.
-    pub(super) fn is_interrupted(&self) -> bool {
+    /// Whether the user ends the session.
+    pub(crate) fn is_interrupted(&self) -> bool {
         self.interrupted.load(Ordering::Relaxed)
     }
 
     /// Asks how it stands. A fault that is new ends what is not attended.
-    pub fn look(&mut self) -> Result<(), Ended> {
+    pub fn look(&mut self) -> Result<(), SessionError> {
         if self.is_interrupted() {
-            return Err(Ended::Interrupted);
+            return Err(SessionError::Interrupted);
         }
         let before = self.session.status().phase;
         self.session.poll()?;
         let [faulted, running] = [Phase::Faulted, Phase::Running].map(|phase| phase.word() as u8);
         let status = self.session.status();
         if !self.attended && status.phase == faulted && before != faulted {
-            return Err(Ended::Fault(format!("the machine is {}, at tick {}", self.stands(), status.tick)));
+            return Err(SessionError::Fault(format!("the machine is {}, at tick {}", self.state(), status.tick)));
         }
-        if before == running && status.phase != running && !std::mem::take(&mut self.goes_down) {
+        if before == running && status.phase != running && !std::mem::take(&mut self.is_stopping) {
             // What was to come was meant for a machine that runs.
             self.was_stopped = true;
             // One that ramps down for a cause is faulted soon, and that is the better message.
@@ -153,13 +157,13 @@ impl<P: Port> Operator<P> {
         done
     }
 
-    fn stopped_by_others(&self) -> Ended {
-        Ended::Fault(format!("the machine was stopped, and is {}, at tick {}", self.stands(), self.status().tick))
+    fn stopped_by_others(&self) -> SessionError {
+        SessionError::Fault(format!("the machine was stopped, and is {}, at tick {}", self.state(), self.status().tick))
     }
 
-    /// Asks for a stop in the midst of an order, which ends with that, and all that waits.
+    /// Asks for a stop in the midst of a command, which ends with that, and all that waits.
     pub(super) fn stop_by_hand(&mut self, request: Request) -> Result<(), ClientError> {
-        (self.ordered, self.goes_down, self.was_stopped) = (true, true, true);
+        (self.in_control, self.is_stopping, self.was_stopped) = (true, true, true);
         self.session.supervise(request)
     }
 
@@ -169,7 +173,7 @@ impl<P: Port> Operator<P> {
         let now = (status.phase, status.cause, status.finding);
         if now != self.shown {
             self.shown = now;
-            ui.progress(&format!("tick {}: {}", status.tick, self.stands()));
+            ui.progress(&format!("tick {}: {}", status.tick, self.state()));
         }
     }
 
@@ -181,101 +185,105 @@ impl<P: Port> Operator<P> {
         }
     }
 
-    /// Refuses `orders` if one of them makes no sense whatever the device does: names, numbers, waves, files that cannot be.
-    pub fn check(&self, orders: &[Order]) -> Result<(), Failure> {
+    /// Refuses `commands` if one of them makes no sense whatever the device does: names, numbers, waves, files that cannot be.
+    pub fn check(&self, commands: &[Command]) -> Result<(), Failure> {
         let nonsense = |text: String| Failure::Usage(format!("{text}; nothing was asked of the machine"));
         let mut marks: Vec<&str> = self.marks.keys().map(String::as_str).collect();
-        // A download may stand above the order that reads its file.
-        orders.iter().filter_map(Order::input).for_each(files::note_input);
-        orders.iter().try_for_each(|order| match order {
-            Order::Set(assignments) => self.session.assign(assignments).map(|_| ()).map_err(nonsense),
-            Order::Mark(name) => {
+        // A download may stand above the command that reads its file.
+        commands.iter().filter_map(Command::input).for_each(files::note_input);
+        commands.iter().try_for_each(|command| match command {
+            Command::Set(assignments) => self.session.assign(assignments).map(|_| ()).map_err(nonsense),
+            Command::Mark(name) => {
                 marks.push(name);
                 self.motion().map(|_| ()).map_err(nonsense)
             }
-            Order::OnEdge(order) => self.check(std::slice::from_ref(order)),
-            Order::Goto(name) if name != ZERO && !marks.contains(&name.as_str()) => Err(nonsense(self.no_mark(name))),
-            Order::Play { name, correction } => {
+            Command::OnEdge(command) => self.check(std::slice::from_ref(command)),
+            Command::Goto(name) if name != ZERO && !marks.contains(&name.as_str()) => Err(nonsense(self.no_mark(name))),
+            Command::Play { name, correction } => {
                 correction.as_ref().map_or(Ok(()), |(path, _)| check_input(path))?;
                 self.playable(name, correction.as_ref()).map(|_| ()).map_err(nonsense)
             }
-            Order::Gains(gains) => self.gains_of(gains).map(|_| ()).map_err(nonsense),
-            Order::Trigger { line, settings } => self.places_of(*line, settings).map(|_| ()).map_err(nonsense),
-            Order::Move { .. }
-            | Order::Frame(_)
-            | Order::Where
-            | Order::Limits
-            | Order::CanIGo { .. }
-            | Order::Goto(_)
-            | Order::Watch { file: None, .. }
-            | Order::Mode(_) => self.motion().map(|_| ()).map_err(nonsense),
-            Order::Wave(path) => {
+            Command::Gains(gains) => self.gains_of(gains).map(|_| ()).map_err(nonsense),
+            Command::Trigger { line, settings } => self.places_of(*line, settings).map(|_| ()).map_err(nonsense),
+            Command::Move { .. }
+            | Command::Frame(_)
+            | Command::Where
+            | Command::Limits
+            | Command::CanIGo { .. }
+            | Command::Goto(_)
+            | Command::Watch { file: None, .. }
+            | Command::Mode(_) => self.motion().map(|_| ()).map_err(nonsense),
+            Command::Wave(path) => {
                 check_input(path)?;
                 self.wave_of(path).map(|_| ()).map_err(nonsense)
             }
-            Order::Watch { file: Some(path), .. } => {
+            Command::Watch { file: Some(path), .. } => {
                 self.motion().map_err(nonsense)?;
                 check_place(path)
             }
-            Order::Download(path) => check_place(path),
+            Command::Download(path) => check_place(path),
             _ => Ok(()),
         })
     }
 
-    pub fn obey(&mut self, order: &Order, ui: &Ui) -> Result<(), Ended> {
+    /// Executes a command, and notes its answer.
+    ///
+    /// # Errors
+    /// The command failed, or the session ends.
+    pub fn execute(&mut self, command: &Command, ui: &Ui) -> Result<(), SessionError> {
         self.look()?;
-        let line = format!("{order:?}");
-        match order {
-            Order::Status => {
+        let line = format!("{command:?}");
+        match command {
+            Command::Status => {
                 let health = self.session.health()?.into();
                 let place = self.session.place()?.map(|place| self.located(&place));
                 let advice = self.advice();
-                self.note(&line, &Standing { status: self.status(), place, advice, health }, ui);
+                self.note(&line, &StatusReport { status: self.status(), place, advice, health }, ui);
             }
-            Order::Wait { until, limit } => {
+            Command::Wait { until, limit } => {
                 self.wait(*until, *limit, ui)?;
-                self.note(&line, &Plain(self.stands()), ui);
+                self.note(&line, &Acknowledgement(self.state()), ui);
             }
-            Order::Move { .. } => {
-                let user = self.user_of(order)?;
+            Command::Move { .. } => {
+                let user = self.user_of(command)?;
                 self.go(user)?;
-                self.note(&line, &Moves { pose: self.seen(&user) }, ui);
+                self.note(&line, &Destination { pose: self.seen(&user) }, ui);
             }
-            Order::OnEdge(order) => {
-                self.on_edge(order)?;
-                self.note(&line, &Plain("done".to_owned()), ui);
+            Command::OnEdge(command) => {
+                self.on_edge(command)?;
+                self.note(&line, &Acknowledgement("done".to_owned()), ui);
             }
-            Order::Edge | Order::DropEdge => {
-                let edge = self.edge(*order == Order::DropEdge)?;
+            Command::Edge | Command::DropEdge => {
+                let edge = self.edge(*command == Command::DropEdge)?;
                 self.note(&line, &edge, ui);
             }
-            Order::Where
-            | Order::Limits
-            | Order::CanIGo { .. }
-            | Order::Frame(_)
-            | Order::Mark(_)
-            | Order::Goto(_)
-            | Order::Play { .. }
-            | Order::Mode(_)
-            | Order::Gains(_) => self.of_platform(order, &line, ui)?,
-            Order::Watch { every, seconds, file } => self.watch(*every, *seconds, file.as_deref(), &line, ui)?,
-            Order::Config => {
+            Command::Where
+            | Command::Limits
+            | Command::CanIGo { .. }
+            | Command::Frame(_)
+            | Command::Mark(_)
+            | Command::Goto(_)
+            | Command::Play { .. }
+            | Command::Mode(_)
+            | Command::Gains(_) => self.of_platform(command, &line, ui)?,
+            Command::Watch { every, seconds, file } => self.watch(*every, *seconds, file.as_deref(), &line, ui)?,
+            Command::Config => {
                 let settings = self.config()?;
                 self.note(&line, &settings, ui);
             }
-            Order::Record(action) => {
+            Command::Record(action) => {
                 let RecorderStatus { running, triggered, ticks, capacity } = self.session.recorder(*action)?;
                 let period = self.session.period();
                 self.note(&line, &RecorderState { running, triggered, ticks, capacity, period }, ui);
             }
-            Order::Download(path) => {
+            Command::Download(path) => {
                 let downloaded = self.download(path)?;
                 self.note(&line, &downloaded, ui);
             }
             _ => {
-                self.ask(order)?;
-                self.note(&line, &Plain("done".to_owned()), ui);
-                if *order == Order::Stop {
+                self.ask(command)?;
+                self.note(&line, &Acknowledgement("done".to_owned()), ui);
+                if *command == Command::Stop {
                     return self.stopped(ui);
                 }
             }
@@ -285,24 +293,24 @@ impl<P: Port> Operator<P> {
         Ok(())
     }
 
-    /// Orders that are answered by being done.
-    fn ask(&mut self, order: &Order) -> Result<(), Ended> {
-        self.ordered = true;
-        match order {
-            Order::Ask(request) => {
-                self.goes_down = matches!(request, Request::Hold | Request::RampDown);
+    /// Commands without an answer of their own.
+    fn ask(&mut self, command: &Command) -> Result<(), SessionError> {
+        self.in_control = true;
+        match command {
+            Command::Ask(request) => {
+                self.is_stopping = matches!(request, Request::Hold | Request::RampDown);
                 self.session.supervise(*request)?;
             }
-            Order::Set(assignments) => {
-                let words = self.session.assign(assignments).map_err(Ended::Refused)?;
+            Command::Set(assignments) => {
+                let words = self.session.assign(assignments).map_err(SessionError::Refused)?;
                 self.session.command(words).map_err(waving)?;
             }
-            Order::WriteConfig(spec) => self.write_config(spec)?,
-            Order::Trigger { line, settings } => self.set_trigger(*line, settings)?,
-            Order::Wave(path) => self.wave(path, false)?,
-            Order::StopWave => self.session.stop_wave()?,
-            Order::Stop => {
-                self.goes_down = true;
+            Command::WriteConfig(spec) => self.write_config(spec)?,
+            Command::Trigger { line, settings } => self.set_trigger(*line, settings)?,
+            Command::Wave(path) => self.wave(path, false)?,
+            Command::StopWave => self.session.stop_wave()?,
+            Command::Stop => {
+                self.is_stopping = true;
                 self.session.stop().map_err(unsupported)?;
             }
             // The others have an answer of their own.
@@ -312,47 +320,47 @@ impl<P: Port> Operator<P> {
     }
 
     /// Words of a move to `pose`, in the controller's coordinates, that the machine can make from rest.
-    pub(super) fn words_of_move(&self, pose: &[f64; 6]) -> Result<Vec<u64>, Ended> {
+    pub(super) fn words_of_move(&self, pose: &[f64; 6]) -> Result<Vec<u64>, SessionError> {
         let status = self.session.status();
         if u64::from(status.phase) != Phase::Running.word() {
-            return Err(Ended::Refused(format!("the machine is {}: it moves when it runs", self.stands())));
+            return Err(SessionError::Refused(format!("the machine is {}: it moves when it runs", self.state())));
         }
         if status.status & BUSY != 0 {
-            return Err(Ended::Refused("a motion is under way; `wait arrived` first".to_owned()));
+            return Err(SessionError::Refused("a motion is under way; `wait arrived` first".to_owned()));
         }
-        if let Some(binding) = self.motion().map_err(Ended::Refused)?.binding(pose) {
+        if let Some(binding) = self.motion().map_err(SessionError::Refused)?.binding(pose) {
             let to = self.seen(pose);
-            let (to, binds) = (specgen_operate::place::in_words(&to), in_words(&binding));
-            return Err(Ended::Refused(format!("it cannot go to {to}: {binds}; nothing moves")));
+            let (to, binds) = (crate::place::in_words(&to), in_words(&binding));
+            return Err(SessionError::Refused(format!("it cannot go to {to}: {binds}; nothing moves")));
         }
-        self.session.move_words(pose).map_err(Ended::Refused)
+        self.session.move_words(pose).map_err(SessionError::Refused)
     }
 
     /// Sends a move, and waits until the machine has taken or refused it. Where a motion is under way a machine looks at a
     /// command only after it, so that nothing could be said of this one.
-    pub(super) fn go(&mut self, pose: [f64; 6]) -> Result<(), Ended> {
+    pub(super) fn go(&mut self, pose: [f64; 6]) -> Result<(), SessionError> {
         let words = self.words_of_move(&pose)?;
         self.send_and_see(words)?;
         let status = self.session.status();
         if u64::from(status.phase) != Phase::Running.word() {
-            return Err(Ended::Fault(format!("the machine is {} and does not move", self.stands())));
+            return Err(SessionError::Fault(format!("the machine is {} and does not move", self.state())));
         }
         if status.status & REFUSED != 0 {
-            return Err(Ended::Refused(format!(
+            return Err(SessionError::Refused(format!(
                 "the machine refuses to move to {}: outside the workspace; it stands where it stood",
-                specgen_operate::place::in_words(&pose)
+                crate::place::in_words(&pose)
             )));
         }
         Ok(())
     }
 
     /// Sends a command, and waits until the status says what became of it.
-    pub(super) fn send_and_see(&mut self, words: Vec<u64>) -> Result<(), Ended> {
+    pub(super) fn send_and_see(&mut self, words: Vec<u64>) -> Result<(), SessionError> {
         self.send(words)?;
         let (sent, start) = (self.session.status().tick, Instant::now());
         while self.session.status().tick < sent + SEEN {
             if start.elapsed() >= ANSWERED {
-                return Err(Ended::Fault(format!("the machine makes no ticks, and is {}", self.stands())));
+                return Err(SessionError::Fault(format!("the machine makes no ticks, and is {}", self.state())));
             }
             std::thread::sleep(Duration::from_millis(1));
             self.look()?;
@@ -361,16 +369,16 @@ impl<P: Port> Operator<P> {
     }
 
     /// Sends a command, and looks at the machine.
-    pub(super) fn send(&mut self, words: Vec<u64>) -> Result<(), Ended> {
-        self.ordered = true;
+    pub(super) fn send(&mut self, words: Vec<u64>) -> Result<(), SessionError> {
+        self.in_control = true;
         self.session.command(words).map_err(waving)?;
         self.look()
     }
 
-    pub(super) fn wait(&mut self, until: WaitCondition, limit: Duration, ui: &Ui) -> Result<(), Ended> {
+    pub(super) fn wait(&mut self, until: WaitCondition, limit: Duration, ui: &Ui) -> Result<(), SessionError> {
         let start = Instant::now();
         // Whoever waits for another phase expects it.
-        self.goes_down |= matches!(until, WaitCondition::Phase(phase) if phase != Phase::Running);
+        self.is_stopping |= matches!(until, WaitCondition::Phase(phase) if phase != Phase::Running);
         self.was_stopped = false;
         loop {
             if until == WaitCondition::Arrived && self.was_stopped {
@@ -382,7 +390,7 @@ impl<P: Port> Operator<P> {
                     let Status { phase, status, .. } = *self.session.status();
                     let runs = u64::from(phase) == Phase::Running.word();
                     if runs && status & REFUSED != 0 {
-                        return Err(Ended::Refused("the machine refuses its command, and stands".to_owned()));
+                        return Err(SessionError::Refused("the machine refuses its command, and stands".to_owned()));
                     }
                     runs && status & BUSY == 0
                 }
@@ -397,9 +405,9 @@ impl<P: Port> Operator<P> {
                 WaitCondition::Passed(_) => "",
             };
             if !expected.is_empty() && start.elapsed() >= limit {
-                return Err(Ended::Fault(format!(
+                return Err(SessionError::Fault(format!(
                     "the machine is still {} after {} s, expected {}",
-                    self.stands(),
+                    self.state(),
                     limit.as_secs_f64(),
                     expected
                 )));
@@ -411,20 +419,24 @@ impl<P: Port> Operator<P> {
     }
 
     /// Waits until the program that serves the link has closed it.
-    fn stopped(&mut self, ui: &Ui) -> Result<(), Ended> {
+    fn stopped(&mut self, ui: &Ui) -> Result<(), SessionError> {
         let start = Instant::now();
         while start.elapsed() < DOWN {
             match self.look() {
-                Err(Ended::Link(ClientError::Port(_))) => return Err(Ended::Stopped),
+                Err(SessionError::Link(ClientError::Port(_))) => return Err(SessionError::Stopped),
                 other => other?,
             }
             self.show(ui);
             std::thread::sleep(self.session.due());
         }
-        Err(Ended::Fault(format!("it has not ended after {} s, the machine is {}", DOWN.as_secs(), self.stands())))
+        Err(SessionError::Fault(format!(
+            "it has not ended after {} s, the machine is {}",
+            DOWN.as_secs(),
+            self.state()
+        )))
     }
 
-    fn config(&mut self) -> Result<Settings, Ended> {
+    fn config(&mut self) -> Result<Settings, SessionError> {
         let words = self.session.config()?;
         let description = self.session.description();
         let value = |name: &str, word: u64| match host_sim::word::WordKind::of(name) {
@@ -436,7 +448,7 @@ impl<P: Port> Operator<P> {
     }
 
     /// Does what takes its time, in which the link is not to be lost.
-    pub(super) fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, Ended> {
+    pub(super) fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, SessionError> {
         std::thread::scope(|scope| {
             let work = scope.spawn(work);
             while !work.is_finished() {
@@ -444,17 +456,19 @@ impl<P: Port> Operator<P> {
                 std::thread::sleep(self.session.due());
             }
             // The hook has said where.
-            work.join().map_err(|_| Ended::Failed(Failure::Environment("the compiler of specs failed".to_owned())))
+            work.join()
+                .map_err(|_| SessionError::Failed(Failure::Environment("the compiler of specs failed".to_owned())))
         })
     }
 
     /// The settings of a spec; its tables stay in the spec.
-    fn write_config(&mut self, path: &Path) -> Result<(), Ended> {
-        let compiled = self.meanwhile(|| compile::compile(path))?.map_err(|refused| Ended::Failed(refused.into()))?;
+    fn write_config(&mut self, path: &Path) -> Result<(), SessionError> {
+        let compiled =
+            self.meanwhile(|| compile::compile(path))?.map_err(|refused| SessionError::Failed(refused.into()))?;
         let (ours, theirs) = (&compiled.ir, self.session.description());
         let words = &compiled.ir.integrity.settings;
         if ours.scalar.bits() != theirs.scalar.bits() || words.len() != theirs.config_names.len() {
-            return Err(Ended::Refused(format!(
+            return Err(SessionError::Refused(format!(
                 "{} has {} settings in f{}, the device {} in f{}: write the settings of a spec of the same kind and scalar",
                 path.display(),
                 words.len(),
@@ -468,36 +482,39 @@ impl<P: Port> Operator<P> {
             ClientError::Refused(Refusal::Word { index }) => {
                 let names = &self.session.description().config_names;
                 let name = names.get(usize::from(index)).map_or("?", String::as_str);
-                Ended::Refused(format!("the device refuses `{name}` of {}: out of its range there", path.display()))
+                SessionError::Refused(format!(
+                    "the device refuses `{name}` of {}: out of its range there",
+                    path.display()
+                ))
             }
             other => other.into(),
         })
     }
 
     /// The whole record, as the bytes of its file.
-    pub(super) fn record(&mut self) -> Result<Vec<u8>, Ended> {
+    pub(crate) fn record(&mut self) -> Result<Vec<u8>, SessionError> {
         let (mut whole, mut looked) = (Vec::new(), Instant::now());
         loop {
             let complete = self.session.download_on(&mut whole).map_err(|error| match error {
                 ClientError::Refused(Refusal::State) => {
-                    Ended::Refused("it still records; `record stop` first, or wait for the trigger".to_owned())
+                    SessionError::Refused("it still records; `record stop` first, or wait for the trigger".to_owned())
                 }
                 other => other.into(),
             })?;
             if complete {
                 return Ok(whole);
             }
-            if looked.elapsed() >= super::ALIVE {
+            if looked.elapsed() >= ALIVE {
                 self.look()?;
                 looked = Instant::now();
             }
         }
     }
 
-    fn download(&mut self, path: &Path) -> Result<Downloaded, Ended> {
+    fn download(&mut self, path: &Path) -> Result<DownloadReport, SessionError> {
         let bytes = self.record()?;
-        write_file(path, &bytes).map_err(Ended::Failed)?;
-        Ok(Downloaded { file: path.display().to_string(), bytes: bytes.len() })
+        write_file(path, &bytes).map_err(SessionError::Failed)?;
+        Ok(DownloadReport { file: path.display().to_string(), bytes: bytes.len() })
     }
 
     /// Ramps down and waits until the amplifiers are off; what came of it.
@@ -511,10 +528,10 @@ impl<P: Port> Operator<P> {
             let status = self.session.status();
             let off = [Phase::Disarmed, Phase::Faulted].map(|phase| phase.word() as u8).contains(&status.phase);
             if off && !status.amplifier_on {
-                return Ok(format!("the machine is {}, amplifiers off", self.stands()));
+                return Ok(format!("the machine is {}, amplifiers off", self.state()));
             }
             std::thread::sleep(self.session.due());
         }
-        Ok(format!("the machine is still {} after {} s", self.stands(), DOWN.as_secs()))
+        Ok(format!("the machine is still {} after {} s", self.state(), DOWN.as_secs()))
     }
 }

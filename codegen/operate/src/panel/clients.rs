@@ -1,4 +1,4 @@
-//! Pages: who is there, who has the orders, what each is told. One page orders, the others look; hold and ramp down are anybody's.
+//! Connected pages. One page is in control, the others watch; hold and ramp down work from every page.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -9,47 +9,47 @@ use serde_json::{Value, json};
 use specgen_runtime::supervisor::Request;
 use tungstenite::Message;
 
-use super::browser::{Heard, Outbox};
+use super::browser::{ClientEvent, Outbox};
 
-/// A page that has the orders is gone when it is silent for so long.
+/// After this silence the page in control is gone.
 const SILENCE: Duration = Duration::from_secs(2);
-/// How long the page that has the orders may think about giving them, and an offer stands.
+/// Time that the page in control has to answer a request for it, and that an offer lasts.
 const ANSWER: Duration = Duration::from_secs(10);
-/// Messages with samples that a page may have taken without showing them: two seconds of them. Then it is left out until it catches up.
+/// Messages with samples that a page may have received and not shown, two seconds of them. Then it gets none until it catches up.
 const BEHIND: u32 = 40;
-/// What other pages order after a hold or a ramp down they ordered before it, until they show samples that are newer, and for so long at most.
+/// Longest time after a stop in which commands of other pages are refused, as they may be older. Samples that are newer end it.
 const LATE: Duration = Duration::from_secs(1);
-/// Orders that wait.
+/// Most commands that wait.
 const WAITING: usize = 16;
-/// Messages that are heard in a round.
+/// Most events of a round.
 const ROUND: usize = 128;
-/// Events that are kept for pages that come later.
-const EVENTS: usize = 100;
+/// Log entries that are kept for pages that connect later.
+const LOG: usize = 100;
 
-/// What a page asks for.
+/// A request of a page.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "do", rename_all = "kebab-case")]
-pub enum Asked {
-    /// It has shown the samples up to this message: it is there.
+pub enum PageRequest {
+    /// It has shown the samples up to this message: its heartbeat.
     Seen {
         number: u32,
     },
     RampDown,
     Hold,
-    /// The orders, or an answer to one who asks for them.
-    Ask,
-    Offer,
-    Give,
-    Keep,
+    RequestControl,
+    OfferControl,
+    /// Answers to a request for control.
+    GrantControl,
+    KeepControl,
     /// A line as `specgen operate` takes it.
-    Order {
+    Command {
         id: u32,
         line: String,
     },
-    /// A request to the supervisor that is to begin to be given.
+    /// An edge-triggered request to the supervisor.
     Begin {
         id: u32,
-        request: Begin,
+        request: EdgeRequest,
     },
     Wave {
         id: u32,
@@ -73,7 +73,7 @@ pub enum Asked {
 
 #[derive(Debug, Deserialize, Clone, Copy, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
-pub enum Begin {
+pub enum EdgeRequest {
     Arm,
     Run,
     Acknowledge,
@@ -82,7 +82,7 @@ pub enum Begin {
 struct Page {
     number: u64,
     to: Outbox,
-    heard: Instant,
+    heartbeat: Instant,
     /// The last message with samples that it was sent, and the last that it has shown.
     sent: u32,
     seen: u32,
@@ -90,26 +90,27 @@ struct Page {
     left_out: u32,
 }
 
-/// Everybody who looks.
-pub struct Hall {
-    heard: Receiver<Heard>,
+/// All connected pages.
+pub struct Clients {
+    events: Receiver<ClientEvent>,
     pages: Vec<Page>,
+    /// The page in control.
     holder: Option<u64>,
-    /// Who asks for the orders, and since when.
-    asked: Option<(u64, Instant)>,
-    /// Since when the orders are anybody's who asks.
+    /// The page that requests control, and since when.
+    requested: Option<(u64, Instant)>,
+    /// Since when any page can take control.
     offered: Option<Instant>,
-    waiting: VecDeque<(u64, Asked)>,
-    /// Hold or ramp down, and who wants it; the later counts, a hold does not end a ramp down.
+    waiting: VecDeque<(u64, PageRequest)>,
+    /// Hold or ramp down, and the page that requests it; the later one counts, but a hold does not end a ramp-down.
     urgent: Option<(u64, Request)>,
-    /// The page that asked for one last, when, and the last message with samples before it.
+    /// The page that stopped the machine last, when, and the last message with samples before that.
     stopped: Option<(u64, Instant, u32)>,
-    /// The page that had the orders went away with them.
+    /// The page in control has gone, and no other has taken control.
     pub is_left: bool,
     /// The check is to end.
     pub ends: bool,
     number: u32,
-    events: VecDeque<Value>,
+    log: VecDeque<Value>,
 }
 
 /// ms since 1970.
@@ -121,13 +122,13 @@ fn text(value: &Value) -> Message {
     Message::text(value.to_string())
 }
 
-impl Hall {
-    pub fn new(heard: Receiver<Heard>) -> Self {
+impl Clients {
+    pub fn new(events: Receiver<ClientEvent>) -> Self {
         Self {
-            heard,
+            events,
             pages: Vec::new(),
             holder: None,
-            asked: None,
+            requested: None,
             offered: None,
             waiting: VecDeque::new(),
             urgent: None,
@@ -135,27 +136,27 @@ impl Hall {
             is_left: false,
             ends: false,
             number: 0,
-            events: VecDeque::new(),
+            log: VecDeque::new(),
         }
     }
 
-    /// Hears what pages say, for so long at most until the first says something; then looks who is there.
+    /// Handles the events of pages, after at most this wait for the first one; then finds pages that have gone.
     pub fn listen(&mut self, limit: Duration) {
-        match self.heard.recv_timeout(limit) {
-            Ok(first) => self.hear(first),
+        match self.events.recv_timeout(limit) {
+            Ok(first) => self.handle(first),
             Err(RecvTimeoutError::Timeout) => {}
-            // The door is closed: nobody comes any more.
+            // The listener has ended: no page connects any more.
             Err(RecvTimeoutError::Disconnected) => std::thread::sleep(limit),
         }
         for _ in 0..ROUND {
-            let Ok(heard) = self.heard.try_recv() else { break };
-            self.hear(heard);
+            let Ok(event) = self.events.try_recv() else { break };
+            self.handle(event);
         }
-        let gone = |page: &&Page| Some(page.number) == self.holder && page.heard.elapsed() >= SILENCE;
+        let gone = |page: &&Page| Some(page.number) == self.holder && page.heartbeat.elapsed() >= SILENCE;
         if let Some(number) = self.pages.iter().find(gone).map(|page| page.number) {
-            self.lose(number, "says nothing any more");
+            self.lose(number, "is silent");
         }
-        if self.asked.is_some_and(|(_, since)| since.elapsed() >= ANSWER) {
+        if self.requested.is_some_and(|(_, since)| since.elapsed() >= ANSWER) {
             self.hand_over();
         }
         if self.offered.is_some_and(|since| since.elapsed() >= ANSWER) {
@@ -163,74 +164,77 @@ impl Hall {
         }
     }
 
-    fn hear(&mut self, heard: Heard) {
-        match heard {
-            Heard::Came { page, to } => {
-                to.send(text(&json!({ "k": "hello", "you": name(page), "events": self.events })));
+    fn handle(&mut self, event: ClientEvent) {
+        match event {
+            ClientEvent::Connected { page, to } => {
+                to.send(text(&json!({ "k": "hello", "you": name(page), "events": self.log })));
                 let sent = self.number;
-                self.pages.push(Page { number: page, to, heard: Instant::now(), sent, seen: sent, left_out: 0 });
+                self.pages.push(Page { number: page, to, heartbeat: Instant::now(), sent, seen: sent, left_out: 0 });
             }
-            Heard::Left { page } => {
+            ClientEvent::Disconnected { page } => {
                 self.pages.retain(|one| one.number != page);
                 if self.holder == Some(page) {
                     self.lose(page, "was closed");
                 }
-                if self.asked.is_some_and(|(asks, _)| asks == page) {
-                    self.asked = None;
+                if self.requested.is_some_and(|(requester, _)| requester == page) {
+                    self.requested = None;
                 }
             }
-            Heard::Said { page, text } => {
-                // What is no order is none: nothing comes of it, not even that somebody is there.
-                if let Ok(asked) = serde_json::from_str(&text) {
-                    self.take(page, asked);
+            ClientEvent::Received { page, text } => {
+                // Text that is not a request is not a heartbeat, either.
+                if let Ok(request) = serde_json::from_str(&text) {
+                    self.take(page, request);
                 }
             }
         }
     }
 
-    fn take(&mut self, page: u64, asked: Asked) {
+    fn take(&mut self, page: u64, request: PageRequest) {
         let Some(index) = self.pages.iter().position(|one| one.number == page) else { return };
-        self.pages[index].heard = Instant::now();
+        self.pages[index].heartbeat = Instant::now();
         let is_mine = self.holder == Some(page);
-        match asked {
-            Asked::Seen { number } => {
+        match request {
+            PageRequest::Seen { number } => {
                 let one = &mut self.pages[index];
                 if number <= one.sent && number > one.seen {
                     one.seen = number;
                 }
             }
-            Asked::RampDown => self.stop(page, Request::RampDown),
-            Asked::Hold if self.urgent.is_none() => self.stop(page, Request::Hold),
-            Asked::Hold => {}
-            Asked::Ask if is_mine => {}
-            Asked::Ask if self.holder.is_none() || self.offered.is_some() => self.give_to(page),
-            Asked::Ask if self.asked.is_none() => self.asked = Some((page, Instant::now())),
-            Asked::Ask => self.answer(page, 0, Err("another page asks already")),
-            Asked::Give if is_mine && self.asked.is_some() => self.hand_over(),
-            Asked::Offer if is_mine => self.offered = Some(Instant::now()),
-            Asked::Keep if is_mine => {
-                if let Some((asks, _)) = self.asked.take() {
-                    self.answer(asks, 0, Err("the page that has the orders keeps them"));
+            PageRequest::RampDown => self.stop(page, Request::RampDown),
+            PageRequest::Hold if self.urgent.is_none() => self.stop(page, Request::Hold),
+            PageRequest::Hold => {}
+            PageRequest::RequestControl if is_mine => {}
+            PageRequest::RequestControl if self.holder.is_none() || self.offered.is_some() => self.give_to(page),
+            PageRequest::RequestControl if self.requested.is_none() => self.requested = Some((page, Instant::now())),
+            PageRequest::RequestControl => self.answer(page, 0, Err("another page has requested control already")),
+            PageRequest::GrantControl if is_mine && self.requested.is_some() => self.hand_over(),
+            PageRequest::OfferControl if is_mine => self.offered = Some(Instant::now()),
+            PageRequest::KeepControl if is_mine => {
+                if let Some((requester, _)) = self.requested.take() {
+                    self.answer(requester, 0, Err("the page in control keeps it"));
                 }
                 self.offered = None;
             }
-            Asked::EndCheck if is_mine => self.ends = true,
-            Asked::Give | Asked::Offer | Asked::Keep | Asked::EndCheck => {}
-            order if self.is_late(index) => {
-                self.answer(page, order.id(), Err("another page has just stopped the machine"));
+            PageRequest::EndCheck if is_mine => self.ends = true,
+            PageRequest::GrantControl
+            | PageRequest::OfferControl
+            | PageRequest::KeepControl
+            | PageRequest::EndCheck => {}
+            command if self.is_late(index) => {
+                self.answer(page, command.id(), Err("another page has just stopped the machine"));
             }
-            order if is_mine && self.waiting.len() < WAITING => self.waiting.push_back((page, order)),
-            order => {
-                let why = if is_mine { "too many orders wait" } else { "this page does not have the orders" };
-                self.answer(page, order.id(), Err(why));
+            command if is_mine && self.waiting.len() < WAITING => self.waiting.push_back((page, command)),
+            command => {
+                let why = if is_mine { "too many commands wait" } else { "this page is not in control" };
+                self.answer(page, command.id(), Err(why));
             }
         }
     }
 
-    /// Whatever waits was asked for before that.
+    /// Waiting commands are older than a stop: they are refused.
     fn stop(&mut self, page: u64, request: Request) {
-        for (page, order) in std::mem::take(&mut self.waiting) {
-            self.answer(page, order.id(), Err("the machine was stopped"));
+        for (page, command) in std::mem::take(&mut self.waiting) {
+            self.answer(page, command.id(), Err("the machine was stopped"));
         }
         (self.urgent, self.stopped) = (Some((page, request)), Some((page, Instant::now(), self.number)));
     }
@@ -243,40 +247,40 @@ impl Hall {
 
     fn give_to(&mut self, page: u64) {
         let before = self.holder.replace(page);
-        (self.asked, self.offered, self.is_left) = (None, None, false);
-        // What another had asked for is not done in this one's name.
+        (self.requested, self.offered, self.is_left) = (None, None, false);
+        // Waiting commands are of the page that was in control before.
         self.waiting.clear();
-        let from = before.map_or(String::new(), |before| format!(" from {}", name(before)));
-        self.note("note", &format!("{} has the orders{from}.", named(page)), "", None);
+        let from = before.map_or(String::new(), |before| format!(", after {}", name(before)));
+        self.note("note", &format!("{} is in control{from}.", named(page)), "", None);
     }
 
     fn hand_over(&mut self) {
-        if let Some((asks, _)) = self.asked.take() {
-            self.give_to(asks);
+        if let Some((requester, _)) = self.requested.take() {
+            self.give_to(requester);
         }
     }
 
-    /// The page with the orders is no longer there.
+    /// The page in control has gone.
     fn lose(&mut self, page: u64, how: &str) {
         (self.holder, self.offered, self.is_left) = (None, None, true);
         self.waiting.clear();
-        self.note("warning", &format!("{} had the orders and {how}.", named(page)), "", None);
+        self.note("warning", &format!("{} was in control and {how}.", named(page)), "", None);
         self.hand_over();
     }
 
-    /// An order that waits, and whose it is.
-    pub fn next(&mut self) -> Option<(u64, Asked)> {
+    /// The next waiting command, and its page.
+    pub fn next(&mut self) -> Option<(u64, PageRequest)> {
         self.waiting.pop_front()
     }
 
-    /// What anybody may ask for at once, and who did.
+    /// A stop that a page requests, and the name of the page.
     pub fn urgent(&mut self) -> Option<(String, Request)> {
         let (page, request) = self.urgent.take()?;
         self.is_left = false;
         Some((named(page), request))
     }
 
-    /// Whether anybody asks for hold or ramp down.
+    /// Whether a page requests hold or ramp-down.
     pub fn is_pressed(&self) -> bool {
         self.urgent.is_some()
     }
@@ -285,7 +289,7 @@ impl Hall {
         self.holder.is_some()
     }
 
-    /// Tells a page what became of an order.
+    /// Sends a page the result of a command.
     pub fn answer(&self, page: u64, id: u32, done: Result<Value, &str>) {
         let value = match done {
             Ok(value) => json!({ "k": "answer", "id": id, "ok": true, "value": value }),
@@ -301,19 +305,19 @@ impl Hall {
         }
     }
 
-    /// What happened, for every page, and for those that come.
+    /// Logs an event: for all pages, and for those that connect later.
     pub fn note(&mut self, kind: &str, what: &str, advice: &str, code: Option<&str>) {
         let event = json!({ "k": "event", "t": now(), "kind": kind, "text": what, "do": advice, "code": code });
         for page in &self.pages {
             page.to.send(text(&event));
         }
-        self.events.push_back(event);
-        if self.events.len() > EVENTS {
-            self.events.pop_front();
+        self.log.push_back(event);
+        if self.log.len() > LOG {
+            self.log.pop_front();
         }
     }
 
-    /// Tells every page how things stand: `state` of the machine, and what is between the pages.
+    /// Sends every page the state of the machine and of control.
     pub fn publish(&self, state: &Value) {
         let left = |since: Instant| ANSWER.saturating_sub(since.elapsed()).as_secs_f64();
         for page in &self.pages {
@@ -322,8 +326,8 @@ impl Hall {
             state["holder"] = json!(self.holder.map(name));
             state["mine"] = json!(self.holder == Some(page.number));
             state["asked"] = json!(
-                self.asked
-                    .map(|(asks, since)| json!({ "by": name(asks), "mine": asks == page.number, "left": left(since) }))
+                self.requested
+                    .map(|(requester, since)| json!({ "by": name(requester), "mine": requester == page.number, "left": left(since) }))
             );
             state["offered"] = json!(self.offered.map(left));
             state["pages"] = json!(self.pages.len());
@@ -353,11 +357,11 @@ impl Hall {
     }
 }
 
-impl Asked {
+impl PageRequest {
     /// The number under which it is answered.
     pub fn id(&self) -> u32 {
         match self {
-            Self::Order { id, .. }
+            Self::Command { id, .. }
             | Self::Begin { id, .. }
             | Self::Wave { id, .. }
             | Self::Gain { id, .. }

@@ -1,4 +1,4 @@
-//! The wiring check of a page: it arms the machine, whose controller then checks gauges and legs itself, and says what was found.
+//! The wiring check of a page: it arms the machine, whose controller checks gauges and legs, and reports the result.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -9,14 +9,14 @@ use serde_json::{Value, json};
 use specgen_link::client::Port;
 use specgen_runtime::supervisor::{Cause, Finding, FindingText, Phase, Request};
 
-use super::ask::begin;
-use super::{Panel, said};
-use crate::cli::operate::{Ended, Operator};
+use super::request::send_edge;
+use super::{Panel, status};
+use crate::commands::{Operator, SessionError};
 
 /// How long a machine may take to arm beyond what its spec says.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// What was found, and what to do about it.
+/// Result of the check, and advice.
 #[derive(Serialize)]
 struct Verdict {
     good: bool,
@@ -25,8 +25,11 @@ struct Verdict {
 }
 
 /// Arms a machine that is disarmed. It holds where gauges and legs are as the spec says; else it is faulted, and the verdict says why.
-pub(super) fn run<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Panel>>) -> Result<Value, Ended> {
-    let refused = |why: String| Err(Ended::Refused(why));
+pub(super) fn check<P: Port + 'static>(
+    operator: &mut Operator<P>,
+    panel: &Rc<RefCell<Panel>>,
+) -> Result<Value, SessionError> {
+    let refused = |why: String| Err(SessionError::Refused(why));
     let (rules, off, period) = {
         let panel = panel.borrow();
         let model = &panel.compiled.model;
@@ -41,13 +44,13 @@ pub(super) fn run<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefC
     }
     panel.borrow_mut().check = json!({ "runs": true, "done": 0 });
     let first = operator.status().tick + u64::from(rules.arm_ticks);
-    begin(operator, Request::Arm)?;
+    send_edge(operator, Request::Arm)?;
     let whole = f64::from(rules.arm_ticks) + 6.0 * f64::from(wiring.ticks);
     let (since, limit) = (Instant::now(), PATIENCE + Duration::from_secs_f64(whole * period));
     let mut arms = false;
     let verdict = loop {
         operator.look()?;
-        if std::mem::take(&mut panel.borrow_mut().hall.ends) {
+        if std::mem::take(&mut panel.borrow_mut().clients.ends) {
             return refused("the check was ended".to_owned());
         }
         let legs = operator.status().tick.saturating_sub(first) / u64::from(wiring.ticks);
@@ -66,12 +69,12 @@ pub(super) fn run<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefC
             Some(Phase::Faulted | Phase::RampingDown) if u64::from(status.cause) == Cause::Wiring.word() => {
                 let finding = Finding::of_word(u32::from(status.finding));
                 let what = format!("{}.", FindingText(finding, rules.alike()));
-                break Verdict { good: false, what, advice: said::advice(finding) };
+                break Verdict { good: false, what, advice: status::advice(finding) };
             }
-            Some(Phase::Faulted) => return Err(Ended::Fault(format!("the machine is {}", operator.stands()))),
+            Some(Phase::Faulted) => return Err(SessionError::Fault(format!("the machine is {}", operator.state()))),
             // Whoever held it, or ramped it down.
             Some(Phase::Disarmed | Phase::RampingDown) if arms => return refused("the check was ended".to_owned()),
-            _ if since.elapsed() > limit => return refused(format!("the machine is still {}", operator.stands())),
+            _ if since.elapsed() > limit => return refused(format!("the machine is still {}", operator.state())),
             now => {
                 arms |= now == Some(Phase::Arming);
                 std::thread::sleep(Duration::from_millis(2));
@@ -80,7 +83,7 @@ pub(super) fn run<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefC
     };
     let kind = if verdict.good { "note" } else { "error" };
     let mut panel = panel.borrow_mut();
-    panel.hall.note(kind, &format!("Wiring check: {}", verdict.what), verdict.advice, None);
+    panel.clients.note(kind, &format!("Wiring check: {}", verdict.what), verdict.advice, None);
     panel.check = json!({ "runs": false, "done": 6, "verdict": verdict });
     Ok(json!(verdict))
 }

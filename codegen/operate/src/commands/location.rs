@@ -1,12 +1,12 @@
-//! Where a platform is, as text and as JSON: what is not measured now is not said to be so now.
+//! Location of a platform, as text and as JSON: the pose is given only if it is measured now.
 
 use std::fmt::Write as _;
 use std::time::Duration;
 
+use crate::place::AXES;
+use crate::session::{FRESH, GAUGES, Place};
 use serde::Serialize;
 use specgen_link::Status;
-use specgen_operate::place::AXES;
-use specgen_operate::{FRESH, GAUGES, Place};
 use specgen_runtime::setpoint::BUSY;
 use specgen_runtime::supervisor::Phase;
 
@@ -16,7 +16,7 @@ use specgen_language::table::{left, right, row};
 
 /// Where a platform is: µm and µrad, V.
 #[derive(Debug, Serialize)]
-pub struct Located {
+pub struct Location {
     tick: u64,
     /// Measured now; none if it is not.
     pose: Option<[f64; 6]>,
@@ -72,7 +72,7 @@ fn why(place: &Place, status: &Status) -> Option<String> {
     }
 }
 
-impl Located {
+impl Location {
     /// Of a place and the status beside it, poses as `seen`.
     pub fn of(place: &Place, status: &Status, seen: impl Fn(&[f64; 6]) -> [f64; 6]) -> Self {
         let millionths = |values: [f64; 6]| values.map(|value| value * 1e6);
@@ -94,7 +94,7 @@ impl Located {
     }
 }
 
-impl Outcome for Located {
+impl Outcome for Location {
     fn text(&self) -> String {
         let mut text = String::new();
         let columns = [left(6), right(12), right(14), right(12), left(0).behind("  ")];
@@ -146,7 +146,7 @@ mod tests {
         }
     }
 
-    fn located(bits: u32, measured: Option<u64>, age: Option<u64>) -> Located {
+    fn location(bits: u32, measured: Option<u64>, age: Option<u64>) -> Location {
         let place = Place {
             tick: 9,
             phase: 3,
@@ -156,12 +156,12 @@ mod tests {
             target: [2e-6; 6],
             voltage: [34.25; 6],
         };
-        Located::of(&place, &status(age), |user| *user)
+        Location::of(&place, &status(age), |user| *user)
     }
 
     #[test]
     fn a_pose_that_is_not_measured_now_has_its_age_and_no_error() {
-        let now = located(0, Some(0), Some(0));
+        let now = location(0, Some(0), Some(0));
         assert!(now.pose.is_some() && now.error.is_some() && now.voltage.is_some() && now.last.is_none(), "{now:?}");
         assert!(now.text().contains("1.0000") && now.text().contains("34.25"), "{}", now.text());
         // Status bits, ms since the gauges were read, µs since a tick; what it says, whether voltages are known.
@@ -174,7 +174,7 @@ mod tests {
             (0, Some(2000), Some(0), &["the gauges are not read", "2.0 s ago"], true),
             (0, None, None, &["there was no tick yet"], false),
         ] {
-            let found = located(bits, measured, age);
+            let found = location(bits, measured, age);
             let text = found.text();
             assert!(found.pose.is_none() && found.error.is_none() && found.voltage.is_some() == volts, "{found:?}");
             assert_eq!(found.last.is_some(), measured.is_some(), "{found:?}");

@@ -1,4 +1,4 @@
-//! What an operator types, as orders.
+//! Commands as an operator types them.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -26,9 +26,9 @@ const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, se
                         wait PHASE|arrived|SECONDS [TIMEOUT], config, config write SPEC, \
                         record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, on-edge [drop | move … | jog … | goto … | play … | wave FILE], watch [EVERY [SECONDS [FILE]]], stop";
 
-/// One order.
+/// One command.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Order {
+pub enum Command {
     /// Say how the machine stands and what it noticed of itself.
     Status,
     /// Ask the supervisor.
@@ -54,7 +54,7 @@ pub enum Order {
         speed: Pace,
     },
     /// Show the frame that poses are said in, or say them in another: work frame, tool point. Of an axis that is not named: zero.
-    Frame(Option<FrameChoice>),
+    Frame(Option<FrameRequest>),
     /// Give the set-point of now a name.
     Mark(String),
     /// Go to a pose that has a name.
@@ -101,7 +101,7 @@ pub enum Order {
     /// Let nothing wait for the edge any more.
     DropEdge,
     /// Begin this at the next rising edge of the input line: a move, a trajectory, or a wave.
-    OnEdge(Box<Order>),
+    OnEdge(Box<Command>),
     /// Show samples of the running machine, or write them to a file.
     Watch {
         /// Ticks of a row; those of 0.1 s if it is not said.
@@ -115,9 +115,9 @@ pub enum Order {
     Stop,
 }
 
-/// Frames of a session.
+/// A requested frame of a session.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum FrameChoice {
+pub enum FrameRequest {
     /// Those of the controller.
     None,
     /// This work frame, m and rad.
@@ -126,7 +126,7 @@ pub enum FrameChoice {
     Tool([f64; 3]),
 }
 
-/// A mode as it is asked for.
+/// A requested mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ModeRequest {
     /// Whether the pose error is fed back, and whether the hysteresis is inverted.
@@ -182,7 +182,7 @@ pub enum WaitCondition {
     Passed(Duration),
 }
 
-impl Order {
+impl Command {
     /// Whether it moves the machine, or lets it move.
     #[must_use]
     pub fn moves(&self) -> bool {
@@ -203,7 +203,7 @@ impl Order {
     pub fn input(&self) -> Option<&Path> {
         match self {
             Self::WriteConfig(path) | Self::Wave(path) | Self::Play { correction: Some((path, _)), .. } => Some(path),
-            Self::OnEdge(order) => order.input(),
+            Self::OnEdge(command) => command.input(),
             _ => None,
         }
     }
@@ -215,7 +215,7 @@ impl Order {
     pub fn parse(line: &str) -> Result<Option<Self>, String> {
         let line = line.split('#').next().unwrap_or_default().trim();
         let words: Vec<&str> = line.split_whitespace().collect();
-        let order = match words[..] {
+        let command = match words[..] {
             [] => return Ok(None),
             ["status"] => Self::Status,
             ["none"] => Self::Ask(Request::None),
@@ -236,13 +236,13 @@ impl Order {
                 Self::CanIGo { axes: named(&axes)?, speed: pace(&speeds)? }
             }
             ["frame"] => Self::Frame(None),
-            ["frame", "none"] => Self::Frame(Some(FrameChoice::None)),
+            ["frame", "none"] => Self::Frame(Some(FrameRequest::None)),
             ["frame", "work", ref rest @ ..] if !rest.is_empty() => {
-                Self::Frame(Some(FrameChoice::Work(named(rest)?.map(Option::unwrap_or_default))))
+                Self::Frame(Some(FrameRequest::Work(named(rest)?.map(Option::unwrap_or_default))))
             }
             ["frame", "tool", ref rest @ ..] if !rest.is_empty() => match named(rest)? {
                 [x, y, z, None, None, None] => {
-                    Self::Frame(Some(FrameChoice::Tool([x, y, z].map(Option::unwrap_or_default))))
+                    Self::Frame(Some(FrameRequest::Tool([x, y, z].map(Option::unwrap_or_default))))
                 }
                 _ => return Err(format!("`{line}`: a tool point has x, y and z")),
             },
@@ -287,15 +287,15 @@ impl Order {
             ["on-edge", "drop"] => Self::DropEdge,
             ["on-edge", ref rest @ ..] => match Self::parse(&rest.join(" "))? {
                 Some(
-                    order @ (Self::Move { .. } | Self::Goto(_) | Self::Play { correction: None, .. } | Self::Wave(_)),
-                ) => Self::OnEdge(Box::new(order)),
+                    command @ (Self::Move { .. } | Self::Goto(_) | Self::Play { correction: None, .. } | Self::Wave(_)),
+                ) => Self::OnEdge(Box::new(command)),
                 _ => return Err(format!("`{line}`: an edge starts {EDGE_STARTS}")),
             },
             ["watch", ref rest @ ..] if rest.len() <= 3 => Self::watch(rest)?,
             ["stop"] => Self::Stop,
             _ => return Err(format!("`{line}` is none of: {COMMANDS}")),
         };
-        Ok(Some(order))
+        Ok(Some(command))
     }
 
     fn watch(words: &[&str]) -> Result<Self, String> {
@@ -374,48 +374,48 @@ mod tests {
         let cases = [
             ("", None),
             ("  # nothing", None),
-            ("arm # now", Some(Order::Ask(Request::Arm))),
-            ("wait running", Some(Order::Wait { until: WaitCondition::Phase(Phase::Running), limit: TIMEOUT })),
+            ("arm # now", Some(Command::Ask(Request::Arm))),
+            ("wait running", Some(Command::Wait { until: WaitCondition::Phase(Phase::Running), limit: TIMEOUT })),
             (
                 "wait ramping-down 3",
-                Some(Order::Wait { until: WaitCondition::Phase(Phase::RampingDown), limit: time(3.0) }),
+                Some(Command::Wait { until: WaitCondition::Phase(Phase::RampingDown), limit: time(3.0) }),
             ),
-            ("wait 0.5", Some(Order::Wait { until: WaitCondition::Passed(time(0.5)), limit: TIMEOUT })),
-            ("set a=1 b[2]=-2e-6", Some(Order::Set(vec![("a".into(), "1".into()), ("b[2]".into(), "-2e-6".into())]))),
-            ("wait arrived 3", Some(Order::Wait { until: WaitCondition::Arrived, limit: time(3.0) })),
-            ("jog z=1um", Some(Order::Move { relative: true, axes: [None, None, Some(1e-6), None, None, None] })),
-            ("where", Some(Order::Where)),
-            ("gains", Some(Order::Gains(Vec::new()))),
-            ("gains ki[2]=1e9", Some(Order::Gains(vec![("ki[2]".into(), 1e9)]))),
+            ("wait 0.5", Some(Command::Wait { until: WaitCondition::Passed(time(0.5)), limit: TIMEOUT })),
+            ("set a=1 b[2]=-2e-6", Some(Command::Set(vec![("a".into(), "1".into()), ("b[2]".into(), "-2e-6".into())]))),
+            ("wait arrived 3", Some(Command::Wait { until: WaitCondition::Arrived, limit: time(3.0) })),
+            ("jog z=1um", Some(Command::Move { relative: true, axes: [None, None, Some(1e-6), None, None, None] })),
+            ("where", Some(Command::Where)),
+            ("gains", Some(Command::Gains(Vec::new()))),
+            ("gains ki[2]=1e9", Some(Command::Gains(vec![("ki[2]".into(), 1e9)]))),
             (
                 "trigger 1 kind=position axis=theta_z start=-1e-4",
-                Some(Order::Trigger {
+                Some(Command::Trigger {
                     line: 1,
                     settings: vec![("kind".into(), 1.0), ("axis".into(), 5.0), ("start".into(), -1e-4)],
                 }),
             ),
-            ("frame tool z=40mm", Some(Order::Frame(Some(FrameChoice::Tool([0.0, 0.0, 0.04]))))),
-            ("goto zero", Some(Order::Goto("zero".into()))),
-            ("mode pf-ewma", Some(Order::Mode(ModeRequest { terms: [true, true], law: Some(1) }))),
+            ("frame tool z=40mm", Some(Command::Frame(Some(FrameRequest::Tool([0.0, 0.0, 0.04]))))),
+            ("goto zero", Some(Command::Goto("zero".into()))),
+            ("mode pf-ewma", Some(Command::Mode(ModeRequest { terms: [true, true], law: Some(1) }))),
             (
                 "can-i-go x=1um speed=2um/s",
-                Some(Order::CanIGo { axes: [Some(1e-6), None, None, None, None, None], speed: [Some(2e-6), None] }),
+                Some(Command::CanIGo { axes: [Some(1e-6), None, None, None, None, None], speed: [Some(2e-6), None] }),
             ),
-            ("record arm 7", Some(Order::Record(RecorderAction::Arm { after: 7 }))),
-            ("record download run.rec", Some(Order::Download("run.rec".into()))),
-            ("wave stop", Some(Order::StopWave)),
-            ("stop", Some(Order::Stop)),
-            ("on-edge", Some(Order::Edge)),
-            ("on-edge drop", Some(Order::DropEdge)),
-            ("on-edge goto zero", Some(Order::OnEdge(Box::new(Order::Goto("zero".into()))))),
-            ("on-edge wave w.toml", Some(Order::OnEdge(Box::new(Order::Wave("w.toml".into()))))),
-            ("watch", Some(Order::Watch { every: None, seconds: 10.0, file: None })),
-            ("watch 20 0.5 w.csv", Some(Order::Watch { every: Some(20), seconds: 0.5, file: Some("w.csv".into()) })),
-            ("wave w.toml", Some(Order::Wave("w.toml".into()))),
-            ("config write tuned.toml", Some(Order::WriteConfig("tuned.toml".into()))),
+            ("record arm 7", Some(Command::Record(RecorderAction::Arm { after: 7 }))),
+            ("record download run.rec", Some(Command::Download("run.rec".into()))),
+            ("wave stop", Some(Command::StopWave)),
+            ("stop", Some(Command::Stop)),
+            ("on-edge", Some(Command::Edge)),
+            ("on-edge drop", Some(Command::DropEdge)),
+            ("on-edge goto zero", Some(Command::OnEdge(Box::new(Command::Goto("zero".into()))))),
+            ("on-edge wave w.toml", Some(Command::OnEdge(Box::new(Command::Wave("w.toml".into()))))),
+            ("watch", Some(Command::Watch { every: None, seconds: 10.0, file: None })),
+            ("watch 20 0.5 w.csv", Some(Command::Watch { every: Some(20), seconds: 0.5, file: Some("w.csv".into()) })),
+            ("wave w.toml", Some(Command::Wave("w.toml".into()))),
+            ("config write tuned.toml", Some(Command::WriteConfig("tuned.toml".into()))),
         ];
-        for (line, order) in cases {
-            assert_eq!(Order::parse(line), Ok(order), "{line}");
+        for (line, command) in cases {
+            assert_eq!(Command::parse(line), Ok(command), "{line}");
         }
     }
 
@@ -453,7 +453,7 @@ mod tests {
             ("watch 1 0", "expected a time of more than 0"),
             ("watch 1 1 a b", "is none of"),
         ] {
-            let error = Order::parse(line).unwrap_err();
+            let error = Command::parse(line).unwrap_err();
             assert!(error.contains(expected), "{line}: {error}");
         }
     }

@@ -1,23 +1,24 @@
-//! Orders about where a platform is and may go, and about the terms of its law.
+//! Commands about where a platform is and may go, and about the terms of its law.
 
 use std::fmt::Write as _;
 
+use crate::command::{Command, FrameRequest, ModeRequest};
+use crate::frame::Frame;
+use crate::motion::{self, Motion};
+use crate::place::{self, AXES, AxisValues, Pace, amount, meant};
+use crate::session::Place;
 use host_sim::word::status_words;
 use serde::Serialize;
 use specgen_compiler::compile;
 use specgen_language::model::Gains;
 use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
-use specgen_operate::frame::Frame;
-use specgen_operate::motion::{self, Motion};
-use specgen_operate::place::{self, AXES, AxisValues, Pace, amount, meant};
-use specgen_operate::{FrameChoice, ModeRequest, Order, Place};
 use specgen_runtime::setpoint::{BUSY, REFUSED, STALE};
 use specgen_runtime::supervisor::{Cause, Phase};
 
-use super::answer::{Moves, Plain};
-use super::ended::Ended;
-use super::located::Located;
+use super::answer::{Acknowledgement, Destination};
+use super::error::SessionError;
+use super::location::Location;
 use super::operator::Operator;
 use super::pose::{ZERO, in_words, unit};
 use specgen_language::outcome::Outcome;
@@ -113,7 +114,7 @@ impl Outcome for GainsInForce {
 }
 
 /// Whether a setting is a gain.
-pub(super) fn is_gain(name: &str) -> bool {
+pub(crate) fn is_gain(name: &str) -> bool {
     let stem = name.split('[').next().unwrap_or(name);
     GAINS.contains(&stem.strip_prefix("position_").unwrap_or(stem))
 }
@@ -123,13 +124,13 @@ impl<P: Port> Operator<P> {
         self.session.motion().ok_or_else(|| "the device controls six legs: it knows of no pose".to_owned())
     }
 
-    pub(super) fn place(&mut self) -> Result<Place, Ended> {
+    pub(super) fn place(&mut self) -> Result<Place, SessionError> {
         let place = self.session.place()?;
-        place.ok_or_else(|| Ended::Refused("the device controls six legs: it knows of no pose".to_owned()))
+        place.ok_or_else(|| SessionError::Refused("the device controls six legs: it knows of no pose".to_owned()))
     }
 
     /// The set-point, in the session's frame.
-    pub(super) fn target(&mut self) -> Result<[f64; 6], Ended> {
+    pub(super) fn target(&mut self) -> Result<[f64; 6], SessionError> {
         let target = self.place()?.target;
         Ok(self.seen(&target))
     }
@@ -140,26 +141,28 @@ impl<P: Port> Operator<P> {
     }
 
     /// The controller's coordinates of a pose in the session's frame.
-    pub(super) fn user(&self, pose: &[f64; 6]) -> Result<[f64; 6], Ended> {
-        self.frame.user(pose).ok_or_else(|| Ended::Refused(format!("it cannot go there: {BEYOND}")))
+    pub(super) fn user(&self, pose: &[f64; 6]) -> Result<[f64; 6], SessionError> {
+        self.frame.user(pose).ok_or_else(|| SessionError::Refused(format!("it cannot go there: {BEYOND}")))
     }
 
     /// Where a move, a step or a way to a name goes, in the controller's coordinates.
-    pub(super) fn user_of(&mut self, order: &Order) -> Result<[f64; 6], Ended> {
-        match order {
-            Order::Goto(name) if name == ZERO => Ok([0.0; 6]),
-            Order::Goto(name) => self.marks.get(name).copied().ok_or_else(|| Ended::Refused(self.no_mark(name))),
-            Order::Move { relative, axes } => {
+    pub(super) fn user_of(&mut self, command: &Command) -> Result<[f64; 6], SessionError> {
+        match command {
+            Command::Goto(name) if name == ZERO => Ok([0.0; 6]),
+            Command::Goto(name) => {
+                self.marks.get(name).copied().ok_or_else(|| SessionError::Refused(self.no_mark(name)))
+            }
+            Command::Move { relative, axes } => {
                 let from = self.target()?;
                 self.user(&meant(&from, *relative, axes))
             }
-            _ => Err(Ended::Refused("it goes nowhere".to_owned())),
+            _ => Err(SessionError::Refused("it goes nowhere".to_owned())),
         }
     }
 
     /// Where it is, in the session's frame.
-    pub(super) fn located(&self, place: &Place) -> Located {
-        Located::of(place, self.session.status(), |user| self.seen(user))
+    pub(super) fn located(&self, place: &Place) -> Location {
+        Location::of(place, self.session.status(), |user| self.seen(user))
     }
 
     pub(super) fn no_mark(&self, name: &str) -> String {
@@ -202,52 +205,52 @@ impl<P: Port> Operator<P> {
     }
 
     /// Carries out what is about a platform.
-    pub(super) fn of_platform(&mut self, order: &Order, line: &str, ui: &Ui) -> Result<(), Ended> {
-        match order {
-            Order::Where => {
+    pub(super) fn of_platform(&mut self, command: &Command, line: &str, ui: &Ui) -> Result<(), SessionError> {
+        match command {
+            Command::Where => {
                 let place = self.place()?;
                 self.note(line, &self.located(&place), ui);
             }
-            Order::Limits => {
+            Command::Limits => {
                 let target = self.target()?;
-                let motion = self.motion().map_err(Ended::Refused)?;
+                let motion = self.motion().map_err(SessionError::Refused)?;
                 let admits = |pose: &[f64; 6]| self.frame.user(pose).is_some_and(|user| motion.admits(&user));
                 let limits =
                     core::array::from_fn(|axis| motion::limits(admits, &target, axis).map(|value| value * 1e6));
                 self.note(line, &Limits { from: target.map(|value| value * 1e6), limits }, ui);
             }
-            Order::CanIGo { axes, speed } => {
+            Command::CanIGo { axes, speed } => {
                 let target = self.target()?;
-                let binds = self.binds(&target, axes, speed).map_err(Ended::Refused)?;
+                let binds = self.binds(&target, axes, speed).map_err(SessionError::Refused)?;
                 self.note(line, &CanGo { can: binds.is_none(), binds }, ui);
             }
-            Order::Frame(frame) => {
+            Command::Frame(frame) => {
                 self.frame = match frame {
                     None => self.frame,
-                    Some(FrameChoice::None) => Frame::default(),
-                    Some(FrameChoice::Work(work)) => Frame::new(*work, *self.frame.tool()),
-                    Some(FrameChoice::Tool(tool)) => Frame::new(*self.frame.work(), *tool),
+                    Some(FrameRequest::None) => Frame::default(),
+                    Some(FrameRequest::Work(work)) => Frame::new(*work, *self.frame.tool()),
+                    Some(FrameRequest::Tool(tool)) => Frame::new(*self.frame.work(), *tool),
                 };
                 let (work, tool) =
                     (self.frame.work().map(|value| value * 1e6), self.frame.tool().map(|value| value * 1e6));
                 self.note(line, &FrameInForce { work, tool }, ui);
             }
-            Order::Mark(name) => {
+            Command::Mark(name) => {
                 let target = self.place()?.target;
                 self.marks.insert(name.clone(), target);
-                self.note(line, &Plain("done".to_owned()), ui);
+                self.note(line, &Acknowledgement("done".to_owned()), ui);
             }
-            Order::Goto(_) => {
-                let user = self.user_of(order)?;
+            Command::Goto(_) => {
+                let user = self.user_of(command)?;
                 self.go(user)?;
-                self.note(line, &Moves { pose: self.seen(&user) }, ui);
+                self.note(line, &Destination { pose: self.seen(&user) }, ui);
             }
-            Order::Play { name, correction } => self.play(name, correction.as_ref(), line, ui)?,
-            Order::Mode(wanted) => {
+            Command::Play { name, correction } => self.play(name, correction.as_ref(), line, ui)?,
+            Command::Mode(wanted) => {
                 self.set_mode(*wanted)?;
                 self.show_gains(None, line, ui)?;
             }
-            Order::Gains(gains) => {
+            Command::Gains(gains) => {
                 let limit = if gains.is_empty() { None } else { self.set_gains(gains)? };
                 self.show_gains(limit, line, ui)?;
             }
@@ -289,7 +292,7 @@ impl<P: Port> Operator<P> {
         core::array::from_fn(|axis| number(axis).unwrap_or_default())
     }
 
-    fn show_gains(&mut self, gain_ratio_limit: Option<f64>, line: &str, ui: &Ui) -> Result<(), Ended> {
+    fn show_gains(&mut self, gain_ratio_limit: Option<f64>, line: &str, ui: &Ui) -> Result<(), SessionError> {
         let words = self.session.config()?;
         let mode = self.word_of(&words, "mode").and_then(|mode| MODES.get(usize::try_from(mode).ok()?).copied());
         let set = |prefix: &str| GAINS.map(|name| self.six(&words, &format!("{prefix}{name}")));
@@ -299,10 +302,10 @@ impl<P: Port> Operator<P> {
     }
 
     /// Every mode of the law is stable with the spec's gains, or the spec was refused.
-    fn set_mode(&mut self, wanted: ModeRequest) -> Result<(), Ended> {
+    fn set_mode(&mut self, wanted: ModeRequest) -> Result<(), SessionError> {
         let mut words = self.session.config()?;
         let now = self.word_of(&words, "mode").unwrap_or_default();
-        let mode = wanted.word(now).map_err(Ended::Refused)?;
+        let mode = wanted.word(now).map_err(SessionError::Refused)?;
         let place = self.session.description().config_names.iter().position(|name| name == "mode");
         if let Some(slot) = place.and_then(|place| words.get_mut(place)) {
             *slot = mode;
@@ -311,8 +314,8 @@ impl<P: Port> Operator<P> {
     }
 
     /// Holds the gains against the margins of the spec, then sends them: λ up to which they are stable in every mode.
-    fn set_gains(&mut self, gains: &[(String, f64)]) -> Result<Option<f64>, Ended> {
-        let places = self.gains_of(gains).map_err(Ended::Refused)?;
+    fn set_gains(&mut self, gains: &[(String, f64)]) -> Result<Option<f64>, SessionError> {
+        let places = self.gains_of(gains).map_err(SessionError::Refused)?;
         let mut words = self.session.config()?;
         let scalar = self.session.description().scalar;
         for (place, value) in places {
@@ -330,20 +333,20 @@ impl<P: Port> Operator<P> {
         }
         let design = self.meanwhile(|| compile::check_stability(&model))?.map_err(|findings| {
             let texts: Vec<String> = findings.iter().map(|one| format!("{}: {}", one.code, one.message)).collect();
-            Ended::Refused(format!("not sent: {}", texts.join("; ")))
+            SessionError::Refused(format!("not sent: {}", texts.join("; ")))
         })?;
         self.configure(&words)?;
         let limits = design.1.iter().flat_map(|design| &design.margins).filter_map(|mode| mode.gain_ratio_limit);
         Ok(limits.reduce(|least, limit| if limit < least { limit } else { least }))
     }
 
-    fn configure(&mut self, words: &[u64]) -> Result<(), Ended> {
-        self.ordered = true;
+    fn configure(&mut self, words: &[u64]) -> Result<(), SessionError> {
+        self.in_control = true;
         self.session.write_config(words).map_err(|error| match error {
             ClientError::Refused(Refusal::Word { index }) => {
                 let names = &self.session.description().config_names;
                 let name = names.get(usize::from(index)).map_or("?", String::as_str);
-                Ended::Refused(format!("the device refuses `{name}`: out of its range there"))
+                SessionError::Refused(format!("the device refuses `{name}`: out of its range there"))
             }
             other => other.into(),
         })

@@ -1,8 +1,11 @@
-//! What is run in the loop: the scenarios of `sim`, with a lock-step for a controller.
+//! The runs in the loop: the scenarios of `sim`, with a lock-step for a controller.
 
-use host_sim::closed_loop::Rig;
+use std::path::Path;
+use std::time::Instant;
+
+use host_sim::closed_loop::{Rig, RunError, Tracking};
 use host_sim::plant::LegPlant;
-use host_sim::platform::rig::OnBoard;
+use host_sim::platform::rig::{OnBoard, PlatformRun};
 use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select as select_platform};
 use host_sim::platform::table::{MachiningTable, PoseRow};
 use host_sim::platform::{PlatformScenario, WorkPart};
@@ -11,14 +14,13 @@ use host_sim::table::TrackingRow;
 use host_sim::trajectory::{LegTrajectory, PaperLeg, PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
 use specgen_link::client::Port;
 
+use super::lockstep::Lockstep;
 use super::report::Report;
-use super::{Arguments, Broken, timed};
 use specgen_compiler::compile::Compilation;
 use specgen_language::model::TaskSpace;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
-use specgen_operate::pil::Lockstep;
-use specgen_report::sim::{chart_of_legs, chart_of_platform};
+use specgen_studies::machine::PlantOptions;
 use specgen_studies::{machine, runs};
 
 /// Operating frequency unless asked otherwise, Hz.
@@ -28,7 +30,80 @@ const MACHINING_FREQUENCY: f64 = 1.0;
 /// Control ticks per period of the leg trajectory, unless asked otherwise.
 const SAMPLES: u32 = 500;
 
-pub enum Plan {
+/// Options of the runs.
+#[derive(Debug)]
+pub struct Options<'a> {
+    /// Workspace to build in.
+    pub output: Option<&'a Path>,
+    /// A scenario of the paper.
+    pub scenario: Option<&'a str>,
+    /// A trajectory of the spec.
+    pub trajectory: Option<&'a str>,
+    /// One law only.
+    pub mode: Option<&'a str>,
+    /// Operating frequency, Hz.
+    pub frequency: Option<f64>,
+    /// Control ticks per period of the leg trajectory.
+    pub samples: Option<u32>,
+    /// Only so much of the trajectory, s.
+    pub seconds: Option<f64>,
+    /// The simulated machine.
+    pub plant: PlantOptions,
+    /// A board at this serial port, at this rate in baud; QEMU without one.
+    pub port: Option<(&'a Path, u32)>,
+    /// An image that is built already.
+    pub elf: Option<&'a Path>,
+}
+
+/// A run that has ended, to draw its errors.
+pub enum Run<'a> {
+    /// Of six legs.
+    Legs {
+        /// Its title.
+        title: &'a str,
+        /// Errors over time.
+        tracking: &'a Tracking,
+    },
+    /// Of a platform.
+    Platform {
+        /// Its title.
+        title: &'a str,
+        /// Control interval, s.
+        interval: f64,
+        /// The run.
+        run: &'a PlatformRun,
+    },
+}
+
+/// Reasons why a plan does not end.
+pub(super) enum PlanError {
+    Command(Failure),
+    /// The error of a run; the lock-step knows the reason best.
+    Run(RunError),
+}
+
+impl From<RunError> for PlanError {
+    fn from(error: RunError) -> Self {
+        Self::Run(error)
+    }
+}
+
+impl From<Failure> for PlanError {
+    fn from(failure: Failure) -> Self {
+        Self::Command(failure)
+    }
+}
+
+/// Runs something and adds the time that it took.
+fn timed<T>(seconds: &mut f64, run: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let done = run();
+    *seconds += start.elapsed().as_secs_f64();
+    done
+}
+
+/// The runs of one command.
+pub(super) enum Plan {
     Legs {
         /// Names with the values of the `mode` word.
         modes: Vec<(&'static str, u32)>,
@@ -48,44 +123,44 @@ pub enum Plan {
 }
 
 impl Plan {
-    /// The plan of the arguments.
+    /// The plan of the options.
     ///
     /// # Errors
     /// Arguments that make no sense for the spec.
-    pub fn of(arguments: &Arguments, compiled: &Compilation) -> Result<Self, Failure> {
+    pub fn of(options: &Options<'_>, compiled: &Compilation) -> Result<Self, Failure> {
         match &compiled.model.task_space {
-            Some(task) => Self::platform(arguments, compiled, task),
-            None => Self::legs(arguments, compiled),
+            Some(task) => Self::platform(options, compiled, task),
+            None => Self::legs(options, compiled),
         }
     }
 
-    fn legs(arguments: &Arguments, compiled: &Compilation) -> Result<Self, Failure> {
-        if arguments.scenario.is_some() || arguments.trajectory.is_some() {
+    fn legs(options: &Options<'_>, compiled: &Compilation) -> Result<Self, Failure> {
+        if options.scenario.is_some() || options.trajectory.is_some() {
             return Err(Failure::Usage(
                 "--scenario and --trajectory are for a platform that six gauges see; this spec has no [control]: its one scenario is the leg trajectory"
                     .to_owned(),
             ));
         }
-        let modes = match &arguments.mode {
+        let modes = match options.mode {
             Some(name) => vec![mode(name, &MODES)?],
             None => runs::modes(&compiled.model.adaptation),
         };
-        let frequency = arguments.frequency.unwrap_or(FREQUENCY);
-        let samples = arguments.samples.unwrap_or(SAMPLES);
+        let frequency = options.frequency.unwrap_or(FREQUENCY);
+        let samples = options.samples.unwrap_or(SAMPLES);
         runs::judge(compiled, frequency, samples)?;
         Ok(Self::Legs { modes, frequency, samples })
     }
 
-    fn platform(arguments: &Arguments, compiled: &Compilation, task: &TaskSpace) -> Result<Self, Failure> {
-        if arguments.samples.is_some() {
+    fn platform(options: &Options<'_>, compiled: &Compilation, task: &TaskSpace) -> Result<Self, Failure> {
+        if options.samples.is_some() {
             return Err(Failure::Usage(
                 "--samples is for legs with their own gauges; a spec with [control] runs at its timing.period"
                     .to_owned(),
             ));
         }
-        let wanted = arguments.mode.as_deref().map(|name| mode(name, &PLATFORM_MODES)).transpose()?;
-        if let Some(name) = &arguments.trajectory {
-            if arguments.frequency.is_some() {
+        let wanted = options.mode.map(|name| mode(name, &PLATFORM_MODES)).transpose()?;
+        if let Some(name) = options.trajectory {
+            if options.frequency.is_some() {
                 return Err(Failure::Usage(
                     "--frequency is for the paper's cases; the spec gives the frequency of its own trajectories"
                         .to_owned(),
@@ -93,9 +168,9 @@ impl Plan {
             }
             let path = machine::on_board(compiled, runs::selector(task, name)?);
             let path = path.ok_or_else(|| Failure::Usage(format!("the controller has no trajectory `{name}`")))?;
-            return Ok(Self::Board { name: name.clone(), path, mode: wanted });
+            return Ok(Self::Board { name: name.to_owned(), path, mode: wanted });
         }
-        let (name, path, part) = match arguments.scenario.as_deref().unwrap_or("case-1") {
+        let (name, path, part) = match options.scenario.unwrap_or("case-1") {
             "case-1" => ("case-1", PaperPath::Case1, None),
             "case-2" => ("case-2", PaperPath::Case2, None),
             "glass" => ("glass", PaperPath::Machining, Some(WorkPart::glass())),
@@ -110,7 +185,7 @@ impl Plan {
             None => FREE_MODES.to_vec(),
             Some(_) => vec![PLATFORM_MODES[0], PLATFORM_MODES[3], PLATFORM_MODES[6]],
         };
-        let frequency = arguments.frequency.unwrap_or(if part.is_some() { MACHINING_FREQUENCY } else { FREQUENCY });
+        let frequency = options.frequency.unwrap_or(if part.is_some() { MACHINING_FREQUENCY } else { FREQUENCY });
         Ok(Self::Path { name, path, part, modes: wanted.map_or(usual, |mode| vec![mode]), frequency })
     }
 
@@ -120,21 +195,22 @@ impl Plan {
         lockstep: &mut Lockstep<P>,
         report: &mut Report,
         compiled: &Compilation,
-        arguments: &Arguments,
+        options: &Options<'_>,
+        draw: &mut dyn FnMut(Run<'_>),
         ui: &Ui,
-    ) -> Result<(), Broken> {
+    ) -> Result<(), PlanError> {
         match self {
             Self::Legs { modes, frequency, samples } => {
-                let rig = legs(compiled, *samples, arguments, ui)?;
-                let trajectory = Start::of(PaperLeg { frequency: *frequency }, arguments.seconds);
+                let rig = legs(compiled, *samples, options, ui)?;
+                let trajectory = Start::of(PaperLeg { frequency: *frequency }, options.seconds);
                 let interval = 1.0 / frequency / f64::from(*samples);
                 report.interval = interval;
                 for &(mode, word) in modes {
                     ui.progress(&format!("leg trajectory at {frequency} Hz, {mode}"));
-                    select_legs(lockstep, word).map_err(host_sim::closed_loop::RunError::from)?;
+                    select_legs(lockstep, word).map_err(RunError::from)?;
                     let mut rig = rig.clone();
                     let run = timed(&mut report.seconds, || rig.run(lockstep, &trajectory, interval))?;
-                    report.charts.push(chart_of_legs(&run.tracking, &format!("{mode} at {frequency} Hz")));
+                    draw(Run::Legs { title: &format!("{mode} at {frequency} Hz"), tracking: &run.tracking });
                     report.tracking.rows.push(TrackingRow::of(mode, *frequency, &run.tracking));
                 }
                 report.errors = format!("tracking error of the leg trajectory, T − Y\n{}", report.tracking.to_text());
@@ -142,18 +218,18 @@ impl Plan {
             }
             Self::Path { name, path, part, modes, frequency } => {
                 let trajectory = PaperPose { path: *path, reading: Reading::Corrected, frequency: *frequency };
-                let trajectory = Start::of(trajectory, arguments.seconds);
-                let scenario = platform(compiled, arguments, ui)?;
+                let trajectory = Start::of(trajectory, options.seconds);
+                let scenario = platform(compiled, options, ui)?;
                 let mut machining = MachiningTable::default();
                 for &(mode, word) in modes {
                     ui.progress(&format!("{name} at {frequency} Hz, {mode}"));
-                    select_platform(lockstep, word).map_err(host_sim::closed_loop::RunError::from)?;
+                    select_platform(lockstep, word).map_err(RunError::from)?;
                     let run = timed(&mut report.seconds, || match part {
                         None => scenario.run(lockstep, &trajectory),
                         Some(part) => scenario.against(lockstep, &trajectory, *part),
                     })?;
                     let title = format!("{name} at {frequency} Hz, {mode}");
-                    report.charts.push(chart_of_platform(&title, scenario.options.interval, &run));
+                    draw(Run::Platform { title: &title, interval: scenario.options.interval, run: &run });
                     match (run.scored(), part) {
                         (Err(error), _) => report.ended(&title, &error),
                         (Ok(found), None) => report.free_motion.rows.push(PoseRow::of(name, mode, *frequency, found)),
@@ -168,13 +244,13 @@ impl Plan {
                 Ok(())
             }
             Self::Board { name, path, mode } => {
-                let scenario = platform(compiled, arguments, ui)?;
+                let scenario = platform(compiled, options, ui)?;
                 if let Some((_, word)) = mode {
-                    select_platform(lockstep, *word).map_err(host_sim::closed_loop::RunError::from)?;
+                    select_platform(lockstep, *word).map_err(RunError::from)?;
                 }
                 ui.progress(&format!("playing {name} on board"));
-                let run = timed(&mut report.seconds, || scenario.play(lockstep, path, arguments.seconds))?;
-                report.charts.push(chart_of_platform(name, scenario.options.interval, &run));
+                let run = timed(&mut report.seconds, || scenario.play(lockstep, path, options.seconds))?;
+                draw(Run::Platform { title: name, interval: scenario.options.interval, run: &run });
                 match run.scored() {
                     Ok(errors) => {
                         let played = runs::Played::of(name, errors);
@@ -197,22 +273,22 @@ fn mode(name: &str, known: &[(&'static str, u32)]) -> Result<(&'static str, u32)
 }
 
 /// Six legs at rest, with their gauges zeroed.
-fn legs(compiled: &Compilation, samples: u32, arguments: &Arguments, ui: &Ui) -> Result<Rig<LegPlant>, Broken> {
-    let (parameters, noise) = arguments.plant.options().read()?;
+fn legs(compiled: &Compilation, samples: u32, options: &Options<'_>, ui: &Ui) -> Result<Rig<LegPlant>, PlanError> {
+    let (parameters, noise) = options.plant.read()?;
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
     let legs = std::array::from_fn(|_| parameters.clone());
-    let mut scenario = machine::legs(&compiled.model, &legs, &noise, arguments.plant.seed, samples);
+    let mut scenario = machine::legs(&compiled.model, &legs, &noise, options.plant.seed, samples);
     Ok(scenario.rig_mut().clone())
 }
 
-fn platform(compiled: &Compilation, arguments: &Arguments, ui: &Ui) -> Result<PlatformScenario, Broken> {
+fn platform(compiled: &Compilation, options: &Options<'_>, ui: &Ui) -> Result<PlatformScenario, PlanError> {
     let model = &compiled.model;
     // A plan of a platform is made of a spec that has one.
     let Some(task) = &model.task_space else {
         return Err(Failure::Usage("this spec has no [control]".to_owned()).into());
     };
     ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
-    Ok(arguments.plant.options().platform(model, task)?.1)
+    Ok(options.plant.platform(model, task)?.1)
 }
 
 /// The start of a trajectory, or all of it.

@@ -1,4 +1,4 @@
-//! Browsers that come: who may see the page, and who becomes a WebSocket. No more of HTTP than that.
+//! HTTP of the panel: access to the page, and the handshake of its WebSocket.
 
 use std::io::{self, Read, Write};
 use std::net::{IpAddr, TcpStream};
@@ -15,20 +15,20 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// Bytes of a token.
 const TOKEN: usize = 16;
 
-/// Who is let in: whoever knows the token, and asks for this computer by an address.
+/// Access control: a browser has to know the token and to use an address of this computer.
 pub struct Guard {
     token: String,
     port: u16,
 }
 
-/// What a request is for.
+/// The destination of a request.
 #[derive(Debug, PartialEq, Eq)]
-enum Asked {
+enum Route {
     Page,
     /// The key of its handshake.
     Socket(String),
     /// Status and why.
-    No(&'static str, &'static str),
+    Refused(&'static str, &'static str),
 }
 
 impl Guard {
@@ -57,10 +57,10 @@ impl Guard {
         let head = head(&mut stream);
         read();
         let head = head?;
-        let asked = self.asked(&head);
-        let (status, kind, body) = match &asked {
-            Asked::Page => ("200 OK", "text/html", page),
-            Asked::Socket(key) => {
+        let route = self.route(&head);
+        let (status, kind, body) = match &route {
+            Route::Page => ("200 OK", "text/html", page),
+            Route::Socket(key) => {
                 let accept = derive_accept_key(key.as_bytes());
                 let answer = format!(
                     "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {accept}\r\n\r\n"
@@ -68,7 +68,7 @@ impl Guard {
                 stream.write_all(answer.as_bytes())?;
                 return Ok(Some(stream));
             }
-            Asked::No(status, why) => (*status, "text/plain", *why),
+            Route::Refused(status, why) => (*status, "text/plain", *why),
         };
         // Nobody else's page may frame it, and it fetches nothing but from here.
         let answer = format!(
@@ -84,22 +84,22 @@ impl Guard {
         Ok(None)
     }
 
-    fn asked(&self, head: &[u8]) -> Asked {
+    fn route(&self, head: &[u8]) -> Route {
         let mut fields = [httparse::EMPTY_HEADER; FIELDS];
         let mut request = httparse::Request::new(&mut fields);
         if !matches!(request.parse(head), Ok(httparse::Status::Complete(_))) {
-            return Asked::No("400 Bad Request", "this is no request of a browser\n");
+            return Route::Refused("400 Bad Request", "this is no request of a browser\n");
         }
         let field = |name: &str| {
             let found = request.headers.iter().find(|field| field.name.eq_ignore_ascii_case(name));
             found.and_then(|field| core::str::from_utf8(field.value).ok())
         };
         if request.method != Some("GET") {
-            return Asked::No("405 Method Not Allowed", "only GET\n");
+            return Route::Refused("405 Method Not Allowed", "only GET\n");
         }
         // A name that somebody else's server gave this address would let that server's page in.
         if !field("host").is_some_and(|host| self.is_here(host)) {
-            return Asked::No(
+            return Route::Refused(
                 "421 Misdirected Request",
                 "open the panel by the address that it printed, not by a name\n",
             );
@@ -107,26 +107,26 @@ impl Guard {
         let (path, query) =
             request.path.and_then(|path| path.split_once('?')).unwrap_or((request.path.unwrap_or(""), ""));
         if !matches!(path, "/" | "/socket") {
-            return Asked::No("404 Not Found", "the panel is one page: /\n");
+            return Route::Refused("404 Not Found", "the panel is one page: /\n");
         }
         let token = query.split('&').find_map(|part| part.strip_prefix("token=")).unwrap_or("");
         if !is_same(token, &self.token) {
-            return Asked::No(
+            return Route::Refused(
                 "403 Forbidden",
                 "the token is missing or wrong: open the address that `specgen panel` printed\n",
             );
         }
         if path == "/" {
-            return Asked::Page;
+            return Route::Page;
         }
         let of_ours = |origin: &str| origin.strip_prefix("http://").is_some_and(|origin| Some(origin) == field("host"));
         if !field("origin").is_some_and(of_ours) {
-            return Asked::No("403 Forbidden", "only the panel's own page may connect\n");
+            return Route::Refused("403 Forbidden", "only the panel's own page may connect\n");
         }
         let upgrades = field("upgrade").is_some_and(|upgrade| upgrade.eq_ignore_ascii_case("websocket"));
         match field("sec-websocket-key").filter(|_| upgrades && field("sec-websocket-version") == Some("13")) {
-            Some(key) => Asked::Socket(key.to_owned()),
-            None => Asked::No("426 Upgrade Required", "expected a WebSocket of version 13\n"),
+            Some(key) => Route::Socket(key.to_owned()),
+            None => Route::Refused("426 Upgrade Required", "expected a WebSocket of version 13\n"),
         }
     }
 
@@ -168,10 +168,10 @@ mod tests {
     #[test]
     fn only_the_panels_own_page_gets_in() {
         let guard = Guard { token: "00ff".to_owned(), port: 8000 };
-        let get = |path: &str, fields: &str| guard.asked(format!("GET {path} HTTP/1.1\r\n{fields}\r\n").as_bytes());
-        let refused = |asked: Asked, code: &str| matches!(asked, Asked::No(status, _) if status.starts_with(code));
+        let get = |path: &str, fields: &str| guard.route(format!("GET {path} HTTP/1.1\r\n{fields}\r\n").as_bytes());
+        let refused = |route: Route, code: &str| matches!(route, Route::Refused(status, _) if status.starts_with(code));
         for host in ["127.0.0.1:8000", "localhost:8000", "[::1]:8000", "192.168.1.7:8000"] {
-            assert_eq!(get("/?token=00ff", &format!("Host: {host}\r\n")), Asked::Page, "{host}");
+            assert_eq!(get("/?token=00ff", &format!("Host: {host}\r\n")), Route::Page, "{host}");
         }
         for host in ["evil.example:8000", "127.0.0.1:8001", "127.0.0.1", "localhost.evil.example:8000"] {
             assert!(refused(get("/?token=00ff", &format!("Host: {host}\r\n")), "421"), "{host}");
@@ -180,12 +180,12 @@ mod tests {
             assert!(refused(get(path, "Host: localhost:8000\r\n"), "403"), "{path}");
         }
         assert!(refused(get("/x?token=00ff", "Host: localhost:8000\r\n"), "404"));
-        assert!(refused(guard.asked(b"POST / HTTP/1.1\r\n\r\n"), "405"));
-        assert!(refused(guard.asked(b"\x00\x01\r\n\r\n"), "400"));
+        assert!(refused(guard.route(b"POST / HTTP/1.1\r\n\r\n"), "405"));
+        assert!(refused(guard.route(b"\x00\x01\r\n\r\n"), "400"));
         let socket =
             "Host: localhost:8000\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: abc\r\n";
         let with = |origin: &str| get("/socket?token=00ff", &format!("{socket}Origin: {origin}\r\n"));
-        assert_eq!(with("http://localhost:8000"), Asked::Socket("abc".to_owned()));
+        assert_eq!(with("http://localhost:8000"), Route::Socket("abc".to_owned()));
         for origin in ["http://evil.example", "null", "https://localhost:8000", "http://127.0.0.1:8000"] {
             assert!(refused(with(origin), "403"), "{origin}");
         }

@@ -4,19 +4,20 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::command::WaitCondition;
 use host_sim::coverage::Coverage;
 use host_sim::word::status_words;
 use serde::Serialize;
 use specgen_link::client::{ClientError, Port};
 use specgen_link::{PassAction, Refusal};
-use specgen_operate::WaitCondition;
 use specgen_runtime::learning::Settings;
 use specgen_runtime::pass::{Course, Stage};
 use specgen_runtime::playback::Knot;
 use specgen_runtime::setpoint::BUSY;
 use specgen_studies::learning::{Table, translation_nm};
 
-use super::Ended;
+use super::answer::Acknowledgement;
+use super::error::SessionError;
 use super::operator::Operator;
 use specgen_language::outcome::Outcome;
 use specgen_language::ui::Ui;
@@ -28,8 +29,8 @@ const LOOK: Duration = Duration::from_millis(5);
 /// How much longer than its ticks a pass may take, and how long learning, s: by the ticks of the device, which on an emulated one take longer.
 const LATER: f64 = 10.0;
 
-/// What a pass showed.
-pub struct Passed {
+/// Result of a pass.
+pub struct PassResult {
     /// Means of the error from knot to knot.
     pub errors: Vec<Knot>,
     /// Status bits seen.
@@ -38,7 +39,7 @@ pub struct Passed {
 
 /// Answer to `play` under a correction.
 #[derive(Serialize)]
-pub struct Played {
+pub struct PassReport {
     correction: String,
     /// Root mean square of the translation's error as the gauges show it, over the motion and the rest after it, nm.
     error_nm: f64,
@@ -48,7 +49,7 @@ pub struct Played {
     status: u32,
 }
 
-impl Outcome for Played {
+impl Outcome for PassReport {
     fn text(&self) -> String {
         let Self { correction, error_nm, coverage, .. } = self;
         let mut text = format!("played under {correction}: {error_nm:.1} nm rms by its gauges over {coverage}");
@@ -86,12 +87,12 @@ impl<P: Port> Operator<P> {
         correction: Option<&(PathBuf, String)>,
         line: &str,
         ui: &Ui,
-    ) -> Result<(), Ended> {
-        let (number, table) = self.playable(name, correction).map_err(Ended::Refused)?;
+    ) -> Result<(), SessionError> {
+        let (number, table) = self.playable(name, correction).map_err(SessionError::Refused)?;
         let Some((table, (path, _))) = table.zip(correction) else {
             let words = self.words_of_trajectory(number)?;
             self.send_and_see(words)?;
-            self.note(line, &super::answer::Plain("done".to_owned()), ui);
+            self.note(line, &Acknowledgement("done".to_owned()), ui);
             return Ok(());
         };
         let (spacing, before) = (table.spacing, table.before);
@@ -104,27 +105,27 @@ impl<P: Port> Operator<P> {
         let ticks = spacing as usize;
         let coverage = Coverage::new(seen * ticks, whole * ticks, self.session.period());
         if !coverage.is_whole() {
-            return Err(Ended::Fault(format!("the pass ended early, after {coverage}: there is no figure")));
+            return Err(SessionError::Fault(format!("the pass ended early, after {coverage}: there is no figure")));
         }
         let error_nm = translation_nm(motion);
-        self.note(line, &Played { correction: shown(path), error_nm, coverage, status: passed.status }, ui);
+        self.note(line, &PassReport { correction: shown(path), error_nm, coverage, status: passed.status }, ui);
         Ok(())
     }
 
     /// Words that play a trajectory.
-    pub(super) fn words_of_trajectory(&self, number: usize) -> Result<Vec<u64>, Ended> {
+    pub(super) fn words_of_trajectory(&self, number: usize) -> Result<Vec<u64>, SessionError> {
         let command = [("command", "trajectory".to_owned()), ("selector", number.to_string())];
         let command = command.map(|(name, value)| (name.to_owned(), value));
-        self.session.assign(&command).map_err(Ended::Refused)
+        self.session.assign(&command).map_err(SessionError::Refused)
     }
 
     /// Knots that the device has room for in a pass.
-    pub fn pass_capacity(&mut self) -> Result<u32, Ended> {
+    pub fn pass_capacity(&mut self) -> Result<u32, SessionError> {
         self.session.pass(PassAction::Look).map(|status| status.capacity).map_err(refused)
     }
 
     /// Sends the correction of passes of a course, zeros behind its knots.
-    pub fn correct(&mut self, knots: &[Knot], course: Course) -> Result<(), Ended> {
+    pub fn correct(&mut self, knots: &[Knot], course: Course) -> Result<(), SessionError> {
         let mut whole = knots.to_vec();
         whole.resize(course.knots() as usize, [0; 6]);
         self.session.put_knots(0, &whole).map_err(refused)
@@ -132,10 +133,16 @@ impl<P: Port> Operator<P> {
 
     /// Goes to `start` (the controller's coordinates, m and rad), rests there, and makes a pass under the correction of these knots, or of those that
     /// the device has.
-    pub fn pass(&mut self, start: &[f64; 6], course: Course, knots: Option<&[Knot]>, ui: &Ui) -> Result<Passed, Ended> {
+    pub fn pass(
+        &mut self,
+        start: &[f64; 6],
+        course: Course,
+        knots: Option<&[Knot]>,
+        ui: &Ui,
+    ) -> Result<PassResult, SessionError> {
         let capacity = self.pass_capacity()?;
         if course.knots() > capacity {
-            return Err(Ended::Refused(format!(
+            return Err(SessionError::Refused(format!(
                 "a pass of {} knots is more than the {capacity} that the device has room for; learn with a lower --bandwidth, which \
                  needs fewer, or a shorter trajectory",
                 course.knots()
@@ -152,7 +159,7 @@ impl<P: Port> Operator<P> {
             self.correct(knots, course)?;
         }
         let Course { spacing, before, ticks, trajectory } = course;
-        self.ordered = true;
+        self.in_control = true;
         self.session.pass(PassAction::Begin { spacing, before, ticks, trajectory }).map_err(refused)?;
         let limit = self.session.status().tick + u64::from(ticks) + self.later();
         let status = loop {
@@ -165,15 +172,15 @@ impl<P: Port> Operator<P> {
             }
             if self.session.status().tick > limit {
                 self.session.pass(PassAction::Abort).map_err(refused)?;
-                return Err(Ended::Fault(format!("the pass does not end; the machine is {}", self.stands())));
+                return Err(SessionError::Fault(format!("the pass does not end; the machine is {}", self.state())));
             }
         };
         if Stage::from_word(status.stage) != Some(Stage::Complete) {
-            return Err(Ended::Fault(format!("the pass was ended; the machine is {}", self.stands())));
+            return Err(SessionError::Fault(format!("the pass was ended; the machine is {}", self.state())));
         }
         // What it began is what is commanded.
         let errors = self.session.errors().map_err(refused)?;
-        Ok(Passed { errors, status: status.status })
+        Ok(PassResult { errors, status: status.status })
     }
 }
 
@@ -185,17 +192,17 @@ impl<P: Port> Operator<P> {
     }
 
     /// Sends what the device learns with, behind the knots of its passes.
-    pub fn plan(&mut self, knots: usize, rows: &[Knot]) -> Result<(), Ended> {
+    pub fn plan(&mut self, knots: usize, rows: &[Knot]) -> Result<(), SessionError> {
         self.session.put_knots(knots, rows).map_err(refused)
     }
 
     /// Lets the device make the correction of the next pass; it then has the knots that this gives.
-    pub fn learn(&mut self, Settings { reach, fade }: Settings, ui: &Ui) -> Result<Vec<Knot>, Ended> {
+    pub fn learn(&mut self, Settings { reach, fade }: Settings, ui: &Ui) -> Result<Vec<Knot>, SessionError> {
         let mut status = self.session.pass(PassAction::Learn { reach, fade }).map_err(refused)?;
         let limit = self.session.status().tick + self.later();
         while Stage::from_word(status.stage) == Some(Stage::Learning) {
             if self.session.status().tick > limit {
-                return Err(Ended::Fault("the device does not come to an end of learning".to_owned()));
+                return Err(SessionError::Fault("the device does not come to an end of learning".to_owned()));
             }
             std::thread::sleep(LOOK);
             self.look()?;
@@ -206,7 +213,7 @@ impl<P: Port> Operator<P> {
     }
 }
 
-/// What a correction says of a trajectory of the spec that a machine plays.
+/// The name in a correction file of a trajectory of the spec.
 pub fn motion_name(trajectory: &str) -> String {
     format!("trajectory {trajectory}")
 }
@@ -215,13 +222,13 @@ fn shown(path: &Path) -> String {
     path.display().to_string()
 }
 
-fn refused(error: ClientError) -> Ended {
+fn refused(error: ClientError) -> SessionError {
     match error {
-        ClientError::Refused(Refusal::Unsupported) => Ended::Refused(
+        ClientError::Refused(Refusal::Unsupported) => SessionError::Refused(
             "the device takes no correction; write correction = \"<number> um\" in [control] of its spec, then build it anew"
                 .to_owned(),
         ),
-        ClientError::Refused(Refusal::State) => Ended::Refused(
+        ClientError::Refused(Refusal::State) => SessionError::Refused(
             "not now: a pass begins with a machine that runs and rests, with no wave or other pass under way"
                 .to_owned(),
         ),

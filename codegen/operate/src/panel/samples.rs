@@ -1,12 +1,12 @@
-//! Blocks of samples on their way to pages.
+//! Messages with blocks of samples for pages.
 //!
 //! A message: number 1 and the count of blocks (u32 each), its own number (u32), nothing (u32), when it was sent (f64, ms since 1970),
 //! where the platform of the last row is from rest (6 f64, m and rad); then each block: first tick (f64), number, ticks a row, rows,
 //! nothing (u32 each); then its rows: status, phase (u32 each), pose, set-point, error, voltages (f32 each; error and voltages least,
 //! mean, most of each axis and leg); pose and error that are not measured are NaN. Little-endian.
 
-use specgen_operate::motion::Motion;
-use specgen_operate::samples::{Block, Spread};
+use crate::motion::Motion;
+use crate::samples::{Block, Spread};
 
 /// What a message is: see above.
 const SAMPLES: u32 = 1;

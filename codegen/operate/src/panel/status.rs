@@ -1,21 +1,21 @@
-//! How a machine stands, as an operator is told: what is so, what to do.
+//! Status messages for the operator: state of the machine, and advice.
 
+use crate::GAUGES;
 use specgen_compiler::ir::Supervision;
 use specgen_language::model::Model;
 use specgen_link::Status;
-use specgen_operate::GAUGES;
 use specgen_runtime::setpoint::{BUSY, REFUSED, STALE};
 use specgen_runtime::supervisor::{Cause, Fault, Finding, FindingText, Phase};
 
-/// Kind of a mark (`ok`, `note`, `warning`, `error`), what is so, what to do, and the number of the cause with its limit.
-pub struct Said {
+/// Kind (`ok`, `note`, `warning`, `error`), state, advice, and the number of the cause with its limit.
+pub struct StatusMessage {
     pub kind: &'static str,
     pub what: String,
     pub advice: &'static str,
     pub code: Option<String>,
 }
 
-/// What a cause means, and what to do about it.
+/// State and advice of a cause.
 fn cause(cause: Cause) -> (&'static str, &'static str) {
     match cause {
         Cause::None => ("", ""),
@@ -49,7 +49,7 @@ fn cause(cause: Cause) -> (&'static str, &'static str) {
     }
 }
 
-/// What to do about what the wiring check found.
+/// Advice on a finding of the wiring check.
 pub fn advice(finding: Finding) -> &'static str {
     match finding {
         Finding::None | Finding::Fallback(_) => "",
@@ -80,7 +80,7 @@ pub fn advice(finding: Finding) -> &'static str {
     }
 }
 
-/// From what on a cause acts, by the spec.
+/// The limit of a cause in the spec.
 fn limit(of: Cause, rules: &Supervision, model: &Model) -> Option<String> {
     let micrometres = |length: f64| format!("limit {}\u{2009}µm", (length * 1e8).round() / 100.0);
     let share = model.supervisor.tracking_error * 100.0;
@@ -99,8 +99,8 @@ fn limit(of: Cause, rules: &Supervision, model: &Model) -> Option<String> {
     }
 }
 
-/// The same of a machine with this status.
-pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
+/// The message of a machine with this status.
+pub fn message(status: &Status, rules: &Supervision, model: &Model) -> StatusMessage {
     let finding = Finding::of_word(u32::from(status.finding));
     let phase = Phase::from_word(u64::from(status.phase));
     let of = Cause::from_word(u64::from(status.cause)).unwrap_or(Cause::None);
@@ -120,14 +120,16 @@ pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
         let limit = limit(of, rules, model).map_or(String::new(), |limit| format!(" · {limit}"));
         format!("cause {}{limit}", of.word())
     });
-    let said = |kind, what: &str, advice| Said { kind, what: what.to_owned(), advice, code: code.clone() };
+    let message = |kind, what: &str, advice| StatusMessage { kind, what: what.to_owned(), advice, code: code.clone() };
     match phase {
-        Some(Phase::Disarmed) => said("note", "Disarmed. Amplifiers are off.", "To begin: arm, then run."),
-        Some(Phase::Arming) => said("note", "Arming. The wiring is checked, leg by leg.", "Run may be asked for now."),
+        Some(Phase::Disarmed) => message("note", "Disarmed. Amplifiers are off.", "To begin: arm, then run."),
+        Some(Phase::Arming) => {
+            message("note", "Arming. The wiring is checked, leg by leg.", "Run may be asked for now.")
+        }
         Some(Phase::Running) => {
             let bits = status.status & !BUSY;
             let (kind, what, advice) = if of != Cause::None {
-                return said("error", &format!("Running. {what}"), advice);
+                return message("error", &format!("Running. {what}"), advice);
             } else if bits & REFUSED != 0 {
                 ("warning", "Running. The last command is refused.", "Hold, run, and move to where there is reach.")
             } else if bits & STALE != 0 {
@@ -141,13 +143,13 @@ pub fn stands(status: &Status, rules: &Supervision, model: &Model) -> Said {
             } else {
                 ("ok", "Running. Nothing to do.", "")
             };
-            said(kind, what, advice)
+            message(kind, what, advice)
         }
-        Some(Phase::Holding) if what.is_empty() => said("note", "Holding. The law is suspended.", "Run goes on."),
-        Some(Phase::Holding) => said("warning", &format!("Holding. {what}"), advice),
-        Some(Phase::RampingDown) if of == Cause::None => said("note", "Ramping down.", ""),
-        Some(Phase::RampingDown) => said("error", &format!("Ramping down. {what}"), advice),
-        Some(Phase::Faulted) => said("error", what, advice),
-        None => said("error", "The machine says a phase that is not known.", "Build panel and controller alike."),
+        Some(Phase::Holding) if what.is_empty() => message("note", "Holding. The law is suspended.", "Run goes on."),
+        Some(Phase::Holding) => message("warning", &format!("Holding. {what}"), advice),
+        Some(Phase::RampingDown) if of == Cause::None => message("note", "Ramping down.", ""),
+        Some(Phase::RampingDown) => message("error", &format!("Ramping down. {what}"), advice),
+        Some(Phase::Faulted) => message("error", what, advice),
+        None => message("error", "The machine reports an unknown phase.", "Build panel and controller alike."),
     }
 }

@@ -1,0 +1,42 @@
+//! `specgen panel`: a machine on one page in the browser.
+
+use std::net::SocketAddr;
+
+use clap::{ArgGroup, Args};
+use specgen_compiler::spec_file;
+use specgen_language::interrupt;
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
+use specgen_operate::panel;
+use specgen_report::panel::{facts, html};
+
+use super::line::Line;
+use super::named::InputFile;
+
+/// Arguments of `panel`.
+#[derive(Args, Debug)]
+#[command(group(ArgGroup::new("line").required(true).args(["port", "socket"])), after_help = super::examples::PANEL)]
+pub struct Arguments {
+    /// The spec that the device was built from: for the figure of the platform, and for the margins of gains.
+    #[arg(value_name = "SPEC")]
+    spec: InputFile,
+    #[command(flatten)]
+    line: Line,
+    /// Where browsers connect. Any address but one of this computer itself lets others on the network who know the token move the
+    /// machine.
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8020")]
+    listen: SocketAddr,
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let compiled = spec_file::looked_up(&arguments.spec, ui)?;
+    interrupt::heed();
+    let (session, name) = arguments.line.open(Some(&compiled.ir.digest))?;
+    let mut facts = facts(&compiled.model, compiled.design.as_ref());
+    for (key, value) in panel::device_facts(&session, &name, &compiled)? {
+        facts[key] = value;
+    }
+    let page = html(&format!("{}: panel", compiled.model.name), &facts);
+    ui.result(&panel::serve(session, &name, compiled, arguments.listen, page, ui)?);
+    Ok(())
+}

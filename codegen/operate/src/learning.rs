@@ -1,0 +1,92 @@
+//! Learning on a machine at the end of a link.
+
+mod machine;
+
+use std::path::Path;
+
+use specgen_compiler::compile::Compilation;
+use specgen_language::interrupt;
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
+use specgen_studies::learning::{LearnError, RepeatableMachine};
+use specgen_studies::lessons::{self, Bed, Done, Options, failure};
+use specgen_studies::trajectory::Followed;
+
+use crate::commands::{Operator, SessionError, lost_link, motion_name};
+use crate::line::Line;
+use machine::{LinkedMachine, OwnTrajectory};
+
+/// Learns a trajectory of the spec on the machine that `line` leads to. `spec` is the file of the spec, for messages.
+///
+/// # Errors
+/// The machine has no such trajectory, or the session or learning fails.
+pub fn run(line: Line<'_>, spec: &Path, options: &Options, compiled: Compilation, ui: &mut Ui) -> Result<(), Failure> {
+    let own = OwnTrajectory::named(options.trajectory.as_deref(), &compiled)?;
+    lessons::run(options, compiled, &mut OnLine { line, spec, own }, ui)
+}
+
+/// A machine at the end of a link.
+struct OnLine<'a> {
+    line: Line<'a>,
+    /// Of the command, for a message.
+    spec: &'a Path,
+    own: OwnTrajectory,
+}
+
+impl Bed for OnLine<'_> {
+    fn motion_name(&self, followed: &Followed) -> String {
+        motion_name(&followed.name)
+    }
+
+    fn start(&self) -> Option<[f64; 6]> {
+        Some(self.own.start)
+    }
+
+    fn work<T, F>(
+        &mut self,
+        compiled: &Compilation,
+        ui: &mut Ui,
+        work: impl FnOnce(&mut dyn RepeatableMachine, &Ui) -> Result<T, LearnError>,
+        keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
+    ) -> Result<Done<F>, Failure> {
+        interrupt::heed();
+        let ir = &compiled.ir;
+        let (session, name) = self.line.open(Some(&ir.digest))?;
+        let mut operator = Operator::new(session, interrupt::heed());
+        if !operator.is_set_to(&ir.integrity.settings).map_err(|error| lost_link(&name, &error))? {
+            return Err(Failure::Gate(format!(
+                "{name}: its settings are not those of the spec, for which learning is proven to converge; `config write {}` in \
+                 specgen operate restores them",
+                self.spec.display()
+            )));
+        }
+        let mut machine = LinkedMachine { operator: &mut operator, ui, own: &self.own, has: None, error: None };
+        let done = match machine.arm() {
+            Ok(()) => work(&mut machine, ui),
+            Err(error) => {
+                machine.error = Some(error);
+                Err(LearnError::Ended)
+            }
+        };
+        let ending = machine.error;
+        let down = match &ending {
+            Some(SessionError::Link(error)) => Err(lost_link(&name, error)),
+            _ if operator.is_powered() => operator.ramp_down(ui).map_err(|error| lost_link(&name, &error)),
+            _ => Ok(format!("the machine is {}, amplifiers off", operator.state())),
+        };
+        // What was found is kept, however the machine ended.
+        let found = match done {
+            Ok(done) => Some(keep(done, ui)?),
+            Err(LearnError::Ended) => None,
+            Err(error) => return Err(down.err().unwrap_or_else(|| failure(&error, format!("{name}: {error}")))),
+        };
+        let down = format!("; {}", down?);
+        let why = match ending {
+            Some(SessionError::Refused(text) | SessionError::Fault(text)) => Some(format!("{name}: {text}")),
+            Some(SessionError::Failed(failure)) => return Err(failure),
+            Some(SessionError::Stopped) => Some(format!("{name}: the program that serves the link has ended")),
+            Some(SessionError::Link(_) | SessionError::Interrupted) | None => None,
+        };
+        Ok(Done { found, why, down })
+    }
+}

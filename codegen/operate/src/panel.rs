@@ -1,0 +1,383 @@
+//! A machine on one page in the browser.
+//!
+//! ```text
+//! browsers ─ HTTP, WebSocket ─► a thread each ─ ClientEvent ─► this thread: Operator ─ link ─► machine
+//!            page, samples ◄────────────────── Outbox ◄─┘ at every look: samples, state, hold and ramp down
+//! ```
+//! One thread has the machine. While a command waits, the machine is looked at all the same; at every look the pages get their samples,
+//! and *hold* and *ramp down* are carried out. A browser that is slow, or fails, delays nothing.
+
+mod browser;
+mod clients;
+mod control;
+mod http;
+mod request;
+mod samples;
+mod status;
+mod wiring;
+
+use std::cell::RefCell;
+use std::io;
+use std::net::{IpAddr, SocketAddr, TcpListener};
+use std::rc::Rc;
+use std::sync::mpsc::sync_channel;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use specgen_compiler::compile::Compilation;
+use specgen_language::interrupt;
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
+use specgen_link::Refusal;
+use specgen_link::client::{ClientError, Port};
+use specgen_runtime::supervisor::{Phase, Request};
+
+use crate::commands::{Operator, Pulse, Service, SessionError, is_gain, lost_link, recoverable};
+use crate::samples::Block;
+use crate::session::Session;
+use clients::{Clients, now};
+use control::{carry_out, queries};
+
+/// Between two messages with samples.
+const FRAME: Duration = Duration::from_millis(25);
+/// Between two looks at the samples that wait.
+const LOOK: Duration = Duration::from_millis(10);
+/// Between two messages with the state of the machine.
+const STATE: Duration = Duration::from_millis(200);
+/// Between two queries that need more than a look: health, reach, recorder, gains.
+const QUERY: Duration = Duration::from_secs(1);
+/// Between two messages about late ticks.
+const LATE: Duration = Duration::from_secs(60);
+/// Rows a second that are asked for, at most.
+const ROWS: f64 = 2000.0;
+/// Longer than any ramp after a host was gone, s.
+const RAMPED: f64 = 5.0;
+
+/// State of the panel.
+struct Panel {
+    clients: Clients,
+    compiled: Compilation,
+    blocks: Vec<Block>,
+    /// Number of the next block, and its first tick.
+    next: Option<(u32, u64)>,
+    /// Ticks whose samples were lost since the last message about that, and its time.
+    lost: (u64, Instant),
+    framed: Instant,
+    stated: Instant,
+    /// Phase, cause and finding that were published last; late ticks.
+    published: Option<((u8, u8, u16), u32)>,
+    /// Late ticks since the last message about them, and its time.
+    late: (u32, Option<Instant>),
+    /// A command is under way: a stop ends it with an error.
+    is_busy: bool,
+    /// Results of the queries.
+    known: Value,
+    check: Value,
+    wave: Value,
+}
+
+/// What the page of a device shows beside its spec: the name, the rate of a ramp (V/s), the trajectories.
+///
+/// # Errors
+/// The device controls six legs.
+pub fn device_facts(
+    session: &Session<impl Port>,
+    name: &str,
+    compiled: &Compilation,
+) -> Result<[(&'static str, Value); 3], Failure> {
+    let Some(motion) = session.motion() else {
+        return Err(Failure::Gate(format!("{name}: the device controls six legs: the panel shows a platform")));
+    };
+    let (rules, volts) = (&compiled.ir.supervision, compiled.ir.actuation.volts_per_code);
+    let ramp = f64::from(rules.ramp_step) * volts / (f64::from(rules.ramp_every) * session.period());
+    Ok([("device", json!(name)), ("ramp", json!(ramp)), ("trajectories", json!(motion.trajectories()))])
+}
+
+/// Serves `page` at an address until Ctrl-C, and operates the machine as the pages request; then ramps down.
+///
+/// # Errors
+/// The address is not free, the device sends no samples, or the link broke.
+pub fn serve<P: Port + 'static>(
+    session: Session<P>,
+    name: &str,
+    compiled: Compilation,
+    listen: SocketAddr,
+    page: String,
+    ui: &Ui,
+) -> Result<Service, Failure> {
+    let refused = |error: io::Error| Failure::Environment(format!("cannot listen at {listen}: {error}"));
+    let listener = TcpListener::bind(listen).map_err(refused)?;
+    let address = listener.local_addr().map_err(refused)?;
+    let guard = http::Guard::new(address.port()).map_err(refused)?;
+    announce(name, address, guard.token(), ui);
+    let (sender, events) = sync_channel(256);
+    browser::serve(listener, guard, page, sender);
+
+    let mut operator = Operator::new(session, interrupt::heed());
+    operator.model = Some(compiled.model.clone());
+    operator.alike = compiled.ir.supervision.alike().to_vec();
+    operator.attended = true;
+    let panel = Rc::new(RefCell::new(Panel::new(Clients::new(events), compiled)));
+    panel.borrow_mut().begin(&mut operator.session).map_err(|error| match error {
+        ClientError::Refused(_) => {
+            let what = "the device sends no samples; build and flash it with this specgen";
+            Failure::Gate(format!("{name}: {what}: {error}"))
+        }
+        other => lost_link(name, &other),
+    })?;
+    operator.pulse = Some(pulse(panel.clone()));
+    let ending = operate(&mut operator, &panel, ui);
+    operator.pulse = None;
+    let left = match ending {
+        SessionError::Link(error) => Err(lost_link(name, &error)),
+        SessionError::Failed(failure) => Err(failure),
+        _ if operator.is_powered() => operator.ramp_down(ui).map_err(|error| lost_link(name, &error)),
+        _ => Ok(operator.state()),
+    };
+    let why = if left.is_ok() { "The panel was ended." } else { "The link to the machine broke." };
+    panel.borrow_mut().clients.publish(&json!({ "k": "end", "why": why }));
+    // The threads of the pages send it.
+    std::thread::sleep(FRAME);
+    Ok(Service { device: name.to_owned(), listened: address.to_string(), stands: left? })
+}
+
+/// Shows where the page is.
+fn announce(name: &str, address: SocketAddr, token: &str, ui: &Ui) {
+    // A server at all addresses is reached at this one.
+    let shown = match address.ip() {
+        IpAddr::V4(ip) if ip.is_unspecified() => SocketAddr::from(([127, 0, 0, 1], address.port())),
+        _ => address,
+    };
+    if !address.ip().is_loopback() {
+        ui.progress(
+            "warning: whoever reaches this address and knows the token can move the machine; nothing is encrypted",
+        );
+    }
+    ui.progress(&format!("{name}: panel at http://{shown}/?token={token}"));
+    ui.progress("Ctrl-C ramps down and ends");
+}
+
+/// Operates the machine until an error or Ctrl-C.
+fn operate<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Panel>>, ui: &Ui) -> SessionError {
+    // Answers go to pages; nothing is printed.
+    let mut quiet = Ui::called(|_| (), None);
+    let mut queried = Instant::now();
+    loop {
+        if let Err(error) = round(operator, panel, &mut quiet, &mut queried) {
+            match recoverable(Err(error), &mut quiet) {
+                // It ended a command at most.
+                Ok(_) => {}
+                Err(error) => return error,
+            }
+        }
+        operator.show(ui);
+    }
+}
+
+/// One round: handles pages, looks at the machine, executes one command or the queries that are due.
+fn round<P: Port + 'static>(
+    operator: &mut Operator<P>,
+    panel: &Rc<RefCell<Panel>>,
+    quiet: &mut Ui,
+    queried: &mut Instant,
+) -> Result<(), SessionError> {
+    panel.borrow_mut().clients.listen(operator.session.due().min(LOOK));
+    if operator.is_interrupted() {
+        return Err(SessionError::Interrupted);
+    }
+    if panel.borrow_mut().leaves_alone(operator) {
+        return Ok(());
+    }
+    operator.look()?;
+    let next = panel.borrow_mut().clients.next();
+    if let Some((page, command)) = next {
+        panel.borrow_mut().is_busy = true;
+        let done = carry_out(operator, panel, page, &command, quiet);
+        panel.borrow_mut().is_busy = false;
+        operator.answers.clear();
+        let id = command.id();
+        return match done {
+            Ok(value) => {
+                panel.borrow().clients.answer(page, id, Ok(value));
+                Ok(())
+            }
+            Err(error) => {
+                if let Some(why) = recoverable(Err(error), quiet)? {
+                    panel.borrow().clients.answer(page, id, Err(&why));
+                }
+                Ok(())
+            }
+        };
+    }
+    if queried.elapsed() >= QUERY {
+        *queried = Instant::now();
+        let known = queries(operator, quiet)?;
+        panel.borrow_mut().known = known;
+    }
+    Ok(())
+}
+
+/// What is done at every look.
+fn pulse<P: Port + 'static>(panel: Rc<RefCell<Panel>>) -> Pulse<P> {
+    Box::new(move |operator| panel.borrow_mut().pulse(operator))
+}
+
+impl Panel {
+    fn new(clients: Clients, compiled: Compilation) -> Self {
+        let begun = Instant::now();
+        Self {
+            clients,
+            compiled,
+            blocks: Vec::new(),
+            next: None,
+            lost: (0, begun),
+            framed: begun,
+            stated: begun,
+            published: None,
+            late: (0, None),
+            is_busy: false,
+            known: json!({}),
+            check: Value::Null,
+            wave: Value::Null,
+        }
+    }
+
+    /// Asks for samples, as many as are of use and there is room for.
+    fn begin(&mut self, session: &mut Session<impl Port>) -> Result<(), ClientError> {
+        let mut every = (1.0 / (ROWS * session.period())).ceil() as u32;
+        loop {
+            match session.stream(every) {
+                Err(ClientError::Refused(Refusal::Rate { least })) if least > every => every = least,
+                other => return other,
+            }
+        }
+    }
+
+    fn pulse<P: Port>(&mut self, operator: &mut Operator<P>) -> Result<(), SessionError> {
+        self.clients.listen(Duration::ZERO);
+        if let Some((who, request)) = self.clients.urgent() {
+            operator.in_control = true;
+            operator.session.supervise(request)?;
+            let what = if request == Request::Hold { "hold" } else { "ramp down" };
+            self.clients.note("note", &format!("{who} requested: {what}."), "", None);
+            if self.is_busy {
+                return Err(SessionError::Refused(format!("{who} requested: {what}")));
+            }
+        }
+        if self.is_busy && !self.clients.has_holder() {
+            return Err(SessionError::Refused("the page in control is gone".to_owned()));
+        }
+        self.samples(&mut operator.session)?;
+        self.publish(operator);
+        Ok(())
+    }
+
+    /// Whether the machine gets no heartbeat: the page in control is gone, so that the machine acts as without a host.
+    fn leaves_alone<P: Port>(&mut self, operator: &Operator<P>) -> bool {
+        let rules = &self.compiled.ir.supervision;
+        let gone = f64::from(*rules.timeout.last().unwrap_or(&0)) * operator.session.period();
+        let silent = operator.session.silence().as_secs_f64();
+        let is_at_rest = silent > gone + RAMPED || !operator.is_powered() || !operator.in_control;
+        if self.clients.is_left && is_at_rest {
+            self.clients.is_left = false;
+        }
+        if !self.clients.is_left || self.clients.is_pressed() {
+            return false;
+        }
+        if self.stated.elapsed() >= STATE {
+            self.stated = Instant::now();
+            let left = if silent < gone { gone - silent } else { 0.0 };
+            self.clients.publish(&json!({ "k": "left", "t": now(), "left": left }));
+        }
+        true
+    }
+
+    fn samples(&mut self, session: &mut Session<impl Port>) -> Result<(), ClientError> {
+        for block in session.take_blocks()? {
+            if let Some((number, tick)) = self.next
+                && block.number != number
+            {
+                self.lost.0 += block.tick.saturating_sub(tick);
+            }
+            self.next = Some((block.number.wrapping_add(1), block.end()));
+            self.blocks.push(block);
+        }
+        if self.lost.0 > 0 && self.lost.1.elapsed() >= QUERY {
+            let seconds = self.lost.0 as f64 * session.period();
+            self.lost = (0, Instant::now());
+            self.clients.note(
+                "warning",
+                &format!("{seconds:.3} s of samples were lost on the way from the machine."),
+                "",
+                None,
+            );
+        }
+        if self.framed.elapsed() >= FRAME && !self.blocks.is_empty() {
+            self.framed = Instant::now();
+            let number = self.clients.number();
+            let bytes = samples::message(number, &self.blocks, session.motion(), now());
+            self.clients.show(number, bytes);
+            self.blocks.clear();
+        }
+        Ok(())
+    }
+
+    /// Publishes the state of the machine, and what is new.
+    fn publish<P: Port>(&mut self, operator: &Operator<P>) {
+        let status = operator.session.status();
+        let current = ((status.phase, status.cause, status.finding), status.late);
+        let message = status::message(status, &self.compiled.ir.supervision, &self.compiled.model);
+        if let Some(before) = self.published.replace(current) {
+            if before.0 != current.0 {
+                self.clients.note(
+                    if message.kind == "ok" { "note" } else { message.kind },
+                    &message.what,
+                    message.advice,
+                    message.code.as_deref(),
+                );
+                if u64::from(status.phase) != Phase::Running.word() {
+                    self.wave = Value::Null;
+                }
+            }
+            self.late.0 += current.1.saturating_sub(before.1);
+            if self.late.0 > 0 && self.late.1.is_none_or(|last| last.elapsed() >= LATE) {
+                let late = std::mem::take(&mut self.late.0);
+                let again = self.late.1.replace(Instant::now()).is_some();
+                let s = if late == 1 { "" } else { "s" };
+                let advice = if again {
+                    "Look at the load of the controller's computer."
+                } else {
+                    "Nothing, unless it comes back."
+                };
+                self.clients.note("warning", &format!("{late} late tick{s}."), advice, None);
+            }
+        }
+        if self.stated.elapsed() < STATE {
+            return;
+        }
+        self.stated = Instant::now();
+        let state = json!({
+            "k": "state",
+            "t": now(),
+            "status": operator.status(),
+            "phase": Phase::from_word(u64::from(status.phase)).map(Phase::name),
+            "said": { "kind": message.kind, "what": message.what, "do": message.advice, "code": message.code },
+            "known": self.known,
+            "check": self.check,
+            "wave": self.wave,
+            "busy": self.is_busy,
+        });
+        self.clients.publish(&state);
+    }
+
+    /// All gains as the spec has them, by this factor.
+    fn gains<P: Port>(&self, operator: &Operator<P>, factor: f64) -> Result<Vec<(String, f64)>, String> {
+        if !(factor.is_finite() && factor > 0.0) {
+            return Err(format!("expected a factor on the gains above 0, found {factor}"));
+        }
+        let description = operator.session.description();
+        let words = description.config_names.iter().zip(&self.compiled.ir.integrity.settings);
+        let gains = words.filter(|(name, _)| is_gain(name));
+        Ok(gains.map(|(name, word)| (name.clone(), description.scalar.decode(*word) * factor)).collect())
+    }
+}

@@ -1,0 +1,132 @@
+//! Commands of the page in control.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use crate::Command;
+use serde_json::{Value, json};
+use specgen_link::RecorderAction;
+use specgen_link::client::Port;
+use specgen_runtime::supervisor::Request;
+use tungstenite::Message;
+
+use super::clients::{EdgeRequest, PageRequest};
+use super::request::{execute, send_edge};
+use super::{Panel, wiring};
+use crate::commands::{Operator, SessionError, recoverable};
+use specgen_language::ui::Ui;
+
+/// Kind of a message with a record.
+const RECORD: u32 = 2;
+
+/// Health, reach of each axis, recorder and gains. A part that the device lacks is left out.
+pub(super) fn queries<P: Port>(operator: &mut Operator<P>, quiet: &mut Ui) -> Result<Value, SessionError> {
+    let mut known = json!({});
+    let commands = [
+        ("standing", Command::Status),
+        ("reach", Command::Limits),
+        ("recorder", Command::Record(RecorderAction::Look)),
+        ("gains", Command::Gains(Vec::new())),
+    ];
+    for (key, command) in commands {
+        let answer = execute(operator, &command, quiet);
+        match answer {
+            Ok(value) => known[key] = value,
+            Err(error) => {
+                recoverable(Err(error), quiet)?;
+            }
+        }
+    }
+    Ok(known)
+}
+
+/// Carries out a request of a page.
+pub(super) fn carry_out<P: Port + 'static>(
+    operator: &mut Operator<P>,
+    panel: &Rc<RefCell<Panel>>,
+    page: u64,
+    request: &PageRequest,
+    quiet: &Ui,
+) -> Result<Value, SessionError> {
+    match request {
+        PageRequest::Command { line, .. } => {
+            let command = Command::parse(line).map_err(SessionError::Refused)?;
+            let command = command.ok_or_else(|| SessionError::Refused("a command is expected".to_owned()))?;
+            if !is_for_pages(&command) {
+                return Err(SessionError::Refused(format!(
+                    "`{line}` is not for a page: it reads or writes files, waits, or ends the program"
+                )));
+            }
+            if matches!(command, Command::StopWave) {
+                panel.borrow_mut().wave = Value::Null;
+            }
+            let what = format!("Page {page}: {line}.");
+            let value = execute(operator, &command, quiet)?;
+            panel.borrow_mut().clients.note("note", &what, "", None);
+            Ok(value)
+        }
+        PageRequest::Begin { request, .. } => {
+            let (request, what) = match request {
+                EdgeRequest::Arm => (Request::Arm, "arm"),
+                EdgeRequest::Run => (Request::Run, "run"),
+                EdgeRequest::Acknowledge => (Request::Acknowledge, "acknowledge"),
+            };
+            send_edge(operator, request)?;
+            panel.borrow_mut().clients.note("note", &format!("Page {page} requested: {what}."), "", None);
+            Ok(Value::Null)
+        }
+        PageRequest::Wave { name, text, .. } => {
+            let (words, center) = operator.wave_of_text(text).map_err(SessionError::Refused)?;
+            operator.start_wave(name, &words, &center, false)?;
+            let mut panel = panel.borrow_mut();
+            panel.wave = json!({ "name": name, "tick": operator.status().tick });
+            panel.clients.note("note", &format!("Page {page} started the wave {name}."), "", None);
+            Ok(Value::Null)
+        }
+        PageRequest::Gain { factor, .. } => {
+            let gains = panel.borrow().gains(operator, *factor).map_err(SessionError::Refused)?;
+            let value = execute(operator, &Command::Gains(gains), quiet)?;
+            panel.borrow_mut().clients.note(
+                "note",
+                &format!("Page {page} set all gains to {factor} of the spec's."),
+                "",
+                None,
+            );
+            Ok(value)
+        }
+        PageRequest::Download { .. } => {
+            let record = operator.record()?;
+            let mut bytes = RECORD.to_le_bytes().to_vec();
+            bytes.extend(&record);
+            panel.borrow().clients.tell(page, Message::binary(bytes));
+            Ok(json!(record.len()))
+        }
+        PageRequest::Check { .. } => {
+            panel.borrow_mut().clients.note("note", &format!("Page {page} began the wiring check."), "", None);
+            let checked = wiring::check(operator, panel);
+            panel.borrow_mut().check["runs"] = json!(false);
+            checked
+        }
+        _ => Ok(Value::Null),
+    }
+}
+
+/// Whether a page may send a command as a line.
+fn is_for_pages(command: &Command) -> bool {
+    match command {
+        Command::Ask(request) => matches!(request, Request::None | Request::Arm | Request::Run | Request::Acknowledge),
+        Command::Play { correction, .. } => correction.is_none(),
+        Command::Status
+        | Command::Where
+        | Command::Limits
+        | Command::CanIGo { .. }
+        | Command::Move { .. }
+        | Command::Goto(_)
+        | Command::Mark(_)
+        | Command::Mode(_)
+        | Command::Gains(_)
+        | Command::Record(_)
+        | Command::StopWave => true,
+        _ => false,
+    }
+}
