@@ -3,22 +3,31 @@
 //! Controllers are emitted into `target/tests`, built there for the host and for the emulated microcontrollers, and run
 //! through their words: what is tested is what a user gets.
 
+pub mod cases;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use host_sim::controller::{Controller, TickController};
 use host_sim::description::Description;
+use host_sim::plant::LegParameters;
+use host_sim::platform::PlatformScenario;
+use host_sim::platform::rig::Noise;
 use host_sim::replay;
 use host_sim::stimulus::platform::{self as platform_stimulus, PlatformInputs};
 use host_sim::stimulus::{self, InputRecording, Setpoints};
 use host_sim::trace::{Trace, first_difference};
-use specgen::compile::{Compilation, compile};
+use specgen::compile::{Compilation, compile, compile_source};
+use specgen::diagnostic::Diagnostic;
+use specgen::machine;
 use specgen::model::Mcu;
+use specgen::spec::SpecSource;
 pub use specgen::target::skipped;
-use specgen::target::{self, Image};
+use specgen::target::{self, Image, ReplayResult};
 use specgen::verify;
 use specgen::workspace;
 
@@ -288,6 +297,26 @@ pub fn compile_edited(name: &str, spec: &str, edits: &[(&str, &str)], more: &[(&
     compile(&path).unwrap_or_else(|refused| panic!("{name} is refused: {:#?}", refused.findings))
 }
 
+/// A spec of `specs/` after edits of its text, each at its first place.
+///
+/// # Panics
+/// If there is no such spec, or an edit finds nothing to replace.
+#[must_use]
+pub fn edited(spec: &str, edits: &[(&str, &str)]) -> String {
+    let text = fs::read_to_string(repository().join("specs").join(spec)).expect("a spec of this repository");
+    edits.iter().fold(text, |text, (old, new)| cases::replaced(&text, old, new))
+}
+
+/// What the compiler says of a text that lies in `specs/`.
+///
+/// # Errors
+/// The findings, where it is refused.
+pub fn compile_text(text: &str) -> Result<Compilation, Vec<Diagnostic>> {
+    let (name, dir) = ("platform.toml".to_owned(), repository().join("specs"));
+    let source = SpecSource { display_name: name, text: text.to_owned(), dir };
+    compile_source(source).map_err(|refused| refused.findings)
+}
+
 /// The host's trace of recorded inputs, with the spec's settings but for the named ones.
 ///
 /// # Panics
@@ -311,6 +340,62 @@ pub fn assert_same_bits(what: &str, image: &Image, config: &[u64], host: &Trace)
     let difference = first_difference(host, &target);
     assert!(difference.is_none(), "{what}, {:?}: {}", image.mcu, difference.expect("a difference"));
     println!("{what}, {:?}: {} ticks, no differing word", image.mcu, host.len());
+}
+
+/// Input, output and digest of a supervised tick.
+pub type Row = (Vec<u64>, Vec<u64>, u64);
+
+/// The first tick of a recorded machine in which an image has another output or digest, and what else the image said.
+///
+/// # Panics
+/// If the image does not run.
+#[must_use]
+pub fn machine_difference(image: &Image, config: &[u64], rows: &[Row]) -> (Option<usize>, ReplayResult) {
+    let inputs: Vec<Vec<u64>> = rows.iter().map(|(input, ..)| input.clone()).collect();
+    let result = target::replay_machine(image, config, &inputs, Duration::from_secs(600));
+    let result = result.unwrap_or_else(|error| panic!("{error}"));
+    assert!(result.outputs.len() == rows.len() && result.digests.len() == rows.len(), "a row each");
+    let found = result.outputs.iter().zip(&result.digests);
+    let differs = rows.iter().zip(found).position(|((_, output, digest), found)| (output, digest) != found);
+    (differs, result)
+}
+
+/// The same, where no tick differs.
+///
+/// # Panics
+/// With `what` and the first tick that differs.
+pub fn assert_same_machine(what: &str, image: &Image, config: &[u64], rows: &[Row]) -> ReplayResult {
+    let (differs, result) = machine_difference(image, config, rows);
+    assert_eq!(differs, None, "{what}: the first tick that differs");
+    result
+}
+
+/// The simulated platform of a compiled spec, with such legs.
+///
+/// # Panics
+/// If the spec is of six legs.
+#[must_use]
+pub fn scenario(compiled: &Compilation, leg: &LegParameters, seed: u64) -> PlatformScenario {
+    let task = compiled.model.task_space.as_ref().expect("a platform");
+    let specimen = machine::specimen(&compiled.model, task, leg, Some(seed));
+    machine::scenario(&compiled.model, task, &specimen, &Noise::of(&specimen), seed)
+}
+
+/// Three classes of legs: plays with creep, Bouc-Wen with creep over five decades, plays that depend on the rate with the same creep.
+#[must_use]
+pub fn leg_class(number: u64) -> LegParameters {
+    let [plays, bouc_wen] = [LegParameters::reference(), LegParameters::bouc_wen()];
+    match number % 3 {
+        0 => plays,
+        1 => bouc_wen,
+        _ => LegParameters {
+            kappa: 0.02,
+            creep_rates_per_s: bouc_wen.creep_rates_per_s,
+            creep_weights: bouc_wen.creep_weights,
+            creep_thresholds_v: bouc_wen.creep_thresholds_v,
+            ..plays
+        },
+    }
 }
 
 /// Numbers of an output word over a trace, by name.

@@ -9,7 +9,7 @@ use specgen::diagnostic::{Diagnostic, Place, Severity, codes};
 use specgen_tests::length;
 
 use super::support::tally::{Base, hit_rate, is_about, new_findings};
-use super::support::undetectable::UNDETECTABLE;
+use super::support::undetectable::{is_of, undetectable};
 use super::support::{mutants, plausible, slips, spec, verdict};
 
 /// Specs that slips are made in.
@@ -103,9 +103,9 @@ fn every_reason_is_of_a_slip() {
     let (_folder, bases) = bases(&SECOND_BASES, SECOND_SEED, 6);
     let made = |base: &Base| mutants::all(&base.text).into_iter().chain(slips::all(&base.text)).collect::<Vec<_>>();
     let all: Vec<(&Base, Vec<mutants::Mutant>)> = bases.iter().map(|base| (base, made(base))).collect();
-    for one in UNDETECTABLE {
-        let used = all.iter().any(|(base, slips)| slips.iter().any(|slip| one.is_of(&base.name, slip)));
-        assert!(used, "{} {} {}", one.kind, one.key, one.change);
+    for one in undetectable() {
+        let used = all.iter().any(|(base, slips)| slips.iter().any(|slip| is_of(one, &base.name, slip)));
+        assert!(used, "{one:?}");
     }
 }
 

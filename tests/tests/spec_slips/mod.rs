@@ -23,7 +23,7 @@ use crate::physical_lint::list;
 use crate::physical_lint::support::{plausible, verdict};
 use crate::support::help;
 use edit::Edit;
-use set::{Of, SET, Slip};
+use set::{Of, Slip};
 
 /// Of all slips: found, found at the right key first, with the right help.
 const BARS: [f64; 3] = [0.99, 0.95, 0.98];
@@ -55,9 +55,9 @@ impl Base {
 
     /// What is found with the slip and not without, in the order in which it is shown; and the text with the slip.
     fn with(&self, slip: &Slip) -> (String, Vec<Diagnostic>) {
-        let text = slip.edit.of(&self.text);
+        let text = slip.edits[0].of(&self.text);
         let path = self.folder.path().join(RECORD);
-        let found = if let Edit::Record(change) = slip.edit {
+        let found = if let Edit::Record(change) = slip.edits[0] {
             let record = fs::read_to_string(&path).unwrap();
             fs::write(&path, change(&record)).unwrap();
             let (_, found) = verdict(&text, self.folder.path());
@@ -91,8 +91,14 @@ fn record(text: &str, dir: &Path) -> String {
     record.to_csv()
 }
 
+/// The slips of `slips.txt`; each is one change.
+fn slips() -> &'static [Slip] {
+    static SLIPS: OnceLock<Vec<Slip>> = OnceLock::new();
+    SLIPS.get_or_init(|| set::slips("slips.txt", set::RECORDS))
+}
+
 fn bases() -> BTreeMap<Of, Base> {
-    let which: BTreeSet<Of> = SET.iter().map(|slip| slip.of).collect();
+    let which: BTreeSet<Of> = slips().iter().map(|slip| slip.of).collect();
     which.into_iter().map(|of| (of, Base::of(of))).collect()
 }
 
@@ -103,7 +109,7 @@ fn caught() -> &'static SlipResults {
     static TRIED: OnceLock<SlipResults> = OnceLock::new();
     TRIED.get_or_init(|| {
         let bases = bases();
-        let some = SET.iter().step_by(specgen_tests::length(7, 1));
+        let some = slips().iter().step_by(specgen_tests::length(7, 1));
         some.map(|slip| (slip, bases[&slip.of].with(slip))).collect()
     })
 }
@@ -117,7 +123,7 @@ fn is_at(found: &Diagnostic, slip: &Slip) -> bool {
 
 #[test]
 fn slips_of_the_first_hour_are_found_at_the_right_key_with_a_help_that_leads_out() {
-    assert!(SET.len() >= 120);
+    assert!(slips().len() >= 120);
     let keys = SECTIONS.iter().flat_map(|section| section.keys);
     let examples: Vec<String> = keys.flat_map(help::values).filter(|value| value.starts_with('"')).collect();
     let mut counts: BTreeMap<&str, [usize; 4]> = BTreeMap::new();
@@ -143,7 +149,7 @@ fn slips_of_the_first_hour_are_found_at_the_right_key_with_a_help_that_leads_out
             *sum += usize::from(good);
         }
         if results.contains(&false) {
-            missed += &format!("  {results:?} {:?} {} {:?} for {:?}\n", slip.of, slip.kind, slip.edit, slip.keys);
+            missed += &format!("  {results:?} {:?} {} {:?} for {:?}\n", slip.of, slip.kind, slip.edits, slip.keys);
             for one in found.iter().take(4) {
                 missed += &format!("      {} {}: {} / {}\n", one.code, one.key, one.message, one.help);
             }
@@ -158,7 +164,7 @@ fn slips_of_the_first_hour_are_found_at_the_right_key_with_a_help_that_leads_out
     println!("{:<24}{:>5}{:>8}{:>16}{:>12}\nnot right:\n{missed}", "all", sum[0], sum[1], sum[2], sum[3]);
     for (good, bar) in sum[1..].iter().zip(BARS) {
         // No more misses than all of the set may have.
-        assert!((sum[0] - good) as f64 <= (1.0 - bar) * SET.len() as f64, "{sum:?} against {BARS:?}");
+        assert!((sum[0] - good) as f64 <= (1.0 - bar) * slips().len() as f64, "{sum:?} against {BARS:?}");
     }
 }
 
@@ -241,7 +247,7 @@ fn every_fix_that_is_offered_is_accepted_by_the_next_check() {
     for (slip, (text, found)) in caught().iter().step_by(specgen_tests::length(2, 1)) {
         let base = &bases[&slip.of];
         let next = |text: &str| verdict(text, base.folder.path()).1;
-        (0..found.len()).for_each(|at| try_fix(&format!("{:?}", slip.edit), found, at, text, &next));
+        (0..found.len()).for_each(|at| try_fix(&format!("{:?}", slip.edits), found, at, text, &next));
     }
     let specs = specgen_tests::repository().join("specs");
     let corpus = fs::read_dir(specgen_tests::repository().join("tests/corpus")).unwrap();

@@ -19,8 +19,8 @@ use specgen_language::model::{Model, RateDependence, TrajectoryKind};
 use specgen_language::spec::{self, SpecSource};
 
 mod cases;
-#[expect(dead_code, reason = "of each rule only the texts are used here")]
-#[path = "../../../../tests/tests/physical_lint/support/rules.rs"]
+#[expect(dead_code, reason = "the cases are only read here")]
+#[path = "../../../../tests/src/cases.rs"]
 mod rules;
 
 /// Specs below `specs/`: both kinds of controller first, each written in full; of the others, what is not as in these.
@@ -316,14 +316,21 @@ fn with_trajectories(text: &str, count: usize) -> String {
 /// What the physical lint says at the boundary of each rule.
 fn boundaries() {
     let mut golden = Golden::open("boundaries.txt");
-    for rule in rules::RULES.iter() {
-        let source = read(rule.base);
-        let with = rule.with.iter().fold(source.text.clone(), |text, (from, to)| text.replacen(from, to, 1));
-        let base = said(&SpecSource { text: with.clone(), ..source.clone() });
-        for to in [rule.raises, rule.passes] {
-            let changed = with.replacen(rule.text, to, 1);
-            golden.line(format!("# {}: {} {:?} -> {to:?}", rule.base, rule.code, rule.text));
-            for line in said(&SpecSource { text: changed, ..source.clone() }).difference(&base) {
+    for (rule, _) in rules::read(&root().join("tests/cases/lint_boundaries.txt")) {
+        let base = rule.one('@').unwrap_or("reference.toml");
+        let source = read(base);
+        let (olds, news): (Vec<&str>, Vec<&str>) = (rule.all('-').collect(), rule.all('+').collect());
+        let (text, raises) = (olds[olds.len() - 1], news[olds.len() - 1]);
+        let with = olds
+            .iter()
+            .zip(&news)
+            .take(olds.len() - 1)
+            .fold(source.text.clone(), |text, (from, to)| text.replacen(from, to, 1));
+        let known = said(&SpecSource { text: with.clone(), ..source.clone() });
+        for to in [raises, rule.one('=').unwrap()] {
+            let changed = with.replacen(text, to, 1);
+            golden.line(format!("# {base}: {} {text:?} -> {to:?}", &rule.title[..5]));
+            for line in said(&SpecSource { text: changed, ..source.clone() }).difference(&known) {
                 golden.line(line.as_str());
             }
         }

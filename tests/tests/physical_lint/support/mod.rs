@@ -2,7 +2,6 @@
 
 pub mod mutants;
 pub mod plausible;
-pub mod rules;
 pub mod slips;
 pub mod tally;
 pub mod undetectable;
