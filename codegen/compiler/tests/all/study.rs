@@ -3,9 +3,7 @@
 use std::path::Path;
 
 use specgen_compiler::stability::platform::RestDynamics;
-use specgen_language::model::{
-    ControlMode, DynamicsChoice, Environment, Frames, Interaction, Model, Probe, SetpointRules, TaskSpace,
-};
+use specgen_language::model::{Model, Probe, SetpointRules, TaskSpace};
 use specgen_language::spec::{self, SpecSource};
 
 /// Home state of the dynamics vectors.
@@ -19,31 +17,11 @@ pub fn rest() -> RestDynamics {
         [-c, 0.0, 0.0, 0.0, i, 0.0],
         [0.0, 0.0, 0.0, 0.0, 0.0, z],
     ];
+    #[rustfmt::skip]
     let half = [
-        [
-            0.10192863598012267,
-            -0.5722408310728464,
-            0.8137266029940828,
-            0.0015337476821357854,
-            -0.08135820464003886,
-            -0.057406036960214755,
-        ],
-        [
-            -0.5465394147818659,
-            -0.1978476274045404,
-            0.8137266029940828,
-            0.07122514586563454,
-            0.03935083786429434,
-            0.057406036960214755,
-        ],
-        [
-            0.44461077880174316,
-            0.374393203668306,
-            0.8137266029940828,
-            0.06969139818349875,
-            0.04200736677574452,
-            -0.057406036960214755,
-        ],
+        [0.10192863598012267, -0.5722408310728464, 0.8137266029940828, 0.0015337476821357854, -0.08135820464003886, -0.057406036960214755],
+        [-0.5465394147818659, -0.1978476274045404, 0.8137266029940828, 0.07122514586563454, 0.03935083786429434, 0.057406036960214755],
+        [0.44461077880174316, 0.374393203668306, 0.8137266029940828, 0.06969139818349875, 0.04200736677574452, -0.057406036960214755],
     ];
     // The other three legs are these mirrored in y.
     let mirror = |[a, b, c, d, e, f]: [f64; 6]| [a, -b, c, -d, e, -f];
@@ -53,45 +31,28 @@ pub fn rest() -> RestDynamics {
 
 /// The leg study's spec with a controller that sees the platform: 10 kHz, ζ 2 %, λ = 1, notch ζ_d = 1.
 pub fn model() -> (Model, TaskSpace) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap().join("specs/legs.toml");
-    let source = SpecSource::read(&path).unwrap();
-    let mut model = spec::load(&source).0.unwrap();
+    let specs = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap().join("specs");
+    let read = |name: &str| spec::load(&SpecSource::read(&specs.join(name)).unwrap()).0.unwrap();
+    let mut model = read("legs.toml");
     model.timing.period = 1e-4;
     model.adaptation.gain_ratio = [1.0, 1.0];
     let probe =
         Probe { point: [0.0; 3], direction: [0.0, 0.0, 1.0], plane_point: [0.0; 3], plane_normal: [0.0, 0.0, 1.0] };
+    let reference = read("reference.toml").task_space.unwrap();
     let task = TaskSpace {
-        mode: ControlMode::PF,
         probes: std::array::from_fn(|_| probe.clone()),
-        calibration: None,
-        modal_damping: 0.02,
-        notch_damping: Some(1.0),
-        active_damping: false,
-        hand_over: false,
-        correction: None,
-        gains: None,
-        position_gains: None,
-        adaptation: None,
         velocity_cutoff: std::f64::consts::TAU * 3500.0,
-        interaction: Interaction::None,
-        environment: Environment { stiffness: [0.0; 6], rest: [0.0; 6] },
-        dynamics: DynamicsChoice::Cheapest,
-        dynamics_tolerance: None,
         lead: Some(0.0),
-        transfer_time: 0.05,
         setpoint: SetpointRules {
-            bias: [0.0, 0.0, 1e-5, 0.0, 0.0, 0.0],
             speed: [1e-3; 6],
             acceleration: [1.0; 6],
             jerk: [1e3; 6],
-            stop_acceleration: None,
-            stop_jerk: None,
             stream_speed: [1e-2; 6],
             stale_ticks: 100,
+            ..reference.setpoint
         },
-        frames: Frames { work: [0.0; 6], tool: [0.0; 3] },
         trajectories: Vec::new(),
-        triggers: Vec::new(),
+        ..reference
     };
     (model, task)
 }

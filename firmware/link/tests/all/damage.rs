@@ -2,7 +2,7 @@
 //! order, each once; the rest is counted.
 
 use crate::support;
-use crate::support::{Notebook, leaked, session};
+use crate::support::{Notebook, answered, leaked, session};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen_link::client::{Client, Port, Timeout};
@@ -23,9 +23,7 @@ fn requests() -> Vec<Request<'static>> {
 /// What a fresh device makes of the bytes.
 fn feed(bytes: &[u8]) -> (Vec<String>, Counters) {
     let (mut endpoint, mut device) = (Endpoint::new(), Notebook::default());
-    for byte in bytes {
-        endpoint.push(*byte, &mut device);
-    }
+    answered(&mut endpoint, &mut device, bytes);
     (device.carried_out, *endpoint.counters())
 }
 
@@ -102,9 +100,7 @@ fn repeated_frames_are_answered_and_not_carried_out_again() {
     assert_eq!((counters.executed, counters.repeated, counters.errors()), (6, 12, 0));
 
     // An older one, late: refused, and the last answer is kept for a repetition of its request.
-    for byte in &whole[3] {
-        endpoint.push(*byte, &mut device);
-    }
+    answered(&mut endpoint, &mut device, &whole[3]);
     let last: Vec<Vec<u8>> =
         whole[6].iter().filter_map(|byte| endpoint.push(*byte, &mut device).map(<[u8]>::to_vec)).collect();
     assert_eq!((device.carried_out.len(), endpoint.counters().sequence, last.len()), (6, 1, 1));
@@ -157,12 +153,8 @@ fn a_million_random_streams_are_counted_and_nothing_is_carried_out() {
     assert!(counters.malformed > 10_000 && counters.checksum > 1_000 && frames > 100_000, "{counters:?}");
 
     // Longer than any frame, then a session: one frame is lost, the session is not.
-    for _ in 0..3 * FRAME {
-        endpoint.push(0x55, &mut device);
-    }
-    for byte in whole.concat() {
-        endpoint.push(byte, &mut device);
-    }
+    answered(&mut endpoint, &mut device, &[0x55; 3 * FRAME]);
+    answered(&mut endpoint, &mut device, &whole.concat());
     assert_eq!(device.carried_out, feed(&whole.concat()).0);
     assert_eq!(endpoint.counters().overlong, counters.overlong + 1);
 }
@@ -171,11 +163,7 @@ fn a_million_random_streams_are_counted_and_nothing_is_carried_out() {
 fn another_version_is_named_and_a_reply_is_no_request() {
     let whole = session(&requests());
     let (mut endpoint, mut device) = (Endpoint::new(), Notebook::default());
-    let mut replies = Vec::new();
-    for byte in &whole[1] {
-        replies.extend_from_slice(endpoint.push(*byte, &mut device).unwrap_or_default());
-    }
-    for byte in replies {
+    for byte in answered(&mut endpoint, &mut device, &whole[1]) {
         assert_eq!(endpoint.push(byte, &mut device), None);
     }
     assert_eq!((endpoint.counters().kind, device.carried_out.len()), (1, 1));

@@ -3,7 +3,7 @@
 use crate::support;
 use std::time::Duration;
 
-use crate::support::{IDENTITY, Tap, leaked};
+use crate::support::{IDENTITY, Tap, answered, leaked};
 use specgen_link::client::{Client, ClientError, Timeout};
 use specgen_link::{
     Bytes, Counters, Device, Endpoint, FRAME, Health, MESSAGE, RecorderAction, RecorderStatus, Refusal, Reply, Request,
@@ -110,13 +110,7 @@ fn converse(requests: &[Request<'_>], answers: Vec<Reply<'static>>) -> (Vec<Stri
     let mut sent = Vec::new();
     let mut seen = Vec::new();
     {
-        let mut answer = |bytes: &[u8]| {
-            let mut out = Vec::new();
-            for byte in bytes {
-                out.extend_from_slice(endpoint.push(*byte, &mut device).unwrap_or_default());
-            }
-            out
-        };
+        let mut answer = |bytes: &[u8]| answered(&mut endpoint, &mut device, bytes);
         let (mut client, _) = Client::open(Tap(&mut sent, &mut answer, Vec::new()), 9, Timeout::PIPE).unwrap();
         for request in requests {
             seen.push(match client.ask(request) {
@@ -171,13 +165,7 @@ fn telemetry_is_kept_and_is_no_answer() {
     let said = specgen_link::telemetry(&STATUS, 3, &mut out).to_vec();
     assert_eq!((said.len() < 64, said.last()), (true, Some(&0)));
     let (mut endpoint, mut device) = (Endpoint::new(), support::Notebook::default());
-    let mut answer = |bytes: &[u8]| {
-        let mut out = said.clone();
-        for byte in bytes {
-            out.extend_from_slice(endpoint.push(*byte, &mut device).unwrap_or_default());
-        }
-        out
-    };
+    let mut answer = |bytes: &[u8]| [said.clone(), answered(&mut endpoint, &mut device, bytes)].concat();
     let mut sent = Vec::new();
     let (mut client, identity) = Client::open(Tap(&mut sent, &mut answer, Vec::new()), 1, Timeout::PIPE).unwrap();
     assert_eq!(identity, IDENTITY);

@@ -11,7 +11,7 @@ use specgen_link::{
     VERSION, WORDS, put_knots, reset_cause,
 };
 
-use crate::support::{IDENTITY, Notebook, Tap, words};
+use crate::support::{IDENTITY, Notebook, Tap, answered, words};
 
 #[test]
 fn sizes_are_those_of_the_protocol() {
@@ -63,11 +63,7 @@ fn the_cause_of_a_reset_has_its_bits_and_names() {
 
 /// A frame of a kind and version, as the device sends it to a request.
 fn frame(asked: &[u8], device: &mut dyn Device, change: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
-    let mut endpoint = Endpoint::new();
-    let mut out = Vec::new();
-    for byte in asked {
-        out.extend_from_slice(endpoint.push(*byte, device).unwrap_or_default());
-    }
+    let out = answered(&mut Endpoint::new(), device, asked);
     if out.is_empty() {
         return out;
     }
@@ -157,9 +153,7 @@ impl Device for Pieces {
 fn fetched(pieces: &[(u32, u32, &'static [u8])]) -> Result<Vec<u8>, ClientError> {
     let (mut sent, mut endpoint) = (Vec::new(), Endpoint::new());
     let mut device = Pieces { pieces: pieces.to_vec() };
-    let mut answer = |bytes: &[u8]| {
-        bytes.iter().flat_map(|byte| endpoint.push(*byte, &mut device).unwrap_or_default().to_vec()).collect()
-    };
+    let mut answer = |bytes: &[u8]| answered(&mut endpoint, &mut device, bytes);
     let port: Box<dyn Port> = Box::new(Tap(&mut sent, &mut answer, Vec::new()));
     let (mut client, _) = Client::open(port, 1, Timeout::PIPE).unwrap();
     client.fetch(|offset| Request::Describe { offset })
@@ -204,8 +198,7 @@ fn a_client_waits_as_it_is_told_and_a_broken_line_ends_it() {
     let (mut sent, mut endpoint, mut device) = (Vec::new(), Endpoint::new(), Notebook::default());
     let mut on = true;
     let mut answer = |bytes: &[u8]| {
-        let all: Vec<u8> =
-            bytes.iter().flat_map(|byte| endpoint.push(*byte, &mut device).unwrap_or_default().to_vec()).collect();
+        let all = answered(&mut endpoint, &mut device, bytes);
         if std::mem::replace(&mut on, bytes.len() < 3) { all } else { Vec::new() }
     };
     let port = Tap(&mut sent, &mut answer, Vec::new());

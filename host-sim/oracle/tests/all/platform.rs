@@ -1,5 +1,5 @@
 //! The figures of the feasibility study (`sixdof.md` §5, §7, §9), with the reference controller in the loop, on a machine of
-//! equal legs; `examples/platform_figures.rs` has all of them, with tolerances and random machines.
+//! equal legs; `tests/tests/platform_tables` has all of them, with tolerances and random machines.
 
 use host_sim::controller::TickController;
 use host_sim::plant::LegParameters;

@@ -3,7 +3,7 @@
 #![allow(dead_code)] // Each test uses its part.
 
 use specgen_link::client::{Client, Port, Timeout};
-use specgen_link::{Bytes, CostUnit, Device, Identity, Reply, Request};
+use specgen_link::{Bytes, CostUnit, Device, Endpoint, Identity, Reply, Request};
 use std::io;
 use std::time::Duration;
 
@@ -50,6 +50,11 @@ impl Port for Tap<'_> {
     }
 }
 
+/// What an endpoint answers to these bytes, with its device.
+pub fn answered(endpoint: &mut Endpoint, device: &mut dyn Device, bytes: &[u8]) -> Vec<u8> {
+    bytes.iter().flat_map(|byte| endpoint.push(*byte, device).unwrap_or_default().to_vec()).collect()
+}
+
 /// Words with many zeros and few, as settings and set-points have.
 pub fn words(count: usize, seed: u64) -> Vec<u8> {
     (0..count as u64)
@@ -64,15 +69,9 @@ pub fn words(count: usize, seed: u64) -> Vec<u8> {
 /// A session as the client of this crate sends it: the zero, then a frame for each request.
 pub fn session(requests: &[Request<'_>]) -> Vec<Vec<u8>> {
     let mut sent = Vec::new();
-    let mut endpoint = specgen_link::Endpoint::new();
+    let mut endpoint = Endpoint::new();
     let mut device = Notebook::default();
-    let mut answer = |bytes: &[u8]| {
-        let mut out = Vec::new();
-        for byte in bytes {
-            out.extend_from_slice(endpoint.push(*byte, &mut device).unwrap_or_default());
-        }
-        out
-    };
+    let mut answer = |bytes: &[u8]| answered(&mut endpoint, &mut device, bytes);
     let (mut client, identity) = Client::open(Tap(&mut sent, &mut answer, Vec::new()), 0x4711, Timeout::PIPE).unwrap();
     assert_eq!(identity, IDENTITY);
     for request in requests {
