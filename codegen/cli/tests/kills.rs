@@ -52,7 +52,8 @@ const OF_USER: [&str; 4] = ["out/target/release/object.o", "out/Cargo.lock", "ou
 
 impl Output {
     fn new() -> Self {
-        let folder = Folder::new();
+        // Where files are written slowly enough to be killed in between.
+        let folder = Folder::on_disk();
         folder.spec("other.toml", &[("= \"pcc\"", "= \"ewma\""), ("name = \"legs\"", "name = \"other\"")]);
         let whole = SPECS.map(|spec| {
             assert_eq!(folder.run(&[spec, "-o", spec.trim_end_matches(".toml"), "--no-build"]).code, 0);

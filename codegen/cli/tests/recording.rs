@@ -154,7 +154,7 @@ fn what_one_controller_records_the_other_replays() {
 fn what_sim_records_replays_bit_for_bit_and_a_changed_bit_does_not() {
     let folder = Folder::new();
     for spec in ["reference.toml", "legs.toml"].into_iter().take(length(1, 2)) {
-        let recorded = folder.json(&["sim", spec, "--record", "run.rec", "--seconds", "2"]);
+        let recorded = folder.json(&["sim", spec, "--record", "run.rec", "--seconds", length("0.8", "2")]);
         assert_eq!(recorded.code, 0, "{spec}: {}", recorded.value);
         let replayed = folder.json(&["replay", "run.rec", "--spec", spec]);
         let result = &replayed.value["result"];

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::support::unprivileged::Unprivileged;
@@ -25,8 +26,11 @@ fn plain(folder: &Folder, spec: &str, output: &str) -> Files {
     made(folder.command().args([spec, "-o", output, "--no-build"]), &folder.path(output))
 }
 
-fn baseline(folder: &Folder, spec: &str) -> Files {
-    plain(folder, spec, &format!("out-{spec}"))
+/// The same, made once for all tests.
+fn baseline(spec: &'static str) -> Files {
+    static MADE: Mutex<BTreeMap<&str, Files>> = Mutex::new(BTreeMap::new());
+    let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+    made.entry(spec).or_insert_with(|| plain(&Folder::new(), spec, "out")).clone()
 }
 
 fn made(command: &mut Command, output: &Path) -> Files {
@@ -54,7 +58,7 @@ fn two_runs_give_the_same_bytes_and_one_changed_constant_does_not() {
         ("level_weight = 0.252", "level_weight = 0.2520000000000001"),
     ];
     for (spec, (old, new)) in KINDS.into_iter().zip(constants) {
-        let first = baseline(&folder, spec);
+        let first = baseline(spec);
         same(&first, &plain(&folder, spec, "again"));
         let text = folder.read(spec);
         assert_eq!(text.matches(old).count(), 1, "{spec}: `{old}`");
@@ -64,12 +68,11 @@ fn two_runs_give_the_same_bytes_and_one_changed_constant_does_not() {
         assert_ne!(first["ir.json"], other["ir.json"]);
     }
     // A record is as much a source as the spec: one digit in its last line.
-    let first: Vec<Files> = KINDS.map(|spec| baseline(&folder, spec)).into();
     let record = folder.read("records/reference-forc.csv");
     let (head, last) = record.trim_end().rsplit_once('\n').unwrap();
     folder.write("records/reference-forc.csv", format!("{head}\n{last}1\n"));
-    for (spec, first) in KINDS.into_iter().zip(first) {
-        assert_ne!(first["ir.json"], plain(&folder, spec, "third")["ir.json"], "{spec}");
+    for spec in KINDS {
+        assert_ne!(baseline(spec)["ir.json"], plain(&folder, spec, "third")["ir.json"], "{spec}");
     }
 }
 
@@ -97,8 +100,8 @@ fn a_table_of_poses_is_a_source() {
 fn the_folder_and_the_name_of_the_spec_do_not_matter() {
     for &spec in some(0) {
         let (folder, other) = (Folder::new(), Folder::new());
-        let first = baseline(&folder, spec);
-        same(&first, &baseline(&other, spec));
+        let first = baseline(spec);
+        same(&first, &plain(&other, spec, "out"));
 
         // From somewhere else, by absolute paths.
         let mut command = Command::new(support::BINARY);
@@ -132,7 +135,7 @@ fn the_environment_does_not_matter() {
     ];
     let folder = Folder::new();
     for &spec in some(1) {
-        let first = baseline(&folder, spec);
+        let first = baseline(spec);
         let mut command = folder.command();
         command.envs(odd).args([spec, "-o", "odd", "--no-build"]);
         same(&first, &made(&mut command, &folder.path("odd")));
@@ -146,7 +149,7 @@ fn the_environment_does_not_matter() {
 fn line_ends_of_the_spec_do_not_matter() {
     let folder = Folder::new();
     for &spec in some(0) {
-        let first = baseline(&folder, spec);
+        let first = baseline(spec);
         let text = folder.read(spec);
         assert!(!text.contains('\r'));
         folder.write(spec, text.replace('\n', "\r\n"));
@@ -157,20 +160,18 @@ fn line_ends_of_the_spec_do_not_matter() {
 #[test]
 fn another_user_makes_the_same_bytes() {
     let folder = Folder::new();
-    let first: Vec<Files> = some(1).iter().map(|spec| baseline(&folder, spec)).collect();
     let Some(user) = Unprivileged::owning(&folder) else { return };
-    for (&spec, first) in some(1).iter().zip(&first) {
+    for spec in some(1) {
         let mut command = user.command(&folder);
         command.args([spec, "-o", "theirs", "--no-build"]);
-        same(first, &made(&mut command, &folder.path("theirs")));
+        same(&baseline(spec), &made(&mut command, &folder.path("theirs")));
     }
 }
 
 /// The committed controller is what the reference spec gives: else the rest would compare something stale.
 #[test]
 fn the_committed_controller_is_the_reference_output() {
-    let folder = Folder::new();
-    let files = baseline(&folder, "reference.toml");
+    let files = baseline("reference.toml");
     let committed = contents(&repository().join("firmware/controller"));
     let emitted: Files = files
         .into_iter()

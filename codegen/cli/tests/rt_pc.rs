@@ -243,7 +243,7 @@ fn wait_for(what: &str, mut there: impl FnMut() -> bool) {
     let start = Instant::now();
     while !there() {
         assert!(start.elapsed() < Duration::from_secs(60), "{what} does not come");
-        std::thread::sleep(Duration::from_millis(20));
+        std::thread::sleep(Duration::from_millis(5));
     }
 }
 
@@ -473,10 +473,13 @@ fn a_record_that_finds_no_room_brings_the_machine_down(bench: &Bench) {
 /// Outputs of two cards.
 const TWO_CARDS: [&str; 4] = ["--comedi-out", "/dev/fake1", "--comedi-out", "/dev/fake2"];
 
-/// A library of cards that stand still.
+/// A library of cards that stand still; built once for a bench.
 fn fake_comedi(bench: &Bench) -> PathBuf {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rt_pc/fake_comedi.rs");
     let library = bench.path("libcomedi.so");
+    if library.exists() {
+        return library;
+    }
     let built =
         Command::new("rustc").args(["--edition=2024", "--crate-type=cdylib", "-o"]).arg(&library).arg(source).output();
     let built = built.unwrap();

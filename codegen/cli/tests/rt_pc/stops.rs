@@ -26,9 +26,11 @@ const ARMING: u8 = 1;
 const MOVE: u64 = 2;
 /// What a stop may take, on a loaded computer whose machine waits for it.
 const RAMP: Duration = Duration::from_millis(500);
+/// Ticks without motion after which it stands.
+const STILL: u64 = 300;
 /// How long it then has to stand.
 fn stands() -> Duration {
-    Duration::from_millis(length(300, 1500))
+    Duration::from_millis(length(200, 1500))
 }
 /// How far a platform comes while it stops, m: a stop at full speed, many times over.
 const STOPPING: f64 = 3e-6;
@@ -52,13 +54,22 @@ impl Look {
     /// After a stop: at most a stopping ramp, and then nothing.
     #[track_caller]
     fn stands(&mut self, what: &str) {
-        let (start, begun) = (Instant::now(), self.now());
-        std::thread::sleep(RAMP);
-        let rest = self.now();
         let way =
             |a: &Place, b: &Place| a.target.iter().zip(&b.target).fold(0.0, |way: f64, (a, b)| way.max((a - b).abs()));
+        let (mut start, begun) = (Instant::now(), self.now());
+        let mut rest = begun;
+        while start.elapsed() < RAMP {
+            std::thread::sleep(Duration::from_millis(5));
+            let now = self.now();
+            if way(&rest, &now) > 1e-12 {
+                rest = now;
+            } else if now.tick > rest.tick + STILL {
+                break;
+            }
+        }
         assert!(way(&begun, &rest) < STOPPING, "{what}: {begun:?} {rest:?}");
-        while start.elapsed() < RAMP + stands() {
+        start = Instant::now();
+        while start.elapsed() < stands() {
             let now = self.now();
             assert!(
                 way(&rest, &now) < 1e-12,
