@@ -1,14 +1,14 @@
-//! The names of an emitted controller, which targets use.
+//! The names of an emitted controller, for targets.
 
-/// Gives an emitted controller the names that targets use: types and sizes of this spec, and functions that call the law with its
-/// constants. It stands at the root of the crate, beside the modules with the constants; `platform` or `legs` says which law it is,
-/// whose trait it implements with them.
+/// Gives an emitted controller its public names: types and sizes of this spec, and functions that call the law with its
+/// constants. Invoke it at the root of the crate, beside the modules with the constants. `platform` or `legs` selects
+/// the law; the macro implements its trait with the constants.
 ///
-/// The functions with a tick in them are not generic, so that each is compiled once, in the controller.
+/// The functions that run a tick are not generic, so that each is compiled once, in the controller.
 #[macro_export]
 macro_rules! controller {
     (platform) => {
-        /// Words of a command: they stand before those that are measured.
+        /// Words of a command: the first of an input, before the measured ones.
         pub const COMMAND_WORDS: usize = $crate::platform::tick::command_words(task_space::CORRECTED);
         /// Words of a tick's input.
         pub const INPUT_WORDS: usize = COMMAND_WORDS + 12;
@@ -18,7 +18,7 @@ macro_rules! controller {
         pub const INPUT_NAMES: [&str; INPUT_WORDS] = $crate::platform::tick::input_names();
         /// Names of the output words, see `output_names` of the law.
         pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] = $crate::platform::tick::output_names();
-        /// Model of what the platform presses on.
+        /// Model of the environment that the platform presses on.
         pub type Environment = $crate::platform::Environment<Real>;
 
         pub use $crate::specgen_runtime::setpoint::{Command, CommandKind, Target};
@@ -28,7 +28,7 @@ macro_rules! controller {
             STATIC_INVERSE, TRIGGER_HIGH, TRIGGER_MISSED, WRENCH_FAULT,
         };
 
-        /// Six gauges that see the platform: constants of `platform::sensing` of the law.
+        /// Six gauges that measure the platform: constants of the law's `platform::sensing`.
         pub mod sensing {
             pub use super::gauges::{CALIBRATION, CONVERTER, GAUGES, RATE, RAW_LIMITS};
         }
@@ -107,15 +107,15 @@ macro_rules! controller {
         pub use $crate::ConfigError;
         pub use $crate::$law::tick::PLACE_WORDS;
 
-        /// What may change while running.
+        /// Settings, which may change while running.
         pub type Config = $crate::Config<Constants>;
-        /// What the controller remembers from tick to tick.
+        /// State of the controller from tick to tick.
         pub type State = $crate::$law::State<Constants>;
         /// State of one leg.
         pub type LegState = $crate::$law::LegState<Constants>;
-        /// What a tick reads.
+        /// Input of a tick.
         pub type TickInput = $crate::$law::TickInput<Constants>;
-        /// What a tick yields.
+        /// Output of a tick.
         pub type TickOutput = $crate::TickOutput<Constants>;
 
         /// Words of the settings.
@@ -166,7 +166,7 @@ macro_rules! controller {
             $crate::supervise::step(Constants, config, state, input)
         }
 
-        /// Words in the order of [`OUTPUT_NAMES`], of a tick and of the state that it left.
+        /// Words in the order of [`OUTPUT_NAMES`], from a tick's output and the state after it.
         #[must_use]
         pub fn output_words(output: &TickOutput, state: &State) -> [u64; OUTPUT_WORDS] {
             let mut words = [0; OUTPUT_WORDS];
@@ -180,13 +180,13 @@ macro_rules! controller {
             <<Constants as $crate::Spec>::Law as $crate::ControlLaw<Constants>>::words_per_leg(Constants, gauges)
         }
 
-        /// Where the platform is, see `place_words` of the law.
+        /// Pose and set-point, see `place_words` of the law.
         #[must_use]
         pub fn place_words(state: &State) -> [u64; PLACE_WORDS] {
             $crate::$law::tick::place_words(Constants, state)
         }
 
-        /// The control law under its supervisor: what every target calls.
+        /// The control law under its supervisor: every target calls this.
         pub mod supervised {
             use super::{COMMAND_WORDS, Config, Constants, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS, Real};
 
@@ -197,24 +197,26 @@ macro_rules! controller {
 
             /// State of the supervisor in this controller's arithmetic.
             pub type Supervisor = $crate::specgen_runtime::supervisor::Supervisor<Real>;
-            /// Everything that is remembered from tick to tick.
+            /// The whole state from tick to tick.
             pub type Machine = $crate::Machine<Constants>;
-            /// What a supervised tick reads.
+            /// Input of a supervised tick.
             pub type MachineInput = $crate::MachineInput<Constants>;
-            /// What a supervised tick yields.
+            /// Output of a supervised tick.
             pub type MachineOutput = $crate::MachineOutput<Constants>;
 
             /// Words of a supervised tick's input.
             pub const MACHINE_INPUT_WORDS: usize = INPUT_WORDS + 2;
             /// Words of a supervised tick's output.
             pub const MACHINE_OUTPUT_WORDS: usize = OUTPUT_WORDS + 2;
-            /// Names of the input words. `request` is 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge; `events` holds bits.
+            /// Names of the input words. `request` is 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge.
+            /// `events` is a set of bits.
             pub const MACHINE_INPUT_NAMES: [&str; MACHINE_INPUT_WORDS] =
                 $crate::followed_by(&INPUT_NAMES, ["request", "events"]);
-            /// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16 | finding of the wiring check, or what
-            /// the law has fallen back to << 17; `conditions` has bit 1 << cause for each cause that is present, whether it has lasted or
-            /// not, from bit 16 on the gauges or legs concerned, from bit 22 on the gauges whose words were replaced by predictions;
-            /// bit 28 is cause 16, bits 29 and 30 say how far the law has fallen back, bit 31 is cause 17, see [`Fallback`].
+            /// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16 | finding of the
+            /// wiring check or fallback stage of the law << 17. `conditions` has bit 1 << cause for each cause that is
+            /// present, debounced or not; from bit 16 on the gauges or legs concerned; from bit 22 on the gauges whose
+            /// words were replaced by predictions. Bit 28 is cause 16, bits 29 and 30 are the fallback stage, bit 31 is
+            /// cause 17, see [`Fallback`].
             pub const MACHINE_OUTPUT_NAMES: [&str; MACHINE_OUTPUT_WORDS] =
                 $crate::followed_by(&OUTPUT_NAMES, ["supervisor", "conditions"]);
 
@@ -224,7 +226,8 @@ macro_rules! controller {
                 Machine::new(super::state_at_reset())
             }
 
-            /// The input of a tick, of what a target was asked for and what it measured. One that measures no wrench gives NaN for it.
+            /// The input of a tick, from the command and the measured values. A target without a wrench sensor gives
+            /// NaN for the wrench.
             #[must_use]
             pub fn measured_input(
                 command: &[u64; COMMAND_WORDS],
@@ -236,7 +239,7 @@ macro_rules! controller {
                 MachineInput::measured(command, gauge, wrench, request, events)
             }
 
-            /// Words in the order of [`MACHINE_OUTPUT_NAMES`], of a tick and of the machine that it left.
+            /// Words in the order of [`MACHINE_OUTPUT_NAMES`], from a tick's output and the machine after it.
             #[must_use]
             pub fn machine_output_words(output: &MachineOutput, machine: &Machine) -> [u64; MACHINE_OUTPUT_WORDS] {
                 let mut words = [0; MACHINE_OUTPUT_WORDS];
@@ -246,8 +249,7 @@ macro_rules! controller {
 
             /// One supervised tick.
             ///
-            /// What events and request say acts in this tick; what the readings show acts in the next one, after the law has seen
-            /// them.
+            /// Events and the request act in this tick. Readings act in the next one, after the law has seen them.
             pub fn supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {
                 $crate::supervise::supervise(Constants, config, machine, input)
             }
@@ -255,7 +257,8 @@ macro_rules! controller {
 
         /// The machine as 64-bit words and back, and the supervised tick with a recorder.
         ///
-        /// A record of [`supervise_recorded`](snapshot::supervise_recorded) replays bit for bit wherever it begins: `specgen replay`.
+        /// A record of [`supervise_recorded`](snapshot::supervise_recorded) replays bit for bit from any block:
+        /// `specgen replay`.
         pub mod snapshot {
             use super::supervised::{MACHINE_INPUT_WORDS, Machine, MachineInput, MachineOutput, supervise};
             use super::{CONFIG_WORDS, Config};
@@ -272,7 +275,7 @@ macro_rules! controller {
             pub const RECORD_LAYOUT: Layout =
                 Layout { config: CONFIG_WORDS, input: MACHINE_INPUT_WORDS, state: MACHINE_STATE_WORDS };
 
-            /// [`supervise`], and what the recorder is to keep of it.
+            /// [`supervise`] with a recorder.
             pub fn supervise_recorded(
                 config: &Config,
                 machine: &mut Machine,
@@ -285,7 +288,7 @@ macro_rules! controller {
                 output
             }
 
-            /// What a recorder keeps before a tick under these settings.
+            /// The recorder's part before a tick with these settings.
             #[inline]
             pub fn record_before(config: &Config, machine: &Machine, recorder: &mut Recorder<'_>) {
                 if recorder.opens() {
@@ -309,8 +312,8 @@ macro_rules! controller {
                 machine.save_piece(first, words);
             }
 
-            /// What it keeps after the tick. Compiled here, for speed, and in a frame of its own, which is done with before the law
-            /// needs the stack.
+            /// The recorder's part after the tick. Compiled here, for speed, and with its own stack frame, which is
+            /// released before the law needs the stack.
             #[inline(never)]
             pub fn record_after(
                 machine: &Machine,
@@ -322,7 +325,7 @@ macro_rules! controller {
             }
         }
 
-        /// Whether tables and settings in memory are still those that the compiler wrote.
+        /// Whether tables and settings in memory are as the compiler wrote them.
         pub mod integrity {
             use super::Config;
             use super::checked::add_tables;
@@ -330,8 +333,8 @@ macro_rules! controller {
 
             pub use super::checked::{CRC, IDENTITY, SETTINGS};
 
-            /// The spec's settings as they lie in memory, which [`intact`] speaks for: what a target starts with. Words that no
-            /// `Config` can hold give `Config::new()`; then [`intact`] is false.
+            /// The spec's settings in memory, which [`intact`] checks: the settings at start. Invalid words give
+            /// `Config::new()`; [`intact`] is then false.
             #[must_use]
             pub fn config() -> Config {
                 Config::from_words(black_box(&SETTINGS)).unwrap_or_default()
@@ -343,7 +346,8 @@ macro_rules! controller {
                 $crate::integrity::computed(&IDENTITY, add_tables, &SETTINGS)
             }
 
-            /// Nothing has changed since the compiler wrote it. A target asks once, before it lets the amplifiers on.
+            /// Whether nothing has changed since the compiler wrote it. A target checks this once, before it switches
+            /// the amplifiers on.
             #[must_use]
             pub fn intact() -> bool {
                 computed() == black_box(CRC)
@@ -358,14 +362,14 @@ macro_rules! controller {
             pub type Wave = $crate::specgen_runtime::wave::Wave<super::Real>;
         }
 
-        /// A pass of a motion that repeats.
+        /// A pass of a repeated motion.
         pub mod passes {
             use super::{COMMAND_WORDS, Constants, Real, State};
             use $crate::ControlLaw as _;
 
             pub use $crate::platform::passes::{begin, write};
 
-            /// Whether this controller takes a correction, which passes are for.
+            /// Whether this controller takes a correction, which passes need.
             pub const POSSIBLE: bool = $corrects;
 
             /// Whether a pass may begin with the next tick, see `may_begin` of the law.
@@ -374,13 +378,13 @@ macro_rules! controller {
                 POSSIBLE && $crate::platform::passes::may_begin(status, words)
             }
 
-            /// What a tick shows: h_d for its end, and h at its beginning, m and rad.
+            /// Result of a tick: h_d for its end, and h at its beginning, m and rad.
             #[must_use]
             pub fn shown(state: &State) -> Option<[[Real; 6]; 2]> {
                 <Constants as $crate::Spec>::Law::shown(state)
             }
 
-            /// Writes that nothing is corrected.
+            /// Writes a correction of zero.
             pub fn end(words: &mut [u64; COMMAND_WORDS]) {
                 $crate::platform::passes::end::<Real>(words);
             }
@@ -396,7 +400,7 @@ macro_rules! controller {
             pub const INPUT: bool = $input;
         }
 
-        /// Parts of the tick as functions of their own, for measuring what each costs. The tick does not use them.
+        /// Parts of the tick as separate functions, to measure their cost. The tick does not use them.
         #[cfg(feature = "stages")]
         pub mod stages {
             use super::{Config, Constants, State, TickInput};
@@ -406,10 +410,11 @@ macro_rules! controller {
             /// A part of the tick.
             pub type Stage = $crate::Stage<Constants>;
 
-            /// All stages, in the order of the tick. A static, so that they are compiled here and share what they call with the tick.
+            /// All stages, in the order of the tick. A static, so that they are compiled here and share code with the
+            /// tick.
             pub static STAGES: [Stage; STAGE_COUNT] = $crate::$law::stages::stages();
 
-            /// Brings a copy of the state to where the stages find it; not measured.
+            /// Prepares a copy of the state for the stages; not measured.
             pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
                 $crate::$law::stages::prepare(Constants, config, state, input);
             }

@@ -1,4 +1,5 @@
-//! Leg kinematics in difference form: leg displacements from rest, without the cancellation of |r| − l₀, and the pose that has them.
+//! Leg kinematics in difference form: leg displacements from rest, without the cancellation of |r| − l₀, and the
+//! inverse.
 
 use crate::spec::{LEGS, Spec};
 
@@ -6,7 +7,7 @@ use crate::spec::{LEGS, Spec};
 ///
 /// `pose` is [x y z θx θy θz] from rest: translation t of P_C in {B} (m) and rotation R = Rz(θz) Ry(θy) Rx(θx) about
 /// fixed axes (AI.1) (rad), within the declared workspace.
-// A call of its own takes 90 instructions of a tick.
+// As a call it would take 90 instructions of a tick.
 #[inline(always)]
 #[must_use]
 pub fn leg_displacements<P: Spec>(p: P, pose: &[P::Real; 6]) -> [P::Real; LEGS] {

@@ -6,12 +6,12 @@
 //! Start reading at [`platform::step`](mod@platform::step): one control tick of a platform in task space. [`legs`] is the law of six
 //! legs with their own gauges. [`supervise`](supervise::supervise) runs either under its supervisor.
 //!
-//! What a law has to know of a spec are the constants and types of a trait: [`Spec`] for both laws, [`platform::Platform`] and
-//! [`legs::SixLegs`] for what only one of them asks for. An emitted controller implements them with constants ([`ConstSpec`] adds the
-//! sizes of its memory), and [`controller!`] gives it the names that targets use. The constants are handed on by value: a type without
-//! size where a compiler wrote them, a reference where they are read at run time.
+//! A law knows a spec by the constants and types of a trait: [`Spec`] for both laws, [`platform::Platform`] and
+//! [`legs::SixLegs`] for one of them. An emitted controller implements the trait with constants ([`ConstSpec`] adds the
+//! sizes of its memory), and [`controller!`] gives it its public names. The constants are passed by value: a zero-sized
+//! type in an emitted controller, a reference if they are read at run time.
 //!
-//! No panic path, no allocation; the rules of `specgen_runtime` hold here, too.
+//! No panic path, no allocation; the rules of `specgen_runtime` apply here, too.
 
 mod controller;
 pub mod integrity;

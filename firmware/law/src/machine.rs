@@ -1,36 +1,37 @@
-//! A machine, the control law under its supervisor: what is read and given out, and both as 64-bit words: those of the law, and what the
-//! supervisor adds.
+//! A machine: the control law under its supervisor. Its input and output, also as 64-bit words: those of the law, and
+//! those of the supervisor.
 
 use specgen_runtime::supervisor::{Cause, Phase, Request};
 
 use crate::spec::{ConstSpec, ControlLaw as _, Input as _, InputOf, Machine, Spec, TickOutput};
 
-/// What a tick reads.
+/// Input of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MachineInput<P: Spec> {
     /// Command and readings, as the control law takes them.
     pub tick: InputOf<P>,
-    /// What is wanted of the supervisor; it holds for as long as it is given.
+    /// Request to the supervisor. It applies to every tick in which it is given.
     pub request: Request,
-    /// What the target noticed since the last tick, as bits: [`MISSED_TICK`](specgen_runtime::supervisor::MISSED_TICK),
-    /// [`LINK_LOST`](specgen_runtime::supervisor::LINK_LOST), [`INTEGRITY`](specgen_runtime::supervisor::INTEGRITY), [`CONVERTER`](specgen_runtime::supervisor::CONVERTER),
-    /// [`STOP`](specgen_runtime::supervisor::STOP), [`AMPLIFIER`](specgen_runtime::supervisor::AMPLIFIER), [`STALLED`](specgen_runtime::supervisor::STALLED).
+    /// The target's events since the last tick, as bits: [`MISSED_TICK`](specgen_runtime::supervisor::MISSED_TICK),
+    /// [`LINK_LOST`](specgen_runtime::supervisor::LINK_LOST), [`INTEGRITY`](specgen_runtime::supervisor::INTEGRITY),
+    /// [`CONVERTER`](specgen_runtime::supervisor::CONVERTER), [`STOP`](specgen_runtime::supervisor::STOP),
+    /// [`AMPLIFIER`](specgen_runtime::supervisor::AMPLIFIER), [`STALLED`](specgen_runtime::supervisor::STALLED).
     pub events: u32,
 }
 
-/// What a tick yields. Every number is finite.
+/// Output of a tick. Every number is finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MachineOutput<P: Spec> {
-    /// Codes and voltages that go out, and the status of the control law where it ran.
+    /// Codes and voltages, and the status of the control law if it ran.
     pub tick: TickOutput<P>,
-    /// What the machine does over the coming interval.
+    /// Phase of the next interval.
     pub phase: Phase,
-    /// Why, if it was forced upon it.
+    /// Cause of the phase, if it was forced.
     pub cause: Cause,
-    /// Whether the amplifiers are to be on over the coming interval.
+    /// Whether the amplifiers are on over the next interval.
     pub amplifier_on: bool,
-    /// Word of what the wiring check found, or of what the law has fallen back to, a [`Finding`](specgen_runtime::supervisor::Finding);
-    /// 0 is nothing.
+    /// Word of a [`Finding`](specgen_runtime::supervisor::Finding): of the wiring check, or the fallback stage of the
+    /// law; 0 is none.
     pub finding: u32,
 }
 
@@ -62,7 +63,7 @@ impl<P: ConstSpec> MachineInput<P> {
         Self::read(P::CONSTANTS, words.as_ref())
     }
 
-    /// Of what a target was asked for and what it measured. One that measures no wrench gives NaN for it.
+    /// From the command and the measured values of a target. A target without a wrench sensor gives NaN for the wrench.
     #[must_use]
     pub fn measured(
         command: &P::CommandWords,
@@ -75,7 +76,7 @@ impl<P: ConstSpec> MachineInput<P> {
     }
 }
 
-/// Writes words in the order of the controller's `MACHINE_OUTPUT_NAMES`, of a tick and of the machine that it left.
+/// Writes words in the order of the controller's `MACHINE_OUTPUT_NAMES`, from a tick's output and the machine after it.
 pub fn write_machine_output<P: Spec>(p: P, output: &MachineOutput<P>, machine: &Machine<P>, words: &mut [u64]) {
     if let Some((law, last)) = words.split_last_chunk_mut() {
         P::Law::write_output(p, &output.tick, &machine.state, law);

@@ -1,4 +1,4 @@
-//! The hysteresis models that a leg may have.
+//! Hysteresis models of a leg.
 
 use core::fmt::Debug;
 
@@ -6,11 +6,11 @@ use specgen_runtime::{
     CreepEverett, CreepMemory, DynamicEverett, DynamicMemory, Grid, LastLine, Real, ReversalMemory, Snapshot,
 };
 
-/// What a leg remembers of its drive; forward model and inverse over a table.
+/// Memory of a leg's drive; forward model and inverse over a table.
 pub trait LegMemory<T: Real, Table>: Copy + Debug + Snapshot {
     /// Displacement that the model gives for the drive last applied, m.
     fn displacement(&self) -> T;
-    /// Whether the last inverse was the static one for want of a safe one of the rate-dependent model.
+    /// Whether the last inverse was the static one because the rate-dependent model could not be inverted safely.
     #[inline(always)]
     fn fell_back(&self) -> bool {
         false
@@ -21,7 +21,7 @@ pub trait LegMemory<T: Real, Table>: Copy + Debug + Snapshot {
     fn apply(&mut self, table: &Table, drive: T) -> T;
     /// The drive for a displacement, m.
     fn solve(&mut self, table: &Table, displacement: T) -> T;
-    /// Applies the drive for a displacement that needs no search, if `permitted` lets it through; returns whether it did.
+    /// Applies the drive for a displacement that needs no search, if `permitted` allows it. Returns whether it did.
     #[inline(always)]
     fn track(
         &mut self,
@@ -32,7 +32,8 @@ pub trait LegMemory<T: Real, Table>: Copy + Debug + Snapshot {
     ) -> bool {
         false
     }
-    /// Applies the drive that comes as near to a displacement as `permitted` lets it; returns whether the table does not reach it.
+    /// Applies the drive that comes as near to a displacement as `permitted` allows. Returns whether the displacement
+    /// is out of the table's range.
     #[inline(always)]
     fn follow_within(&mut self, table: &Table, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
         let within = self.reaches(table, displacement);

@@ -8,12 +8,12 @@ use crate::spec::{ConstSpec, ControlLaw as _, Input as _, Machine, Spec, TickOut
 use crate::words::WordArray as _;
 
 impl<P: Spec> Machine<P> {
-    /// Everything that later ticks depend on, as words: a slice of the length that a state has.
+    /// The whole state as words; the slice must have the state's length.
     pub fn save_into(&self, words: &mut [u64]) {
         Snapshot::save(self, &mut Writer::new(words));
     }
 
-    /// Words of it from the `first`-th on, as many as have room.
+    /// Its words from the `first`-th on, as many as fit.
     #[cold]
     pub fn save_piece(&self, first: usize, words: &mut [u64]) {
         let Ok(()) = self.show(&mut StatePart::new(words, first));
@@ -21,7 +21,7 @@ impl<P: Spec> Machine<P> {
 }
 
 impl<P: ConstSpec> Machine<P> {
-    /// Everything that later ticks depend on, as words.
+    /// The whole state as words.
     pub fn save(&self, words: &mut P::MachineWords) {
         self.save_into(words.as_mut());
     }
@@ -29,7 +29,7 @@ impl<P: ConstSpec> Machine<P> {
     /// The machine that [`Machine::save`] wrote.
     ///
     /// # Errors
-    /// The first word that no machine holds: not finite, none of its kind, a code out of limits, no staircase of extrema.
+    /// The first invalid word: not finite, of the wrong kind, a code out of limits, or not a staircase of extrema.
     pub fn load(words: &P::MachineWords) -> Result<Self, InvalidState> {
         let mut reader = Reader::new(words.as_ref()).within(P::CONSTANTS.sizes());
         let mut machine = Self::new(P::Law::at_reset(&P::CONSTANTS.reset()));
@@ -51,7 +51,7 @@ impl<P: ConstSpec> MachineInput<P> {
     }
 }
 
-/// What a recorder keeps after a tick.
+/// The recorder's part after a tick.
 #[inline]
 pub fn record_after<P: ConstSpec>(
     machine: &Machine<P>,

@@ -1,4 +1,4 @@
-//! What every law has to know of a spec, and what the supervised tick has to know of a law.
+//! Interfaces: of a spec to every law, and of a law to the supervised tick.
 
 mod config;
 mod machine;
@@ -18,24 +18,24 @@ pub use machine::Machine;
 /// Number of legs.
 pub const LEGS: usize = 6;
 
-/// Constants of a spec that both laws ask for, and the types of what has a size of its own.
+/// Constants of a spec that both laws need, and the types of parts whose size depends on the spec.
 pub trait Spec: Copy + Debug + PartialEq + 'static {
     /// `f32` or `f64`.
     type Real: Real + Debug;
-    /// The law that it runs: [`TaskSpace`](crate::platform::TaskSpace) or [`LegSpace`](crate::legs::LegSpace).
+    /// The law in use: [`TaskSpace`](crate::platform::TaskSpace) or [`LegSpace`](crate::legs::LegSpace).
     type Law: ControlLaw<Self>;
     /// Hysteresis model of a leg.
     type Table;
-    /// What a leg remembers of its drive.
+    /// Memory of a leg's drive.
     type Memory: LegMemory<Self::Real, Self::Table>;
 
     /// Hysteresis model of each leg.
     fn tables(&self) -> &[Self::Table; LEGS];
     /// Converter codes in volts and in cells of the tables.
     fn dac(&self) -> &Dac<Self::Real>;
-    /// What the supervisor takes for a fault.
+    /// Constants of the supervisor.
     fn supervision(&self) -> &Supervision<Self::Real>;
-    /// Lowest and highest word of each gauge that is believed.
+    /// Lowest and highest valid word of each gauge.
     fn raw_limits(&self) -> &[[Self::Real; 2]; 6];
     /// Reading of each gauge (rows) per displacement of each leg (columns) at rest.
     fn readings_per_leg(&self) -> &[[Self::Real; LEGS]; 6];
@@ -47,15 +47,16 @@ pub trait Spec: Copy + Debug + PartialEq + 'static {
     fn corrections(&self) -> usize;
     /// Largest |x|, |y|, |z| (m) and |θx|, |θy|, |θz| (rad) accepted.
     fn pose_bound(&self) -> &[Self::Real; 6];
-    /// Ranges of the settings, each for so many words.
+    /// Ranges of the settings, each for a number of words.
     fn permitted(&self) -> &[(PermittedRange<Self::Real>, usize)];
-    /// How large the numbers of a state may be.
+    /// Bounds of the numbers of a state.
     fn sizes(&self) -> Sizes;
     /// The legs at reset.
     fn reset(&self) -> Reset<Self>;
 }
 
-/// A spec whose constants a compiler wrote, so that all sizes are known. [`controller!`](crate::controller) implements it.
+/// A spec with constants from the compiler, so that all sizes are known. [`controller!`](crate::controller) implements
+/// it.
 pub trait ConstSpec: Spec {
     /// The constants.
     const CONSTANTS: Self;
@@ -84,10 +85,10 @@ pub struct Reset<P: Spec> {
     pub code: i32,
 }
 
-/// What a tick yields. Every number is finite. What else there is to know stands in the state.
+/// Output of a tick. Every number is finite. The state has all other results.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TickOutput<P: Spec> {
-    /// Voltage of each leg for the coming interval, V: exactly that of [`TickOutput::dac_code`].
+    /// Voltage of each leg for the next interval, V: exactly that of [`TickOutput::dac_code`].
     pub voltage: [P::Real; LEGS],
     /// Converter code of each leg.
     pub dac_code: [i32; LEGS],
@@ -95,7 +96,8 @@ pub struct TickOutput<P: Spec> {
     pub status: u32,
 }
 
-/// What may change while running, unchecked: as the compiler writes it. [`Config`](crate::Config) holds what was checked.
+/// Settings, unchecked, as the compiler writes them; they may change while running. [`Config`](crate::Config) holds
+/// checked settings.
 pub trait Settings<P: Spec>: Copy + Debug + PartialEq {
     /// First word of the code limits.
     const CODES: usize;
@@ -104,36 +106,36 @@ pub trait Settings<P: Spec>: Copy + Debug + PartialEq {
     /// From words in the order of the controller's `CONFIG_NAMES`, each within its range.
     ///
     /// # Errors
-    /// The first word that does not go with the others.
+    /// The first word that is inconsistent with the others.
     fn read(p: P, words: &[u64]) -> Result<Self, ConfigError>;
     /// Writes the words in the order of the controller's `CONFIG_NAMES`.
     fn save(&self, words: &mut Writer<'_>);
 }
 
-/// What a tick reads.
+/// Input of a tick.
 pub trait Input<P: Spec>: Copy + Debug + PartialEq {
-    /// From words in the order of the controller's `INPUT_NAMES`; zero beyond their end.
+    /// From words in the order of the controller's `INPUT_NAMES`; missing words are zero.
     fn read(p: P, words: &[u64]) -> Self;
-    /// Of the words of a command, and of readings as a target has them. One that measures no wrench gives NaN for it.
+    /// From the words of a command and a target's readings. A target without a wrench sensor gives NaN for the wrench.
     fn measured(p: P, command: &[u64], gauge: &[P::Real; 6], wrench: &[P::Real; 6]) -> Self;
     /// As words in the order of the controller's `INPUT_NAMES`.
     fn save(&self, words: &mut Writer<'_>);
     /// The gauges' words.
     fn gauges(&self) -> &[P::Real; 6];
-    /// The same, to be replaced.
+    /// The same, mutable.
     fn gauges_mut(&mut self) -> &mut [P::Real; 6];
 }
 
-/// A law that a supervisor can begin, run and suspend.
+/// A law that a supervisor can start, run and suspend.
 ///
-/// Every method takes the constants, the settings, the state or the machine, and the input of the tick, as far as it needs them, in this
-/// order.
+/// Every method takes, as far as it needs them and in this order: the constants, the settings, the state or the
+/// machine, and the input of the tick.
 pub trait ControlLaw<P: Spec<Law = Self>>: Sized {
-    /// What may change while running.
+    /// Settings, which may change while running.
     type Settings: Settings<P>;
-    /// What is remembered from tick to tick.
+    /// State from tick to tick.
     type State: Copy + Debug + Snapshot;
-    /// What a tick reads.
+    /// Input of a tick.
     type Input: Input<P>;
 
     /// The state at reset.
@@ -147,35 +149,37 @@ pub trait ControlLaw<P: Spec<Law = Self>>: Sized {
     fn readings(_p: P, words: &[P::Real; 6]) -> [P::Real; 6] {
         *words
     }
-    /// Word of each gauge (rows) per displacement of each leg (columns) near these words, per m: for a host that stands in for gauges.
+    /// Word of each gauge (rows) per displacement of each leg (columns) near these words, per m. For a host that
+    /// simulates gauges.
     #[must_use]
     fn words_per_leg(p: P, _words: &[P::Real; 6]) -> [[P::Real; 6]; 6] {
         *p.readings_per_leg()
     }
-    /// What a gauge ought to read by the codes sent over the interval that has ended, and the set-point of the axis or leg of that number.
+    /// Expected reading of a gauge by the codes sent over the last interval, and the set-point of the axis or leg of
+    /// that number.
     fn expected_reading(p: P, state: &Self::State, channel: usize) -> (P::Real, P::Real);
-    /// Where the axis or leg of that number is, m or rad, and the correction at work on it, if it has one. `reading` is that of its gauge.
+    /// Measured position of the axis or leg of that number, m or rad, and its present correction, if any. `reading` is
+    /// that of its gauge.
     fn reached(state: &Self::State, channel: usize, reading: P::Real) -> (P::Real, Option<P::Real>);
 
-    /// A tick of the law, or of what it has fallen back to; its status.
+    /// A tick of the law, or of its fallback; returns the status.
     fn advance(p: P, config: &Config<P>, state: &mut Self::State, fallback: Fallback, input: &Self::Input) -> u32;
-    /// Puts the law where the machine is. No leg moves in the first tick.
+    /// Sets the law's state to the machine's position. No leg moves in the first tick.
     fn enter_running(p: P, config: &Config<P>, machine: &mut Machine<P>, input: &Self::Input);
-    /// A tick of the law under its supervisor; its status.
+    /// A tick of the law under its supervisor; returns the status.
     #[inline]
     fn run(p: P, config: &Config<P>, machine: &mut Machine<P>, input: &Self::Input) -> u32 {
         let Machine { state, supervisor } = machine;
         Self::advance(p, config, state, supervisor.oscillation.stage, input)
     }
-    /// Brings a motion that was under way to rest where the law is to be suspended: the status; none where nothing moves.
+    /// Stops a motion under way when the law is to be suspended. Returns the status; none if nothing moves.
     #[inline]
     fn decelerate(_p: P, _config: &Config<P>, _machine: &mut Machine<P>, _input: &Self::Input) -> Option<u32> {
         None
     }
-    /// What is still measured while codes are held or on their way to rest, the law suspended. Returns the gauges that are not believed,
-    /// bit by bit.
+    /// Measures while codes are held or ramp to rest and the law is suspended. Returns the invalid gauges, bit by bit.
     fn hold(p: P, config: &Config<P>, machine: &mut Machine<P>, input: &Self::Input) -> u32;
-    /// Output lines over the coming interval, as bits of the status. They are low unless the law runs.
+    /// Output lines over the next interval, as bits of the status. They are low unless the law runs.
     #[inline]
     fn fire_triggers(
         _config: &Config<P>,
@@ -186,12 +190,12 @@ pub trait ControlLaw<P: Spec<Law = Self>>: Sized {
     ) -> u32 {
         0
     }
-    /// h_d for the end of a tick, and h at its beginning, m and rad, where passes of a motion are learned from them.
+    /// h_d for the end of a tick, and h at its beginning, m and rad, if passes of a motion are learned from them.
     #[must_use]
     fn shown(_state: &Self::State) -> Option<[[P::Real; 6]; 2]> {
         None
     }
-    /// A tick's output as words in the order of the controller's `OUTPUT_NAMES`, and what of the state that it left is shown.
+    /// Words of a tick's output and of the state after it, in the order of the controller's `OUTPUT_NAMES`.
     fn write_output(p: P, output: &TickOutput<P>, state: &Self::State, words: &mut [u64]);
 }
 
@@ -199,5 +203,5 @@ pub trait ControlLaw<P: Spec<Law = Self>>: Sized {
 pub type SettingsOf<P> = <<P as Spec>::Law as ControlLaw<P>>::Settings;
 /// State of a spec's law.
 pub type StateOf<P> = <<P as Spec>::Law as ControlLaw<P>>::State;
-/// What a tick of a spec's law reads.
+/// Input of a tick of a spec's law.
 pub type InputOf<P> = <<P as Spec>::Law as ControlLaw<P>>::Input;

@@ -1,19 +1,19 @@
-//! What a measurable part of the tick is.
+//! A measurable part of the tick.
 
 use crate::spec::{Config, InputOf, Spec, StateOf};
 
-/// A part of the tick. `run` gets a copy of the state and leaves its result there.
+/// A part of the tick. `run` gets a copy of the state and writes its result there.
 #[derive(Debug, Clone, Copy)]
 pub struct Stage<P: Spec> {
     /// Name, at most 16 bytes of ASCII.
     pub name: &'static str,
-    /// How often a tick runs it: once, or once for each leg with the number of the leg.
+    /// Calls per tick: one, or one for each leg with the leg's number.
     pub calls: usize,
     /// The part itself.
     pub run: extern "C" fn(&Config<P>, &mut StateOf<P>, &InputOf<P>, usize),
 }
 
-/// The stages of a law, in the order of the tick: name, how often a tick runs it, and what it does, a function of that name.
+/// The stages of a law, in the order of the tick: name, calls per tick, and a function of that name.
 macro_rules! stages {
     ($kind:ident, |$p:ident, $config:ident, $state:ident, $input:ident, $leg:ident|
      $($(#[$about:meta])* $name:ident, $calls:expr => $run:block)+) => {

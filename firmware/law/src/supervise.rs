@@ -1,4 +1,4 @@
-//! A tick of the control law: alone, and under its supervisor, which is what every target calls.
+//! A tick of the control law: alone, and under its supervisor, as every target calls it.
 
 use specgen_runtime::linear::{component, each};
 use specgen_runtime::sensing::faults;
@@ -17,7 +17,7 @@ pub fn step<P: Spec>(p: P, config: &Config<P>, state: &mut StateOf<P>, input: &I
     outputs(p, state, status)
 }
 
-/// What goes out, of the state that a tick left.
+/// Outputs of a tick, from the state after it.
 #[inline]
 fn outputs<P: Spec>(p: P, state: &StateOf<P>, status: u32) -> TickOutput<P> {
     let dac_code = P::Law::codes(state);
@@ -26,8 +26,7 @@ fn outputs<P: Spec>(p: P, state: &StateOf<P>, status: u32) -> TickOutput<P> {
 
 /// One supervised tick.
 ///
-/// What events and request say acts in this tick; what the readings show acts in the next one, after the law has seen
-/// them.
+/// Events and the request act in this tick. Readings act in the next one, after the law has seen them.
 #[inline]
 pub fn supervise<P: Spec>(
     p: P,
@@ -65,12 +64,12 @@ pub fn supervise<P: Spec>(
     if status & GAUGE_FAULT != 0 {
         supervisor.sift.forget();
     }
-    // Of the state and at the end: what is as large as an output is slow to move.
+    // Written into the state's place at the end: a large output is slow to move.
     let finding = supervisor.finding();
     MachineOutput { tick: outputs(p, state, status), phase, cause, amplifier_on: phase.is_powered(), finding }
 }
 
-/// The input with predictions in place of the words that are not believed.
+/// The input with predictions in place of invalid words.
 #[cold]
 #[inline(never)]
 fn sift<P: Spec>(p: P, supervisor: &mut Supervisor<P::Real>, input: &MachineInput<P>) -> MachineInput<P> {
@@ -79,7 +78,7 @@ fn sift<P: Spec>(p: P, supervisor: &mut Supervisor<P::Real>, input: &MachineInpu
     sifted
 }
 
-/// The law at work; returns its status. Of the channel: what is expected, and its target.
+/// The law runs; returns its status. Of the channel: the expected reading, and its target.
 #[inline]
 fn run<P: Spec>(
     p: P,
@@ -109,7 +108,7 @@ fn run<P: Spec>(
     status
 }
 
-/// Codes held or on their way to rest, the law suspended. Returns the status.
+/// Codes held or ramping to rest, the law suspended. Returns the status.
 #[cold]
 #[inline(never)]
 fn hold<P: Spec>(
@@ -124,7 +123,7 @@ fn hold<P: Spec>(
     let faults = P::Law::hold(p, config, machine, input);
     let supervisor = &mut machine.supervisor;
     if faults == 0 {
-        // The codes must stand still for gauges to be compared with the model.
+        // Gauges are compared with the model only while the codes are constant.
         let compares = matches!(supervisor.phase, Phase::Arming | Phase::Holding);
         if compares && !supervisor.is_checking(p.supervision()) {
             supervisor.look(p.supervision(), channel, &sample(p, input, channel, expected));
@@ -136,7 +135,7 @@ fn hold<P: Spec>(
     faults << 8
 }
 
-/// Codes held, on their way to rest, or in the pulse of the wiring check; the memories follow what is really sent.
+/// Codes held, ramping to rest, or in the pulse of the wiring check. The memories follow the codes.
 fn move_codes<P: Spec>(p: P, max_step: i32, machine: &mut Machine<P>) {
     let Machine { state, supervisor } = machine;
     let step = supervisor.step_to_rest(p.supervision(), max_step);
@@ -146,14 +145,14 @@ fn move_codes<P: Spec>(p: P, max_step: i32, machine: &mut Machine<P>) {
     }
 }
 
-/// Of a gauge, without an error of the law.
+/// Sample of a gauge, without an error of the law.
 #[inline]
 fn sample<P: Spec>(p: P, input: &InputOf<P>, channel: usize, expected: P::Real) -> Sample<P::Real> {
     let reading = component(&P::Law::readings(p, input.gauges()), channel);
     Sample { word: component(input.gauges(), channel), reading, expected, error: None }
 }
 
-/// Codes by which each leg moved.
+/// Code steps of each leg.
 #[cold]
 fn moved(before: &[i32; LEGS], mut codes: [i32; LEGS]) -> [i32; LEGS] {
     for (code, before) in codes.iter_mut().zip(before) {

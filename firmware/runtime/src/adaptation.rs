@@ -7,16 +7,16 @@
 //!        φ̂_n = ω2 (m_n − δ̂_{n−1}) + (1−ω2) φ̂_{n−1}                       (AII.6), with the old δ̂
 //! next request: ρ̂ X_{n+1} = T_{n+1} − δ̂_n − φ̂_n                          (AII.2), (AII.4)
 //! ```
-//! ρ̂ X is the displacement really requested, after every limit: that is the anti-windup. The integrator form
-//! (AII.7)–(AII.13) belongs to another error (Y − Ŷ); it must not be fed with m.
+//! ρ̂ X is the displacement requested after all limits: that is the anti-windup. The integrator form (AII.7)–(AII.13)
+//! belongs to another error (Y − Ŷ); it must not be fed with m.
 
 use crate::choice::choice;
 use crate::real::Real;
 
 choice! {
-    /// Which estimates are kept.
+    /// Estimates in use.
     pub enum Law {
-        /// None: inverse Preisach alone.
+        /// None: inverse Preisach model alone.
         Invhys = 0,
         /// δ̂ by (AII.3).
         Ewma = 1,
@@ -30,13 +30,13 @@ crate::state! { |words|
     pub struct Estimate<T>[T: Real] {
         /// δ̂: offset between the leg and its model.
         pub level: T = T::ZERO, number(words.sizes().request);
-        /// φ̂: what δ̂ lags behind when the offset drifts; zero under EWMA.
+        /// φ̂: the lag of δ̂ behind a drifting offset; zero under EWMA.
         pub drift: T = T::ZERO, number(words.sizes().request);
     }
 }
 
 impl<T: Real> Estimate<T> {
-    /// Displacement to take off the demand before the inverse, δ̂ + φ̂, m.
+    /// Displacement to subtract from the demand before the inverse, δ̂ + φ̂, m.
     #[inline]
     #[must_use]
     pub fn correction(&self) -> T {
@@ -60,12 +60,12 @@ impl<T: Real> Estimate<T> {
         }
     }
 
-    /// The same law for six, with the innovation ν = m − δ̂ − φ̂ in place of m, so that ν may have been filtered on the way
-    /// (the modal notch): δ̂ ← δ̂ + ω1 (ν + φ̂), φ̂ ← φ̂ + ω2 ν with the old φ̂ in both. Without a filter it is
-    /// [`Estimate::update`]. The six may be those of the legs, or of other coordinates linear in them.
+    /// The same law for six, with the innovation ν = m − δ̂ − φ̂ in place of m, so that ν can be filtered (the modal
+    /// notch): δ̂ ← δ̂ + ω1 (ν + φ̂), φ̂ ← φ̂ + ω2 ν with the old φ̂ in both. Without a filter it equals
+    /// [`Estimate::update`]. The six may be legs, or other coordinates linear in them.
     ///
-    /// With the filter some of the permitted weights are unstable. Both estimates are held within ±1, so that they stay
-    /// finite whatever the weights and come back at once under better ones.
+    /// With the filter some permitted weights are unstable. Both estimates are limited to ±1: they stay finite at any
+    /// weights and recover at once under stable ones.
     #[inline]
     pub fn correct(estimates: &mut [Self; 6], law: Law, level_weight: T, drift_weight: T, innovation: &[T; 6]) {
         let mut size = T::ZERO;
@@ -87,7 +87,7 @@ impl<T: Real> Estimate<T> {
                 }
             }
         }
-        // Where the sum is within the bound so is each, and one comparison does for all.
+        // If the sum is within the bound, so is each term. One comparison checks all.
         if size <= T::ONE {
             return;
         }
@@ -97,7 +97,7 @@ impl<T: Real> Estimate<T> {
     }
 }
 
-/// Within ±1, far beyond any leg in m or in modal coordinates.
+/// Limits to ±1, far beyond any leg in m or in modal coordinates.
 #[inline]
 fn bounded<T: Real>(estimate: T) -> T {
     if estimate.abs() <= T::ONE {

@@ -1,10 +1,10 @@
 //! Attitude by three angles about fixed axes: R = Rz(θz) Ry(θy) Rx(θx) (AI.1), from {P} to {B}.
 //!
-//! The angles' rates are not the angular velocity: ω = T(θ) θ̇ (base axes). The paper takes one for the other; that is
-//! right at rest only, and wrong by the tilt elsewhere.
+//! The rates of the angles are not the angular velocity: ω = T(θ) θ̇ (base axes). The paper equates them. That is exact
+//! only at rest; elsewhere the error is of the order of the tilt.
 //!
-//! Everything is built of sin θ and 1 − cos θ, so that nothing cancels for small angles. Where they come from is the caller's
-//! choice: [`Series`] is for angles within a declared bound.
+//! Everything is built from sin θ and 1 − cos θ, so that nothing cancels for small angles. The caller chooses how to
+//! compute them: [`Series`] is for angles within a declared bound.
 
 use crate::real::Real;
 
@@ -17,7 +17,7 @@ pub struct Attitude<T> {
     pub versine: [T; 3],
 }
 
-/// Power series of sine and versine, cut where the rest is below the last bit for the angles that they are meant for.
+/// Power series of sine and versine, truncated where the rest is below the last bit over the permitted angles.
 #[derive(Debug, Clone, Copy)]
 pub struct Series<'a, T> {
     /// Coefficients of sin x / x in x² after the leading 1: −1/3!, 1/5!, …
@@ -91,7 +91,7 @@ impl<T: Real> Attitude<T> {
         ]
     }
 
-    /// T(θ), row by row: ω = T θ̇ in base axes, rad/s. Its columns are the axes that θx, θy and θz turn about.
+    /// T(θ), row by row: ω = T θ̇ in base axes, rad/s. Its columns are the axes of rotation of θx, θy and θz.
     #[inline]
     #[must_use]
     pub fn rate_matrix(&self) -> [[T; 3]; 3] {
@@ -99,7 +99,7 @@ impl<T: Real> Attitude<T> {
         [[cy * cz, -sz, T::ZERO], [cy * sz, cz, T::ZERO], [-sy, T::ZERO, T::ONE]]
     }
 
-    /// T⁻¹(θ): θ̇ = T⁻¹ ω. Finite for |θy| < π/2, where the three angles stop being coordinates.
+    /// T⁻¹(θ): θ̇ = T⁻¹ ω. Finite for |θy| < π/2; beyond, the three angles are no longer coordinates.
     #[inline]
     #[must_use]
     pub fn rate_matrix_inverse(&self) -> [[T; 3]; 3] {

@@ -1,15 +1,15 @@
-//! Choices that are one word of a state, a link or a record.
+//! Enumerations that are one word of a state, a link or a record.
 
-/// A choice that is one word.
+/// An enumeration that is one word.
 pub trait Choice: Sized {
     /// Its word.
     fn to_word(&self) -> u64;
-    /// The inverse; none of a word that is no choice.
+    /// The inverse; none for an unknown word.
     fn of_word(word: u64) -> Option<Self>;
 }
 
-/// Declares a choice in one list: each variant with its word and, for all or for none, its name for people. Behind `or` stands what any
-/// other word is taken for; without it such a word is none.
+/// Declares an enumeration in one list: each variant with its word and, for all or for none, its name. `or` names the
+/// variant for unknown words; without it, unknown words are refused.
 macro_rules! choice {
     (
         $(#[$about:meta])*
@@ -38,7 +38,7 @@ macro_rules! choice {
     };
     (@name $($variant:ident)+) => {};
     (@name $($variant:ident $text:literal)+) => {
-        /// In words for people.
+        /// Name for messages.
         #[must_use]
         pub const fn name(self) -> &'static str {
             match self {

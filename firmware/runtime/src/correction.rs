@@ -1,18 +1,19 @@
-//! A correction of the request that is given from outside, tick by tick: learned in earlier passes of a motion that repeats, or
-//! prepared for one that is known.
+//! A correction of the request from outside, tick by tick: learned in earlier passes of a repeated motion, or prepared
+//! for a known one.
 //!
 //! ```text
 //! q ← q + J c        c: pose, m and rad; |c| ≤ most, and from tick to tick |Δc| ≤ step, axis by axis
 //! ```
-//! It is no set-point: the error (7) is still that of h_d, and the innovation does not see it. What is not a number asks for none; what is
-//! larger or faster than it may be is followed as far as the limits let it, so that it fades in and out without a bump.
+//! It is not a set-point: the error (7) is still that of h_d, and the innovation does not see it. A value that is not
+//! finite counts as zero. A value that is too large or too fast is followed up to the limits, so that the correction
+//! fades in and out without a bump.
 
 use core::fmt::Debug;
 
 use crate::real::{Real, saturate};
 use crate::snapshot::Snapshot;
 
-/// How far and how fast the correction of an axis goes.
+/// Limits of an axis's correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CorrectionLimit<T> {
     /// Largest magnitude, m or rad.
@@ -22,8 +23,8 @@ pub struct CorrectionLimit<T> {
 }
 
 crate::state! { |words|
-    /// The correction now at work on `N` axes; zero at reset. `N` is 6, or 0 where a controller takes none, which costs neither memory nor
-    /// instructions.
+    /// The present correction of `N` axes; zero at reset. `N` is 6, or 0 for a controller without corrections, which
+    /// then costs no memory and no instructions.
     pub struct Correction<T, N>[T: Real, const N: usize] {
         /// c over the interval now running, m and rad.
         pub given: [T; N] = [T::ZERO; N], numbers(words.sizes().request);
@@ -32,22 +33,22 @@ crate::state! { |words|
 
 /// Correction of the request on six axes, or on none.
 pub trait RequestCorrection<T: Real>: Copy + Debug + Snapshot {
-    /// How far and how fast that of each axis goes.
+    /// Limits of the axes.
     type Limits;
-    /// What is wanted of each axis.
+    /// Requested correction of the axes.
     type Offsets: Copy + Debug + PartialEq + AsRef<[T]> + AsMut<[T]>;
     /// Nothing corrected.
     const REST: Self;
-    /// From now on nothing is corrected.
+    /// Removes the correction at once.
     #[inline(always)]
     fn rest(&mut self) {
         *self = Self::REST;
     }
-    /// Nothing wanted of as many axes as have limits.
+    /// A request of zero on every axis that has limits.
     fn nothing(limits: &Self::Limits) -> Self::Offsets;
-    /// One tick: follows what is wanted as far as the limits let it. Returns whether they held any axis back.
+    /// One tick: follows the request up to the limits. Returns whether a limit held an axis back.
     fn follow(&mut self, limits: &Self::Limits, wanted: &Self::Offsets) -> bool;
-    /// c as a pose; none where there is none.
+    /// c as a pose; none if the controller has no correction.
     #[must_use]
     fn pose(&self) -> Option<[T; 6]>;
 }

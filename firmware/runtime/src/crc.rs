@@ -1,7 +1,7 @@
 //! CRC-32/ISO-HDLC, the checksum of Ethernet and zip: polynomial 0x04c11db7, reflected, start and final exclusive-or all ones.
 //!
-//! Finds every change of up to 32 neighbouring bits, and one, two or three bits anywhere in the tables of a controller. By
-//! half bytes, with a table of 16 words: a controller has a few kilobytes to check, once.
+//! Finds every change of up to 32 neighbouring bits, and of one, two or three bits anywhere in a controller's tables.
+//! It works on half bytes with a table of 16 words: a controller checks a few kilobytes, once.
 
 use crate::real::Real;
 

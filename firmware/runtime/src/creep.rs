@@ -6,20 +6,20 @@
 //! ẋ_j = (f − x_j)/τ_j          x_j ← x_j + g_j (f − x_j),   g_j = 1 − e^(−T/τ_j)      exact for a held drive
 //! y   = f + Σ w_j x_j          at the end of the tick, w_j ≥ 0
 //! ```
-//! The inverse solves the same line for f: what the states will have crept to is taken off the demand, and the rest goes
+//! The inverse solves the same equation for f. It subtracts the creep of the states from the demand and passes the rest
 //! through Γ⁻¹: f = (y − Σ w_j (1 − g_j) x_j)/(1 + Σ w_j g_j). One division, no iteration.
 //!
-//! Each state is a mean of past f with positive weights, so it stays within the reach of the table whatever is demanded.
+//! Each state is a mean of past f with positive weights, so it stays within the range of the table at any demand.
 
 use crate::crc::Crc32;
 use crate::everett::Grid;
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
 
-/// `K` creep operators in parallel, for one length of the tick.
+/// `K` creep operators in parallel, for a given length of the tick.
 #[derive(Debug, Clone, Copy)]
 pub struct Creep<T, const K: usize> {
-    /// g_j, share of the way to f that a state goes in a tick, within (0, 1\].
+    /// g_j: fraction of the distance to f that a state covers in a tick, within (0, 1\].
     pub gains: [T; K],
     /// w_j ≥ 0.
     pub weights: [T; K],
@@ -39,7 +39,7 @@ impl<T: Real, const K: usize> Creep<T, K> {
     }
 }
 
-/// Everett function of one leg with creep behind it.
+/// Everett function of one leg, followed by creep.
 #[derive(Debug, Clone, Copy)]
 pub struct CreepEverett<'a, T, G, const K: usize> {
     /// The static model.
@@ -49,7 +49,7 @@ pub struct CreepEverett<'a, T, G, const K: usize> {
 }
 
 crate::state! { |words|
-    /// Reversal memory and creep states of one leg. Resets to rest: drive 0 after negative saturation, nothing left to creep.
+    /// Reversal memory and creep states of one leg. Reset: at rest, drive 0 after negative saturation, no creep left.
     pub struct CreepMemory<T, CAP, K>[T: Real, const CAP: usize, const K: usize] {
         memory: ReversalMemory<T, CAP> = ReversalMemory::new(), part;
         /// x_j, m.
@@ -60,7 +60,7 @@ crate::state! { |words|
 }
 
 impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
-    /// Just risen to a drive, see [`ReversalMemory::risen`]: the creep of it is to come.
+    /// At a drive just reached from below, see [`ReversalMemory::risen`]; its creep is still to come.
     #[must_use]
     pub const fn risen(drive: T, displacement: T) -> Self {
         let mut memory = Self::new();
@@ -110,7 +110,7 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
         self.memory.solve(&table.still, self.still_part(table, displacement))
     }
 
-    /// Whether the table reaches `displacement` (m) from here.
+    /// Whether the table reaches `displacement` (m) from the present state.
     #[inline]
     #[must_use]
     pub fn reaches<G: Grid<T>>(&self, table: &CreepEverett<'_, T, G, K>, displacement: T) -> bool {
@@ -118,7 +118,7 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
         still >= T::ZERO && still <= table.still.full_displacement()
     }
 
-    /// f: what the static model must give for `displacement` at the end of the next tick, m; not limited.
+    /// f: output of the static model that gives `displacement` at the end of the next tick, m; not limited.
     #[inline]
     fn still_part<G: Grid<T>>(&self, table: &CreepEverett<'_, T, G, K>, displacement: T) -> T {
         let mut rest = displacement;

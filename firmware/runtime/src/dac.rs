@@ -1,11 +1,11 @@
-//! From a drive to a converter code, with the voltage and slew limits kept in integers.
+//! From a drive to a converter code, with the voltage and slew limits as integers.
 //!
-//! A voltage leaves the controller only as `volts_at_zero + code · volts_per_code` with
-//! `code_min ≤ code ≤ code_max`, so it is finite and within limits whatever happened before.
+//! A voltage leaves the controller only as `volts_at_zero + code · volts_per_code` with `code_min ≤ code ≤ code_max`.
+//! So it is always finite and within limits.
 
 use crate::real::Real;
 
-/// A converter with straight binary codes, and how its codes lie on the Everett grid.
+/// A converter with straight binary codes, and its scale on the Everett grid.
 #[derive(Debug, Clone, Copy)]
 pub struct Dac<T> {
     /// Voltage of code 0, V.
@@ -20,7 +20,7 @@ pub struct Dac<T> {
     pub codes_per_cell: T,
 }
 
-/// What the codes may be.
+/// Limits of the codes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CodeLimits {
     /// Lowest code.
@@ -32,8 +32,9 @@ pub struct CodeLimits {
 }
 
 impl<T: Real> Dac<T> {
-    /// The permitted code nearest to `drive` (cells) when the present code is `previous`, and whether a limit held it back.
-    /// The step counts most: after a change of limits, a code outside of them comes back no faster than it may.
+    /// The permitted code nearest to `drive` (cells) after the code `previous`, and whether a limit held it back. The
+    /// slew limit has priority: after a change of limits, a code outside them returns no faster than the slew limit
+    /// allows.
     #[inline]
     #[must_use]
     pub fn code(&self, drive: T, previous: i32, limits: CodeLimits) -> (i32, bool) {
@@ -44,12 +45,13 @@ impl<T: Real> Dac<T> {
         (code, code != wanted)
     }
 
-    /// The code nearest to `drive` (cells) if no limit holds it back: [`Dac::code`] where that is all.
+    /// The code nearest to `drive` (cells), as [`Dac::code`] if no limit holds it back.
     #[inline(always)]
     #[must_use]
     pub fn free_code(&self, drive: T, previous: i32, limits: CodeLimits) -> Option<i32> {
         let wanted = self.nearest(drive);
-        // Places in a range, of which those below it are large: one comparison each. Codes are far from the ends of their type.
+        // One comparison for each range: a code below the range wraps to a large number. Codes are far from the ends of
+        // their type.
         let within = wanted.wrapping_sub(limits.min) as u32 <= limits.max.wrapping_sub(limits.min) as u32;
         let place = wanted.wrapping_sub(previous).wrapping_add(limits.max_step) as u32;
         (within && place <= 2 * limits.max_step as u32).then_some(wanted)
@@ -75,7 +77,7 @@ impl<T: Real> Dac<T> {
     }
 }
 
-/// `start` + `way`, without the sum where a converter known to the compiler starts at zero. (No code gives −0.)
+/// `start` + `way`. The compiler omits the sum if the converter starts at zero. (No code gives −0.)
 #[inline(always)]
 fn from<T: Real>(start: T, way: T) -> T {
     if start == T::ZERO { way } else { start + way }

@@ -3,9 +3,9 @@
 //! ```text
 //! d = D(z) e        D = (b₀ + b₁z⁻¹ + b₂z⁻²) / (1 + a₁z⁻¹ + a₂z⁻²)
 //! ```
-//! e is V⁻¹ (h_d − h), the raw pose error of a mode, before the notch; d is the displacement of the legs that is asked for beside the
-//! feedback of (7), as V⁻¹J⁻¹ of it. Near the mode D turns the phase that amplifier and sampling take, so that d is against the
-//! velocity of the platform. Like k_v it is known to the model of the innovation, which does not see it.
+//! e is V⁻¹ (h_d − h), the raw pose error of a mode, before the notch. d is a displacement of the legs that is added to
+//! the feedback of (7), as V⁻¹J⁻¹ of it. Near the mode, D compensates the phase lag of amplifier and sampling, so that
+//! d opposes the velocity of the platform. As with k_v, the innovation does not see it.
 
 use core::fmt::Debug;
 
@@ -22,29 +22,29 @@ pub struct Resonator<T> {
 }
 
 crate::state! { |words|
-    /// What the sections of `N` modes remember; zero at reset. `N` is 6, or 0 where nothing is damped, which takes neither memory nor
-    /// instructions.
+    /// State of the sections of `N` modes; zero at reset. `N` is 6, or 0 without damping, which then costs no memory
+    /// and no instructions.
     pub struct Damping<T, N>[T: Real, const N: usize] {
-        /// d of each mode over the interval now running, m and rad in modal coordinates.
+        /// d of each mode over the present interval, m and rad in modal coordinates.
         pub asked: [T; N] = [T::ZERO; N], numbers(words.sizes().request);
         delays: [[T; 2]; N] = [[T::ZERO; 2]; N], rows(words.sizes().request);
     }
 }
 
-/// Active damping of six modes, or of none: what it remembers.
+/// Active damping of six modes, or of none.
 pub trait ModalDamping<T: Real>: Copy + Debug + Snapshot {
     /// A section for each mode.
     type Sections;
     /// Nothing asked for.
     const REST: Self;
-    /// From now on nothing is asked for.
+    /// Resets the damping to zero.
     #[inline(always)]
     fn rest(&mut self) {
         *self = Self::REST;
     }
-    /// One tick: the error of each mode to what is asked for against it.
+    /// One tick: from the error of each mode to its damping request.
     fn act(&mut self, sections: &Self::Sections, error: &[T; 6]);
-    /// `wanted` and what is asked for against the modes.
+    /// `wanted` plus the damping request.
     #[must_use]
     fn beside(&self, wanted: [T; 6]) -> [T; 6];
 }

@@ -1,4 +1,4 @@
-//! Fingerprint of a state: FNV-1a, word by word. For comparing two runs, not against forgery.
+//! Fingerprint of a state: FNV-1a, word by word. It compares two runs; it does not protect against forgery.
 
 use crate::real::Real;
 
@@ -23,7 +23,7 @@ impl Digest {
     #[inline]
     pub fn word(&mut self, word: u64) {
         self.0 = (self.0 ^ word).wrapping_mul(0x0000_0100_0000_01b3);
-        // Eight bytes at once leave the high bits of the word unmixed below; fold them down.
+        // Eight bytes at once leave the low bits unmixed with the high bits of the word; fold them down.
         self.0 ^= self.0 >> 32;
     }
 

@@ -6,12 +6,12 @@
 //! ```text
 //! h(u) = Γ₀[u] + (u − u_last) Γ₁[u]
 //! ```
-//! The inverse solves h(u) = q between bounds that the static inverse gives, by at most [`DynamicMemory::ITERATIONS`] steps of
-//! regula falsi (Illinois). It gives the static inverse instead, and says so, where (6) cannot be inverted safely:
+//! The inverse solves h(u) = q between bounds from the static inverse, in at most [`DynamicMemory::ITERATIONS`] steps
+//! of regula falsi (Illinois). It returns the static inverse, and sets a flag, if (6) cannot be inverted safely:
 //!
-//! - no root between the bounds, h not monotone on the points looked at, or the steps do not suffice;
-//! - the rate term takes away more than half of what Γ₀ gains since the last tick. On a straight branch of slope f' the inverse
-//!   is u ← (q + Γ₁ u_last)/(f' + Γ₁), and grows from tick to tick if Γ₁ < −f'/2.
+//! - there is no root between the bounds, h is not monotone at the points tried, or the steps do not suffice;
+//! - the rate term takes away more than half of the gain of Γ₀ since the last tick. On a straight branch of slope f'
+//!   the inverse is u ← (q + Γ₁ u_last)/(f' + Γ₁). It diverges from tick to tick if Γ₁ < −f'/2.
 
 use crate::everett::Grid;
 use crate::memory::ReversalMemory;
@@ -22,14 +22,14 @@ use crate::real::{Real, saturate};
 pub struct DynamicEverett<T, G> {
     /// Of μ₀, m.
     pub still: G,
-    /// Of μ₁, m per cell a tick; of either sign, not monotone. Only its values are looked up.
+    /// Of μ₁, m per cell a tick; of either sign, not monotone. Only its values are used.
     pub rate: G,
-    /// How far h may be from the demand for the inverse to count as found, m.
+    /// Largest |h − demand| that counts as solved, m.
     pub tolerance: T,
 }
 
 crate::state! { |words|
-    /// Reversal memory of one leg, with Γ₁ along it. Resets to rest at drive 0 after negative saturation.
+    /// Reversal memory of one leg, with Γ₁ along it. Reset: at rest, drive 0 after negative saturation.
     pub struct DynamicMemory<T, CAP>[T: Real, const CAP: usize] {
         memory: ReversalMemory<T, CAP> = ReversalMemory::new(), part;
         /// Γ₁ at each extremum of the memory, m per cell a tick.
@@ -57,7 +57,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
     /// Most evaluations of h within the bounds.
     pub const ITERATIONS: u32 = 12;
 
-    /// At rest at a drive that was risen to, see [`ReversalMemory::risen`], with Γ₁ = `rate` there, m per cell a tick.
+    /// At rest at a drive reached from below, see [`ReversalMemory::risen`], with Γ₁ = `rate` there, m per cell a tick.
     #[must_use]
     pub const fn risen(drive: T, displacement: T, rate: T) -> Self {
         let mut memory = Self::new();
@@ -74,14 +74,14 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         self.memory.drive()
     }
 
-    /// What the last tick requested, see [`DynamicMemory::apply`], m.
+    /// Displacement requested in the last tick, see [`DynamicMemory::apply`], m.
     #[inline]
     #[must_use]
     pub fn displacement(&self) -> T {
         self.displacement
     }
 
-    /// Whether the last [`DynamicMemory::solve`] gave the static inverse for want of a safe one of (6).
+    /// Whether the last [`DynamicMemory::solve`] returned the static inverse because (6) could not be inverted safely.
     #[inline]
     #[must_use]
     pub fn fell_back(&self) -> bool {
@@ -95,9 +95,9 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         displacement >= T::ZERO && displacement <= table.still.full_displacement()
     }
 
-    /// One tick that ends at `drive` (cells, finite, held within 0..=N); returns what was requested by it, m: h, or Γ₀ if the
-    /// last inverse was the static one. Whoever compares a gauge with it must see the model that was inverted: a rate term too
-    /// large to be inverted would come back through the adaptation.
+    /// One tick that ends at `drive` (cells, finite, limited to 0..=N). Returns the requested displacement, m: h, or Γ₀
+    /// if the last inverse was the static one. A gauge must be compared with the model that was inverted. Otherwise a
+    /// rate term too large to invert would return through the adaptation.
     #[inline]
     pub fn apply<G: Grid<T>>(&mut self, table: &DynamicEverett<T, G>, drive: T) -> T {
         let drive = saturate(drive, T::ZERO, table.still.full_scale());
@@ -121,8 +121,8 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         self.displacement
     }
 
-    /// The drive (cells) with which the next tick ends at `displacement` (m, finite): of (6), or of the static model where
-    /// [`DynamicMemory::fell_back`] then says so.
+    /// The drive (cells) with which the next tick ends at `displacement` (m, finite): by (6), or by the static model if
+    /// [`DynamicMemory::fell_back`].
     #[inline]
     pub fn solve<G: Grid<T>>(&mut self, table: &DynamicEverett<T, G>, displacement: T) -> T {
         let wanted = saturate(displacement, T::ZERO, table.still.full_displacement());
@@ -132,16 +132,17 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         found.unwrap_or(still)
     }
 
-    /// The drive at which h exceeds Γ₀ at the last drive by `wanted` (m); `still` is that of the static model.
+    /// The drive at which h exceeds Γ₀ at the last drive by `wanted` (m); `still` is the drive of the static model.
     fn invert<G: Grid<T>>(&self, table: &DynamicEverett<T, G>, wanted: T, still: T) -> Option<T> {
         let last = self.memory.drive();
         let step = still - last;
         if step == T::ZERO {
-            // No rate, no rate term. A table that ends here, or is flat, gives no more than this.
+            // Without a rate there is no rate term. At the end of the table, or where it is flat, this is all that is
+            // reached.
             return Some(still);
         }
         let rising = wanted > T::ZERO;
-        // Excess over the demand in the direction of travel: negative before the root, positive behind it.
+        // Excess over the demand in the direction of travel: negative before the root, positive after it.
         let excess = |point: &Point<T>| {
             let h = point.gain + point.rate_term - wanted;
             if rising { h } else { -h }
@@ -159,7 +160,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         if high < T::ZERO {
             return None;
         }
-        // Illinois: an end that stays twice counts half, or it would never move.
+        // Illinois: an end that is kept twice is halved, or it would never move.
         let (mut low_weight, mut high_weight) = (low, high);
         let mut root = if high <= table.tolerance {
             Some(far)
@@ -190,7 +191,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
             }
         }
         let root = root?;
-        // The rate term against the gain: both in the direction of travel.
+        // Compares the rate term with the gain in the direction of travel.
         let (gain, rate_term) = if rising { (root.gain, root.rate_term) } else { (-root.gain, -root.rate_term) };
         (rate_term >= -(gain * T::HALF)).then_some(root.drive)
     }
@@ -211,7 +212,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         Point { drive, gain: still - self.memory.displacement(), rate_term: (drive - last) * rate }
     }
 
-    /// Γ₁ at every extremum anew: the memory was full and has given up a pair of them.
+    /// Recomputes Γ₁ at every extremum after the full memory dropped a pair.
     #[cold]
     #[inline(never)]
     fn restore<G: Grid<T>>(&mut self, table: &DynamicEverett<T, G>) {

@@ -1,8 +1,8 @@
 //! Inverse dynamics of a platform on six two-part legs: motion to leg forces and leg displacements.
 //!
-//! Coordinates are h = [x y z θx θy θz] from rest (m, rad): translation of P_C in {B} and R = Rz(θz) Ry(θy) Rx(θx) about
-//! fixed axes (AI.1). Rates and accelerations are time derivatives of these six numbers; the angular velocity is
-//! ω = T(θ) θ̇, which the paper's (4) takes for θ̇.
+//! Coordinates are h = [x y z θx θy θz] from rest (m, rad): translation of P_C in {B} and R = Rz(θz) Ry(θy) Rx(θx)
+//! about fixed axes (AI.1). Rates and accelerations are time derivatives of these six numbers. The angular velocity is
+//! ω = T(θ) θ̇; the paper's (4) equates it with θ̇.
 //!
 //! ```text
 //! Jᵀ f + w = M ḧ + C ḣ + G    (3)   J = ∂l/∂h;  f > 0 pushes the platform;  w: other forces on it, such as (5)
@@ -15,20 +15,20 @@
 //! y = −[(2 q − J/l) r̈ − 2 (q − J/l) (l̇/l) ṙ + (q − σ) g] / l    q = m_e l_e, σ = m_s l_s, J = I_s + I_e + m_s l_s² + m_e l_e²
 //! s·(F − m_e (r̈ + g)) = q |ṙ⊥|² / l²
 //! ```
-//! so m_e moves with the platform as a point mass at the joint (put into its mass constants when compiling), what
-//! remains along s goes straight into that leg's force, and y loads the platform. Six equilibrium equations then give the
-//! leg forces. Moments are taken about the joint of the leg that is eliminated first (its moment column is zero); which
-//! equation is solved for which leg is a constant of the platform.
+//! so m_e moves with the platform as a point mass at the joint (the compiler adds it to the mass constants). The
+//! remainder along s goes straight into that leg's force, and y loads the platform. Six equilibrium equations then give
+//! the leg forces. Moments are taken about the joint of the leg that is eliminated first (its moment column is zero).
+//! The equation for each leg is a constant of the platform.
 //!
-//! A flat base or platform (joints in one plane) saves a fifth: the components that are zero are left out.
+//! A flat base or platform (joints in one plane) saves a fifth: zero components are left out.
 //!
-//! Vectors are in platform axes unless said otherwise: there joints and inertia are constant.
+//! Vectors are in platform axes unless stated otherwise: joints and inertia are constant there.
 //!
 //! # Range
 //! |θx|, |θy|, |θz| ≤ π/4 and leg lengths within ±30 % of those at rest: there every result is exact but for rounding.
-//! Beyond, the polynomials for sine, cosine and 1/l depart from what they stand for, and a singular pose divides by a
-//! pivot near zero: results are then wrong, and for absurd arguments not finite. Callers accept poses of the declared
-//! workspace only, over which the compiler checks lengths and pivots.
+//! Beyond these bounds, the polynomials for sine, cosine and 1/l lose accuracy, and a singular pose divides by a pivot
+//! near zero. Results are then wrong, and for extreme arguments not finite. Callers accept only poses of the declared
+//! workspace; the compiler checks lengths and pivots over it.
 
 mod affine;
 mod attitude;
@@ -46,7 +46,7 @@ use leg::{Common, Round};
 /// Number of legs.
 const LEGS: usize = 6;
 
-/// What the legs must do for a motion.
+/// Leg displacements and forces for a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Load<T> {
     /// Δl, m: change of each leg's length from rest.
@@ -79,9 +79,9 @@ pub struct Leg<T> {
 pub struct Platform<T> {
     /// The legs in the order of elimination.
     pub legs: [Leg<T>; LEGS],
-    /// Place (0 to 5) of each leg in that order.
+    /// Index (0 to 5) of each leg in that order.
     pub places: [usize; LEGS],
-    /// Equation (0 to 2 force, 3 to 5 moment about the pole) that each place is solved from; the first is a force.
+    /// Equation (0 to 2 force, 3 to 5 moment about the pole) that is solved at each step; the first is a force.
     pub rows: [usize; LEGS],
     /// All third components of `base` are zero: they are left out.
     pub flat_base: bool,
@@ -119,8 +119,8 @@ impl<T: Real> Platform<T> {
         self.by_leg(&balance.forces(&self.rows))
     }
 
-    /// Leg displacements and leg forces for a motion, under a wrench on the platform if there is one: force (N) and torque
-    /// (N m) about P_C, base axes.
+    /// Leg displacements and leg forces for a motion, with an optional wrench on the platform: force (N) and torque (N
+    /// m) about P_C, base axes.
     #[inline]
     #[must_use]
     pub fn load(&self, motion: &Motion<T>, wrench: Option<&[T; 6]>) -> Load<T> {
@@ -169,7 +169,7 @@ impl<T: Real> Platform<T> {
         }))
     }
 
-    /// M(h), symmetric: generalised force per acceleration of a coordinate. Formed for analysis, never on the tick.
+    /// M(h), symmetric: generalised force per acceleration of a coordinate. For analysis, not on the tick.
     #[inline]
     #[must_use]
     pub fn mass_matrix(&self, pose: &[T; 6]) -> [[T; 6]; 6] {
@@ -217,8 +217,8 @@ impl<T: Real> Platform<T> {
         [x, y, z, a, b, c]
     }
 
-    /// Ratio of the smallest to the largest pivot of the elimination at a pose, moments in units of `reach` (m): how
-    /// near the fixed order comes to dividing by zero. 0 if a pivot vanishes.
+    /// Ratio of the smallest to the largest pivot of the elimination at a pose, with moments in units of `reach` (m).
+    /// It shows how near the fixed order is to a division by zero. 0 if a pivot vanishes.
     #[must_use]
     pub fn pivot_ratio(&self, pose: &[T; 6], reach: T) -> T {
         let mut balance = self.balance::<0>(&Attitude::new(pose), &at_rest(pose), T::ZERO);
@@ -235,7 +235,7 @@ impl<T: Real> Platform<T> {
             low = if size < low { size } else { low };
             high = if size > high { size } else { high };
         }
-        // What a division by a pivot of zero leaves behind is not finite.
+        // A division by a zero pivot gives a result that is not finite.
         if low > T::ZERO && high.is_finite() { low / high } else { T::ZERO }
     }
 
@@ -263,7 +263,7 @@ impl<T: Real> Platform<T> {
         let [ax, ay, az, bx, by, bz] = motion.acceleration;
         let Attitude { turn, to_platform, .. } = attitude;
         let [[_, _, up_x], [_, _, up_y], [_, _, up_z]] = *to_platform;
-        // Three vectors turned row by row: so a microcontroller needs each row once.
+        // Rotates three vectors row by row, so that a microcontroller loads each row once.
         let turned = |k: usize| {
             let (e, r) = (&turn[k], &to_platform[k]);
             let shift = e[0] * x + e[1] * y + e[2] * (z + self.base_depth);
@@ -290,7 +290,8 @@ impl<T: Real> Platform<T> {
         let heave = [acceleration[0] + g * up_x, acceleration[1] + g * up_y, acceleration[2] + g * up_z];
         let [a, b, c, d, e, f] = &self.legs;
         let mut round = Round { platform: self, common: &common, wrench: self.body(&heave, &tow) };
-        // Two at once share loads, but ask for more registers than a Cortex-M has in f64 (16; 32 in f32). The same bits.
+        // Two at once share loads, but need more registers than a Cortex-M has in f64 (16; 32 in f32). The bits are the
+        // same.
         let shares = if T::SINGLE {
             let ([a, b], [c, d], [e, f]) = (round.shares([a, b]), round.shares([c, d]), round.shares([e, f]));
             [a, b, c, d, e, f]

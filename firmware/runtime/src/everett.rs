@@ -1,14 +1,14 @@
 //! The Everett function on a grid.
 //!
-//! E(up, down) is the displacement that a rise of the drive from `down` to `up` adds when it starts at a
-//! reversal (and that the fall from `up` to `down` takes away). It is what first-order reversal curves measure, and
-//! the double integral of the Preisach weight over the triangle down ≤ down' ≤ up' ≤ up.
+//! E(up, down) is the displacement that a rise of the drive from `down` to `up` adds if it starts at a reversal, and
+//! that the fall from `up` to `down` subtracts. First-order reversal curves measure it. It is the double integral of
+//! the Preisach weight over the triangle down ≤ down' ≤ up' ≤ up.
 //!
 //! Drives are counted in *cells* above the lowest threshold: 0 ≤ x ≤ N. Between nodes E is bilinear in square cells
 //! (uniform weight) and linear in the triangles on the diagonal (their weight is reversible).
 //!
-//! The algorithms are those of [`Grid`]. A table that a compiler wrote is an [`Everett`], whose size is part of its type; one that was
-//! read at run time is [`Nodes`]. The same numbers give the same bits in either.
+//! [`Grid`] has the algorithms. A table written by the compiler is an [`Everett`], whose size is part of its type; a
+//! table read at run time is [`Nodes`]. Equal numbers give equal bits in both.
 
 use crate::field::Field;
 use crate::real::{Real, saturate};
@@ -23,7 +23,7 @@ pub struct Everett<T: 'static, const N: usize, const NODES: usize> {
     pub nodes: &'static [T; NODES],
 }
 
-/// A stretch of a branch within one cell, where E is linear in the drive x: E = `base` + `slope` |x − `origin`|.
+/// A segment of a branch within one cell, where E is linear in the drive x: E = `base` + `slope` |x − `origin`|.
 #[derive(Debug, Clone, Copy)]
 pub struct Line<T> {
     cell: usize,
@@ -33,10 +33,10 @@ pub struct Line<T> {
 }
 
 impl<T: Real> Line<T> {
-    /// Of a branch that has come to the end of the table: no drive lies on it.
+    /// For a branch that has reached the end of the table: no drive lies on it.
     const END: Self = Self { cell: usize::MAX, origin: T::ZERO, base: T::ZERO, slope: T::ZERO };
 
-    /// E at a drive in the cell, above the origin on a branch that rises, below it on one that falls; m.
+    /// E at a drive in the cell, above the origin on a rising branch, below it on a falling one; m.
     #[inline(always)]
     #[must_use]
     pub fn at<const RISING: bool>(&self, drive: T) -> T {
@@ -50,14 +50,14 @@ impl<T: Real> Line<T> {
         drive.truncate() as usize == self.cell
     }
 
-    /// Where E is `value`, if that is in the cell of a stretch that is not flat.
+    /// The drive where E is `value`, if it is in the cell and the segment is not flat.
     #[inline(always)]
     pub(crate) fn within<const RISING: bool>(&self, value: T) -> Option<T> {
         let drive = self.solve::<RISING>(value);
         (self.slope > T::ZERO && self.holds(drive)).then_some(drive)
     }
 
-    /// Where E is `value`; the origin if the stretch is flat.
+    /// The drive where E is `value`; the origin if the segment is flat.
     #[inline(always)]
     fn solve<const RISING: bool>(&self, value: T) -> T {
         let length = if self.slope > T::ZERO { (value - self.base) / self.slope } else { T::ZERO };
@@ -65,13 +65,13 @@ impl<T: Real> Line<T> {
     }
 }
 
-/// The stretch on which a leg was found last, so that one that tracks within it does not look it up again: most of the ticks.
+/// The segment of the last solution. A leg that tracks within it, as in most ticks, needs no look-up.
 ///
-/// What it holds follows from its key and the table, which must be the same each time. So it is no part of a state: it may be empty, or of
-/// another time, and no bit changes.
+/// Its content follows from its key and the table, which must be the same each time. So it is not part of the state:
+/// whether it is empty or old changes no bit.
 #[derive(Debug, Clone, Copy)]
 pub struct LastLine<T> {
-    /// Drive that the branch starts from, and whether it rises.
+    /// Start of the branch, and whether it rises.
     start: T,
     rising: bool,
     line: Line<T>,
@@ -91,7 +91,7 @@ impl<T: Real> LastLine<T> {
             return self.line;
         }
         let line = if RISING { table.rising(start, cell) } else { table.falling(start, cell) };
-        // Within the cell where it starts a branch is found faster than it is kept.
+        // Within its first cell, a branch is found faster than it is stored.
         if table.cell(start) != cell {
             *self = Self { start, rising: RISING, line };
         }
@@ -114,7 +114,7 @@ pub trait Grid<T: Real>: Sized {
     /// N ≥ 1.
     fn cells(&self) -> usize;
 
-    /// How many extrema a reversal memory with room for `room` keeps on this table: 4 to `room`.
+    /// Number of extrema that a reversal memory with room for `room` stores on this table: 4 to `room`.
     #[inline(always)]
     fn capacity(&self, room: usize) -> usize {
         room
@@ -126,11 +126,11 @@ pub trait Grid<T: Real>: Sized {
     /// E over a diagonal cell: that at `up` node `cell` + 1 and `down` node `cell`.
     fn diagonal(&self, cell: usize) -> T;
 
-    /// The nodes about a cell off the diagonal: those at its lower `up` threshold and those at its upper one, each from the
-    /// lower `down` threshold.
+    /// The nodes around a cell off the diagonal: those at its lower `up` threshold and those at its upper one, each
+    /// starting at the lower `down` threshold.
     fn corners(&self, up: usize, down: usize) -> [[T; 2]; 2];
 
-    /// The cell that a drive lies in, 0..N; full drive in the last.
+    /// The cell of a drive, 0..N; full drive is in the last.
     #[inline]
     fn cell(&self, drive: T) -> usize {
         let whole = drive.truncate();
@@ -154,7 +154,7 @@ pub trait Grid<T: Real>: Sized {
         self.node(self.cells(), 0)
     }
 
-    /// A displacement held within 0..=E(N, 0), m.
+    /// A displacement limited to 0..=E(N, 0), m.
     #[inline]
     #[must_use]
     fn within_reach(&self, displacement: T) -> T {
@@ -194,12 +194,12 @@ pub trait Grid<T: Real>: Sized {
         Line { cell, origin: T::from_i32(cell as i32 + 1), base: high, slope: low - high }
     }
 
-    /// The drive above `down` at which a rise from `down` has added `gain` (m): solves E(x, `down`) = `gain`. With it the
-    /// stretch of the branch that it lies on.
+    /// The drive above `down` at which a rise from `down` has added `gain` (m): solves E(x, `down`) = `gain`. Also
+    /// returns the segment of the branch.
     ///
-    /// `least` is a drive that the solution is known not to lie below, `down` at the least: the search begins in its cell,
-    /// where a tracking leg finds it. `gain` beyond what full drive gives yields N. Where the table is flat, the smallest
-    /// solution not below the cell of `least`.
+    /// `least` is a known lower bound of the solution, at least `down`. The search begins in its cell, where a tracking
+    /// leg finds the solution. If full drive gives less than `gain`, the result is N. Where the table is flat, it is
+    /// the smallest solution not below the cell of `least`.
     #[inline(always)]
     #[must_use]
     fn rise(&self, down: T, least: T, gain: T) -> (T, Line<T>) {
@@ -210,12 +210,12 @@ pub trait Grid<T: Real>: Sized {
         }
     }
 
-    /// The drive below `up` at which a fall from `up` has taken away `loss` (m): solves E(`up`, x) = `loss`. With it the
-    /// stretch of the branch that it lies on.
+    /// The drive below `up` at which a fall from `up` has subtracted `loss` (m): solves E(`up`, x) = `loss`. Also
+    /// returns the segment of the branch.
     ///
-    /// `most` is a drive that the solution is known not to lie above, `up` at the most: the search begins in its cell.
-    /// `loss` beyond what zero drive takes yields 0. Where the table is flat, the largest solution not above the cell of
-    /// `most`.
+    /// `most` is a known upper bound of the solution, at most `up`. The search begins in its cell. If zero drive
+    /// subtracts less than `loss`, the result is 0. Where the table is flat, it is the largest solution not above the
+    /// cell of `most`.
     #[inline(always)]
     #[must_use]
     fn fall(&self, up: T, most: T, loss: T) -> (T, Line<T>) {
@@ -227,7 +227,7 @@ pub trait Grid<T: Real>: Sized {
     }
 }
 
-/// [`Grid::rise`] where the solution is no drive within the cell of `first`: at the end of a stretch, flat, or beyond.
+/// [`Grid::rise`] if the solution is not a drive within the cell of `first`: at the end of a segment, flat, or beyond.
 #[cold]
 #[inline(never)]
 fn rise_beyond<T: Real, G: Grid<T>>(table: &G, down: T, first: Line<T>, gain: T) -> (T, Line<T>) {
@@ -256,7 +256,7 @@ fn rise_beyond<T: Real, G: Grid<T>>(table: &G, down: T, first: Line<T>, gain: T)
     (line.solve::<true>(gain), line)
 }
 
-/// [`Grid::fall`] where the solution is no drive within the cell of `first`.
+/// [`Grid::fall`] if the solution is not a drive within the cell of `first`.
 #[cold]
 #[inline(never)]
 fn fall_beyond<T: Real, G: Grid<T>>(table: &G, up: T, first: Line<T>, loss: T) -> (T, Line<T>) {
@@ -283,7 +283,7 @@ fn fall_beyond<T: Real, G: Grid<T>>(table: &G, up: T, first: Line<T>, loss: T) -
     (line.solve::<false>(loss), line)
 }
 
-/// Bisection steps that separate N nodes: ⌈log₂ N⌉.
+/// Bisection steps for N nodes: ⌈log₂ N⌉.
 #[inline(always)]
 fn search_steps<T: Real, G: Grid<T>>(table: &G) -> u32 {
     table.cells().next_power_of_two().trailing_zeros()
@@ -301,7 +301,7 @@ fn along_column<T: Real, G: Grid<T>>(table: &G, up: Place<T>, column: usize) -> 
     between([table.node(up.cell, column), table.node(up.cell + 1, column)], up.part)
 }
 
-/// A drive, taken apart: cell number 0..N and the place in it, 0..=1.
+/// A drive as cell number 0..N and position in the cell, 0..=1.
 #[derive(Clone, Copy)]
 struct Place<T> {
     cell: usize,
@@ -324,7 +324,7 @@ impl<T: Real, const N: usize, const NODES: usize> Grid<T> for Everett<T, N, NODE
 
     #[inline]
     fn node(&self, up: usize, down: usize) -> T {
-        // The callers keep down ≤ up ≤ N; the bound is for the compiler, which then sees no panic path.
+        // The callers ensure down ≤ up ≤ N. The bound shows the compiler that there is no panic path.
         let node = index(up, down);
         self.nodes[if node < NODES { node } else { NODES - 1 }]
     }
@@ -337,7 +337,7 @@ impl<T: Real, const N: usize, const NODES: usize> Grid<T> for Everett<T, N, NODE
 
     #[inline(always)]
     fn corners(&self, up: usize, down: usize) -> [[T; 2]; 2] {
-        // Neighbours in a row: one bound, for the compiler, serves both.
+        // Neighbours in a row. One bound serves both; it is for the compiler.
         let bounded = |index: usize| if index < NODES - 1 { index } else { NODES - 2 };
         let low = index(up, down);
         let (low, high) = (bounded(low), bounded(low + up + 1));
@@ -356,10 +356,10 @@ pub struct Nodes<'a, T> {
 impl<'a, T> Nodes<'a, T> {
     /// `nodes` as in [`Everett`], for `cells` × `cells` cells. A reversal memory keeps `capacity` extrema on it.
     ///
-    /// `None` if the number of nodes is another one, or a memory of that capacity has no room for a loop within a loop.
+    /// `None` if the number of nodes does not match, or if the capacity is too small for a loop within a loop.
     #[must_use]
     pub const fn new(nodes: &'a [T], cells: usize, capacity: usize) -> Option<Self> {
-        // Up to here no product overflows.
+        // Up to this size no product overflows.
         let fits = cells >= 1 && cells < 1 << 15 && nodes.len() == index(cells + 1, 0) && capacity >= 4;
         if fits { Some(Self { nodes, cells, capacity }) } else { None }
     }
@@ -368,7 +368,7 @@ impl<'a, T> Nodes<'a, T> {
 impl<T: Real> Nodes<'_, T> {
     #[inline(always)]
     fn at(&self, index: usize) -> T {
-        // Always in the table, see above; without a panic path.
+        // Always in the table, see above. This form has no panic path.
         self.nodes.get(index).copied().unwrap_or(T::ZERO)
     }
 }

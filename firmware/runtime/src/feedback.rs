@@ -1,6 +1,6 @@
 //! Feedback of (7): k_p e + k_I ∫e, as a generalised force on the platform, with anti-windup.
 //!
-//! The integral is kept as the force it exerts (N, N m), not as ∫e: a change of gain then moves nothing.
+//! The integral is stored as the force it exerts (N, N m), not as ∫e, so that a change of gain is bumpless.
 
 use crate::real::{Real, saturate};
 use crate::snapshot::LARGEST;
@@ -47,8 +47,7 @@ impl<T: Real> Integral<T> {
         growth
     }
 
-    /// Adds a tick's growth. No force grows beyond [`LARGEST`]: some of the permitted gains would take it there, and from there
-    /// to where numbers end.
+    /// Adds a tick's growth. No force grows beyond [`LARGEST`]: with some permitted gains it would otherwise overflow.
     #[inline]
     pub fn grow(&mut self, growth: &[T; 6]) {
         let mut size = T::ZERO;
@@ -56,7 +55,7 @@ impl<T: Real> Integral<T> {
             *force = *force + *growth;
             size = size + force.abs();
         }
-        // Where the sum is within the bound so is each, and one comparison does for all.
+        // If the sum is within the bound, so is each term. One comparison checks all.
         let largest = T::from_f64(LARGEST);
         if size > largest {
             self.bound(largest);
@@ -72,10 +71,10 @@ impl<T: Real> Integral<T> {
     }
 }
 
-/// Whether a growth that moves the legs' requests by `push` would drive a leg further beyond the limit that holds it back.
+/// Whether a growth that moves the legs' requests by `push` drives a leg further beyond its active limit.
 ///
-/// `excess` is what each leg was asked for beyond what it could do (m; zero for a leg that is free). Growth that leads back
-/// is let through: an integral that is held whatever the error may keep a leg at its limit for ever.
+/// `excess` is the part of each leg's request beyond its limit (m; zero for a free leg). Growth that leads back is
+/// allowed: otherwise an integral could keep a leg at its limit for ever.
 #[inline]
 #[must_use]
 pub fn winds_up<T: Real>(excess: &[T; 6], push: &[T; 6]) -> bool {

@@ -1,10 +1,10 @@
-//! How many words the parts of a state take.
+//! Number of words of the parts of a state.
 
 use crate::choice::Choice;
 
-/// What a state is made of: numbers, flags, choices, arrays of them, and other states.
+/// A part of a state: a number, a flag, a choice, an array of them, or another state.
 pub trait Field {
-    /// Words that it takes.
+    /// Number of words.
     const WORDS: usize;
 }
 

@@ -24,7 +24,7 @@ pub struct Legs<'a, T> {
     pub platform_joint: [[T; 3]; 6],
     /// Leg lengths at rest l₀ = |r₀|, m.
     pub rest_length: [T; 6],
-    /// Sine and versine over the angles that occur.
+    /// Sine and versine over the permitted angles.
     pub series: Series<'a, T>,
     /// Coefficients of the root in τ after the leading 1: −1/2, 1/2, −5/8, … None: s / (2 l₀).
     pub root: &'a [T],
@@ -35,9 +35,9 @@ pub struct Legs<'a, T> {
 impl<T: Real> Legs<'_, T> {
     /// Δl_i = |P₀ + t + R P_i − B_i| − l₀ of each leg, m, positive when it gets longer.
     ///
-    /// `pose` is [x y z θx θy θz] from rest: translation t of P_C in {B} (m) and rotation R = Rz(θz) Ry(θy) Rx(θx) about
-    /// fixed axes (AI.1) (rad), within the bounds that series and steps are made for.
-    // Its many constants are folded where it is inlined.
+    /// `pose` is [x y z θx θy θz] from rest: translation t of P_C in {B} (m) and rotation R = Rz(θz) Ry(θy) Rx(θx)
+    /// about fixed axes (AI.1) (rad), within the bounds of series and steps.
+    // Inlined, because its many constants are then folded.
     #[inline(always)]
     #[must_use]
     pub fn displacements(&self, pose: &[T; 6]) -> [T; 6] {
@@ -50,17 +50,18 @@ impl<T: Real> Legs<'_, T> {
         let swept = [x * ax + y * bx + level * cx, x * ay + y * by + level * cy, x * az + y * bz + level * cz];
         let values = [ax, ay, az, bx, by, bz, cx, cy, cz, swept[0], swept[1], swept[2], x, y];
         let shift = T::HALF * (x * x + y * y + z * z);
-        // u of all legs side by side, term by term: none waits for its own last product. The small terms come first.
+        // u of all legs side by side, term by term, so that no product waits for the one before. The small terms come
+        // first.
         let start = each(|leg| (shift + z * self.rest_leg[leg][2]) * inverse[leg]);
         let factors = each(|leg| self.factors(leg, inverse[leg], height));
         self.extensions(&sums(&factors, &values, start), &inverse)
     }
 
-    /// What the terms of u = s/(2 l₀) are multiplied by: those of E row by row, of tᵀE with `height` in it, of x and y.
+    /// Factors of the terms of u = s/(2 l₀): those of E row by row, of tᵀE with `height` in it, of x and y.
     #[inline(always)]
     fn factors(&self, leg: usize, inverse: T, height: T) -> [T; TERMS] {
         let ([rx, ry, rz], [px, py, pz]) = (self.rest_leg[leg], self.platform_joint[leg]);
-        // r₀ − P: from the base joint to P_C at rest. The height is mostly that of all legs.
+        // r₀ − P: from the base joint to P_C at rest. Its height is usually the same for all legs.
         let (fx, fy, fz) = ((rx - px) * inverse, (ry - py) * inverse, (rz - pz - height) * inverse);
         [
             fx * px,
@@ -101,8 +102,8 @@ impl<T: Real> Legs<'_, T> {
 
     /// The pose at which the legs have these displacements (m): forward kinematics.
     ///
-    /// `inverse` is J⁻¹ of the legs at rest, J = ∂l/∂h; each of the `corrections` brings the pose nearer by the factor that
-    /// J changes by within the workspace.
+    /// `inverse` is J⁻¹ of the legs at rest, J = ∂l/∂h. Each of the `corrections` reduces the error by the relative
+    /// change of J within the workspace.
     #[inline]
     #[must_use]
     pub fn pose(&self, inverse: &[[T; 6]; 6], corrections: usize, displacements: &[T; 6]) -> [T; 6] {
@@ -116,7 +117,7 @@ impl<T: Real> Legs<'_, T> {
     }
 }
 
-/// `start` and what the terms add, term by term. What a factor of zero would add is left out.
+/// `start` plus the terms, one by one. Terms with a factor of zero are left out.
 #[inline(always)]
 fn sums<T: Real>(factors: &[[T; TERMS]; 6], values: &[T; TERMS], start: [T; 6]) -> [T; 6] {
     let [a, b, c, d, e, f] = factors;

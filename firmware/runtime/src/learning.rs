@@ -1,13 +1,16 @@
-//! Learning between passes, on the device itself: its background changes the correction of the next pass by what the last one showed.
+//! Learning between passes on the device: the background updates the correction of the next pass from the error of the
+//! last.
 //!
 //! ```text
 //! c_j ← w_j V ( Σ_m q_|m| V⁻¹ c_{j−m} + Σ_m h_m V⁻¹ e_{j−m} )        |m| ≤ M, j = 0 … N − 1
 //! ```
-//! c is the correction and e = h_d − h the error of a pass, knot by knot, V the modes. q and h are impulse responses of Q and of Q T⁻¹: both look
-//! ahead as far as back, so nothing is late in them. w fades the correction in and out. Whoever designs q and h shows that this converges. Sums
-//! are of `f32`, in the order in which they stand, so that every device learns the same bits from the same errors.
+//! c is the correction and e = h_d − h the error of a pass, knot by knot; V are the modes. q and h are impulse
+//! responses of Q and of Q T⁻¹. Both reach as far ahead as back, so that they add no delay. w fades the correction in
+//! and out. Convergence is the responsibility of the design of q and h. Sums are of `f32` in written order, so that
+//! every device learns the same bits from the same errors.
 //!
-//! What it learns with, a [*plan*](plan_rows), lies in the memory of the player behind the knots of the pass: rows of six words, the bits of an `f32` each.
+//! Learning needs a [*plan*](plan_rows). It lies in the memory of the player after the knots of the pass: rows of six
+//! words, the bits of an `f32` each.
 
 use crate::playback::Knot;
 use crate::real::Real as _;
@@ -15,13 +18,13 @@ use crate::real::Real as _;
 /// Rows of a plan before its taps: V⁻¹ and V.
 pub const HEAD: usize = 12;
 
-/// Rows of a plan whose impulse responses reach M knots to both sides: its head, h_−M to h_M of each mode, q_0 to q_M.
+/// Rows of a plan whose impulse responses reach M knots to each side: its head, h_−M to h_M of each mode, q_0 to q_M.
 #[must_use]
 pub const fn plan_rows(reach: usize) -> usize {
     HEAD + 2 * reach + 1 + (reach + 1).div_ceil(6)
 }
 
-/// How the knots of a pass are learned from.
+/// Settings of learning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
     /// M, knots.
@@ -30,20 +33,20 @@ pub struct Settings {
     pub fade: [u32; 2],
 }
 
-/// What is done next.
+/// The next step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Step {
-    /// The knot of this number to modal coordinates, of correction and error.
+    /// Transforms the correction and error of this knot to modal coordinates.
     ToModes(usize),
-    /// The correction of this mode at this knot.
+    /// Computes the correction of this mode at this knot.
     Mode(usize, usize),
-    /// The knot of this number to a pose.
+    /// Transforms this knot to a pose.
     ToPose(usize),
     /// Nothing.
     Done,
 }
 
-/// Makes the correction of the next pass.
+/// Computes the correction of the next pass.
 #[derive(Debug)]
 pub struct Learning {
     settings: Settings,
@@ -55,8 +58,8 @@ impl Learning {
     /// Nothing to do.
     pub const NONE: Self = Self { settings: Settings { reach: 0, fade: [0; 2] }, knots: 0, step: Step::Done };
 
-    /// Learns from a pass of `knots` knots from here on; none if the plan behind them is none or there is no room. `table` is the half of the
-    /// memory that holds the correction and the plan, `errors` the other.
+    /// Learns from a pass of `knots` knots. None if there is no valid plan after them or not enough room. `table` is
+    /// the half of the memory with the correction and the plan, `errors` the other.
     #[must_use]
     pub fn new(settings: Settings, knots: usize, table: &[Knot], errors: &[Knot]) -> Option<Self> {
         let reach = settings.reach as usize;
@@ -69,13 +72,13 @@ impl Learning {
         known.then_some(Self { settings, knots, step: Step::ToModes(0) })
     }
 
-    /// Whether there is something left to do.
+    /// Whether steps remain.
     #[must_use]
     pub const fn is_busy(&self) -> bool {
         !matches!(self.step, Step::Done)
     }
 
-    /// Does so many steps, each of at most 4 M + 2 products; whether there are more.
+    /// Does `steps` steps, each of at most 4 M + 2 products. Returns whether more remain.
     pub fn work(&mut self, steps: u32, table: &mut [Knot], errors: &mut [Knot]) -> bool {
         let Some((played, plan)) = table.split_at_mut_checked(self.knots) else { return false };
         let Some((errors, scratch)) = errors.split_at_mut_checked(self.knots) else { return false };
@@ -92,7 +95,7 @@ impl Learning {
                     self.after(knot, Step::ToModes, Step::Mode(0, 0))
                 }
                 Step::Mode(mode, knot) => {
-                    // The old correction, for the new one is written over it.
+                    // A copy of the old correction: the new one overwrites it.
                     let old = scratch.as_flattened_mut();
                     if knot == 0 {
                         for (slot, row) in old.iter_mut().zip(&*played) {
@@ -151,7 +154,7 @@ impl Learning {
         sum
     }
 
-    /// w: 0 at both ends, 1 but for the fades.
+    /// w: 0 at both ends, 1 between the fades.
     fn share(&self, knot: usize) -> f32 {
         let part = |inward: usize, fade: u32| {
             if inward >= fade as usize {
@@ -186,7 +189,7 @@ const fn number(word: i32) -> f32 {
     f32::from_bits(word as u32)
 }
 
-/// To the nearest whole number, saturated; a NaN gives 0.
+/// Rounds to the nearest whole number, saturated; a NaN gives 0.
 fn rounded(value: f32) -> i32 {
     (if value < 0.0 { value - 0.5 } else { value + 0.5 }).truncate()
 }

@@ -3,8 +3,8 @@
 #![deny(missing_docs)]
 //! Control kernels that every emitted controller uses.
 //!
-//! Nothing here depends on a spec: sizes are const parameters and numbers come in as arguments. What depends on
-//! the spec (geometry, tables, limits, the order of the stages) is emitted into the `controller` crate.
+//! Nothing here depends on a spec: sizes are const parameters, and numbers are arguments. The emitted `controller`
+//! crate contains the spec's geometry, tables and limits.
 //!
 //! | module | what | source |
 //! |---|---|---|

@@ -2,19 +2,19 @@
 
 use crate::real::Real;
 
-/// [f(0), …, f(5)], spelled out so that constants at a known index are known.
+/// [f(0), …, f(5)], written out so that the compiler knows constants at a fixed index.
 #[inline(always)]
 pub fn each<T>(f: impl Fn(usize) -> T) -> [T; 6] {
     [f(0), f(1), f(2), f(3), f(4), f(5)]
 }
 
-/// `matrix · vector`; every sum from the first column to the last, all six side by side: none waits for its own last product. Entries
-/// that are zero are left out, so that with a matrix known to the compiler they cost nothing.
+/// `matrix · vector`. Every sum runs from the first column to the last; all six run side by side, so that no product
+/// waits for the one before. Zero entries are left out: with a matrix known to the compiler they cost nothing.
 #[inline(always)]
 #[must_use]
 pub fn transform<T: Real>(matrix: &[[T; 6]; 6], vector: &[T; 6]) -> [T; 6] {
     let add = |sums: [T; 6], column: usize| each(|row| plus(sums[row], matrix[row][column], vector[column]));
-    // −0 is what a sum begins with that adds nothing to its first term.
+    // A sum starts with −0, which leaves its first term unchanged.
     let half = add(add(add([-T::ZERO; 6], 0), 1), 2);
     add(add(add(half, 3), 4), 5)
 }
@@ -31,7 +31,7 @@ pub fn difference<T: Real>(left: &[T; 6], right: &[T; 6]) -> [T; 6] {
     each(|axis| left[axis] - right[axis])
 }
 
-/// An entry, zero where there is none.
+/// An entry; zero if there is none.
 #[inline]
 #[must_use]
 pub fn component<T: Real>(vector: &[T; 6], index: usize) -> T {
@@ -41,7 +41,7 @@ pub fn component<T: Real>(vector: &[T; 6], index: usize) -> T {
     }
 }
 
-/// Every value is finite and of a magnitude up to its bound.
+/// Whether every value is finite and within its bound.
 #[inline]
 #[must_use]
 pub fn is_within<T: Real>(values: &[T; 6], bounds: &[T; 6]) -> bool {

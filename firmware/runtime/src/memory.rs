@@ -1,16 +1,16 @@
-//! Reversal memory: the Preisach model on line, forward and inverse, in bounded storage.
+//! Reversal memory: the Preisach model online, forward and inverse, in bounded memory.
 //!
-//! The state of a Preisach model is the staircase of past extrema that later drives have not wiped out. With
-//! extrema p₀ < p₂ < … (minima) and p₁ > p₃ > … (maxima), p₀ being negative saturation, and f_k the displacement at p_k,
+//! The state of a Preisach model is the staircase of past extrema that later drives have not wiped out. With extrema p₀
+//! < p₂ < … (minima) and p₁ > p₃ > … (maxima), p₀ being negative saturation, and f_k the displacement at p_k,
 //!
 //! ```text
 //! rising  from a minimum p_k:  f(x) = f_k + E(x, p_k)     until x ≥ p_{k−1}, which wipes p_{k−1} and p_k out
 //! falling from a maximum p_k:  f(x) = f_k − E(p_k, x)     until x ≤ p_{k−1}, likewise
 //! ```
-//! The inverse walks the same staircase by displacement, then solves one branch ([`Grid::rise`], [`Grid::fall`]). Within a
-//! cell of the table a branch is a straight line ([`Line`]), which inverse and forward model share.
+//! The inverse follows the same staircase by displacement, then solves one branch ([`Grid::rise`], [`Grid::fall`]).
+//! Within a cell of the table a branch is a straight line ([`Line`]), which inverse and forward model share.
 //!
-//! How many extrema are kept the table says ([`Grid::capacity`]): as many as there is room for, or fewer at run time.
+//! The table sets the number of stored extrema ([`Grid::capacity`]): all that fit, or fewer at run time.
 
 use crate::everett::{Grid, LastLine, Line};
 use crate::real::{Real, saturate};
@@ -19,10 +19,10 @@ use crate::snapshot::LARGEST;
 crate::state! { |words|
     /// Staircase of at most `CAP` ≥ 4 extrema. Drives in cells of the Everett grid, displacements in m.
     ///
-    /// Reset state: drive 0 after negative saturation, displacement 0; a real leg reaches it by a sweep to the
-    /// upper voltage limit and back.
+    /// Reset state: drive 0 after negative saturation, displacement 0. A real leg reaches it by a sweep to the upper
+    /// voltage limit and back.
     pub struct ReversalMemory<T, CAP>[T: Real, const CAP: usize] {
-        /// Stored extrema, 1..=CAP. Only they count: the room behind them is zero in the words of a state.
+        /// Stored extrema, 1..=CAP. The unused room after them is zero in the words of a state.
         len: usize = { let () = Self::FITS; 1 }, place(words.sizes().kept(CAP)) if *len > 0;
         /// Pairs dropped because the memory was full.
         dropped: u32 = 0, tally;
@@ -36,7 +36,8 @@ crate::state! { |words|
     }
 }
 
-/// Minima rise, maxima fall from `grid` at most, all of them nested, the first at negative saturation, the drive within the innermost.
+/// Whether minima rise and maxima fall from at most `grid`, all nested, the first at negative saturation, and the drive
+/// is within the innermost.
 fn is_staircase<T: Real>(extrema: &[T], drive: T, grid: T) -> bool {
     let mut low = T::ZERO;
     let mut high = grid;
@@ -48,10 +49,10 @@ fn is_staircase<T: Real>(extrema: &[T], drive: T, grid: T) -> bool {
     nested && low <= drive && drive <= high
 }
 
-/// Where a branch starts.
+/// Start of a branch.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Origin<T> {
-    /// Which extremum it starts at; [`ReversalMemory::depth`] if that is the present point, which would become one.
+    /// Index of its extremum; [`ReversalMemory::depth`] if it starts at the present point, which would become one.
     pub(crate) place: usize,
     /// Drive there, cells.
     pub(crate) start: T,
@@ -59,7 +60,7 @@ pub(crate) struct Origin<T> {
     pub(crate) at_start: T,
 }
 
-/// A branch that a drive may be on: what a look-up found, for the drive that is then applied.
+/// A candidate branch: the result of a look-up, for the drive that is then applied.
 #[derive(Clone, Copy)]
 struct Branch<T> {
     /// Index of the extremum that it starts from; `len` if it starts at the present point.
@@ -72,7 +73,8 @@ struct Branch<T> {
 impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     const FITS: () = assert!(CAP >= 4, "a reversal memory needs room for a loop within a loop");
 
-    /// Risen from negative saturation to `drive` (cells, 0..=N), where the model gives `displacement` = E(`drive`, 0), m.
+    /// The state after a rise from negative saturation to `drive` (cells, 0..=N), where the model gives `displacement`
+    /// = E(`drive`, 0), m.
     #[must_use]
     pub const fn risen(drive: T, displacement: T) -> Self {
         let mut memory = Self::new();
@@ -101,13 +103,13 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         self.len
     }
 
-    /// How many pairs of extrema were given up for want of room since reset.
+    /// Pairs of extrema dropped since reset because the memory was full.
     #[must_use]
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
 
-    /// Γ: applies `drive` (cells, held within 0..=N) and returns the displacement, m.
+    /// Γ: applies `drive` (cells, limited to 0..=N) and returns the displacement, m.
     ///
     /// `drive` must be finite.
     #[inline]
@@ -144,8 +146,8 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         self.displacement
     }
 
-    /// Γ⁻¹: the drive (cells) that [`ReversalMemory::apply`] would turn into `displacement` (m, held within the reach
-    /// of the table). Does not change the memory.
+    /// Γ⁻¹: the drive (cells) that [`ReversalMemory::apply`] would turn into `displacement` (m, limited to the range of
+    /// the table). Does not change the memory.
     ///
     /// `displacement` must be finite.
     #[inline]
@@ -169,7 +171,8 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         displacement >= T::ZERO && displacement <= table.full_displacement()
     }
 
-    /// [`ReversalMemory::follow`] for a displacement (m, finite) that the table may not reach; returns whether it did not.
+    /// [`ReversalMemory::follow`] for a displacement (m, finite) that may be out of the table's range. Returns whether
+    /// it was.
     #[inline(always)]
     pub fn follow_within<G: Grid<T>>(&mut self, table: &G, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
         let reached = self.reaches(table, displacement);
@@ -177,9 +180,9 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         !reached
     }
 
-    /// [`ReversalMemory::follow_within`] where nothing is unusual: the table reaches `displacement` (m, finite), the solution lies in the
-    /// cell of the present drive, and `permitted` lets it through. Then that has been done; else nothing has changed. Returns which.
-    /// `last` is of this table and no other.
+    /// The fast path of [`ReversalMemory::follow_within`]: the table reaches `displacement` (m, finite), the solution
+    /// lies in the cell of the present drive, and `permitted` leaves it in that cell. Returns whether that was so; if
+    /// not, nothing has changed. `last` must belong to this table.
     #[inline(always)]
     pub fn track<G: Grid<T>>(
         &mut self,
@@ -215,12 +218,12 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         }
     }
 
-    /// Γ⁻¹ and Γ in one: solves for `displacement`, which must be within the reach of the table, and applies the drive that
-    /// `permitted` makes of the solution (finite). `permitted` is called once.
+    /// Γ⁻¹ and Γ in one: solves for `displacement`, which must be within the range of the table, and applies the drive
+    /// that `permitted` makes of the solution (finite). `permitted` is called once.
     ///
-    /// The same to the bit as [`ReversalMemory::solve`] and [`ReversalMemory::apply`]. A drive that is permitted differs from
-    /// the solution by a fraction of a cell: mostly it lies on the stretch of the branch that the solution was found on, and
-    /// then nothing is looked up twice.
+    /// Equal to the bit to [`ReversalMemory::solve`] followed by [`ReversalMemory::apply`]. A permitted drive differs
+    /// from the solution by a fraction of a cell. It usually lies on the same segment of the branch, and then nothing
+    /// is looked up twice.
     #[inline(always)]
     pub fn follow<G: Grid<T>>(&mut self, table: &G, displacement: T, permitted: impl FnOnce(T) -> T) {
         let drive = if displacement > self.displacement {
@@ -243,7 +246,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         self.apply(table, drive);
     }
 
-    /// Applies a drive, which mostly lies on the branch; true.
+    /// Applies a drive that usually lies on the branch; true.
     #[inline(always)]
     fn take_or_apply<const RISING: bool, G: Grid<T>>(&mut self, table: &G, branch: &Branch<T>, drive: T) -> bool {
         if !self.take::<RISING, G>(table, branch, drive) {
@@ -252,31 +255,32 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         true
     }
 
-    /// [`ReversalMemory::apply`], out of the way.
+    /// [`ReversalMemory::apply`], not inlined.
     #[cold]
     #[inline(never)]
     fn apply_anew<G: Grid<T>>(&mut self, table: &G, drive: T) {
         self.apply(table, drive);
     }
 
-    /// Applies a drive if it lies on the stretch of a branch that [`ReversalMemory::find`] gave, and wipes out what the solution does;
-    /// returns whether it does.
+    /// Applies a drive if it lies on the segment of a branch that [`ReversalMemory::find`] gave, and wipes out what the
+    /// solution wipes out. Returns whether it does.
     #[inline(always)]
     fn take<const RISING: bool, G: Grid<T>>(&mut self, table: &G, branch: &Branch<T>, drive: T) -> bool {
         let Branch { top, at_start, line } = *branch;
         let onward = if RISING { drive > self.drive } else { drive < self.drive };
-        // Full, a new extremum may cost another.
+        // If the memory is full, a new extremum may drop another.
         if !onward || !line.holds(drive) || self.len >= table.capacity(CAP) {
             return drive == self.drive;
         }
-        // Loops that the solution leaves are wiped out if the drive leaves them, too: the outermost of them tells.
+        // Loops that the solution leaves are wiped out only if the drive leaves them, too. The outermost of them
+        // decides.
         if top + 1 < self.len {
             let inner = self.extremum(top + 1);
             if if RISING { drive < inner } else { drive > inner } {
                 return false;
             }
         }
-        // Falling from the first maximum ends at p₀, which wipes everything out.
+        // A fall from the first maximum ends at p₀, which wipes out everything.
         if top >= if RISING { 2 } else { 1 } {
             let bound = self.extremum(top - 1);
             if if RISING { drive >= bound } else { drive <= bound } {
@@ -295,11 +299,11 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         true
     }
 
-    /// Where the branch to a displacement above the present one, or below it, starts: drive, displacement, and the number of extrema
-    /// below it.
+    /// Start of the branch to a displacement above the present one, or below it: drive, displacement, and the number of
+    /// extrema below it.
     #[inline(always)]
     fn start<const RISING: bool>(&self, wanted: T) -> (T, T, usize) {
-        // The branch starts at the last extremum if the direction stays, else where the drive is now; `top` is the
+        // The branch starts at the last extremum if the direction is unchanged, else at the present drive. `top` is the
         // number of extrema below that start.
         let (mut start, mut at_start, mut top) = if RISING == self.is_rising() {
             let top = self.len - 1;
@@ -307,7 +311,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         } else {
             (self.drive, self.displacement, self.len)
         };
-        // Walk outwards: each pair whose inner loop the wanted displacement leaves is (would be) wiped out.
+        // Walk outwards: if the displacement leaves the inner loop of a pair, the pair is (or would be) wiped out.
         while top >= 2 {
             let bound = self.displacement_at(top - 1);
             let leaves = if RISING { wanted >= bound } else { wanted <= bound };
@@ -333,7 +337,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         (drive, Branch { top, at_start, line })
     }
 
-    /// Where the branch starts that [`ReversalMemory::apply`] of `drive` would end on. Does not change the memory.
+    /// Start of the branch on which [`ReversalMemory::apply`] of `drive` would end. Does not change the memory.
     #[inline]
     pub(crate) fn origin(&self, drive: T) -> Origin<T> {
         let rising = drive > self.drive;
@@ -362,7 +366,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         self.extremum(k)
     }
 
-    /// The branch since the last extremum goes up (it left a minimum).
+    /// Whether the branch since the last extremum rises (it left a minimum).
     #[inline]
     fn is_rising(&self) -> bool {
         self.len % 2 == 1
@@ -378,7 +382,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         self.displacements[Self::bounded(k)]
     }
 
-    /// `k`: it always is below CAP, and this shows it to the compiler.
+    /// `k`, which is always below CAP. This form shows it to the compiler.
     #[inline(always)]
     const fn bounded(k: usize) -> usize {
         if CAP.is_power_of_two() {
@@ -403,12 +407,12 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         self.len = k + 1;
     }
 
-    /// Forgets the pair of neighbouring extrema that matters least.
+    /// Drops the pair of neighbouring extrema with the smallest effect.
     ///
-    /// Removing p_i and p_{i+1} changes every later displacement by the Everett rectangle of the four neighbours,
-    /// w_i = E(p_{i−1}, p_i) − E(p_i, p_{i+1}) + E(p_{i+1}, p_{i+2}) − E(p_{i−1}, p_{i+2}) in absolute value. The pair with
-    /// the smallest w goes (the innermost loop would be wrong: up to 3.9 µm); p₀ stays. Three of the four terms are
-    /// differences of stored displacements.
+    /// Without p_i and p_{i+1}, every later displacement changes by the Everett rectangle of the four neighbours, w_i =
+    /// E(p_{i−1}, p_i) − E(p_i, p_{i+1}) + E(p_{i+1}, p_{i+2}) − E(p_{i−1}, p_{i+2}) in absolute value. The pair with
+    /// the smallest w is dropped (dropping the innermost loop instead gave errors up to 3.9 µm); p₀ stays. Three of the
+    /// four terms are differences of stored displacements.
     #[cold]
     #[inline(never)]
     fn drop_least<G: Grid<T>>(&mut self, table: &G) {

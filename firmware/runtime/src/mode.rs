@@ -1,4 +1,4 @@
-//! Which parts of the control law are at work.
+//! Active parts of the control law.
 
 use crate::adaptation::Law;
 use crate::choice::{Choice, choice};
@@ -10,7 +10,7 @@ pub enum ControlMode {
     P,
     /// F: hysteresis feed-forward (Fig. 5) on the measured leg displacements; no position feedback.
     F(Law),
-    /// P/F: both, with the feed-forward under the position feedback.
+    /// P/F: both; the feed-forward is inside the position feedback.
     PF(Law),
 }
 
@@ -29,14 +29,14 @@ impl ControlMode {
         !matches!(self, Self::P)
     }
 
-    /// Whether active damping, where there is any, is at work: with the feedback that it was designed beside.
+    /// Whether active damping, if there is any, is active: only together with the feedback it was designed for.
     #[inline]
     #[must_use]
     pub const fn damps_modes(self) -> bool {
         matches!(self, Self::PF(_))
     }
 
-    /// Run-to-run law; `Invhys` where nothing adapts.
+    /// Run-to-run law; `Invhys` in a mode without adaptation.
     #[inline]
     #[must_use]
     pub const fn law(self) -> Law {
@@ -74,9 +74,9 @@ impl ControlMode {
 }
 
 choice! {
-    /// Where the force between platform and work piece in (7) comes from.
+    /// Source of the force between platform and work piece in (7).
     pub enum Interaction {
-        /// There is none, or it is left to the feedback.
+        /// No force, or the feedback compensates it.
         Neglected = 0,
         /// K_e (h_d − h_e) with the stiffness in the settings.
         Modelled = 1,
@@ -86,7 +86,7 @@ choice! {
 }
 
 choice! {
-    /// What the six numbers of a leg controller's set-point are.
+    /// Meaning of the six numbers of a leg controller's set-point.
     pub enum SetpointKind {
         /// Pose from rest: m, rad.
         Pose = 0,

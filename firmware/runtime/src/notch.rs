@@ -5,16 +5,16 @@
 //! ```text
 //! (s² + 2 ζ_i ω_i s + ω_i²) / (s² + 2 ζ_d ω_i s + ω_i²)
 //! ```
-//! It takes the resonance out of the feedback, so that integral action and adaptation may be fast; it passes slow signals
-//! unchanged (DC gain 1). It stands in the feedback only, never in the set-point. It does not damp the platform.
+//! It removes the resonance from the feedback, so that integral action and adaptation may be fast. Slow signals pass
+//! unchanged (DC gain 1). It filters the feedback only, never the set-point. It does not damp the platform.
 
 use crate::real::Real;
 
-/// H(z) = 1 − g (1 − z⁻²) / (1 + a₁z⁻¹ + a₂z⁻²): what the bilinear transformation makes of the notch. At z = 1 it is 1
-/// whatever the rounding of g, a₁ and a₂.
+/// H(z) = 1 − g (1 − z⁻²) / (1 + a₁z⁻¹ + a₂z⁻²): the bilinear transform of the notch. At z = 1 it is 1 for any rounding
+/// of g, a₁ and a₂.
 #[derive(Debug, Clone, Copy)]
 pub struct Section<T> {
-    /// g: 1 less the gain above all frequencies; 0 lets everything pass.
+    /// g: 1 less the gain at high frequency; 0 passes everything.
     pub depth: T,
     /// a₁, a₂.
     pub a: [T; 2],
@@ -32,7 +32,7 @@ pub struct Notch<T> {
 }
 
 crate::state! { |words|
-    /// What the six sections remember. Zero at reset.
+    /// State of the six sections. Zero at reset.
     pub struct NotchState<T>[T: Real] {
         delays: [[T; 2]; 6] = [[T::ZERO; 2]; 6], rows(words.sizes().request);
     }
@@ -45,7 +45,7 @@ impl<T: Real> NotchState<T> {
     pub fn filter(&mut self, sections: &[Section<T>; 6], modal: &[T; 6]) -> [T; 6] {
         let mut filtered = *modal;
         for ((value, section), [first, second]) in filtered.iter_mut().zip(sections).zip(&mut self.delays) {
-            // The part that is taken out: a band-pass about the mode, transposed direct form II.
+            // The part that is removed: a band-pass at the mode, transposed direct form II.
             let driven = section.depth * *value;
             let resonant = driven + *first;
             *value = *value - resonant;

@@ -1,4 +1,4 @@
-//! A pass of a motion that repeats: its correction is played, and what the gauges show of its error is kept, both in fixed memory.
+//! A pass of a repeated motion: the player applies a correction and stores the measured error, both in fixed memory.
 //!
 //! ```text
 //! e_k = 1/D Σ (h_d(n) − h(n)),  n = k D … (k + 1) D − 1        D: ticks from knot to knot, of errors as of corrections
@@ -10,42 +10,42 @@ use crate::learning::{Learning, Settings};
 use crate::playback::{self, Knot, UNIT};
 use crate::real::Real;
 
-/// Ticks of a pass at most, so that every count fits.
+/// Most ticks of a pass, so that every count fits.
 pub const MOST_TICKS: u32 = 1 << 30;
 
-/// How a pass runs.
+/// Timing of a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Course {
     /// D, ticks, at least 1.
     pub spacing: u32,
-    /// Ticks of rest before the command of the motion.
+    /// Ticks at rest before the motion starts.
     pub before: u32,
     /// Ticks in all, at least 1.
     pub ticks: u32,
-    /// Number of the trajectory that is played behind the rest.
+    /// Number of the trajectory that is played after the rest.
     pub trajectory: u32,
 }
 
 impl Course {
-    /// Knots of its correction, and of its error.
+    /// Knots of the correction, and of the error.
     #[must_use]
     pub const fn knots(&self) -> u32 {
         if self.spacing == 0 { 0 } else { self.ticks.div_ceil(self.spacing) }
     }
 }
 
-/// Where a pass stands.
+/// State of a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// None was made.
+    /// There was no pass.
     None,
     /// Under way.
     Running,
-    /// It came to its end.
+    /// Complete.
     Complete,
-    /// It was ended before: the machine did not run any more, or somebody asked.
+    /// Ended early: the machine left its running phase, or a stop was requested.
     Aborted,
-    /// It came to its end, and the correction of the next one is being made of it.
+    /// Complete; the correction for the next pass is being computed.
     Learning,
 }
 
@@ -62,7 +62,7 @@ impl Stage {
         }
     }
 
-    /// Of its number.
+    /// The stage with this number.
     #[must_use]
     pub const fn from_word(word: u8) -> Option<Self> {
         match word {
@@ -76,38 +76,38 @@ impl Stage {
     }
 }
 
-/// What the coming tick of a pass is given.
+/// Input of the next tick of a pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PassInput<T> {
     /// c, m and rad.
     pub correction: [T; 6],
-    /// This trajectory is played from this tick on.
+    /// The trajectory that starts in this tick.
     pub begins: Option<u32>,
 }
 
-/// Plays corrections and keeps errors.
+/// Plays corrections and stores errors.
 #[derive(Debug)]
 pub struct Player<'m, T> {
     table: &'m mut [Knot],
     errors: &'m mut [Knot],
     course: Course,
     stage: Stage,
-    /// Ticks of the pass that are over.
+    /// Completed ticks of the pass.
     tick: u32,
-    /// h_d of the tick before, once there was one.
+    /// h_d of the previous tick; none before the first.
     last: Option<[T; 6]>,
-    /// Sum of the errors of a knot, m and rad, and of how many knots there are sums.
+    /// Sum of the errors of a knot, m and rad, and the number of sums.
     sum: [T; 6],
     kept: u32,
     /// Status bits of its ticks.
     status: u32,
-    /// The trajectory that it began.
+    /// The trajectory that it started.
     begun: Option<u32>,
     learning: Learning,
 }
 
 impl<'m, T: Real> Player<'m, T> {
-    /// With this memory, half of it for corrections: none yet.
+    /// Uses one half of `memory` for corrections, which are empty at first.
     #[must_use]
     pub fn new(memory: &'m mut [Knot]) -> Self {
         memory.fill([0; 6]);
@@ -133,7 +133,7 @@ impl<'m, T: Real> Player<'m, T> {
         self.table.len()
     }
 
-    /// Where it stands.
+    /// State of the pass.
     #[must_use]
     pub const fn stage(&self) -> Stage {
         self.stage
@@ -151,32 +151,32 @@ impl<'m, T: Real> Player<'m, T> {
         matches!(self.stage, Stage::Running | Stage::Learning)
     }
 
-    /// Status bits that the controller gave in the ticks of the last pass.
+    /// Union of the controller's status bits over the ticks of the last pass.
     #[must_use]
     pub const fn status(&self) -> u32 {
         self.status
     }
 
-    /// The trajectory that the last pass began; none if it did not come to that.
+    /// The trajectory that the last pass started, if it came to that.
     #[must_use]
     pub const fn begun(&self) -> Option<u32> {
         self.begun
     }
 
-    /// Errors of the last pass, as far as it came.
+    /// Errors of the last pass, up to where it ended.
     #[must_use]
     pub fn errors(&self) -> &[Knot] {
         self.errors.get(..self.kept as usize).unwrap_or_default()
     }
 
-    /// Knots of the correction that the next pass of the same course plays.
+    /// The correction that the next pass with the same timing plays.
     #[must_use]
     pub fn correction(&self) -> &[Knot] {
         self.table.get(..self.course.knots() as usize).unwrap_or_default()
     }
 
-    /// Takes knots of the correction, or rows of a [plan](crate::learning), from the `first` on; false, with nothing taken, during a pass or
-    /// learning, or where there is no room.
+    /// Stores knots of the correction, or rows of a [plan](crate::learning), from index `first` on. False, with nothing
+    /// stored, during a pass or learning, or if they do not fit.
     pub fn put(&mut self, first: usize, knots: impl ExactSizeIterator<Item = Knot>) -> bool {
         let Some(end) = first.checked_add(knots.len()) else { return false };
         let busy = self.is_busy();
@@ -189,7 +189,8 @@ impl<'m, T: Real> Player<'m, T> {
         true
     }
 
-    /// Begins a pass with the coming tick; false, with nothing changed, during another one, or if it is none or there is no room for it.
+    /// Starts a pass with the next tick. False, with nothing changed, if another pass is under way, if the timing is
+    /// invalid, or if it does not fit.
     pub fn begin(&mut self, course: Course) -> bool {
         let Course { spacing, before, ticks, .. } = course;
         let makes_sense = spacing >= 1 && (1..=MOST_TICKS).contains(&ticks) && before < ticks;
@@ -202,15 +203,16 @@ impl<'m, T: Real> Player<'m, T> {
         true
     }
 
-    /// Ends a pass that is under way.
+    /// Aborts the pass.
     pub fn abort(&mut self) {
         if self.is_running() {
             self.stage = Stage::Aborted;
         }
     }
 
-    /// Makes the correction of the next pass of the one that came to its end; false, with nothing changed, if there is none, or no
-    /// [plan](crate::learning) behind its knots, or no room. What the pass kept of the error is gone then. [`Player::work`] does it.
+    /// Starts to compute the correction of the next pass from the pass that completed. False, with nothing changed, if
+    /// there is no such pass, no [plan](crate::learning) after its knots, or no room. The stored error is overwritten.
+    /// [`Player::work`] does the computation.
     pub fn learn(&mut self, settings: Settings) -> bool {
         let knots = self.course.knots();
         if self.stage != Stage::Complete || self.kept != knots {
@@ -221,8 +223,8 @@ impl<'m, T: Real> Player<'m, T> {
         true
     }
 
-    /// Does so many steps of learning, each of at most four products for every knot that the plan reaches; whether there are more. For a
-    /// background: no pass begins before it is done.
+    /// Does `steps` steps of learning and returns whether more remain. A step takes at most four products for every
+    /// knot that the plan reaches. For the background: no pass can start before learning is complete.
     pub fn work(&mut self, steps: u32) -> bool {
         if self.stage != Stage::Learning {
             return false;
@@ -234,7 +236,7 @@ impl<'m, T: Real> Player<'m, T> {
         more
     }
 
-    /// What the coming tick is given; none if no pass is under way.
+    /// Input of the next tick; none if no pass is under way.
     #[inline]
     #[must_use]
     pub fn give(&mut self) -> Option<PassInput<T>> {
@@ -249,7 +251,8 @@ impl<'m, T: Real> Player<'m, T> {
         Some(PassInput { correction: playback::at(table, spacing, tick), begins })
     }
 
-    /// A tick of the pass is over: its `target` h_d is for its end, its `pose` is h at its beginning, m and rad; `status` is what the controller gave.
+    /// Records a completed tick of the pass: `target` is h_d for its end, `pose` is h at its beginning, m and rad,
+    /// `status` the controller's status.
     #[inline]
     pub fn keep(&mut self, target: &[T; 6], pose: &[T; 6], status: u32) {
         if self.stage != Stage::Running {
@@ -261,7 +264,7 @@ impl<'m, T: Real> Player<'m, T> {
             for ((sum, last), pose) in self.sum.iter_mut().zip(last).zip(pose) {
                 *sum = *sum + (last - *pose);
             }
-            // One tick is behind: of tick n − 1.
+            // The pose is one tick older: of tick n − 1.
             let next = tick.checked_rem(self.course.spacing).unwrap_or(tick) == 0 || tick >= self.course.ticks;
             if next {
                 if let Some(slot) = self.errors.get_mut(self.kept as usize) {

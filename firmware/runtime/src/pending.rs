@@ -1,35 +1,36 @@
-//! What waits for the rising edge of the input line.
+//! A command that waits for the rising edge of the input line.
 //!
-//! The line is sampled once a tick, with the gauges. An edge in tick n lets the order that waits be in force from tick n + 1 on, and is
-//! bit [`EDGE`] of the events of tick n, which the supervisor leaves alone and every record keeps.
+//! The line is sampled once a tick, with the gauges. After an edge in tick n, the waiting command takes effect from
+//! tick n + 1 on. The edge is bit [`EDGE`] of the events of tick n: the supervisor ignores it, and every record stores
+//! it.
 
 use crate::choice::choice;
 
-/// Bit of an event word, none of the supervisor's: the input line has risen in this tick.
+/// Bit of an event word that the supervisor does not use: the input line has risen in this tick.
 pub const EDGE: u32 = 32;
 
 choice! {
-    /// What became of the last order that was to wait.
+    /// Outcome of the last command that was to wait.
     pub enum Stage {
-        /// There was none.
+        /// There was no such command.
         None = 0 => "nothing was ordered for the edge",
         /// It waits.
         Waiting = 1 => "waits for the edge",
-        /// It is in force since the tick of the edge.
+        /// It took effect in the tick of the edge.
         Begun = 2 => "begun at the edge",
-        /// The machine did not run at rest at the edge, or something else was under way.
+        /// At the edge, the machine was not running at rest, or something else was under way.
         Refused = 3 => "refused at the edge",
-        /// Another order came before the edge, or the machine left the running phase.
+        /// Another command replaced it before the edge, or the machine left the running phase.
         Dropped = 4 => "dropped before the edge",
     }
 }
 
-/// An order that waits, and the line that it waits for.
+/// A waiting command, and the input line.
 #[derive(Debug, Clone, Copy)]
 pub struct EdgeWait<T> {
     order: Option<T>,
     stage: Stage,
-    /// The line at the last tick. It begins high: only one that was seen low can rise.
+    /// Level of the line in the last tick. It is high at first: a line must be seen low before it can rise.
     high: bool,
     rose: bool,
     edges: u32,
@@ -49,19 +50,20 @@ impl<T> EdgeWait<T> {
         Self { order: None, stage: Stage::None, high: true, rose: false, edges: 0, tick: 0 }
     }
 
-    /// This order waits, in place of another one.
+    /// Makes this command wait, in place of another one.
     pub fn wait(&mut self, order: T) {
         (self.order, self.stage) = (Some(order), Stage::Waiting);
     }
 
-    /// Nothing waits any more.
+    /// Removes the waiting command.
     pub fn cancel(&mut self) {
         if self.order.take().is_some() {
             self.stage = Stage::Dropped;
         }
     }
 
-    /// The line as it is in a tick, high or low, or not to be read: whether it rose. Behind a gap it has to be seen low first, too.
+    /// Takes the level of the line in this tick and returns whether it rose. If the line cannot be read, it must be
+    /// seen low again before it can rise.
     #[inline]
     pub fn sense<E>(&mut self, high: Result<bool, E>) -> bool {
         let high = high.ok();
@@ -71,18 +73,18 @@ impl<T> EdgeWait<T> {
         self.rose
     }
 
-    /// The order that the edge of this tick is for. Whoever takes it says what became of it: [`Self::settle`].
+    /// The command whose edge came in this tick. The caller reports the outcome with [`Self::settle`].
     #[inline]
     pub fn due(&mut self) -> Option<T> {
         if self.rose { self.order.take() } else { None }
     }
 
-    /// What was due was begun at the edge of this tick, or refused.
+    /// Records whether the command was begun at the edge of this tick, or refused.
     pub fn settle(&mut self, tick: u64, begun: bool) {
         (self.stage, self.tick) = (if begun { Stage::Begun } else { Stage::Refused }, tick);
     }
 
-    /// What became of the last order.
+    /// Outcome of the last command.
     #[must_use]
     pub const fn stage(&self) -> Stage {
         self.stage
@@ -112,7 +114,7 @@ mod tests {
     fn an_order_is_due_once_in_the_tick_of_a_rising_edge() {
         let mut pending = EdgeWait::new();
         pending.wait('a');
-        // High since before: no edge.
+        // High from the start: no edge.
         assert!(!pending.sense(HIGH) && pending.due().is_none());
         assert!(!pending.sense(LOW) && pending.due().is_none());
         assert!(pending.sense(HIGH));

@@ -1,4 +1,4 @@
-//! What a setting may be: the rows of the table that the compiler makes of the spec.
+//! Permitted ranges of settings: the rows of the table that the compiler writes from the spec.
 
 use crate::real::Real;
 
@@ -12,7 +12,8 @@ pub enum PermittedRange<T> {
 }
 
 impl<T: Real> PermittedRange<T> {
-    /// The range of the setting with this place, in a table whose rows each hold for so many of them; none beyond the last.
+    /// The range of the setting at index `place`. Each row of the table holds for a number of settings. None beyond the
+    /// last row.
     #[must_use]
     pub fn of(table: &[(Self, usize)], place: usize) -> Option<&Self> {
         let mut end = 0;
@@ -25,7 +26,7 @@ impl<T: Real> PermittedRange<T> {
         None
     }
 
-    /// Whether a setting may hold this word.
+    /// Whether a setting may have this word.
     #[inline]
     #[must_use]
     pub fn takes(&self, word: u64) -> bool {
@@ -33,7 +34,7 @@ impl<T: Real> PermittedRange<T> {
             Self::Whole(least, most) => least <= word && word <= most,
             Self::Number(least, most) => {
                 let value = T::from_word(word);
-                // A NaN fails the comparison; bits above an `f32` do not come back.
+                // A NaN fails the comparison. Bits above those of an `f32` do not survive the conversion.
                 least <= value && value <= most && value.to_word() == word
             }
         }
@@ -53,7 +54,7 @@ mod tests {
             assert_eq!(weight.takes(u64::from(value.to_bits())), taken, "{value}");
         }
         assert!(!weight.takes(u64::from(0.5_f32.to_bits()) | 1 << 32));
-        // −0 is within [0, 1] by comparison, and stays what it is.
+        // −0 compares as within [0, 1], and keeps its sign.
         assert!(weight.takes(u64::from((-0.0_f32).to_bits())));
     }
 }

@@ -21,7 +21,7 @@ pub fn at<T: Real>(knots: &[Knot], spacing: u32, tick: u32) -> [T; 6] {
     let spacing = if spacing == 0 { 1 } else { spacing };
     let (whole, part) = ((tick / spacing) as usize, tick % spacing);
     let n = |number: i32| T::from_i32(number);
-    // Both are below 2³¹ where anything is played: more knots than that fit no memory.
+    // Both are below 2³¹: a memory cannot hold more knots.
     let x = n(part as i32) / n(spacing as i32);
     let rest = T::ONE - x;
     let unit = T::from_f64(UNIT / 6.0);
@@ -33,7 +33,7 @@ pub fn at<T: Real>(knots: &[Knot], spacing: u32, tick: u32) -> [T; 6] {
     ];
     let mut sum = [T::ZERO; 6];
     for (ahead, weight) in weights.iter().enumerate() {
-        // Knots from the one before.
+        // Counts from the previous knot.
         let Some(knot) = (whole + ahead).checked_sub(1).and_then(|index| knots.get(index)) else { continue };
         for (sum, value) in sum.iter_mut().zip(knot) {
             *sum = *sum + *weight * n(*value);

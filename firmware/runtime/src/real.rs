@@ -4,7 +4,7 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::field::Field;
 
-/// `f32` or `f64`: what the kernels need of a floating-point number, and no more.
+/// `f32` or `f64`: the operations that the kernels need.
 ///
 /// Every operation is an IEEE 754 basic operation or a comparison, so that the same inputs give the same bits on
 /// every target.
@@ -117,7 +117,7 @@ impl Real for f32 {
     }
 }
 
-/// `value` held within `low..=high`, by comparison; a NaN gives `low`, and −0 gives +0 where `low` is 0.
+/// `value` limited to `low..=high`, by comparison. A NaN gives `low`, and −0 gives +0 if `low` is 0.
 #[inline]
 pub fn saturate<T: Real>(value: T, low: T, high: T) -> T {
     if value > high {

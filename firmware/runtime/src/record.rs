@@ -1,4 +1,4 @@
-//! The record format: what a recorder leaves behind, in memory, over a link and in a file.
+//! The record format: in memory, over a link and in a file.
 //!
 //! A **block** is a run of 64-bit words that can be replayed by itself:
 //!
@@ -48,18 +48,18 @@ pub const HAS_DIGEST: u64 = 1 << 63;
 pub const NO_TRIGGER: u64 = u64::MAX;
 
 choice! {
-    /// Why a block begins.
+    /// Reason why a block begins.
     pub enum Reason {
         /// The recorder was started.
         Started = 0,
-        /// The block before it was full: no tick lies between them.
+        /// The block before it was full. The ticks are consecutive.
         Continued = 1,
-        /// The settings changed: no tick lies between them.
+        /// The settings changed. The ticks are consecutive.
         Settings = 2,
     }
 }
 
-/// How many words a controller's records are made of.
+/// Sizes of a controller's words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Of its settings.
@@ -90,8 +90,8 @@ impl Layout {
     }
 }
 
-/// [`Crc32`] of words in little-endian order, as it follows a block in a file. Not for the tick: it takes some
-/// 100 instructions a word.
+/// [`Crc32`] of words in little-endian order, as it follows a block in a file. Not for the tick: it takes about 100
+/// instructions a word.
 #[must_use]
 pub fn checksum(words: &[u64]) -> u64 {
     let mut crc = Crc32::new();
@@ -99,10 +99,11 @@ pub fn checksum(words: &[u64]) -> u64 {
     u64::from(crc.finish())
 }
 
-/// The beginning of a file for the text `description`, without the padding that the text needs: call `out` with the pieces.
+/// Writes the start of a file with the text `description`, without the padding of the text: calls `out` with the
+/// pieces.
 ///
 /// # Errors
-/// Whatever `out` says, at the first piece that it does not take.
+/// The first error of `out`.
 pub fn write_header<E>(description: &str, mut out: impl FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
     const PADDING: [u8; 8] = [b'\n'; 8];
     let text = description.as_bytes();
@@ -116,10 +117,10 @@ pub fn write_header<E>(description: &str, mut out: impl FnMut(&[u8]) -> Result<(
     out(&u64::from(crc.finish()).to_le_bytes())
 }
 
-/// A block of a file with its checksum: call `out` with the pieces.
+/// Writes a block of a file with its checksum: calls `out` with the pieces.
 ///
 /// # Errors
-/// Whatever `out` says, at the first piece that it does not take.
+/// The first error of `out`.
 pub fn write_block<E>(block: &[u64], mut out: impl FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
     for word in block {
         out(&word.to_le_bytes())?;

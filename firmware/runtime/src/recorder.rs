@@ -1,19 +1,20 @@
-//! The recorder: ticks kept in fixed memory, so that they can be looked at, and replayed bit for bit, after the event.
+//! The recorder: it stores ticks in fixed memory, so that they can be inspected and replayed bit for bit later.
 //!
 //! ```text
 //! start ─► waiting ──trigger──► triggered ──rows after it──► complete      blocks in a ring, the oldest given up
 //!      └─► streaming ─────────────────────────────────────► stop           blocks handed out as they fill
 //! ```
-//! Memory is a slice of the caller, cut into blocks of equal size ([`crate::record`]). Each begins with the settings and a
-//! snapshot of the machine, so that every block that is left can be replayed by itself.
+//! Memory is a slice of the caller, cut into blocks of equal size ([`crate::record`]). Each block begins with the
+//! settings and a snapshot of the machine, so that it can be replayed by itself.
 //!
-//! A target calls [`Recorder::opens`] before a tick and, if it says so, [`Recorder::open`] with the machine as it is then;
-//! after the tick [`Recorder::push`]. The emitted controller does all three (`snapshot::supervise_recorded`).
+//! Before a tick, a target calls [`Recorder::opens`]. If that is true, it calls [`Recorder::open`] with the state of
+//! the machine. After the tick it calls [`Recorder::push`]. The emitted controller makes all three calls
+//! (`snapshot::supervise_recorded`).
 //!
-//! Snapshot and digest take longer than a row. Where that is too long for a tick, they are the work of the background
-//! ([`Recorder::owing`]): between two ticks it keeps a copy of the machine, if the recorder [wants](Recorder::wants) one, and hands in
-//! what is then owed while ticks go on. Until that is done no other block begins, no other row gets a digest, and what it holds is not
-//! to be fetched. A background that is late leaves rows out, and never a row in a block that it does not continue.
+//! A snapshot and a digest take longer than a row. If that is too long for a tick, the background does them
+//! ([`Recorder::owing`]). Between two ticks it copies the machine if the recorder [wants](Recorder::wants) a copy, and
+//! writes the data while ticks go on. Until then no other block begins, no other row gets a digest, and the memory must
+//! not be fetched. If the background is late, rows are left out; no row is ever in a block that it does not continue.
 
 mod ring;
 
@@ -21,10 +22,10 @@ use crate::record::{HAS_DIGEST, HEADER_WORDS, LARGEST_INPUT, Layout, Reason};
 use crate::supervisor::Phase;
 use ring::{DIGEST, Place, Ring};
 
-/// What makes a recorder keep what it has, besides [`Recorder::trigger`].
+/// Events that trigger a recorder, besides [`Recorder::trigger`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Trigger {
-    /// A fault: the phase becomes [`Trigger::FAULTED`].
+    /// A fault: the phase changes to [`Trigger::FAULTED`].
     pub fault: bool,
     /// Any change of phase.
     pub phase_change: bool,
@@ -42,16 +43,16 @@ pub struct Settings {
     pub streaming: bool,
     /// What triggers.
     pub trigger: Trigger,
-    /// Rows that are recorded after the trigger, ≥ 1: the rest of the memory is what was before it.
+    /// Rows recorded after the trigger, ≥ 1. The rest of the memory holds rows from before it.
     pub after: u32,
-    /// Every so-manieth tick is recorded, ≥ 1. Above 1 a record shows more time but cannot be replayed.
+    /// Every n-th tick is recorded, ≥ 1. Above 1 a record covers more time but cannot be replayed.
     pub decimation: u32,
-    /// Every so-manieth row ends with a digest of the machine; 0 for none. It costs the target about as much as a row.
+    /// Every n-th row ends with a digest of the machine; 0 for none. It costs the target about as much as a row.
     pub digest_every: u32,
 }
 
 impl Settings {
-    /// Everything, handed out block by block.
+    /// Every tick, handed out block by block.
     pub const STREAM: Self = Self {
         streaming: true,
         trigger: Trigger { fault: false, phase_change: false },
@@ -61,22 +62,22 @@ impl Settings {
     };
 }
 
-/// What a recorder does.
+/// State of a recorder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Activity {
-    /// Nothing; what it has stays.
+    /// Not recording; the memory is kept.
     Stopped,
-    /// Records, and waits for the trigger.
+    /// Recording before the trigger.
     Waiting,
-    /// Records what comes after it: so many rows more.
+    /// Recording after the trigger: this number of rows remains.
     Triggered(u32),
-    /// Has what it was to record.
+    /// The record is complete.
     Complete,
-    /// Records, and hands out.
+    /// Recording; blocks are handed out as they fill.
     Streaming,
 }
 
-/// What a tick put out.
+/// Outputs of a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Row {
     /// Converter codes.
@@ -87,63 +88,64 @@ pub struct Row {
     pub supervisor: u32,
 }
 
-/// Why a memory is not enough.
+/// Reason why a memory cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MemoryError {
-    /// It has no room for so many blocks of a row each, or there are fewer than two of them: words needed.
+    /// There is no room for this number of blocks with a row each, or fewer than two blocks were requested: words
+    /// needed.
     TooSmall(usize),
-    /// An input of more words than a row can tell apart.
+    /// The input has more words than a row can mark as changed.
     InputTooLong,
 }
 
-/// Records ticks in the memory of a caller.
+/// Records ticks in memory of the caller.
 #[derive(Debug)]
 pub struct Recorder<'m> {
     ring: Ring<'m>,
     layout: Layout,
     settings: Settings,
     activity: Activity,
-    /// Ticks seen since it was made.
+    /// Ticks since the recorder was made.
     tick: u64,
-    /// Ticks until the next one that is recorded.
+    /// Ticks until the next recorded one.
     skip: u32,
     /// Rows until the next digest.
     digest_in: u32,
-    /// A new block must begin with the next row, and why.
+    /// Reason why the next row must begin a new block.
     due: Option<Reason>,
-    /// Asked for from outside.
+    /// A trigger was requested.
     asked: bool,
     /// Phase of the last tick.
     phase: u32,
-    /// Input of the last row, by which the next is told.
+    /// Input of the last row; the next row stores its changes.
     last: [u64; LARGEST_INPUT],
-    /// Digest of the machine as it is, where the last row has it.
+    /// Digest of the present state, if the last row has it.
     digest: Option<u64>,
-    /// Snapshots and digests come later, and which does.
+    /// Whether the background writes snapshots and digests, and the pending one.
     owing: bool,
     owed: Option<PendingWrite>,
 }
 
-/// For what a machine is kept.
+/// Purpose of a copy of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SnapshotPurpose {
-    /// A block begins with it, after the settings that are in force.
+    /// A block begins with it, after the present settings.
     Block,
     /// Its digest ends the last row.
     Digest,
 }
 
-/// Rows that a block has left when the next is to begin.
+/// A block begins early: when this number of rows fits into the open one.
 const AHEAD: usize = 8;
 
-/// Where what comes later goes.
+/// Destination of data that the background writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum PendingWrite {
-    /// Settings, state and digest that a block begins with.
+    /// Settings, state and digest at the start of a block.
     Block(Place),
     /// The digest of a row.
     Digest(Place),
-    /// Nowhere: what it was for is forgotten.
+    /// None: the block was discarded.
     Nothing,
 }
 
@@ -151,7 +153,7 @@ impl<'m> Recorder<'m> {
     /// A stopped recorder that cuts `memory` into `blocks` (≥ 2) blocks.
     ///
     /// # Errors
-    /// There is no room for that.
+    /// The blocks do not fit into the memory.
     pub fn new(memory: &'m mut [u64], blocks: usize, layout: Layout) -> Result<Self, MemoryError> {
         if layout.input > LARGEST_INPUT {
             return Err(MemoryError::InputTooLong);
@@ -179,13 +181,13 @@ impl<'m> Recorder<'m> {
         })
     }
 
-    /// The same, whose snapshots and digests are the work of a background: see [`Recorder::wants`].
+    /// Leaves snapshots and digests to the background, see [`Recorder::wants`].
     #[must_use]
     pub fn owing(self) -> Self {
         Self { owing: true, ..self }
     }
 
-    /// Forgets what it has and records from the next tick on.
+    /// Discards the memory and records from the next tick on.
     pub fn start(&mut self, settings: Settings) {
         self.ring.clear();
         self.settings = settings;
@@ -198,7 +200,7 @@ impl<'m> Recorder<'m> {
         self.owed = self.owed.map(|_| PendingWrite::Nothing);
     }
 
-    /// Ends the recording; what there is stays to be fetched.
+    /// Ends the recording; the memory can still be fetched.
     pub fn stop(&mut self) {
         self.ring.close();
         if self.activity != Activity::Complete {
@@ -211,21 +213,21 @@ impl<'m> Recorder<'m> {
         self.asked = true;
     }
 
-    /// The controller was reset: a block that does not continue the last one begins with the next row.
+    /// The controller was reset: the next row begins a block that does not continue the last one.
     pub fn restarted(&mut self) {
         self.due = Some(Reason::Started);
         self.digest = None;
     }
 
-    /// The settings of the controller changed: a block with the new ones begins with the next row.
+    /// The controller's settings changed: the next row begins a block with the new ones.
     pub fn settings_changed(&mut self) {
         if self.due.is_none() {
             self.due = Some(Reason::Settings);
         }
     }
 
-    /// The next row is that of `tick`, and a block begins with it; where that is not the tick after the last one, the block
-    /// does not continue what was before. For a recorder that is handed from one place to another, or misses ticks.
+    /// The next row is that of `tick` and begins a block. If `tick` does not follow the last one, the block does not
+    /// continue the one before. For a recorder that changes its place or misses ticks.
     pub fn begin(&mut self, tick: u64) {
         if tick != self.tick {
             self.tick = tick;
@@ -242,13 +244,13 @@ impl<'m> Recorder<'m> {
         self.activity
     }
 
-    /// Ticks seen since it was made.
+    /// Ticks since the recorder was made.
     #[must_use]
     pub fn tick(&self) -> u64 {
         self.tick
     }
 
-    /// Blocks that were given up before anyone had fetched them, while streaming.
+    /// Blocks lost while streaming: they were overwritten before they were fetched.
     #[must_use]
     pub fn lost(&self) -> u32 {
         self.ring.lost()
@@ -258,43 +260,43 @@ impl<'m> Recorder<'m> {
         !matches!(self.activity, Activity::Stopped | Activity::Complete)
     }
 
-    /// Before a tick: whether a block begins with it, which [`Recorder::open`] must be called for.
+    /// Before a tick: whether a block begins with it. Then [`Recorder::open`] must be called.
     #[inline]
     #[must_use]
     pub fn opens(&self) -> bool {
         self.records() && self.skip == 0 && (self.due.is_some() || !self.ring.has_room())
     }
 
-    /// Begins a block, before a tick, with the settings that the tick runs under, the digest of the machine as it is, and its
-    /// state, which `save` writes.
+    /// Begins a block before a tick, with the settings of the tick, the digest of the present state, and the state,
+    /// which `save` writes.
     pub fn open(&mut self, config: &[u64], digest: u64, save: impl FnOnce(&mut [u64])) {
         self.open_with(config, || digest, save);
     }
 
-    /// The same with a digest that is asked for only where the row before has none. The last row of a full block has one, so that
-    /// not everything falls into one tick.
+    /// The same with a digest that is computed only if the previous row has none. The last row of a full block has one,
+    /// so that a single tick does not pay for both.
     pub fn open_with(&mut self, config: &[u64], digest: impl FnOnce() -> u64, save: impl FnOnce(&mut [u64])) {
         let reason = self.due.take().unwrap_or(Reason::Continued).word() | u64::from(self.settings.decimation) << 32;
         let digest = self.digest.take().unwrap_or_else(digest);
         self.ring.open([self.tick, reason, digest], config, save, self.settings.streaming);
         self.last = [0; LARGEST_INPUT];
-        // What the block begins with is as good as a digest of its first row.
+        // The digest of the block's start also serves its first row.
         if self.settings.digest_every > 1 {
             self.digest_in = self.settings.digest_every - 1;
         }
     }
 
-    // Cold, as what follows: small before fast.
-    /// Between two ticks: for what the machine as it is now is to be kept, if for anything. Then [`Recorder::owe`].
+    // This and what follows is cold: small before fast.
+    /// Between two ticks: whether a copy of the machine is needed now, and for what. Then call [`Recorder::owe`].
     #[cold]
     #[must_use]
     pub fn wants(&self) -> Option<SnapshotPurpose> {
         let records = self.owing && self.records() && self.skip == 0 && !self.owes();
         let every = self.settings.digest_every;
         match () {
-            // Before the open block is full, so that no row is without one.
+            // Before the open block is full, so that no row is left out.
             () if records && (self.due.is_some() || !self.ring.has_room_for(AHEAD)) => Some(SnapshotPurpose::Block),
-            // Of the last row, which is that of the last tick.
+            // For the last row, which is that of the last tick.
             () if records
                 && self.settings.decimation <= 1
                 && every > 0
@@ -307,7 +309,7 @@ impl<'m> Recorder<'m> {
         }
     }
 
-    /// It is kept: a block begins with the next row, or the last row ends with a digest. Both are owed.
+    /// The copy was made: a block begins with the next row, or the last row ends with a digest. The data follows later.
     #[cold]
     pub fn owe(&mut self, want: SnapshotPurpose) {
         self.owed = match want {
@@ -322,20 +324,20 @@ impl<'m> Recorder<'m> {
         };
     }
 
-    /// Whether something is owed.
+    /// Whether data is pending.
     #[inline]
     #[must_use]
     pub fn owes(&self) -> bool {
         self.owed.is_some()
     }
 
-    /// Whether that is a whole block, settings and state and all, or the digest alone.
+    /// Whether a whole block start is pending, not only a digest.
     #[must_use]
     pub fn owes_block(&self) -> bool {
         matches!(self.owed, Some(PendingWrite::Block(_)))
     }
 
-    /// Words of what an owed block begins with, settings and then state, from the `first`-th on.
+    /// Writes words of a pending block start (settings, then state) from the `first`-th on.
     #[cold]
     pub fn hand_in(&mut self, first: usize, words: &[u64]) {
         if let Some(PendingWrite::Block(place)) = self.owed {
@@ -345,7 +347,7 @@ impl<'m> Recorder<'m> {
         }
     }
 
-    /// The digest, which is the last that is owed.
+    /// Writes the digest, the last part of pending data.
     #[cold]
     pub fn settle(&mut self, digest: u64) {
         match self.owed.take() {
@@ -355,7 +357,7 @@ impl<'m> Recorder<'m> {
         }
     }
 
-    /// After a tick: its input words and what came out. `digest` gives that of the machine, where one is due.
+    /// After a tick: its input words and outputs. `digest` computes the digest of the machine if one is due.
     #[inline]
     pub fn push(&mut self, input: &[u64], row: &Row, digest: impl FnOnce() -> u64) {
         let tick = self.tick;
@@ -399,7 +401,7 @@ impl<'m> Recorder<'m> {
     #[inline]
     fn write(&mut self, input: &[u64], row: &Row, digest: impl FnOnce() -> u64) {
         if self.owing && (self.due.is_some() || !self.ring.has_room()) {
-            // No block has begun with it: the next one does not continue what is there.
+            // No block began with this row: the next block does not continue the last one.
             self.due = Some(Reason::Started);
             return;
         }
@@ -431,31 +433,31 @@ impl<'m> Recorder<'m> {
         slots.finish(which);
     }
 
-    /// Rows in memory, those of the open block included.
+    /// Rows in memory, including those of the open block.
     #[must_use]
     pub fn rows(&self) -> u64 {
         self.ring.rows()
     }
 
-    /// Rows that fit whatever changes in them; there is room for more where less changes.
+    /// Rows that fit even if every input word changes. More fit if less changes.
     #[must_use]
     pub fn capacity(&self) -> usize {
         self.ring.capacity()
     }
 
-    /// Blocks that can be fetched: closed ones, and the open one where recording has ended.
+    /// Blocks that can be fetched: closed ones, and the open one after the end of the recording.
     #[must_use]
     pub fn blocks(&self) -> usize {
         self.ring.closed()
     }
 
-    /// The `index`-th of them, the oldest first.
+    /// The `index`-th block, the oldest first.
     #[must_use]
     pub fn block(&self, index: usize) -> Option<&[u64]> {
         self.ring.block(index)
     }
 
-    /// The oldest of them was fetched: its place may be used again. For streams.
+    /// Frees the oldest block after it was fetched. For streams.
     pub fn release(&mut self) {
         self.ring.release();
     }

@@ -1,4 +1,4 @@
-//! Pose from six gauges that see the platform.
+//! Pose from six gauges that measure the platform.
 //!
 //! Gauge k measures along a line fixed in the base, of direction n (unit, {B}), to a plane fixed to the platform; at rest the line
 //! pierces the plane at c ({P}) and the reading is zero. With m the plane's normal ({P}), scaled so that m·n = 1:
@@ -7,19 +7,21 @@
 //! y = [(R m)·t − ((R − I) m)·c] / [1 + n·(R − I) m]                       reading of a pose, in difference form
 //! ```
 //!
-//! The other way round, take u = D Rᵀt and the turn as R = I + (ψ× + ½ ψ×²)/D with D = 1 + ¼|ψ|² (Cayley; |ψ| = 2 tan(φ/2) for a
-//! turn by φ). The equations of the six gauges are then polynomials of second degree in ψ, and linear in u:
+//! For the inverse, take u = D Rᵀt and the rotation as R = I + (ψ× + ½ ψ×²)/D with D = 1 + ¼|ψ|² (Cayley; |ψ| = 2
+//! tan(φ/2) for a rotation by φ). The equations of the six gauges are then polynomials of second degree in ψ, and
+//! linear in u:
 //!
 //! ```text
 //! m·u + (c × m)·ψ = y (1 − ¼|ψ|²) + y [(m × n)·ψ + ½ (m·ψ)(n·ψ)] + ½ [(m·ψ)(c·ψ) − (m·c)|ψ|²]
 //! ```
 //!
-//! The left side is J [u; ψ] with the Jacobian J of the gauges at rest. J⁻¹ of the readings is the first guess; a pass puts ψ
-//! into the right side, which is small by the angle. All but the last pass need ψ alone. No sine or cosine is needed; three
-//! divisions and three short series turn ψ into θ.
+//! The left side is J [u; ψ] with the Jacobian J of the gauges at rest. J⁻¹ of the readings is the first guess. A pass
+//! puts ψ into the right side, which is of the order of the angle. All but the last pass need ψ alone. No sine or
+//! cosine is needed; three divisions and three short series turn ψ into θ.
 //!
-//! A gauge along an axis of the base, or normal to its plane, has zeros among its constants. Their terms are left out, so that with
-//! the constants known to the compiler they cost nothing: an axis-aligned layout takes less than half of what a skew one does.
+//! A gauge along an axis of the base, or normal to its plane, has zeros among its constants. Their terms are left out,
+//! so that constants known to the compiler cost nothing: an axis-aligned layout takes less than half the time of a skew
+//! one.
 
 use crate::attitude::{Series, horner, odd_series};
 use crate::linear::each;
@@ -65,7 +67,8 @@ impl<T: Real> Gauges<'_, T> {
 
     /// The pose [x y z θx θy θz] from rest (m, rad) at which the gauges read `readings` (m).
     ///
-    /// Exact to what the passes were counted for over the declared workspace; finite for every reading that the gauges can give.
+    /// The number of passes makes it exact over the declared workspace. It is finite for every reading that the gauges
+    /// can give.
     #[inline]
     #[must_use]
     pub fn pose(&self, readings: &[T; 6]) -> [T; 6] {
@@ -73,14 +76,14 @@ impl<T: Real> Gauges<'_, T> {
         self.pose_from(readings, &guess, [guess[3], guess[4], guess[5]])
     }
 
-    /// J⁻¹ of `readings` (m): [u; ψ] but for terms of second degree, m and 1.
+    /// J⁻¹ of `readings` (m): [u; ψ] without the terms of second degree, m and 1.
     #[inline]
     #[must_use]
     pub fn guess(&self, readings: &[T; 6]) -> [T; 6] {
         each(|row| dot6(&self.inverse[row], readings))
     }
 
-    /// A pass: ψ from one that is off by more, for `guess` of `readings` (m).
+    /// A pass: a better ψ from this one, for `guess` of `readings` (m).
     #[inline]
     #[must_use]
     pub fn next_turn(&self, readings: &[T; 6], guess: &[T; 6], psi: &[T; 3]) -> [T; 3] {
@@ -88,7 +91,7 @@ impl<T: Real> Gauges<'_, T> {
         [self.row(3, guess, &terms), self.row(4, guess, &terms), self.row(5, guess, &terms)]
     }
 
-    /// The pose for `guess` of `readings` (m), all passes done from the turn ψ that is given.
+    /// The pose for `guess` of `readings` (m), after all passes from ψ.
     #[inline]
     #[must_use]
     pub fn pose_from(&self, readings: &[T; 6], guess: &[T; 6], mut psi: [T; 3]) -> [T; 6] {
@@ -100,7 +103,7 @@ impl<T: Real> Gauges<'_, T> {
         self.coordinates([x, y, z], [a, b, c])
     }
 
-    /// The terms of second degree and above, for the turn ψ.
+    /// The terms of second degree and above, for the rotation ψ.
     #[inline]
     fn terms(&self, readings: &[T; 6], psi: &[T; 3]) -> Terms<T> {
         let [a, b, c] = *psi;
@@ -150,7 +153,7 @@ impl<T: Real> Gauges<'_, T> {
     }
 }
 
-/// The right side of the equations but for the readings themselves.
+/// The right side of the equations, without the readings themselves.
 struct Terms<T> {
     /// ψx², ψy², ψz², ψxψy, ψxψz, ψyψz.
     products: [T; 6],
@@ -167,7 +170,7 @@ pub struct Calibration<T, const N: usize> {
     pub coefficients: [[T; N]; 6],
 }
 
-/// What the gauges' words mean.
+/// Meaning of the gauges' words.
 pub trait GaugeCalibration<T: Real> {
     /// Readings, m, of words.
     #[must_use]
@@ -193,13 +196,13 @@ pub struct GaugeConverter<T> {
     pub per_code: T,
     /// Highest code, 2^bits − 1.
     pub highest: i32,
-    /// Below and above whatever is believed: what a converter at its end stands for.
+    /// Numbers below and above every permitted reading: the reading of a converter at its end.
     pub beyond: [T; 2],
 }
 
 impl<T: Real> GaugeConverter<T> {
-    /// The number of a code. A converter at its lowest or highest code only says that the signal is there or beyond, as that
-    /// of a broken line is: it gives a number that is a gauge fault.
+    /// The number for a code. At its lowest or highest code a converter shows only that the signal is there or beyond,
+    /// as with a broken line. The code then gives a number that counts as a gauge fault.
     #[inline]
     #[must_use]
     pub fn reading(&self, code: i32) -> T {
@@ -243,7 +246,7 @@ fn plus6<T: Real>(sum: T, c: &[T; 6], x: &[T; 6]) -> T {
     plus(plus(plus(half, c[3], x[3]), c[4], x[4]), c[5], x[5])
 }
 
-/// c·x from the left; −0 is what a sum begins with that adds nothing to its first term.
+/// c·x from the left. The sum starts with −0, which leaves its first term unchanged.
 #[inline(always)]
 fn dot3<T: Real>(c: &[T; 3], x: &[T; 3]) -> T {
     plus3(-T::ZERO, c, x)

@@ -1,4 +1,4 @@
-//! Set-points: where the platform is to be at the end of the coming interval, and how it is to move there.
+//! Set-points: the pose at the end of the next interval, and the motion there.
 //!
 //! | part | what |
 //! |---|---|
@@ -8,9 +8,9 @@
 //! | [`Trajectory`] | prepared motions: segments of polynomial and sinusoid, tables with cubic splines |
 //! | [`Frames`] | work and tool coordinates of the user to coordinates of the platform |
 //!
-//! Coordinates h = [x y z θx θy θz] from rest: P_C in the base frame (m) and the angles of R = Rz Ry Rx (rad). Rates and
-//! accelerations are the time derivatives of these six numbers. They are analytic piece by piece: a difference would
-//! put an impulse into the force feed-forward wherever a path has a corner.
+//! Coordinates h = [x y z θx θy θz] from rest: P_C in the base frame (m) and the angles of R = Rz Ry Rx (rad). Rates
+//! and accelerations are the time derivatives of these six numbers. Each piece of a path has analytic derivatives: a
+//! finite difference would put an impulse into the force feed-forward at every corner.
 
 mod frames;
 mod generator;
@@ -30,7 +30,7 @@ pub use stop::{Stop, StopLimits};
 pub use trajectory::{Axis, Row, Segment, Table, Trajectory};
 
 choice! {
-    /// What the user wants done.
+    /// Kind of a command.
     pub enum CommandKind or Unknown {
         /// Stand still.
         Hold = 0,
@@ -40,12 +40,12 @@ choice! {
         Move = 2,
         /// Play the trajectory [`Command::selector`].
         Trajectory = 3,
-        /// None of these: refused, and held.
+        /// Any other value: refused, and the platform holds.
         Unknown = 4,
     }
 }
 
-/// A command; it holds for as long as it is given.
+/// A command. It applies to every tick in which it is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command<T: Real> {
     /// What.
@@ -54,11 +54,11 @@ pub struct Command<T: Real> {
     pub selector: u32,
     /// Counter of streamed set-points: a new value marks a fresh one.
     pub sequence: u32,
-    /// Streamed set-point at the end of the coming interval, or the pose of a move; in the user's frames.
+    /// Streamed set-point at the end of the next interval, or the pose of a move; in the user's frames.
     pub target: Target<T>,
 }
 
-/// What the spec fixes about set-points.
+/// Constants of set-points, from the spec.
 #[derive(Debug, Clone, Copy)]
 pub struct Setpoints<T: Real, F> {
     /// T_s, s.
@@ -67,11 +67,11 @@ pub struct Setpoints<T: Real, F> {
     pub rate: T,
     /// 1/T_s², 1/s².
     pub square_rate: T,
-    /// Pose that every set-point is added to, m and rad.
+    /// Pose that is added to every set-point, m and rad.
     pub bias: [T; 6],
     /// The user's coordinates of that pose.
     pub home: [T; 6],
-    /// Largest |pose component| given out, the bias included, m and rad.
+    /// Largest |pose component| of a set-point, the bias included, m and rad.
     pub bound: [T; 6],
     /// Limits of bias and moves.
     pub limits: MoveLimits<T>,
@@ -100,13 +100,13 @@ impl<T: Real, F> Setpoints<T, F> {
 }
 
 impl<T: Real, F: Frames<T>> Setpoints<T, F> {
-    /// Puts the user's set-point as one of the platform into `target`, if it is finite and within the workspace.
+    /// Writes the user's set-point in platform coordinates into `target`, if it is finite and within the workspace.
     #[inline]
     pub fn admit(&self, user: &Target<T>, target: &mut Target<T>) -> bool {
         self.frames.admit(user, &self.bias, &self.bound, target)
     }
 
-    /// The user's pose as one of the platform, if it is finite and within the workspace.
+    /// The user's pose in platform coordinates, if it is finite and within the workspace.
     #[must_use]
     pub fn admitted(&self, user: &[T; 6]) -> Option<[T; 6]> {
         let mut target = Target::new();

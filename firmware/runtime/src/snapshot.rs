@@ -1,8 +1,8 @@
-//! A state as 64-bit words and back: what a recording begins with, so that it can be replayed from the middle of a run.
+//! A state as 64-bit words, and back. A recording begins with one, so that it can be replayed from the middle of a run.
 //!
-//! Every word is the bits of a number (an `f32` zero-extended), an integer or a flag. What is loaded is believed only if each
-//! word is one that a state can hold: a finite number of a size that a machine has, an index within its bounds, a staircase
-//! that is one. That it is the state of *this* run is for its digest to say.
+//! Every word is the bits of a number (an `f32` zero-extended), an integer or a flag. Loading checks each word: a
+//! number must be finite and of a plausible size, an index within its bounds, a staircase monotone. The digest shows
+//! whether the state belongs to *this* run.
 
 use core::convert::Infallible;
 
@@ -20,11 +20,11 @@ pub const LARGEST_PLACE: f64 = 16.0;
 /// Largest |rate|, |acceleration| or |force| that is loaded, in SI units.
 pub const LARGEST: f64 = 1e9;
 
-/// How large the numbers of a state may be: magnitudes, by axis where there are six. What the spec's workspace, gauges, tables and
-/// settings allow; the emitted `permitted::STATE`.
+/// Largest magnitudes of the numbers in a state, by axis where there are six. They follow from the spec's workspace,
+/// gauges, tables and settings: the emitted `permitted::STATE`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sizes {
-    /// Set-point as it is given out: the workspace, m and rad.
+    /// Set-point as passed to the law, within the workspace, m and rad.
     pub place: [f64; 6],
     /// The same in the user's coordinates.
     pub user: [f64; 6],
@@ -36,20 +36,20 @@ pub struct Sizes {
     pub pose: [f64; 6],
     /// Its rate, m/s and rad/s.
     pub pose_rate: [f64; 6],
-    /// Pose error behind the notch, m and rad.
+    /// Pose error after the notch, m and rad.
     pub error: f64,
-    /// Set-point, and what it is off the measured pose: of each axis, m and rad, or of each leg, m.
+    /// Set-point, and its difference from the measured pose: per axis, m and rad, or per leg, m.
     pub apart: [f64; 6],
     /// Measured wrench, N and N m.
     pub wrench: [f64; 6],
-    /// Displacement of a leg, demanded or by its model, m.
+    /// Displacement of a leg, requested or modelled, m.
     pub leg: f64,
-    /// What a cell a tick adds to it, m.
+    /// Change of that displacement at one cell a tick, m.
     pub leg_rate: f64,
-    /// Position of an output line's settings, m and rad.
+    /// Position in the settings of an output line, m and rad.
     pub line: f64,
-    /// What the law asks for or withholds, m and rad: deflection, load, excess, offset of a change of mode, estimates, and what
-    /// the notch remembers of them. Gains may make it larger than any place.
+    /// Requests of the law and what it withholds, m and rad: deflection, load, excess, offset of a change of mode,
+    /// estimates, and what the notch stores of them. Gains may make it larger than any place.
     pub request: f64,
     /// Word of a gauge: m, or V with a calibration.
     pub reading: f64,
@@ -59,18 +59,18 @@ pub struct Sizes {
     pub codes: [i32; 2],
     /// Drive of a leg: cells of its table.
     pub grid: f64,
-    /// Extrema that a reversal memory has words for, if it has room for more than it keeps ([`crate::Grid::capacity`]).
+    /// Number of extrema stored for a reversal memory, if its room is larger than this ([`crate::Grid::capacity`]).
     pub memory: usize,
 }
 
 impl Sizes {
-    /// Extrema that a memory with this `room` has words for.
+    /// Number of extrema stored for a memory with this `room`.
     #[must_use]
     pub const fn kept(&self, room: usize) -> usize {
         if self.memory < room { self.memory } else { room }
     }
 
-    /// Of a state of no particular spec: what any machine has.
+    /// Bounds for a state of any spec.
     pub const ANY: Self = Self {
         place: [LARGEST_PLACE; 6],
         user: [LARGEST_PLACE; 6],
@@ -93,9 +93,10 @@ impl Sizes {
     };
 }
 
-/// Something that later ticks depend on. [`state!`](crate::state) declares it: its fields, what they are at reset, and the walk over them.
+/// State that later ticks depend on. [`state!`](crate::state) declares its fields, their reset values and the walk over
+/// them.
 pub trait Snapshot: Field {
-    /// Shows every word in order.
+    /// Writes every word in order.
     ///
     /// # Errors
     /// Never.
@@ -104,8 +105,8 @@ pub trait Snapshot: Field {
     /// Takes the state that [`Snapshot::save`] wrote.
     ///
     /// # Errors
-    /// At the first word that no state holds; what was read before it is taken, so that a state which must not be lost is
-    /// restored into a copy.
+    /// At the first invalid word. The words before it have been taken: restore into a copy if the old state is still
+    /// needed.
     fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), InvalidState>;
 
     /// Appends the state.
@@ -114,7 +115,8 @@ pub trait Snapshot: Field {
         let Ok(()) = self.show(words);
     }
 
-    /// Words of the state where sizes are known at run time. Of one whose memories keep all they have room for: [`Field::WORDS`].
+    /// Number of words of the state if sizes are known only at run time. [`Field::WORDS`] is the number if every memory
+    /// uses all its room.
     fn word_count(&self, sizes: Sizes) -> usize {
         let mut words = Writer::new(&mut []);
         let Ok(()) = self.show(&mut words.within(sizes));
@@ -128,14 +130,14 @@ pub trait Snapshot: Field {
     }
 }
 
-/// A word that no state holds.
+/// A word that no state can contain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct InvalidState {
     /// Its index.
     pub word: usize,
 }
 
-/// Words in the order of a state. What does not fit is counted, but not kept.
+/// Writes words in the order of a state. Words that do not fit are counted but not stored.
 #[derive(Debug)]
 pub struct Writer<'a> {
     words: &'a mut [u64],
@@ -143,7 +145,7 @@ pub struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    /// Into `words`, from the first on.
+    /// Writes into `words`, from the first on.
     #[must_use]
     pub fn new(words: &'a mut [u64]) -> Self {
         Self { words, count: 0 }
@@ -202,7 +204,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Some words of a state, from the `first`-th on: a state that is written piece by piece, where there is time for a walk each.
+/// Writes a range of a state's words, from the `first`-th on. A state can so be written in several walks.
 #[derive(Debug)]
 pub struct StatePart<'a> {
     words: &'a mut [u64],
@@ -211,7 +213,7 @@ pub struct StatePart<'a> {
 }
 
 impl<'a> StatePart<'a> {
-    /// As many words as have room.
+    /// As many words as fit.
     #[must_use]
     pub fn new(words: &'a mut [u64], first: usize) -> Self {
         Self { words, first, count: 0 }
@@ -220,7 +222,7 @@ impl<'a> StatePart<'a> {
     /// The next word. Not inlined: a walk calls it for every field.
     #[inline(never)]
     fn word(&mut self, word: u64) {
-        // One before the first has a place beyond all.
+        // A word before the first wraps to an index beyond the end.
         if let Some(slot) = self.words.get_mut(self.count.wrapping_sub(self.first)) {
             *slot = word;
         }
@@ -235,8 +237,9 @@ impl<'a> StatePart<'a> {
     }
 }
 
-/// Zeros. Most of a state is the room behind its staircases, and `fill` would become a call of `memset`, which takes some eight
-/// instructions a word on a Cortex-M; with a zero that the compiler does not know, and eight words at a time, it is one and a half.
+/// Writes zeros. Most of a state is unused room of staircases. `fill` would become a call of `memset`, which takes
+/// about eight instructions a word on a Cortex-M. Eight words at a time, with a zero that the compiler does not know,
+/// take one and a half.
 #[inline]
 fn clear(words: &mut [u64]) {
     let zero = core::hint::black_box(0);
@@ -251,7 +254,7 @@ fn clear(words: &mut [u64]) {
     }
 }
 
-/// Words of a state, checked one by one.
+/// Reads words of a state and checks each one.
 #[derive(Debug)]
 pub struct Reader<'a> {
     words: &'a [u64],
@@ -260,13 +263,13 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// From the first of `words` on.
+    /// Reads from the first of `words` on.
     #[must_use]
     pub fn new(words: &'a [u64]) -> Self {
         Self { words, count: 0, sizes: Sizes::ANY }
     }
 
-    /// The same for a state with numbers of these sizes.
+    /// Limits the numbers to these sizes.
     #[must_use]
     pub fn within(self, sizes: Sizes) -> Self {
         Self { sizes, ..self }
@@ -284,7 +287,7 @@ impl<'a> Reader<'a> {
         self.count
     }
 
-    /// That the word last read is none.
+    /// Reports the word last read as invalid.
     #[must_use]
     pub fn refused(&self) -> InvalidState {
         InvalidState { word: self.count.saturating_sub(1) }
@@ -304,10 +307,10 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A number of ticks or the like, from 0 to `largest`.
+    /// A count, such as ticks, from 0 to `largest`.
     ///
     /// # Errors
-    /// It is none, see [`Reader::word`].
+    /// The word is out of range, see [`Reader::word`].
     #[inline]
     pub fn count_to(&mut self, largest: i32) -> Result<i32, InvalidState> {
         let largest = if largest < 0 { 0 } else { largest as u64 };
@@ -335,19 +338,19 @@ impl<'a> Reader<'a> {
     /// A finite number within ±`largest`.
     ///
     /// # Errors
-    /// It is none.
+    /// The word is not such a number.
     #[inline]
     pub fn real<T: Real>(&mut self, largest: f64) -> Result<T, InvalidState> {
         let word = self.word(u64::MAX)?;
         let value = T::from_word(word);
-        // A NaN fails the comparison; bits above an `f32` do not come back.
+        // A NaN fails the comparison. Bits above those of an `f32` do not survive the conversion.
         if value.abs() <= T::from_f64(largest) && value.to_word() == word { Ok(value) } else { Err(self.refused()) }
     }
 
     /// Finite numbers within ±`largest`.
     ///
     /// # Errors
-    /// At the first that is none.
+    /// At the first word that is not such a number.
     pub fn reals<T: Real>(&mut self, values: &mut [T], largest: f64) -> Result<(), InvalidState> {
         for value in values {
             *value = self.real(largest)?;

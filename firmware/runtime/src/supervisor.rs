@@ -1,4 +1,4 @@
-//! The supervisor: which phase the machine is in, why, and what the codes do in it.
+//! The supervisor: phase of the machine, its cause, and the codes while the law does not run.
 //!
 //! ```text
 //!             arm              time and wiring, all good          run
@@ -9,8 +9,9 @@
 //!     │ acknowledge               │ for a cause
 //!     └───────── faulted ◄────────┘            a cause that takes the amplifiers off at once: from any phase to faulted
 //! ```
-//! The law runs in one phase only. In all others codes stand still or go to rest by whole codes, never by more than the slew
-//! limit, so that no reading and no request can make a jump; while arming, each leg makes one small pulse. `docs/supervisor.md` has the table of causes.
+//! The law runs in one phase only. In all others codes are constant or ramp to rest by whole codes, never faster than
+//! the slew limit, so that no reading and no request can cause a jump. While arming, each leg makes one small pulse.
+//! `docs/supervisor.md` has the table of causes.
 //!
 //! | module | what |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! Bumpless change of mode: what the new law asks for differs from where the legs are, and the difference is faded out.
+//! Bumpless change of mode: the difference between the new law's request and the legs' position is faded out.
 
 use crate::real::Real;
 
@@ -7,13 +7,13 @@ crate::state! { |words|
     pub struct Transfer<T>[T: Real] {
         /// Offset of each leg, m.
         offset: [T; 6] = [T::ZERO; 6], numbers(words.sizes().request);
-        /// Any of them is left.
+        /// Whether any of them is left.
         active: bool = false, set;
     }
 }
 
 impl<T: Real> Transfer<T> {
-    /// Begins to fade `offset` (m).
+    /// Starts to fade `offset` (m).
     #[inline]
     pub fn begin(&mut self, offset: [T; 6]) {
         self.offset = offset;
@@ -27,15 +27,15 @@ impl<T: Real> Transfer<T> {
         &self.offset
     }
 
-    /// Any offset is left.
+    /// Whether any offset is left.
     #[inline]
     #[must_use]
     pub fn is_active(&self) -> bool {
         self.active
     }
 
-    /// One tick: `keep` (in [0, 1)) of each offset is left, and none once it is below `negligible` (m, > 0), so that it
-    /// ends in zero rather than in subnormal numbers.
+    /// One tick: leaves the fraction `keep` (in [0, 1)) of each offset, and zero once it is below `negligible` (m, >
+    /// 0), so that it does not end in subnormal numbers.
     #[inline]
     pub fn fade(&mut self, keep: T, negligible: T) {
         if !self.active {

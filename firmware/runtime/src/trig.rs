@@ -1,7 +1,7 @@
-//! Sine and cosine from IEEE basic operations alone: the same bits on every machine, no table, no call.
+//! Sine and cosine from IEEE basic operations only: the same bits on every machine, no table, no library call.
 //!
-//! The kernels are those of fdlibm (f64) and Cephes (f32) for |angle| ≤ π/4. Larger angles come as fractions of a turn
-//! in fixed point, whose reduction is exact.
+//! The kernels are those of fdlibm (f64) and Cephes (f32) for |angle| ≤ π/4. Larger angles are fractions of a turn in
+//! fixed point, whose reduction is exact.
 
 use crate::real::Real;
 
@@ -28,16 +28,16 @@ pub fn versine<T: Real>(angle: T) -> T {
     sine_versine(angle).1
 }
 
-/// sin and cos of `phase`/2⁶⁴ of a turn. Every phase is meant; the reduction to an eighth of a turn is exact.
+/// sin and cos of `phase`/2⁶⁴ of a turn, for every phase. The reduction to an eighth of a turn is exact.
 ///
-/// A phase accumulator of this form runs for ever without drift: it wraps where the turn does. Absolute error within
-/// 2 ulp of 1.
+/// Such a phase accumulator never drifts: it wraps at a full turn. Absolute error within 2 ulp of 1.
 #[inline]
 #[must_use]
 pub fn sine_cosine_turns<T: Real>(phase: u64) -> (T, T) {
     let nearest = phase.wrapping_add(1 << 61);
     let rest = nearest.wrapping_sub(1 << 61).wrapping_sub(nearest & (3 << 62));
-    // A signed number of 62 bits as two exact integers: no conversion of 64 bits, which is a call on a microcontroller.
+    // A signed number of 62 bits as two exact integers. A conversion of 64 bits would be a library call on a
+    // microcontroller.
     let high = T::from_i32((rest >> 32) as i32) * T::from_f64(RADIANS_PER_HIGH);
     let low = T::from_i32((rest as u32 >> 1) as i32) * T::from_f64(RADIANS_PER_LOW);
     let (sine, cosine) = sine_cosine(high + low);
@@ -89,7 +89,7 @@ fn cosine_tail<T: Real>(z: T) -> T {
 #[inline]
 fn cosine_kernel<T: Real>(z: T) -> T {
     let tail = cosine_tail(z);
-    // What 1 − z/2 rounds off is put back.
+    // Add back what 1 − z/2 rounds off.
     let half = T::HALF * z;
     let near = T::ONE - half;
     near + (((T::ONE - near) - half) + z * z * tail)

@@ -8,15 +8,16 @@
 //! | points | gives a pulse at set-point `first` of a stream or wave, counted from 1, and at every `every`-th after it |
 //! | ticks | gives a pulse at tick `first` of the run, counted from 1, and at every `every`-th after it |
 //!
-//! A position that was passed, in either direction, is armed again once the pose was away from it by the hysteresis h: to the side that
-//! it came from or to the other. With h above the noise it is passed once.
+//! A position that was passed, in either direction, is armed again once the pose has moved away from it by the
+//! hysteresis h, to either side. With h above the noise, each passage is detected once.
 //!
 //! ```text
 //! armed ──x reaches p_k──► near p_k ──|x − p_k| ≥ h──► armed          a pulse on the way in, if its direction is asked for
 //! ```
-//! A pulse lasts `width` ticks, and the line is low for a tick before the next: every pulse has an edge of its own. Positions that are passed
-//! while it is not low, and all but one of those that are passed within a tick, give none and are counted as missed. A tick is the
-//! resolution: a position is passed in the tick whose pose is the first at or beyond it.
+//! A pulse lasts `width` ticks, and the line is low for a tick before the next, so that every pulse has its own edge.
+//! Positions passed while the line is not low, and all but one of those passed within a tick, give no pulse and are
+//! counted as missed. The resolution is a tick: a position is passed in the tick whose pose is the first at or beyond
+//! it.
 
 use core::fmt::Debug;
 
@@ -27,44 +28,44 @@ use crate::snapshot::{LARGEST_PLACE, Snapshot};
 
 /// Most output lines.
 pub const MOST: usize = 4;
-/// Most steps from start to stop, as the ranges of settings see to it.
+/// Most steps from start to stop, guaranteed by the ranges of settings.
 pub const MOST_STEPS: i32 = 1 << 20;
 /// Longest pulse, ticks.
 pub const LONGEST: i32 = 1_000_000;
-/// Largest number of missed pulses that is counted.
+/// Largest count of missed pulses.
 pub const MOST_MISSED: i32 = 0x7fff;
 
 /// Bit of the status of each line: it is high.
 pub const HIGH: [u32; MOST] = [1 << 6, 1 << 7, 1 << 14, 1 << 15];
-/// Bit 21 of the status: some line has missed a pulse since its settings were given.
+/// Bit 21 of the status: a line has missed a pulse since its settings were written.
 pub const MISSED: u32 = 1 << 21;
 
 choice! {
-    /// What a line shows.
+    /// Function of a line.
     pub enum Kind {
-        /// Nothing: it is low.
+        /// Off: it is low.
         Off = 0,
         /// Positions passed.
         Position = 1,
-        /// The pose within bounds.
+        /// High while the pose is within bounds.
         Level = 2,
-        /// The set-point in motion.
+        /// High while the set-point moves.
         Motion = 3,
-        /// Set-points of a stream or wave.
+        /// Pulses at set-points of a stream or wave.
         Points = 4,
-        /// Ticks of the run.
+        /// Pulses at ticks of the run.
         Ticks = 5,
     }
 }
 
 choice! {
-    /// Which passages of a position give a pulse.
+    /// Direction of passages that give a pulse.
     pub enum Direction {
         /// All.
         Both = 0,
-        /// Those with the pose rising.
+        /// Only with the pose rising.
         Up = 1,
-        /// Those with the pose falling.
+        /// Only with the pose falling.
         Down = 2,
     }
 }
@@ -83,7 +84,7 @@ crate::state! { |words|
         pub start: T = T::ZERO, number(words.sizes().line);
         /// Last position, or upper end of the level; not below `start`.
         pub stop: T = T::ZERO, number(words.sizes().line);
-        /// From position to position, > 0 and so large that there are at most [`MOST_STEPS`].
+        /// Distance between positions, > 0, large enough for at most [`MOST_STEPS`].
         pub step: T = T::ONE, number(LARGEST_PLACE);
         /// h, m or rad.
         pub hysteresis: T = T::ZERO, number(words.sizes().line);
@@ -91,17 +92,17 @@ crate::state! { |words|
         pub first: u32 = 1, tally;
         /// Set-points or ticks from pulse to pulse, ≥ 1.
         pub every: u32 = 1, tally;
-        /// Last set-point or tick that may have one; 0: there is no last one.
+        /// Last set-point or tick with a pulse; 0: no last one.
         pub last: u32 = 0, tally;
         /// Length of a pulse, ticks ≥ 1.
         pub width: i32 = 1, ticks(LONGEST);
     }
 }
 
-/// What a tick shows.
+/// Inputs of the lines in a tick.
 #[derive(Debug, Clone, Copy)]
 pub struct Observation<'a, T> {
-    /// Measured pose from rest, m and rad; the last one believed.
+    /// Last valid measured pose from rest, m and rad.
     pub pose: &'a [T; 6],
     /// The set-point moves.
     pub moves: bool,
@@ -123,23 +124,24 @@ choice! {
 }
 
 crate::state! { |words|
-    /// What is remembered of a line.
+    /// State of a line.
     struct Watch<T>[T: Real] {
-        /// The settings that all else belongs to.
+        /// The settings that the state belongs to.
         line: Line<T> = Line::new(), part;
         place: Place = Place::Unknown, choice;
         passed: i32 = 0, ticks(MOST_STEPS + 1);
-        /// Set-points or ticks so far, and how many go by without a pulse before the next.
+        /// Set-points or ticks so far, and how many remain before the next pulse.
         count: u32 = 0, tally;
         left: u32 = 0, tally;
-        /// Ticks that the line is still high.
+        /// Ticks that the line remains high.
         high: i32 = 0, ticks(LONGEST);
         missed: i32 = 0, ticks(MOST_MISSED);
     }
 }
 
 crate::state! { |words|
-    /// All lines of a controller; `N` is 0 where it has none, which costs neither memory nor instructions.
+    /// All lines of a controller; `N` is 0 for a controller without lines, which then cost no memory and no
+    /// instructions.
     pub struct Triggers<T, N>[T: Real, const N: usize] {
         lines: [Watch<T>; N] = [Watch::new(); N], parts;
         /// Counter of the stream at the last tick.
@@ -154,20 +156,20 @@ impl<T: Real> Line<T> {
         self.start + T::from_i32(index) * self.step
     }
 
-    /// What no position lies above.
+    /// Upper bound of the positions.
     #[inline]
     fn top(&self) -> T {
         self.stop + self.step * T::HALF
     }
 
-    /// How many positions are not above `pose`.
+    /// Number of positions that are not above `pose`.
     fn below(&self, pose: T) -> i32 {
         let top = self.top();
         let pose = if pose < top { pose } else { top };
         if pose < self.start {
             return 0;
         }
-        // The quotient is off by less than one, for there are not so many positions.
+        // The quotient is off by less than one, because the number of positions is limited.
         let index = ((pose - self.start) / self.step).truncate();
         let index = if index > MOST_STEPS { MOST_STEPS } else { index };
         if self.position(index) > pose {
@@ -181,7 +183,7 @@ impl<T: Real> Line<T> {
 }
 
 impl<T: Real> Watch<T> {
-    /// One tick of a run; whether the line is high.
+    /// One tick of a run. Returns whether the line is high.
     #[inline(never)]
     fn tick(&mut self, line: &Line<T>, seen: &Observation<'_, T>, fresh: bool) -> bool {
         if self.line != *line {
@@ -225,7 +227,7 @@ impl<T: Real> Watch<T> {
         self.high > 0
     }
 
-    /// The line is low, and what is seen next is a beginning.
+    /// Sets the line low and starts afresh.
     fn rest(&mut self) {
         self.place = Place::Unknown;
         self.count = 0;
@@ -247,7 +249,7 @@ impl<T: Real> Watch<T> {
         i32::from(line.last == 0 || self.count <= line.last)
     }
 
-    /// The pose is at `x`; how many positions it has passed in a direction that is asked for.
+    /// Takes the pose `x`. Returns how many positions it has passed in the selected direction.
     #[inline]
     fn passes(&mut self, line: &Line<T>, x: T) -> i32 {
         match self.place {
@@ -276,7 +278,7 @@ impl<T: Real> Watch<T> {
         }
     }
 
-    /// Where the pose is at first: a position within the hysteresis counts as passed.
+    /// Initial state: a position within the hysteresis counts as passed.
     fn settle(&mut self, line: &Line<T>, x: T) {
         let below = line.below(x);
         let next = line.position(below);
@@ -298,7 +300,7 @@ impl<T: Real> Watch<T> {
     }
 
     fn fall(&mut self, line: &Line<T>, x: T) -> i32 {
-        // One that the pose is exactly at is passed, too.
+        // A position exactly at the pose is passed, too.
         let at = line.below(x);
         let below = if at > 0 && line.position(at - 1) >= x { at - 1 } else { at };
         let passed = self.passed - below;
@@ -310,7 +312,7 @@ impl<T: Real> Watch<T> {
 
 /// Output lines.
 pub trait OutputLines<T: Real>: Copy + Debug + Snapshot {
-    /// What each line shows.
+    /// Settings of the lines.
     type Settings: Copy + Debug + PartialEq + AsRef<[Line<T>]> + AsMut<[Line<T>]>;
     /// All lines low.
     const LOW: Self;
@@ -318,9 +320,10 @@ pub trait OutputLines<T: Real>: Copy + Debug + Snapshot {
     fn any(&self) -> bool;
     /// One tick of a run under these settings; the lines as bits of the status: [`HIGH`], [`MISSED`].
     fn tick(&mut self, lines: &Self::Settings, seen: &Observation<'_, T>) -> u32;
-    /// One tick outside a run: all lines are low. What was missed stays: [`MISSED`].
+    /// One tick outside a run: all lines are low. [`MISSED`] keeps its value.
     fn rest(&mut self) -> u32;
-    /// Pulses that each line has missed since its settings were given, up to [`MOST_MISSED`]: 15 bits a line, the first lowest.
+    /// Pulses that each line has missed since its settings were written, up to [`MOST_MISSED`]: 15 bits a line, the
+    /// first lowest.
     #[must_use]
     fn missed(&self) -> u64;
 }
@@ -371,7 +374,7 @@ impl<T: Real + Debug, const N: usize> OutputLines<T> for Triggers<T, N> {
     }
 }
 
-/// The lines that are high, by a status: bit k for line k.
+/// The lines that are high in a status: bit k for line k.
 #[inline]
 #[must_use]
 pub const fn lines(status: u32) -> u32 {

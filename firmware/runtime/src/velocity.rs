@@ -4,9 +4,9 @@
 //! v_n = (1 − α) v_{n−1} + (α/T) (h_n − h_{n−1}),   α = 1 − exp(−ω_c T)
 //! V(z)/H(z) = (α/T) (1 − z⁻¹) / (1 − (1 − α) z⁻¹)
 //! ```
-//! α makes the low-pass the exact sampled form of 1/(1 + s/ω_c). A ramp gives its slope once the start has died away
-//! (e^{−ω_c t}); a slow sine gives its derivative late by T/2 + (1 − α) T/α ≈ 1/ω_c. White noise of σ on the pose becomes
-//! σ (α/T) √(2/(2 − α)) on the rate.
+//! α makes the low-pass the exact sampled form of 1/(1 + s/ω_c). A ramp gives its slope once the initial transient has
+//! decayed (e^{−ω_c t}). A slow sine gives its derivative with a delay of T/2 + (1 − α) T/α ≈ 1/ω_c. White noise of σ
+//! on the pose becomes σ (α/T) √(2/(2 − α)) on the rate.
 
 use crate::real::Real;
 
@@ -20,13 +20,13 @@ pub struct RateFilter<T> {
 }
 
 crate::state! { |words|
-    /// Rates of six coordinates: what is remembered. At rest and without a last pose at reset.
+    /// State of the rates of six coordinates. At rest and without a last pose at reset.
     pub struct Rate<T>[T: Real] {
         /// Last pose, m and rad.
         previous: [T; 6] = [T::ZERO; 6], axes(words.sizes().pose);
         /// Last rate, per s.
         value: [T; 6] = [T::ZERO; 6], axes(words.sizes().pose_rate);
-        /// There is a last pose to take a difference from.
+        /// Whether there is a last pose to take a difference from.
         primed: bool = false, set;
     }
 }
@@ -39,8 +39,8 @@ impl<T: Real> Rate<T> {
         &self.value
     }
 
-    /// A new pose (finite), one period after the last call. The first one, and the first after [`Rate::coast`], only gives the next
-    /// one something to differ from: a jump over a gap is not a rate.
+    /// Takes a new pose (finite), one period after the last call. The first one, and the first after [`Rate::coast`],
+    /// gives no rate: a jump over a gap is not a rate.
     #[inline]
     pub fn update(&mut self, filter: &RateFilter<T>, pose: &[T; 6]) {
         for ((value, previous), present) in self.value.iter_mut().zip(&mut self.previous).zip(pose) {
@@ -51,7 +51,7 @@ impl<T: Real> Rate<T> {
         self.primed = true;
     }
 
-    /// A period without a pose: the estimate dies away as the low-pass does.
+    /// A period without a pose: the estimate decays with the low-pass.
     #[inline]
     pub fn coast(&mut self, filter: &RateFilter<T>) {
         for value in &mut self.value {
@@ -60,7 +60,7 @@ impl<T: Real> Rate<T> {
         self.primed = false;
     }
 
-    /// Back to reset: nobody asks for the rate. Costs next to nothing once done.
+    /// Resets the filter while the rate is not needed. Costs almost nothing when already reset.
     #[inline]
     pub fn rest(&mut self) {
         if self.primed {

@@ -1,4 +1,5 @@
-//! The wave generator: set-points on board in fixed memory, clocked by the tick, for identification, tests and records.
+//! The wave generator: set-points from the controller's own tick, in fixed memory, for identification, tests and
+//! records.
 //!
 //! Each of the six axes (of the pose, or the legs) has a [`Shape`] about an offset. All of them begin and end together at the
 //! `center`, smoothly: the wave is
@@ -6,9 +7,9 @@
 //! ```text
 //! h_d = center + e(t) (offset + s(t))        e: 0 → 1 over `ramp_ticks` as x³ (10 − 15 x + 6 x²), and back at the end
 //! ```
-//! with analytic rates and accelerations. What would leave the range of an axis, or be faster than its stream may be, is refused
-//! before it begins ([`Wave::load`]); the controller checks every set-point again. Sine and chirp count their phase in 2⁻⁶⁴
-//! turns and take their sine from [`crate::trig`]: the same bits everywhere, no drift however long they run.
+//! with analytic rates and accelerations. A wave that would leave the range of an axis, or exceed the limits of its
+//! stream, is refused before it begins ([`Wave::load`]). The controller checks every set-point again. Sine and chirp
+//! count their phase in 2⁻⁶⁴ turns and use [`crate::trig`]: the same bits everywhere, and no drift.
 
 mod shape;
 mod words;
@@ -21,7 +22,7 @@ use crate::real::Real;
 use crate::setpoint::{Frames, Setpoints};
 use shape::{Cursor, Sample};
 
-/// What a wave has to keep to.
+/// Limits of a wave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits<T> {
     /// Lowest and highest set-point of each axis, m and rad.
@@ -37,8 +38,8 @@ pub struct Limits<T> {
 }
 
 impl<T: Real> Limits<T> {
-    /// Those of the streams of a platform. In frames that turn the user's coordinates the range is that of the platform's; the
-    /// controller refuses what is beyond it.
+    /// The limits of a platform's streams. In frames that rotate the user's coordinates, the range is that of the
+    /// platform; the controller refuses set-points beyond it.
     #[must_use]
     pub fn of<F: Frames<T>>(setpoints: &Setpoints<T, F>) -> Self {
         let mut limits = Self {
@@ -59,7 +60,7 @@ impl<T: Real> Limits<T> {
 /// A wave of six axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings<T> {
-    /// Where it begins and ends, m and rad.
+    /// Pose at its start and end, m and rad.
     pub center: [T; 6],
     /// By axis.
     pub axes: [AxisWave<T>; 6],
@@ -67,16 +68,16 @@ pub struct Settings<T> {
     pub tones: [Tone<T>; TONES],
     /// Ticks of the smooth start and of the smooth end, ≥ 1.
     pub ramp_ticks: i32,
-    /// Ticks from the start until it ends by itself; 0 if it goes on until it is stopped.
+    /// Ticks from the start until it ends by itself; 0: it runs until it is stopped.
     pub ticks: i32,
 }
 
-/// Why a wave is not taken.
+/// Reason why a wave is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
-    /// One is under way.
+    /// Another one is under way.
     Busy,
-    /// A word that is no number, or none that its place can hold.
+    /// A word that is not a number, or out of range for its place.
     Word(usize),
     /// The axis would leave its range.
     Range(usize),
@@ -86,16 +87,16 @@ pub enum Refusal {
     Acceleration(usize),
 }
 
-/// What a wave is doing.
+/// State of a wave.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// Nothing.
     Idle,
-    /// Its amplitude grows: ticks since the start.
+    /// The amplitude grows: ticks since the start.
     Starting(i32),
     /// At full amplitude.
     Running,
-    /// Its amplitude falls: ticks since that began.
+    /// The amplitude falls: ticks since the stop.
     Ending(i32),
 }
 
@@ -107,15 +108,15 @@ pub struct Wave<T> {
     stage: Stage,
     /// Ticks since the start.
     tick: i32,
-    /// To end as soon as it has started.
+    /// Stop as soon as the start is complete.
     stop: bool,
     cursors: [Cursor; 6],
-    /// Set-points given so far.
+    /// Number of set-points so far.
     sequence: u32,
 }
 
 impl<T: Real> Wave<T> {
-    /// Idle, with a wave that stands still.
+    /// Idle, with a constant wave.
     #[must_use]
     pub const fn new(limits: Limits<T>) -> Self {
         Self {
@@ -129,28 +130,28 @@ impl<T: Real> Wave<T> {
         }
     }
 
-    /// What it is doing.
+    /// Its state.
     #[must_use]
     pub fn stage(&self) -> Stage {
         self.stage
     }
 
-    /// Where it begins and ends.
+    /// Pose at its start and end.
     #[must_use]
     pub fn center(&self) -> &[T; 6] {
         &self.settings.center
     }
 
-    /// Set-points given so far: the `sequence` of a stream.
+    /// Number of set-points so far: the `sequence` of a stream.
     #[must_use]
     pub fn sequence(&self) -> u32 {
         self.sequence
     }
 
-    /// Takes other settings, as words ([`Settings::to_words`]).
+    /// Takes new settings, as words ([`Settings::to_words`]).
     ///
     /// # Errors
-    /// A wave is under way, a word is none, or an axis would go beyond its limits; the settings stay.
+    /// If a wave is under way, a word is invalid, or an axis would exceed its limits. The settings are then unchanged.
     pub fn load(&mut self, words: &[u64; WORDS]) -> Result<(), Refusal> {
         self.set(&Settings::from_words(words)?)
     }
@@ -168,7 +169,7 @@ impl<T: Real> Wave<T> {
         Ok(())
     }
 
-    /// Begins, if none is under way.
+    /// Starts, if no wave is under way.
     pub fn start(&mut self) {
         if self.stage == Stage::Idle {
             self.stage = Stage::Starting(0);
@@ -180,12 +181,13 @@ impl<T: Real> Wave<T> {
         }
     }
 
-    /// Ends smoothly; a start is finished first.
+    /// Ends smoothly; a start in progress is completed first.
     pub fn stop(&mut self) {
         self.stop = true;
     }
 
-    /// The set-point at the end of the coming interval; none if no wave is under way. The last one stands still at the center.
+    /// The set-point at the end of the next interval; none if no wave is under way. The last one is at rest at the
+    /// center.
     #[inline]
     pub fn advance(&mut self) -> Option<Motion<T>> {
         let envelope = self.envelope()?;
@@ -204,7 +206,7 @@ impl<T: Real> Wave<T> {
         Some(target)
     }
 
-    /// e one tick on, with its derivatives per tick.
+    /// Moves e one tick on, with its derivatives per tick.
     #[inline]
     fn envelope(&mut self) -> Option<Sample<T>> {
         let full = Sample { value: T::ONE, rate: T::ZERO, bend: T::ZERO };
@@ -266,7 +268,7 @@ impl<T: Real> Settings<T> {
         }
     }
 
-    /// Whether each axis keeps within its limits, ramps included.
+    /// Whether each axis stays within its limits, ramps included.
     fn check(&self, limits: &Limits<T>) -> Result<(), Refusal> {
         // Largest slope and curvature of the envelope: 15/8, and 10/√3 rounded up.
         let n = T::from_i32(if self.ramp_ticks > 0 { self.ramp_ticks } else { 1 });
@@ -278,7 +280,7 @@ impl<T: Real> Settings<T> {
             let (low, high) = (axis.offset + peak.low, axis.offset + peak.high);
             let lowest = center + if low < T::ZERO { low } else { T::ZERO };
             let highest = center + if high > T::ZERO { high } else { T::ZERO };
-            // Asked so that what is not a number is refused.
+            // Written so that a NaN is refused.
             if !(lowest >= limits.low[index] && highest <= limits.high[index]) {
                 return Err(Refusal::Range(index));
             }

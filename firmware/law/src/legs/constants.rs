@@ -1,4 +1,4 @@
-//! What the law has to know of six legs.
+//! Constants of six legs that the law needs.
 
 use super::lead::DeadTimeLead;
 use crate::spec::Spec;
@@ -7,23 +7,23 @@ use crate::spec::Spec;
 #[derive(Debug, Clone, Copy)]
 pub struct LegSpace;
 
-/// Constants of six legs, and the type of what has a size of its own.
+/// Constants of six legs, and the types of parts whose size depends on the spec.
 pub trait SixLegs: Spec<Law = LegSpace> {
-    /// What a leg is asked for ahead of its dead time, or none.
+    /// Lead that compensates a leg's dead time, or none.
     type Lead: DeadTimeLead<Self::Real>;
 
-    /// Lead of the leg displacements asked for, ticks.
+    /// Lead of the leg displacements, ticks.
     fn lead(&self) -> Self::Real;
-    /// Most that it adds to a demand, m.
+    /// Largest lead, m.
     fn lead_limit(&self) -> Self::Real;
-    /// Lowest and highest displacement that is accepted as a set-point, m.
+    /// Lowest and highest permitted set-point of a leg, m.
     fn leg_setpoint(&self) -> &[Self::Real; 2];
     /// ρ̂ of a leg, m/V.
     fn leg_gain(&self) -> Self::Real;
     /// Control period, s.
     fn period_seconds(&self) -> f64;
-    /// What is left after a tick of the way to the set-point when the law begins.
+    /// Fraction of the approach's offset that is left after a tick.
     fn approach_keep(&self) -> Self::Real;
-    /// A way this short, m and rad, is none.
+    /// Offset that counts as zero, m and rad.
     fn approach_negligible(&self) -> Self::Real;
 }

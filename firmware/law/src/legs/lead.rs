@@ -1,21 +1,21 @@
-//! What a leg is asked for ahead of its dead time.
+//! Lead of a leg that compensates its dead time.
 
 use core::fmt::Debug;
 
 use specgen_runtime::{Real, Snapshot};
 
-/// What a leg is asked for beyond the demand, so that it arrives in time; or nothing.
+/// A lead on a leg's demand that compensates its dead time; or none.
 pub trait DeadTimeLead<T: Real>: Copy + Debug + Snapshot {
     /// None asked for.
     const REST: Self;
-    /// From now on none is asked for.
+    /// Resets the lead to zero.
     #[inline(always)]
     fn rest(&mut self) {
         *self = Self::REST;
     }
-    /// Asks for so much, m. `lead` is not called where there is none.
+    /// Sets the lead, m. `lead` is not called if the controller has none.
     fn ask(&mut self, lead: impl FnOnce() -> T);
-    /// What is asked for, m.
+    /// The lead, m.
     fn asked(&self) -> Option<T>;
 }
 

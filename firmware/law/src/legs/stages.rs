@@ -1,4 +1,4 @@
-//! Parts of the tick as functions of their own, for measuring what each costs. The tick does not use them.
+//! Parts of the tick as separate functions, to measure their cost. The tick does not use them.
 
 use specgen_runtime::SetpointKind;
 
@@ -11,7 +11,7 @@ use crate::memory::LegMemory as _;
 use crate::spec::{Config, ConstSpec, LEGS};
 use crate::stage::{Stage, stages};
 
-/// Brings a copy of the state to where the stages find it; not measured.
+/// Prepares a copy of the state for the stages; not measured.
 pub fn prepare<P: SixLegs>(p: P, config: &Config<P>, state: &mut State<P>, input: &TickInput<P>) {
     take_setpoint(p, config, state, input);
 }
@@ -31,7 +31,7 @@ stages! { SixLegs, |p, config, state, input, leg|
             *demand = leg.memory.solve(table, *demand - leg.estimate.correction());
         }
     }
-    /// One leg from demand to code: Γ⁻¹, converter and limits, and the reversal memory brought up to date.
+    /// One leg from demand to code: Γ⁻¹, converter and limits, and the update of the reversal memory.
     actuate, LEGS => {
         if let (Some(leg), Some(table), Some(demand)) =
             (state.legs.get_mut(leg), p.tables().get(leg), state.demand.get(leg))

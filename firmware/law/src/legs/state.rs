@@ -1,4 +1,4 @@
-//! What the controller remembers from tick to tick. No NaN or infinity is ever stored here.
+//! State of the controller from tick to tick. It never contains a NaN or infinity.
 
 use specgen_runtime::snapshot::Snapshot;
 use specgen_runtime::{Digest, Estimate, Real as _};
@@ -11,19 +11,19 @@ use crate::spec::{LEGS, Reset};
 specgen_runtime::state! { |words|
     /// State of one leg.
     pub struct LegState<P>[P: SixLegs](reset: &Reset<P>, leg: usize) {
-        /// Reversal memory; its displacement is q̂ = ρ̂X, what was really requested, m.
+        /// Reversal memory. Its displacement is q̂ = ρ̂X, the displacement requested after all limits, m.
         pub memory: P::Memory = reset.memory[leg], part;
         /// Converter code now held at the output.
         pub code: i32 = reset.code, ticks(words.sizes().codes[1]) if *code >= words.sizes().codes[0];
         /// δ̂ and φ̂, m.
         pub estimate: Estimate<P::Real> = Estimate::new(), part;
-        /// What the leg is asked for beyond the demand, so that it arrives in time, m; none without `hysteresis.dead_time`.
+        /// Lead on the demand that compensates the dead time, m; none without `hysteresis.dead_time`.
         pub lead: P::Lead = P::Lead::REST, part;
     }
 }
 
 specgen_runtime::state! { |words|
-    /// State of the controller. Reset: at rest, as the spec says, no correction.
+    /// State of the controller. Reset: at rest by the spec, no correction.
     pub struct State<P>[P: SixLegs](reset: &Reset<P>) {
         /// Legs 0 to 5.
         pub legs: [LegState<P>; LEGS] = [
@@ -38,7 +38,8 @@ specgen_runtime::state! { |words|
 }
 
 impl<P: SixLegs> LegState<P> {
-    /// ρ̂X, m: what the leg is to show. The lead is no part of it: the leg is asked for it so that it arrives in time.
+    /// ρ̂X, m: the displacement that the gauge should show. It does not include the lead, which only compensates the
+    /// dead time.
     #[inline]
     #[must_use]
     pub fn shown(&self) -> P::Real {
@@ -50,7 +51,7 @@ impl<P: SixLegs> LegState<P> {
 }
 
 impl<P: SixLegs> State<P> {
-    /// Fingerprint of everything that later ticks depend on, for comparing two machines bit for bit.
+    /// Fingerprint of the whole state, for comparing two machines bit for bit.
     #[must_use]
     pub fn digest(&self) -> u64 {
         let mut digest = Digest::new();

@@ -1,7 +1,7 @@
 //! One control tick.
 //!
-//! At time t_n the interval that voltage u_n was held over has just ended and Y_n is read; the set-point is that of the
-//! END of the interval that begins now, T_{n+1}, and the voltages that come out are held over it.
+//! At time t_n the interval with voltage u_n has just ended, and Y_n is read. The set-point is for the END of the
+//! interval that begins now, T_{n+1}; the new voltages are held over it.
 
 use specgen_runtime::linear::is_within;
 use specgen_runtime::real::saturate;
@@ -18,7 +18,7 @@ use crate::memory::LegMemory as _;
 use crate::spec::{Config, LEGS};
 use crate::status::SETPOINT_FAULT;
 
-/// The work of a tick of the law, or of what it has fallen back to; returns its status.
+/// A tick of the law, or of its fallback; returns the status.
 pub fn advance<P: SixLegs>(
     p: P,
     config: &Config<P>,
@@ -43,7 +43,7 @@ pub fn advance<P: SixLegs>(
     status
 }
 
-/// T = Δl(h_d), or T itself. A set-point that is not accepted leaves the last demand standing.
+/// T = Δl(h_d), or T itself. A set-point that is not accepted leaves the last demand unchanged.
 #[inline]
 pub fn take_setpoint<P: SixLegs>(p: P, config: &Config<P>, state: &mut State<P>, input: &TickInput<P>) -> bool {
     let accepted = is_accepted(p, config, &input.setpoint);
@@ -56,7 +56,7 @@ pub fn take_setpoint<P: SixLegs>(p: P, config: &Config<P>, state: &mut State<P>,
     accepted
 }
 
-/// Every number of a set-point is finite, and within the declared workspace or the legs' range.
+/// Whether every number of a set-point is finite, and within the declared workspace or the legs' range.
 #[inline]
 pub fn is_accepted<P: SixLegs>(p: P, config: &Config<P>, setpoint: &[P::Real; LEGS]) -> bool {
     match config.setpoint {
@@ -74,7 +74,7 @@ fn count_run<P: SixLegs>(config: &Config<P>, state: &mut State<P>) -> bool {
     ends
 }
 
-/// m = Y − ρ̂X, then (AII.3) or (AII.5), (AII.6), with what the fallback leaves of the weights.
+/// m = Y − ρ̂X, then (AII.3) or (AII.5), (AII.6), with the weights of the fallback stage.
 #[inline]
 fn adapt<P: SixLegs>(config: &Config<P>, leg: &mut LegState<P>, fallback: Fallback, gauge: P::Real) {
     let model_error = gauge - leg.shown();
@@ -83,8 +83,8 @@ fn adapt<P: SixLegs>(config: &Config<P>, leg: &mut LegState<P>, fallback: Fallba
     leg.estimate.update(config.law, level, drift, model_error);
 }
 
-/// u = Γ⁻¹(T − δ̂ − φ̂) as a permitted code; the memory then holds what that code really requests. Returns whether a
-/// limit of table, voltage or slew rate held the leg back.
+/// u = Γ⁻¹(T − δ̂ − φ̂) as a permitted code; the memory then follows that code. Returns whether a limit of table,
+/// voltage or slew rate held the leg back.
 #[inline]
 pub fn actuate<P: SixLegs>(p: P, config: &Config<P>, leg: &mut LegState<P>, table: &P::Table, demand: P::Real) -> bool {
     let led = match leg.lead.asked() {

@@ -1,4 +1,4 @@
-//! How the law begins, works and stands still under the supervisor.
+//! The law under the supervisor: start, run and hold.
 
 use specgen_runtime::linear::component;
 use specgen_runtime::sensing::faults;
@@ -35,7 +35,7 @@ impl<P: SixLegs> ControlLaw<P> for LegSpace {
         state.legs.iter_mut().map(|LegState { code, memory, .. }| (code, memory))
     }
 
-    /// What a leg ought to show by the code sent, and the demand on it, m.
+    /// Expected reading of a leg by the code sent, and its demand, m.
     #[inline]
     fn expected_reading(_p: P, state: &State<P>, channel: usize) -> (P::Real, P::Real) {
         match state.legs.get(channel) {
@@ -54,9 +54,9 @@ impl<P: SixLegs> ControlLaw<P> for LegSpace {
         advance(p, config, state, fallback, input)
     }
 
-    /// The demand on a leg is where its gauge shows it, and its level estimate is what the model lacks to that, so that the code held
-    /// stays what the law asks for. Without adaptation, or where the gauge is not believed, the demand is where the model has the leg.
-    /// From there the demand goes to the set-point that is given.
+    /// The demand of a leg starts at its gauge reading, and the level estimate at the difference between model and
+    /// reading, so that the law requests the present code. Without adaptation, or with an invalid reading, the demand
+    /// starts at the model's displacement. From there the demand approaches the set-point.
     #[cold]
     #[inline(never)]
     fn enter_running(p: P, config: &Config<P>, machine: &mut Machine<P>, input: &TickInput<P>) {
@@ -104,7 +104,7 @@ impl<P: SixLegs> ControlLaw<P> for LegSpace {
     }
 }
 
-/// The tick with the set-point that the law is given on its way to the one that is asked for.
+/// The tick with the set-point of the approach.
 #[cold]
 #[inline(never)]
 fn approaching<P: SixLegs>(

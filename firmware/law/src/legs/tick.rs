@@ -1,5 +1,5 @@
-//! What a tick reads and yields, and both as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every target
-//! reads and writes these, so that two of them can be compared bit for bit.
+//! Input and output of a tick, also as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every
+//! target reads and writes these words, so that two targets can be compared bit for bit.
 
 use specgen_runtime::Real as _;
 use specgen_runtime::snapshot::Writer;
@@ -12,13 +12,13 @@ use crate::words::{names, six};
 /// Words of a tick's input.
 pub const INPUT_WORDS: usize = 12;
 
-/// Words of a command: they stand before those that are measured.
+/// Words of a command: the first of an input, before the measured ones.
 pub const COMMAND_WORDS: usize = 6;
 
 /// Words of a tick's output.
 pub const OUTPUT_WORDS: usize = 37;
 
-/// Words of where a platform is: six legs know of none.
+/// Words of the platform's pose: none, because six legs do not measure it.
 pub const PLACE_WORDS: usize = 0;
 
 /// Names of the input words.
@@ -28,11 +28,11 @@ pub const INPUT_NAMES: [&str; INPUT_WORDS] = names![; "setpoint", "displacement"
 pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] =
     names![; "voltage", "requested", "demand", "level", "drift", "dac_code"; "status"];
 
-/// What a tick reads.
+/// Input of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TickInput<P: SixLegs> {
-    /// Set-point for the end of the coming interval: pose from rest (m, rad) or leg displacements (m), as
-    /// [`Settings::setpoint`](super::Settings::setpoint) says.
+    /// Set-point for the end of the next interval: pose from rest (m, rad) or leg displacements (m), as selected by
+    /// [`Settings::setpoint`](super::Settings::setpoint).
     pub setpoint: [P::Real; 6],
     /// Gauge reading Y of each leg, m, zero at rest.
     pub displacement: [P::Real; LEGS],
@@ -43,7 +43,7 @@ impl<P: SixLegs> Input<P> for TickInput<P> {
         Self { setpoint: six(words, 0), displacement: six(words, COMMAND_WORDS) }
     }
 
-    /// No wrench is asked for.
+    /// A measured wrench is ignored.
     fn measured(_p: P, command: &[u64], gauge: &[P::Real; 6], _wrench: &[P::Real; 6]) -> Self {
         Self { setpoint: six(command, 0), displacement: *gauge }
     }
@@ -72,8 +72,8 @@ impl<P: SixLegs + ConstSpec> TickInput<P> {
     }
 }
 
-/// Writes the words of a tick's output, of a tick and of the state that it left, in the order of [`OUTPUT_NAMES`]: `requested` is what
-/// was really requested of each leg, after all limits, `level` and `drift` are δ̂ and φ̂; m.
+/// Writes the words of a tick's output and of the state after it, in the order of [`OUTPUT_NAMES`]. `requested` is the
+/// displacement requested of each leg after all limits, `level` and `drift` are δ̂ and φ̂; m.
 pub fn write_output<P: SixLegs>(_p: P, output: &TickOutput<P>, state: &State<P>, all: &mut [u64]) {
     let Some(words) = all.first_chunk_mut::<OUTPUT_WORDS>() else { return };
     for (index, leg) in state.legs.iter().enumerate() {
@@ -87,7 +87,7 @@ pub fn write_output<P: SixLegs>(_p: P, output: &TickOutput<P>, state: &State<P>,
     words[6 * LEGS] = output.status as u64;
 }
 
-/// Where a platform is: nothing of it is known.
+/// The platform's pose: unknown.
 #[must_use]
 pub fn place_words<P: SixLegs>(_p: P, _state: &State<P>) -> [u64; PLACE_WORDS] {
     []

@@ -1,4 +1,4 @@
-//! A wave in place of the host's set-points: what it has to keep to, and the input words that it writes.
+//! A wave in place of the host's set-points: its limits, and the input words that it writes.
 
 use specgen_runtime::wave::Limits;
 use specgen_runtime::{Motion, Real, SetpointKind};
@@ -7,11 +7,11 @@ use super::constants::SixLegs;
 use crate::kinematics::leg_displacements;
 use crate::spec::{Config, ConstSpec};
 
-/// No limit of the spec: the slew rate of the amplifiers is what a leg has to keep to, m/s².
+/// Not a limit of the spec: legs are limited by the slew rate of the amplifiers, m/s².
 const ACCELERATION: f64 = 1e6;
 
-/// Range from `actuator.stroke` or, where set-points are poses, `workspace`; the rate is what the slew limit in force
-/// leaves a leg, shared by the six axes of a pose.
+/// Range from `actuator.stroke` or, if set-points are poses, `workspace`. The rate is the present slew limit of a leg,
+/// shared by the six axes of a pose.
 #[must_use]
 pub fn limits<P: SixLegs + ConstSpec>(config: &Config<P>) -> Limits<P::Real> {
     let p = P::CONSTANTS;
@@ -47,11 +47,11 @@ pub fn limits<P: SixLegs + ConstSpec>(config: &Config<P>) -> Limits<P::Real> {
     limits
 }
 
-/// A wave may begin with the next tick: the set-point in force, in `words`, is its center, but for what an axis may move
-/// in a tick. Legs would jump otherwise.
+/// Whether a wave may begin with the next tick: the present set-point, in `words`, must be its center, within an axis's
+/// motion in a tick. Otherwise legs would jump.
 ///
 /// # Errors
-/// The first axis that stands elsewhere.
+/// The first axis that is not there.
 pub fn may_begin<T: Real>(_status: u32, words: &[u64], center: &[T; 6], limits: &Limits<T>) -> Result<(), usize> {
     for (axis, (word, center)) in words.iter().zip(center).enumerate() {
         let away = (T::from_word(*word) - *center).abs();
@@ -68,7 +68,7 @@ pub fn write<T: Real>(motion: &Motion<T>, _sequence: u32, words: &mut [u64]) {
     rest(&motion.pose, words);
 }
 
-/// Writes the command to stay where a wave about `center` has come to rest.
+/// Writes the command to stay where a wave around `center` has ended.
 pub fn rest<T: Real>(center: &[T; 6], words: &mut [u64]) {
     for (slot, number) in words.iter_mut().zip(center) {
         *slot = number.to_word();

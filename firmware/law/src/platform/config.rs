@@ -12,14 +12,14 @@ use crate::words::{code_limits, save_code_limits, six, word};
 const GAINS: usize = 7;
 const LINES: usize = GAINS + 48;
 
-/// Place of the end of a line among its words.
+/// Index of the end of a line among its words.
 const LINE_STOP: usize = 4;
 
-/// What the output lines of a platform show.
+/// Settings of a platform's output lines.
 type LineSettings<P> = <<P as Platform>::Lines as OutputLines<<P as spec::Spec>::Real>>::Settings;
 
 specgen_runtime::state! { |words|
-    /// K_e (h − h_e): a linear model of what the platform presses on.
+    /// K_e (h − h_e): a linear model of the environment.
     #[derive(PartialEq)]
     pub struct Environment<T>[T: Real] {
         /// K_e, N/m and N m/rad, x y z θx θy θz.
@@ -34,7 +34,7 @@ specgen_runtime::state! { |words|
 pub struct Settings<P: Platform> {
     /// P, F or P/F with its run-to-run law; from `control.mode` and `adaptation.mode`.
     pub mode: ControlMode,
-    /// Where the interaction force of (7) comes from; from `control.interaction`.
+    /// Source of the interaction force of (7); from `control.interaction`.
     pub interaction: Interaction,
     /// ω (EWMA) or ω1 (PCC) per tick, within [0, 1]; from `adaptation`.
     pub level_weight: P::Real,
@@ -48,14 +48,14 @@ pub struct Settings<P: Platform> {
     pub position_gains: Gains<P::Real>,
     /// K_e and h_e; from `environment`.
     pub environment: Environment<P::Real>,
-    /// Whether any k_v is other than zero: of `gains`, of `position_gains`.
+    /// Whether any k_v is non-zero: of `gains`, of `position_gains`.
     pub damps: [bool; 2],
-    /// What the output lines show; from `trigger`.
+    /// Functions of the output lines; from `trigger`.
     pub triggers: LineSettings<P>,
 }
 
 impl<P: Platform> Settings<P> {
-    /// Gains of (7) in the present mode: those of P where it works alone.
+    /// Gains of (7) in the present mode: in P, those of P alone.
     #[inline]
     #[must_use]
     pub const fn active_gains(&self) -> &Gains<P::Real> {
@@ -65,7 +65,7 @@ impl<P: Platform> Settings<P> {
         }
     }
 
-    /// Whether any k_v of the present mode is other than zero.
+    /// Whether any k_v of the present mode is non-zero.
     #[inline]
     #[must_use]
     pub const fn damps(&self) -> bool {
@@ -126,7 +126,7 @@ impl<P: Platform> spec::Settings<P> for Settings<P> {
     }
 }
 
-/// The output lines of the words of settings; none of them ends before it starts.
+/// The output lines in the words of settings; none if a line ends before it starts.
 fn lines<P: Platform>(p: P, words: &[u64]) -> Result<LineSettings<P>, ConfigError> {
     let mut lines = *p.lines();
     let mut reader = Reader::new(words.get(LINES..).unwrap_or_default());
@@ -141,7 +141,7 @@ fn lines<P: Platform>(p: P, words: &[u64]) -> Result<LineSettings<P>, ConfigErro
     Ok(lines)
 }
 
-/// Whether any k_v is other than zero.
+/// Whether any k_v is non-zero.
 fn damps<T: Real>(gains: &Gains<T>) -> bool {
     gains.derivative.iter().any(|gain| *gain != T::ZERO)
 }

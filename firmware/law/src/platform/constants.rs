@@ -1,4 +1,4 @@
-//! What the law has to know of a platform.
+//! Constants of a platform that the law needs.
 
 use specgen_runtime::dynamics;
 use specgen_runtime::setpoint::{Frames, Setpoints};
@@ -11,8 +11,8 @@ use crate::spec::{LEGS, Spec};
 #[derive(Debug, Clone, Copy)]
 pub struct TaskSpace;
 
-/// Constants of a platform in task space, and the types of what has a size of its own. One accessor for each constant: of one struct
-/// with all of them the compiler makes slower code.
+/// Constants of a platform in task space, and the types of parts whose size depends on the spec. There is one accessor
+/// for each constant: with a single struct of all constants the compiler makes slower code.
 pub trait Platform: Spec<Law = TaskSpace> {
     /// Active damping, or none.
     type Damping: ModalDamping<Self::Real>;
@@ -22,18 +22,18 @@ pub trait Platform: Spec<Law = TaskSpace> {
     type Lines: OutputLines<Self::Real>;
     /// The user's frames.
     type Frames: Frames<Self::Real>;
-    /// What the gauges' words mean.
+    /// Calibration of the gauges' words.
     type Calibration: GaugeCalibration<Self::Real>;
 
     /// T_s, s.
     fn period(&self) -> Self::Real;
     /// 1/k_a, m/N.
     fn compliance(&self) -> Self::Real;
-    /// J⁻ᵀ/k_a at rest: generalised force on the platform to the displacement of each leg that it takes, m/N and 1/N.
+    /// J⁻ᵀ/k_a at rest: from generalised force on the platform to leg displacements, m/N and 1/N.
     fn wrench_to_legs(&self) -> &[[Self::Real; 6]; LEGS];
     /// k_a Jᵀ at rest, its inverse: N/m and N.
     fn legs_to_wrench(&self) -> &[[Self::Real; LEGS]; 6];
-    /// V⁻¹ K⁻¹ with K = Jᵀ k_a J: generalised force to the deflection it makes, in modal coordinates.
+    /// V⁻¹ K⁻¹ with K = Jᵀ k_a J: from generalised force to deflection, in modal coordinates.
     fn force_to_modes(&self) -> &[[Self::Real; 6]; 6];
     /// V⁻¹ J⁻¹: leg displacements to modal coordinates.
     fn legs_to_modes(&self) -> &[[Self::Real; LEGS]; 6];
@@ -41,19 +41,19 @@ pub trait Platform: Spec<Law = TaskSpace> {
     fn modes_to_legs(&self) -> &[[Self::Real; 6]; LEGS];
     /// The inverse dynamics.
     fn body(&self) -> &dynamics::Platform<Self::Real>;
-    /// To first order the legs give way to inertia and gravity by P h + Q ḧ. None: by the whole kernel.
+    /// First-order model of the legs' deflection under inertia and gravity, P h + Q ḧ. None: the full dynamics.
     fn affine_load(&self) -> Option<&Affine<Self::Real>>;
-    /// Leg forces under which the gauges were zeroed: gravity at rest, N.
+    /// Leg forces at which the gauges were zeroed: gravity at rest, N.
     fn rest_force(&self) -> &[Self::Real; LEGS];
-    /// Largest |component| of the measured wrench that is believed, N and N m.
+    /// Largest valid |component| of the measured wrench, N and N m.
     fn wrench_limit(&self) -> &[Self::Real; 6];
     /// Lead of the leg displacements, in periods. Zero: none.
     fn lead(&self) -> Self::Real;
-    /// Lead of each trajectory, in periods; empty where they have none of their own.
+    /// Lead of each trajectory, in periods; empty if trajectories have no lead of their own.
     fn own_leads(&self) -> &[Self::Real];
-    /// Part of the offset of a change of mode that is left after a tick.
+    /// Fraction of the offset of a change of mode that is left after a tick.
     fn transfer_keep(&self) -> Self::Real;
-    /// Offset of a change of mode below which it is over, m.
+    /// Offset of a change of mode that counts as zero, m.
     fn transfer_negligible(&self) -> Self::Real;
     /// 1/ρ̂ in cells of the Everett grid, 1/m.
     fn cells_per_metre(&self) -> Self::Real;
@@ -63,15 +63,15 @@ pub trait Platform: Spec<Law = TaskSpace> {
     fn notch(&self) -> Option<&Notch<Self::Real>>;
     /// Active damping of each mode.
     fn damping(&self) -> &<Self::Damping as ModalDamping<Self::Real>>::Sections;
-    /// Whether the integral is handed to the estimates when the set-point comes to rest.
+    /// Whether the integral is transferred to the estimates when the set-point comes to rest.
     fn hands_over(&self) -> bool;
-    /// How far and how fast the correction of each axis goes.
+    /// Limits of each axis's correction.
     fn correction(&self) -> &<Self::Correction as RequestCorrection<Self::Real>>::Limits;
-    /// What each output line of the spec shows.
+    /// Function of each output line in the spec.
     fn lines(&self) -> &<Self::Lines as OutputLines<Self::Real>>::Settings;
-    /// What the generator of set-points needs to know.
+    /// Constants of the set-point generator.
     fn setpoints(&self) -> &Setpoints<Self::Real, Self::Frames>;
-    /// Where the gauges are.
+    /// Positions of the gauges.
     fn gauges(&self) -> &Gauges<'_, Self::Real>;
     /// Words to readings in m. Without it a word is a reading.
     fn calibration(&self) -> Option<&Self::Calibration>;

@@ -1,4 +1,5 @@
-//! Errors and innovations in modal coordinates, and the notch on each mode. Without a notch in the spec both are what they were.
+//! Errors and innovations in modal coordinates, and the notch on each mode. Without a notch in the spec both are
+//! unchanged.
 
 use specgen_runtime::NotchState;
 use specgen_runtime::linear::transform;

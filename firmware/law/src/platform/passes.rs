@@ -1,4 +1,4 @@
-//! A pass of a motion that repeats: what it writes into the words of a command, and what a tick shows of it.
+//! A pass of a repeated motion: the command words that it writes, and the result of a tick.
 
 use specgen_runtime::Real;
 use specgen_runtime::pass::PassInput;
@@ -7,15 +7,15 @@ use specgen_runtime::setpoint::CommandKind;
 use super::tick::command_words;
 use crate::status::GENERATOR_BUSY;
 
-/// A pass may begin with the next tick: no motion is under way, and no trajectory is what is asked for. `status` is that of the last tick,
-/// `words` is the command that it ran under.
+/// Whether a pass may begin with the next tick: no motion is under way, and no trajectory is requested. `status` is
+/// that of the last tick, `words` is its command.
 #[must_use]
 pub fn may_begin(status: u32, words: &[u64]) -> bool {
     let plays = words.first().is_some_and(|word| CommandKind::from_word(*word) == CommandKind::Trajectory);
     status & GENERATOR_BUSY == 0 && !plays
 }
 
-/// Writes the correction into the command's words, and the trajectory that begins.
+/// Writes the correction, and the trajectory that begins, into the command's words.
 pub fn write<T: Real>(given: &PassInput<T>, words: &mut [u64]) {
     for (slot, number) in words.iter_mut().skip(command_words(0)).zip(&given.correction) {
         *slot = number.to_word();
@@ -32,7 +32,7 @@ pub fn begin(trajectory: u32, words: &mut [u64]) {
     }
 }
 
-/// Writes that nothing is corrected.
+/// Writes a correction of zero.
 pub fn end<T: Real>(words: &mut [u64]) {
     for slot in words.iter_mut().skip(command_words(0)) {
         *slot = T::ZERO.to_word();

@@ -1,4 +1,4 @@
-//! Pose from six gauges that see the platform, and the filter of its rate.
+//! Pose from six gauges that measure the platform, and the filter of its rate.
 
 use specgen_runtime::linear::component;
 use specgen_runtime::{GaugeCalibration as _, Real as _};
@@ -15,7 +15,8 @@ pub fn readings<P: Platform>(p: P, raw: &[P::Real; 6]) -> [P::Real; 6] {
     }
 }
 
-/// Word of each gauge (rows) per displacement of each leg (columns) near these words, per m: for a host that stands in for gauges.
+/// Word of each gauge (rows) per displacement of each leg (columns) near these words, per m. For a host that simulates
+/// gauges.
 #[must_use]
 pub fn words_per_leg<P: Platform>(p: P, raw: &[P::Real; 6]) -> [[P::Real; 6]; 6] {
     let mut rows = *p.readings_per_leg();
@@ -31,7 +32,7 @@ pub fn words_per_leg<P: Platform>(p: P, raw: &[P::Real; 6]) -> [[P::Real; 6]; 6]
     rows
 }
 
-/// Pose [x y z θx θy θz] from rest (m, rad) of gauge words without faults; finite for these.
+/// Pose [x y z θx θy θz] from rest (m, rad) from valid gauge words; finite.
 #[inline]
 #[must_use]
 pub fn pose<P: Platform>(p: P, raw: &[P::Real; 6]) -> [P::Real; 6] {

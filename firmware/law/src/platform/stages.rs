@@ -1,4 +1,4 @@
-//! Parts of the tick as functions of their own, for measuring what each costs. The tick does not use them.
+//! Parts of the tick as separate functions, to measure their cost. The tick does not use them.
 
 use specgen_runtime::Real as _;
 use specgen_runtime::linear::difference;
@@ -12,7 +12,7 @@ use crate::memory::LegMemory as _;
 use crate::spec::{Config, ConstSpec, LEGS};
 use crate::stage::{Stage, stages};
 
-/// Brings a copy of the state to where the stages find it, with each leg's request in place of its excess; not measured.
+/// Prepares a copy of the state for the stages, with each leg's request in place of its excess; not measured.
 pub fn prepare<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, input: &TickInput<P>) {
     step::sense(p, config, state, &input.gauge);
     state.generator.tick(p.setpoints(), &input.command);
@@ -33,7 +33,7 @@ stages! { Platform, |p, config, state, input, leg|
         let error = modal_error(p, &difference(&state.generator.target().pose, &state.pose));
         state.error = notch_error(p, &mut state.error_notch, &error);
     }
-    /// All that the readings teach: both notches, integral and adaptation.
+    /// Everything learned from the readings: both notches, integral and adaptation.
     learn, 1 => {
         step::learn(p, config, state);
     }
@@ -45,7 +45,7 @@ stages! { Platform, |p, config, state, input, leg|
     dynamics, 1 => {
         state.error = p.body().leg_forces(state.generator.target());
     }
-    /// Motion to leg displacements and to what the legs give way, as the tick takes it.
+    /// Motion to leg displacements and deflections, as in the tick.
     load, 1 => {
         (state.error, state.wrench) = known_load(p, config, state);
     }
@@ -55,7 +55,7 @@ stages! { Platform, |p, config, state, input, leg|
             leg.excess = leg.memory.solve(table, leg.excess);
         }
     }
-    /// One leg from request to code: Γ⁻¹, converter and limits, and the reversal memory brought up to date.
+    /// One leg from request to code: Γ⁻¹, converter and limits, and the update of the reversal memory.
     actuate, LEGS => {
         if let (Some(leg), Some(table)) = (state.legs.get_mut(leg), p.tables().get(leg)) {
             let request = leg.excess;

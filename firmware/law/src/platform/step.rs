@@ -1,7 +1,7 @@
 //! One control tick.
 //!
-//! At time t_n the interval that the voltages u_n were held over has just ended and the gauges are read; the set-point is
-//! that of the END of the interval that begins now, t_{n+1}, and the voltages that come out are held over it.
+//! At time t_n the interval with voltages u_n has just ended, and the gauges are read. The set-point is for the END of
+//! the interval that begins now, t_{n+1}; the new voltages are held over it.
 //!
 //! ```text
 //! sense      gauges → h                                                      pose from rest
@@ -12,16 +12,18 @@
 //!            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T                  damping, lead
 //! legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is what was really requested
 //! ```
-//! N is the modal notch. A correction c that was learned or prepared for the motion (`specgen_runtime::correction`) adds J c to q; like damping the innovation does not see it. Active damping D(z) e, where a spec asks for it, is part of p: `specgen_runtime::damping`. p is a load that the legs really carry, so it belongs to the model of the innovation; the feedback
-//! is none and does not.
+//! N is the modal notch. A correction c that was learned or prepared for the motion (`specgen_runtime::correction`)
+//! adds J c to q; the innovation does not see it, nor the damping. Active damping D(z) e, if the spec has it, is part
+//! of p: `specgen_runtime::damping`. p is a real load on the legs and belongs to the model of the innovation; the
+//! feedback is not a load and does not.
 //!
-//! Y = Δl(h) is taken to first order about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,
-//! offset b of a change of mode) and w = q − q̂ withheld by limits, the innovation is then w − b − f − J e: no large numbers
-//! are subtracted, and f is small in modal coordinates, too. What is left out is the error times the change of J over the
-//! workspace, a thousandth of it, and the rounding of the converter on a leg that is free.
+//! Y = Δl(h) is linearised about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,
+//! offset b of a change of mode) and w = q − q̂ withheld by limits, the innovation is then w − b − f − J e: no large
+//! numbers are subtracted, and f is small in modal coordinates, too. This neglects the error times the change of J over
+//! the workspace, about a thousandth of the error, and the rounding of the converter on a free leg.
 //!
-//! δ̂ and φ̂ are kept in modal coordinates, where N works: with the same weights on every leg the law commutes with the map
-//! between them, and one map takes feedback and estimates to the legs, J⁻ᵀF/k_a − δ̂ − φ̂ = J V (V⁻¹K⁻¹F − δ̂ − φ̂).
+//! δ̂ and φ̂ are in modal coordinates, as N is. With equal weights on all legs, the law commutes with the map between
+//! the coordinates, and one map takes feedback and estimates to the legs, J⁻ᵀF/k_a − δ̂ − φ̂ = J V (V⁻¹K⁻¹F − δ̂ − φ̂).
 
 use specgen_runtime::feedback::{force_of, winds_up};
 use specgen_runtime::linear::{difference, each, is_within, transform};
@@ -42,7 +44,7 @@ use crate::memory::LegMemory as _;
 use crate::spec::{Config, LEGS};
 use crate::status::{CORRECTION_LIMITED, WRENCH_FAULT};
 
-/// The work of a tick of the law, or of what it has fallen back to, with `kind` in place of that of the command; returns its status.
+/// A tick of the law, or of its fallback, with `kind` in place of the command's; returns the status.
 pub fn advance<P: Platform>(
     p: P,
     config: &Config<P>,
@@ -107,7 +109,7 @@ pub fn advance<P: Platform>(
     static_inverse | limited | gauge_faults << 8 | setpoint_status | inputs
 }
 
-/// Lead of a trajectory that is played, or of any other motion.
+/// Lead of the trajectory being played, or of any other motion.
 #[inline]
 fn lead<P: Platform>(p: P, played: Option<u32>) -> P::Real {
     match played {
@@ -118,8 +120,8 @@ fn lead<P: Platform>(p: P, played: Option<u32>) -> P::Real {
     }
 }
 
-/// Whether this tick is the first of its mode, or of its source of the interaction force. If so, what the mode does not
-/// use is put at rest; the first request then defines what keeps the voltages where they are.
+/// Whether this tick is the first of its mode, or of its source of the interaction force. If so, the parts that the
+/// mode does not use are reset. The first request then sets the offset that keeps the voltages unchanged.
 #[inline]
 fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bool {
     let (mode, interaction) = (config.mode, config.interaction);
@@ -166,8 +168,8 @@ fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bo
     true
 }
 
-/// Gives what the first `request` of a mode (m of each leg) lacks to where the legs stand to what the mode would itself
-/// come to hold it with: the estimates, else the integral if every axis has one. Else it becomes an offset that fades.
+/// Bumpless change of mode: the difference between the legs' position and the first `request` of a mode (m of each leg)
+/// goes to the estimates, or to the integral if every axis has one. Otherwise it becomes an offset that fades.
 #[cold]
 fn hand_over<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, request: &[P::Real; LEGS]) {
     let held = each(|leg| state.legs[leg].requested - request[leg]);
@@ -185,8 +187,8 @@ fn hand_over<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, reques
     state.transfer.begin(offset);
 }
 
-/// The law falls back, or has all its parts again. What damping and gains asked for against the oscillation ends at once: to keep
-/// what it happened to be in this tick would put the platform off by as much. Integral and estimates stay.
+/// Enters or leaves the fallback. The requests of damping and gains against the oscillation end at once: if they were
+/// frozen, the platform would keep an error of that size. Integral and estimates stay.
 #[cold]
 #[inline(never)]
 fn fall_back<P: Platform>(state: &mut State<P>, fallback: Fallback) {
@@ -194,13 +196,13 @@ fn fall_back<P: Platform>(state: &mut State<P>, fallback: Fallback) {
     state.damping.rest();
     if fallback == Fallback::FeedForward {
         for estimate in &mut state.estimates {
-            // δ̂ would go on with φ̂.
+            // δ̂ would continue to move with φ̂.
             *estimate = Estimate { level: estimate.correction(), drift: P::Real::ZERO };
         }
     }
 }
 
-/// An error, or an innovation, as far as the fallback lets it count.
+/// An error or innovation, scaled by the fallback stage.
 #[cold]
 #[inline(never)]
 fn weaken<T: Real>(fallback: Fallback, values: &mut [T; 6]) {
@@ -210,8 +212,9 @@ fn weaken<T: Real>(fallback: Fallback, values: &mut [T; 6]) {
     }
 }
 
-/// The set-point has come to rest: the estimates take over what the integral gathered on the way. Nothing else of the request changes. Both
-/// work on one error; the integral would give back at the rate of k_I/(1 + k_p) what the estimates unlearn at theirs.
+/// When the set-point comes to rest, the estimates take over the integral. Nothing else of the request changes. Both
+/// act on one error; otherwise the integral would return, at the rate k_I/(1 + k_p), what the estimates unlearn at
+/// their rate.
 #[cold]
 fn rest<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
     let mode = config.mode;
@@ -224,7 +227,7 @@ fn rest<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
     }
 }
 
-/// h and ḣ from the gauges; returns the gauges that are not believed, bit by bit. With any such the last pose is held.
+/// h and ḣ from the gauges; returns the invalid gauges, bit by bit. If a gauge is invalid, the last pose is held.
 #[inline]
 pub fn sense<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, gauge: &[P::Real; 6]) -> u32 {
     let faults = faults(gauge, p.raw_limits());
@@ -241,7 +244,7 @@ pub fn sense<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, gauge:
     faults
 }
 
-/// What the readings teach: the integral of (7), the run-to-run estimates, and what is asked for against the modes.
+/// Updates from the readings: the integral of (7), the run-to-run estimates, and the damping request.
 #[inline]
 pub fn learn<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
     let mode = config.mode;
@@ -278,14 +281,14 @@ pub fn learn<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
     }
 }
 
-/// Whether the integral's growth would push a leg further beyond the limit that holds it back.
+/// Whether the integral's growth would push a leg further beyond its active limit.
 #[inline]
 fn would_wind_up<P: Platform>(p: P, legs: &[LegState<P>; LEGS], growth: &[P::Real; 6]) -> bool {
     let excess = each(|leg| legs[leg].excess);
     winds_up(&excess, &transform(p.wrench_to_legs(), growth))
 }
 
-/// Takes the measured wrench if it is to be believed; one that nobody asks for is not looked at.
+/// Takes the measured wrench if it is valid. If the mode does not use it, it is not checked.
 #[inline]
 fn take_wrench<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, wrench: &[P::Real; 6]) -> bool {
     if config.interaction != Interaction::Measured {
@@ -311,7 +314,8 @@ fn damping<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> Option<[P
     Some(transform(p.wrench_to_legs(), &force_of(&config.active_gains().derivative, &error)))
 }
 
-/// Leg displacements at the set-point, and by how much the legs give way to motion, gravity and the work piece there, (7); m.
+/// Leg displacements at the set-point, and the legs' deflections under motion, gravity and the work piece there, (7);
+/// m.
 #[inline]
 pub fn known_load<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> ([P::Real; LEGS], [P::Real; LEGS]) {
     let target = state.generator.target();
@@ -332,7 +336,7 @@ pub fn known_load<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> ([
     (load.displacement, each(|leg| (load.force[leg] - p.rest_force()[leg]) * p.compliance()))
 }
 
-/// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂, what is asked for against the modes, and J c: m of each leg.
+/// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂, plus the damping request and J c: m of each leg.
 #[inline]
 pub fn reaction<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> [P::Real; LEGS] {
     if config.mode.feeds_back() {
@@ -350,7 +354,7 @@ pub fn reaction<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> 
     transform(p.modes_to_legs(), &wanted)
 }
 
-/// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,
+/// The request as a permitted code; the memory then follows the drive of that code. Returns whether a limit of table,
 /// voltage or slew rate held the leg back.
 #[inline(never)]
 pub fn actuate<P: Platform>(
@@ -366,7 +370,7 @@ pub fn actuate<P: Platform>(
     actuate_limited(p, config, leg, table, request)
 }
 
-/// The short way of a leg that tracks; where it is none, nothing has changed. Returns whether it was one.
+/// The fast path of a tracking leg. If it does not apply, nothing has changed. Returns whether it applied.
 #[inline(always)]
 fn track<P: Platform>(p: P, config: &Config<P>, leg: &mut LegState<P>, table: &P::Table, request: P::Real) -> bool {
     let previous = leg.code;
@@ -383,7 +387,7 @@ fn track<P: Platform>(p: P, config: &Config<P>, leg: &mut LegState<P>, table: &P
     tracked
 }
 
-/// [`actuate`] whatever the request.
+/// [`actuate`] for any request.
 #[inline(never)]
 fn actuate_limited<P: Platform>(
     p: P,
@@ -413,7 +417,7 @@ fn actuate_limited<P: Platform>(
     limited
 }
 
-/// What the code that is held means in the leg model of a mode, m.
+/// Displacement that the present code requests, in the leg model of a mode, m.
 #[inline]
 fn requested<P: Platform>(p: P, mode: ControlMode, leg: &LegState<P>) -> P::Real {
     if mode.inverts() { leg.memory.displacement() } else { p.dac().drive(leg.code) * p.metres_per_cell() }

@@ -1,4 +1,4 @@
-//! How the law begins, works and stands still under the supervisor.
+//! The law under the supervisor: start, run and hold.
 
 use specgen_runtime::linear::component;
 use specgen_runtime::setpoint::{CommandKind, Generator};
@@ -45,7 +45,7 @@ impl<P: Platform> ControlLaw<P> for TaskSpace {
         sensing::words_per_leg(p, words)
     }
 
-    /// Of the codes sent and the known load, m; and the set-point, m or rad.
+    /// From the codes sent and the known load, m; and the set-point, m or rad.
     #[inline]
     fn expected_reading(p: P, state: &State<P>, channel: usize) -> (P::Real, P::Real) {
         let Some([a, b, c, d, e, f]) = p.readings_per_leg().get(channel) else {
@@ -70,8 +70,8 @@ impl<P: Platform> ControlLaw<P> for TaskSpace {
         advance(p, config, state, fallback, input.command.kind, input)
     }
 
-    /// A mode that begins takes over what is held. After arming set-points begin at the measured pose and the estimates at zero; after
-    /// a hold the last set-point and the estimates stay, and only what feeds back begins anew.
+    /// A bumpless start. After arming, set-points begin at the measured pose and the estimates at zero. After a hold,
+    /// the last set-point and the estimates stay, and only the feedback starts afresh.
     #[cold]
     #[inline(never)]
     fn enter_running(p: P, _config: &Config<P>, machine: &mut Machine<P>, _input: &TickInput<P>) {
@@ -113,7 +113,7 @@ impl<P: Platform> ControlLaw<P> for TaskSpace {
             leg.requested = leg.memory.displacement();
         }
         if !supervisor.phase.is_powered() {
-            // What it knew of a load ends with the run: arming begins without.
+            // The known load ends with the run: arming begins without one.
             state.load = [P::Real::ZERO; LEGS];
         }
         sense(p, config, state, &input.gauge)
@@ -133,8 +133,7 @@ impl<P: Platform> ControlLaw<P> for TaskSpace {
     }
 }
 
-/// A motion that was under way when the law was to be suspended, brought to rest by it within the limits of stops. Returns
-/// the status.
+/// Stops a motion that was under way when the law is to be suspended, within the stop limits. Returns the status.
 #[cold]
 #[inline(never)]
 fn stop<P: Platform>(p: P, config: &Config<P>, machine: &mut Machine<P>, input: &TickInput<P>) -> u32 {

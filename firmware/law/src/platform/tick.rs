@@ -1,5 +1,5 @@
-//! What a tick reads and yields, and both as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every target
-//! reads and writes these, so that two of them can be compared bit for bit.
+//! Input and output of a tick, also as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every
+//! target reads and writes these words, so that two targets can be compared bit for bit.
 
 use specgen_runtime::linear::{each, transform};
 use specgen_runtime::setpoint::{Command, CommandKind, Target};
@@ -15,26 +15,26 @@ use crate::words::{fill, names, six};
 /// Words of a command without a correction.
 const MOTION_WORDS: usize = 21;
 
-/// Words of a command: they stand before those that are measured.
+/// Words of a command: the first of an input, before the measured ones.
 #[must_use]
 pub const fn command_words(corrected: usize) -> usize {
     MOTION_WORDS + corrected
 }
 
-/// Words of a tick's output: those of a platform without output lines, and one more.
+/// Words of a tick's output: one more if the platform has output lines.
 #[must_use]
 pub const fn output_words_with(lines: usize) -> usize {
     if lines == 0 { STATUS + 1 } else { STATUS + 2 }
 }
 
-/// Place of the status among the words of an output.
+/// Index of the status among the words of an output.
 const STATUS: usize = 9 * LEGS;
 
-/// Words of where a platform is, see [`place_words`].
+/// Words of pose and set-point, see [`place_words`].
 pub const PLACE_WORDS: usize = 24;
 
-/// Names of the input words. `command` is 0 hold, 1 stream, 2 move, 3 trajectory; `correction` stands there if `control.correction` asks
-/// for it.
+/// Names of the input words. `command` is 0 hold, 1 stream, 2 move, 3 trajectory. `correction` is present if
+/// `control.correction` is set.
 #[must_use]
 pub const fn input_names<const N: usize>() -> [&'static str; N] {
     let mut names = [""; N];
@@ -46,14 +46,14 @@ pub const fn input_names<const N: usize>() -> [&'static str; N] {
     names
 }
 
-/// Those of a controller that has them all.
+/// Names of a controller with all of them.
 const EVERY_NAME: [&str; 39] = names![
     "command", "selector", "sequence";
     "setpoint", "setpoint_rate", "setpoint_acceleration", "correction", "gauge", "wrench";
 ];
 
-/// Names of the output words. `missed` stands there if the spec has a `trigger`: the pulses that each line has missed since its settings were
-/// given, 15 bits a line, the first lowest.
+/// Names of the output words. `missed` is present if the spec has a `trigger`: the pulses that each line has missed
+/// since its settings were written, 15 bits a line, the first lowest.
 #[must_use]
 pub const fn output_names<const N: usize>() -> [&'static str; N] {
     let every = names![;
@@ -69,17 +69,17 @@ pub const fn output_names<const N: usize>() -> [&'static str; N] {
     names
 }
 
-/// What is wanted of a platform's correction.
+/// Requested correction of a platform.
 type Offsets<P> = <<P as Platform>::Correction as RequestCorrection<<P as crate::Spec>::Real>>::Offsets;
 
-/// What a tick reads.
+/// Input of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TickInput<P: Platform> {
-    /// What the platform is to do.
+    /// Command to the platform.
     pub command: Command<P::Real>,
-    /// c, what was learned or prepared for the motion, added to the request: m and rad.
+    /// c, the correction that was learned or prepared for the motion, added to the request: m and rad.
     pub correction: Offsets<P>,
-    /// Reading of each gauge: V if the spec gives a calibration, else m from rest.
+    /// Reading of each gauge: V if the spec has a calibration, else m from rest.
     pub gauge: [P::Real; 6],
     /// Measured force (N) and torque (N m) of the work piece ON the platform, about P_C, base axes.
     pub wrench: [P::Real; 6],
@@ -145,7 +145,7 @@ fn command<T: specgen_runtime::Real>(words: &[u64]) -> Command<T> {
     }
 }
 
-/// Writes the words of a tick's output, of a tick and of the state that it left, in the order of [`output_names`]. `level` and `drift`
+/// Writes the words of a tick's output and of the state after it, in the order of [`output_names`]. `level` and `drift`
 /// are δ̂ and φ̂ as displacements of the legs.
 pub fn write_output<P: Platform>(p: P, output: &TickOutput<P>, state: &State<P>, all: &mut [u64]) {
     let Some((words, last)) = all.split_first_chunk_mut::<{ STATUS + 1 }>() else { return };
@@ -169,8 +169,8 @@ pub fn write_output<P: Platform>(p: P, output: &TickOutput<P>, state: &State<P>,
     }
 }
 
-/// Where the platform is: the pose measured and the set-point, both from rest and with the bias, then the set-point in the
-/// user's coordinates, m and rad; then the voltage of each leg, V. Six words each.
+/// Measured pose and set-point, both from rest and with the bias, then the set-point in the user's coordinates, m and
+/// rad; then the voltage of each leg, V. Six words each.
 #[must_use]
 pub fn place_words<P: Platform>(p: P, state: &State<P>) -> [u64; PLACE_WORDS] {
     let mut words = [0; PLACE_WORDS];

@@ -1,4 +1,4 @@
-//! Output lines at positions, levels, in motion, at set-points and ticks: what a tick under the supervisor gives them to see.
+//! Output lines at positions, levels, in motion, at set-points and ticks: their inputs in a supervised tick.
 
 use specgen_runtime::setpoint::CommandKind;
 use specgen_runtime::supervisor::Phase;
@@ -10,8 +10,8 @@ use super::tick::TickInput;
 use crate::spec::Config;
 use crate::status::{GENERATOR_BUSY, SETPOINT_FAULT, SETPOINT_STALE};
 
-/// After the law: the bits of the status that say how the lines are over the coming interval, by the pose measured at its beginning. They are
-/// low unless the law runs.
+/// After the law: bits of the status for the lines over the next interval, from the pose at its beginning. They are low
+/// unless the law runs.
 #[inline]
 pub(crate) fn fire<P: Platform>(
     config: &Config<P>,

@@ -1,4 +1,4 @@
-//! A wave in place of the host's set-points: what it has to keep to, and the input words that it writes.
+//! A wave in place of the host's set-points: its limits, and the input words that it writes.
 
 use specgen_runtime::setpoint::CommandKind;
 use specgen_runtime::wave::Limits;
@@ -8,18 +8,18 @@ use super::constants::Platform;
 use crate::spec::{Config, ConstSpec};
 use crate::status::GENERATOR_BUSY;
 
-/// Those of streams; from `control.setpoint` and `workspace`.
+/// The limits of streams; from `control.setpoint` and `workspace`.
 #[must_use]
 pub fn limits<P: Platform + ConstSpec>(_config: &Config<P>) -> Limits<P::Real> {
     Limits::of(P::CONSTANTS.setpoints())
 }
 
-/// A wave may begin with the next tick: the platform is at its bias pose and plays nothing. `status` is that of the last
-/// tick, `words` is the command that it ran under. That the wave begins where the platform stands is for the generator to
-/// say, which believes no jump.
+/// Whether a wave may begin with the next tick: the platform is at its bias pose and plays nothing. `status` is that of
+/// the last tick, `words` is its command. The generator checks that the wave begins at the present pose: it refuses a
+/// jump.
 ///
 /// # Errors
-/// It may not; the axis in the way, 0 for all of them.
+/// It may not: the number of the axis, 0 for all.
 pub fn may_begin<T: Real>(status: u32, words: &[u64], _center: &[T; 6], _limits: &Limits<T>) -> Result<(), usize> {
     let plays = words.first().is_some_and(|word| CommandKind::from_word(*word) == CommandKind::Trajectory);
     if status & GENERATOR_BUSY == 0 && !plays { Ok(()) } else { Err(0) }
@@ -35,7 +35,7 @@ pub fn write<T: Real>(motion: &Motion<T>, sequence: u32, words: &mut [u64]) {
     }
 }
 
-/// Writes the command to stay where a wave has come to rest: to hold.
+/// Writes the command to stay where a wave has ended: hold.
 pub fn rest<T: Real>(_center: &[T; 6], words: &mut [u64]) {
     if let Some(kind) = words.first_mut() {
         *kind = CommandKind::Hold.word();

@@ -1,4 +1,4 @@
-//! Settings that were checked. Their defaults are the spec's; another tuning is another `Config`, never another build.
+//! Checked settings. The defaults are the spec's. New tuning needs another `Config`, never another build.
 
 use core::ops::Deref;
 
@@ -8,14 +8,14 @@ use specgen_runtime::snapshot::Writer;
 use super::{ConstSpec, Settings as _, SettingsOf, Spec};
 use crate::words::{WordArray as _, word};
 
-/// What may change while running. Every value it holds keeps the tick within its promises.
+/// Settings, which may change while running. Every value it can hold keeps the tick's guarantees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config<P: Spec>(SettingsOf<P>);
 
-/// A value that a `Config` cannot hold.
+/// An invalid word of settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConfigError {
-    /// The word that is out of range, of those named by the controller's `CONFIG_NAMES`.
+    /// Index of the word that is out of range; the controller's `CONFIG_NAMES` names it.
     pub word: usize,
 }
 
@@ -55,12 +55,12 @@ impl<P: ConstSpec> Config<P> {
         Self(P::DEFAULTS)
     }
 
-    /// The same after a change. While running a change of the mode is bumpless; of output lines each whose settings are other than before
-    /// begins anew, low.
+    /// A changed copy. While running, a change of mode is bumpless. An output line whose settings change starts afresh,
+    /// low.
     ///
     /// # Errors
-    /// The first word that is out of its range in the controller's `permitted::SETTINGS`. That gains and weights are stable on the platform
-    /// is for the compiler to check, not for this function.
+    /// The first word that is out of its range in the controller's `permitted::SETTINGS`. The compiler, not this
+    /// function, checks that gains and weights are stable on the platform.
     pub fn with(self, change: impl FnOnce(&mut SettingsOf<P>)) -> Result<Self, ConfigError> {
         let mut changed = self;
         change(&mut changed.0);

@@ -1,4 +1,4 @@
-//! What is remembered of a law and of its supervisor.
+//! State of a law and of its supervisor.
 
 use specgen_runtime::supervisor::Supervisor;
 use specgen_runtime::{Digest, Snapshot as _};
@@ -6,17 +6,17 @@ use specgen_runtime::{Digest, Snapshot as _};
 use super::{Spec, StateOf};
 
 specgen_runtime::state! { |words|
-    /// Everything that is remembered from tick to tick. No NaN or infinity is ever stored here. Reset: disarmed, and the law at reset.
+    /// The whole state from tick to tick. It never contains a NaN or infinity. Reset: disarmed, and the law at reset.
     pub struct Machine<P>[P: Spec](state: StateOf<P>) {
         /// State of the control law.
         pub state: StateOf<P> = state, part;
-        /// Phase, cause and what the supervisor watches.
+        /// State of the supervisor.
         pub supervisor: Supervisor<P::Real> = Supervisor::new(), part;
     }
 }
 
 impl<P: Spec> Machine<P> {
-    /// Fingerprint of everything that later ticks depend on.
+    /// Fingerprint of the whole state.
     #[must_use]
     pub fn digest(&self) -> u64 {
         let mut digest = Digest::new();

@@ -3,21 +3,21 @@
 use super::LEGS;
 use crate::real::Real;
 
-/// What a leg asks for.
+/// A leg's contribution.
 pub(super) struct Share<T, const E: usize> {
     /// Its column of the equilibrium equations: s, and the moment of s about the pole.
     pub column: [T; 6],
-    /// What goes straight into its force, N.
+    /// Part that goes straight into its force, N.
     pub axial: T,
-    /// Δl, m, if wanted.
+    /// Δl, m, if requested.
     pub displacement: [T; E],
 }
 
-/// What the legs must balance.
+/// Equilibrium of the legs.
 pub(super) struct Balance<T, const E: usize> {
     /// The legs in the order of elimination.
     pub shares: [Share<T, E>; LEGS],
-    /// What remains, force and moment about the pole.
+    /// Remaining force, and moment about the pole.
     pub wrench: [T; 6],
 }
 
@@ -49,20 +49,20 @@ impl<T: Real, const E: usize> Balance<T, E> {
         force
     }
 
-    /// What is divided by on the way.
+    /// The divisors of the elimination.
     pub fn pivots(&self, rows: &[usize; 6]) -> [T; LEGS] {
         let [a, b, c, d, e, f] = self.factors(rows);
         [a.entries[0], b.entries[1], c.entries[2], d.entries[3], e.entries[4], f.entries[5]]
     }
 
-    /// Δl of each leg, m, if wanted.
+    /// Δl of each leg, m, if requested.
     #[inline(always)]
     pub fn displacements(&self) -> [T; LEGS] {
         let [a, b, c, d, e, f] = &self.shares;
         [a, b, c, d, e, f].map(|share| share.displacement.first().copied().unwrap_or(T::ZERO))
     }
 
-    /// LU factors, column by column: one at a time fits into the registers of a microcontroller.
+    /// LU factors, column by column: one at a time fits into a microcontroller's registers.
     #[inline(always)]
     fn factors(&self, rows: &[usize; 6]) -> [Column<T>; LEGS] {
         let [sa, sb, sc, sd, se, sf] = &self.shares;
@@ -94,7 +94,7 @@ fn factor<T: Real, const E: usize, const J: usize>(
     Column { entries, inverse_pivot }
 }
 
-/// Takes from `values` what the legs before account for.
+/// Subtracts from `values` the part of the legs before.
 #[inline(always)]
 fn eliminate<T: Real, const J: usize>(values: &mut [T; 6], before: [&Column<T>; J], rows: &[usize; 6]) {
     for k in 0..J {
@@ -107,7 +107,7 @@ fn eliminate<T: Real, const J: usize>(values: &mut [T; 6], before: [&Column<T>; 
     }
 }
 
-/// Values in the order of the equations; the bound is for the compiler, which then sees no panic path.
+/// Values in the order of the equations. The bound shows the compiler that there is no panic path.
 #[inline(always)]
 fn ordered<T: Real>(values: &[T; 6], rows: &[usize; 6]) -> [T; 6] {
     rows.map(|row| values[if row < 6 { row } else { 0 }])

@@ -4,7 +4,7 @@ use core::ops::{Add, Mul, Sub};
 
 use crate::real::Real;
 
-/// A number of each of `N` legs. Operations are element by element, so that results do not depend on `N`.
+/// A number of each of `N` legs. Operations are element by element, so results do not depend on `N`.
 #[derive(Clone, Copy)]
 pub(super) struct Lanes<T, const N: usize>(pub [T; N]);
 

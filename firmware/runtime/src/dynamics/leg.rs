@@ -1,15 +1,16 @@
-//! One leg: what it asks of its own actuator, and what it loads the platform with.
+//! One leg: the request to its own actuator, and its load on the platform.
 
 use super::balance::Share;
 use super::lanes::{Lanes, Vectors, dot};
 use super::{Leg, Platform};
 use crate::real::Real;
 
-/// What all legs need to know of a motion, platform axes. Of base and platform joints, `B` and `P` dimensions count.
+/// Data of a motion that all legs share, platform axes. `B` and `P` are the dimensions of base and platform joints that
+/// count.
 pub(super) struct Common<T, const B: usize, const P: usize> {
     /// Rᵀ − I.
     pub turn: [[T; B]; 3],
-    /// What moves every joint by the same, m.
+    /// Shift common to all joints, m.
     pub shift: [T; 3],
     /// ω, rad/s.
     pub omega: [T; 3],
@@ -23,17 +24,18 @@ pub(super) struct Common<T, const B: usize, const P: usize> {
     pub leg_weight: [T; 3],
 }
 
-/// A round over the legs.
+/// A pass over the legs.
 pub(super) struct Round<'a, T, const B: usize, const P: usize> {
     pub platform: &'a Platform<T>,
     pub common: &'a Common<T, B, P>,
-    /// What the legs so far left for the equilibrium equations, force and moment about the pole.
+    /// Remainder for the equilibrium equations after the legs so far: force, and moment about the pole.
     pub wrench: [T; 6],
 }
 
 impl<T: Real, const B: usize, const P: usize> Round<'_, T, B, P> {
-    /// `N` legs: their shares; what else they ask for is taken off the wrench. `E` is 1 if their displacements are wanted,
-    /// else 0. Inlined only where code costs nothing: on a PC the legs then overlap, which takes 0.6 of the time; the same bits.
+    /// Contributions of `N` legs; the rest of their load is subtracted from the wrench. `E` is 1 if displacements are
+    /// requested, else 0. Inlined only where code size costs nothing: on a PC the legs then overlap, which takes 0.6 of
+    /// the time. The bits are the same.
     #[cfg_attr(target_arch = "x86_64", inline(always))]
     #[cfg_attr(not(target_arch = "x86_64"), inline(never))]
     pub fn shares<const N: usize, const E: usize>(&mut self, legs: [&Leg<T>; N]) -> [Share<T, E>; N] {
@@ -49,7 +51,7 @@ impl<T: Real, const B: usize, const P: usize> Round<'_, T, B, P> {
         };
         let (rest, joint, arm) = (vector(|leg| &leg.rest), vector(|leg| &leg.joint), vector(|leg| &leg.arm));
 
-        // r₀ + d with the difference in one piece: l² − l₀² = (2 r₀ + d)·d loses nothing for small d.
+        // r₀ + d with the difference as one number: l² − l₀² = (2 r₀ + d)·d keeps its accuracy for small d.
         let moved = affine(&common.shift, &common.turn, &vector(|leg| &leg.base));
         let r = [rest[0] + moved[0], rest[1] + moved[1], rest[2] + moved[2]];
         let doubled = [rest[0] + r[0], rest[1] + r[1], rest[2] + r[2]];
@@ -116,12 +118,12 @@ impl<T: Real, const B: usize, const P: usize> Round<'_, T, B, P> {
     }
 }
 
-/// l₀/l for `half` = l² / (2 l₀²), by Newton from a cubic: multiplications only. Relative error below 2e-16 (f64) and
-/// 1e-8 (f32), and rounding, for lengths within ±30 %.
+/// l₀/l for `half` = l² / (2 l₀²), by Newton steps from a cubic: multiplications only. Relative error below 2e-16 (f64)
+/// and 1e-8 (f32), plus rounding, for lengths within ±30 %.
 #[inline(always)]
 fn inverse_root<T: Real, const N: usize>(half: Lanes<T, N>) -> Lanes<T, N> {
     let c = |value: f64| Lanes::splat(T::from_f64(value));
-    // Through 1 at rest, so that small motions converge at once; 0.7 % off at worst.
+    // Exact at rest, so that small motions converge at once; 0.7 % off at worst.
     let mut y = c(5.478_193_507_198_157) + half * c(-2.427_454_611_221_644);
     y = c(-4.681_659_876_000_378) + half * y;
     y = c(2.274_713_387_603_355_6) + half * y;
@@ -189,7 +191,7 @@ mod tests {
         }
     }
 
-    /// How many are worked on at once is a matter of speed alone.
+    /// The number of legs per pass changes only the speed.
     #[test]
     fn results_do_not_depend_on_how_many_legs_are_side_by_side() {
         let (first, second) = (leg(5), leg(50));

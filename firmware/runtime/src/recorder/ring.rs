@@ -2,13 +2,13 @@
 
 use crate::record::{BLOCK_MAGIC, HEADER_WORDS, Layout, NO_TRIGGER};
 
-/// Places in a block's header.
+/// Indices in a block's header.
 const WORDS: usize = 1;
 const ROWS: usize = 2;
 pub(super) const DIGEST: usize = 5;
 const TRIGGER: usize = 7;
 
-/// Of a word in the memory of a ring.
+/// Index of a word in the memory of a ring.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Place(usize);
 
@@ -19,13 +19,13 @@ pub(super) struct Ring<'m> {
     size: usize,
     blocks: usize,
     layout: Layout,
-    /// The oldest block that is held, and how many are, the open one included.
+    /// The oldest block, and the number of blocks, the open one included.
     oldest: usize,
     held: usize,
-    /// Words used of the open block; none is open if there are none.
+    /// Words used in the open block; 0 if none is open.
     used: usize,
     rows: u64,
-    /// Where its last row begins.
+    /// Start of its last row.
     row: usize,
     lost: u32,
 }
@@ -55,7 +55,7 @@ impl<'m> Ring<'m> {
         self.lost
     }
 
-    /// Rows of all blocks that are held.
+    /// Rows of all blocks.
     pub(super) fn rows(&self) -> u64 {
         let mut rows: u64 = 0;
         for k in 0..self.held {
@@ -70,19 +70,19 @@ impl<'m> Ring<'m> {
         self.blocks * room.checked_div(self.layout.longest_row()).unwrap_or_default()
     }
 
-    /// The open block has room for the longest row.
+    /// Whether the open block has room for the longest row.
     #[inline]
     pub(super) fn has_room(&self) -> bool {
         self.has_room_for(1)
     }
 
-    /// The open block has room for so many of the longest rows.
+    /// Whether the open block has room for `rows` rows of the longest kind.
     #[inline]
     pub(super) fn has_room_for(&self, rows: usize) -> bool {
         self.used > 0 && self.used + rows * self.layout.longest_row() <= self.size
     }
 
-    /// Index of the `k`-th held block.
+    /// Index of the `k`-th block.
     #[inline]
     fn place(&self, k: usize) -> usize {
         let place = self.oldest + k;
@@ -99,7 +99,7 @@ impl<'m> Ring<'m> {
         self.memory.get_mut(start..start + self.size)
     }
 
-    /// Closes the open block; an empty one is given back.
+    /// Closes the open block; an empty one is removed.
     pub(super) fn close(&mut self) {
         if self.used == 0 {
             return;
@@ -110,7 +110,8 @@ impl<'m> Ring<'m> {
         self.used = 0;
     }
 
-    /// Closes the open block and begins the next, in place of the oldest if there is no other. In a stream, that is a loss.
+    /// Closes the open block and begins the next. If no block is free, it replaces the oldest; in a stream, that is a
+    /// loss.
     pub(super) fn open(
         &mut self,
         [tick, reason, digest]: [u64; 3],
@@ -139,24 +140,24 @@ impl<'m> Ring<'m> {
         }
     }
 
-    /// Of the newest block.
+    /// Place of the newest block.
     pub(super) fn newest_place(&self) -> Option<Place> {
         (self.held > 0).then(|| Place(self.place(self.held - 1) * self.size))
     }
 
-    /// Writes words so many behind a place.
+    /// Writes words at an offset from a place.
     pub(super) fn write(&mut self, Place(place): Place, offset: usize, words: &[u64]) {
         for (slot, word) in self.memory.iter_mut().skip(place + offset).zip(words) {
             *slot = *word;
         }
     }
 
-    /// Whether the last row of the open block can have one more word.
+    /// Whether the last row of the open block has room for one more word.
     pub(super) fn may_add(&self) -> bool {
         self.used > 0 && self.rows > 0 && self.used < self.size
     }
 
-    /// One more word, for the last row; `which` says so in its first.
+    /// Adds a word to the last row and sets the bit `which` in the row's first word.
     pub(super) fn add(&mut self, which: u64) -> Option<Place> {
         if !self.may_add() {
             return None;
@@ -179,7 +180,7 @@ impl<'m> Ring<'m> {
         }
     }
 
-    /// Room for a row; none without an open block.
+    /// Room for a row; none if no block is open.
     #[inline]
     pub(super) fn row(&mut self) -> Option<Slots<'_>> {
         if !self.has_room() {
@@ -221,7 +222,7 @@ impl Slots<'_> {
         self.end += 1;
     }
 
-    /// The row is whole; `which` is its first word.
+    /// Ends the row; `which` is its first word.
     #[inline]
     pub(super) fn finish(self, which: u64) {
         if let Some(slot) = self.block.get_mut(self.start) {

@@ -8,8 +8,8 @@
 //! R = W R_u Wᵀ        t = W q − (R − I) c        (the offset of the work frame is part of the plan's bias)
 //! ω = W T(θ_u) θ̇_u    ṫ = W q̇ − ω × R c          ẗ = W q̈ − ω̇ × R c − ω × (ω × R c)
 //! ```
-//! R − I is computed as such, with 1 − cos as one number: nothing cancels, and f32 keeps its last bits. Euler rates are not
-//! angular velocities: T(θ) and its derivative are exact.
+//! R − I is computed directly, with 1 − cos as one number: nothing cancels, and f32 keeps its last bits. Euler rates
+//! are not angular velocities: T(θ) and its derivative are exact.
 
 use super::Target;
 use crate::attitude::Attitude;
@@ -18,10 +18,11 @@ use crate::trig::sine_cosine;
 
 /// From the user's coordinates to those of the platform.
 pub trait Frames<T: Real> {
-    /// `user` as pose of P_C from rest, without the bias; none if an angle is beyond what is meant.
+    /// `user` as pose of P_C from rest, without the bias; none if an angle is beyond its limit.
     fn to_platform(&self, user: &Target<T>) -> Option<Target<T>>;
 
-    /// Puts `user` with `bias` into `target`, if the pose is then finite and within ±`bound`; else leaves it.
+    /// Writes `user` plus `bias` to `target` if that is finite and within ±`bound`; otherwise leaves `target`
+    /// unchanged.
     #[inline]
     fn admit(&self, user: &Target<T>, bias: &[T; 6], bound: &[T; 6], target: &mut Target<T>) -> bool {
         let Some(mut platform) = self.to_platform(user) else {
@@ -47,7 +48,7 @@ fn shifted<T: Real>(pose: &[T; 6], bias: &[T; 6], bound: &[T; 6]) -> Option<[T; 
     shifted.iter().zip(bound).all(|(value, bound)| value.abs() <= *bound).then_some(shifted)
 }
 
-/// Axes parallel to the base, rotations about P_C: the same coordinates. Costs nothing.
+/// Axes parallel to the base, rotations about P_C: the same coordinates, at no cost.
 #[derive(Debug, Clone, Copy)]
 pub struct Parallel;
 
@@ -72,7 +73,7 @@ impl<T: Real> Frames<T> for Parallel {
 pub struct Tool<T> {
     /// c in {P}, m.
     pub point: [T; 3],
-    /// Largest |angle| that is meant, ≤ π/4, rad.
+    /// Largest permitted |angle|, ≤ π/4, rad.
     pub largest_angle: T,
 }
 
@@ -87,14 +88,14 @@ impl<T: Real> Frames<T> for Tool<T> {
     }
 }
 
-/// Axes of the work frame's own, rotations about a tool point.
+/// Axes of a work frame, rotations about a tool point.
 #[derive(Debug, Clone, Copy)]
 pub struct Work<T> {
     /// W: columns are the axes of the work frame in {B}.
     pub axes: [[T; 3]; 3],
     /// c in {P}, m.
     pub point: [T; 3],
-    /// Largest |angle| that is meant, ≤ π/12, rad.
+    /// Largest permitted |angle|, ≤ π/12, rad.
     pub largest_angle: T,
 }
 
@@ -120,7 +121,7 @@ impl<T: Real> Frames<T> for Work<T> {
         }
         subtract(&mut target, &pivot(&less_identity, &velocity, &angular_acceleration, &self.point));
 
-        // The angles of R: each a ratio of entries once the ones before are known.
+        // The angles of R: each is a ratio of entries once those before are known.
         let r = &less_identity;
         let z = angle_of(r[1][0], T::ONE + r[0][0]);
         let (sz, cz) = sine_cosine(z);
@@ -172,7 +173,7 @@ impl<T: Real> Rotation<T> {
     }
 }
 
-/// Of |angles| ≤ π/4; 1 − cos without cancellation.
+/// For |angles| ≤ π/4; 1 − cos without cancellation.
 #[inline]
 fn attitude<T: Real>(angles: [T; 3]) -> Attitude<T> {
     let [(sx, vx), (sy, vy), (sz, vz)] = angles.map(|angle| {
@@ -182,8 +183,8 @@ fn attitude<T: Real>(angles: [T; 3]) -> Attitude<T> {
     Attitude { sine: [sx, sy, sz], versine: [vx, vy, vz] }
 }
 
-/// The angle whose sine and cosine stand as `s` to `c` > 0, |angle| ≤ π/4: Newton on s cos θ − c sin θ, whose error is
-/// cubed by every step; from tan θ three bring the worst start to the last bit.
+/// The angle whose sine and cosine are in the ratio `s` to `c` > 0, |angle| ≤ π/4: Newton on s cos θ − c sin θ, whose
+/// error is cubed by every step. From tan θ, three steps reach the last bit in the worst case.
 #[inline]
 fn angle_of<T: Real>(s: T, c: T) -> T {
     let mut angle = s / c;

@@ -1,4 +1,4 @@
-//! The state machine of set-points.
+//! The state machine that generates set-points.
 //!
 //! ```text
 //! reset ─► bias ─► hold ─┬─► move ───────────────────────────┬─► hold
@@ -18,11 +18,11 @@
 //! * **Stop**: any other command during a motion; obeyed when standing. A motion that would leave the workspace after
 //!   all (the frames bend the way) is frozen at its last pose.
 //!
-//! [`BUSY`] stays set from the first of several motions to the last: in the tick in which one arrives, too, if the command
-//! begins the next with the following tick.
+//! [`BUSY`] stays set from the first to the last of several motions. It also stays set in the tick in which a motion
+//! ends if the command begins another with the next tick.
 //!
-//! Nothing non-finite and no pose outside the workspace is ever given out or kept, whatever the command. From tick to tick
-//! no axis moves further than speed · T_s in a move, or the stream's speed · T_s in a stream.
+//! No set-point is ever non-finite or outside the workspace, whatever the command. From tick to tick no axis moves
+//! further than speed · T_s in a move, or the stream's speed · T_s in a stream.
 
 use super::profile::Profile;
 use super::stop::Stop;
@@ -33,11 +33,12 @@ use crate::snapshot::Sizes;
 
 mod snapshot;
 
-/// Status: a set-point or command is refused and the platform held, for it is not finite, out of the workspace, or a jump.
+/// Status: a set-point or command is refused and the platform held, because it is not finite, out of the workspace, or
+/// a jump.
 pub const REFUSED: u32 = 1 << 16;
 /// Status: the stream is stale and the platform held.
 pub const STALE: u32 = 1 << 17;
-/// Status: bias, move, trajectory or stop under way, or begun by the command with the next tick.
+/// Status: bias, move, trajectory or stop under way, or started by the command with the next tick.
 pub const BUSY: u32 = 1 << 18;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,37 +54,38 @@ enum Phase {
 }
 
 crate::state! { |words|
-    /// Set-points of one platform. At reset at rest, bias not yet approached.
+    /// Set-points of one platform. At reset: at rest, bias not yet approached.
     pub struct Generator<T>[T: Real] {
         phase: Phase = Phase::Reset, part;
-        /// Where it is in the user's frames, and how it moves; where the bias leads, until it is reached.
+        /// Pose in the user's frames and the present motion; the end of the bias move until it is reached.
         place: [T; 6] = [T::ZERO; 6], axes(words.sizes().user);
         rate: [T; 6] = [T::ZERO; 6], axes(words.sizes().rate);
-        /// Straight motion under way: start, end, end − start; its course and tick below.
+        /// Straight motion under way: start, end, end − start; its profile and tick follow.
         start: [T; 6] = [T::ZERO; 6], axes(ends(*phase, &words.sizes()));
         goal: [T; 6] = [T::ZERO; 6], axes(ends(*phase, &words.sizes()));
         way: [T; 6] = [T::ZERO; 6], axes(ends(*phase, &words.sizes()).map(|most| 2.0 * most));
-        /// What was given out last.
+        /// The last set-point.
         target: Target<T> = Target::new(), part;
         profile: Profile<T> = Profile::new(), part;
         tick: i32 = 0, ticks(MOST);
         stop: Stop<T> = Stop::new(), part;
         cursor: Cursor = Cursor::new(), part;
-        /// Trajectory that was played to its end under the present command.
+        /// Trajectory that the present command has completed.
         finished: Option<u32> = None, choice;
-        /// Last counter of the stream, and ticks without a believed set-point under the command to stream.
+        /// Last counter of the stream, and ticks since the last valid set-point under a stream command.
         sequence: u32 = 0, tally;
         age: u32 = 0, tally;
     }
 }
 
-/// How far start and end of a straight motion may lie: the way to the bias is one of the platform itself, which nothing admits.
+/// Bounds for the ends of a straight motion. The bias move is in platform coordinates; no check of user coordinates
+/// applies to it.
 fn ends(phase: Phase, sizes: &Sizes) -> [f64; 6] {
     if phase == Phase::Bias { sizes.place } else { sizes.user }
 }
 
 impl<T: Real> Generator<T> {
-    /// At rest at a pose of the platform (finite, brought within the workspace); the bias is approached from there.
+    /// At rest at a pose of the platform (finite, limited to the workspace). The bias is approached from there.
     #[must_use]
     pub fn starting_at<F>(setpoints: &Setpoints<T, F>, pose: &[T; 6]) -> Self {
         let mut generator = Self::new();
@@ -93,8 +95,8 @@ impl<T: Real> Generator<T> {
         generator
     }
 
-    /// Stands still at once where the last set-point was, whatever motion was under way; a bias that was not reached is
-    /// approached anew.
+    /// Stops at once at the last set-point, whatever motion was under way. If the bias was not reached, it is
+    /// approached again.
     pub fn stand_still(&mut self) {
         let began = !matches!(self.phase, Phase::Reset | Phase::Bias);
         self.rest();
@@ -103,8 +105,7 @@ impl<T: Real> Generator<T> {
         }
     }
 
-    /// Whether a motion is under way that the command to hold brings to rest within the limits of stops; the way to the bias
-    /// is none.
+    /// Whether a motion is under way that a hold command stops within the stop limits. The bias move is not one.
     #[must_use]
     pub fn can_stop(&self) -> bool {
         match self.phase {
@@ -114,7 +115,7 @@ impl<T: Real> Generator<T> {
         }
     }
 
-    /// The trajectory that is played, if one is: not on the way to its start.
+    /// The trajectory that is being played, if any; none on the way to its start.
     #[inline]
     #[must_use]
     pub fn plays(&self) -> Option<u32> {
@@ -124,14 +125,15 @@ impl<T: Real> Generator<T> {
         }
     }
 
-    /// Set-point at the end of the interval before the last [`Generator::tick`], or after it: from rest and with the bias.
+    /// Set-point from rest, with the bias: before [`Generator::tick`] that of the last interval, after it that of the
+    /// next.
     #[inline]
     #[must_use]
     pub fn target(&self) -> &Target<T> {
         &self.target
     }
 
-    /// The same set-point in the user's coordinates, m and rad; those of the bias until it is reached.
+    /// The same set-point in the user's coordinates, m and rad; that of the bias until it is reached.
     #[must_use]
     pub fn place(&self) -> &[T; 6] {
         &self.place
@@ -144,13 +146,13 @@ impl<T: Real> Generator<T> {
         (self.target, status)
     }
 
-    /// Brings [`Generator::target`] to the end of the coming interval; returns [`REFUSED`], [`STALE`], [`BUSY`].
+    /// Moves [`Generator::target`] to the end of the next interval; returns [`REFUSED`], [`STALE`], [`BUSY`].
     #[inline]
     pub fn tick<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, command: &Command<T>) -> u32 {
         self.tick_as(setpoints, command.kind, command)
     }
 
-    /// As [`Generator::tick`], with `kind` in place of that of the command, which need not be copied for it.
+    /// [`Generator::tick`] with `kind` in place of the command's, so that the command need not be copied.
     #[inline]
     pub fn tick_as<F: Frames<T>>(
         &mut self,
@@ -174,7 +176,7 @@ impl<T: Real> Generator<T> {
         status
     }
 
-    /// Whether the command begins a motion with the next tick, now that it stands still.
+    /// Whether the command begins a motion with the next tick, now that the platform is at rest.
     #[cold]
     #[inline(never)]
     fn begins_next<F: Frames<T>>(&self, setpoints: &Setpoints<T, F>, kind: CommandKind, command: &Command<T>) -> bool {
@@ -192,7 +194,7 @@ impl<T: Real> Generator<T> {
         goal != self.place && setpoints.admitted(&goal).is_some()
     }
 
-    /// One tick under the command to stream.
+    /// One tick under a stream command.
     #[inline]
     fn stream<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, command: &Command<T>, fresh: bool) -> u32 {
         self.finished = None;
@@ -218,7 +220,7 @@ impl<T: Real> Generator<T> {
         self.advance(setpoints, status)
     }
 
-    /// Whether a streamed set-point is no jump from where the platform is and states no impossible motion.
+    /// Whether a streamed set-point is not a jump and its derivatives are possible.
     #[inline]
     fn is_believed<F>(&self, setpoints: &Setpoints<T, F>, user: &Target<T>) -> bool {
         // A NaN fails every comparison.
@@ -229,7 +231,7 @@ impl<T: Real> Generator<T> {
         })
     }
 
-    /// Begins and ends motions as the command wants; returns the status of a refusal.
+    /// Begins and ends motions as commanded; returns the status of a refusal.
     #[inline]
     fn obey<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, kind: CommandKind, command: &Command<T>) -> u32 {
         let played = match kind {
@@ -263,8 +265,8 @@ impl<T: Real> Generator<T> {
         if accepted { 0 } else { REFUSED }
     }
 
-    /// The bias is a move of the platform itself, for the user's frames may bend the way. Without it nothing moves. It begins
-    /// where the platform stands: at rest after reset.
+    /// Starts the move to the bias, in platform coordinates, because the user's frames may bend the path. Nothing else
+    /// moves before it. It starts from the present pose: after reset, from rest.
     #[inline(never)]
     fn begin_bias<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>) -> bool {
         self.place = setpoints.home;
@@ -277,7 +279,7 @@ impl<T: Real> Generator<T> {
         }
     }
 
-    /// Whether the goal is one; begins no motion if it is reached.
+    /// Starts a move, unless it is already at the goal. Returns whether the goal is valid.
     #[inline(never)]
     fn begin_move<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, goal: &[T; 6], phase: Phase) -> bool {
         if *goal == self.place {
@@ -310,7 +312,7 @@ impl<T: Real> Generator<T> {
         }
     }
 
-    /// Whether the platform is at, or can go to, the start of a trajectory.
+    /// Whether the platform is at, or can move to, the start of a trajectory.
     fn begin_trajectory<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, selector: u32) -> bool {
         if self.finished == Some(selector) {
             return true;
@@ -336,7 +338,7 @@ impl<T: Real> Generator<T> {
         }
     }
 
-    /// Stands still where it is.
+    /// Stops at the present pose.
     fn rest(&mut self) {
         self.phase = Phase::Hold;
         self.rate = [T::ZERO; 6];
@@ -352,7 +354,7 @@ impl<T: Real> Generator<T> {
             Phase::Bias => {
                 let (target, ended) = self.straight(setpoints);
                 if !setpoints.reaches(&target.pose) {
-                    // Only where a snapshot gave a course that does not belong to its way.
+                    // Only if a snapshot had a profile that does not belong to its path.
                     self.stand_still();
                     return status | REFUSED;
                 }
@@ -388,7 +390,7 @@ impl<T: Real> Generator<T> {
         }
     }
 
-    /// The straight motion one tick on, and whether it has arrived.
+    /// The straight motion after one tick, and whether it is complete.
     #[inline]
     fn straight<F>(&mut self, setpoints: &Setpoints<T, F>) -> (Target<T>, bool) {
         self.tick += 1;
@@ -396,7 +398,7 @@ impl<T: Real> Generator<T> {
         let progress = self.profile.at(self.tick);
         let (rate, acceleration) = (progress.rate * setpoints.rate, progress.acceleration * setpoints.square_rate);
         if ended {
-            // Exactly: start + way may miss it by a rounding.
+            // Exactly: start + delta may differ by a rounding.
             return (Target::at(self.goal), true);
         }
         let mut target = Target::at(self.start);
@@ -409,7 +411,7 @@ impl<T: Real> Generator<T> {
         (target, false)
     }
 
-    /// Takes the proposed set-point, or freezes where it would leave the workspace.
+    /// Takes the proposed set-point; if it is outside the workspace, freezes.
     #[inline]
     fn commit<F: Frames<T>>(
         &mut self,

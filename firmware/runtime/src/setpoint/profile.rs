@@ -1,20 +1,20 @@
-//! Point to point with limited speed, acceleration and jerk: the S-curve of seven phases, in whole ticks.
+//! Point-to-point motion with limited speed, acceleration and jerk: the seven-phase S-curve, in whole ticks.
 //!
-//! All axes share one course s from 0 to 1, so that they start and end together and the path is straight:
-//! h = h₀ + Δ s(k). With n ticks of jerk, m ≥ n ticks from the start until the acceleration falls again, and L ticks
-//! that the whole way would take at full speed,
+//! All axes share one progress variable s from 0 to 1, so that they start and end together and the path is straight: h
+//! = h₀ + Δ s(k). With n ticks of jerk, m ≥ n ticks from the start until the acceleration falls again, and L ticks that
+//! the whole distance would take at full speed,
 //!
 //! ```text
 //! k:      0      n          m     m+n            L       L+n        L+m    L+m+n
 //! jerk    +j     0          −j     0             −j       0          +j
 //! j = 1/(n m L)     peak acceleration 1/(m L)     peak speed 1/L            (per tick)
 //! ```
-//! The least n, m and L, in this order, that keep every axis within its limits are looked for in integers, without a
-//! root: see [`Profile::plan`].
+//! The least n, m and L, in this order, that keep every axis within its limits are found by an integer search, without
+//! a square root: see [`Profile::plan`].
 
 use crate::real::Real;
 
-/// Longest phase that is looked for, ticks: 2²¹ is 3.5 min at 10 kHz.
+/// Longest phase, ticks: 2²¹ is 3.5 min at 10 kHz.
 pub const LONGEST: i32 = 1 << BITS;
 const BITS: u32 = 21;
 
@@ -30,7 +30,7 @@ pub struct MoveLimits<T> {
 }
 
 crate::state! { |words|
-    /// A course from 0 to 1. No way to go at reset.
+    /// Progress from 0 to 1. Nothing to move at reset.
     #[derive(PartialEq)]
     pub struct Profile<T>[T: Real] {
         /// n.
@@ -39,7 +39,7 @@ crate::state! { |words|
         rise_ticks: i32 = 0, ticks(LONGEST);
         /// L + m + n.
         ticks: i32 = 0, ticks(3 * LONGEST);
-        /// j, per tick³. It and what follows are shares of the way, per tick at the least.
+        /// j, per tick³. This and the following fields are fractions of the distance.
         jerk: T = T::ZERO, number(1.0);
         /// Peak acceleration, per tick².
         acceleration: T = T::ZERO, number(1.0);
@@ -67,11 +67,11 @@ pub(super) fn largest<T: Real>(values: &[T; 6], factors: &[T; 6]) -> T {
     largest
 }
 
-/// The least n in 1..=[`LONGEST`] that is `enough`, which must hold above it too, and at the first power of two above `known`
-/// (≥ 0, or NaN where 1 is enough); none if there is none.
+/// The least n in 1..=[`LONGEST`] that is `enough`; none if there is none. `enough` must be monotone, and hold at the
+/// first power of two above `known` (≥ 0, or NaN if 1 is enough).
 pub(super) fn least<T: Real>(known: T, enough: impl Fn(T) -> bool) -> Option<i32> {
     let mut too_few = 0;
-    // Halvings of LONGEST down to that power: bigger ones need no look, nor does it itself.
+    // Start the bisection at that power of two.
     let known = known.truncate();
     let above = if known < LONGEST { BITS + known.leading_zeros() - 31 } else { 0 };
     for bit in above..=BITS {
@@ -84,19 +84,19 @@ pub(super) fn least<T: Real>(known: T, enough: impl Fn(T) -> bool) -> Option<i32
 }
 
 impl<T: Real> Profile<T> {
-    /// The course for a way of `delta` (m and rad, finite); none if it would take longer than [`LONGEST`].
+    /// The profile for a move by `delta` (m and rad, finite); none if it would take longer than [`LONGEST`].
     #[must_use]
     pub fn plan(delta: &[T; 6], limits: &MoveLimits<T>) -> Option<Self> {
         // Limits of s: speed ≤ 1/v, acceleration ≤ 1/a, jerk ≤ 1/j.
         let v = largest(delta, &limits.speed);
         let a = largest(delta, &limits.acceleration);
         let j = largest(delta, &limits.jerk);
-        // Jerk until it has built up the full acceleration, or the full speed, or a quarter of the time is over.
+        // Jerk until full acceleration or full speed is reached, or a quarter of the time is over.
         let jerk_ticks: i32 = least(j / a, |n: T| n * a >= j || n * n * v >= j || (n * n * n) + (n * n * n) >= j)?;
         let n = T::from_i32(jerk_ticks);
         let for_jerk = j / n;
         let a = if for_jerk > a { for_jerk } else { a };
-        // Then the acceleration is kept until it has built up the full speed, or half the way is done.
+        // Then constant acceleration until full speed is reached, or half the distance is done.
         let full_speed = a / v;
         let known = if full_speed > n { full_speed } else { n };
         let rise_ticks: i32 = least(known, |m: T| m >= n && (m * v >= a || m * (m + n) >= a))?;
@@ -151,7 +151,7 @@ impl<T: Real> Profile<T> {
             let place = early * n * (sixth + sixth) + early * t + self.acceleration * t * t * T::HALF;
             Progress { place, rate: early + self.acceleration * t, acceleration: self.acceleration }
         } else if tick <= both {
-            // Seen from where full speed is reached, half of `both` behind a start at full speed.
+            // Time from the point of full speed, half of `both` after a start at full speed.
             let t = T::from_i32(both - tick);
             let acceleration = self.jerk * t;
             let place = self.speed * (T::from_i32(both) * T::HALF - t) + acceleration * t * t * sixth;
@@ -167,7 +167,7 @@ impl<T: Real> Profile<T> {
 mod tests {
     use super::*;
 
-    /// The search starts lower where it may, and finds the same.
+    /// The search may start lower, and finds the same.
     #[test]
     fn what_is_known_changes_no_result() {
         let mut seed = 1_u64;

@@ -1,30 +1,30 @@
-//! To standstill from any motion: pose and rate go on without a step, and the way is inside the workspace.
+//! Deceleration to standstill from any motion, without a step in pose or rate, inside the workspace.
 //!
-//! Over D ticks the rate falls as v (1 − 3σ² + 2σ³), σ = k/D, and the way is D v/2, in the direction of v on every axis.
-//! The deceleration peaks at 1.5 v/D and its slope at 6 v/D². D is the least within [`StopLimits`], and is
-//! halved while the platform would leave the workspace: walls come before comfort. The acceleration that the motion had is
-//! dropped at once.
+//! Over D ticks the rate falls as v (1 − 3σ² + 2σ³), σ = k/D, and the distance is D v/2, in the direction of v on every
+//! axis. The deceleration peaks at 1.5 v/D and its slope at 6 v/D². D is the least within [`StopLimits`]. It is halved
+//! while the path would leave the workspace: the workspace has priority over the limits. The acceleration of the motion
+//! is dropped at once.
 
 use super::profile::{LONGEST, largest, least};
 use super::{Frames, Setpoints, Target};
 use crate::real::Real;
 
-/// Halvings of D that are tried: after them a tick is all that is left.
+/// Number of halvings of D: after them only a tick is left.
 const HALVINGS: u32 = 21;
 
-/// Limits of stops: of one tick, reciprocal and by axis, 1/(A T_s²) and 1/(J T_s³), per m or rad; and the least duration.
+/// Limits of stops, per tick, reciprocal and by axis: 1/(A T_s²) and 1/(J T_s³), per m or rad; and the least duration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StopLimits<T> {
     /// Of deceleration.
     pub acceleration: [T; 6],
     /// Of jerk.
     pub jerk: [T; 6],
-    /// Least D, ≥ 1: a slow motion has limits that it would reach within a tick.
+    /// Least D, ≥ 1, for slow motions.
     pub shortest: i32,
 }
 
 impl<T: Real> StopLimits<T> {
-    /// D of a stop from `rate` (m and rad per tick), at most [`LONGEST`]. The way of each axis is D/2 times its rate.
+    /// D of a stop from `rate` (m and rad per tick), at most [`LONGEST`]. Each axis moves D/2 times its rate.
     #[must_use]
     pub fn ticks(&self, rate: &[T; 6]) -> i32 {
         let a = largest(rate, &self.acceleration) * T::from_f64(1.5);
@@ -42,7 +42,7 @@ crate::state! { |words|
     /// A stop under way. Nothing to stop at reset.
     #[derive(PartialEq)]
     pub struct Stop<T>[T: Real] {
-        /// Where it began, in the user's frames, m and rad.
+        /// Pose at its start, in the user's frames, m and rad.
         start: [T; 6] = [T::ZERO; 6], axes(words.sizes().user);
         /// Rate there, m and rad per tick.
         rate: [T; 6] = [T::ZERO; 6], axes(words.sizes().rate);
@@ -71,7 +71,7 @@ impl<T: Real> Stop<T> {
         stop
     }
 
-    /// Where it ends, m and rad.
+    /// Pose at its end, m and rad.
     fn end(&self) -> [T; 6] {
         let half = T::from_i32(self.ticks) * T::HALF;
         let mut end = self.start;
@@ -81,7 +81,7 @@ impl<T: Real> Stop<T> {
         end
     }
 
-    /// Set-point one tick on, and whether that is standstill.
+    /// Set-point after one tick, and whether the platform has stopped.
     #[inline]
     pub(super) fn next<F>(&mut self, setpoints: &Setpoints<T, F>) -> (Target<T>, bool) {
         self.tick += 1;

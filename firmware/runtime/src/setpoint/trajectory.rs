@@ -1,28 +1,28 @@
-//! Prepared motions: segments, and tables with cubic splines.
+//! Prepared trajectories: segments, and tables with cubic splines.
 
 use super::Target;
 use crate::crc::Crc32;
 use crate::real::Real;
 use crate::trig::sine_cosine_turns;
 
-/// Most ticks that a count may hold, so that none overflows for a day.
+/// Largest tick count, so that none overflows within a day.
 pub(super) const MOST: i32 = 1 << 30;
 
-/// A prepared motion, in the user's frames.
+/// A prepared trajectory, in the user's frames.
 #[derive(Debug, Clone, Copy)]
 pub enum Trajectory<T: Real> {
-    /// Analytic pieces; ends at rest.
+    /// Analytic segments; it ends at rest.
     Segments {
-        /// Where it begins, m and rad.
+        /// Start pose, m and rad.
         start: [T; 6],
-        /// In the order of time; each lasts a tick at least.
+        /// In order of time; each lasts at least a tick.
         segments: &'static [Segment<T>],
         /// First tick that is not before the end.
         ticks: i32,
-        /// Where it ends, m and rad.
+        /// End pose, m and rad.
         end: [T; 6],
     },
-    /// Rows at a fixed time from each other.
+    /// Rows at equal time intervals.
     Table(Table<T>),
 }
 
@@ -51,13 +51,13 @@ impl<T: Real> Trajectory<T> {
     }
 }
 
-/// A piece on which each axis is a straight line and a sinusoid whose amplitude grows with time.
+/// A segment on which each axis is a straight line plus a sinusoid whose amplitude grows linearly with time.
 ///
 /// With w = 0..1 over the segment and S, C the sine and cosine of its phase,
 /// h = p + q w + (a + b w) S + (c + d w) C.
 #[derive(Debug, Clone, Copy)]
 pub struct Segment<T> {
-    /// Tick at which it begins; its own time counts from there.
+    /// First tick; the segment's own time counts from there.
     pub first: i32,
     /// w per tick.
     pub per_tick: T,
@@ -86,10 +86,10 @@ pub struct Axis<T> {
     pub cosine: [T; 2],
 }
 
-/// Poses at a fixed time from each other, joined by a cubic spline.
+/// Poses at equal time intervals, joined by a cubic spline.
 #[derive(Debug, Clone, Copy)]
 pub struct Table<T: Real> {
-    /// At least two; the last of one that repeats is the first again.
+    /// At least two; if the table repeats, the last equals the first.
     pub rows: &'static [Row<T>],
     /// Ticks from row to row, ≥ 1.
     pub row_ticks: i32,
@@ -99,7 +99,7 @@ pub struct Table<T: Real> {
     pub per_second: T,
     /// 6 · (rows per s)², 1/s².
     pub bend_rate: T,
-    /// Begins again after the last row.
+    /// Whether it starts again after the last row.
     pub repeat: bool,
 }
 
@@ -113,7 +113,7 @@ pub struct Row<T> {
 }
 
 crate::state! { |words|
-    /// Place within a trajectory.
+    /// Position within a trajectory.
     #[derive(PartialEq, Eq)]
     pub(super) struct Cursor {
         /// Segment or row.
@@ -133,7 +133,7 @@ impl<T: Real> Trajectory<T> {
         }
     }
 
-    /// Set-point one tick on, and whether that is the end, at rest.
+    /// Set-point after one tick, and whether that is the end, at rest.
     #[inline]
     pub(super) fn next(&self, cursor: &mut Cursor) -> (Target<T>, bool) {
         match self {

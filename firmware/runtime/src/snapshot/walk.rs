@@ -1,4 +1,5 @@
-//! The walk over a state: one list of its fields declares it, starts it, saves, restores and digests it.
+//! The walk over a state: one list of fields gives the struct, its reset value, and how it is saved, restored and
+//! digested.
 
 use core::convert::Infallible;
 
@@ -7,12 +8,13 @@ use crate::digest::Digest;
 use crate::field::Field;
 use crate::real::Real;
 
-/// Declares a state in one list. Each field has its type, its value at reset, and how its word or words are walked over: a method of
-/// [`WordSink`], which [`Reader`] has under the same name, with its bounds. Behind `if` stands what must hold of the fields restored so
-/// far, which are references there.
+/// Declares a state in one list. Each field has a type, a reset value, and the method of [`WordSink`] that walks over
+/// it. [`Reader`] has a method of the same name; it checks the bounds. An expression after `if` must hold for the
+/// fields restored so far, which are references there.
 ///
-/// From it come the struct, `new`, and [`Snapshot`], whose words are in the order of the fields. The name between bars is what bounds
-/// call the walk, for [`WordSink::sizes`]. Generic parameters are named behind the state, and declared in brackets.
+/// The macro makes the struct, `new`, and [`Snapshot`] with the words in the order of the fields. The name between bars
+/// is the walk, for use in bounds, see [`WordSink::sizes`]. Generic parameters follow the name; their declarations
+/// follow in brackets.
 #[macro_export]
 macro_rules! state {
     (
@@ -68,7 +70,7 @@ macro_rules! state {
             }
         }
     };
-    // What `new` makes of an argument has no default.
+    // A state whose `new` has arguments has no default.
     (@default [$($declared:tt)*] $name:ident $(<$($generic:ident),+>)? ($($arg:ident)+)) => {};
     (@default [$($declared:tt)*] $type:ty) => {
         impl<$($declared)*> Default for $type {
@@ -79,19 +81,19 @@ macro_rules! state {
     };
 }
 
-/// What a state is shown to, word by word: a writer or a digest. No method fails; they return what the methods of [`Reader`] do, so
-/// that a walk does for both.
+/// Receives a state word by word: a writer or a digest. Its methods never fail. They return the type that the methods
+/// of [`Reader`] return, so that one walk serves both.
 pub trait WordSink: Sized {
     /// A word.
     fn put(&mut self, word: u64);
 
-    /// No matter: what is shown has its size.
+    /// Unused: the state that is written has valid sizes.
     #[inline]
     fn sizes(&self) -> Sizes {
         Sizes::ANY
     }
 
-    /// The same for a state of these sizes, known at run time: what [`Reader::within`] reads.
+    /// The same with sizes known at run time. [`Reader::within`] reads it.
     fn within(&mut self, sizes: Sizes) -> SizedSink<'_, Self> {
         SizedSink { words: self, sizes }
     }
@@ -109,7 +111,7 @@ pub trait WordSink: Sized {
         self.stored(values, values.len(), LARGEST)
     }
 
-    /// Six numbers, each within a bound of its own.
+    /// Six numbers, each with its own bound.
     #[inline]
     fn axes<T: Real>(&mut self, values: &[T; 6], _largest: [f64; 6]) -> Result<(), Infallible> {
         self.numbers(values, LARGEST)
@@ -121,7 +123,8 @@ pub trait WordSink: Sized {
         rows.iter().try_for_each(|row| self.numbers(row, largest))
     }
 
-    /// Numbers of a memory within ±`largest`, of which the first `count` are stored; the others are zeros, which a digest leaves out.
+    /// Numbers of a memory within ±`largest`. The first `count` are stored; the others are zeros, and a digest leaves
+    /// them out.
     #[inline]
     fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
         for value in values.iter().take(count) {
@@ -130,14 +133,14 @@ pub trait WordSink: Sized {
         Ok(())
     }
 
-    /// A number of ticks or the like, from 0 to `largest`.
+    /// A count, such as ticks, from 0 to `largest`.
     #[inline]
     fn ticks(&mut self, value: &i32, _largest: i32) -> Result<(), Infallible> {
         self.put(u64::from(*value as u32));
         Ok(())
     }
 
-    /// A place from 0 to `largest`.
+    /// An index from 0 to `largest`.
     #[inline]
     fn place(&mut self, value: &usize, _largest: usize) -> Result<(), Infallible> {
         self.put(*value as u64);
@@ -171,14 +174,14 @@ pub trait WordSink: Sized {
         Ok(())
     }
 
-    /// What follows from the rest, and has no word.
+    /// A field that follows from the others and has no word.
     #[inline]
     fn derived<F: Field>(&mut self, _value: &F) -> Result<(), Infallible> {
         const { assert!(F::WORDS == 0) };
         Ok(())
     }
 
-    /// A counter that this state has none of.
+    /// A zero in place of a counter that this state does not have.
     #[inline]
     fn blank(&mut self) -> Result<(), Infallible> {
         self.put(0);
@@ -197,14 +200,14 @@ pub trait WordSink: Sized {
         parts.iter().try_for_each(|part| self.part(part))
     }
 
-    /// Whether what was restored so far fits together.
+    /// Checks that the fields restored so far are consistent.
     #[inline]
     fn check(&self, _fits: impl FnOnce() -> bool) -> Result<(), Infallible> {
         Ok(())
     }
 }
 
-/// A walk over a state of sizes that are known at run time: a memory has words for the extrema that it keeps, not for its room.
+/// A walk with sizes known at run time: it stores only as many extrema of a memory as the memory uses.
 #[derive(Debug)]
 pub struct SizedSink<'a, W> {
     words: &'a mut W,
@@ -231,7 +234,7 @@ impl WordSink for Digest {
         self.word(word);
     }
 
-    // A loop of its own: written out for every array of a state it would take kilobytes of flash.
+    // Not inlined: a copy for every array of a state would take kilobytes of flash.
     #[inline(never)]
     fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
         for value in values.iter().take(count) {
@@ -271,7 +274,7 @@ impl WordSink for StatePart<'_> {
     }
 }
 
-/// The methods of [`WordSink`], for a state that is restored.
+/// The methods of [`WordSink`], for restoring.
 impl Reader<'_> {
     /// [`WordSink::number`], restored.
     ///
@@ -416,7 +419,7 @@ impl Reader<'_> {
     /// [`WordSink::check`], restored.
     ///
     /// # Errors
-    /// It does not.
+    /// They are not consistent.
     #[inline]
     pub fn check(&self, fits: impl FnOnce() -> bool) -> Result<(), InvalidState> {
         if fits() { Ok(()) } else { Err(self.refused()) }

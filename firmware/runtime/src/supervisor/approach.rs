@@ -1,10 +1,11 @@
-//! Set-points of a controller without a generator, from where the legs are to where they are asked for.
+//! Set-points of a controller without a generator: a smooth approach from the present position to the requested
+//! set-point.
 
 use crate::choice::choice;
 use crate::real::Real;
 
 choice! {
-    /// How far an approach has come.
+    /// State of an approach.
     enum Stage {
         Done = 0,
         /// No set-point has been accepted yet.
@@ -14,32 +15,32 @@ choice! {
 }
 
 crate::state! { |words|
-    /// An offset on the set-point that fades: at first it is where the legs are, in the end where they are asked for. At reset
-    /// set-points go through as they are.
+    /// An offset on the set-point that fades: it starts at the present position and ends at the requested set-point. At
+    /// reset set-points pass unchanged.
     pub struct Approach<T>[T: Real] {
         stage: Stage = Stage::Done, choice;
-        /// Where it starts, then what is left of the way; in the coordinates of the set-point.
+        /// The remaining offset, in the coordinates of the set-point.
         offset: [T; 6] = [T::ZERO; 6], axes(words.sizes().user);
     }
 }
 
 impl<T: Real> Approach<T> {
-    /// Begins where the legs are (finite).
+    /// Starts at the position of the legs (finite).
     #[inline]
     pub fn begin(&mut self, from: [T; 6]) {
         *self = Self { stage: Stage::Waiting, offset: from };
     }
 
-    /// Whether set-points go through as they are.
+    /// Whether set-points pass unchanged.
     #[inline]
     #[must_use]
     pub fn is_done(&self) -> bool {
         self.stage == Stage::Done
     }
 
-    /// The set-point to give to the law for the one that is asked for. One that is not `accepted` (finite, within bounds) goes
-    /// through as it is, for the law to refuse. `keep` (in [0, 1)) of the way is left after each tick, and none of what is below
-    /// `negligible`.
+    /// The set-point for the law, from the requested one. A set-point that is not `accepted` (finite, within bounds)
+    /// passes unchanged, so that the law refuses it. Each tick leaves the fraction `keep` (in [0, 1)) of the offset,
+    /// and nothing below `negligible`.
     #[inline]
     pub fn setpoint(&mut self, asked: &[T; 6], accepted: bool, keep: T, negligible: T) -> [T; 6] {
         if self.stage == Stage::Done || !accepted {

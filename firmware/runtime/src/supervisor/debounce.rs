@@ -1,20 +1,20 @@
-//! For how long a condition must last before it is a cause.
+//! Debouncing: how long a condition must last before it becomes a cause.
 
 use super::kinds::Cause;
 use super::supervision::{Supervision, TIMED, TIMERS};
 
-/// What a tick with a wrong sample, or with a converter that failed, adds to a count that falls by 1 in every other tick: more than one in
-/// five adds up to a fault.
+/// Increment of a count in a tick with a wrong sample or a failed converter. Every other tick decrements it by 1, so
+/// more than one such tick in five leads to a fault.
 pub const WRONG: u32 = 4;
 
-/// Causes that act in the tick in which they are seen.
+/// Causes that act without debouncing.
 const AT_ONCE: u32 = Cause::LinkLost.bit()
     | Cause::Integrity.bit()
     | Cause::EmergencyStop.bit()
     | Cause::Stalled.bit()
     | Cause::AmplifierFault.bit();
 
-/// The bit of the condition that a cause waits for: its own, or that of the cause before it in time.
+/// The bit of the condition that a cause waits for: its own, or that of the preceding cause.
 const fn condition(cause: Cause) -> u32 {
     match cause {
         Cause::HostGone => Cause::LinkLost.bit(),
@@ -23,18 +23,19 @@ const fn condition(cause: Cause) -> u32 {
 }
 
 crate::state! { |words|
-    /// Leaky counts: a condition that comes and goes counts, too, if its share of the ticks is above 1 in 1 + its weight.
+    /// Leaky counters. An intermittent condition is counted if its share of the ticks is above 1 in 1 + its weight.
     #[derive(PartialEq, Eq)]
     pub struct Debounce {
-        /// Of each of [`TIMED`].
+        /// One for each of [`TIMED`].
         pub counts: [u32; TIMERS] = [0; TIMERS], tallies;
     }
 }
 
 impl Debounce {
-    /// Counts the conditions that are `present` (bits of causes) and returns the causes that have lasted.
+    /// Counts the conditions that are `present` (bits of causes) and returns the causes that have lasted long enough.
     ///
-    /// Mostly nothing is, and nothing was: `busy` is what the last call left there, any count above zero.
+    /// Usually no condition is present or counted. `busy` is the result of the last call: whether any count is above
+    /// zero.
     #[inline]
     pub fn count<T>(&mut self, supervision: &Supervision<T>, present: u32, busy: &mut bool) -> u32 {
         if present == 0 && !*busy {
@@ -65,7 +66,7 @@ impl Debounce {
     }
 }
 
-/// Adds to a leaky count. It is held at its limit, so that it is forgotten as fast as its limit allows.
+/// Adds to a leaky counter. It saturates at its limit, so that its decay time is bounded.
 #[inline(always)]
 pub(super) fn rise(count: &mut u32, by: u32, limit: u32) {
     let sum = count.saturating_add(by);

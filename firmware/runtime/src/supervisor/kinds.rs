@@ -2,51 +2,53 @@
 
 use crate::choice::choice;
 
-/// Bit of an event word: a tick began too late, or one was left out.
+/// Bit of an event word: a tick began too late or was skipped.
 pub const MISSED_TICK: u32 = 1;
-/// Bit of an event word: nothing was heard over the link for longer than the target permits.
+/// Bit of an event word: no message over the link for longer than the target permits.
 pub const LINK_LOST: u32 = 2;
-/// Bit of an event word: tables or settings are not those that were built.
+/// Bit of an event word: tables or settings in memory have changed.
 pub const INTEGRITY: u32 = 4;
-/// Bit of an event word: a converter did not answer, or wrongly.
+/// Bit of an event word: a converter did not respond, or responded wrongly.
 pub const CONVERTER: u32 = 8;
 /// Bit of an event word: emergency stop.
 pub const STOP: u32 = 16;
 /// Bit of an event word: an amplifier reports a fault.
 pub const AMPLIFIER: u32 = 64;
-/// Bit of an event word: more ticks in a row never came than the spec permits, `supervisor.missed_in_a_row`.
+/// Bit of an event word: more ticks in a row were missed than the spec permits, `supervisor.missed_in_a_row`.
 pub const STALLED: u32 = 1 << (Cause::Stalled.word() - FIRST_EVENT);
-/// Bits of an event word that are causes by [`FIRST_EVENT`]. [`AMPLIFIER`] is a cause as well; the other bits are for records.
+/// Bits of an event word that map to causes by [`FIRST_EVENT`]. [`AMPLIFIER`] is a cause as well; the other bits are
+/// for records.
 pub const EVENTS: u32 = MISSED_TICK | LINK_LOST | INTEGRITY | CONVERTER | STOP | STALLED;
-/// The cause of an event's bit is its number and this.
+/// The cause of an event bit is its number plus this.
 pub const FIRST_EVENT: u64 = Cause::MissedTick.word();
-/// Conditions name the gauges or legs that they are about from this bit on.
+/// First bit in conditions for the gauges or legs concerned.
 pub(super) const FIRST_CHANNEL: u32 = 16;
-/// Bit of [`Cause::Oscillation`] in conditions, where bits 16 to 27 are taken by the gauges and legs concerned, 29 and 30 by the stage.
+/// Bit of [`Cause::Oscillation`] in conditions: bits 16 to 27 are for gauges and legs, 29 and 30 for the fallback
+/// stage.
 pub(super) const OSCILLATION_CONDITION: u32 = 28;
 /// Bit of [`Cause::AmplifierFault`] in conditions.
 pub(super) const AMPLIFIER_CONDITION: u32 = 31;
 
 choice! {
-    /// What the machine is doing.
+    /// Phase of the machine.
     pub enum Phase {
         /// Amplifiers off, codes at rest.
         Disarmed = 0 => "disarmed",
-        /// Amplifiers on, codes held, the law put where the machine is.
+        /// Amplifiers on, codes held; the law's state is set to the machine's.
         Arming = 1 => "arming",
-        /// The control law at work.
+        /// The control law is active.
         Running = 2 => "running",
         /// Codes held, the law suspended.
         Holding = 3 => "holding",
-        /// Codes on their way to rest.
+        /// Codes ramp to rest.
         RampingDown = 4 => "ramping down",
-        /// As disarmed, for a cause that is to be acknowledged.
+        /// As disarmed, with a cause that must be acknowledged.
         Faulted = 5 => "faulted",
     }
 }
 
 impl Phase {
-    /// Whether the amplifiers are to be on.
+    /// Whether the amplifiers are on in this phase.
     #[inline]
     #[must_use]
     pub const fn is_powered(self) -> bool {
@@ -55,37 +57,37 @@ impl Phase {
 }
 
 choice! {
-    /// What the user wants of the supervisor. It holds for as long as it is given. A word that is none is a hold: what cannot be
-    /// understood must not move anything.
+    /// A request to the supervisor. It applies to every tick in which it is given. An unknown word means hold: nothing
+    /// may move because of it.
     pub enum Request or Hold {
-        /// Nothing: the machine stays in its phase.
+        /// No request: the machine stays in its phase.
         None = 0,
-        /// Amplifiers on. Taken when it begins to be given, not while it stays: a machine never arms itself again.
+        /// Amplifiers on. Edge-triggered: a machine never arms itself again.
         Arm = 1,
-        /// The control law at work.
+        /// Run the control law.
         Run = 2,
         /// Codes held.
         Hold = 3,
         /// Codes to rest, then amplifiers off.
         RampDown = 4,
-        /// The cause of a fault was seen. Taken when it begins to be given.
+        /// Acknowledges a fault. Edge-triggered.
         Acknowledge = 5,
     }
 }
 
 choice! {
-    /// Why a phase was forced upon the machine. The name of none is empty.
+    /// Cause of a forced change of phase. [`Cause::None`] has an empty name.
     #[derive(PartialOrd, Ord)]
     pub enum Cause {
         /// Nothing was.
         None = 0 => "",
-        /// A gauge's word is no number.
+        /// A gauge's word is not finite.
         GaugeNotFinite = 1 => "gauge not finite",
         /// A gauge is beyond its range.
         GaugeRange = 2 => "gauge out of range",
-        /// A gauge gives the same word over and over while the legs move.
+        /// A gauge repeats the same word while the legs move.
         GaugeStuck = 3 => "gauge stuck",
-        /// A leg is not where its model says, by its gauges.
+        /// A gauge disagrees with the model of its leg.
         GaugeDisagreement = 4 => "gauges disagree",
         /// The platform or a leg is too far from its set-point.
         TrackingError = 5 => "tracking error",
@@ -103,15 +105,15 @@ choice! {
         Converter = 11 => "converter",
         /// [`STOP`].
         EmergencyStop = 12 => "emergency stop",
-        /// [`LINK_LOST`] for so long that nobody is waited for any more.
+        /// [`LINK_LOST`] for so long that the host is considered gone.
         HostGone = 13 => "host gone",
-        /// Gauges or legs are not wired as the spec says: the wiring check found it while arming.
+        /// Gauges or legs are not wired as in the spec: found by the wiring check while arming.
         Wiring = 14 => "wiring",
         /// [`STALLED`].
         Stalled = 15 => "stalled",
-        /// The error goes on oscillating. While running it is the cause of what the law has fallen back to.
+        /// The error keeps oscillating. While running, it is the cause of the law's fallback.
         Oscillation = 16 => "oscillation",
-        /// [`AMPLIFIER`]. The spec says what it leads to: [`Reaction`].
+        /// [`AMPLIFIER`]. The spec sets the reaction: [`Reaction`].
         AmplifierFault = 17 => "amplifier fault",
     }
 }
@@ -138,7 +140,7 @@ impl Cause {
         Self::AmplifierFault,
     ];
 
-    /// Its bit in conditions: 1 << word, of those beyond 15 what gauges and legs leave.
+    /// Its bit in conditions: 1 << word; beyond 15, a bit that gauges and legs leave free.
     #[inline]
     #[must_use]
     pub const fn bit(self) -> u32 {
@@ -149,7 +151,7 @@ impl Cause {
         }
     }
 
-    /// The cause of the lowest bit; none without any.
+    /// The cause of the lowest bit; [`Cause::None`] if no bit is set.
     pub(super) const fn of_lowest(bits: u32) -> Self {
         let word = match bits.trailing_zeros() {
             OSCILLATION_CONDITION => Self::Oscillation.word(),
@@ -163,23 +165,23 @@ impl Cause {
     }
 }
 
-/// What a fault of an amplifier leads to; from `supervisor.amplifier_fault`.
+/// Reaction to an amplifier fault; from `supervisor.amplifier_fault`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reaction {
-    /// Amplifiers off in that very tick.
+    /// Amplifiers off in the same tick.
     Off,
-    /// Codes to rest, then amplifiers off.
+    /// Codes ramp to rest, then amplifiers off.
     RampDown,
     /// Codes held.
     Hold,
 }
 
-/// Causes that are about a gauge.
+/// Causes that concern a gauge.
 pub const OF_GAUGES: u32 =
     Cause::GaugeNotFinite.bit() | Cause::GaugeRange.bit() | Cause::GaugeStuck.bit() | Cause::GaugeDisagreement.bit();
-/// Causes that take the amplifiers off at once, in any phase.
+/// Causes that switch the amplifiers off at once, in any phase.
 pub const SWITCHES_OFF: u32 = Cause::Integrity.bit() | Cause::EmergencyStop.bit();
-/// Causes that bring the codes to rest, then take the amplifiers off.
+/// Causes that ramp the codes to rest and then switch the amplifiers off.
 pub const RAMPS_DOWN: u32 = OF_GAUGES
     | Cause::Converter.bit()
     | Cause::HostGone.bit()

@@ -1,4 +1,4 @@
-//! A sustained oscillation of the error, and what the law falls back to.
+//! Detection of a sustained oscillation of the error, and the fallback of the law.
 //!
 //! ```text
 //! swing      y = e − m, m ← m + a y                              of one axis (or leg) a tick, over what noise and environment may make of it
@@ -6,44 +6,43 @@
 //! explained  E ← max(E keep, 1, (motion |Δ set-point|)²)         of all axes together
 //! sustained  p > E counts up, else down, and raises E to a share of p
 //! ```
-//! A ring that dies out sinks below what its own peak explains, which is held longer than any mode rings; so do corners and steps of
-//! the set-point. What stays as large as it was goes on counting, if it
-//! goes both ways. While an axis moves and a leg is at the end of its
-//! voltage, which keeps the platform from following, it is not counted.
+//! A ring that decays falls below the level explained by its own peak, which is held longer than any mode rings; so do
+//! corners and steps of the set-point. An oscillation that does not decay keeps counting if it goes both ways. It is
+//! not counted while an axis moves and a leg is at its voltage limit, which keeps the platform from following.
 
 use super::kinds::Cause;
 use crate::choice::choice;
 use crate::real::Real;
 
 choice! {
-    /// How much of the law is at work.
+    /// Fallback stage: the active part of the law.
     pub enum Fallback {
         /// All of it.
         None = 0 => "",
-        /// No active damping; gains of the feedback and weights of the estimates are [`Fallback::share`] of those set.
+        /// No active damping; feedback gains and weights of the estimates are [`Fallback::share`] of their settings.
         Reduced = 1 => "damping off and gains reduced",
-        /// Feed-forward alone: no feedback, the estimates as they were.
+        /// Feed-forward only: no feedback, estimates frozen.
         FeedForward = 2 => "feedback off",
     }
 }
 
-/// What is left of the gains in [`Fallback::Reduced`].
+/// Factor on the gains in [`Fallback::Reduced`].
 const SHARE: f64 = 0.25;
-/// Part of a new sample in the power.
+/// Weight of a new sample in the power.
 const NEW: f64 = 0.0625;
-/// Part of a power that explains itself later on, as long as it is held.
+/// Part of a power that it explains later, while held.
 const OWN: f64 = 0.5;
-/// No power is larger, in squares of limits.
+/// Upper bound of a power, in squares of limits.
 const LARGEST: f64 = 1e30;
-/// Swing that is explained by a correction given beside the law, as a multiple of it: what a mode makes of it at its resonance.
+/// Swing explained by an external correction, as a multiple of it: the amplification of a mode at resonance.
 const GIVEN: f64 = 8.0;
-/// The first axis whose mean and set-point are known, in the word of signs.
+/// First bit in the word of signs for axes whose mean and set-point are known.
 const FIRST_KNOWN: u32 = 1 << 8;
-/// The stage stands from this bit of the conditions on.
+/// First bit of the stage in conditions.
 const FIRST_STAGE: u32 = 29;
 
 impl Fallback {
-    /// What is left of the gains.
+    /// Factor on the gains.
     #[inline]
     #[must_use]
     pub fn share<T: Real>(self) -> T {
@@ -54,7 +53,7 @@ impl Fallback {
         }
     }
 
-    /// What comes next if the oscillation goes on; none after the last.
+    /// The next stage if the oscillation continues; none after the last.
     #[must_use]
     pub const fn next(self) -> Option<Self> {
         match self {
@@ -69,29 +68,29 @@ crate::constants::constants! {
     ($) steadiness_fields;
     /// Constants of the detection; from `supervisor.disturbance`.
     pub struct Steadiness<T> {
-        /// Of each axis (1/m, 1/rad), or of each leg (1/m): one over what noise and environment may make of its swing.
+        /// For each axis (1/m, 1/rad) or leg (1/m): one over the swing that noise and environment may cause.
         pub per_limit: [T; 6],
-        /// Part of a swing that the slow mean takes up, in (0, 1].
+        /// Fraction of a swing that the slow mean follows, in (0, 1].
         pub follow: T,
-        /// Swing that is explained by a change of the set-point from one sample to the next, as a multiple of it.
+        /// Swing explained by a change of the set-point between samples, as a multiple of the change.
         pub motion: T,
-        /// What is left in the next tick of the power that was explained in this one, in (0, 1).
+        /// Fraction of the explained power that is kept to the next tick, in (0, 1).
         pub keep: T,
-        /// The same in a stage, where what goes on is to be told soon from what went before.
+        /// The same in a fallback stage, where a continuing oscillation must soon be distinguished from the previous one.
         pub keep_fallen: T,
-        /// Samples with one sign in a row of which more are no oscillation.
+        /// More samples in a row with one sign than this are not an oscillation.
         pub one_way: u32,
-        /// Samples that lead to the first stage, ≥ 1.
+        /// Samples before the first stage, ≥ 1.
         pub first: u32,
-        /// Samples that lead from one stage to the next: a ring that the last stage left has died out by then.
+        /// Samples between stages, ≥ 1: a ring that the last stage left has decayed by then.
         pub next: u32,
     }
 }
 
 crate::state! { |words|
-    /// State of the detection, and the stage that it led to.
+    /// State of the detection, and its fallback stage.
     pub struct Oscillation<T>[T: Real] {
-        /// What the law has fallen back to.
+        /// Present fallback stage.
         pub stage: Fallback = Fallback::None, choice;
         /// m: slow mean of each error, m or rad.
         mean: [T; 6] = [T::ZERO; 6], axes(words.sizes().apart);
@@ -101,32 +100,34 @@ crate::state! { |words|
         power: [T; 6] = [T::ZERO; 6], numbers(LARGEST);
         /// E.
         explained: T = T::ONE, number(LARGEST);
-        /// Samples with a power that nothing explains, less those without.
+        /// Count for each axis or leg: samples with unexplained power less samples without.
         counts: [u32; 6] = [0; 6], tallies;
-        /// Samples with such a power since the swing changed its sign. Bits of the signs: set where it is below zero; from bit 8 on,
-        /// where a sample is known.
+        /// Samples with unexplained power since the last change of sign. Sign bits: set if negative; from bit 8 on, set
+        /// if a sample is known.
         runs: [u32; 6] = [0; 6], tallies;
         signs: u32 = 0, tally;
-        /// What it adds to the conditions: the bit of the cause while it is suspected, the stage from bit 29 on.
+        /// Its part of the conditions: the bit of the cause while an oscillation is suspected, the stage from bit 29
+        /// on.
         pub conditions: u32 = 0, tally;
     }
 }
 
-/// One axis or leg in one tick; finite.
+/// One axis or leg in one tick; all finite.
 #[derive(Debug, Clone, Copy)]
 pub struct Motion<T> {
-    /// Set-point less what is measured, m or rad.
+    /// Set-point less measured value, m or rad.
     pub error: T,
     /// Set-point, m or rad.
     pub target: T,
-    /// What is asked for against the error beside the law, m or rad; none where there is no such.
+    /// External correction, m or rad; none if the controller has none.
     pub given: Option<T>,
-    /// A leg is at the end of its voltage.
+    /// A leg is at its voltage limit.
     pub limited: bool,
 }
 
 impl<T: Real> Oscillation<T> {
-    /// Takes the motion of an axis or leg (0 to 5) while the law runs. Whether an oscillation of it is counted.
+    /// Takes the motion of an axis or leg (0 to 5) while the law runs. Returns whether an oscillation of it is being
+    /// counted.
     #[inline]
     pub fn look(&mut self, limits: &Steadiness<T>, index: usize, motion: &Motion<T>) -> bool {
         let index = if index < 6 { index } else { 0 };
@@ -161,7 +162,7 @@ impl<T: Real> Oscillation<T> {
             && self.count(limits, index, swing < T::ZERO, motion.limited && moved != T::ZERO)
     }
 
-    /// The count of an axis whose power nothing explains, or did not lately; whether there is one.
+    /// Updates the count of an axis with unexplained power, now or lately. Returns whether there is a count.
     #[cold]
     #[inline(never)]
     fn count(&mut self, limits: &Steadiness<T>, index: usize, below: bool, kept_back: bool) -> bool {
@@ -176,7 +177,7 @@ impl<T: Real> Oscillation<T> {
         *run = if self.signs & bit == sign { run.saturating_add(1) } else { 0 };
         self.signs = (self.signs & !bit) | sign;
         if *power > self.explained {
-            // What goes one way is on its way somewhere.
+            // A motion in one direction is not an oscillation.
             *count = if *run <= limits.one_way { count.saturating_add(1) } else { count.saturating_sub(1) };
             let own = *power * T::from_f64(OWN);
             if own > self.explained {
@@ -198,20 +199,20 @@ impl<T: Real> Oscillation<T> {
         if self.stage == Fallback::None { limits.first } else { limits.next }
     }
 
-    /// Whether an oscillation that is counted has lasted.
+    /// Whether a counted oscillation has lasted long enough.
     pub(super) fn has_lasted(&self, limits: &Steadiness<T>) -> bool {
         self.counts.iter().any(|count| *count >= self.enough(limits))
     }
 
-    /// Whether the error may be about to oscillate: something is counted, which an oscillation that grows is soon enough; or a stage
-    /// has not yet ended it.
+    /// Whether the error may be about to oscillate: an axis is counted, which is early enough for a growing
+    /// oscillation, or a stage has not yet ended the oscillation.
     #[must_use]
     pub(super) fn is_suspected(&self) -> bool {
         let rings = self.stage != Fallback::None && self.power.iter().any(|power| *power > T::ONE);
         rings || self.counts.iter().any(|count| *count != 0)
     }
 
-    /// Goes on to the next stage; whether there was one.
+    /// Advances to the next stage. Returns whether there was one.
     pub(super) fn fall_back(&mut self) -> bool {
         let next = self.stage.next();
         if let Some(stage) = next {
@@ -221,7 +222,7 @@ impl<T: Real> Oscillation<T> {
         next.is_some()
     }
 
-    /// Forgets what was suspected, but not the stage.
+    /// Clears the suspicion, but keeps the stage.
     pub(super) fn forgive(&mut self) {
         self.counts = [0; 6];
         self.show(false);

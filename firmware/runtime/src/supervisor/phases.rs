@@ -17,48 +17,49 @@ use crate::real::Real;
 crate::state! { |words|
     /// State of the supervisor. Disarmed at reset, nothing seen.
     pub struct Supervisor<T>[T: Real] {
-        /// What the machine is doing.
+        /// Present phase.
         pub phase: Phase = Phase::Disarmed, choice;
-        /// Why, if it was forced upon it.
+        /// Cause of the phase, if it was forced.
         pub cause: Cause = Cause::None, choice;
         /// The request of the last tick.
         pub request: Request = Request::None, choice;
-        /// Armed since it last ran: the law begins anew.
+        /// Armed since the law last ran: the law starts from scratch.
         pub fresh: bool = true, set;
-        /// A request to arm that began to be given and could not be followed yet.
+        /// A new request to arm that could not be followed yet.
         pub wants_arming: bool = false, set;
-        /// Some conditions are being counted.
+        /// Whether conditions are being counted.
         pub busy: bool = false, set;
-        /// What the last tick showed of gauges and limits: bits of causes, and of channels.
+        /// Gauge and limit conditions of the last tick: bits of causes, and of channels.
         pub seen: u32 = 0, tally;
-        /// Conditions of the present tick: bits of causes (bit 31 for a fault of an amplifier), from bit 16 on the gauges or legs that
-        /// they are about, from bit 22 on the gauges whose words were replaced.
+        /// Conditions of the present tick: bits of causes (bit 31 for an amplifier fault), from bit 16 on the gauges or
+        /// legs concerned, from bit 22 on the gauges whose words were replaced.
         pub conditions: u32 = 0, tally;
         /// Ticks without a condition while arming; ticks of a ramp.
         pub ticks: u32 = 0, tally;
         /// How long conditions have lasted.
         pub debounce: Debounce = Debounce::new(), part;
-        /// What the gauges show against what was sent.
+        /// Compares the gauges with the codes sent.
         pub watch: Watch<T> = Watch::new(), part;
-        /// Samples of the gauges before this one.
+        /// Previous samples of the gauges.
         pub sift: Sift<T> = Sift::new(), part;
-        /// Whether gauges and legs are wired as the spec says.
+        /// The wiring check.
         pub check: Check<T> = Check::new(), part;
-        /// Whether the error goes on oscillating, and what the law has fallen back to.
+        /// Oscillation detection and the fallback stage.
         pub oscillation: Oscillation<T> = Oscillation::new(), part;
-        /// Way to the set-point that is asked for, where the law has no generator.
+        /// Approach to the requested set-point, if the law has no generator.
         pub approach: Approach<T> = Approach::new(), part;
     }
 }
 
 impl<T: Real> Supervisor<T> {
-    /// Whether the gauges' words may be used as they are; where not, [`Supervisor::sift`] them. Before [`Supervisor::decide`].
+    /// Whether the gauges' words can be used unchanged; otherwise [`Supervisor::sift`] them. Before
+    /// [`Supervisor::decide`].
     #[inline]
     pub fn accepts(&mut self, supervision: &Supervision<T>, words: &[T; 6]) -> bool {
         !self.phase.is_powered() || self.sift.accepts(supervision, words)
     }
 
-    /// Replaces words that leapt. `faults`: which words the law does not believe, bit by bit.
+    /// Replaces words that jumped. `faults`: gauges that the law rejects, bit by bit.
     pub fn sift(&mut self, supervision: &Supervision<T>, words: &mut [T; 6], faults: impl Fn(&[T; 6]) -> u32) {
         let activity = if self.phase == Phase::Arming && !self.is_checking(supervision) {
             Activity::Standing
@@ -70,10 +71,10 @@ impl<T: Real> Supervisor<T> {
         self.watch.lasted |= self.sift.sift(supervision, words, faults, activity);
     }
 
-    /// Brings the machine into the phase of the coming interval; returns whether it begins to run with it.
+    /// Sets the phase of the next interval; returns whether the law starts running with it.
     ///
-    /// `events` are what the target noticed since the last tick, `at_rest` whether every code is at rest (not asked while
-    /// running).
+    /// `events` are the target's events since the last tick; `at_rest` returns whether every code is at rest (not
+    /// called while running).
     #[inline]
     pub fn decide(&mut self, supervision: &Supervision<T>, request: Request, events: u32, at_rest: bool) -> bool {
         let begun = request != self.request;
@@ -94,7 +95,7 @@ impl<T: Real> Supervisor<T> {
         self.change(supervision, begun, present, lasted, at_rest)
     }
 
-    /// Everything but running on.
+    /// Every transition except running on.
     #[cold]
     #[inline(never)]
     fn change(&mut self, supervision: &Supervision<T>, begun: bool, present: u32, lasted: u32, at_rest: bool) -> bool {
@@ -119,7 +120,7 @@ impl<T: Real> Supervisor<T> {
     }
 
     fn disarmed(&mut self, begun: bool, present: u32, at_rest: bool) {
-        // A request that stays from before does not count; one that came too early waits as long as it is given.
+        // A request held from before does not count. One that came too early waits as long as it is given.
         self.wants_arming = self.request == Request::Arm && (begun || self.wants_arming);
         if self.wants_arming && present == 0 && at_rest {
             self.wants_arming = false;
@@ -135,7 +136,7 @@ impl<T: Real> Supervisor<T> {
         } else if self.request == Request::RampDown
             || self.request == Request::Hold && supervision.wiring.is_some() && !self.check.done
         {
-            // A machine whose wiring was not checked cannot hold.
+            // A machine whose wiring was not checked must not hold.
             self.enter(Phase::RampingDown, Cause::None);
         } else if present != 0 {
             self.ticks = 0;
@@ -170,7 +171,7 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// The user knows of the oscillation: all of the law is at work again.
+    /// The user has acknowledged the oscillation: the full law is active again.
     fn recover(&mut self) {
         self.oscillation = Oscillation::new();
         self.cause = Cause::None;
@@ -188,7 +189,7 @@ impl<T: Real> Supervisor<T> {
         match self.request {
             Request::RampDown => self.enter(Phase::RampingDown, self.cause),
             Request::Acknowledge if begun && present == 0 => self.recover(),
-            // After a cause, only a request that begins now shows that the user knows of it.
+            // After a cause, only a new request shows that the user knows of it.
             Request::Run if present == 0 && (begun || self.cause == Cause::None) => {
                 self.enter(Phase::Running, Cause::None);
                 return true;
@@ -216,12 +217,12 @@ impl<T: Real> Supervisor<T> {
             self.sift = Sift::new();
         }
         match phase {
-            // It stays fallen back until the user acknowledges it, or arms anew.
+            // The fallback lasts until the user acknowledges it, or arms again.
             Phase::Running if self.oscillation.stage != Fallback::None => self.cause = Cause::Oscillation,
             Phase::Running | Phase::Holding | Phase::RampingDown => self.oscillation.forgive(),
             Phase::Disarmed | Phase::Arming | Phase::Faulted => self.oscillation = Oscillation::new(),
         }
-        // What was suspected before belongs to the phase before. A ramp and a hold go on with it.
+        // A suspicion belongs to the phase in which it arose. Ramp and hold keep it.
         if !matches!(phase, Phase::Holding | Phase::RampingDown) {
             self.watch.forgive();
             self.debounce = Debounce::new();
@@ -229,14 +230,14 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// Whether a leg makes its pulse, or what they showed is judged.
+    /// Whether a pulse is under way, or being evaluated.
     #[inline]
     #[must_use]
     pub fn is_checking(&self, supervision: &Supervision<T>) -> bool {
         self.phase == Phase::Arming && self.ticks >= supervision.arm_ticks && supervision.wiring.is_some()
     }
 
-    /// Word of what the wiring check found, where that is why the machine does not run; or of what the law has fallen back to.
+    /// Word of the wiring check's finding if that is why the machine does not run, or of the fallback stage.
     #[inline]
     #[must_use]
     pub fn finding(&self) -> u32 {
@@ -247,7 +248,8 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// Goes on with the wiring check, of readings that are believed (m), where one is under way. `expected`: readings per leg displacement.
+    /// Continues the wiring check, if one is under way, with valid readings (m). `expected`: readings per leg
+    /// displacement.
     #[inline]
     pub fn check(
         &mut self,
@@ -275,7 +277,7 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// Where a leg goes when the law does not run: rest, or its pulse beyond it.
+    /// Target code of a leg while the law does not run: rest, or rest plus its pulse.
     #[inline]
     #[must_use]
     pub fn goal(&self, supervision: &Supervision<T>, leg: usize) -> i32 {
@@ -287,7 +289,7 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// Codes by which every leg goes towards its goal in this tick, when the law does not run; never above `max_step`.
+    /// Code steps of every leg towards its target in this tick, while the law does not run; never above `max_step`.
     #[inline]
     pub fn step_to_rest(&mut self, supervision: &Supervision<T>, max_step: i32) -> i32 {
         match self.phase {
@@ -304,7 +306,7 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// Takes what a tick showed: gauges that are not believed (bits), legs that a limit held back (bits).
+    /// Takes a tick's results: invalid gauges (bits), legs held back by a limit (bits).
     #[inline]
     pub fn see(&mut self, faults: u32, limited: u32, words: &[T; 6], moved: &[i32; 6], max_step: i32) {
         self.seen = if faults | limited == 0 { 0 } else { seen(faults, limited, words, moved, max_step) };
@@ -316,7 +318,8 @@ impl<T: Real> Supervisor<T> {
         self.watch.look(supervision, channel, sample);
     }
 
-    /// Takes error and set-point (m or rad, finite) of that channel while the law runs, and what is asked for beside the law, if there is such.
+    /// Takes error and set-point (m or rad, finite) of that channel while the law runs, and the external correction, if
+    /// any.
     #[inline]
     pub fn follow(&mut self, supervision: &Supervision<T>, channel: usize, error: T, target: T, given: Option<T>) {
         let limited = self.seen & Cause::VoltageSaturation.bit() != 0;
@@ -326,7 +329,7 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// An oscillation is counted.
+    /// An oscillation is being counted.
     #[cold]
     #[inline(never)]
     fn suspect(&mut self, supervision: &Supervision<T>) {

@@ -1,4 +1,5 @@
-//! Samples of the gauges against the two before them: one that leaps is replaced by its prediction, one that repeats is counted.
+//! Checks the gauges' samples against the two before: a sample that jumps is replaced by its prediction; a repeated one
+//! is counted.
 //!
 //! ```text
 //! prediction   2 y(n−1) − y(n−2)            wrong by no more than the legs can accelerate, and noise: the bound `leap`
@@ -9,9 +10,9 @@
 //!              to y(n−2): then it was y(n−1) that leapt, by less than the bound, and the middle stands for it from here on
 //! repeated     all six words are those of the sample before, or of the one before that
 //! ```
-//! Both are leaky counts: 4 for a tick with it, 1 taken off by one without. Three replaced in a row are a fault, or every fourth over long. Of
-//! repeated ones the spec says how many: none where the noise is below a step of the converter, or where the gauges showed no noise
-//! while the machine armed.
+//! Both are leaky counters: 4 up for a tick with the condition, 1 down for one without. Three replaced samples in a row
+//! are a fault, or every fourth over a long time. The spec sets the limit for repeated samples. There is none if the
+//! noise is below a converter step, or if the gauges showed no noise while the machine armed.
 
 use super::debounce::{WRONG, rise};
 use super::kinds::{Cause, FIRST_CHANNEL};
@@ -20,31 +21,32 @@ use crate::linear::each;
 use crate::real::Real;
 use crate::snapshot::LARGEST;
 
-/// Bit 22 of the status: the word of a gauge leapt and was replaced by its prediction.
+/// Bit 22 of the status: a gauge's word jumped and was replaced by its prediction.
 pub const SAMPLE_REPLACED: u32 = 0x40_0000;
-/// Bit 23 of the status: six gauges gave the very words of a sample before.
+/// Bit 23 of the status: all six gauges repeated the words of an earlier sample.
 pub const SAMPLE_REPEATED: u32 = 0x80_0000;
-/// Count of replaced samples at which they are a fault.
+/// Count of replaced samples that is a fault.
 const REPLACED_LIMIT: u32 = 3 * WRONG;
-/// Predictions in a row after which a sample is taken as it comes.
+/// Predictions in a row after which the next sample is accepted.
 const MOST_PREDICTED: usize = 3;
-/// Conditions name gauges whose words were replaced from this bit on.
+/// First bit in conditions for gauges whose words were replaced.
 const FIRST_REPLACED: u32 = 22;
 
-/// Times the swing by which the next word may be off its prediction.
+/// Multiple of the swing by which the next word may differ from its prediction.
 const GROWTH: f64 = 2.0;
-/// What a tick leaves of a swing.
+/// Factor on a swing per tick.
 const DECAY: f64 = 0.9375;
-/// Times the swing by which a word is off the line through a prediction that was off by the swing; up to so large a swing.
+/// Multiple of the swing by which a word may differ from the line through a prediction with an error of the swing; and
+/// the largest such swing.
 const AFTER_PREDICTED: f64 = 3.0;
 const MOST_WIDENED: f64 = 64.0;
-/// A swing below it is none.
+/// A smaller swing counts as zero.
 const NEGLIGIBLE: f64 = 0.0625;
 
-/// What the machine does, as far as its samples tell it.
+/// State of the machine, as far as its samples show it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Activity {
-    /// It arms, and no leg moves.
+    /// Arming; no leg moves.
     Standing,
     /// A straight line through two samples predicts the next one.
     Moving,
@@ -53,29 +55,29 @@ pub enum Activity {
 }
 
 crate::state! { |words|
-    /// What is remembered of samples. At reset none is known.
+    /// Memory of samples. Empty at reset.
     pub struct Sift<T>[T: Real] {
-        /// The two samples before this one. Every word was believed.
+        /// The two previous samples. Every word was valid.
         pub samples: [[T; 6]; 2] = [[T::ZERO; 6]; 2], rows(words.sizes().reading);
-        /// Which of them is the newer one.
+        /// Index of the newer one.
         pub newer: usize = 0, place(1);
-        /// How many there are.
+        /// Number of known samples.
         pub known: usize = 0, place(2);
-        /// How many of the last ones, in a row, were missing or repeated.
+        /// Number of samples in a row that were missing or repeated.
         pub predicted: usize = 0, place(MOST_PREDICTED);
-        /// By how much words were lately off their predictions, as a multiple of `leap`: what an oscillation makes of them.
+        /// Checksums of the words of the last two samples, the newer first; `samples` may not hold these words.
         pub swing: T = T::ZERO, number(LARGEST);
-        /// Checksums of the words of the last two samples, the newer one first, where they may not be in `samples`.
+        /// Checksums of the words of the last two samples, the newer first, if they may differ from `samples`.
         pub sums: [u32; 2] = [0; 2], tallies;
         /// Leaky count of samples with replaced words.
         pub leapt: u32 = 0, tally;
         /// Leaky count of repeated samples.
         pub stale: u32 = 0, tally;
-        /// Leaky count of new samples while the machine arms and stands: whether the gauges show noise.
+        /// Leaky count of new samples while the machine arms and no leg moves: it shows whether the gauges have noise.
         pub noise: u32 = 0, tally;
         /// Gauges whose words were replaced in this tick, bit by bit.
         pub replaced: u32 = 0, tally;
-        /// The sample of this tick was a repeated one.
+        /// Whether this tick's sample was a repeated one.
         pub repeated: bool = false, set;
         /// Two samples are known, neither is a prediction, and nothing is being counted.
         pub quiet: bool = false, set if !*quiet || *known == 2;
@@ -83,7 +85,7 @@ crate::state! { |words|
 }
 
 impl<T: Real> Sift<T> {
-    /// Takes a sample in which nothing is wrong. Where it returns false nothing has changed: [`Sift::sift`] it.
+    /// Takes a sample without irregularities. If it returns false, nothing has changed; then call [`Sift::sift`].
     #[inline]
     pub fn accepts(&mut self, supervision: &Supervision<T>, words: &[T; 6]) -> bool {
         if !self.quiet {
@@ -104,9 +106,9 @@ impl<T: Real> Sift<T> {
         true
     }
 
-    /// Takes any sample, and replaces the words that leapt. Returns the causes that have lasted, as bits.
+    /// Takes any sample, and replaces the words that jumped. Returns the causes that have lasted, as bits.
     ///
-    /// `faults` says which words the law does not believe: such a sample is left to the law.
+    /// `faults` are the gauges that the law rejects: such a sample is left to the law.
     #[cold]
     #[inline(never)]
     pub fn sift(
@@ -120,7 +122,7 @@ impl<T: Real> Sift<T> {
         let believed = faults(words) == 0;
         self.repeated = self.repeats(supervision, words, believed, activity) && believed;
         let (newer, older) = self.last_two();
-        // A prediction is believed, or it is the word before.
+        // The prediction if it is valid, otherwise the previous word.
         let mut prediction = each(|gauge| predict(newer[gauge], older[gauge]));
         if self.known < 2 || faults(&prediction) != 0 {
             prediction = newer;
@@ -136,7 +138,7 @@ impl<T: Real> Sift<T> {
             self.predicted = 0;
         } else {
             self.samples[self.newer & 1] = smoothed;
-            // A repeated sample is given to the law, but says nothing of how the legs move.
+            // A repeated sample is passed to the law, but carries no information on the motion.
             let by_prediction = !believed || (self.repeated && self.known == 2);
             let remembered = if by_prediction { prediction } else { *words };
             self.remember(words, &remembered, !believed || self.repeated);
@@ -151,7 +153,7 @@ impl<T: Real> Sift<T> {
         }
         let mut lasted = 0;
         if self.replaced != 0 && self.leapt >= REPLACED_LIMIT {
-            // From here on it is the gauges that are right: what is predicted from predictions runs away.
+            // Accept the gauges from here on: predictions from predictions diverge.
             self.known = 0;
             lasted |= Cause::GaugeDisagreement.bit();
         }
@@ -161,13 +163,13 @@ impl<T: Real> Sift<T> {
         lasted
     }
 
-    /// The two samples before this one, the newer one first.
+    /// The two previous samples, the newer first.
     fn last_two(&self) -> ([T; 6], [T; 6]) {
         let [even, odd] = self.samples;
         if self.newer == 0 { (even, odd) } else { (odd, even) }
     }
 
-    /// Whether the words are those of a sample before, on a machine whose gauges showed noise while it stood.
+    /// Whether the words repeat an earlier sample, on a machine whose gauges showed noise at rest.
     fn repeats(&mut self, supervision: &Supervision<T>, words: &[T; 6], believed: bool, activity: Activity) -> bool {
         let (newer, older) = self.last_two();
         let sums = if self.quiet { [sum(&newer), sum(&older)] } else { self.sums };
@@ -184,7 +186,7 @@ impl<T: Real> Sift<T> {
         same && supervision.repeats != 0 && self.noise.saturating_mul(2) > supervision.arm_ticks
     }
 
-    /// An oscillation is suspected: from here on every sample goes through [`Sift::sift`], which looks at its swing.
+    /// An oscillation is suspected: from now on every sample goes through [`Sift::sift`], which tracks the swing.
     #[cold]
     #[inline(never)]
     pub fn look_closely(&mut self) {
@@ -195,7 +197,7 @@ impl<T: Real> Sift<T> {
         }
     }
 
-    /// The swing, with the words that are within the bound. A prediction from predictions says less of it.
+    /// The swing, from the words within the bound. A prediction from predictions is weaker evidence.
     #[cold]
     #[inline(never)]
     fn swings(&self, leaps: &[T; 6], words: &[T; 6], prediction: &[T; 6], bound: T, oscillates: bool) -> T {
@@ -213,7 +215,8 @@ impl<T: Real> Sift<T> {
         swing
     }
 
-    /// Replaces the words that leapt by their prediction. Returns the sample before, without what turns out to have leapt in it.
+    /// Replaces the words that jumped by their prediction. Returns the previous sample, without words that now prove to
+    /// have jumped.
     fn replace(
         &mut self,
         supervision: &Supervision<T>,
@@ -247,7 +250,7 @@ impl<T: Real> Sift<T> {
         newer
     }
 
-    /// The law does not believe the sample of this tick. One that was let pass, close to the bound of the range, is not remembered.
+    /// The law rejects this tick's sample. A sample close to the range limit is not stored.
     #[cold]
     #[inline(never)]
     pub fn forget(&mut self) {
@@ -258,7 +261,7 @@ impl<T: Real> Sift<T> {
         }
     }
 
-    /// Remembers a sample. After too many predictions in a row it begins anew with the words.
+    /// Stores a sample. After too many predictions in a row, it starts again with the measured words.
     fn remember(&mut self, words: &[T; 6], remembered: &[T; 6], is_predicted: bool) {
         let begins = is_predicted && (self.known < 2 || self.predicted >= MOST_PREDICTED);
         if begins {
@@ -274,7 +277,7 @@ impl<T: Real> Sift<T> {
         }
     }
 
-    /// What this tick's sample is as conditions: causes, and from bit 16 and bit 22 on the gauges.
+    /// This tick's sample as conditions: causes, and the gauges from bit 16 and bit 22 on.
     #[inline]
     #[must_use]
     pub fn conditions(&self) -> u32 {
@@ -298,7 +301,7 @@ impl<T: Real> Sift<T> {
     }
 }
 
-/// What a swing may be behind a prediction that is remembered for a word.
+/// Bound on the swing after a prediction was stored for a word.
 fn widened<T: Real>(swing: T) -> T {
     let (most, widened) = (T::from_f64(MOST_WIDENED), swing * T::from_f64(AFTER_PREDICTED));
     if swing >= most {
@@ -310,13 +313,13 @@ fn widened<T: Real>(swing: T) -> T {
     }
 }
 
-/// Where a word goes on in a straight line.
+/// Linear extrapolation of a word.
 #[inline(always)]
 fn predict<T: Real>(newer: T, older: T) -> T {
     newer + newer - older
 }
 
-/// Written so that what is no number is not within.
+/// Written so that a NaN is not within.
 #[inline(always)]
 fn is_within<T: Real>(word: T, predicted: T, bound: T) -> bool {
     (word - predicted).abs() <= bound
@@ -330,7 +333,7 @@ fn sum<T: Real>(words: &[T; 6]) -> u32 {
     })
 }
 
-/// A leaky count, held at its limit.
+/// A leaky counter, saturated at its limit.
 fn count(count: &mut u32, wrong: bool, limit: u32) {
     if wrong {
         rise(count, WRONG, limit);

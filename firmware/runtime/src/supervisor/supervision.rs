@@ -1,11 +1,11 @@
-//! What the spec fixes about the supervisor.
+//! Constants of the supervisor, from the spec.
 
 use super::kinds::{Cause, RAMPS_DOWN, Reaction, SWITCHES_OFF};
 use super::oscillation::Steadiness;
 use super::wiring::Wiring;
 
-/// Causes that are timed tick by tick, in the order of [`Supervision::timeout`]. Those of the watch are counted in samples there; all
-/// others act at once.
+/// Causes that are debounced tick by tick, in the order of [`Supervision::timeout`]. Those of the watch are counted in
+/// samples; all others act at once.
 pub const TIMED: [Cause; TIMERS] = [
     Cause::GaugeNotFinite,
     Cause::GaugeRange,
@@ -15,58 +15,59 @@ pub const TIMED: [Cause; TIMERS] = [
     Cause::Converter,
     Cause::HostGone,
 ];
-/// How many these are.
+/// Number of these causes.
 pub const TIMERS: usize = 7;
 
 crate::constants::constants! {
     ($) supervision_fields;
-    /// Constants of the supervisor; from `supervisor`. Six gauges are looked at in turn, so what they show is counted in samples, one
-    /// in six ticks.
+    /// Constants of the supervisor; from `supervisor`. Six gauges are checked in turn, so their conditions are counted in
+    /// samples, one in six ticks.
     pub struct Supervision<T> {
-        /// Ticks without any condition that arming takes, ≥ 1.
+        /// Ticks without any condition that arming requires, ≥ 1.
         pub arm_ticks: u32,
         /// Code at rest.
         pub rest: i32,
-        /// Codes by which a ramp moves, ≥ 1, every so many ticks, ≥ 1.
+        /// Codes per step of a ramp, ≥ 1, and ticks per step, ≥ 1.
         pub ramp_step: i32,
         /// See [`Supervision::ramp_step`].
         pub ramp_every: u32,
         /// For each of [`TIMED`], the count at which the condition is a cause, ≥ 1.
         pub timeout: [u32; TIMERS],
-        /// For each of them, what a tick with the condition counts; one without it takes 1 off.
+        /// For each of them, the increment of a tick with the condition; a tick without it decrements by 1.
         pub weight: [u32; TIMERS],
-        /// Motion along a gauge that the codes sent must have caused before an unchanged word means that the gauge is stuck, m.
+        /// Motion along a gauge, by the codes sent, after which an unchanged word means that the gauge is stuck, m.
         pub stuck_motion: T,
         /// Samples after that, ≥ 1.
         pub stuck_samples: u32,
         /// Largest |reading − expected| of a gauge, m.
         pub disagreement: T,
-        /// Samples for which it must be beyond, ≥ 1.
+        /// Samples for which that must last, ≥ 1.
         pub disagreement_samples: u32,
         /// Largest |set-point − measured| of each axis (m, rad), or of each leg (m).
         pub tracking: [T; 6],
-        /// Samples for which it must be beyond, ≥ 1.
+        /// Samples for which that must last, ≥ 1.
         pub tracking_samples: u32,
         /// Largest |word − prediction| of each gauge, in the unit of its words; beyond it the word is replaced.
         pub leap: [T; 6],
-        /// Count of repeated samples, [`WRONG`](super::WRONG) each, at which they are a fault; 0 where they say nothing.
+        /// Count of repeated samples, [`WRONG`](super::WRONG) each, that is a fault; 0 if they are not checked.
         pub repeats: u32,
-        /// What a sustained oscillation is told by.
+        /// Limits of the oscillation detection.
         pub steadiness: Steadiness<T>,
-        /// What a fault of an amplifier leads to.
+        /// Reaction to an amplifier fault.
         pub amplifier_fault: Reaction,
-        /// The wiring check that arming ends with; none where the spec switches it off.
+        /// The wiring check at the end of arming; none if the spec switches it off.
         pub wiring: Option<Wiring<T>>,
     }
 }
 
 impl<T> Supervision<T> {
-    /// Causes that take the amplifiers off at once, where they are on or not (`powered`). A disarmed machine minds no amplifier: it refuses to arm.
+    /// Causes that switch the amplifiers off at once. `powered`: whether they are on. A disarmed machine ignores its
+    /// amplifiers: it refuses to arm.
     pub(super) fn switches_off(&self, powered: bool) -> u32 {
         SWITCHES_OFF | if powered { self.where_it_is(Reaction::Off) } else { 0 }
     }
 
-    /// Causes that bring the codes to rest, then take the amplifiers off.
+    /// Causes that ramp the codes to rest and then switch the amplifiers off.
     pub(super) fn ramps_down(&self) -> u32 {
         RAMPS_DOWN | self.where_it_is(Reaction::RampDown)
     }

@@ -1,13 +1,13 @@
-//! What the gauges show against what was sent. One gauge and one axis a tick, each once in six: faults last longer, and a
-//! sixth of the work is a sixth of the time.
+//! Compares the gauges with the codes sent. One gauge and one axis per tick, each once in six ticks: faults last longer
+//! than that, and the check takes a sixth of the time.
 
 use super::debounce::rise;
 use super::kinds::Cause;
 use super::supervision::Supervision;
 use crate::real::Real;
 
-/// Every channel once in six ticks, in an order by which none comes at regular intervals: no oscillation of its error up to a quarter
-/// of the rate of ticks looks as if it stood still. Found by trial, with the worst of all frequencies and phases as the measure.
+/// Every channel once in six ticks, in an order in which none comes at regular intervals. So no oscillation of an error
+/// up to a quarter of the tick rate aliases to a constant. Found by search over the worst frequency and phase.
 const ORDER: [u8; 36] =
     [2, 4, 0, 1, 5, 3, 1, 3, 5, 2, 4, 0, 4, 1, 0, 5, 2, 3, 3, 1, 2, 5, 0, 4, 2, 1, 3, 4, 0, 5, 5, 3, 4, 1, 2, 0];
 
@@ -16,51 +16,51 @@ const ORDER: [u8; 36] =
 pub struct Sample<T> {
     /// Its word.
     pub word: T,
-    /// What the word means, m.
+    /// Reading of the gauge, m.
     pub reading: T,
-    /// What it ought to be by the hysteresis model at the voltages sent and the known load, m.
+    /// Expected reading, by the hysteresis model at the voltages sent and the known load, m.
     pub expected: T,
-    /// Set-point less what is measured of the axis or leg of the same number, m or rad; none where nothing is tracked.
+    /// Set-point less measured value of the axis or leg of the same number, m or rad; none while nothing is tracked.
     pub error: Option<T>,
 }
 
 crate::state! { |words|
-    /// What is remembered of one gauge and one axis.
+    /// State of one gauge and one axis.
     pub struct Channel<T>[T: Real] {
         /// Last word of the gauge.
         pub word: T = T::ZERO, number(words.sizes().reading);
         /// There is one.
         pub known: bool = false, set;
-        /// Least and most that was expected since that word came, m: displacement less the known load, which a gain may have made
-        /// large.
+        /// Smallest and largest expected reading since that word came, m: displacement less the known load, which a
+        /// gain may have made large.
         pub expected: [T; 2] = [T::ZERO; 2], numbers(words.sizes().request);
-        /// Samples since these lie apart by more than the gauge could have missed.
+        /// Samples since these differ by more than the gauge can fail to show.
         pub stuck: u32 = 0, tally;
-        /// Samples, less those without, in which reading and model disagreed.
+        /// Count of samples in which reading and model disagreed, less samples in which they agreed.
         pub disagreed: u32 = 0, tally;
-        /// Samples, less those without, in which the axis was too far from its set-point.
+        /// Count of samples in which the axis was too far from its set-point, less samples in which it was not.
         pub astray: u32 = 0, tally;
     }
 }
 
 crate::state! { |words|
-    /// All of them, and whose turn it is.
+    /// All channels, and the order in which they are checked.
     pub struct Watch<T>[T: Real] {
         /// Channels 0 to 5.
         pub channels: [Channel<T>; 6] = [Channel::new(); 6], parts;
-        /// Which turn comes next, of `ORDER`.
+        /// Next index into `ORDER`.
         pub turn: usize = 0, place(ORDER.len());
-        /// Channels that are stuck, disagree, are astray: three sets of bits.
+        /// Channels that are suspected to be stuck, to disagree, or to be off the set-point: three sets of bits.
         pub suspects: [u32; 3] = [0; 3], tallies;
-        /// Their causes, present but not yet lasting.
+        /// Their causes, before debouncing.
         pub present: u32 = 0, tally;
-        /// Causes that have lasted, found in the last sample.
+        /// Causes that have lasted, of the last sample.
         pub lasted: u32 = 0, tally;
     }
 }
 
 impl<T: Real> Watch<T> {
-    /// Forgets what was seen, but not whose turn it is.
+    /// Clears the suspicions, but keeps the order.
     #[inline(never)]
     pub fn forgive(&mut self) {
         for channel in &mut self.channels {
@@ -74,7 +74,7 @@ impl<T: Real> Watch<T> {
         self.lasted = 0;
     }
 
-    /// The channel whose turn it is in this tick, 0 to 5.
+    /// The next channel, 0 to 5.
     #[inline]
     pub fn take_turn(&mut self) -> usize {
         let turn = if self.turn < ORDER.len() { self.turn } else { 0 };
@@ -82,7 +82,7 @@ impl<T: Real> Watch<T> {
         ORDER[turn] as usize
     }
 
-    /// Looks at a channel (0 to 5). Every number of the sample is finite.
+    /// Checks a channel (0 to 5). Every number of the sample is finite.
     #[inline]
     pub fn look(&mut self, supervision: &Supervision<T>, index: usize, sample: &Sample<T>) {
         let index = if index < 6 { index } else { 0 };
@@ -113,14 +113,14 @@ impl<T: Real> Watch<T> {
         }
     }
 
-    /// The counts of a channel that something is, or was, wrong with.
+    /// Updates the counts of a channel with a suspicion, now or before.
     #[cold]
     #[inline(never)]
     fn count(&mut self, supervision: &Supervision<T>, index: usize, [moved, disagrees, astray]: [bool; 3]) {
         let index = if index < 6 { index } else { 0 };
         let channel = &mut self.channels[index];
         let lasting = [
-            // One word that changes shows that the gauge lives: nothing is left of the count.
+            // One changed word shows that the gauge works: the count is reset.
             count(&mut channel.stuck, moved, supervision.stuck_samples, u32::MAX),
             count(&mut channel.disagreed, disagrees, supervision.disagreement_samples, 1),
             count(&mut channel.astray, astray, supervision.tracking_samples, 1),
@@ -143,7 +143,7 @@ impl<T: Real> Watch<T> {
         }
     }
 
-    /// Channels that anything is suspected of, bit by bit.
+    /// Suspected channels, bit by bit.
     #[inline]
     #[must_use]
     pub fn suspected(&self) -> u32 {
@@ -151,7 +151,8 @@ impl<T: Real> Watch<T> {
     }
 }
 
-/// Counts a sample in which something was seen, takes `off` for one in which it was not; whether it has lasted.
+/// Increments for a sample that was `seen`, decrements by `off` for another. Returns whether the count has reached its
+/// limit.
 #[inline]
 fn count(count: &mut u32, seen: bool, timeout: u32, off: u32) -> bool {
     if !seen {

@@ -1,14 +1,15 @@
-//! The wiring check: before feedback is allowed, each leg in turn makes a small pulse, and what the gauges show of it is held
-//! against the Jacobian.
+//! The wiring check: before feedback is allowed, each leg in turn makes a small pulse. The response of the gauges is
+//! compared with the Jacobian.
 //!
 //! ```text
 //! one leg    u = (1 − cos θ)/2 of the pulse, θ once around; of every gauge the part along u, beside the way of u (hysteresis),
 //!            a constant, a drift and the mains: a weight for each sample, known before          → a column of the response Y
 //! all legs   Y ≈ diag(a) S diag(b): S readings per leg displacement, a gains of the gauges, b of the legs
 //! ```
-//! A gauge or leg whose gain leaves its range is named. What no gains explain is tried with one gauge inverted, or two gauges or two
-//! legs swapped: what explains it best is named. The response is in the spec's displacement of a leg at the pulse, which makes
-//! b the gain of small motions over the spec's; a common factor of all gauges is not seen, it is in b.
+//! A gauge or leg whose gain leaves its range is named. If no gains explain the response, the check tries one inverted
+//! gauge, or two swapped gauges or legs, and names the best explanation. The response is in units of the spec's
+//! displacement of a leg at the pulse, so b is the gain of small motions over the spec's. A common factor of all gauges
+//! cannot be distinguished; it is in b.
 
 use core::fmt;
 
@@ -24,56 +25,56 @@ crate::constants::constants! {
     ($) wiring_fields;
     /// Constants of the check; from `supervisor.wiring_check`.
     pub struct Wiring<T> {
-        /// Ticks of a leg, ≥ 8.
+        /// Ticks per leg, ≥ 8.
         pub ticks: u32,
-        /// Height of the pulse, codes; below zero where there is no room above rest.
+        /// Height of the pulse, codes; negative if there is no room above rest.
         pub height: i32,
-        /// Cosine and sine of a tick's part of the pulse, then of the mains.
+        /// Rotation per tick as cosine and sine: of the pulse, then of the mains.
         pub turn: [[T; 2]; 2],
-        /// Cosine and sine of what the readings lag, of the pulse.
+        /// Phase lag of the readings at the pulse, as cosine and sine.
         pub lag: [T; 2],
-        /// Weights of u, of its way, of a constant, of the time (0 to 1), of the mains' cosine and sine: their sum is the weight of a
-        /// sample.
+        /// Weights of u, of its displacement, of a constant, of the time (0 to 1), of the mains' cosine and sine. Their sum
+        /// is the weight of a sample.
         pub weights: [T; 6],
-        /// Of each leg, what its response is counted in: one over the displacement that the spec has for it at the pulse, 1/m.
+        /// Unit of each leg's response: one over the spec's displacement of the leg at the pulse, 1/m.
         pub per_metre: [T; 6],
         /// Lowest and highest gain of a gauge over the median of all.
         pub gauge_gain: [T; 2],
-        /// Lowest and highest gain of a leg over the mean of the five others; none where legs differ and nobody knows by how much.
+        /// Lowest and highest gain of a leg over the mean of the five others; none if the legs differ by an unknown amount.
         pub leg_gain: Option<[T; 2]>,
-        /// Largest part of the response that no gains explain, squared.
+        /// Largest part of the response that may remain unexplained by gains, squared.
         pub residual: T,
     }
 }
 
-/// Below this gain a leg is dead; of the gauges likewise. Creep and hysteresis leave half of it and more.
+/// A leg or gauge with a smaller gain is dead. Creep and hysteresis leave at least half of the gain.
 const DEAD: f64 = 0.16;
-/// Gains of gauges that are looked for.
+/// Range of gauge gains in the fit.
 const GAUGE: [f64; 2] = [0.05, 8.0];
-/// Rounds of the fit, one a tick: gains that are 2 come out as 1.8 at least on the reference platform.
+/// Iterations of the fit, one a tick. On the reference platform, a gain of 2 is found as at least 1.8.
 const ROUNDS: u32 = 8;
-/// What is tried beyond gains: six gauges inverted, fifteen pairs of gauges, fifteen of legs.
+/// Trials beyond gains: six inverted gauges, fifteen pairs of gauges, fifteen pairs of legs.
 const TRIALS: u32 = 36;
 /// Ticks of all trials.
 const TRIED: u32 = (TRIALS + 1) * ROUNDS;
 
-/// What is wrong with one gauge, or one leg.
+/// Fault of one gauge or one leg.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fault {
-    /// It shows or moves the wrong way.
+    /// Wrong direction.
     Inverted,
-    /// It shows or moves nothing.
+    /// No response.
     Dead,
-    /// It has the place of that one.
+    /// Swapped with that one.
     Swapped(u32),
-    /// It shows or moves so many hundredths of what it should.
+    /// Wrong gain, in hundredths of the right one.
     Gain(u32),
 }
 
-/// What a check found.
+/// Finding of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Finding {
-    /// Nothing, or none was made.
+    /// No fault, or no check was made.
     None,
     /// One gauge (0 to 5).
     Gauge(u32, Fault),
@@ -81,17 +82,17 @@ pub enum Finding {
     Leg(u32, Fault),
     /// No gauge shows any leg.
     Nothing,
-    /// All gauges or all legs show or move the wrong way.
+    /// All gauges or all legs have the wrong direction.
     Inverted,
-    /// All legs move so many hundredths of what they should, or all gauges show that.
+    /// Common gain of all legs or all gauges, in hundredths of the right one.
     Common(u32),
-    /// No single fault explains the response, nor that of a check made again.
+    /// No single fault explains the response, and a repeated check did not help.
     Unexplained,
     /// The limits of the codes leave no room for the pulse.
     NoRoom,
-    /// The limit of a tick's step is too small for the pulse.
+    /// The step limit of a tick is too small for the pulse.
     TooSlow,
-    /// Nothing of the check: what the law has fallen back to, for an oscillation.
+    /// Not a finding of the check: the law's fallback stage, for an oscillation.
     Fallback(Fallback),
 }
 
@@ -100,13 +101,13 @@ const NO_ROOM: u32 = 0x7ffe;
 const NOTHING: u32 = 0x7ffd;
 const INVERTED: u32 = 0x7ffc;
 const TOO_SLOW: u32 = 0x7ffb;
-/// And a gain, hundredths.
+/// Plus a gain, hundredths.
 const COMMON: u32 = 0x6000;
-/// And a stage, 0 to 2.
+/// Plus a stage, 0 to 2.
 const FALLBACK: u32 = 0x7ff0;
 const SUBJECTS: u32 = 12;
 const FIRST_GAIN: u32 = 8;
-/// Largest gain that a word has, hundredths.
+/// Largest gain in a word, hundredths.
 const LARGEST_GAIN: u32 = 2000;
 const LARGEST_COMMON: u32 = COMMON + LARGEST_GAIN;
 
@@ -143,7 +144,7 @@ impl Finding {
         1 + subject + SUBJECTS * kind
     }
 
-    /// The inverse of [`Finding::word`]; a word that is none is unexplained.
+    /// The inverse of [`Finding::word`]; an unknown word means unexplained.
     #[must_use]
     pub const fn of_word(word: u32) -> Self {
         match word {
@@ -173,7 +174,7 @@ impl Finding {
 }
 
 impl Finding {
-    /// Whether that word is the same fault; of gains, too little or too much.
+    /// Whether `word` is the same fault. Gains compare by too small or too large.
     fn is_like(self, word: u32) -> bool {
         let less = |gain: u32| gain < 100;
         match (self, Self::of_word(word)) {
@@ -184,7 +185,7 @@ impl Finding {
     }
 }
 
-/// In words for people; empty where there is none. Inlined: no controller is to be linked with the machinery of texts for it.
+/// Text for messages; empty for no finding. Inlined, so that no controller links the formatting code.
 impl fmt::Display for Finding {
     #[inline]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -211,7 +212,8 @@ impl fmt::Display for Finding {
     }
 }
 
-/// A finding, and what looks like it on a geometry with these sets of alike faults, in words for people.
+/// A finding and its alternatives, as text. On a geometry with these sets of equivalent faults, the alternatives have
+/// the same response.
 #[derive(Debug, Clone, Copy)]
 pub struct FindingText<'a, S>(pub Finding, pub &'a [S]);
 
@@ -231,7 +233,7 @@ impl<S: AsRef<[u32]>> fmt::Display for FindingText<'_, S> {
 }
 
 impl<S> FindingText<'_, S> {
-    /// What looks like it, with the gain that was found.
+    /// An alternative, with the gain that was found.
     fn of_gain(finding: Finding, other: Finding) -> Finding {
         match (finding, other) {
             (
@@ -250,17 +252,18 @@ impl<S> FindingText<'_, S> {
 crate::state! { |words|
     /// A check under way.
     pub struct Check<T>[T: Real] {
-        /// The leg that moves, 0 to 5; then 6, while what it gave is judged.
+        /// The leg that moves, 0 to 5; 6 while the response is evaluated.
         pub leg: usize = 0, place(6);
-        /// Ticks of this leg, or rounds of all trials, that are done.
+        /// Completed ticks of this leg, or iterations of all trials.
         pub tick: u32 = 0, tally;
         /// Cosine and sine of θ, then of the mains.
         pub turned: [[T; 2]; 2] = [[T::ONE, T::ZERO]; 2], rows(2.0);
-        /// What the gauges showed (rows) of each leg (columns), in the spec's displacement of a leg at the pulse.
+        /// Response of the gauges (rows) to each leg (columns), in units of the spec's displacement of a leg at the
+        /// pulse.
         pub response: Response<T> = [[T::ZERO; 6]; 6], rows(LARGEST);
-        /// Gains of the gauges after the last round of a trial.
+        /// Gauge gains after the last iteration of a trial.
         pub gauges: [T; 6] = [T::ONE; 6], numbers(GAUGE[1]);
-        /// Least that a trial left unexplained so far.
+        /// Smallest residual of a trial so far.
         pub least: T = T::ONE, number(2.0);
         /// Word of the finding of that trial; after the check, of the check.
         pub finding: u32 = 0, tally;
@@ -270,7 +273,8 @@ crate::state! { |words|
 }
 
 impl<T> Wiring<T> {
-    /// Whether codes that change by no more than that in a tick can follow the pulse, whose steepest step is π/ticks of its height.
+    /// Whether codes limited to this change per tick can follow the pulse, whose steepest step is π/ticks of its
+    /// height.
     #[must_use]
     pub(super) fn can_follow(&self, max_step: i32) -> bool {
         let steepest = (i64::from(self.height).abs() - 1) * 355;
@@ -279,7 +283,7 @@ impl<T> Wiring<T> {
 }
 
 impl<T: Real> Check<T> {
-    /// Codes by which a leg is away from rest.
+    /// Offset of a leg from rest, codes.
     #[inline]
     #[must_use]
     pub fn pulse(&self, wiring: &Wiring<T>, leg: usize) -> i32 {
@@ -290,8 +294,9 @@ impl<T: Real> Check<T> {
         if wiring.height < 0 { (height - T::HALF).truncate() } else { (height + T::HALF).truncate() }
     }
 
-    /// Takes the readings (m, finite) of a tick, or goes on to judge them. `expected`: readings per leg displacement; `since`: ticks since
-    /// the first check began, which is made again while nothing explains the response: vibration may have hidden the pulse.
+    /// Takes the readings (m, finite) of a tick, or continues the evaluation. `expected`: readings per leg
+    /// displacement. `since`: ticks since the first check began. The check is repeated while nothing explains the
+    /// response, because vibration may have hidden the pulse.
     #[cold]
     #[inline(never)]
     pub fn tick(&mut self, wiring: &Wiring<T>, expected: &Response<T>, readings: &[T; 6], since: u32) {
@@ -305,7 +310,7 @@ impl<T: Real> Check<T> {
             // The second check ends before this, the third after it.
             self.judge(wiring, expected, since / 5 >= whole / 2);
         } else {
-            // No two pauses are alike: each check is to meet another phase of the vibration.
+            // Pauses differ, so that each check meets another phase of the vibration.
             let pause = if since / 3 >= whole / 2 { wiring.ticks / 2 } else { wiring.ticks / 4 };
             self.tick = self.tick.saturating_add(1);
             if self.tick >= TRIED.saturating_add(pause) {
@@ -339,7 +344,8 @@ impl<T: Real> Check<T> {
         }
     }
 
-    /// One round of a fit a tick, as a whole fit takes longer than one has: of gains first, then of what may be inverted or swapped.
+    /// One iteration of a fit per tick, because a whole fit takes longer than a tick: first gains, then inverted or
+    /// swapped channels.
     fn judge(&mut self, wiring: &Wiring<T>, expected: &Response<T>, is_last: bool) {
         let (number, round) = (self.tick / ROUNDS, self.tick % ROUNDS);
         self.tick = self.tick.saturating_add(1);
@@ -371,13 +377,14 @@ impl<T: Real> Check<T> {
     }
 }
 
-/// A vector of the plane, turned.
+/// A rotated vector of the plane.
 #[inline]
 fn rotated<T: Real>([x, y]: [T; 2], [cosine, sine]: [T; 2]) -> [T; 2] {
     [x * cosine - y * sine, y * cosine + x * sine]
 }
 
-/// What a trial of [`Check::judge`] takes to be wrong: nothing, then gauges inverted, pairs of gauges swapped, pairs of legs.
+/// Assumption of a trial of [`Check::judge`]: nothing, then inverted gauges, swapped pairs of gauges, swapped pairs of
+/// legs.
 fn trial(number: u32) -> Finding {
     if number == 0 {
         return Finding::None;
@@ -395,7 +402,7 @@ fn trial(number: u32) -> Finding {
     if number < 22 { Finding::Gauge(first, fault) } else { Finding::Leg(first, fault) }
 }
 
-/// What the gauges show of legs whose machine has this fault; a gain of 0 where it is dead.
+/// Response of a machine with this fault; a gain of 0 if it is dead.
 #[must_use]
 pub fn with<T: Real>(expected: &Response<T>, finding: Finding) -> Response<T> {
     let mut shown = *expected;
@@ -427,7 +434,7 @@ pub fn with<T: Real>(expected: &Response<T>, finding: Finding) -> Response<T> {
     shown
 }
 
-/// Whether gauges and legs that are good explain the `response` of a machine that shows `expected`: what the check lets pass.
+/// Whether a fault-free machine explains the `response` of a machine that shows `expected`: then the check passes.
 #[must_use]
 pub fn explains<T: Real>(wiring: &Wiring<T>, expected: &Response<T>, response: &Response<T>) -> bool {
     let fit = Fit::of(response, expected);
@@ -441,13 +448,13 @@ fn entry_of<T: Real>(matrix: &Response<T>, row: usize, column: usize) -> T {
     }
 }
 
-/// diag(a) S diag(b), as near as may be to a response.
+/// diag(a) S diag(b), fitted to a response.
 struct Fit<T> {
     gauges: [T; 6],
     legs: [T; 6],
-    /// What it leaves of the response, in power.
+    /// Residual of the response, in power.
     residual: T,
-    /// The response is nothing.
+    /// Whether there is no response.
     nothing: bool,
 }
 
@@ -460,9 +467,9 @@ impl<T: Real> Fit<T> {
         Self::of_gauges(response, expected, gauges)
     }
 
-    /// The last round, whose gains of gauges are those of the one before.
+    /// The last iteration; its gauge gains are those of the iteration before.
     fn of_gauges(response: &Response<T>, expected: &Response<T>, mut gauges: [T; 6]) -> Self {
-        // As they are, but for those of a snapshot that nobody made.
+        // Unchanged, unless a snapshot was tampered with.
         for gain in &mut gauges {
             *gain = held(*gain);
         }
@@ -487,7 +494,7 @@ impl<T: Real> Fit<T> {
         Self { gauges, legs, residual, nothing }
     }
 
-    /// What the gains say.
+    /// The finding that the gains show.
     fn finding(&self, wiring: &Wiring<T>) -> Finding {
         let dead = T::from_f64(DEAD);
         if self.legs.iter().all(|gain| *gain <= -dead) {
@@ -512,7 +519,7 @@ impl<T: Real> Fit<T> {
             if let Some((leg, gain)) = furthest(&relative, [low, high]) {
                 return Finding::Leg(leg, Fault::Gain(hundredths(gain)));
             }
-            // Of all together, small motions explain a half, and creep with hysteresis one and a half.
+            // Common to all legs, small motions explain a half, and creep with hysteresis one and a half.
             let common = sum / T::from_i32(6);
             if common < low * T::HALF || common > high + high * T::HALF {
                 return Finding::Common(hundredths(common));
@@ -522,7 +529,7 @@ impl<T: Real> Fit<T> {
     }
 }
 
-/// Gains of the legs that fit best to these of the gauges.
+/// Leg gains that fit best to these gauge gains.
 fn legs_of<T: Real>(response: &Response<T>, expected: &Response<T>, gauges: &[T; 6]) -> [T; 6] {
     let mut legs = [T::ZERO; 6];
     for (leg, gain) in legs.iter_mut().enumerate() {
@@ -531,7 +538,7 @@ fn legs_of<T: Real>(response: &Response<T>, expected: &Response<T>, gauges: &[T;
     legs
 }
 
-/// A round of the fit: gains of the legs, then those of the gauges that fit best to them.
+/// An iteration of the fit: leg gains, then the gauge gains that fit best to them.
 fn next_gauges<T: Real>(response: &Response<T>, expected: &Response<T>, gauges: &[T; 6]) -> [T; 6] {
     let legs = legs_of(response, expected, gauges);
     let mut next = [T::ONE; 6];
@@ -541,7 +548,7 @@ fn next_gauges<T: Real>(response: &Response<T>, expected: &Response<T>, gauges: 
     next
 }
 
-/// The gain of a gauge, within what is looked for.
+/// The gain of a gauge, limited to the range of the fit.
 fn held<T: Real>(gain: T) -> T {
     let [low, high] = GAUGE.map(T::from_f64);
     saturate(gain, low, high)
@@ -555,7 +562,7 @@ fn column<T: Real>(matrix: &Response<T>, index: usize) -> [T; 6] {
     column
 }
 
-/// The gain with which `expected` times `gains` is nearest to `shown`; `otherwise` where that is nothing.
+/// The gain with which `expected` times `gains` is nearest to `shown`; `otherwise` if that product is zero.
 fn gain_of<T: Real>(shown: &[T; 6], expected: &[T; 6], gains: &[T; 6], otherwise: T) -> T {
     let (mut along, mut power) = (T::ZERO, T::ZERO);
     for ((shown, expected), gain) in shown.iter().zip(expected).zip(gains) {
@@ -566,7 +573,7 @@ fn gain_of<T: Real>(shown: &[T; 6], expected: &[T; 6], gains: &[T; 6], otherwise
     if power > T::from_f64(1e-9) { along / power } else { otherwise }
 }
 
-/// Of the gains (> 0) beyond their range that which is furthest.
+/// The gain (> 0) that is furthest beyond its range.
 fn furthest<T: Real>(gains: &[T; 6], [low, high]: [T; 2]) -> Option<(u32, T)> {
     let (mut worst, mut found) = (T::ONE, None);
     for (place, gain) in (0..).zip(gains) {
@@ -580,7 +587,7 @@ fn furthest<T: Real>(gains: &[T; 6], [low, high]: [T; 2]) -> Option<(u32, T)> {
 }
 
 fn hundredths<T: Real>(gain: T) -> u32 {
-    // A gain that is looked at is above zero.
+    // Gains are above zero here.
     (gain * T::from_i32(100) + T::HALF).truncate() as u32
 }
 

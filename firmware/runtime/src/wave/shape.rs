@@ -8,14 +8,14 @@ pub const TONES: usize = 16;
 /// 2π/2³²: rad in a step of 2⁻³² turns.
 const RADIANS: f64 = core::f64::consts::TAU / 4_294_967_296.0;
 
-/// How an axis moves. Amplitudes in m or rad; phases and steps per tick in 2⁻⁶⁴ turns, steps below half a turn.
+/// Motion of an axis. Amplitudes in m or rad; phases and steps per tick in 2⁻⁶⁴ turns, steps below half a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Shape<T> {
     /// Stays.
     Constant,
-    /// Straight to `amplitude` in `ticks`, then stays.
+    /// Straight to `amplitude` in `ticks`, then constant.
     Ramp {
-        /// Where to; of either sign.
+        /// Its end; of either sign.
         amplitude: T,
         /// ≥ 1.
         ticks: i32,
@@ -32,7 +32,7 @@ pub enum Shape<T> {
         /// The tone.
         tone: Tone<T>,
     },
-    /// Sine whose frequency goes evenly from that of the tone to another, and stays there.
+    /// Sine whose frequency changes linearly from that of the tone to another, and stays there.
     Chirp {
         /// It begins so.
         tone: Tone<T>,
@@ -43,9 +43,9 @@ pub enum Shape<T> {
     },
     /// Sum of some of the wave's tones.
     Multisine {
-        /// The first of them.
+        /// Index of the first tone.
         first: usize,
-        /// How many, `first` + `count` ≤ [`TONES`].
+        /// Number of tones, `first` + `count` ≤ [`TONES`].
         count: usize,
     },
     /// First-order reversal curves, as `specgen identify` reads them: for k = 1 … `levels`, straight from zero to
@@ -76,7 +76,7 @@ pub struct Tone<T> {
 pub struct AxisWave<T> {
     /// Added to the shape, m or rad.
     pub offset: T,
-    /// What is added to it.
+    /// Shape of the motion.
     pub shape: Shape<T>,
 }
 
@@ -88,7 +88,7 @@ pub(super) struct Sample<T> {
     pub bend: T,
 }
 
-/// What a shape can come to.
+/// Bounds of a shape.
 pub(super) struct Peak<T> {
     pub low: T,
     pub high: T,
@@ -96,10 +96,10 @@ pub(super) struct Peak<T> {
     pub bend: T,
 }
 
-/// Where a shape is.
+/// Position in a shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Cursor {
-    /// Ticks since the start, and reversals since then.
+    /// Ticks since the start, and since the last reversal.
     tick: i32,
     peak: i32,
     /// Phase and step of a sine; ticks since the start of a multisine.
@@ -154,7 +154,7 @@ impl<T: Real> AxisWave<T> {
         Self { offset: T::ZERO, shape: Shape::Constant }
     }
 
-    /// Bounds of the shape, the offset left out.
+    /// Bounds of the shape, without the offset.
     pub(super) fn peak(&self, tones: &[Tone<T>; TONES]) -> Peak<T> {
         let zero = T::ZERO;
         match &self.shape {
@@ -212,7 +212,7 @@ impl Cursor {
         }
     }
 
-    /// The shape one tick on.
+    /// Moves the shape one tick on.
     #[inline]
     pub(super) fn next<T: Real>(&mut self, axis: &AxisWave<T>, tones: &[Tone<T>; TONES]) -> Sample<T> {
         match &axis.shape {
@@ -235,7 +235,8 @@ impl Cursor {
             }
             Shape::Chirp { tone, sweep, ticks } => {
                 let sweeps = self.tick < *ticks;
-                // φ = φ₀ + n s + n² h with the step s and half its change h: between two ticks it grows by s + (2 n + 1) h.
+                // φ = φ₀ + n s + n² h with the step s and half its change h: between two ticks it grows by s + (2 n +
+                // 1) h.
                 self.phase = self.phase.wrapping_add(self.step);
                 if sweeps {
                     self.tick += 1;
@@ -281,7 +282,7 @@ impl Cursor {
 /// 0 at phase 0, `amplitude` a quarter of a turn on.
 #[inline]
 fn triangle<T: Real>(amplitude: T, phase: u64, step: u64) -> Sample<T> {
-    // Half a turn about each peak, as a signed share of a quarter turn.
+    // Half a turn around each peak, as a signed fraction of a quarter turn.
     let shifted = phase.wrapping_add(1 << 62);
     let falls = shifted >> 63 == 1;
     let within = (shifted << 1).wrapping_sub(1 << 63) as i64;

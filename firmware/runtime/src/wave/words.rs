@@ -5,19 +5,19 @@ use super::{Refusal, Settings};
 use crate::real::Real;
 use crate::snapshot::{InvalidState, LARGEST_PLACE, Reader, Writer};
 
-/// Words of an axis: kind (the shape's place in [`Shape`]), offset, amplitude, and four: steps before phases, levels before
+/// Words of an axis: kind (index in [`Shape`]), offset, amplitude, and four more: steps before phases, levels before
 /// ticks.
 const AXIS: usize = 7;
 /// Words of [`Settings`]: center, axes, tones, two counts.
 pub const WORDS: usize = 6 + 6 * AXIS + TONES * 3 + 2;
-/// Most ticks of anything: a day at 10 kHz.
+/// Largest tick count: a day at 10 kHz.
 const MOST: i32 = 1 << 30;
 /// Steps stay below half a turn.
 const HALF_TURN: u64 = (1 << 63) - 1;
 
 impl Refusal {
-    /// The word to name when a wave is refused over a link; none if one is under way. What an axis cannot do is told by the words
-    /// of its offset (range), amplitude (rate) and the one behind (acceleration), for [`Refusal::of_word`].
+    /// The word to report when a wave is refused over a link; none if one is under way. If an axis exceeds a limit, it
+    /// is the word of its offset (range), amplitude (rate) or the next one (acceleration), see [`Refusal::of_word`].
     #[must_use]
     pub const fn word(self) -> Option<usize> {
         let (axis, behind) = match self {
@@ -30,7 +30,7 @@ impl Refusal {
         Some(6 + axis * AXIS + behind)
     }
 
-    /// What a word named by a link means, if every word sent could stand in its place.
+    /// Meaning of a reported word if every word sent was in range.
     #[must_use]
     pub const fn of_word(word: usize) -> Self {
         let (axis, behind) = match word.checked_sub(6) {
@@ -67,7 +67,7 @@ impl<T: Real> Settings<T> {
     /// From words.
     ///
     /// # Errors
-    /// [`Refusal::Word`]: the first word that its place cannot hold.
+    /// [`Refusal::Word`]: the first word that is out of range.
     pub fn from_words(words: &[u64; WORDS]) -> Result<Self, Refusal> {
         let mut settings = Self::still();
         settings.read(&mut Reader::new(words)).map_err(|InvalidState { word }| Refusal::Word(word))?;
@@ -158,7 +158,7 @@ impl<T: Real> AxisWave<T> {
                 (Shape::Reversals { amplitude, levels, ticks }, 2)
             }
         };
-        // What a shape does not use is zero, so that there is one way to say it.
+        // Unused words must be zero, so that each shape has one encoding.
         for _ in read..4 {
             words.word(0)?;
         }

@@ -45,8 +45,7 @@ fn legs() -> ([Vector; 6], [Vector; 6]) {
     let mut random = Random(9);
     let mut off = || 0.02 * (2.0 * random.unit() - 1.0);
     let ring = |radius: f64, leg: usize, spread: f64| {
-        let angle =
-            std::f64::consts::TAU / 3.0 * (leg / 2) as f64 + if leg % 2 == 0 { -spread } else { spread };
+        let angle = std::f64::consts::TAU / 3.0 * (leg / 2) as f64 + if leg % 2 == 0 { -spread } else { spread };
         [radius * angle.cos(), radius * angle.sin(), 0.0]
     };
     let joint = std::array::from_fn(|leg| plus(ring(0.1, leg, 0.8), [off(), off(), off()]));
