@@ -5,8 +5,7 @@ use super::statistics::extent;
 
 /// A branch: the drive goes from one reversal to the next, samples `first..end`.
 ///
-/// Samples during which the drive is held at a reversal belong to no branch: they say nothing about hysteresis,
-/// only about creep.
+/// Samples during which the drive is held at a reversal belong to no branch: they show only creep, not hysteresis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Branch {
     /// Its first sample.
@@ -17,7 +16,8 @@ pub struct Branch {
     pub rising: bool,
 }
 
-/// Branches of `drive` from sample `first` on. A turn counts as a reversal when the drive goes back by `retreat` (V) or more.
+/// Branches of `drive` from sample `first` on. A change of direction counts as a reversal if the drive goes back by at
+/// least `retreat` (V).
 #[must_use]
 pub fn branches(drive: &[f64], first: usize, retreat: f64) -> Vec<Branch> {
     let mut found = Vec::new();
@@ -59,17 +59,17 @@ pub fn branches(drive: &[f64], first: usize, retreat: f64) -> Vec<Branch> {
     found
 }
 
-/// Share of the displacement range by which the displacement may still move while the drive is held, in the second half of the hold.
+/// Fraction of the displacement range by which the displacement may still move in the second half of a hold.
 const SETTLED: f64 = 0.01;
-/// A hold shorter than this many samples cannot be judged and counts as settled.
+/// A hold shorter than this many samples cannot be evaluated and counts as settled.
 const JUDGED_HOLD: usize = 8;
 
 /// The first sample that identification may use, or `None` if the drive never leaves its minimum.
 ///
-/// Rule: before the drive has been at its minimum (within `tolerance`, V) the state is unknown, so nothing before is used.
-/// While the drive stays at the minimum nothing is learned, so the record starts with the last sample of that stay.
-/// If the displacement is still moving in the second half of the stay (ringing or creep after a jump to the minimum),
-/// the next visit of the minimum is taken instead; if none is better, the last visit that exists is used.
+/// Before the drive has been at its minimum (within `tolerance`, V) the state is unknown, so nothing earlier is used.
+/// The record starts with the last sample of that stay at the minimum. If the displacement still moves in the second
+/// half of the stay (ringing or creep after a jump to the minimum), the next visit of the minimum is used instead; if
+/// none is better, the last visit.
 #[must_use]
 pub fn first_usable(record: &Record, tolerance: f64) -> Option<usize> {
     let drive = &record.drive;
@@ -87,7 +87,7 @@ pub fn first_usable(record: &Record, tolerance: f64) -> Option<usize> {
         if end >= drive.len() {
             break;
         }
-        // The last sample at the very minimum of this stay.
+        // The last sample at the exact minimum of this stay.
         let leaves = leave(&drive[at..end]) + at;
         let (bottom, top) = extent(&record.displacement[at + (leaves - at) / 2..=leaves]);
         if leaves - at < JUDGED_HOLD || top - bottom <= settled {

@@ -1,10 +1,10 @@
-//! Names what a residual consists of: an ordered account of its mean square.
+//! Breaks a residual down into its causes: an ordered account of its mean square.
 //!
-//! Taken out one after the other, each by least squares on what the ones before it left: a linear drift; what is
-//! proportional to the drive's rate (dead time, lag); hum of the mains; what a lightly damped mode adds to the drive; a
-//! drift that bends, where it leaves less than half of what creep does; what first-order creep of the drive explains.
-//! White noise is known from second differences. The rest is the model's: cells of finite size, and hysteresis that is not
-//! a Preisach model's.
+//! The causes are removed one after the other, each by least squares on the rest of those before: a linear drift; a
+//! part proportional to the drive's rate (dead time, lag); mains hum; the response of a lightly damped mode to the
+//! drive; a curved drift, if it leaves less than half of what creep leaves; first-order creep of the drive. White noise
+//! follows from second differences. The remainder belongs to the model: cells of finite size, and hysteresis that is
+//! not of Preisach type.
 
 use serde::Serialize;
 
@@ -22,13 +22,13 @@ pub enum Source {
     Drift,
     /// Proportional to the rate of the drive.
     DeadTime,
-    /// What a lightly damped mode adds to the drive.
+    /// Response of a lightly damped mode to the drive.
     Resonance,
-    /// Quadratic in time, without regard to the drive.
+    /// Quadratic in time, independent of the drive.
     BentDrift,
-    /// Slow answer to the drive.
+    /// Slow response to the drive.
     Creep,
-    /// At the frequency of the mains, which the drive does not have.
+    /// At the mains frequency, which the drive does not contain.
     Hum,
     /// White noise of gauge and converter.
     Noise,
@@ -37,7 +37,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// The cause as messages name it.
+    /// Name of the cause in messages.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -53,36 +53,37 @@ impl Source {
     }
 }
 
-/// Shares of the mean square of a residual with its linear drift. They sum to 1.
+/// Fractions of the mean square of a residual with its linear drift. They sum to 1.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cause {
-    /// The largest share of what is left without the drift.
+    /// The largest fraction after the drift.
     pub main: Source,
-    /// Shares without the drift, in the order dead time, hum, resonance, bent drift, creep, noise, model; they sum to 1. Resonance,
-    /// bent drift and hum are there only where they are found.
+    /// Fractions without the drift, in the order dead time, hum, resonance, bent drift, creep, noise, model; they sum
+    /// to 1. Resonance, bent drift and hum are present only if they were found.
     pub shares: Vec<(Source, f64)>,
     /// Root mean square that the removed linear drift had, m.
     pub drift_rms: f64,
-    /// Dead time that the part proportional to the rate would mean, s; its sign shows a dead time taken too short (+) or too long (−).
+    /// Dead time that corresponds to the part proportional to the rate, s. Its sign shows whether the dead time in use
+    /// is too short (+) or too long (−).
     pub rate_delay: f64,
-    /// Frequency of the hum, Hz, where there is any.
+    /// Frequency of the hum, Hz, if any.
     pub hum: Option<f64>,
-    /// Frequency of the resonance, to one step of the search, Hz, where there is any.
+    /// Frequency of the resonance, to one step of the search, Hz, if any.
     pub resonance: Option<f64>,
 }
 
-/// A bent drift or a hum of a smaller share is none.
+/// A bent drift or a hum with a smaller fraction is ignored.
 const FOUND: f64 = 0.05;
-/// Share of the sampling frequency up to which a hum is looked for.
+/// Highest frequency of the search for hum, as a fraction of the sampling frequency.
 const RESOLVED: f64 = 0.4;
 
-/// Creep time constants tried, as shares of the record's duration.
+/// Creep time constants tried, as fractions of the record's duration.
 const CREEP: [f64; 4] = [0.003, 0.02, 0.1, 0.5];
-/// Samples that the account is made on; a longer record is taken in even steps.
+/// Number of samples used; a longer record is decimated evenly.
 const SAMPLES: usize = 20_000;
 
-/// The account of `residual` (m) at `time` (s) under `drive` (V), of white noise `noise` (m); `gain` in m/V.
-/// `keep` tells the samples that count.
+/// The account of `residual` (m) at `time` (s) under `drive` (V) with white noise `noise` (m); `gain` in m/V. `keep`
+/// selects the samples.
 pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64, gain: f64, keep: &[bool]) -> Cause {
     let step = time.len().div_ceil(SAMPLES).max(1);
     let chosen: Vec<usize> = (0..time.len()).filter(|&k| keep[k]).step_by(step).collect();
@@ -145,14 +146,14 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
     Cause { main, shares, drift_rms, rate_delay, hum: hum.map(|(frequency, _)| frequency), resonance }
 }
 
-/// A part that was taken out.
+/// A part that was removed.
 struct RemovedPart {
-    /// Mean square by which it lowered the residual.
+    /// Reduction of the residual's mean square.
     explained: f64,
     left: Vec<f64>,
 }
 
-/// What a parabola over time explains.
+/// The part that a parabola over time explains.
 fn bend_of(time: &[f64], left: &[f64]) -> Option<RemovedPart> {
     let middle = 0.5 * (time.first()? + time.last()?);
     let line = centred(time.to_vec());
@@ -161,8 +162,8 @@ fn bend_of(time: &[f64], left: &[f64]) -> Option<RemovedPart> {
     Some(RemovedPart { explained: mean_square(left) - mean_square(&found.residual), left: found.residual })
 }
 
-/// What creep explains beside the drive itself, so that a wrong gain is not taken for it; one time constant after the other
-/// keeps every fit solvable. `pick` takes the samples at `chosen` out of all.
+/// The part that creep explains in addition to the drive itself, so that a wrong gain does not count as creep. Time
+/// constants are added one by one, so that every fit is solvable. `pick` takes the samples at `chosen` from all.
 fn creep_of(
     time: &[f64],
     drive: &[f64],
@@ -179,7 +180,7 @@ fn creep_of(
     };
     let mut columns: Vec<&[f64]> = vec![&level];
     let before = mean_square(&gain.residual);
-    // The gain's own part stays with the model.
+    // The part of the gain stays with the model.
     let mut best = Vec::new();
     let mut explained = 0.0;
     for state in &states {
@@ -195,7 +196,7 @@ fn creep_of(
     RemovedPart { explained, left: if best.is_empty() { left.to_vec() } else { best } }
 }
 
-/// Central differences, V/s, without the samples that do not count: a jump behind a sample is not its rate.
+/// Central differences, V/s, without the excluded samples: a jump after a sample is not its rate.
 fn rates(time: &[f64], drive: &[f64], keep: &[bool]) -> Vec<f64> {
     let last = time.len() - 1;
     (0..=last)
@@ -250,13 +251,13 @@ mod tests {
         let lagged: Vec<f64> = rate.iter().map(|r| -1e-7 * 2e-4 * r).collect();
         let found = explain(&time, &drive, &lagged, 0.0, 1e-7, &keep);
         assert_eq!(found.main, Source::DeadTime);
-        // To one per cent: the drift that is taken out first takes a little of it along.
+        // To one per cent: the drift that is removed first takes a small part with it.
         assert!((found.rate_delay - 2e-4).abs() < 2e-6, "{}", found.rate_delay);
-        // A jump at the end does not count, and is no rate of the sample before it.
+        // A jump at the end is excluded, and is not the rate of the sample before it.
         let (mut jumping, mut kept) = (drive.clone(), keep.clone());
         (jumping[3999], kept[3999]) = (1e4, false);
         assert_eq!(explain(&time, &jumping, &lagged, 0.0, 1e-7, &kept).main, Source::DeadTime);
-        // Slow against the cycle of 0.2 s: a faster one looks like a lag, which the account takes out first.
+        // Slow compared with the cycle of 0.2 s: a faster one looks like a lag, which is removed first.
         let creep: Vec<f64> = lagging(&time, &drive, 1.0).iter().map(|x| 1e-9 * x).collect();
         assert_eq!(explain(&time, &drive, &creep, 0.0, 1e-7, &keep).main, Source::Creep);
         let steps: Vec<f64> = drive.iter().map(|u| 1e-9 * libm::sin(0.8 * u)).collect();

@@ -1,7 +1,7 @@
-//! Reads columns of numbers from text files: names, then values. How a file of the bench separates its columns, writes its
-//! decimals and what it has above the names is found in its first lines; text behind `#` or `%` at the beginning of a line is
-//! a comment. How the mistakes of a kind of file are called stands in its [`Format`]. Lines are read one after the other, so
-//! that only the numbers are kept.
+//! Reads columns of numbers from text files: names, then values. The first lines show how a file separates its columns,
+//! writes decimals, and what precedes the names. Text after `#` or `%` at the beginning of a line is a comment.
+//! [`Format`] has the codes and texts for the mistakes of a kind of file. Lines are read one by one, so that only the
+//! numbers are kept in memory.
 
 mod dialect;
 pub(crate) mod foreign;
@@ -20,7 +20,7 @@ use specgen_language::interrupt;
 
 pub(crate) use line_numbers::LineNumbers;
 
-/// What a kind of file calls its mistakes.
+/// Codes and texts for the mistakes in a kind of file.
 #[derive(Debug)]
 pub(crate) struct Format {
     /// A header that cannot be read.
@@ -31,9 +31,9 @@ pub(crate) struct Format {
     pub(crate) not_finite: (Code, &'static str),
     /// Whether a line may have more values than the header has names.
     pub(crate) longer_lines: bool,
-    /// Message and help for any line without a finite number in every column, instead of what is wrong with each value.
+    /// Message and help for any line without a finite number in every column, instead of one for each value.
     pub(crate) whole_line: Option<[&'static str; 2]>,
-    /// Whether a preamble may stand above the names.
+    /// Whether a preamble may precede the names.
     pub(crate) preamble: bool,
 }
 
@@ -47,13 +47,13 @@ pub(crate) const RECORD: Format = Format {
     preamble: true,
 };
 
-/// More samples are refused: a few columns of so many take a gigabyte.
+/// Most samples; a few columns of this length take a gigabyte.
 const MAX_SAMPLES: usize = 1 << 25;
 
 /// The header of a file.
 #[derive(Debug)]
 pub(crate) struct Header {
-    /// Names of the columns, without white space around them; none where the file begins with numbers.
+    /// Names of the columns, without surrounding white space; none if the file begins with numbers.
     pub(crate) names: Vec<String>,
     /// Its line, counted from 1.
     pub(crate) line: usize,
@@ -68,18 +68,18 @@ pub(crate) struct Column<'a> {
     pub(crate) at: usize,
     /// Its name for messages.
     pub(crate) name: &'a str,
-    /// How many of its unit are one of what is wanted.
+    /// Number of the column's units in one unit of the quantity.
     pub(crate) per: f64,
 }
 
-/// The lines behind the header.
+/// The lines after the header.
 pub(crate) struct Lines<'a> {
     format: &'a Format,
     names: usize,
     separator: u8,
     /// Decimal sign of the file, once a number has one.
     decimal: Option<char>,
-    /// Whether a line above said that the file is simulated.
+    /// Whether an earlier line marked the file as simulated.
     simulated: bool,
     input: Input<'a>,
 }
@@ -88,14 +88,14 @@ pub(crate) struct Lines<'a> {
 pub(crate) struct Samples {
     /// Line of each.
     pub(crate) lines: LineNumbers,
-    /// The columns that were wanted; NaN after the problem with a value was reported.
+    /// The requested columns; NaN after a problem with a value was reported.
     pub(crate) columns: Vec<Vec<f64>>,
     /// Whether a comment marks the file as simulated.
     pub(crate) simulated: bool,
 }
 
-/// What a simulation writes below the names of the columns of its record: the names stay in the first line, where programs look for
-/// them, and the mark stays with the file wherever it is copied. A measured record that takes its place has none.
+/// A simulation writes this mark below the column names of its record: the names stay in the first line, where programs
+/// look for them, and the mark stays with every copy of the file. A measured record that replaces it has no mark.
 pub const SIMULATED: &str = "# simulated by specgen: no leg was measured";
 
 /// Whether the text of a data file is marked as simulated: by a comment whose first word is `simulated`.
@@ -155,16 +155,16 @@ pub(crate) fn open<'a>(
 
 const EMPTY: &str = "the first line must be the header `time_s,drive_V,displacement_um`";
 
-/// Reports a byte of value `byte` that no text has, at `at` of its line.
+/// Reports an invalid byte `byte` at position `at` of its line.
 fn not_text(line: Option<usize>, at: usize, byte: u8, findings: &mut Findings) {
     let message = format!("is not a text file in UTF-8: byte {at} of the line is 0x{byte:02x}");
     findings.add(codes::RECORD_NOT_TEXT, line, message, "export the record as CSV text in UTF-8");
 }
 
-/// Rows that are looked at for decimal commas.
+/// Rows that are checked for decimal commas.
 const ROWS: usize = 10;
 
-/// Reports commas that are decimal signs and separators at once; whether there are.
+/// Reports commas that are both decimal signs and separators; returns whether there are any.
 fn check_decimal_commas(
     head: &head::Head,
     lines: &[(usize, Vec<u8>)],
@@ -292,7 +292,7 @@ impl Format {
 }
 
 impl<'a> Column<'a> {
-    /// A column in the unit that is wanted.
+    /// A column in the unit of the quantity.
     pub(crate) const fn plain(at: usize, name: &'a str) -> Self {
         Self { at, name, per: 1.0 }
     }

@@ -1,7 +1,7 @@
-//! Records in the files of MATLAB, HDF5 and TDMS: their columns as lines of text, which are then read like those of any file.
+//! Records in files of MATLAB, HDF5 and TDMS: their columns as lines of text, which are then read as in any other file.
 //!
-//! Columns are the arrays of numbers with the most values, under their names; what is shorter says something about the record and is
-//! left out. Numbers are written so that they read back to the bit.
+//! Columns are the named arrays of numbers with the most values; shorter arrays are metadata and left out. Numbers are
+//! written so that they read back to the bit.
 
 mod bytes;
 mod mat;
@@ -15,12 +15,12 @@ use std::path::Path;
 /// Names and values.
 type Columns = Vec<(String, Vec<f64>)>;
 
-/// What a file is by its first bytes.
+/// Kind of a file by its first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// MAT-file of version 5.
     Mat,
-    /// HDF5, as MAT-files of version 7.3 are too, behind a header of their own.
+    /// HDF5, including MAT-files of version 7.3, which have an additional header.
     Hdf5,
     /// TDMS.
     Tdms,
@@ -44,7 +44,7 @@ impl Kind {
     /// The columns of `file`, which lies at `path`, as lines.
     ///
     /// # Errors
-    /// Why there are none, in words that follow the name of the file.
+    /// Reason why it has none, as a text that follows the name of the file.
     pub(crate) fn open(self, mut file: File, path: &Path) -> Result<Lines, String> {
         let mut whole = || -> Result<Vec<u8>, String> {
             let mut bytes = Vec::new();
@@ -66,17 +66,17 @@ impl Kind {
     }
 }
 
-/// Whether an array has one dimension that counts.
+/// Whether an array has exactly one dimension larger than 1.
 fn is_column<N: Copy + PartialOrd + From<u8>>(size: &[N]) -> bool {
     size.iter().filter(|length| **length > N::from(1)).count() <= 1
 }
 
-/// Datasets of the root, and of its groups where the root has no column.
+/// Datasets of the root, and of its groups if the root has no column.
 fn of_hdf5(path: &Path) -> Result<Columns, String> {
     let said = |error: hdf5_pure::Error| error.to_string();
     let file = hdf5_pure::File::open(path).map_err(said)?;
     let read = |names: Vec<String>, of: &dyn Fn(&str) -> Result<hdf5_pure::Dataset, hdf5_pure::Error>| -> Columns {
-        // Texts and tables are no columns.
+        // Texts and tables are not columns.
         let column = |name: String| {
             let data = of(&name).ok()?;
             is_column(&data.shape().ok()?).then(|| data.read_f64().ok())?.map(|values| (name, values))
@@ -86,7 +86,7 @@ fn of_hdf5(path: &Path) -> Result<Columns, String> {
     let root = file.root();
     let mut columns = read(root.datasets().map_err(said)?, &|name| root.dataset(name));
     if columns.iter().filter(|(_, values)| values.len() > 1).count() < 2 {
-        // What MATLAB keeps for itself begins so.
+        // Names of MATLAB's internal objects begin so.
         for name in root.groups().map_err(said)?.into_iter().filter(|name| !name.starts_with('#')) {
             let group = file.group(&name).map_err(said)?;
             columns.extend(read(group.datasets().map_err(said)?, &|name| group.dataset(name)));
@@ -95,7 +95,7 @@ fn of_hdf5(path: &Path) -> Result<Columns, String> {
     Ok(columns)
 }
 
-/// Columns of one length, line by line as they are read, names first.
+/// Columns of equal length, line by line, names first.
 #[derive(Debug)]
 pub(crate) struct Lines {
     columns: Columns,
@@ -106,7 +106,7 @@ pub(crate) struct Lines {
 
 impl Lines {
     fn new(columns: Columns) -> Self {
-        // What separates names cannot stand in one.
+        // A separator must not occur in a name.
         let names: Vec<String> = columns.iter().map(|(name, _)| name.replace(['\t', '\n', '\r'], " ")).collect();
         Self { columns, next: 0, line: (names.join("\t") + "\n").into_bytes(), taken: 0 }
     }

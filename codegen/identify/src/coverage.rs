@@ -1,4 +1,4 @@
-//! Does a record excite the plane that the table covers? Checks that need the drive range and the grid.
+//! Whether a record excites the plane of the table. Checks that need the drive range and the grid.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -15,13 +15,13 @@ use specgen_language::diagnostic::codes;
 use specgen_language::model::MAX_GRID;
 use specgen_language::shell;
 
-/// The record may exceed the declared range by this share of it (amplifier overshoot, ADC noise).
+/// Fraction by which the record may exceed the declared range (amplifier overshoot, ADC noise).
 const BEYOND: f64 = 0.02;
-/// A ratio of ranges this large is a wrong unit, not a wrong experiment.
+/// A ratio of ranges this large shows a wrong unit, not a wrong experiment.
 const UNIT_RATIO: f64 = 100.0;
-/// Reversal curves below this number identify nothing.
+/// Fewer reversal curves identify nothing.
 const MIN_CURVES: usize = 3;
-/// Σ(φ − φ̄)², in samples, from which a cell or a difference of two cells counts as excited.
+/// Σ(φ − φ̄)², in samples, above which a cell or a difference of two cells counts as excited.
 const EXCITED: f64 = 0.25;
 
 /// Checks the options and returns the plane.
@@ -94,7 +94,7 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
     }
 }
 
-/// The command that writes a drive which identifies the plane.
+/// The command that writes a suitable drive for the plane.
 pub(crate) fn such_a_drive(plane: &Plane) -> String {
     let ([low, high], grid) = (plane.range, plane.grid);
     let line = shell::line("specgen forc --drive-only --drive")
@@ -104,12 +104,12 @@ pub(crate) fn such_a_drive(plane: &Plane) -> String {
     format!("`{line}` writes such a drive for a generator")
 }
 
-/// Time of the first sample whose drive fits, s.
+/// Time of the first sample whose drive satisfies `fits`, s.
 fn time_of(record: &Record, fits: impl Fn(f64) -> bool) -> f64 {
     record.drive.iter().position(|u| fits(*u)).map_or(record.time[0], |k| record.time[k])
 }
 
-/// A displacement that no piezo actuator makes refuses the identification: a table in a wrong unit would be believed.
+/// Refuses a displacement that no piezo actuator can have: it shows a wrong unit.
 fn check_displacement_unit(record: &Record, findings: &mut Findings) {
     let (low, high) = extent(&record.displacement);
     let range = high - low;
@@ -150,11 +150,11 @@ pub(crate) fn check_curves(branches: &[Branch], plane: &Plane, findings: &mut Fi
     curves
 }
 
-/// Which cells the record excites: they switch within a branch, and not only together with their neighbours.
+/// The cells that the record excites: they switch within a branch, and not only together with their neighbours.
 ///
-/// `gram` is Σ(φ − φ̄)(φ − φ̄)ᵀ over the weights, so dᵀGd is what the record holds about the combination d of cells.
-/// Tried are single cells, differences of two neighbours, and the mixed difference of four: rises alone tell rows of
-/// cells apart and falls alone columns, and only a reversal between them tells apart the four.
+/// `gram` is Σ(φ − φ̄)(φ − φ̄)ᵀ over the weights, so dᵀGd is the information of the record on the combination d of
+/// cells. The check tries single cells, differences of two neighbours, and the mixed difference of four. Rises alone
+/// distinguish rows of cells and falls alone columns; only a reversal between them distinguishes all four.
 pub(crate) fn excited(plane: &Plane, gram: &DMatrix<f64>) -> Vec<bool> {
     let mut excited = vec![true; gram.nrows()];
     let mut require = |cells: &[(usize, usize)]| {
@@ -188,7 +188,7 @@ pub(crate) fn excited(plane: &Plane, gram: &DMatrix<f64>) -> Vec<bool> {
     excited
 }
 
-/// A part of the plane, connected over the edges of its cells, that a record does not excite.
+/// A connected part of the plane that a record does not excite.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Region {
     /// Cells in it.
@@ -199,15 +199,15 @@ pub struct Region {
     pub up: [f64; 2],
     /// down_thresholds from and to, V.
     pub down: [f64; 2],
-    /// The cells as (up, down), for drawing: the cell lies below threshold `up` and above threshold `down`.
+    /// The cells as (up, down), for drawing: a cell lies below threshold `up` and above threshold `down`.
     #[serde(skip)]
     pub members: Vec<(usize, usize)>,
 }
 
-/// Regions named one by one in a message.
+/// Number of regions that a message names.
 const NAMED: usize = 3;
 
-/// Warns of cells that were not [`excited`], names the parts of the plane they lie in and what the table does there.
+/// Warns of cells that were not [`excited`], with their parts of the plane and the content of the table there.
 pub(crate) fn check_excited(plane: &Plane, excited: &[bool], findings: &mut Findings) -> Vec<Region> {
     let regions = regions(plane, excited);
     if regions.is_empty() {
@@ -243,7 +243,7 @@ pub(crate) fn check_excited(plane: &Plane, excited: &[bool], findings: &mut Find
     regions
 }
 
-/// Connected parts of cells that are not excited, the largest first.
+/// Connected parts of unexcited cells, the largest first.
 fn regions(plane: &Plane, excited: &[bool]) -> Vec<Region> {
     let grid = plane.grid;
     let threshold = |k: usize| plane.range[0] + k as f64 * plane.interval();

@@ -1,11 +1,11 @@
 //! Dead time between the drive column and the displacement column: amplifier lag, filters, sensor processing.
 //!
-//! A dead time widens the measured loop in proportion to the rate. It can be distinguished from hysteresis only when the
-//! record holds branches of different rates; on a record of one rate, creep and hysteresis would be mistaken for it,
-//! and the estimate is refused.
+//! A dead time widens the measured loop in proportion to the rate. It can be distinguished from hysteresis only if the
+//! record has branches of different rates. In a record of one rate, creep and hysteresis would be mistaken for a dead
+//! time, and the estimate is refused.
 //!
-//! Where the drive is a command, a converter holds each sample until the next, so that half a sampling interval of what is
-//! found is the hold's and not the actuator's: [`Record::held`].
+//! If the drive is a command, a converter holds each sample until the next. Half a sampling interval of the estimate
+//! then belongs to the hold and not to the actuator: [`Record::held`].
 
 use nalgebra::DMatrix;
 use specgen_numerics::Factor;
@@ -16,19 +16,20 @@ use super::prior;
 use super::record::Record;
 use super::regressor::Plane;
 
-/// Ratio of the fast to the slow branches (90 % and 10 % quantile of |du/dt|) from which a dead time can be identified.
+/// Least ratio of the fast to the slow branches (90 % and 10 % quantile of |du/dt|) for an estimate of the dead time.
 const RATE_RATIO: f64 = 2.0;
-/// Longest dead time tried, s, and as a share of a fast branch: half a cycle later, a table of negative weights fits as well.
+/// Longest dead time tried, s, and as a fraction of a fast branch: half a cycle later, a table of negative weights fits
+/// as well.
 const LONGEST: f64 = 8e-3;
 const OF_BRANCH: f64 = 0.5;
-/// Intervals of the first search over it, and of the second one between the neighbours of the best.
+/// Intervals of the first search, and of the second one between the neighbours of the best.
 const STEPS: usize = 32;
-/// Samples that a search is made on; a longer record is taken in even steps.
+/// Number of samples used in a search; a longer record is decimated evenly.
 const SAMPLES: usize = 100_000;
-/// The residual must fall by this share, or the dead time is zero.
+/// The residual must fall by this fraction; otherwise the dead time is zero.
 const WORTHWHILE: f64 = 0.1;
 
-/// Estimates the dead time between the columns in s, at most 8 ms; the text says how it was decided.
+/// Estimates the dead time between the columns in s, at most 8 ms. The text describes the decision.
 #[must_use]
 pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch]) -> (f64, String) {
     let (slow, fast) = rates(record, branches);
@@ -40,7 +41,7 @@ pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch
     }
     let scale = 1.0 / record.displacement_range();
     let every = (record.time.len() - first).div_ceil(SAMPLES);
-    // A longer dead time leads behind the end of the record from there on.
+    // Beyond this point, a longer dead time would need samples after the end of the record.
     let longest = longest(record, branches);
     let end = within(record, longest);
     let found = search(longest, |tried| {
@@ -72,14 +73,14 @@ pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch
 pub(super) struct SearchResult {
     /// s.
     pub(super) dead_time: f64,
-    /// Σ of squares without dead time, and with the best one tried.
+    /// Σ of squares without dead time, and with the best one.
     none: f64,
     least: f64,
-    /// Whether the longest one tried is the best.
+    /// Whether the best one is the longest tried.
     pub(super) at_end: bool,
 }
 
-/// The longest dead time tried in a record, s.
+/// The longest dead time that is tried in a record, s.
 pub(super) fn longest(record: &Record, branches: &[Branch]) -> f64 {
     let mut durations: Vec<f64> = branches.iter().map(|b| record.time[b.end - 1] - record.time[b.first]).collect();
     durations.sort_unstable_by(f64::total_cmp);
@@ -87,8 +88,8 @@ pub(super) fn longest(record: &Record, branches: &[Branch]) -> f64 {
     if fast < LONGEST { fast } else { LONGEST }
 }
 
-/// The dead time up to `longest` (s) of least `residual`, a function of those tried (s): coarse over all, then fine beside the best, then the
-/// vertex of a parabola. `None` where the residual is not known.
+/// The dead time up to `longest` (s) with the least `residual`, a function of the dead time (s): a coarse search, a
+/// fine one around the best, then the vertex of a parabola. `None` if the residual is not known.
 pub(super) fn search(longest: f64, mut residual: impl FnMut(&[f64]) -> Option<Vec<f64>>) -> Option<SearchResult> {
     let between = |from: f64, to: f64| -> Vec<f64> {
         (0..=STEPS).map(|k| from + (to - from) * k as f64 / STEPS as f64).collect()
@@ -118,7 +119,7 @@ fn shifts(tried: &[f64]) -> Vec<Shift> {
     tried.iter().map(|&tau| Shift { tau, next: 0 }).collect()
 }
 
-/// What the best fit leaves of each target, Σ of squares; `None` if the Gram matrix is not positive definite.
+/// Residual of the best fit of each target, Σ of squares; `None` if the Gram matrix is not positive definite.
 pub(super) fn residuals(gram: &DMatrix<f64>, rhs: &[Vec<f64>], energy: &[f64]) -> Option<Vec<f64>> {
     let factor = Factor::of(gram.nrows(), |row, column| gram[(column, row)])?;
     let mut solutions = rhs.to_vec();
@@ -132,7 +133,7 @@ fn smallest(residual: &[f64]) -> usize {
     (0..residual.len()).fold(0, |best, k| if residual[k] < residual[best] { k } else { best })
 }
 
-/// Vertex of the parabola through three values at a distance of `step`, from the middle one.
+/// Vertex of the parabola through three values spaced by `step`, relative to the middle one.
 fn vertex([a, b, c]: [f64; 3], step: f64) -> f64 {
     0.5 * step * (a - c) / (a - 2.0 * b + c)
 }
@@ -151,18 +152,18 @@ fn rates(record: &Record, branches: &[Branch]) -> (f64, f64) {
     (at(0.1), at(0.9))
 }
 
-/// Displacement (m) at each sample's time + `tau` (s), interpolated; held at the last value behind the end.
+/// Displacement (m) at each sample's time + `tau` (s), interpolated; constant after the end.
 #[must_use]
 pub fn delayed(record: &Record, tau: f64) -> Vec<f64> {
     let mut shift = Shift { tau, next: 0 };
     (0..record.time.len()).map(|k| shift.displacement(record, k)).collect()
 }
 
-/// Reads a displacement `tau` later than asked for, for samples in ascending order.
+/// Reads a displacement `tau` later than requested, for samples in ascending order.
 struct Shift {
     /// s, ≥ 0.
     tau: f64,
-    /// First sample that may lie behind the time asked for last.
+    /// First sample that may lie after the last requested time.
     next: usize,
 }
 

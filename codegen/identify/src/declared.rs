@@ -1,4 +1,4 @@
-//! The records that a spec names: each is identified, or taken as the table that it is, and held against what the spec says.
+//! The records in a spec: each is identified, or used as the table that it is, and compared with the spec.
 
 use std::path::Path;
 
@@ -10,22 +10,22 @@ use crate::{Options, Report, identify, is_simulated, is_table_csv, parse_record,
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen_language::model::{Model, RateDependence};
 
-/// Displacement of a record against that of stack gain and voltage: creep and a rough data sheet explain less than this
-/// factor, a wrong unit is 1000.
+/// Largest ratio of a record's displacement to that of stack gain and voltage: creep and a rough data sheet explain
+/// less than this, a wrong unit gives 1000.
 const LARGEST_SCALE: f64 = 5.0;
 
-/// What the records of a spec yield.
+/// Tables and reports of a spec's records.
 #[derive(Debug, Default)]
 pub struct SpecRecords {
     /// The table of each record, in the order of `hysteresis.records`.
     pub tables: Vec<EverettTable>,
     /// The tables of the second weight of (6), m s/V, in the order of `hysteresis.rate_tables`.
     pub rate_tables: Vec<EverettTable>,
-    /// How each record was identified; none for one that is a table already.
+    /// Report of each identification; none for a record that is a table already.
     pub reports: Vec<Option<Report>>,
-    /// Files among records and rate tables that are marked as simulated, in their order.
+    /// Records and rate tables that are marked as simulated, in their order.
     pub simulated: Vec<String>,
-    /// Warnings, none of which refuses anything.
+    /// Warnings; nothing is refused because of them.
     pub warnings: Vec<Diagnostic>,
     /// Name and text of each file that was read.
     pub texts: Vec<(String, String)>,
@@ -58,7 +58,7 @@ pub fn records(model: &Model, dir: &Path) -> Result<SpecRecords, Vec<Diagnostic>
 }
 
 impl SpecRecords {
-    /// The model of `leg`, 0 to 5, as `model` uses it; its dead time counts from the voltage. None without records.
+    /// The model of `leg`, 0 to 5, as in `model`; its dead time counts from the voltage. None without records.
     #[must_use]
     pub fn leg(&self, model: &Model, leg: usize) -> Option<RateModel> {
         let of = |tables: &[EverettTable]| tables.get(leg).or(tables.first()).cloned();
@@ -74,7 +74,7 @@ impl SpecRecords {
         Some(RateModel { still, rate: of(&self.rate_tables), creep, inertia, dead_time })
     }
 
-    /// A controller of so short a period that most ticks would get the static inverse is not the one that was asked for.
+    /// Refuses a period so short that most ticks would use the static inverse: that is not the controller in the spec.
     fn not_invertible(&self, model: &Model) -> Option<Diagnostic> {
         let pairs = (0..6).filter_map(|leg| {
             let of = |tables: &[EverettTable]| tables.get(leg).or(tables.first()).cloned();
@@ -125,12 +125,13 @@ impl SpecRecords {
     }
 }
 
-/// The leg's resonance as the spec has it.
+/// The leg's resonance in the spec.
 fn mode_of(model: &Model) -> Mode {
     Mode { frequency: model.actuator.resonance, damping: model.actuator.damping_ratio }
 }
 
-/// A displacement that stack gain and voltage do not explain is one in another unit, and the controller would be off by it.
+/// Refuses a displacement that stack gain and voltage do not explain: it has another unit, and the controller would be
+/// wrong by that factor.
 fn of_right_scale(model: &Model, name: &str, table: &EverettTable) -> Result<(), Vec<Diagnostic>> {
     let [min, max] = model.actuator.voltage;
     let expected = model.actuator.leg_gain() * (max - min);
@@ -153,7 +154,7 @@ fn of_right_scale(model: &Model, name: &str, table: &EverettTable) -> Result<(),
     )])
 }
 
-/// Refuses a table of another grid or range than the spec's.
+/// Refuses a table whose grid or range differs from the spec's.
 fn fits_spec(model: &Model, name: &str, table: &EverettTable, code: Code, key: &str) -> Result<(), Vec<Diagnostic>> {
     let [min, max] = model.actuator.voltage;
     let slack = 1e-9 * (max - min);
@@ -178,18 +179,18 @@ fn about_file(name: &str, code: Code, key: &str, message: String, help: String) 
     Diagnostic::new(code, key, place, message, help)
 }
 
-/// Of a record whose drive is not what the spec says: the key that says it.
+/// For a record whose drive differs from the spec: the key that sets it.
 fn about_voltage(mut findings: Vec<Diagnostic>) -> Vec<Diagnostic> {
     for one in &mut findings {
         if [codes::DRIVE_RANGE, codes::NOT_EXCITED].iter().any(|code| one.code == *code) {
             one.key = "actuator.voltage".to_owned();
-            one.help = format!("{}; `actuator.voltage` says that range, in volts at the stack", one.help);
+            one.help = format!("{}; `actuator.voltage` sets that range, in volts at the stack", one.help);
         }
     }
     findings
 }
 
-/// The check of the adaptation knows the static inverse only.
+/// The stability check of the adaptation uses the static inverse only.
 fn rate_not_in_stability(model: &Model) -> Diagnostic {
     Diagnostic::at(
         &model.spans,
@@ -228,7 +229,7 @@ fn not_invertible(model: &Model, share: f64, needed: f64) -> Diagnostic {
         &["hysteresis.rate"],
         codes::RATE_NOT_INVERTIBLE,
         format!(
-            "at a period of {} ms the dynamic Preisach model (6) can be inverted on {:.0} % of the travel only; elsewhere ticks get the static inverse",
+            "at a period of {} ms the dynamic Preisach model (6) can be inverted on only {:.0} % of the travel; elsewhere ticks use the static inverse",
             micro(model.timing.period * 1e3),
             100.0 * share
         ),
@@ -240,7 +241,7 @@ fn not_invertible(model: &Model, share: f64, needed: f64) -> Diagnostic {
     )
 }
 
-/// Without the rounding of the last digits.
+/// Rounds off the last digits.
 fn micro(milliseconds: f64) -> f64 {
     libm::round(milliseconds * 1e6) / 1e6
 }

@@ -1,25 +1,25 @@
-//! Samples that a record holds but that a fit must not believe: they get no weight, and a finding says when they were.
+//! Invalid samples of a record: they get no weight in fits, and a finding states their times.
 
 use super::columns::LineNumbers;
 use super::findings::Findings;
 use super::statistics::{extent, median, noise_floor};
 use specgen_language::diagnostic::codes;
 
-/// A sample that differs from the median of its neighbourhood by this share of the displacement range is a glitch, if
-/// that is also far above noise and above what the drive moves in a sample.
+/// A sample that differs from the median of its neighbourhood by this fraction of the displacement range is a glitch,
+/// if the difference is also far above noise and above the motion of the drive in a sample.
 const GLITCH: f64 = 0.02;
-/// Noise floors that a glitch exceeds.
+/// Multiple of the noise floor that a glitch exceeds.
 const ABOVE_NOISE: f64 = 12.0;
-/// Spreads of its neighbours that it exceeds.
+/// Multiple of its neighbours' spread that it exceeds.
 const ALONE: f64 = 3.0;
 /// Half width of the neighbourhood, samples.
 const NEAR: usize = 2;
-/// A step between two samples by this share of the drive's range is a jump: no rate-independent model follows it.
+/// A step between two samples by this fraction of the drive's range is a jump: no rate-independent model follows it.
 pub(crate) const JUMP: f64 = 0.1;
-/// Samples that get no weight from a jump on: the actuator is still ringing.
+/// Samples without weight after a jump, while the actuator rings.
 pub(crate) const SETTLING: usize = 200;
 
-/// Which samples get no weight: glitches of the displacement, and what follows a jump of the drive.
+/// Samples without weight: glitches of the displacement, and those after a jump of the drive.
 pub(crate) fn weightless(
     lines: &LineNumbers,
     time: &[f64],
@@ -52,12 +52,12 @@ fn glitches(
         let around = k - NEAR..=k + NEAR;
         let mut near = displacement[around.clone()].to_vec();
         let off = (displacement[k] - median(&mut near)).abs();
-        // Cheap test first: hardly any sample passes it.
+        // Cheap test first: few samples pass it.
         if off <= GLITCH * (high - low) || off <= ABOVE_NOISE * noise {
             continue;
         }
         let (near_low, near_high) = extent(&drive[around]);
-        // Ringing moves the neighbours too: what stands out of them alone is a glitch.
+        // Ringing moves the neighbours too; only a sample that differs from them is a glitch.
         let (least, most) = extent(&[k - 2, k - 1, k + 1, k + 2].map(|i| displacement[i]));
         if off <= GLITCH * (high - low) + 3.0 * gain * (near_high - near_low) || off <= ALONE * (most - least) {
             continue;

@@ -1,4 +1,4 @@
-//! The Everett table: what identification yields and lowering turns into a constant.
+//! The Everett table: the result of an identification, which the lowering turns into a constant.
 
 /// Everett function E(up, down) of one leg on a uniform grid of `grid` intervals, in metres of displacement.
 ///
@@ -37,7 +37,7 @@ impl EverettTable {
         self.drive_min + k as f64 * (self.drive_max - self.drive_min) / self.grid as f64
     }
 
-    /// Displacement of the whole range over its voltage, m/V.
+    /// Displacement of the whole range divided by its voltage, m/V.
     #[must_use]
     pub fn mean_gain(&self) -> f64 {
         self.node(self.grid, 0) / (self.drive_max - self.drive_min)

@@ -34,10 +34,11 @@ pub fn is_table_csv(text: &str) -> bool {
     text.lines().next() == Some(HEADER)
 }
 
-/// Reads what [`write_table_csv`] wrote; node values are the same within rounding of the unit. `shown_as` names the file in messages.
+/// Reads the text of [`write_table_csv`]; node values are equal within rounding of the unit. `shown_as` names the file
+/// in messages.
 ///
 /// # Errors
-/// A finding per line that is not as [`write_table_csv`] writes it.
+/// A finding for each line that does not have the form of [`write_table_csv`].
 pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Diagnostic>> {
     const LINE: [&str; 2] = ["is not three finite numbers", "write the file with `specgen identify`"];
     let mut findings = Findings::new(shown_as);
@@ -48,8 +49,8 @@ pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Di
     findings.conclude(table).map(|((table, _), _)| table)
 }
 
-/// Nodes in µ of their unit behind two thresholds in V, in the order of a triangle whose thresholds rise; with the line of
-/// each node. Values beyond `largest` are refused. `None` after the problem was reported.
+/// Nodes in µ of their unit after two thresholds in V, in the order of a triangle with rising thresholds; with the line
+/// of each node. Values above `largest` are refused. `None` after the problem was reported.
 pub(crate) fn read_nodes(
     text: &str,
     header: &str,
@@ -107,7 +108,7 @@ pub(crate) fn read_nodes(
     Some((table, lines))
 }
 
-/// A table with a negative weight is not monotone, so that its inverse is not unique. Rounding is let pass.
+/// Refuses a table with a negative weight: it is not monotone, so its inverse is not unique. Rounding is tolerated.
 fn check_weights(table: &EverettTable, lines: &LineNumbers, findings: &mut Findings) {
     let rounding = 1e-9 * table.node(table.grid, 0).abs();
     for up in 1..=table.grid {

@@ -1,4 +1,4 @@
-//! Opens the data files that are named: as text that is kept, or to be read line by line.
+//! Opens data files: to keep their text, or to read them line by line.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -14,7 +14,7 @@ use specgen_language::files::{self, ReadError};
 /// The text of a data file, record or table, without a byte order mark.
 ///
 /// # Errors
-/// A finding if it is no regular file, cannot be read, is larger than [`MAX_FILE_BYTES`] or not UTF-8.
+/// A finding if it is not a regular file, cannot be read, is larger than [`MAX_FILE_BYTES`], or is not UTF-8.
 pub fn read_file(path: &Path, shown_as: &str) -> Result<String, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
     read_text(path, &mut findings).ok_or_else(|| findings.into_diagnostics())
@@ -51,8 +51,8 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
     Some(String::from_utf8_lossy(bytes).into_owned())
 }
 
-/// A data file to read lines from, or `None` after the reason was reported. One of MATLAB, HDF5 or TDMS is as large as a text that is
-/// kept at most; another is read as it comes.
+/// A data file to read lines from, or `None` after the reason was reported. A file of MATLAB, HDF5 or TDMS has the size
+/// limit of a text in memory; any other is read in sequence.
 pub(crate) fn open_file(path: &Path, findings: &mut Findings) -> Option<Source> {
     findings.lies_at(path);
     let (mut file, mut first) =
@@ -70,12 +70,12 @@ pub(crate) fn open_file(path: &Path, findings: &mut Findings) -> Option<Source> 
         .ok()
 }
 
-/// Where the lines of a data file come from.
+/// Source of the lines of a data file.
 #[derive(Debug)]
 pub(crate) enum Source {
     /// Its text.
     File(File),
-    /// Columns that are no text.
+    /// Columns of a binary file.
     Container(Lines),
 }
 

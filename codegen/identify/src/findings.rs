@@ -1,45 +1,45 @@
-//! Collects findings about one data file, so that one run reports all of them without drowning the reader.
+//! Collects findings about one data file, so that one run reports all of them without flooding the user.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use specgen_language::diagnostic::{Code, Diagnostic, Severity};
 
-/// Findings of one kind that are shown one by one; the rest is counted.
+/// Findings of one kind that are shown; further ones are counted.
 const SHOWN_PER_CODE: usize = 5;
 
 /// Findings about one file.
 #[derive(Debug)]
 pub(crate) struct Findings {
     path: String,
-    /// Where it lies, as a command line names it.
+    /// Path for a command line.
     place: String,
     found: Vec<Diagnostic>,
     count: BTreeMap<&'static str, (Code, usize)>,
 }
 
 impl Findings {
-    /// An empty collection for the file that the user knows as `path`.
+    /// An empty collection for the file that the user named `path`.
     pub(crate) fn new(path: &str) -> Self {
         Self { path: path.to_owned(), place: path.to_owned(), found: Vec::new(), count: BTreeMap::new() }
     }
 
-    /// The file as the user knows it.
+    /// The file as the user named it.
     pub(crate) fn path(&self) -> &str {
         &self.path
     }
 
-    /// The file is opened at `path`: one that a spec names is shown relative to the spec, but lies beside it.
+    /// Path at which the file is opened: a file in a spec is shown relative to the spec, but lies beside it.
     pub(crate) fn lies_at(&mut self, path: &Path) {
         self.place = path.strip_prefix(".").unwrap_or(path).display().to_string();
     }
 
-    /// Where the file lies, as a command line names it.
+    /// Path of the file for a command line.
     pub(crate) fn place(&self) -> &str {
         &self.place
     }
 
-    /// Adds a finding about `line`, or about the whole file, as bad as its code.
+    /// Adds a finding about `line`, or about the whole file, with the severity of its code.
     pub(crate) fn add(&mut self, code: Code, line: Option<usize>, message: String, help: &str) {
         let (_, count) = self.count.entry(code.id).or_insert((code, 0));
         *count += 1;
@@ -48,12 +48,12 @@ impl Findings {
         }
     }
 
-    /// Whether any finding refuses the file.
+    /// Whether a finding refuses the file.
     pub(crate) fn any_error(&self) -> bool {
         self.found.iter().any(|d| d.severity == Severity::Error)
     }
 
-    /// What a record gave, with the warnings about it, unless a finding refuses it.
+    /// The result of a record, with its warnings, unless a finding refuses it.
     pub(crate) fn conclude<T>(self, found: Option<T>) -> Result<(T, Vec<Diagnostic>), Vec<Diagnostic>> {
         let refused = self.any_error();
         let all = self.into_diagnostics();
@@ -63,7 +63,7 @@ impl Findings {
         }
     }
 
-    /// All findings in the order found, followed by one line for each kind that was cut short.
+    /// All findings in their order, then one line for each kind that was cut.
     pub(crate) fn into_diagnostics(self) -> Vec<Diagnostic> {
         let Self { path, mut found, count, .. } = self;
         for (code, n) in count.into_values().filter(|(_, n)| *n > SHOWN_PER_CODE) {

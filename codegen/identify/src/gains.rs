@@ -1,8 +1,8 @@
-//! Gain of each leg of a platform over its table, from what a run of the machine recorded: λ = ρ/ρ̂ of (AII.13).
+//! Gain of each leg of a platform relative to its table, from a recorded run of the machine: λ = ρ/ρ̂ of (AII.13).
 //!
-//! The table follows the voltages of the run; a leg moves by λ times that, from an offset that nobody knows (where its memory
-//! was before, and what it carries) and with a slow drift (creep, temperature). Forces on the platform under motion are not taken
-//! out: a record of slow motion, well below the lowest mode, has hardly any.
+//! The table follows the voltages of the run. A leg moves by λ times that, from an unknown offset (the previous state
+//! of its memory, and its load) and with a slow drift (creep, temperature). Forces on the platform under motion are not
+//! compensated: a record of slow motion, well below the lowest mode, has almost none.
 
 use serde::Serialize;
 
@@ -13,28 +13,28 @@ use super::statistics::extent;
 use crate::everett::EverettTable;
 use specgen_language::diagnostic::Diagnostic;
 
-/// Parts of a run that are also fitted by themselves: their spread is the error of the whole.
+/// Parts of a run that are also fitted separately: their spread gives the error of the whole.
 const PARTS: usize = 8;
-/// Fewer samples in a part say nothing.
+/// A part needs at least this many samples.
 const SAMPLES: usize = 16;
 
 /// One leg.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LegGain {
-    /// λ: displacement over that of the table.
+    /// λ: displacement divided by that of the table.
     pub gain: f64,
     /// Standard error of λ, from the spread of the parts of the run.
     pub error: f64,
-    /// From the lowest to the highest displacement, m.
+    /// Difference of the highest and lowest displacement, m.
     pub travel: f64,
-    /// Root mean square of what is left, m.
+    /// Root mean square residual, m.
     pub residual_rms: f64,
     /// The same with λ = 1, m.
     pub residual_before: f64,
 }
 
-/// λ of a leg with `model` whose voltage (V) and displacement (m) were recorded at `time` (s, rising). None if it did not move enough
-/// to tell: all of it by its noise, or in one part hardly.
+/// λ of a leg with `model` whose voltage (V) and displacement (m) were recorded at `time` (s, rising). None if it did
+/// not move enough: the motion is within its noise, or almost absent in one part.
 ///
 /// # Errors
 /// As [`predict`]: the drive never moves, or leaves the range of the table.

@@ -1,4 +1,4 @@
-//! Calibration of a gauge: its voltage against a reference displacement, as the polynomial that a spec takes.
+//! Calibration of a gauge: its voltage against a reference displacement, as the polynomial of a spec.
 
 use serde::Serialize;
 use std::path::Path;
@@ -10,7 +10,7 @@ use super::signals::{self, ColumnSpec, Signals};
 use super::statistics::{extent, median};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
-/// A calibration and how well it is founded. Lengths in m, voltages in V.
+/// A calibration and its quality. Lengths in m, voltages in V.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GaugeReport {
     /// Name of the record.
@@ -23,7 +23,7 @@ pub struct GaugeReport {
     pub degree: usize,
     /// Cross-validated error of each degree from 1 on, m.
     pub held_out_rms: Vec<f64>,
-    /// Rule of choice, in words.
+    /// Rule of the choice, as text.
     pub rule: &'static str,
     /// Displacement as a polynomial of the voltage, lowest power first, m/V^k.
     pub coefficients: Vec<f64>,
@@ -37,9 +37,10 @@ pub struct GaugeReport {
     pub residual_rms: f64,
     /// Largest magnitude of reference less calibration, m.
     pub residual_max: f64,
-    /// Where that is: time or line.
+    /// Time or line of that sample.
     pub residual_max_at: String,
-    /// Largest mean difference of the reading between falling and rising displacement; none if it never turns back.
+    /// Largest mean difference of the reading between falling and rising displacement; none if it never changes
+    /// direction.
     pub hysteresis: Option<f64>,
     /// Least |slope| over the voltages covered, in % of the mean slope: above 0 the calibration can be inverted.
     pub least_slope_percent: f64,
@@ -55,17 +56,17 @@ pub struct GaugeReport {
 
 /// Highest power that a spec takes.
 const HIGHEST: usize = 5;
-/// Parts of the voltage range that are held out in turn, interleaved.
+/// Interleaved parts of the voltage range, each of which is held out in turn.
 const FOLDS: usize = 5;
-/// Groups of neighbouring voltages that are dealt to the folds.
+/// Groups of neighbouring voltages that are distributed over the folds.
 const GROUPS: usize = 50;
-/// Samples per coefficient, at least.
+/// Least number of samples per coefficient.
 const PER_COEFFICIENT: usize = 4;
 /// Knots of the table.
 const KNOTS: usize = 33;
-/// Voltages at which the slope and the hysteresis are looked at.
+/// Voltages at which slope and hysteresis are evaluated.
 const BINS: usize = 25;
-/// Hysteresis beyond this many residuals is worth a warning.
+/// Hysteresis above this many residuals gives a warning.
 const HYSTERESIS: f64 = 2.0;
 /// A reference range (m) outside these bounds suggests another unit.
 const PLAUSIBLE: [f64; 2] = [50e-9, 5e-3];
@@ -313,7 +314,7 @@ fn to_volts(found: &Fit, square: f64, low: f64, high: f64) -> (Vec<f64>, Vec<f64
     (values, errors)
 }
 
-/// Mean squares of each degree (from 1) and fold; degrees that are not determined are left out with those above.
+/// Mean squares of each degree (from 1) and fold. Degrees that are not determined are left out, with all higher ones.
 fn held_out(x: &[f64], y: &[f64]) -> Vec<Vec<f64>> {
     let fold_of: Vec<usize> = x.iter().map(|x| ((x + 1.0) * 0.5 * GROUPS as f64) as usize % FOLDS).collect();
     let mut scores = Vec::new();
@@ -346,10 +347,11 @@ fn root_mean(squares: &[f64]) -> f64 {
     (squares.iter().fold(0.0, |sum, s| sum + s) / squares.len() as f64).sqrt()
 }
 
-/// A gain in error below this share of the best one is not worth a degree.
+/// A smaller relative gain in error does not justify a degree.
 const WORTHWHILE: f64 = 0.01;
 
-/// Lowest degree whose error exceeds the best one's by at most one standard error of the paired difference, or one per cent.
+/// Lowest degree whose error exceeds the best one's by at most one standard error of the paired difference, or one per
+/// cent.
 fn choose(scores: &[Vec<f64>]) -> usize {
     let best =
         (0..scores.len()).fold(0, |best, k| if root_mean(&scores[k]) < root_mean(&scores[best]) { k } else { best });
@@ -403,7 +405,7 @@ fn noise_of(residual: &[f64]) -> f64 {
     median(&mut absolute) / 0.674_489_75
 }
 
-/// Points at twelve times the usual residual.
+/// Points at more than twelve times the usual residual.
 fn glitches(signals: &Signals, residual: &[f64], findings: &mut Findings) {
     let usual = noise_of(residual);
     for (k, r) in residual.iter().enumerate().filter(|(_, r)| r.abs() > 12.0 * usual && r.abs() > 0.0) {

@@ -1,12 +1,12 @@
 //! Chooses the grid of an Everett table by cross-validation over whole reversal curves.
 //!
-//! Curves are grouped by the voltage at which they turn back, so that two sweeps of the same curve never stand on both
-//! sides. Groups are dealt in turn to the folds; the highest group spans the range and is always fitted. Each fold is
-//! held out once: the table is fitted to the others and scored on the held-out curves, every sample counting the same
-//! and each branch with its own offset, as in the fit.
+//! Curves are grouped by the voltage of their reversal, so that two sweeps of the same curve are always on the same
+//! side. Groups are distributed over the folds in turn; the highest group spans the range and is always fitted. Each
+//! fold is held out once: the table is fitted to the others and scored on the held-out curves, with equal weight for
+//! every sample and a free offset for each branch, as in the fit.
 //!
-//! Rule: the coarsest grid whose held-out error exceeds that of the best grid by no more than one standard error of
-//! their difference over the folds (the one-standard-error rule of Breiman et al. 1984, paired by fold).
+//! Rule: the coarsest grid whose held-out error exceeds that of the best grid by at most one standard error of their
+//! difference over the folds (the one-standard-error rule of Breiman et al. 1984, paired by fold).
 
 use serde::Serialize;
 
@@ -22,15 +22,15 @@ use specgen_numerics::nnls;
 
 /// Grids that are tried.
 pub const TRIED: [usize; 9] = [6, 8, 12, 16, 20, 24, 32, 40, 48];
-/// Grid on which the dead time is estimated and the branches to fit are chosen.
+/// Grid for the estimate of the dead time and the choice of branches.
 const PROBE: usize = 16;
-/// Folds, if there are as many groups of curves below the highest.
+/// Number of folds, if there are as many groups of curves below the highest.
 const FOLDS: usize = 5;
-/// Samples that the grids are compared on; a longer record is taken in even steps.
+/// Number of samples used to compare grids; a longer record is decimated evenly.
 const SAMPLES: usize = 1_000_000;
-/// Fewer folds say nothing about the spread.
+/// Fewer folds give no estimate of the spread.
 const FEWEST_FOLDS: usize = 3;
-/// Curves that turn back within this share of the range of each other are one group.
+/// Curves whose reversals are within this fraction of the range form a group.
 const SAME_LEVEL: f64 = 0.005;
 
 /// Held-out error of one grid.
@@ -46,18 +46,18 @@ pub struct Score {
     pub standard_error: f64,
 }
 
-/// How the grid was chosen.
+/// Choice of the grid.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GridChoice {
-    /// Intervals per axis that were chosen.
+    /// Chosen intervals per axis.
     pub chosen: usize,
-    /// N of least held-out error.
+    /// N with the least held-out error.
     pub best: usize,
-    /// Parts into which the curves were divided; each was held out once.
+    /// Number of parts of the curves; each was held out once.
     pub folds: usize,
-    /// Groups of curves that turn back at the same voltage.
+    /// Groups of curves with a common reversal voltage.
     pub levels: usize,
-    /// How the grid was chosen from the scores, in words.
+    /// Rule of the choice, as text.
     pub rule: &'static str,
     /// Every grid tried, ascending.
     pub scores: Vec<Score>,
@@ -66,7 +66,7 @@ pub struct GridChoice {
 /// Chooses the grid for `record` over `drive` (V) by cross-validation.
 ///
 /// # Errors
-/// As [`super::identify`]; E0622 if the curves turn back at too few different voltages to hold any out.
+/// As [`super::identify`]; E0622 if the curves have too few different reversal voltages to hold any out.
 pub fn choose_grid(record: &Record, drive: [f64; 2], dead_time: DeadTime) -> Result<GridChoice, Vec<Diagnostic>> {
     let mut findings = Findings::new(&record.shown_as);
     let choice = choose(record, drive, dead_time, &mut findings);
@@ -86,7 +86,7 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
     if findings.any_error() {
         return None;
     }
-    // The finest segmentation that the record allows serves all grids: they are scored on the same samples.
+    // All grids use the finest segmentation that the record allows: they are scored on the same samples.
     let mut used = None;
     for grid in TRIED {
         let mut unheard = Findings::new("");
@@ -168,8 +168,8 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
     Some(decide(&errors, folds, levels, 1.0 / scale, top - bottom))
 }
 
-/// Normal equations of the branches that are always fitted, and of each fold: weighted as they are fitted, and evenly as they are
-/// scored. All in one walk, over at most [`SAMPLES`] samples.
+/// Normal equations of the branches that are always fitted, and of each fold: with the weights of the fit, and with
+/// equal weights for the score. One pass, over at most [`SAMPLES`] samples.
 fn sums(
     plane: &Plane,
     record: &Record,
@@ -223,7 +223,7 @@ fn mean_square(held_out: &Normal, weights: &[f64]) -> f64 {
         square += w * (row - 2.0 * held_out.rhs[0][column]);
     }
     let mean = square / held_out.samples.max(1) as f64;
-    // Rounding may leave a perfect fit a hair below zero.
+    // Rounding may leave a perfect fit slightly below zero.
     if mean > 0.0 { mean } else { 0.0 }
 }
 
@@ -253,7 +253,7 @@ fn deal(record: &Record, branches: &[Branch], drive: [f64; 2]) -> (Vec<Option<us
 }
 
 /// Applies the rule to the mean squares of each grid and fold; `unit` is the unit of the target, `range` that of the
-/// displacement behind the skipped samples, m.
+/// displacement after the skipped samples, m.
 fn decide(errors: &[(usize, Vec<f64>)], folds: usize, levels: usize, unit: f64, range: f64) -> GridChoice {
     let count = folds as f64;
     let mean = |values: &[f64]| values.iter().fold(0.0, |sum, v| sum + v) / count;
@@ -296,7 +296,7 @@ mod tests {
             [(8, vec![9.0, 9.0, 9.0]), (16, vec![1.1, 1.3, 1.0]), (32, vec![1.0, 1.0, 1.2]), (40, vec![1.4, 1.5, 1.6])];
         let choice = decide(&errors, 3, 10, 1.0, 1.0);
         assert_eq!((choice.chosen, choice.best), (16, 32));
-        // The same excess in every fold is no chance.
+        // An equal excess in every fold is not chance.
         let steady = [(16, vec![1.21, 1.21, 1.21]), (32, vec![1.0, 1.0, 1.0])];
         assert_eq!(decide(&steady, 3, 10, 1.0, 1.0).chosen, 32);
     }

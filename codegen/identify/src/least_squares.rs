@@ -1,6 +1,6 @@
 //! Least squares on a handful of columns, by normal equations of columns scaled to unit length.
 //!
-//! Written out in fixed order: the figures do not depend on which instructions a matrix library picks.
+//! Written out in fixed order, so that results do not depend on the CPU instructions of a matrix library.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -11,11 +11,11 @@ pub struct Fit {
     pub coefficients: Vec<f64>,
     /// Covariance of the coefficients for residuals of unit variance.
     pub covariance: DMatrix<f64>,
-    /// y less the fit, one value for each of y.
+    /// y less the fit, sample by sample.
     pub residual: Vec<f64>,
 }
 
-/// Fits `y` by `columns`, each as long as `y`; none if they are (nearly) dependent or hold nothing.
+/// Fits `y` by `columns`, each as long as `y`; none if they are (nearly) dependent or empty.
 #[must_use]
 pub fn fit(columns: &[&[f64]], y: &[f64]) -> Option<Fit> {
     let n = columns.len();
@@ -31,7 +31,7 @@ pub fn fit(columns: &[&[f64]], y: &[f64]) -> Option<Fit> {
     let gram = DMatrix::from_fn(n, n, |r, c| scale[r] * scale[c] * dot(columns[r], columns[c]));
     let rhs = DVector::from_fn(n, |r, _| scale[r] * dot(columns[r], y));
     let factor = Cholesky::new(gram)?;
-    // A pivot below the rounding of the sums says that the column is a mixture of the ones before it.
+    // A pivot below the rounding of the sums shows that the column depends on the ones before it.
     if (0..n).any(|k| factor.l_dirty()[(k, k)] < 1e-6) {
         return None;
     }
@@ -51,7 +51,7 @@ pub fn mean_square(values: &[f64]) -> f64 {
     if values.is_empty() { 0.0 } else { values.iter().fold(0.0, |sum, v| sum + v * v) / values.len() as f64 }
 }
 
-/// Number of independent samples that `residual` is worth, from its correlation at lag one (Bartlett): n (1 − r)/(1 + r).
+/// Number of independent samples of `residual`, from its correlation at lag one (Bartlett): n (1 − r)/(1 + r).
 #[must_use]
 pub fn independent_samples(residual: &[f64]) -> f64 {
     let energy = mean_square(residual) * residual.len() as f64;

@@ -4,10 +4,10 @@
 //! CSV → record (checked samples) → usable part, branches → dead time → normal equations → non-negative weights → table
 //! ```
 //! Model: displacement(t + dead time) = offset of the branch + Σ w_c φ_c(drive), w_c ≥ 0, with one weight per cell of
-//! the plane, the triangles on the diagonal (reversible) included. Each branch between two reversals has a free
-//! offset, so that drift and creep between the curves cannot bend the table. Of a first-order reversal record only
-//! the falls are fitted, with most weight on samples near the thresholds of the grid: the result is the classical
-//! E(u_i, u_j) = f(u_i) − f_{u_i}(u_j) with less noise, for any spacing of the curves, and without negative weights.
+//! the plane, including the (reversible) triangles on the diagonal. Each branch between two reversals has a free
+//! offset, so that drift and creep between the curves do not distort the table. For a first-order reversal record only
+//! the falls are fitted, with most weight on samples near the thresholds of the grid. The result is the classical
+//! E(u_i, u_j) = f(u_i) − f_{u_i}(u_j), with less noise, for any spacing of the curves, and without negative weights.
 //!
 //! | module | what |
 //! |---|---|
@@ -89,12 +89,12 @@ pub struct Options {
     pub grid: usize,
     /// Range of the thresholds [lowest, highest], V.
     pub drive: [f64; 2],
-    /// Also remove the drift that the returns to saturation show from within the branches.
-    /// Creep looks like drift there, so leave it off unless the sensor is known to drift within one curve.
+    /// Also remove, within branches, the drift that the returns to saturation show. Creep looks like drift there, so
+    /// leave it off unless the sensor is known to drift within a curve.
     pub drift: bool,
-    /// How the time by which the displacement lags the drive is found.
+    /// Source of the time by which the displacement lags the drive.
     pub dead_time: DeadTime,
-    /// The mode behind the table, if it is known otherwise than from the ring of a record.
+    /// The mode after the table, if it is known from elsewhere than the ring of a record.
     pub mode: Option<Mode>,
 }
 
@@ -109,33 +109,33 @@ impl Options {
 /// Dead time between drive and displacement in a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DeadTime {
-    /// Estimate it if the record holds branches of different rates, else zero.
+    /// Estimate it if the record has branches of different rates, otherwise zero.
     Estimate,
     /// This many seconds, ≥ 0.
     Fixed(f64),
 }
 
-/// An identified table and how well it is founded.
+/// An identified table and its quality.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
     /// The table, monotone.
     pub table: EverettTable,
     /// Figures of record and fit.
     pub report: Report,
-    /// Samples and residual behind the first usable one.
+    /// Samples and residual from the first usable one on.
     pub trace: Trace,
-    /// Findings that refuse nothing, those of the record included.
+    /// Findings that do not refuse the record, including those about its file.
     pub warnings: Vec<Diagnostic>,
 }
 
-/// A residual above this share of the range means that the model does not hold.
+/// A residual above this share of the range shows that the model does not apply.
 const POOR_FIT_PERCENT: f64 = 3.0;
 
 /// Identifies the Everett table of one record.
 ///
 /// # Errors
 /// All findings if the record cannot identify the table: unit or range that contradict `options.drive`, parts of the
-/// range never reached, too few reversal curves.
+/// range that are never reached, too few reversal curves.
 pub fn identify(record: &Record, options: &Options) -> Result<Identification, Vec<Diagnostic>> {
     let mut findings = Findings::new(&record.shown_as);
     let found = identify_checked(record, options, &mut findings);

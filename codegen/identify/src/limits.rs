@@ -1,25 +1,25 @@
-//! Finds where a displacement hardly moves while the drive does: a gauge at the end of its range or stuck, with noise
-//! still on it, or an amplifier at its limit.
+//! Finds parts of a record in which the displacement does not follow the drive: a gauge at the end of its range or
+//! stuck, with noise, or an amplifier at its limit.
 
 use super::columns::LineNumbers;
 use super::findings::Findings;
 use super::statistics::{extent, median, noise_floor};
 use specgen_language::diagnostic::codes;
 
-/// Travel of the drive over which it is judged, as a share of its range, and least number of samples in it.
+/// Travel of the drive that is evaluated, as a fraction of its range, and least number of samples in it.
 const TRAVEL: f64 = 0.1;
 const SAMPLES: usize = 10;
-/// Samples behind a reversal that are not judged, and least time, s: a dead time holds the displacement there.
+/// Samples that are skipped after a reversal, and least time, s: a dead time holds the displacement there.
 const SKIPPED: usize = 16;
 const SKIPPED_TIME: f64 = 1.6e-3;
-/// Share of the mean gain below which nothing of a piezo's motion is left; behind a reversal it moves by about half.
+/// Fraction of the mean gain below which a piezo does not move; after a reversal it moves by about half.
 const HARDLY: f64 = 0.08;
-/// Times that the travel's displacement must exceed the noise for a verdict.
+/// Least ratio of the travel's displacement to the noise.
 const ABOVE_NOISE: f64 = 30.0;
-/// From the lowest to the highest of the samples of a travel, noise alone comes to less than this, of its rms.
+/// Largest peak-to-peak value of noise over a travel, in units of its rms.
 const NOISE_EXTENT: f64 = 8.0;
 
-/// Reports every stretch on which the displacement hardly moves.
+/// Reports every part in which the displacement does not follow the drive.
 pub(crate) fn check(lines: &LineNumbers, time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
     let (low, high) = extent(drive);
     let (bottom, top) = extent(displacement);
@@ -29,7 +29,7 @@ pub(crate) fn check(lines: &LineNumbers, time: &[f64], drive: &[f64], displaceme
     if gain * travel < ABOVE_NOISE * noise {
         return;
     }
-    // A glitch at the end of a stretch is no standstill: medians of three do not see it.
+    // Medians of three, so that a glitch at the end of a part has no effect.
     let middle: Vec<f64> = (0..displacement.len())
         .map(|k| {
             let (from, to) = (k.saturating_sub(1), (k + 2).min(displacement.len()));
@@ -47,7 +47,7 @@ pub(crate) fn check(lines: &LineNumbers, time: &[f64], drive: &[f64], displaceme
             };
             let moved = sign * (middle[to] - middle[at]);
             let little = HARDLY * gain * (drive[to] - drive[at]).abs();
-            // One that rings goes there and back: it is where it was, and moved meanwhile.
+            // A ringing displacement returns to its start, but has moved in the meantime.
             let (lowest, highest) = extent(&middle[at..=to]);
             let hardly = moved < little && highest - lowest < little + NOISE_EXTENT * noise;
             flat = match (flat, hardly) {
@@ -82,7 +82,7 @@ pub(crate) fn check(lines: &LineNumbers, time: &[f64], drive: &[f64], displaceme
     }
 }
 
-/// Stretches `first..end` over which the drive never turns back, and whether it rises.
+/// Ranges `first..end` in which the drive does not change direction, and whether it rises.
 fn runs(drive: &[f64]) -> Vec<(usize, usize, bool)> {
     let mut runs = Vec::new();
     let mut first = 0;

@@ -19,7 +19,7 @@ pub struct Relation {
     pub simulated: bool,
     /// Frequency of the cycles, Hz.
     pub frequency: f64,
-    /// Whether the frequency was found in the record (or given).
+    /// Whether the frequency was found in the record (otherwise given).
     pub frequency_detected: bool,
     /// Whole cycles that the line was fitted to.
     pub cycles: usize,
@@ -27,13 +27,13 @@ pub struct Relation {
     pub span: [f64; 2],
     /// Slope ρ of the line, m/V.
     pub gain: f64,
-    /// Standard error of ρ: from cycle to cycle if there are three or more, else of the line's residual; m/V.
+    /// Standard error of ρ, m/V: from cycle to cycle if there are three or more, otherwise from the line's residual.
     pub gain_error: f64,
     /// Displacement δ of the line at 0 V, m.
     pub offset: f64,
     /// Correlation of X and Y.
     pub correlation: f64,
-    /// Largest distance of rise and fall at the same voltage, m.
+    /// Largest difference of rise and fall at the same voltage, m.
     pub loop_width: f64,
     /// The same in % of the displacement range.
     pub loop_percent: f64,
@@ -41,14 +41,14 @@ pub struct Relation {
     pub residual_rms: f64,
 }
 
-/// The relations of all records, and what they say together.
+/// The relations of all records, and their joint results.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LinearReport {
     /// One relation for each record, by rising frequency.
     pub relations: Vec<Relation>,
-    /// Gain ρ̂ that λ is counted from, m/V.
+    /// Reference gain ρ̂ of λ, m/V.
     pub reference_gain: f64,
-    /// Frequency that ρ̂ was taken at, Hz.
+    /// Frequency of ρ̂, Hz.
     pub reference_frequency: f64,
     /// Least and largest λ = ρ/ρ̂, two standard errors included.
     pub gain_ratio: [f64; 2],
@@ -60,14 +60,14 @@ pub struct LinearReport {
 
 /// ω2/ω1 of the paper.
 pub const PAPER_PROPORTION: f64 = 0.011 / 0.252;
-/// Crossings count once the drive has been beyond this share of its half range on the other side.
+/// A crossing counts once the drive was beyond this fraction of its half range on the other side.
 const ARMED: f64 = 0.3;
-/// Cycles may differ in length by this share.
+/// Largest relative difference in length of cycles.
 const STEADY: f64 = 0.2;
 /// Voltages at which the loop's width is measured.
 const WIDTHS: usize = 40;
 
-/// The relation in `record`; `frequency` (Hz) if it is known, else it is found from the crossings of the drive.
+/// The relation in `record`; `frequency` (Hz) if it is known, otherwise it is found from the crossings of the drive.
 ///
 /// # Errors
 /// E0625 if the record holds no whole cycle, E0626 if its cycles are not alike or contradict `frequency`.
@@ -134,12 +134,12 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
         );
         return None;
     }
-    // The first cycle settles, if others can be spared.
+    // The first cycle is for settling, if there are others.
     let from = usize::from(starts.len() > 3);
     line(record, frequency.unwrap_or(found), frequency.is_none(), &starts[from..], findings)
 }
 
-/// First samples behind upward crossings of the middle of the drive.
+/// First samples after upward crossings of the middle of the drive.
 fn cycle_starts(drive: &[f64]) -> Vec<usize> {
     let (low, high) = extent(drive);
     let middle = 0.5 * (low + high);
@@ -186,7 +186,7 @@ fn line(
         let spread = each.iter().fold(0.0, |sum, g| sum + (g - mean) * (g - mean)) / (each.len() - 1) as f64;
         (spread / each.len() as f64).sqrt()
     } else {
-        // The loop is no noise: what is left of the line counts as one sample a branch.
+        // The loop is not noise: the residual of the line counts as one sample per branch.
         (square * found.covariance[(1, 1)] * count / (2.0 * (starts.len() - 1) as f64)).sqrt()
     };
     let mean_y = y.iter().fold(0.0, |sum, v| sum + v) / count;
@@ -211,15 +211,15 @@ fn line(
     })
 }
 
-/// Largest difference of the mean displacement in falls and in rises at the same voltage, m. `gain` (m/V) takes out what
-/// the samples of a bin differ in voltage.
+/// Largest difference of the mean displacement in falls and in rises at the same voltage, m. `gain` (m/V) compensates
+/// voltage differences within a bin.
 fn widest(record: &Record, first: usize, end: usize, gain: f64) -> f64 {
     let drive = &record.drive;
     let (low, high) = extent(&drive[first..end]);
     let mut sums = vec![[(0.0, 0.0); 2]; WIDTHS];
     let (mut rising, mut turn) = (true, drive[first]);
     for (k, &u) in drive.iter().enumerate().take(end).skip(first) {
-        // A turn counts from a fiftieth of the range on: noise of the drive column is no reversal.
+        // A change of direction counts from a fiftieth of the range on: noise of the drive column is not a reversal.
         let back = if rising { turn - u } else { u - turn };
         if back > 0.02 * (high - low) {
             rising = !rising;
@@ -240,7 +240,7 @@ fn widest(record: &Record, first: usize, end: usize, gain: f64) -> f64 {
     both.map(|[fall, rise]| (fall.0 / fall.1 - rise.0 / rise.1).abs()).fold(0.0, |w, d| if d > w { d } else { w })
 }
 
-/// Puts the relations together. ρ̂ is taken at `reference` (Hz, the nearest one), else at the lowest frequency.
+/// Combines the relations. ρ̂ is that at `reference` (Hz, the nearest one), otherwise at the lowest frequency.
 ///
 /// # Errors
 /// E0625 if there is no relation, or one of them has no gain.
@@ -301,7 +301,7 @@ impl LinearReport {
         self.gain_ratio[1] < pcc_limit(level, drift)
     }
 
-    /// The interval rounded outwards to three digits behind the point, and never empty: what the spec takes.
+    /// The interval rounded outwards to three decimals, and never empty, as for a spec.
     #[must_use]
     pub fn gain_ratio_for_spec(&self) -> [f64; 2] {
         let low = (self.gain_ratio[0] * 1e3).floor() / 1e3;

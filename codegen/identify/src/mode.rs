@@ -1,10 +1,11 @@
-//! A mode behind the model: the second-order resonance of what is driven, and how a record tells it.
+//! A mode after the model: the second-order resonance of the driven mass, and its estimate from a record.
 //!
 //! ```text
 //! y″ + 2ζω y′ + ω² y = ω² f        f: what the actuator would do without inertia
 //! ```
-//! Below it, y follows f by 2ζ/ω later and larger by (f/f₀)²; beside it and above, y is another signal. A drive that jumps and
-//! then rests lets the mode ring freely, and the ring shows frequency and damping without any model of the actuator.
+//! Below the mode, y lags f by 2ζ/ω and is larger by (f/f₀)²; near and above it, y is another signal. After a jump of
+//! the drive followed by a rest the mode rings freely, and the ring shows frequency and damping without any model of
+//! the actuator.
 
 use serde::Serialize;
 
@@ -25,7 +26,7 @@ impl Mode {
         2.0 * core::f64::consts::PI * self.frequency
     }
 
-    /// What the mode makes of `f`, exact for an f that is straight between the samples at `time` (s). It starts at rest.
+    /// Response of the mode to `f`, exact for an f that is linear between the samples at `time` (s). It starts at rest.
     #[must_use]
     pub fn behind(self, time: &[f64], f: &[f64]) -> Vec<f64> {
         let omega = self.angular();
@@ -39,7 +40,7 @@ impl Mode {
                 if (step - turn.step).abs() > SAME_STEP * step {
                     turn = FreeStep::over(self, step);
                 }
-                // Behind a ramp y lags by 2ζ/ω times its slope; the rest turns and decays.
+                // After a ramp y lags by 2ζ/ω times its slope; the rest rotates and decays.
                 let slope = (value - f[k - 1]) / step;
                 let (off, speed) = turn.apply(y - f[k - 1] + lag * slope, rate - slope);
                 (y, rate) = (value - lag * slope + off, slope + speed);
@@ -49,7 +50,7 @@ impl Mode {
         all
     }
 
-    /// A free ring from `time[0]` on: its two phases, each of amplitude 1 there.
+    /// A free ring from `time[0]` on: its two phases, each with amplitude 1 there.
     #[must_use]
     pub(crate) fn ring(self, time: &[f64]) -> [Vec<f64>; 2] {
         let start = time.first().copied().unwrap_or(0.0);
@@ -62,10 +63,10 @@ impl Mode {
     }
 }
 
-/// Steps that differ by less than this share are one.
+/// Steps whose relative difference is smaller are equal.
 const SAME_STEP: f64 = 1e-6;
 
-/// The free motion of a mode over one step: displacement and speed after it, of those before it.
+/// Free motion of a mode over one step: displacement and speed after it as functions of those before it.
 struct FreeStep {
     step: f64,
     of: [[f64; 2]; 2],
@@ -89,40 +90,41 @@ impl FreeStep {
     }
 }
 
-/// A ring that a record shows while its drive rests.
+/// A ring of a record while its drive rests.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Ring {
     /// What rings.
     pub mode: Mode,
-    /// Time of the first sample that it was found from, s.
+    /// Time of the first sample used, s.
     pub time: f64,
     /// Amplitude there, m.
     pub amplitude: f64,
-    /// What is left of the displacement, rms, m.
+    /// Residual of the displacement, rms, m.
     pub left: f64,
 }
 
-/// Samples of a rest that are looked at, from those behind the jump on, and the fewest.
+/// Most samples of a rest that are used, from those after the jump on, and fewest.
 const LOOKED_AT: usize = 800;
 const FEWEST: usize = 100;
-/// Samples behind a jump that are left out: the amplifier is still slewing, and gauges have filters.
+/// Samples skipped after a jump: the amplifier is still slewing, and gauges have filters.
 const BEHIND_JUMP: usize = 20;
-/// Periods that a rest holds at least, and samples of a period.
+/// Least number of periods in a rest, and of samples in a period.
 const PERIODS: f64 = 5.0;
 const SAMPLES_A_PERIOD: f64 = 4.0;
 /// Damping ratios tried at each frequency, before both are refined.
 const DAMPING: [f64; 4] = [0.004, 0.015, 0.05, 0.15];
 const LARGEST_DAMPING: f64 = 0.5;
-/// A ring that hardly decays is a hum.
+/// A ring with less damping is hum.
 const LEAST_DAMPING: f64 = 1e-3;
-/// A ring explains this share of what moves in the rest at least, and stands this far out of what it leaves.
+/// Least fraction of the motion in the rest that a ring explains, and least ratio to its residual.
 const EXPLAINED: f64 = 0.8;
 const ABOVE_LEFT: f64 = 5.0;
-/// Rests that are looked at.
+/// Number of rests that are tried.
 const RESTS: usize = 4;
 const REFINED: usize = 40;
 
-/// The clearest ring of a record (s, V, m): in a rest of the drive at its beginning or behind a jump. `None` if nothing rings.
+/// The clearest ring of a record (s, V, m): in a rest of the drive at its beginning or after a jump. `None` if nothing
+/// rings.
 #[must_use]
 pub fn ring(time: &[f64], drive: &[f64], displacement: &[f64]) -> Option<Ring> {
     let (low, high) = statistics::extent(drive);
@@ -165,7 +167,7 @@ fn ring_of_rest(time: &[f64], y: &[f64]) -> Option<Ring> {
         let amplitude = libm::hypot(found.coefficients[0], found.coefficients[1]);
         Some((mean_square(&found.residual), amplitude))
     };
-    // Steps of a quarter of the line's width in so short a stretch.
+    // Steps of a quarter of the line's width for such a duration.
     let (lowest, highest) = (PERIODS / duration, 1.0 / (SAMPLES_A_PERIOD * interval));
     let steps = (4.0 * (highest - lowest) * duration) as usize;
     let tried = (0..=steps).flat_map(|k| {
@@ -184,7 +186,7 @@ fn ring_of_rest(time: &[f64], y: &[f64]) -> Option<Ring> {
     (rings && mode.damping > LEAST_DAMPING).then_some(Ring { mode, time: time[0], amplitude, left: rest.sqrt() })
 }
 
-/// The mode of least `left` near `mode`: steps in both directions, halved where none helps.
+/// The mode near `mode` with the least `left`: steps in both directions, halved if none helps.
 fn refined(mut mode: Mode, step: f64, left: impl Fn(Mode) -> Option<f64>) -> Mode {
     let (mut wide, mut factor) = (step, 1.5);
     let mut least = left(mode).unwrap_or(f64::INFINITY);

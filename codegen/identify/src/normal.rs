@@ -1,7 +1,7 @@
 //! Normal equations of the fit, accumulated sparsely over Everett nodes and turned into cell weights by sums.
 //!
-//! Each branch has a free offset of its own, which is projected out by centring the branch.
-//! Slow drift and creep between the curves then cannot bend the table.
+//! Each branch has a free offset, which is eliminated by centring the branch. Slow drift and creep between the curves
+//! then do not distort the table.
 
 mod sums;
 
@@ -16,8 +16,8 @@ use specgen_language::interrupt;
 
 pub(super) use sums::Sums;
 
-/// Σ over the samples of φφᵀ, φ·y and y², each centred in its branch. φ_c is the displacement of a unit weight in cell c;
-/// with a second table, its cells come behind those of the first.
+/// Σ over the samples of φφᵀ, φ·y and y², each centred in its branch. φ_c is the displacement of a unit weight in cell
+/// c. The cells of a second table follow those of the first.
 #[derive(Debug, Clone)]
 pub struct Normal {
     /// Gram matrix over weights, symmetric.
@@ -52,14 +52,14 @@ pub fn each_row_from(
     }
 }
 
-/// How much each sample counts.
+/// Weight of the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Weighting {
-    /// Every sample counts the same.
+    /// Equal weights.
     Even,
-    /// Every n-th sample before the second one counts the same, the others nothing.
+    /// Every n-th sample before the second number has weight 1, the others 0.
     Every(usize, usize),
-    /// Most where the drive is at a threshold of the grid, see [`node_weight`].
+    /// Most weight if the drive is at a threshold of the grid, see [`node_weight`].
     AtNodes,
 }
 
@@ -67,14 +67,14 @@ pub enum Weighting {
 const BETWEEN: f64 = 0.01;
 /// Weight of a sample with the drive at `drive` (V): 1 at a threshold, [`BETWEEN`] half-way to the next.
 ///
-/// The table is linear between thresholds while the actuator is curved there. Fitted evenly, the table would leave the
-/// curve at the nodes to meet it half-way; weighted so, it holds the measured values at its nodes, as the classical
-/// reading does, and samples beside the nodes still average the noise.
+/// The table is linear between thresholds, while the actuator is curved there. With equal weights, the table would be
+/// off at the nodes to fit the middle. With these weights it has the measured values at its nodes, as in the classical
+/// method, and samples near the nodes still average the noise.
 fn node_weight(plane: &Plane, drive: f64) -> f64 {
     let position = (drive - plane.range[0]) / plane.interval();
     let off = (position - position.round()).abs();
     let near = 1.0 - 2.0 * off;
-    // Sixth power, written out: the rounding of `powi` is the compiler's choice.
+    // Sixth power, written out: the compiler may choose the rounding of `powi`.
     let cubed = near * near * near;
     BETWEEN + (1.0 - BETWEEN) * cubed * cubed
 }
@@ -87,8 +87,8 @@ pub enum Step<'a> {
     End(usize),
 }
 
-/// Walks over `branches` (in ascending order; neighbours may share one sample), with negative saturation before sample `first`.
-/// Rows are made of the samples that are `wanted`.
+/// Walks over `branches` (in ascending order; neighbours may share one sample), with negative saturation before sample
+/// `first`. Rows are computed only for the `wanted` samples.
 pub fn walk(
     plane: &Plane,
     record: &Record,
@@ -125,7 +125,7 @@ pub fn walk(
     }
 }
 
-/// How much sample `k` counts.
+/// Weight of sample `k`.
 pub fn weight(weighting: Weighting, plane: &Plane, record: &Record, k: usize) -> f64 {
     match weighting {
         Weighting::Even => 1.0,
@@ -136,8 +136,8 @@ pub fn weight(weighting: Weighting, plane: &Plane, record: &Record, k: usize) ->
 
 /// Normal equations over `branches` (in ascending order; neighbours may share one sample).
 ///
-/// `fill` writes the targets of a sample, `targets` in number; it is called with samples in ascending order, and again
-/// with the last one where two branches share it.
+/// `fill` writes the `targets` targets of a sample. It is called with samples in ascending order, and twice for a
+/// sample that two branches share.
 #[must_use]
 pub fn accumulate(
     plane: &Plane,
@@ -175,7 +175,7 @@ fn weights_to_nodes(grid: usize, values: &mut [f64]) {
     }
 }
 
-/// The table of cell weights that are in units of `unit` (m, or m s/V).
+/// The table of cell weights given in units of `unit` (m, or m s/V).
 pub fn table_of(plane: &Plane, weights: &[f64], unit: f64) -> EverettTable {
     let mut nodes: Vec<f64> = weights.iter().map(|w| w * unit).collect();
     weights_to_nodes(plane.grid, &mut nodes);

@@ -1,21 +1,21 @@
-//! What is assumed about weights that the record leaves undetermined: neighbouring cells have similar weights.
+//! Assumption on weights that the record leaves undetermined: neighbouring cells have similar weights.
 
 use nalgebra::DMatrix;
 
 use crate::everett::EverettTable;
 
-/// Penalty on the squared difference of neighbouring weights, as a share of the mean diagonal of the Gram matrix.
+/// Penalty on the squared difference of neighbouring weights, as a fraction of the mean diagonal of the Gram matrix.
 ///
-/// Chosen so that it decides where the record says nothing (a cell that no branch crosses) and does not show where
-/// it does: a cell that switches in one sample of a thousand outweighs it.
+/// It decides where the record has no information (a cell that no branch crosses), and has no visible effect elsewhere:
+/// a cell that switches in one sample of a thousand outweighs it.
 const SMOOTHNESS: f64 = 1e-6;
 /// Share of the mean diagonal that keeps the matrix positive definite in floating point.
 const RIDGE: f64 = 1e-12;
 
 /// Adds the penalty to `gram` (both triangles) and returns its strength, in the unit of `gram`.
 ///
-/// Neighbours share an edge in the plane. The triangles on the diagonal also hold the reversible part and are much
-/// heavier than the cells beside them: they are neighbours of each other only.
+/// Neighbours share an edge in the plane. The triangles on the diagonal include the reversible part and are much
+/// heavier than the cells beside them: they are neighbours only of each other.
 pub fn add(grid: usize, gram: &mut DMatrix<f64>) -> f64 {
     let count = gram.nrows();
     let mean = (0..count).fold(0.0, |sum, k| sum + gram[(k, k)]) / count as f64;

@@ -8,9 +8,10 @@
 //! creep, one weight    the same with all w_j equal and τ_j evenly spaced in their logarithm
 //! creep and mode   the same as creep, behind a second-order mode ([`crate::mode`])
 //! ```
-//! All are fitted to the same samples of all records, every record with the same weight, with a free offset for each
-//! branch while a table is fitted. What tells them apart is the error at a rate that they were not fitted on: each is fitted
-//! again without each of the records in turn. Errors are those of the whole record after one offset and one line.
+//! All options are fitted to the same samples of all records, with equal weight for every record, and a free offset for
+//! each branch while a table is fitted. They are compared by the error at a rate that they were not fitted on: each
+//! option is fitted again without each record in turn. Errors are those of the whole record after one offset and one
+//! line.
 
 mod creep;
 mod export;
@@ -39,13 +40,13 @@ use super::{Options, coverage, time_unit};
 pub use export::{read_rate_csv, spec_lines, write_rate_csv};
 pub use report::{HoldOut, OptionReport, RateRecord, RateReport, Verdict};
 
-/// A way to account for the rate.
+/// An option for the rate dependence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RateOption {
     /// One Everett table, at any rate.
     Static,
-    /// One table behind a dead time.
+    /// One table with a dead time.
     DeadTime,
     /// A second table times the rate of the drive (6).
     DynamicPreisach,
@@ -53,22 +54,22 @@ pub enum RateOption {
     Creep,
     /// The same with one weight for all its time constants.
     EvenCreep,
-    /// Table, creep, dead time and a mode behind them, where a record rings or the mode is given.
+    /// Table, creep, dead time and a mode after them, if a record rings or the mode is given.
     CreepMode,
 }
 
 impl RateOption {
-    /// Every option, the plainest first.
+    /// Every option, the simplest first.
     pub const ALL: [Self; 6] =
         [Self::Static, Self::DeadTime, Self::DynamicPreisach, Self::Creep, Self::EvenCreep, Self::CreepMode];
 
-    /// Whether the controller can run it. No controller takes a mode out of its demand: that one predicts.
+    /// Whether the controller can run it. No controller inverts a mode: that option only predicts.
     #[must_use]
     pub const fn runs(self) -> bool {
         !matches!(self, Self::CreepMode)
     }
 
-    /// What it is called in a report.
+    /// Its name in a report.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -91,10 +92,10 @@ pub struct CreepTerm {
     pub weight: f64,
 }
 
-/// What a mode adds to the displacement: its answer to `gain` · drive, less gain · drive itself.
+/// Contribution of a mode to the displacement: its response to `gain` · drive, less gain · drive itself.
 ///
-/// Not to the displacement of the table: that has an edge at each of its nodes, and every edge would make a lightly damped mode
-/// ring, which the actuator does not.
+/// The input is not the displacement of the table: its edges at the nodes would make a lightly damped mode ring, which
+/// the actuator does not.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Inertia {
     /// The mode.
@@ -103,24 +104,24 @@ pub struct Inertia {
     pub gain: f64,
 }
 
-/// A fitted option. What it does not have is empty or zero.
+/// A fitted option. Parts that it lacks are empty or zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RateModel {
-    /// Γ₀: the table that holds at any rate, m.
+    /// Γ₀: the rate-independent table, m.
     pub still: EverettTable,
     /// Γ₁, m s/V, on the grid of `still`; its weights are of either sign.
     pub rate: Option<EverettTable>,
-    /// Creep behind Γ₀, slowest first.
+    /// Creep after Γ₀, slowest first.
     pub creep: Vec<CreepTerm>,
     /// What a mode adds.
     pub inertia: Option<Inertia>,
-    /// s by which the displacement lags the drive column of a record, ≥ 0. Of a command, half a sampling interval of it is the
-    /// converter's, see [`Record::held`].
+    /// Lag of the displacement behind the drive column of a record, s, ≥ 0. If the drive is a command, half a sampling
+    /// interval of it is the converter's, see [`Record::held`].
     pub dead_time: f64,
 }
 
 impl RateModel {
-    /// The static model of a table behind `dead_time` (s).
+    /// The static model of a table with `dead_time` (s).
     #[must_use]
     pub const fn of_table(still: EverettTable, dead_time: f64) -> Self {
         Self { still, rate: None, creep: Vec::new(), inertia: None, dead_time }
@@ -138,10 +139,10 @@ pub struct RateIdentification {
     pub warnings: Vec<Diagnostic>,
 }
 
-/// Fits every option to `records`, at least two at different rates, and tries each at the rate it was not fitted on.
+/// Fits every option to `records`, at least two at different rates, and tests each at the rate it was not fitted on.
 ///
-/// `hold_out` takes no part in any fit. `options.drift` and `options.dead_time` are not used; without
-/// `options.mode` the mode is that of the clearest ring in a record.
+/// `hold_out` is excluded from all fits. `options.drift` and `options.dead_time` are not used. Without `options.mode`
+/// the mode is that of the clearest ring in a record.
 ///
 /// # Errors
 /// All findings if a record cannot identify the table, or if the records have one rate only.

@@ -1,12 +1,12 @@
-//! What the user says about the files of the bench beside what stands in them.
+//! The user's description of the columns of bench files.
 
 use super::columns::names::{self, Quantity};
 
-/// How records are read where their names do not say it. By default, by their names.
+/// How to read records whose names are not standard. By default, by their names.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Reading {
     columns: Vec<ColumnChoice>,
-    /// Samples per second, Hz: time is counted from it.
+    /// Samples per second, Hz; time is computed from it.
     rate: Option<f64>,
 }
 
@@ -15,21 +15,21 @@ pub struct Reading {
 struct ColumnChoice {
     /// The quantity's name in this project, or `sample`.
     quantity: &'static str,
-    /// How many of the column's unit are one of the quantity's.
+    /// Number of the column's units in one of the quantity's.
     per: f64,
     /// Its name, or its number from 1.
     column: String,
 }
 
-/// Quantity of a column that counts samples.
+/// Quantity of a column with sample numbers.
 const SAMPLE: &str = "sample";
 
 impl Reading {
-    /// From `NAME=COLUMN` each, such as `drive_mV=Voltage` or `time_s=1`: a name with its unit, and the header or the number
-    /// (from 1) of its column; and samples per second, Hz.
+    /// From `NAME=COLUMN` each, such as `drive_mV=Voltage` or `time_s=1`: a name with its unit, and the header or the
+    /// number (from 1) of its column; and samples per second, Hz.
     ///
     /// # Errors
-    /// What was expected, of the first that is not such.
+    /// The expected form, for the first that does not have it.
     pub fn new(columns: &[String], rate: Option<f64>) -> Result<Self, String> {
         Ok(Self { columns: columns.iter().map(|text| chosen(text)).collect::<Result<_, _>>()?, rate })
     }
@@ -47,12 +47,12 @@ impl Reading {
             .map(|chosen| (chosen.column.as_str(), chosen.per))
     }
 
-    /// The column that counts samples.
+    /// The column with sample numbers.
     pub(crate) fn sample_column(&self) -> Option<&str> {
         self.column(SAMPLE).map(|(column, _)| column)
     }
 
-    /// Quantities that the user names a column for, without those `wanted`.
+    /// Quantities with a column from the user, without those `wanted`.
     pub(crate) fn unknown<'a>(&'a self, wanted: &'a [&str]) -> impl Iterator<Item = &'static str> + 'a {
         self.columns.iter().map(|chosen| chosen.quantity).filter(|name| *name != SAMPLE && !wanted.contains(name))
     }
@@ -81,7 +81,7 @@ fn chosen(text: &str) -> Result<ColumnChoice, String> {
                 },
                 Quantity::all_names,
             );
-            Err(format!("`{name}` is no name of a column; expected one of {known}"))
+            Err(format!("`{name}` is not a column name; expected one of {known}"))
         }
     }
 }

@@ -1,7 +1,6 @@
-//! Reads a measured record: a text file with the columns `time_s`, `drive_V`, `displacement_um`, or what they are called.
+//! Reads a measured record: a text file with the columns `time_s`, `drive_V`, `displacement_um`, or under other names.
 //!
-//! Every problem of the file is reported in one run. What depends on the declared drive range is checked
-//! later, by [`super::coverage`].
+//! One run reports every problem of the file. [`super::coverage`] later checks the drive range.
 
 use std::io::Read;
 use std::path::Path;
@@ -31,7 +30,7 @@ pub(crate) const NAMES: [&str; 3] = ["time_s", "drive_V", "displacement_um"];
 /// time increases strictly and has no gaps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
-    /// Name of the file as its user knows it.
+    /// Name of the file as the user gave it.
     pub shown_as: String,
     /// Time, s.
     pub time: Vec<f64>,
@@ -41,7 +40,7 @@ pub struct Record {
     pub monitored: bool,
     /// Displacement, m.
     pub displacement: Vec<f64>,
-    /// Samples that no fit believes: glitches, and what follows a jump of the drive.
+    /// Samples without weight in fits: glitches, and those after a jump of the drive.
     pub weightless: Vec<bool>,
     /// Whether a comment in the file marks it as simulated.
     pub simulated: bool,
@@ -76,8 +75,8 @@ impl Record {
         finish(findings, shown_as, &lines, [time, drive, displacement])
     }
 
-    /// Half the interval for which a converter holds each sample of the drive, s: by so much the voltage lags a command on the
-    /// mean. 0 where the drive is the measured voltage, or is sampled more slowly than at 1 kHz.
+    /// Half the interval for which a converter holds each sample of the drive, s: the mean lag of the voltage behind a
+    /// command. 0 if the drive is the measured voltage, or is sampled more slowly than at 1 kHz.
     #[must_use]
     pub fn held(&self) -> f64 {
         if self.monitored { 0.0 } else { hold(&self.time) }
@@ -91,10 +90,10 @@ impl Record {
     }
 }
 
-/// Reads a record. `shown_as` is how messages name the file, `reading` what the user says about it.
+/// Reads a record. `shown_as` is its name in messages, `reading` the user's description of its columns.
 ///
 /// # Errors
-/// All findings of the file, warnings included, if at least one refuses it.
+/// All findings of the file, including warnings, if at least one refuses it.
 pub fn read_record(path: &Path, shown_as: &str, reading: &Reading) -> Result<Record, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
     match open_file(path, &mut findings) {
@@ -111,7 +110,7 @@ pub fn parse_record(text: &str, shown_as: &str) -> Result<Record, Vec<Diagnostic
     of_source(text.as_bytes(), &Reading::default(), Findings::new(shown_as))
 }
 
-/// Columns of a record; the displacement may be missing in one that is only predicted.
+/// Columns of a record; the displacement is optional in a record for prediction.
 pub(crate) const fn wanted(displacement: bool) -> [ColumnSpec; 4] {
     [
         ColumnSpec { name: NAMES[TIME], required: true },
@@ -136,10 +135,10 @@ fn of_source(source: impl Read, reading: &Reading, mut findings: Findings) -> Re
     Ok(Record { monitored, simulated, ..record })
 }
 
-/// Longest interval for which a converter is believed to hold a command, s: a record sampled more slowly leaves commands out.
+/// Longest plausible hold of a converter, s: a record sampled more slowly does not contain every command.
 const LONGEST_HOLD: f64 = 1e-3;
 
-/// Half of the median sampling interval, s; 0 where that is too long for a converter's.
+/// Half of the median sampling interval, s; 0 if that is too long for a converter.
 pub(crate) fn hold(time: &[f64]) -> f64 {
     let mut intervals: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
     let interval = statistics::median(&mut intervals);
@@ -152,7 +151,7 @@ fn finish(
     lines: &LineNumbers,
     columns: [Vec<f64>; 3],
 ) -> Result<Record, Vec<Diagnostic>> {
-    // A value that could not be read would only cause a trail of follow-up findings.
+    // An unreadable value would only cause further findings.
     if !findings.any_error() {
         sanity::check(lines, &columns, &mut findings);
     }

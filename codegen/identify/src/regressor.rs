@@ -1,4 +1,4 @@
-//! One row of the regression: how the model's displacement depends on the nodes of the Everett table.
+//! One row of the regression: dependence of the model's displacement on the nodes of the Everett table.
 //!
 //! With the memory p_0 < p_1 > p_2 < … p_m = u (the last one is the drive) the model's displacement above negative
 //! saturation is f = E(p_1, p_0) − E(p_1, p_2) + E(p_3, p_2) − …, and E is linear in its nodes, so f is too.
@@ -58,7 +58,7 @@ impl Plane {
         }
     }
 
-    /// Index of the interval that holds `drive`, and the position in it from 0 to 1.
+    /// Index of the interval that contains `drive`, and the position in it from 0 to 1.
     fn cell(&self, drive: f64) -> (usize, f64) {
         let position = (drive - self.range[0]) / self.interval();
         // A float-to-integer cast saturates, so that no drive leads outside the grid.

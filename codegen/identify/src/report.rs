@@ -1,18 +1,18 @@
-//! What identification tells about its result.
+//! Results of an identification.
 
 use serde::Serialize;
 
 use super::cause::Cause;
 use super::coverage::Region;
 
-/// Which branches the table was fitted to.
+/// Branches that the table was fitted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Branches {
     /// Falls from a reversal only: by definition E(up, down) is the displacement lost in them.
     Descending,
-    /// Rises and falls: the record holds more than first-order reversal curves, or its falls alone do not excite
-    /// every cell that it excites.
+    /// Rises and falls: the record has more than first-order reversal curves, or its falls alone do not excite every
+    /// cell.
     All,
 }
 
@@ -27,7 +27,7 @@ pub struct Report {
     pub grid: usize,
     /// Samples in the record.
     pub samples: usize,
-    /// Samples at the beginning that are not used, since the state is unknown or still settling.
+    /// Unused samples at the beginning, where the state is unknown or still settling.
     pub samples_skipped: usize,
     /// Samples in the least-squares fit.
     pub samples_fitted: usize,
@@ -35,9 +35,9 @@ pub struct Report {
     pub reversal_curves: usize,
     /// Branches in the fit; each has a free offset.
     pub branches: Branches,
-    /// Share of the cells that the record excites: they switch, and not only together with a neighbouring cell.
+    /// Fraction of the cells that the record excites: they switch, and not only together with a neighbouring cell.
     pub excited_share: f64,
-    /// Difference of the largest and smallest displacement behind the skipped samples.
+    /// Difference of the largest and smallest displacement after the skipped samples.
     pub displacement_range: f64,
     /// Residual over all samples that are not skipped, rising and falling, after one offset and one linear drift.
     pub fit_rms: f64,
@@ -47,7 +47,7 @@ pub struct Report {
     pub fit_rms_percent: f64,
     /// `fit_max` in % of the range.
     pub fit_max_percent: f64,
-    /// Residual of the fitted branches with their own offsets: hysteresis alone, without drift and creep between curves.
+    /// Residual of the fitted branches with their own offsets: only hysteresis, without drift and creep between curves.
     pub branch_rms: f64,
     /// `branch_rms` in % of the range.
     pub branch_rms_percent: f64,
@@ -55,24 +55,24 @@ pub struct Report {
     pub offset: f64,
     /// Drift in m/s: median slope of the displacement over the returns to negative saturation. Creep is part of it.
     pub drift: f64,
-    /// Returns from which the drift was taken.
+    /// Number of returns used for the drift.
     pub drift_returns: usize,
     /// Whether the drift was removed from the branches too.
     pub drift_removed: bool,
-    /// Mean rate of the drive in the fastest branch that is no jump, V/s.
+    /// Mean rate of the drive in the fastest branch that is not a jump, V/s.
     pub fastest: f64,
     /// Time by which the displacement lags the drive column, s.
     pub dead_time: f64,
-    /// What of it is the converter's, which holds each sample of a command: half a sampling interval, s; 0 for `monitor_V` and below 1 kHz.
-    /// `hysteresis.dead_time` of a spec is the rest.
+    /// Part of it that belongs to the converter, which holds each sample of a command: half a sampling interval, s; 0
+    /// for `monitor_V` and below 1 kHz. The rest is `hysteresis.dead_time` of a spec.
     pub held: f64,
-    /// How the dead time was decided.
+    /// Basis of the dead time.
     pub dead_time_basis: String,
     /// Standard deviation of white noise on the displacement.
     pub noise_floor: f64,
-    /// Used samples that got no weight: glitches, and what follows a jump of the drive.
+    /// Used samples without weight: glitches, and those after a jump.
     pub weightless: usize,
-    /// What the residual behind `fit_rms` consists of.
+    /// Causes of the residual of `fit_rms`.
     pub cause: Cause,
     /// Parts of the plane that the record does not excite, largest first.
     pub unexcited: Vec<Region>,

@@ -1,4 +1,4 @@
-//! What a fitted table leaves of its own record.
+//! Residual of a fitted table on its own record.
 
 use super::branches::Branch;
 use super::cause::{self, Cause};
@@ -13,7 +13,7 @@ use crate::everett::EverettTable;
 pub(crate) struct Residual {
     /// As it is, m.
     plain: Vec<f64>,
-    /// Without `line`, of the samples that have weight, m.
+    /// Without `line`, of the samples with weight, m.
     pub(crate) detrended: Vec<f64>,
     /// Offset (m) and linear drift (m/s) of `plain`.
     pub(crate) line: trend::Line,
@@ -42,12 +42,12 @@ impl Residual {
         let line = trend::Line::fit(&time, &kept);
         let detrended = kept.iter().zip(&time).map(|(r, t)| r - line.at(*t)).collect();
         let (low, high) = statistics::extent(&believed(&displacement[used.first..]));
-        // Behind the end the displacement is not known.
+        // After the end the displacement is not known.
         plain[used.end - used.first..].fill(f64::NAN);
         Self { plain, detrended, line, range: high - low }
     }
 
-    /// What it consists of, given white noise `noise` (m) and the gain (m/V).
+    /// Its causes, given white noise `noise` (m) and the gain (m/V).
     pub(crate) fn cause(&self, record: &Record, first: usize, noise: f64, gain: f64) -> Cause {
         let keep: Vec<bool> =
             record.weightless[first..].iter().zip(&self.plain).map(|(w, r)| !w && !r.is_nan()).collect();

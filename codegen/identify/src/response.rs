@@ -23,7 +23,7 @@ pub use fit::response;
 pub use fit::{Estimate, ResonanceFit};
 pub use welch::Bin;
 
-/// A response and what was fitted to it.
+/// A response and its fit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResponseReport {
     /// Name of the record.
@@ -71,20 +71,20 @@ pub struct Band {
 
 /// Coherence below which a bin is left out.
 const COHERENT: f64 = 0.6;
-/// Power of the drive, as a share of the strongest bin's, below which a bin counts as not excited.
+/// Power of the drive, relative to the strongest bin, below which a bin counts as not excited.
 const EXCITED: f64 = 1e-6;
 /// Least number of bins to fit, and of averages.
 const BINS: usize = 12;
 const AVERAGES: usize = 4;
-/// The resonance is believed if this share of the bins from 0.7 to 1.3 times its frequency is used.
+/// The resonance is valid if this fraction of the bins from 0.7 to 1.3 times its frequency is used.
 const AROUND: f64 = 0.6;
-/// Sampling intervals may differ from the median by this share.
+/// Largest relative deviation of a sampling interval from the median.
 const UNIFORM: f64 = 0.01;
-/// Share of samples at exactly the largest or smallest displacement that means a limit.
+/// Fraction of samples at exactly the largest or smallest displacement that shows a limit.
 const AT_LIMIT: f64 = 0.01;
-/// Misfit that calls for a warning, %.
+/// Misfit that causes a warning, %.
 const POOR: f64 = 15.0;
-/// Bands narrower than this many bins are not named one by one.
+/// Narrower bands, in bins, are not named separately.
 const NARROW: usize = 3;
 
 const COLUMNS: [ColumnSpec; 3] = [
@@ -96,7 +96,7 @@ const COLUMNS: [ColumnSpec; 3] = [
 /// Identifies from a record of a swept sine, multisine or noise. `segment`: samples in a segment, a power of two is best.
 ///
 /// # Errors
-/// E0630 for a record that is not sampled evenly or too short, E0631 where the coherence is too low (the bands are named),
+/// E0630 for a record that is too short or not sampled evenly, E0631 if the coherence is too low (the bands are named),
 /// E0632 if the model cannot be fitted, and those of reading.
 pub fn respond(
     path: &Path,
@@ -206,7 +206,7 @@ fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings)
     })
 }
 
-/// A power of two that leaves about fifteen half-overlapped segments.
+/// A power of two that gives about fifteen half-overlapped segments.
 fn automatic(samples: usize) -> usize {
     let eighth = (samples / 8).max(1);
     (1usize << eighth.ilog2()).clamp(64, 1 << 15)
@@ -216,7 +216,7 @@ fn sampling_rate(signals: &Signals, findings: &mut Findings) -> Option<f64> {
     let time = signals.column(0);
     let mut intervals: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
     let interval = median(&mut intervals);
-    // A time column of few digits rounds each time by up to half a digit; the grid as a whole must fit.
+    // A time column with few digits rounds each time by up to half a digit; the grid as a whole must fit.
     let even = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
     let off = |k: usize| (time[k] - time[0] - k as f64 * even).abs();
     let worst = (0..time.len()).fold(0, |w, k| if off(k) > off(w) { k } else { w });
@@ -237,7 +237,7 @@ fn sampling_rate(signals: &Signals, findings: &mut Findings) -> Option<f64> {
     Some(1.0 / even)
 }
 
-/// A limited channel shows as many samples at exactly its largest or smallest value; a dead one as a long standstill.
+/// A limited channel has many samples at exactly its largest or smallest value; a dead one a long standstill.
 fn check_limits(signals: &Signals, findings: &mut Findings) {
     for (column, name) in [(1, "drive_V"), (2, "displacement_um")] {
         let values = signals.column(column);
@@ -252,9 +252,9 @@ fn check_limits(signals: &Signals, findings: &mut Findings) {
             return;
         }
         for (limit, word) in [(low, "lower"), (high, "upper")] {
-            // Two neighbours at the limit: a peak touches it once, a clipped one stays.
+            // Two neighbours at the limit: a peak touches it once, a clipped signal stays.
             let stays = values.windows(2).filter(|w| w[0] == limit && w[1] == limit).count();
-            // A drive of two levels (a random binary signal) is at its limits by intent.
+            // A drive of two levels (a random binary signal) is intentionally at its limits.
             if column == 2 && stays > 10 && stays as f64 > AT_LIMIT * values.len() as f64 {
                 let first = values.windows(2).position(|w| w[0] == limit && w[1] == limit).unwrap_or(0);
                 let message = format!(
@@ -335,7 +335,7 @@ fn named(bands: &[Band]) -> String {
     format!("{}{more}", each.join(", "))
 }
 
-/// Refuses a resonance that the record does not show: outside the band, or where the coherence is too low.
+/// Refuses a resonance without evidence in the record: outside the band, or where the coherence is too low.
 fn check_resonance(
     fitted: &ResonanceFit,
     band: [f64; 2],

@@ -1,4 +1,4 @@
-//! Is a record plausible as a measurement, whatever it was meant for?
+//! Whether a record is plausible as a measurement of any kind.
 
 use super::columns::LineNumbers;
 use super::findings::Findings;
@@ -6,20 +6,21 @@ use super::limits;
 use super::statistics::{extent, median, micrometres};
 use specgen_language::diagnostic::codes;
 
-/// Fewer samples are no record.
+/// Least number of samples of a record.
 pub const MIN_SAMPLES: usize = 100;
-/// A sampling interval this many times the median one is a gap: a reversal may hide in it.
+/// A sampling interval this many times the median is a gap: a reversal may be hidden in it.
 const GAP: f64 = 10.0;
-/// The displacement may stay exactly equal while the drive travels this share of its range; longer is a stuck or limited sensor.
+/// Fraction of the drive's range over which the displacement may stay exactly equal; longer shows a stuck or limited
+/// sensor.
 const STUCK_TRAVEL: f64 = 0.05;
-/// A record of reversal curves that goes on for longer, s, is in another unit, or drifts.
+/// A longer record of reversal curves, s, has another unit, or drifts.
 const LONGEST: f64 = 3600.0;
-/// White noise of a command, as a share of its range, is below this (rounding to five digits); of a gauge it is above.
+/// White noise of a command, relative to its range, is below this (rounding to five digits); that of a gauge is above.
 const COMMANDED_NOISE: f64 = 3e-6;
 /// A displacement range outside these bounds (m) is unusual for a piezo actuator and suggests another unit.
 pub(crate) const PLAUSIBLE_RANGE: [f64; 2] = [50e-9, 2e-3];
 
-/// Checks columns of finite numbers in s, V, m; `lines` tells each sample stands in the file.
+/// Checks columns of finite numbers in s, V, m; `lines` has the line of each sample.
 pub(crate) fn check(lines: &LineNumbers, columns: &[Vec<f64>; 3], findings: &mut Findings) {
     let [time, drive, displacement] = columns;
     if time.len() < MIN_SAMPLES {
@@ -43,7 +44,7 @@ pub(crate) fn check(lines: &LineNumbers, columns: &[Vec<f64>; 3], findings: &mut
     }
 }
 
-/// Reversal curves take seconds to some minutes; in an hour the temperature moves an actuator more than its hysteresis does.
+/// Reversal curves take seconds to minutes; within an hour the temperature moves an actuator more than its hysteresis.
 fn check_duration(time: &[f64], findings: &mut Findings) {
     let [first, .., last] = time else { return };
     let duration = last - first;
@@ -87,7 +88,7 @@ pub(crate) fn check_time(lines: &LineNumbers, time: &[f64], findings: &mut Findi
     }
 }
 
-/// `unit`: how many of the unit in `name` are one of the column's.
+/// `unit`: number of the units in `name` in one of the column's.
 fn check_not_constant(time: &[f64], column: &[f64], name: &str, unit: f64, findings: &mut Findings) -> bool {
     let (low, high) = extent(column);
     if low < high {
@@ -117,7 +118,7 @@ fn check_stuck(lines: &LineNumbers, time: &[f64], drive: &[f64], displacement: &
             let um = micrometres(value);
             if swapped {
                 let message = format!(
-                    "from {} s to {} s `displacement_um` stands at {um:.4} while `drive_V` goes through {run_low} to {run_high} with noise on it",
+                    "from {} s to {} s `displacement_um` stays at {um:.4} while `drive_V` goes through {run_low} to {run_high} with noise on it",
                     time[first],
                     time[first + run - 1]
                 );
@@ -142,13 +143,13 @@ fn check_stuck(lines: &LineNumbers, time: &[f64], drive: &[f64], displacement: &
     }
 }
 
-/// Whether the displacement has the look of a command, and the drive of a measurement.
+/// Whether the displacement looks like a command, and the drive like a measurement.
 pub(crate) fn look_swapped(drive: &[f64], displacement: &[f64]) -> bool {
     is_commanded(displacement) && !is_commanded(drive)
 }
 
-/// Whether a column has the look of a command, not of a measurement: next to no noise. From fourth differences, which see
-/// nothing of a ramp and next to nothing of a sine.
+/// Whether a column looks like a command and not like a measurement: it has almost no noise. From fourth differences,
+/// which remove ramps and almost all of a sine.
 fn is_commanded(column: &[f64]) -> bool {
     let (low, high) = extent(column);
     let mut fourth: Vec<f64> =
@@ -178,7 +179,7 @@ fn correlation(drive: &[f64], displacement: &[f64]) -> f64 {
     uy / (uu * yy).sqrt()
 }
 
-/// Reports a relation that no actuator has, with the stretch of the record that shows it best.
+/// Reports a relation that no actuator has, with the part of the record that shows it best.
 fn relation(time: &[f64], drive: &[f64], displacement: &[f64], correlation: f64, findings: &mut Findings) {
     let at = |value: f64| drive.iter().position(|u| *u == value).unwrap_or(0);
     let (low, high) = extent(drive);

@@ -1,4 +1,4 @@
-//! Chooses what a record is fitted to: from which sample on, which branches, how weighted.
+//! Selects the samples and branches of a record for the fit, and their weights.
 
 use super::branches::{self, Branch};
 use super::coverage;
@@ -10,13 +10,14 @@ use super::report::Branches;
 use super::{statistics, trend};
 use specgen_language::diagnostic::codes;
 
-/// Share of the drive range within which the drive counts as being at its minimum.
+/// Fraction of the drive range within which the drive counts as being at its minimum.
 const AT_MINIMUM: f64 = 0.002;
-/// A turn of the drive is a reversal when it goes back by this many grid intervals.
+/// A change of direction is a reversal if the drive goes back by this many grid intervals.
 const REVERSAL: f64 = 0.5;
-/// A record counts as first-order reversal curves if at least this share of its rises starts in saturation.
+/// A record has first-order reversal curves if at least this fraction of its rises starts in saturation.
 const FIRST_ORDER: f64 = 0.9;
-/// Of such a record the falls alone are fitted if they excite at least this share of the cells that all branches excite.
+/// Of such a record only the falls are fitted if they excite at least this fraction of the cells that all branches
+/// excite.
 const FALLS_SUFFICE: f64 = 0.99;
 
 /// The part of a record that identification uses.
@@ -25,7 +26,7 @@ pub(crate) struct RecordSpan {
     pub(crate) first: usize,
     /// One past the last sample.
     pub(crate) end: usize,
-    /// Between the reversals behind it, in order.
+    /// Branches between its reversals, in order.
     pub(crate) branches: Vec<Branch>,
     /// Falls from a reversal.
     pub(crate) curves: usize,
@@ -34,7 +35,7 @@ pub(crate) struct RecordSpan {
 }
 
 impl RecordSpan {
-    /// Leaves out what lies behind sample `end`.
+    /// Removes everything after sample `end`.
     pub(crate) fn until(&mut self, end: usize) {
         let end = if end > self.first { end } else { self.first };
         self.end = end;
@@ -71,9 +72,9 @@ pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) ->
     Some(RecordSpan { first, end: record.time.len(), branches, curves, first_order })
 }
 
-/// Normal equations over the falls of first-order reversal curves, if they excite the plane as well as all branches do,
-/// else over all branches: in other records it takes the rises to tell apart cells that only switch off together.
-/// The third value says of each cell whether the chosen branches excite it.
+/// Normal equations over the falls of first-order reversal curves, if they excite the plane as well as all branches do;
+/// otherwise over all branches, because in other records only rises distinguish cells that switch off together. The
+/// third value shows for each cell whether the chosen branches excite it.
 pub(crate) fn select(
     plane: &Plane,
     record: &Record,
@@ -103,7 +104,7 @@ pub(crate) fn falls(branches: &[Branch]) -> Vec<Branch> {
     branches.iter().copied().filter(|b| !b.rising).collect()
 }
 
-/// Share of the cells that are true.
+/// Fraction of the cells that are true.
 pub(crate) fn share(excited: &[bool]) -> f64 {
     excited.iter().filter(|e| **e).count() as f64 / excited.len() as f64
 }
@@ -119,7 +120,7 @@ pub(crate) fn drift_of_returns(record: &Record, branches: &[Branch], plane: &Pla
     (trend::median_slope(&returns), returns.len())
 }
 
-/// Drive in V up to which it counts as being at its minimum.
+/// Largest drive in V that counts as being at its minimum.
 fn at_minimum(record: &Record, plane: &Plane) -> f64 {
     let (low, _) = statistics::extent(&record.drive);
     low + AT_MINIMUM * (plane.range[1] - plane.range[0])

@@ -1,4 +1,4 @@
-//! Reads records of other kinds than reversal curves: named columns, some of which may be left out.
+//! Reads records of other kinds than reversal curves: named columns, some of which are optional.
 
 mod places;
 
@@ -21,10 +21,10 @@ pub(crate) struct ColumnSpec {
     pub(crate) required: bool,
 }
 
-/// Columns of equal length, in the order wanted, in the units of their names.
+/// Columns of equal length, in the requested order, in the units of their names.
 #[derive(Debug, Clone)]
 pub(crate) struct Signals {
-    /// Name of the file as its user knows it.
+    /// Name of the file as the user gave it.
     pub(crate) shown_as: String,
     /// Line of each sample.
     pub(crate) lines: LineNumbers,
@@ -39,10 +39,10 @@ pub(crate) use places::MONITOR;
 /// The column of times.
 pub(crate) const TIME: &str = "time_s";
 
-/// Fewer samples are no record.
+/// Least number of samples of a record.
 const MIN_SAMPLES: usize = 8;
 
-/// Reads the `wanted` columns. Time, if wanted, is the first one; it must rise.
+/// Reads the `wanted` columns. Time, if requested, is the first one; it must rise.
 pub(crate) fn read(
     path: &Path,
     shown_as: &str,
@@ -104,12 +104,12 @@ pub(crate) fn columns_of(
 }
 
 impl Signals {
-    /// A column that was required; empty if it was not.
+    /// A required column; empty if it was not required.
     pub(crate) fn column(&self, k: usize) -> &[f64] {
         self.columns.get(k).and_then(Option::as_deref).unwrap_or(&[])
     }
 
-    /// Where a sample is, for messages: its time if column 0 holds times, else its line.
+    /// Place of a sample in messages: its time if column 0 holds times, otherwise its line.
     pub(crate) fn place(&self, k: usize) -> String {
         match self.columns.first().and_then(Option::as_ref).and_then(|t| t.get(k)) {
             Some(t) => format!("{t} s"),
@@ -117,7 +117,7 @@ impl Signals {
         }
     }
 
-    /// Refuses a column that never changes, or that stands exactly still while `input` travels 5 % of its range.
+    /// Refuses a column that never changes, or that is exactly constant while `input` travels 5 % of its range.
     pub(crate) fn check_moves(&self, input: usize, output: usize, names: [&str; 2], findings: &mut Findings) {
         for (which, name) in [input, output].into_iter().zip(names) {
             let (low, high) = statistics::extent(self.column(which));

@@ -1,11 +1,11 @@
-//! The memory of a Preisach model: the reversals of the drive that later drive has not wiped out.
+//! The memory of a Preisach model: the reversals that later drive has not wiped out.
 //!
-//! This is the identification's own memory in f64 without a bound on its depth. The controller's bounded one is
-//! another implementation, and tests compare the two kinds through brute-force relays.
+//! This is the identification's own memory, in f64 and with unlimited depth. The controller's bounded one is a separate
+//! implementation; tests compare both with brute-force relays.
 
 /// Alternating extrema of the drive, in V: a minimum first, then a maximum, a minimum, …; the last one is the present drive.
 ///
-/// The first entry is the lower end of the range: the memory starts in, and falls back to, negative saturation.
+/// The first entry is the lower end of the range: the memory starts in negative saturation and returns to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Staircase {
     range: [f64; 2],
@@ -26,13 +26,13 @@ impl Staircase {
             self.extrema.truncate(1);
             return;
         }
-        // The extremum on top, and what it wipes out, depend on the direction. The bottom entry is a minimum, so
-        // entries of odd position are maxima.
+        // The top extremum, and what the drive wipes out, depend on the direction. The bottom entry is a minimum, so
+        // entries of odd index are maxima.
         while let [.., last] = self.extrema[..] {
             let top_is_maximum = self.extrema.len().is_multiple_of(2);
             let passed = if top_is_maximum { u >= last } else { u <= last };
             if passed && self.extrema.len() > 1 {
-                // Going on in the direction of the top extremum: it was no reversal.
+                // The drive continues in the direction of the top extremum, which was then not a reversal.
                 self.extrema.pop();
                 continue;
             }

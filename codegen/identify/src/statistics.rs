@@ -1,4 +1,4 @@
-//! Figures of a list of numbers.
+//! Statistics of a list of numbers.
 
 /// Smallest and largest value of finite numbers; (+inf, -inf) if there are none.
 pub fn extent(values: &[f64]) -> (f64, f64) {
@@ -7,7 +7,7 @@ pub fn extent(values: &[f64]) -> (f64, f64) {
     })
 }
 
-/// A length (m) in µm as a record has it: 1.03, not 1.0299999999999998.
+/// A length (m) in µm as in a record: 1.03, not 1.0299999999999998.
 pub(crate) fn micrometres(metres: f64) -> f64 {
     libm::round(metres * 1e12) / 1e6
 }
@@ -21,7 +21,8 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Standard deviation of white noise on `y`, from the median of its second differences: smooth motion hardly counts.
+/// Standard deviation of white noise on `y`, from the median of its second differences: smooth motion has almost no
+/// effect.
 pub(crate) fn noise_floor(y: &[f64]) -> f64 {
     let mut second: Vec<f64> = y.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
     // The median of |N(0, s)| is 0.6745 s; second differences of white noise have the variance 6 σ².

@@ -1,8 +1,8 @@
 //! Axial stiffness of an actuator from force and displacement at constant drive.
 //!
-//! Model: displacement = offset + force/k + slow part, the slow part being the linear drift of the record and, where it
-//! lowers the residual enough, one first-order creep of the force. k is the stiffness at the rate of the record without
-//! its creep. Force counts positive where it pushes the displacement up: k is positive then.
+//! Model: displacement = offset + force/k + slow part. The slow part is the linear drift of the record and, if it
+//! lowers the residual enough, a first-order creep of the force. k is the stiffness at the rate of the record without
+//! its creep. A force is positive if it pushes the displacement up: k is positive then.
 
 use serde::Serialize;
 use std::path::Path;
@@ -15,7 +15,7 @@ use super::signals::{self, ColumnSpec, Signals};
 use super::statistics::extent;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
-/// A stiffness and how well it is founded.
+/// A stiffness and its quality.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StiffnessReport {
     /// Name of the record.
@@ -26,21 +26,21 @@ pub struct StiffnessReport {
     pub samples: usize,
     /// Stiffness k, N/m: force over displacement without creep.
     pub stiffness: f64,
-    /// Standard error of k, N/m, for as many samples as the correlation of the residual leaves independent.
+    /// Standard error of k, N/m, for the number of independent samples that the correlation of the residual leaves.
     pub error: f64,
-    /// Stiffness by a straight line through all samples, creep and drift left in, N/m.
+    /// Stiffness of a straight line through all samples, including creep and drift, N/m.
     pub uncorrected: f64,
-    /// Time constant of the creep that was taken out, s; none if it did not lower the residual.
+    /// Time constant of the creep that was removed, s; none if it did not lower the residual.
     pub creep_time: Option<f64>,
     /// Creep in % of the elastic displacement.
     pub creep_percent: f64,
-    /// Drift of the displacement that was taken out, m/s.
+    /// Drift of the displacement that was removed, m/s.
     pub drift: f64,
     /// Least and largest force of the record, N.
     pub force: [f64; 2],
     /// Displacement less the model, root mean square, m.
     pub residual_rms: f64,
-    /// How many independent samples the residual is worth.
+    /// Number of independent samples of the residual.
     pub independent: f64,
     /// Force (N), displacement without offset, drift and creep (m), residual (m) of each sample, for drawing.
     #[serde(skip)]
@@ -63,13 +63,13 @@ const COLUMNS: [ColumnSpec; 4] = [
 const PER_DECADE: usize = 6;
 /// Halvings of the step in ln τ around the best of them.
 const REFINED: usize = 12;
-/// The residual's mean square must fall by this share for creep to be believed.
+/// Least fraction by which creep must lower the residual's mean square.
 const WORTHWHILE: f64 = 0.05;
-/// The drive may move by this much, V: more adds displacement that is not the force's.
+/// Largest motion of the drive, V: more adds displacement that the force does not cause.
 const CONSTANT: f64 = 0.05;
 /// Stiffness (N/m) outside these bounds suggests a wrong unit.
 const PLAUSIBLE: [f64; 2] = [1e4, 1e10];
-/// The uncertainty above which a warning says that the record does not tell, %.
+/// Uncertainty that causes a warning, %.
 const UNCERTAIN: f64 = 10.0;
 
 /// A fit with creep of time constant `tau` (s).
@@ -133,7 +133,7 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
     let plain = fit(&[&one, force], &y)?;
     let Some(straight) = fit(&[&one, &ramp, force], &y) else {
         let message = format!(
-            "from {} to {} the force only drifts in one direction: its effect cannot be told from creep",
+            "from {} to {} the force only drifts in one direction: its effect cannot be distinguished from creep",
             signals.place(0),
             signals.place(time.len() - 1)
         );
@@ -154,7 +154,7 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
     for k in 0..=steps {
         best = at(shortest * libm::pow(ratio, k as f64)).filter(|tried| better(&best, tried)).or(best);
     }
-    // Between the neighbours of the best one, ever closer.
+    // Narrows the interval between the neighbours of the best one.
     let mut width = ratio.sqrt();
     for _ in 0..REFINED {
         let Some(middle) = best.as_ref().map(|b| b.tau) else { break };
@@ -163,13 +163,13 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
         }
         width = width.sqrt();
     }
-    // Creep goes the way of the force; a negative one would be an artefact.
+    // Creep has the direction of the force; a negative one would be an artefact.
     let best = best
         .filter(|b| b.square < (1.0 - WORTHWHILE) * base && b.found.coefficients[3] * b.found.coefficients[2] > 0.0);
     let (chosen, creep_time, creep_share, state) = match best {
         Some(Creep { tau, mut found, state, .. }) => {
             let share = found.coefficients[3] / found.coefficients[2];
-            // The time constant is estimated too: its column widens the error of k.
+            // The time constant is estimated too: its column increases the error of k.
             let near = lagging(time, force, tau * 1.001);
             let turn: Vec<f64> = near.iter().zip(&state).map(|(a, b)| a - b).collect();
             if let Some(wider) = fit(&[&one, &ramp, force, &state, &turn], &y) {
@@ -183,7 +183,7 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
     let independent = independent_samples(&chosen.residual);
     let freedom = (independent - chosen.coefficients.len() as f64).max(1.0);
     let variance = mean_square(&chosen.residual) * y.len() as f64 / freedom;
-    // Covariance is for y.len() independent samples; fewer of them make it wider in proportion.
+    // The covariance is for y.len() independent samples; fewer of them increase it in proportion.
     let compliance_error = (variance * chosen.covariance[(2, 2)]).sqrt();
     check_sign(signals, force, compliance, compliance_error, findings)?;
     let stiffness = 1.0 / compliance;

@@ -1,4 +1,4 @@
-//! Warns where the sweep of a record cannot tell hysteresis from something else.
+//! Warns if the sweep of a record does not distinguish hysteresis from other effects.
 
 use super::findings::Findings;
 use super::record::Record;
@@ -9,16 +9,16 @@ use super::statistics::median;
 use super::time_unit;
 use specgen_language::diagnostic::codes;
 
-/// A lag that widens the loop by this share of the range is worth a warning.
+/// A lag that widens the loop by this fraction of the range causes a warning.
 const WIDENING: f64 = 0.01;
-/// The lag that is thought of: one sampling interval, but no more than amplifiers and gauges have, s.
+/// The assumed lag: one sampling interval, but at most the lag of amplifiers and gauges, s.
 const LONGEST_LAG: f64 = 1e-3;
-/// Curves count as different if their ends differ by this many noise floors.
+/// Curves differ if their ends differ by this many noise floors.
 const ABOVE_NOISE: f64 = 2.0;
-/// Curves that turn back within this share of the range of each other repeat one curve.
+/// Curves whose reversals are within this fraction of the range repeat one curve.
 const SAME_LEVEL: f64 = 0.005;
 
-/// Rate of the sweep against sampling and dead time, and spacing of the curves against noise.
+/// Checks the rate of the sweep against sampling and dead time, and the spacing of the curves against noise.
 pub(crate) fn check(plane: &Plane, record: &Record, used: &RecordSpan, report: &Report, findings: &mut Findings) {
     let span = plane.range[1] - plane.range[0];
     let gain = report.displacement_range / span;
@@ -43,7 +43,7 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &RecordSpan, report: &
         );
     } else if unknown && rate * lag > WIDENING * span {
         let message = format!(
-            "from {} s on the drive runs at {rate:.0} V/s, where a dead time of {:.3} ms alone widens the loop by {:.1} nm; all of the dead time that there may be is counted as hysteresis (dead time {})",
+            "from {} s on the drive runs at {rate:.0} V/s, where a dead time of {:.3} ms alone widens the loop by {:.1} nm; any dead time then counts as hysteresis (dead time {})",
             record.time[at],
             lag * 1e3,
             2.0 * rate * lag * gain * 1e9,
@@ -53,7 +53,7 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &RecordSpan, report: &
             codes::SWEEP_TOO_FAST,
             None,
             message,
-            "sweep more slowly, or record branches of at least two rates so that the dead time can be told",
+            "sweep more slowly, or record branches of at least two rates so that the dead time can be identified",
         );
     }
     let mut turns: Vec<f64> = used.branches.iter().filter(|b| !b.rising).map(|b| record.drive[b.first]).collect();
@@ -80,7 +80,7 @@ pub(crate) fn fastest(record: &Record, used: &RecordSpan) -> (f64, usize) {
     let mut fastest = (0.0, 0);
     for branch in &used.branches {
         let last = branch.end - 1;
-        // A jump is no sweep; its samples have no weight.
+        // A jump is not a sweep; its samples have no weight.
         if record.weightless[branch.first + 1..branch.end].iter().all(|w| *w) {
             continue;
         }

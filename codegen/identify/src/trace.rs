@@ -7,8 +7,8 @@ pub struct Trace {
     pub time: Vec<f64>,
     /// Drive of each sample, V.
     pub drive: Vec<f64>,
-    /// Displacement moved by the dead time, m.
+    /// Displacement shifted by the dead time, m.
     pub measured: Vec<f64>,
-    /// Displacement minus model, offset and drift, m; NaN for a sample of no weight.
+    /// Displacement minus model, offset and drift, m; NaN for a sample without weight.
     pub residual: Vec<f64>,
 }

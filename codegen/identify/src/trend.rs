@@ -51,7 +51,7 @@ pub fn rms_and_max(errors: &[f64]) -> (f64, f64) {
 /// Median slope of all pairs (Theil–Sen): a line through points of which some are wrong. 0 for fewer than two points.
 #[must_use]
 pub fn median_slope(points: &[(f64, f64)]) -> f64 {
-    // A few hundred returns are plenty; taking every n-th keeps the number of pairs bounded.
+    // A few hundred returns are enough; taking every n-th bounds the number of pairs.
     let every = points.len().div_ceil(300).max(1);
     let points: Vec<_> = points.iter().step_by(every).collect();
     let mut slopes = Vec::new();

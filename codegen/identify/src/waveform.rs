@@ -1,8 +1,8 @@
 //! Reads a table of poses: a CSV file whose columns name axis and unit, such as `x_um` and `theta_z_urad`.
 //!
-//! Rows stand at the fixed period that the spec gives. A column `time_s` (or `time_ms`, `time_us`) may be there; it is then
-//! checked against that period, so that a table played at the wrong speed is found. Axes without a column stay at 0.
-//! Every problem of the file is reported in one run.
+//! Rows have the fixed period of the spec. A column `time_s` (or `time_ms`, `time_us`) is optional; it is compared with
+//! that period, so that a table played at the wrong speed is found. Axes without a column stay at 0. One run reports
+//! every problem of the file.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::columns::{self, Format, Header, Samples};
 use crate::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
-/// More rows are refused: a table lies in the flash of a microcontroller.
+/// Most rows: a table is stored in a microcontroller's flash.
 pub const MAX_ROWS: usize = 65_536;
 
 /// Names of the axes in column names.
@@ -18,13 +18,13 @@ const AXES: [&str; 6] = ["x", "y", "z", "theta_x", "theta_y", "theta_z"];
 const LENGTHS: [(&str, f64); 4] = [("nm", 1e-9), ("um", 1e-6), ("mm", 1e-3), ("m", 1.0)];
 const ANGLES: [(&str, f64); 4] = [("nrad", 1e-9), ("urad", 1e-6), ("mrad", 1e-3), ("rad", 1.0)];
 const TIMES: [(&str, f64); 3] = [("us", 1e-6), ("ms", 1e-3), ("s", 1.0)];
-/// What a time column may deviate from the period, of the period: times are written with few digits.
+/// Largest deviation of a time column from the period, as a fraction of it: times have few digits.
 const TIME_SLACK: f64 = 1e-3;
 
 /// A table of poses, each finite, at least two.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Waveform {
-    /// Name of the file as its user knows it.
+    /// Name of the file as the user gave it.
     pub shown_as: String,
     /// Line of each row.
     pub lines: Vec<usize>,
@@ -35,7 +35,7 @@ pub struct Waveform {
 /// The waveform in the file at `path`, whose rows are `period` (s) apart, and the text of the file.
 ///
 /// # Errors
-/// One finding if it is no regular file, cannot be read, is too large or not UTF-8; else as [`parse`].
+/// One finding if it is not a regular file, cannot be read, is too large or not UTF-8; otherwise as [`parse`].
 pub fn read(path: &Path, shown_as: &str, period: f64) -> Result<(Waveform, String), Vec<Diagnostic>> {
     let text = crate::read_file(path, shown_as)?;
     Ok((parse(&text, shown_as, period)?, text))
@@ -53,7 +53,7 @@ pub fn parse(text: &str, shown_as: &str, period: f64) -> Result<Waveform, Vec<Di
     }
 }
 
-/// What a column holds, and the size of its unit.
+/// Content of a column, and its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Column {
     Time(f64),
@@ -101,7 +101,7 @@ const FORMAT: Format = Format {
 
 const EXPECTED: &str = "name the columns by axis and unit in the first line, such as `x_um,y_um,z_um,theta_x_urad`";
 
-/// What each column holds, or `None` after every problem of the header was reported.
+/// Content of each column, or `None` after every problem of the header was reported.
 fn meanings(header: &Header, findings: &mut Findings) -> Option<Vec<Column>> {
     let line = Some(header.line);
     let mut found: Vec<Column> = Vec::new();
@@ -121,7 +121,7 @@ fn meanings(header: &Header, findings: &mut Findings) -> Option<Vec<Column>> {
                 found.push(column);
             }
             Err(help) => {
-                let message = format!("`{name}` is no column of a table of poses");
+                let message = format!("`{name}` is not a column of a table of poses");
                 findings.add(codes::WAVEFORM_HEADER, line, message, &help);
             }
         }
@@ -136,7 +136,7 @@ fn meanings(header: &Header, findings: &mut Findings) -> Option<Vec<Column>> {
     Some(found)
 }
 
-/// A column by its name, or how to fix the name.
+/// The column of a name, or how to fix the name.
 fn column(name: &str) -> Result<Column, String> {
     let lower = name.to_ascii_lowercase();
     let (quantity, unit) = lower.rsplit_once('_').unwrap_or((lower.as_str(), ""));
@@ -145,7 +145,7 @@ fn column(name: &str) -> Result<Column, String> {
         let all: Vec<String> = units.iter().map(|(unit, _)| format!("`{quantity}_{unit}`")).collect();
         format!("the unit is part of the name: {}", all.join(", "))
     };
-    // `theta_x` alone is an axis without its unit, not a quantity `theta` in a unit x.
+    // `theta_x` alone is an axis without unit, not a quantity `theta` in a unit x.
     if let Some(axis) = AXES.iter().position(|axis| *axis == lower) {
         return Err(format!("the unit is part of the name: `{name}_{}`", if axis < 3 { "um" } else { "urad" }));
     }

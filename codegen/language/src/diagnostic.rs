@@ -1,4 +1,4 @@
-//! What the compiler tells its user about the spec file or a record.
+//! Findings: messages to the user about the spec file or a record.
 
 pub mod codes;
 mod json;
@@ -12,63 +12,64 @@ pub use codes::Code;
 pub use json::to_json;
 pub use render::render;
 
-/// How bad a finding is.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// Worth knowing; nothing is refused.
+    /// For information; nothing is refused.
     Note,
-    /// Probably wrong; nothing is refused.
+    /// A probable mistake; nothing is refused.
     Warning,
-    /// Refused: nothing is generated.
+    /// An error: nothing is generated.
     Error,
 }
 
-/// Where a finding is.
+/// Place of a finding.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// Byte range in the spec file.
     Spec(Range<usize>),
     /// A line (counted from 1) of a data file named in the spec, or the whole file.
     File {
-        /// Path as the spec names it.
+        /// Path as in the spec.
         path: String,
-        /// Line, counted from 1, if one line is to blame.
+        /// Line, counted from 1, if the finding is about one line.
         line: Option<usize>,
     },
     /// The run as a whole (a missing file, an output folder).
     Whole,
 }
 
-/// One finding: what is wrong, where, and how to fix it. Only the functions below make one, each from a [`Code`] of the table.
+/// A finding: the problem, its place, and how to fix it. Only the functions below create one, each from a [`Code`] of
+/// the table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Diagnostic {
-    /// How bad it is, as its code says.
+    /// Severity of its code.
     pub severity: Severity,
     /// Stable code such as `E0102`, documented in `docs/diagnostics.md`.
     pub code: &'static str,
-    /// Key path such as `actuator.voltage[1]`, empty if no key is to blame.
+    /// Key path such as `actuator.voltage[1]`; empty if the finding is not about a key.
     pub key: String,
     /// Where it is.
     pub place: Place,
-    /// What is wrong, with the value found and what was expected.
+    /// The problem, with the value found and what was expected.
     pub message: String,
     /// How to fix it.
     pub help: String,
-    /// Text that may stand at `place` instead, where the fix is as simple as that.
+    /// Replacement for the text at `place`, if the fix is that simple.
     pub replacement: Option<String>,
 }
 
 impl Diagnostic {
-    /// A finding as bad as its `code`, about `key` (empty: about no key), at `place`.
+    /// A finding with the severity of `code`, about `key` (empty: about no key), at `place`.
     #[must_use]
     pub fn new(code: Code, key: &str, place: Place, message: impl Into<String>, help: impl Into<String>) -> Self {
         let (message, help) = (message.into(), help.into());
         Self { severity: code.severity(), code: code.id, key: key.to_owned(), place, message, help, replacement: None }
     }
 
-    /// A finding at the first of `keys` that stands in the spec, by its `spans`; at none of them, about the whole spec
-    /// and under the first.
+    /// A finding at the first of `keys` that is in the spec, by its `spans`. If none is, it is about the whole spec,
+    /// with the first key.
     #[must_use]
     pub fn at(
         spans: &BTreeMap<String, Range<usize>>,
@@ -82,7 +83,8 @@ impl Diagnostic {
         Self::new(code, key, place, message, help)
     }
 
-    /// A finding about no key, in the data file `path` as its user knows it: at `line`, counted from 1, or about the whole.
+    /// A finding about no key, in the data file `path` as the user named it: at `line`, counted from 1, or about the
+    /// whole file.
     #[must_use]
     pub fn in_file(
         path: &str,

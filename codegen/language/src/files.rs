@@ -1,8 +1,8 @@
-//! Files that a user names: one way in, and one guard of every way out.
+//! Files that a user names: how they are opened, and which outputs are refused.
 //!
-//! [`open`] looks at the kind of a file before it opens it, and keeps in mind which file a command has read. [`guard`] refuses an
-//! output that would replace one of those, whatever its name. Both are of one command at a time: [`forget_inputs`] forgets. A command opens
-//! its files in the thread that performs it.
+//! [`open`] checks the kind of a file before it opens it, and notes that the command has read it. [`guard`] refuses an
+//! output that would replace one of these files, under any name. The notes belong to one command: [`forget_inputs`]
+//! clears them. A command opens its files in the thread that runs it.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -15,22 +15,22 @@ use std::time::{Duration, Instant};
 
 use rustix::fs::{Access, OFlags, access, fcntl_setfl};
 
-/// Larger files whose content is kept in memory are refused, bytes.
+/// Largest file whose content is kept in memory, bytes.
 pub const MAX_BYTES: u64 = 256 << 20;
-/// A reader of a pipe that is written to has so long to open it.
+/// Time for a program to open the read end of a pipe that is written to.
 const READER: Duration = Duration::from_secs(2);
-/// As many links lead from one to the next, as Linux has it.
+/// Longest chain of links, as in Linux.
 const LINKS: usize = 40;
 
-/// Which file it is, whatever its name: device and inode.
+/// Identity of a file under any name: device and inode.
 type Identity = (u64, u64);
 
 thread_local! {
-    /// What the command of this thread has read, by the first name of each.
+    /// The files that the command of this thread has read, by the first name of each.
     static INPUTS: RefCell<BTreeMap<Identity, PathBuf>> = const { RefCell::new(BTreeMap::new()) };
 }
 
-/// Forgets all inputs: a new command starts.
+/// Clears the list of inputs: a new command starts.
 pub fn forget_inputs() {
     INPUTS.take();
 }
@@ -45,7 +45,7 @@ fn remember(found: &Metadata, path: &Path) {
     });
 }
 
-/// What kind of file it is, in words.
+/// Kind of a file, in words.
 fn kind(found: &Metadata) -> &'static str {
     let kind = found.file_type();
     if kind.is_dir() {
@@ -61,33 +61,33 @@ fn kind(found: &Metadata) -> &'static str {
     }
 }
 
-/// Why a file cannot be read.
+/// Reason why a file cannot be read.
 #[derive(Debug)]
 pub enum ReadError {
-    /// It is no regular file, but this.
+    /// It is not a regular file, but of this kind.
     Kind(&'static str),
     /// It has more bytes than this.
     Large(u64),
-    /// It is no text in UTF-8 from this byte on, which is in this line (from 1).
+    /// It is not UTF-8 text from this byte on, which is in this line (from 1).
     Text {
         /// From 0.
         byte: usize,
         /// From 1.
         line: usize,
     },
-    /// What the system says.
+    /// The error of the operating system.
     System(io::Error),
 }
 
 impl ReadError {
-    /// What to do about it.
+    /// How to fix it.
     #[must_use]
     pub fn help(&self) -> &'static str {
         match self {
             Self::Kind("a folder") => "name a file in it",
-            Self::Kind(_) => "store what it gives in a file, and name that",
+            Self::Kind(_) => "store its output in a file, and name that file",
             Self::Large(_) => "name a smaller file",
-            Self::Text { .. } => "save it as text in UTF-8",
+            Self::Text { .. } => "save it as UTF-8 text",
             Self::System(_) => "check the path and its permissions",
         }
     }
@@ -99,7 +99,7 @@ impl fmt::Display for ReadError {
             Self::Kind(kind) => write!(f, "it is {kind}, expected a regular file"),
             Self::Large(limit) if *limit < 1 << 20 => write!(f, "it is larger than {limit} bytes"),
             Self::Large(limit) => write!(f, "it is larger than {} MiB", limit >> 20),
-            Self::Text { byte, line } => write!(f, "it is no text in UTF-8: byte {byte}, in line {line}"),
+            Self::Text { byte, line } => write!(f, "it is not UTF-8 text: byte {byte}, in line {line}"),
             Self::System(error) => match error.kind() {
                 io::ErrorKind::NotFound => f.write_str("there is no such file"),
                 io::ErrorKind::PermissionDenied => f.write_str("reading it is not permitted"),
@@ -109,7 +109,7 @@ impl fmt::Display for ReadError {
     }
 }
 
-/// What the system says, in words where its own are of no help.
+/// The error of the operating system, reworded if its own text is of no help.
 fn write_error(error: &io::Error, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     match error.kind() {
         io::ErrorKind::InvalidFilename => f.write_str("its name is too long"),
@@ -125,14 +125,14 @@ impl From<io::Error> for ReadError {
     }
 }
 
-/// Opens a regular file to read, or a pipe that this process was given, such as `/dev/stdin` or `<(…)` of a shell. A named pipe is
-/// refused: without a writer it would wait for ever.
+/// Opens a regular file to read, or a pipe that this process was given, such as `/dev/stdin` or a shell's `<(…)`. A
+/// named pipe is refused: without a writer it would block for ever.
 ///
 /// # Errors
-/// If it is of another kind, or the system refuses it.
+/// If it is of another kind, or the operating system refuses.
 pub fn open(path: &Path) -> Result<File, ReadError> {
     let found = fs::metadata(path)?;
-    // What has no name is in the hands of this process already.
+    // A file without a name was passed to this process.
     let given = found.file_type().is_fifo() && fs::canonicalize(path).is_err();
     if given { opened(path, &found, true) } else { open_file(path) }
 }
@@ -150,7 +150,7 @@ fn opened(path: &Path, found: &Metadata, pipe: bool) -> Result<File, ReadError> 
     if !fits(found) {
         return Err(ReadError::Kind(kind(found)));
     }
-    // It may be another file by now: opening this one waits for nobody, and it is looked at again.
+    // It may be another file by now: open without blocking, and check again.
     let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
     let file = OpenOptions::new().read(true).custom_flags(flags.bits().cast_signed()).open(path)?;
     let found = file.metadata()?;
@@ -165,7 +165,7 @@ fn opened(path: &Path, found: &Metadata, pipe: bool) -> Result<File, ReadError> 
     Ok(file)
 }
 
-/// Looks whether [`read`] would read a file of at most [`MAX_BYTES`].
+/// Checks whether [`read`] would read a file of at most [`MAX_BYTES`].
 ///
 /// # Errors
 /// As [`read`].
@@ -177,18 +177,18 @@ pub fn look(path: &Path) -> Result<(), ReadError> {
 /// The content of a file.
 ///
 /// # Errors
-/// As [`open`], and if it has more bytes than `limit`.
+/// As [`open`], or if it has more bytes than `limit`.
 pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
     content(open(path)?, limit)
 }
 
-/// What is left of an open file.
+/// The rest of an open file.
 ///
 /// # Errors
-/// If it has more bytes than `limit`, or the system refuses it.
+/// If it has more bytes than `limit`, or the operating system refuses.
 pub fn content(file: File, limit: u64) -> Result<Vec<u8>, ReadError> {
     let mut bytes = Vec::new();
-    // One more tells that it is too large.
+    // One byte more shows that it is too large.
     file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > limit { Err(ReadError::Large(limit)) } else { Ok(bytes) }
 }
@@ -196,7 +196,7 @@ pub fn content(file: File, limit: u64) -> Result<Vec<u8>, ReadError> {
 /// The content of a text file of at most [`MAX_BYTES`].
 ///
 /// # Errors
-/// As [`read`], and if it is not in UTF-8.
+/// As [`read`], or if it is not UTF-8.
 pub fn text(path: &Path) -> Result<String, ReadError> {
     text_of(path, MAX_BYTES)
 }
@@ -213,7 +213,7 @@ pub fn text_of(path: &Path, limit: u64) -> Result<String, ReadError> {
     })
 }
 
-/// Keeps in mind that a command reads this file, before it does.
+/// Notes, before a command reads this file, that it does.
 pub fn note_input(path: &Path) {
     if let Ok(found) = fs::metadata(path)
         && found.is_file()
@@ -222,26 +222,26 @@ pub fn note_input(path: &Path) {
     }
 }
 
-/// The input that this file is, by the name it was read by; none if the command has not read it.
+/// The input that is this file, by the name under which it was read; none if the command has not read it.
 fn input(path: &Path) -> Option<PathBuf> {
     let found = fs::metadata(path).ok()?;
     INPUTS.with_borrow(|inputs| inputs.get(&identity(&found)).cloned())
 }
 
-/// Why a file cannot be written.
+/// Reason why a file cannot be written.
 #[derive(Debug)]
 pub enum OutputError {
     /// It is this input of the same command.
     Input(PathBuf),
     /// Another output of the same command has this name.
     Twice,
-    /// Nobody may write to it.
+    /// It is write-protected.
     Protected,
-    /// It is of a kind that no output can be.
+    /// It is of a kind that cannot be an output.
     Kind(&'static str),
-    /// It is a pipe that nobody reads.
+    /// It is a pipe without a reader.
     Unheard,
-    /// What the system says.
+    /// The error of the operating system.
     System(io::Error),
 }
 
@@ -269,16 +269,17 @@ impl From<io::Error> for OutputError {
     }
 }
 
-/// Where an output that may be written goes.
+/// Destination of an output.
 #[derive(Debug)]
 pub enum Destination {
-    /// A regular file of this name, which is there or not: no link.
+    /// A regular file of this name, existing or not, but not a link.
     File(PathBuf),
     /// A device or a pipe.
     Device,
 }
 
-/// Looks whether a command may write this file: it is none of its inputs, by device and inode, and whoever owns it permits it.
+/// Checks whether a command may write this file: it is not one of its inputs, by device and inode, and its permissions
+/// allow it.
 ///
 /// # Errors
 /// Why not.
@@ -294,7 +295,7 @@ pub fn guard_edit(path: &Path) -> Result<Destination, OutputError> {
     let target = behind_links(path)?;
     let found = match fs::metadata(path) {
         Ok(found) => found,
-        // What is missing above it is made, or stands in the way then.
+        // A missing parent folder is made later, or causes an error then.
         Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
             return Ok(Destination::File(target));
         }
@@ -307,14 +308,14 @@ pub fn guard_edit(path: &Path) -> Result<Destination, OutputError> {
     if !found.is_file() {
         return Ok(Destination::Device);
     }
-    // Whoever may write everything, as root, still means what the permissions say.
+    // Root may write everything, but the permissions still count.
     if found.mode() & 0o222 == 0 || access(path, Access::WRITE_OK).is_err() {
         return Err(OutputError::Protected);
     }
     Ok(Destination::File(target))
 }
 
-/// The name that links lead to, which need not be there.
+/// The name at the end of a chain of links; it need not exist.
 fn behind_links(path: &Path) -> io::Result<PathBuf> {
     if let Ok(whole) = fs::canonicalize(path) {
         return Ok(whole);
@@ -329,10 +330,10 @@ fn behind_links(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("links lead in a circle"))
 }
 
-/// Opens a device or a pipe to write to. A pipe that nobody reads is refused after a moment.
+/// Opens a device or a pipe to write to. A pipe without a reader is refused after a moment.
 ///
 /// # Errors
-/// If nobody reads the pipe, or the system refuses it.
+/// If nobody reads the pipe, or the operating system refuses.
 pub fn open_device(path: &Path) -> Result<File, OutputError> {
     let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
     let until = Instant::now() + READER;

@@ -1,7 +1,7 @@
-//! Ctrl-C, SIGTERM and a terminal that is closed: what is half done is taken away, then the process ends.
+//! Ctrl-C, SIGTERM and a closed terminal: partial output is removed, then the process ends.
 //!
-//! A command that has a result to show on the way, or a machine to bring down, asks by [`heed`] to be notified instead, and ends
-//! by itself.
+//! A command with intermediate results, or with a running machine to stop, calls [`heed`] to be notified instead, and
+//! ends by itself.
 
 use std::cell::Cell;
 use std::fs::{self, File};
@@ -19,22 +19,22 @@ use crate::lock;
 
 static PRESSED: AtomicBool = AtomicBool::new(false);
 thread_local! {
-    /// In place of [`PRESSED`] and [`HEEDED`], for the command of this thread.
+    /// Replaces [`PRESSED`] and [`HEEDED`] for the command of this thread.
     static OWN: Cell<Option<(&'static AtomicBool, bool)>> = const { Cell::new(None) };
 }
 static HEEDED: AtomicBool = AtomicBool::new(false);
-/// Held by whoever must not be cut in two.
+/// Held during operations that must not be interrupted.
 static WHOLE: Mutex<()> = Mutex::new(());
-/// What is there on the way only, in the order in which it was made.
+/// Temporary objects, in the order of their creation.
 static PASSING: Mutex<Vec<TemporaryPath>> = Mutex::new(Vec::new());
 
-/// What goes away at the end, whichever end.
+/// Removed at the end, however the process ends.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum TemporaryPath {
-    /// With all that is in it.
+    /// With its content.
     Tree(PathBuf),
     File(PathBuf),
-    /// If nothing is in it.
+    /// Only if it is empty.
     EmptyFolder(PathBuf),
 }
 
@@ -48,10 +48,10 @@ impl TemporaryPath {
     }
 }
 
-/// From now on an interrupt takes away what is on the way, calls `end`, which says so, and ends the process with the exit code
-/// that `end` gives.
+/// From now on an interrupt removes temporary objects, calls `end`, which reports it, and ends the process with the
+/// exit code that `end` returns.
 pub fn catch(end: impl Fn() -> u8 + Send + 'static) {
-    // Without a handler an interrupt ends the process all the same, and leaves what lies in temporary folders.
+    // Without a handler an interrupt still ends the process, but leaves temporary folders.
     let Ok(mut signals) = Signals::new([SIGHUP, SIGINT, SIGTERM]) else { return };
     std::thread::spawn(move || {
         for _ in signals.forever() {
@@ -63,12 +63,12 @@ pub fn catch(end: impl Fn() -> u8 + Send + 'static) {
     });
 }
 
-/// Takes away what is on the way, and ends the process.
+/// Removes temporary objects and ends the process.
 fn leave(end: &impl Fn() -> u8) -> ! {
     let _whole = whole();
     let passing = locked(&PASSING);
     for one in passing.iter().rev() {
-        // A compiler that was interrupted with us may write its last file just now.
+        // A compiler that was interrupted as well may still be writing its last file.
         let grows = |error: &io::Error| {
             error.kind() == io::ErrorKind::DirectoryNotEmpty && matches!(one, TemporaryPath::Tree(_))
         };
@@ -82,8 +82,8 @@ fn leave(end: &impl Fn() -> u8) -> ! {
     std::process::exit(i32::from(end()));
 }
 
-/// From now on an interrupt does nothing but set what is returned: the command looks at it and ends by itself. A second one
-/// does nothing.
+/// From now on an interrupt only sets the returned flag; the command checks it and ends by itself. A second interrupt
+/// has no effect.
 pub fn heed() -> &'static AtomicBool {
     if let Some((stop, _)) = OWN.get() {
         OWN.set(Some((stop, true)));
@@ -93,25 +93,26 @@ pub fn heed() -> &'static AtomicBool {
     &PRESSED
 }
 
-/// From now on a command in this thread is interrupted by `stop`, which is its caller's to set, and by nothing else: for programs
-/// in which a command is a function.
+/// From now on only `stop`, which the caller sets, interrupts a command in this thread. For programs that call a
+/// command as a function.
 pub fn own(stop: &'static AtomicBool) {
     OWN.set(Some((stop, false)));
 }
 
-/// How a command unwinds that its caller interrupted.
+/// Payload of the unwinding of a command that its caller interrupted.
 #[derive(Debug)]
 pub struct Interruption;
 
-/// Unwinds with [`Interruption`] if the command of this thread was interrupted by its caller, and does not heed that by itself.
+/// Unwinds with [`Interruption`] if the caller has interrupted the command of this thread and the command does not use
+/// [`heed`].
 pub fn point() {
     if OWN.get().is_some_and(|(stop, heeded)| !heeded && stop.load(Ordering::SeqCst)) {
         std::panic::resume_unwind(Box::new(Interruption));
     }
 }
 
-/// Waits for the end if an interrupt is about to bring it: what failed meanwhile failed because of it, as a compiler that
-/// heard of the interrupt first.
+/// Waits for the end if an interrupt is about to end the process: a failure in the meantime was caused by it, for
+/// example in a compiler that got the interrupt first.
 pub fn settle() {
     std::thread::sleep(Duration::from_millis(50));
     while PRESSED.load(Ordering::SeqCst) && !HEEDED.load(Ordering::SeqCst) {
@@ -119,17 +120,17 @@ pub fn settle() {
     }
 }
 
-/// No interrupt ends the process while this is held. For moments, not for work.
+/// While this is held, no interrupt ends the process. For short operations only.
 pub fn whole() -> MutexGuard<'static, ()> {
     locked(&WHOLE)
 }
 
 fn locked<T>(mutex: &'static Mutex<T>) -> MutexGuard<'static, T> {
-    // Whoever panicked with it left a list that is whole.
+    // A thread that panicked with the lock left a complete list.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Keeps the name of something that an interrupt is to take away; dropped when it is gone, or another process'.
+/// Registers an object that an interrupt must remove. Dropped when it is gone, or belongs to another process.
 #[derive(Debug)]
 pub struct Guard(TemporaryPath);
 
@@ -139,7 +140,7 @@ impl Guard {
         Self(passing)
     }
 
-    /// Of a file that is made by `make`.
+    /// For a file that `make` creates.
     ///
     /// # Errors
     /// What `make` says.
@@ -160,42 +161,43 @@ impl Drop for Guard {
     }
 }
 
-/// A temporary folder, gone when this is dropped or the process is interrupted.
+/// A temporary folder, removed when this is dropped or the process is interrupted.
 #[derive(Debug)]
 pub struct Scratch {
     folder: TempDir,
-    // After the folder: it is kept in mind, and locked, until it is gone.
+    // Dropped after the folder: it stays registered and locked until it is removed.
     _guard: Guard,
     _lock: Option<File>,
 }
 
-/// Of the names of temporary folders.
+/// Prefix of temporary folders.
 const SCRATCH: &str = "specgen-scratch-";
 
 impl Scratch {
-    /// A new and empty one.
+    /// A new empty folder.
     ///
     /// # Errors
-    /// What the file system says.
+    /// The error of the file system.
     pub fn new() -> io::Result<Self> {
         Self::below(&std::env::temp_dir())
     }
 
-    /// A new and empty one in another folder than the system's, so that what is in it can be renamed to its place there.
+    /// A new empty folder in `folder` instead of the system's, so that its content can be renamed to its destination
+    /// there.
     ///
     /// # Errors
-    /// What the file system says.
+    /// The error of the file system.
     pub fn below(folder: &Path) -> io::Result<Self> {
-        // Of processes that were killed.
+        // Left by processes that were killed.
         lock::sweep(folder, SCRATCH);
         let _whole = whole();
         loop {
             let folder = tempfile::Builder::new().prefix(SCRATCH).tempdir_in(folder)?;
             let lock = match File::open(folder.path()).and_then(|file| lock::of(file, folder.path())) {
                 Ok(lock) => Some(lock),
-                // Another process took it for one that was left.
+                // Another process took it for an abandoned one.
                 Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::NotFound) => continue,
-                // Where folders cannot be locked nobody sweeps.
+                // Where folders cannot be locked, none is swept.
                 Err(_) => None,
             };
             let guard = Guard::of(TemporaryPath::Tree(folder.path().to_owned()));
@@ -210,15 +212,15 @@ impl Scratch {
     }
 }
 
-/// Folders that were made for results to come; those that are still empty at the end go.
+/// Folders made for results; those that are still empty at the end are removed.
 #[derive(Debug)]
 pub struct ResultFolders(Vec<Guard>);
 
 impl ResultFolders {
-    /// Makes `folder` and what is missing above it.
+    /// Makes `folder` and its missing parents.
     ///
     /// # Errors
-    /// What the file system says; nothing was made then.
+    /// The error of the file system; nothing was made then.
     pub fn new(folder: &Path) -> io::Result<Self> {
         let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
         let mut missing: Vec<&Path> = folder.ancestors().take_while(is_missing).collect();
@@ -230,7 +232,7 @@ impl ResultFolders {
                 claimed.0.push(Guard::of(TemporaryPath::EmptyFolder(path.to_owned())));
             }
         }
-        // Another run may have removed it meanwhile; what is there and is no folder shows when it is tried.
+        // Another run may have removed it in the meantime. If it is there and not a folder, the attempt shows it.
         let _whole = whole();
         if !folder.is_dir() && make_folder(folder)? {
             claimed.0.push(Guard::of(TemporaryPath::EmptyFolder(folder.to_owned())));
@@ -239,13 +241,13 @@ impl ResultFolders {
     }
 }
 
-/// Makes a folder; false if there is one by now.
+/// Makes a folder; false if it exists by now.
 fn make_folder(path: &Path) -> io::Result<bool> {
     loop {
         match fs::create_dir(path) {
             Ok(()) => return Ok(true),
             Err(_) if path.is_dir() => return Ok(false),
-            // It was there, and whoever had made it has just removed it, or has made it once more by now.
+            // It existed, and another process has just removed it, or has made it once more.
             Err(error)
                 if error.kind() == io::ErrorKind::AlreadyExists
                     && fs::symlink_metadata(path).map_or(true, |there| there.is_dir()) => {}
@@ -257,7 +259,7 @@ fn make_folder(path: &Path) -> io::Result<bool> {
 impl Drop for ResultFolders {
     fn drop(&mut self) {
         while let Some(guard) = self.0.pop() {
-            // One that holds something stays.
+            // A folder with content stays.
             let _ = guard.0.remove();
         }
     }
@@ -282,7 +284,7 @@ mod tests {
         assert_eq!((passing(&path), path.exists()), (0, false));
     }
 
-    /// As another run of specgen does it: in one process the second waits for the first to be done.
+    /// Simulates another run of specgen: within one process the second waits for the first.
     #[test]
     fn a_folder_that_goes_while_it_is_made_is_made_again() {
         let scratch = Scratch::new().unwrap();
@@ -297,7 +299,7 @@ mod tests {
                 });
             }
         });
-        // What stands in the way for good is an error, and no reason to wait.
+        // A permanent obstacle is an error, and no reason to wait.
         std::os::unix::fs::symlink("nowhere", &folder).unwrap();
         assert_eq!(make_folder(&folder).unwrap_err().kind(), io::ErrorKind::AlreadyExists);
     }
@@ -310,7 +312,7 @@ mod tests {
         assert!(!is_ended());
         first.store(true, Ordering::SeqCst);
         assert!(is_ended() && !std::thread::spawn(is_ended).join().unwrap());
-        // Whoever heeds it ends by itself; the next command begins anew.
+        // A command that heeds it ends by itself; the next command starts afresh.
         assert!(std::ptr::eq(heed(), first) && !is_ended());
         assert!(!PRESSED.load(Ordering::SeqCst) && !HEEDED.load(Ordering::SeqCst));
         own(second);
@@ -327,7 +329,7 @@ mod tests {
         fs::write(inner.join("result"), "x").unwrap();
         drop(claimed);
         assert!(inner.join("result").is_file());
-        // What was there before is nobody's to remove.
+        // A folder that existed before is not removed.
         fs::create_dir(scratch.path().join("old")).unwrap();
         drop(ResultFolders::new(&scratch.path().join("old")).unwrap());
         assert!(scratch.path().join("old").is_dir());

@@ -1,6 +1,8 @@
-//! How sections and keys of a spec are declared: kind, range, default and meaning of each key, and the field that it fills.
+//! Declarations of a spec's sections and keys: kind, range, default and meaning of each key, and the field that it
+//! fills.
 //!
-//! The declarations are in [`crate::model`]. Reading, messages, the JSON Schema and `docs/spec-reference.md` all come from them.
+//! The declarations are in [`crate::model`]. Reading, messages, the JSON Schema and `docs/spec-reference.md` follow
+//! from them.
 
 pub(crate) mod declare;
 pub(crate) mod fields;
@@ -15,9 +17,9 @@ pub const SCHEMA_VERSION: i64 = 1;
 pub struct Section {
     /// Path such as `target.budget`; empty for the keys before the first table.
     pub name: &'static str,
-    /// How often it stands in a file.
+    /// How often it may occur in a file.
     pub kind: Kind,
-    /// What else people call it; messages lead from there to the section.
+    /// Other names; messages lead from them to the section.
     pub aliases: &'static [&'static str],
     /// One line for the reference.
     pub doc: &'static str,
@@ -25,18 +27,18 @@ pub struct Section {
     pub keys: &'static [Key],
 }
 
-/// How often a section stands in a file.
+/// How often a section may occur in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Once; it may be left out if no key in it must be given.
+    /// Once; optional if it has no required key.
     Plain,
-    /// Once, or left out as a whole although keys in it are required.
+    /// Once, or left out as a whole although some of its keys are required.
     Optional,
-    /// At least and at most so many times, with double brackets: `[[gauge]]`. Checks count them.
+    /// At least and at most this many times, with double brackets: `[[gauge]]`. Checks count them.
     Repeated(usize, usize),
 }
 
-/// Most tables of a repeated section that are read; no section may have more.
+/// Most tables of a repeated section that are read.
 pub const MAX_TABLES: usize = 32;
 
 /// One key.
@@ -44,7 +46,7 @@ pub const MAX_TABLES: usize = 32;
 pub struct Key {
     /// Name within the section.
     pub name: &'static str,
-    /// What may stand there.
+    /// Form of its value.
     pub shape: Shape,
     /// What happens if it is left out.
     pub presence: Presence,
@@ -52,10 +54,10 @@ pub struct Key {
     pub doc: &'static str,
     /// Symbol of the paper, empty if it has none.
     pub symbol: &'static str,
-    /// What else people call it. Nothing is read under such a name, or under the symbol; messages lead from it to the key.
+    /// Other names. They are not accepted, nor is the symbol; messages lead from them to the key.
     pub aliases: &'static [&'static str],
-    /// A TOML literal that is right for some platform: for the reference, the schema and tests. It is no fix; messages show
-    /// [`Key::template`].
+    /// A TOML literal that is valid for some platform: for the reference, the schema and tests. It is not a fix;
+    /// messages show [`Key::template`].
     pub example: &'static str,
 }
 
@@ -66,9 +68,9 @@ pub enum Shape {
     One(Item),
     /// An array with exactly these items.
     List(&'static [Item]),
-    /// An array of so many arrays, each with exactly these items.
+    /// An array of this many arrays, each with exactly these items.
     Rows(usize, &'static [Item]),
-    /// An array with at least so many of these items, from the first one on.
+    /// An array with at least this many of these items, from the first one on.
     Leading(usize, &'static [Item]),
     /// An array of one or six file names, relative to the spec.
     Records,
@@ -87,12 +89,12 @@ pub enum Item {
         dimension: Dimension,
         /// Bounds in SI.
         range: Range,
-        /// Unit in which messages speak of it.
+        /// Unit that messages use.
         unit: &'static str,
     },
     /// A number without dimension.
     Number(Range),
-    /// A whole number, bounds inclusive.
+    /// A whole number, both bounds included.
     Integer(i64, i64),
     /// One of these strings.
     Choice(&'static [&'static str]),
@@ -100,7 +102,7 @@ pub enum Item {
     Flag,
     /// A file name relative to the spec.
     File,
-    /// Why something is as it is: two words at least.
+    /// A reason: at least two words.
     Reason,
     /// A name: ASCII letter first, then letters, digits, `-` and `_`, at most [`MAX_NAME`] characters.
     Name,
@@ -129,7 +131,7 @@ impl Range {
         Self { min, max, min_included: true, max_included: true }
     }
 
-    /// More than `min`, up to `max`.
+    /// Above `min`, up to `max`.
     #[must_use]
     pub const fn above(min: f64, max: f64) -> Self {
         Self { min, max, min_included: false, max_included: true }
@@ -153,23 +155,23 @@ impl Range {
 /// What happens if a key is left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Presence {
-    /// It must be there (in an optional section: if the section is there).
+    /// It is required (in an optional section: if the section is there).
     Required,
-    /// This TOML literal takes its place.
+    /// This TOML literal is used.
     Default(&'static str),
-    /// Nothing takes its place.
+    /// It stays empty.
     Optional,
-    /// Instead of another key, which must not stand beside it; whether one is needed depends on the mode.
+    /// It is an alternative to another key, which excludes it; whether one is needed depends on the mode.
     InsteadOf(&'static str),
-    /// It belongs to the form of this name: the keys of exactly one form stand in the section, all of them.
+    /// It belongs to the form of this name: the section has all keys of exactly one form.
     Form(&'static str),
-    /// What this says happens; a check or the building of the model sees to it.
+    /// This rule, which a check or the building of the model implements.
     Rule(&'static str),
 }
 
 impl Item {
-    /// A TOML literal of its form, with a placeholder for the value and with its unit: `"<number> kg"`. Only a value that the
-    /// language leaves no choice of is written out.
+    /// A TOML literal of its form, with a placeholder for the value and with its unit: `"<number> kg"`. A value is
+    /// written out only if it is the only valid one.
     #[must_use]
     pub fn template(self) -> String {
         match self {
@@ -196,8 +198,8 @@ pub fn placeholder(text: &str) -> Option<&str> {
 }
 
 impl Key {
-    /// A TOML literal of its form, with a placeholder for each value: `["<number> V", "<number> V"]`. Of a list, as many
-    /// values as it must have.
+    /// A TOML literal of its form, with a placeholder for each value: `["<number> V", "<number> V"]`. For a list, its
+    /// least number of values.
     #[must_use]
     pub fn template(&self) -> String {
         let list = |items: &[Item]| {
@@ -215,7 +217,7 @@ impl Key {
         }
     }
 
-    /// A line of a spec with it: name and [`Key::template`].
+    /// A line of a spec with this key: name and [`Key::template`].
     #[must_use]
     pub fn line(&self) -> String {
         match self.shape {
@@ -224,10 +226,10 @@ impl Key {
         }
     }
 
-    /// Whether people call it `name`: its symbol or an alias, upper or lower case, with or without what joins words.
+    /// Whether `name` is its symbol or an alias, regardless of case and word separators.
     #[must_use]
     pub fn is_called(&self, name: &str) -> bool {
-        // "I_xx I_yy I_zz" are the three of one list.
+        // "I_xx I_yy I_zz" are the three symbols of one list.
         self.symbol.split(' ').chain(self.aliases.iter().copied()).any(|other| is_same(other, name))
     }
 }
@@ -275,7 +277,7 @@ impl Section {
         forms
     }
 
-    /// Its header, and a line of each key that must be given, with a placeholder for each value.
+    /// Its header, and a line for each required key, with a placeholder for each value.
     #[must_use]
     pub fn template(&self) -> String {
         let mut text = self.header();
@@ -291,7 +293,8 @@ impl Section {
     }
 }
 
-/// Whether two names differ by nothing but case and what joins words; the case of a single letter counts, as in `k` and `K`.
+/// Whether two names are equal apart from case and word separators. The case of a single letter counts, as in `k` and
+/// `K`.
 fn is_same(a: &str, b: &str) -> bool {
     !a.is_empty() && (a == b || (a.len() > 1 && letters(a).eq(letters(b))))
 }

@@ -1,4 +1,4 @@
-//! What a spec says, and what the compiler knows of it before it computes anything.
+//! The language of a spec, and everything that is known of a spec before any computation.
 //!
 //! ```text
 //! TOML → spec (tables, keys, units, places) → model (SI, checked)

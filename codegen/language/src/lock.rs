@@ -1,18 +1,18 @@
-//! Locks that end with their process, however that ends: what a killed process left is distinguished from what another one works on.
+//! Locks that end with their process, however it ends. They distinguish files of a killed process from files in use.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::Path;
 
-/// Makes the file unless it is there, and locks it; `WouldBlock` if another process has it.
+/// Makes the file if it does not exist, and locks it; `WouldBlock` if another process has it.
 ///
 /// # Errors
-/// `WouldBlock`, or what the file system says.
+/// `WouldBlock`, or the error of the file system.
 pub fn make(path: &Path) -> io::Result<File> {
     of(OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?, path)
 }
 
-/// Locks an open file or folder, which has to be still the one at `path`: the last owner of a lock may have removed it.
+/// Locks an open file or folder. It must still be the one at `path`: the last owner of the lock may have removed it.
 ///
 /// # Errors
 /// As [`make`].
@@ -20,14 +20,15 @@ pub fn of(file: File, path: &Path) -> io::Result<File> {
     match file.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => return Err(io::ErrorKind::WouldBlock.into()),
-        // A file system without locks: one run at a time is the user's business there.
+        // A file system without locks: there the user must not start two runs at a time.
         Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
         Err(TryLockError::Error(error)) => return Err(error),
     }
     if is_at(&file, path) { Ok(file) } else { Err(io::ErrorKind::WouldBlock.into()) }
 }
 
-/// Removes files and folders in `folder` whose names begin with `prefix`, of this user, that no living process has locked.
+/// Removes this user's files and folders in `folder` whose names begin with `prefix`, unless a living process has
+/// locked them.
 pub fn sweep(folder: &Path, prefix: &str) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         if !entry.file_name().to_string_lossy().starts_with(prefix) {
@@ -38,21 +39,21 @@ pub fn sweep(folder: &Path, prefix: &str) {
         if found.is_symlink() || !is_own(&found) {
             continue;
         }
-        // Held until it is gone: nobody takes up meanwhile what is being removed.
+        // Held during the removal, so that nobody starts to use it.
         if let Ok(_held) = File::open(&path).and_then(|file| of(file, &path)) {
             let _ = if found.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
         }
     }
 }
 
-/// Whether it is this user's.
+/// Whether it belongs to this user.
 #[cfg(unix)]
 #[must_use]
 pub fn is_own(found: &fs::Metadata) -> bool {
     std::os::unix::fs::MetadataExt::uid(found) == rustix::process::geteuid().as_raw()
 }
 
-/// Whether it is this user's; permissions say so where users have no numbers.
+/// Whether it belongs to this user; decided by permissions if users have no numbers.
 #[cfg(not(unix))]
 #[must_use]
 pub fn is_own(_: &fs::Metadata) -> bool {

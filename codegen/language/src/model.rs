@@ -1,7 +1,7 @@
 //! The checked platform: SI units, no optional value that the controller needs, every number finite and in range.
 //!
-//! Vectors are in the base frame {B} or the platform frame {P} as stated; angles in rad. Each part of it is a section of a spec,
-//! declared once: keys with shape, range, unit, default, symbol and text, and the fields that they fill.
+//! Vectors are in the base frame {B} or the platform frame {P} as stated; angles in rad. Each section of a spec is
+//! declared once: its keys with shape, range, unit, default, symbol and text, and the fields that they fill.
 
 mod electronics;
 mod hysteresis;
@@ -107,8 +107,8 @@ const START: Section = Section {
 pub struct Model {
     /// Name of the platform: ASCII letters, digits, `-` and `_`.
     pub name: String,
-    /// Paths of keys and repeated sections whose values nobody gave or measured, in the order of the spec; each names a value that
-    /// the spec has, and no two name the same.
+    /// Paths of keys and repeated sections whose values are assumed, neither given nor measured, in the order of the
+    /// spec. Each names a value in the spec; no two are equal.
     pub assumed: Vec<String>,
     /// (1), (2), (AI.2)–(AI.4).
     pub geometry: Geometry,
@@ -122,9 +122,9 @@ pub struct Model {
     pub amplifier: Amplifier,
     /// Converter that drives the amplifier, in volts at the stack.
     pub dac: Dac,
-    /// Displacement gauge of a leg, or with `task_space` one of the six that see the platform.
+    /// Displacement gauge of a leg, or with `task_space` one of the six that measure the platform.
     pub sensor: Sensor,
-    /// Where the hysteresis tables come from.
+    /// Source of the hysteresis tables.
     pub hysteresis: Hysteresis,
     /// Run-to-run adaptation, Appendix B.
     pub adaptation: Adaptation,
@@ -134,24 +134,24 @@ pub struct Model {
     pub workspace: Workspace,
     /// What is emitted.
     pub controller: ControllerOptions,
-    /// What it runs on.
+    /// Where the controller runs.
     pub target: Target,
-    /// The controller that sees the platform: a spec with `[control]`. None: six legs with a gauge each.
+    /// The task-space controller: a spec with `[control]`. None: six legs, each with its own gauge.
     pub task_space: Option<TaskSpace>,
-    /// What the platform is for.
+    /// Requirements on the platform.
     pub requirements: Requirements,
-    /// What the supervisor takes for a fault.
+    /// Limits of the supervisor.
     pub supervisor: Supervisor,
     /// What `specgen robust` varies, and its gate; no constant of the controller comes from here.
     pub robust: Robust,
-    /// What the physical lint lets pass, and why.
+    /// Exceptions from the physical lint, with reasons.
     pub lint: Lint,
-    /// Where each key stands in the spec file, by key path (`actuator.voltage[1]`), for findings of later phases.
+    /// Place of each key in the spec file, by key path (`actuator.voltage[1]`), for findings of later phases.
     pub spans: BTreeMap<String, ops::Range<usize>>,
 }
 
 impl Model {
-    /// The model; `None` if a value is missing: then there is a finding for it.
+    /// The model; `None` if a value is missing, for which there is a finding.
     pub(crate) fn read(fields: &Fields) -> Option<Self> {
         let controlled = fields.table("control").is_some();
         let task_space = if controlled { Some(TaskSpace::read(fields, "control")?) } else { None };
@@ -180,7 +180,7 @@ impl Model {
         })
     }
 
-    /// Voltage at which the legs stand while disarmed, V; within the limits of a spec that compiles.
+    /// Voltage of the legs while disarmed, V; within the limits of a spec that compiles.
     #[must_use]
     pub fn rest_voltage(&self) -> f64 {
         let [low, high] = self.actuator.voltage;

@@ -5,8 +5,8 @@
 //! unit     = product {"/" factor}     product = factor {[" "|"*"|"·"] factor}
 //! factor   = (name | "(" unit ")") [["^"] power]
 //! ```
-//! Conversion to SI is exact up to one rounding, unless a divisor other than a power of ten stands in the unit
-//! (`V/min`): then the division rounds a second time.
+//! Conversion to SI is exact up to one rounding. If the unit has a divisor other than a power of ten (`V/min`), the
+//! division rounds a second time.
 
 mod decimal;
 mod dimension;
@@ -18,7 +18,7 @@ use std::ops::Range;
 pub use decimal::Decimal;
 pub use dimension::Dimension;
 
-/// Longer quantities are refused: no sane one comes near.
+/// Longest quantity that is accepted.
 pub const MAX_LENGTH: usize = 120;
 
 /// A quantity in SI units.
@@ -33,13 +33,13 @@ pub struct Quantity {
 /// Why a text is not a quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QuantityError {
-    /// The bytes of the text that are to blame.
+    /// The bytes of the text that are wrong.
     pub range: Range<usize>,
     /// What is wrong there.
     pub problem: Problem,
 }
 
-/// The ways in which a text fails to be a quantity.
+/// Reasons why a text is not a quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Problem {
     /// Longer than [`MAX_LENGTH`].
@@ -48,13 +48,13 @@ pub enum Problem {
     NoNumber,
     /// A decimal comma, or commas between thousands.
     Comma,
-    /// A unit nobody knows; with what was probably meant.
+    /// An unknown unit, and the unit that was probably meant.
     UnknownUnit(String, Option<&'static str>),
     /// A product after a slash can be read in two ways.
     AmbiguousQuotient,
     /// A power that is not a whole number from -9 to 9.
     BadPower,
-    /// Something that belongs to no quantity, such as a stray slash.
+    /// Text that does not belong to a quantity, such as a stray slash.
     Unexpected(String),
     /// NaN or infinity.
     NotFinite,
@@ -64,7 +64,7 @@ pub enum Problem {
     Underflow,
 }
 
-/// Units as people write them; any other of the same dimension will do, too.
+/// Units in common use; any other unit of the same dimension is valid, too.
 const COMMON: &[&str] = &[
     "m",
     "mm",
@@ -123,7 +123,7 @@ pub fn common_units(dimension: Dimension) -> impl Iterator<Item = &'static str> 
 /// Reads a quantity. A text without a unit is a quantity without dimension.
 ///
 /// # Errors
-/// The first thing that is wrong, with its place in `text`.
+/// The first error, with its place in `text`.
 pub fn parse(text: &str) -> Result<Quantity, QuantityError> {
     if text.len() > MAX_LENGTH {
         return Err(QuantityError { range: 0..text.len(), problem: Problem::TooLong });
@@ -160,7 +160,7 @@ fn parse_number(text: &str) -> Result<(bool, Decimal, usize), QuantityError> {
     let fail = |range: Range<usize>, problem| Err(QuantityError { range, problem });
     let start = text.len() - text.trim_start().len();
     let rest = &text[start..];
-    // U+2212 is what word processors make of a minus sign.
+    // U+2212 is the minus sign of word processors.
     let sign_length = match rest.chars().next() {
         Some(sign @ ('+' | '-' | '\u{2212}')) => sign.len_utf8(),
         _ => 0,

@@ -1,6 +1,6 @@
-//! Lines for a shell, as messages print them: whatever a file is called, a line that is pasted does what it says.
+//! Command lines in messages: a pasted line works whatever the name of the file.
 //!
-//! Every printed line with a name in it is built here; `tests/tests/shell_lines.rs` holds that against the sources.
+//! Every printed command line with a name in it is built here; `tests/tests/shell_lines.rs` checks the sources.
 
 use std::fmt;
 use std::path::Path;
@@ -33,14 +33,14 @@ impl Line {
         Self(format!("{} {}", self.0, quoted(text)))
     }
 
-    /// Adds the name of a file, which no program takes for an option.
+    /// Adds the name of a file in a form that no program takes for an option.
     #[must_use]
     pub fn path(self, path: impl AsRef<Path>) -> Self {
         self.word(&no_option(path.as_ref().display().to_string()))
     }
 
-    /// The line with its output in a new file beside `input`: of its name, but with `ending`, numbered if there is one already. With
-    /// the name of that file.
+    /// The line with its output redirected to a new file beside `input`: of the same name, but with `ending`, and a
+    /// number if that exists. Also returns the name of the new file.
     #[must_use]
     pub fn into_new(self, input: &str, ending: &str) -> (Self, String) {
         let new = free(input, ending);
@@ -66,14 +66,14 @@ pub fn on(command: &str, path: impl AsRef<Path>, options: &str) -> String {
     line(command).path(path).words(options).into()
 }
 
-/// The same file by a name that no program takes for an option.
+/// The same file under a name that no program takes for an option.
 #[must_use]
 pub fn no_option(path: String) -> String {
     if path.starts_with('-') { format!("./{path}") } else { path }
 }
 
-/// In words: the line by which `command` makes a new file of `input`, and that this is to be named instead. `command` reads standard
-/// input where it ends in `<`.
+/// Help text: the line by which `command` makes a new file from `input`, and the request to name the new file instead.
+/// `command` reads standard input if it ends in `<`.
 #[must_use]
 pub fn converted(command: &str, input: &str, ending: &str) -> String {
     let (line, new) = line(command).path(input).into_new(input, ending);
@@ -87,7 +87,7 @@ pub fn as_utf8(encoding: &str, input: &str) -> String {
     converted(&format!("iconv -f {encoding} -t UTF-8"), input, &format!(".utf8{ending}"))
 }
 
-/// As a shell takes it for one word.
+/// Quoted as one word of a shell.
 #[must_use]
 pub fn quoted(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./+=:%,@".contains(c);
@@ -98,7 +98,7 @@ pub fn quoted(text: &str) -> String {
     }
 }
 
-/// A name beside `path` that no file has: that of `path` without what tells its kind, and `ending`, with a number if need be.
+/// A free name beside `path`: `path` without its extension, and `ending`, with a number if needed.
 #[must_use]
 pub fn free(path: &str, ending: &str) -> String {
     let folder = path.rfind('/').map_or(0, |slash| slash + 1);
@@ -107,7 +107,7 @@ pub fn free(path: &str, ending: &str) -> String {
     let stem = stem.strip_suffix(".csv").filter(|stem| stem.len() > folder).unwrap_or(stem);
     let name = |number: u32| if number == 1 { format!("{stem}{ending}") } else { format!("{stem}-{number}{ending}") };
     let is_free = |name: &String| name != path && std::fs::symlink_metadata(name).is_err();
-    // There are not as many files as numbers.
+    // There are fewer files than numbers.
     (1..).map(name).find(is_free).unwrap_or_default()
 }
 
@@ -116,7 +116,7 @@ mod tests {
     use super::*;
     use std::process::Command;
 
-    /// Names that a careless line takes for something else.
+    /// Names that a careless line would misread.
     const NAMES: [&str; 9] =
         ["a b.csv", "it's.csv", "-rf.csv", "$HOME.csv", "a;b.csv", "`id`.csv", "\"q\".csv", "*.csv", "é\n\t.csv"];
 

@@ -1,11 +1,10 @@
-//! Reads the spec file: TOML text to a checked [`Model`]. The only module that knows TOML.
+//! Reads the spec file: TOML text to a checked [`Model`]. This is the only module that reads TOML.
 //!
 //! ```text
 //! text → tree with spans (syntax) → values by key path (read, value) → checks → model
 //! ```
-//! Everything about a key stands where [`crate::model`] declares its field; the JSON Schema and the reference are printed from
-//! that, too.
-//! A run reports every finding, in the order of the file.
+//! [`crate::model`] declares everything about a key together with its field; the JSON Schema and the reference follow
+//! from it, too. A run reports every finding, in the order of the file.
 
 mod check;
 mod findings;
@@ -32,8 +31,8 @@ pub use schema::json_schema;
 pub use source::MAX_BYTES;
 pub use text::nearest;
 
-/// Errors that leave every value that the model needs as it stands in the file. A gain without a unit counts: gains may be
-/// left out.
+/// Errors after which every value that the model needs is still as in the file. A gain without a unit is one of them:
+/// gains are optional.
 const UNPHYSICAL: [Code; 8] = [
     codes::BIAS_OUTSIDE,
     codes::VOLTAGE_OUTSIDE_DAC,
@@ -47,8 +46,8 @@ const UNPHYSICAL: [Code; 8] = [
 
 /// Checks a spec and builds its model.
 ///
-/// The findings are in the order of the file; the model is there if none of them is an error. The records that the
-/// spec names are looked for beside it, but not read.
+/// The findings are in the order of the file. The model is there if none of them is an error. The records in the spec
+/// must exist, but are not read.
 #[must_use]
 pub fn load(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     let (model, findings) = load_as_far(source);
@@ -56,8 +55,8 @@ pub fn load(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     (model.filter(|_| !refused), findings)
 }
 
-/// The same, with the model also where all errors are about what could not be built, so that a second look at masses, limits
-/// and paths still makes sense: a file that has one slip often has another.
+/// The same, but the model is also there if all errors are of a kind that could not be built. Masses, limits and paths
+/// are then still checked: a file with one mistake often has another.
 #[must_use]
 pub fn load_as_far(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     let mut findings = Findings::default();
@@ -96,7 +95,7 @@ pub fn load_as_far(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     (model, findings.finish())
 }
 
-/// "Put it in quotes" is no help where the key takes no text at all, and of a placeholder.
+/// Removes the advice to add quotes if the key takes no text, or if the value is a placeholder.
 fn drop_wrong_advice(findings: &mut Findings) {
     let known = |d: &&Diagnostic| d.code == codes::WRONG_TYPE || d.code == codes::PLACEHOLDER;
     let not_text: Vec<_> = findings.all().iter().filter(known).map(|d| d.place.clone()).collect();

@@ -74,7 +74,7 @@ lints! {
     /// ## Why it matters
     ///
     /// A stack that is driven so fast overshoots into tension, which ceramics do not
-    /// stand.
+    /// tolerate.
     ///
     /// ## Example
     ///

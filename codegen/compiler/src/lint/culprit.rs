@@ -18,7 +18,7 @@ lints! {
 
     /// # W0893: one value that would explain several findings
     ///
-    /// Where several findings come together, the spec is checked anew with one value
+    /// Where several findings come together, the spec is checked again with one value
     /// changed by a power of ten, its sign or its order; a change after which most of
     /// the findings are gone is named first.
     ///

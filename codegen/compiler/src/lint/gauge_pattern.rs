@@ -10,13 +10,13 @@ lints! {
 
     /// # W0848: a gauge out of the pattern of the others
     ///
-    /// Gauges stand at one height or one radius, look along the axis, along their
-    /// radius or across it, or make an equilateral triangle. One that does not, and
+    /// Gauges are at one height or one radius, measure along the axis, along their
+    /// radius or across it, or form an equilateral triangle. One that does not, and
     /// would with another sign, digit or order of its coordinates, is named.
     ///
     /// ## Why it matters
     ///
-    /// A gauge that stands elsewhere than the spec says gives a pose that is wrong by
+    /// A gauge that is not where the spec says gives a pose that is wrong by
     /// its lever: tilts are read where there are none.
     ///
     /// ## Example

@@ -65,7 +65,7 @@ lints! {
 
     /// # W0885: gauges close together
     ///
-    /// The farthest gauge should stand at least a fifth of the joint radius from the
+    /// The farthest gauge should be at least a fifth of the joint radius from the
     /// axis.
     ///
     /// ## Why it matters

@@ -68,7 +68,7 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// It is possible, but most hexapods stand on the wider side.
+    /// It is possible, but the base of most hexapods is the wider side.
     ///
     /// ## Example
     ///

@@ -4,17 +4,18 @@ use crate::least_squares::{fit, mean_square};
 
 /// Frequencies of mains and their first harmonics, Hz.
 const MAINS: [f64; 6] = [50.0, 60.0, 100.0, 120.0, 150.0, 180.0];
-/// How far mains are off their frequency, as a share.
+/// Largest relative deviation of the mains frequency.
 const OFF: f64 = 0.004;
-/// Frequencies tried on each side, and samples that they are tried on.
+/// Frequencies tried on each side, and number of samples used.
 const TRIED: i32 = 10;
 const SAMPLES: usize = 4000;
-/// Harmonics of the drive up to this one are not taken for hum.
+/// Harmonics of the drive up to this one do not count as hum.
 const HARMONICS: f64 = 8.0;
-/// Share of a drive from which on a frequency is the drive's own.
+/// Fraction of the drive above which a frequency belongs to the drive.
 const DRIVEN: f64 = 0.001;
 
-/// The strongest hum up to `highest` (Hz) in `left` that is none of the drive's own frequencies: Hz, and what is left without it.
+/// The strongest hum in `left` up to `highest` (Hz) that is not one of the drive's frequencies: Hz, and the rest
+/// without it.
 pub(super) fn take(time: &[f64], drive: &[f64], left: &[f64], highest: f64) -> Option<(f64, Vec<f64>)> {
     let duration = time.last()? - time.first()?;
     let step = time.len().div_ceil(SAMPLES);
@@ -45,7 +46,7 @@ pub(super) fn take(time: &[f64], drive: &[f64], left: &[f64], highest: f64) -> O
     Some((frequency, wave(frequency, time, left)?))
 }
 
-/// How often a signal turns back.
+/// Number of changes of direction of a signal.
 fn turns(values: &[f64]) -> usize {
     let steps = values.windows(2).map(|w| w[1] - w[0]).filter(|step| *step != 0.0);
     let (_, turns) =

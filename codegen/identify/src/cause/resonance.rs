@@ -1,4 +1,4 @@
-//! Resonance in a residual: what a mode makes of the drive beyond a wrong gain, searched over its frequency.
+//! Resonance in a residual: the response of a mode to the drive, beyond a wrong gain, searched over its frequency.
 
 use super::{centred, rates};
 use crate::least_squares::{fit, mean_square};
@@ -9,12 +9,12 @@ const MODES: usize = 48;
 const SLOWEST: f64 = 20.0;
 const FASTEST: f64 = 0.25;
 const DAMPING: f64 = 0.02;
-/// Share of what is left that a resonance explains at least to be called one.
+/// Least fraction of the rest that a resonance must explain.
 const NOTABLE: f64 = 0.1;
-/// Samples that a resonance is looked for in.
+/// Number of samples used in the search.
 const STRETCH: usize = 200_000;
 
-/// A resonance that was taken out of a residual.
+/// A resonance that was removed from a residual.
 pub(super) struct Resonance {
     /// Hz.
     pub(super) frequency: f64,
@@ -22,7 +22,8 @@ pub(super) struct Resonance {
     pub(super) left: Vec<f64>,
 }
 
-/// The mode whose answer to the drive explains most of `left`, a residual at the samples `chosen`, beyond a wrong gain.
+/// The mode whose response to the drive explains most of `left`, a residual at the samples `chosen`, beyond a wrong
+/// gain.
 pub(super) fn take(time: &[f64], drive: &[f64], chosen: &[usize], left: &[f64]) -> Option<Resonance> {
     let end = if time.len() < STRETCH { time.len() } else { STRETCH };
     let count = chosen.partition_point(|k| *k < end);
@@ -36,12 +37,12 @@ pub(super) fn take(time: &[f64], drive: &[f64], chosen: &[usize], left: &[f64]) 
     let level = pick(&drive[..end]);
     let before = mean_square(&fit(&[&level], left_there)?.residual);
     let step = libm::log(highest / lowest) / (MODES - 1) as f64;
-    // Its answer has no jumps.
+    // Its response has no jumps.
     let all = vec![true; end];
     let tried = (0..MODES).filter_map(|k| {
         let frequency = lowest * libm::exp(step * k as f64);
         let moved = Mode { frequency, damping: DAMPING }.behind(&time[..end], &drive[..end]);
-        // Both phases, since neither the frequency nor a dead time before it is known to its period.
+        // Both phases, because neither the frequency nor the dead time is known to a fraction of a period.
         let (answer, speed) = (pick(&moved), pick(&rates(&time[..end], &moved, &all)));
         let found = fit(&[&level, &answer, &speed], left_there)?;
         Some((frequency, before - mean_square(&found.residual), [answer, speed], found.coefficients))

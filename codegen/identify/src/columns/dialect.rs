@@ -1,6 +1,6 @@
-//! How a file separates its columns and writes its numbers.
+//! Separators and number formats of a file.
 
-/// Separators that are tried, in this order: one that stands in a line is not found in numbers, but for the comma.
+/// Separators in the order in which they are tried. Apart from the comma, none of them occurs in a number.
 pub(super) const SEPARATORS: [u8; 4] = [b'\t', b';', b',', BLANK];
 /// Any number of blanks and tabs.
 const BLANK: u8 = b' ';
@@ -32,7 +32,7 @@ fn clean(field: &[u8]) -> &[u8] {
     }
 }
 
-/// Text of a line for its names: UTF-8, or else Latin-1, in which programs of the bench write their µ.
+/// Text of a line with names: UTF-8, or else Latin-1, in which many instruments write their µ.
 pub(super) fn decoded(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
@@ -40,7 +40,7 @@ pub(super) fn decoded(bytes: &[u8]) -> String {
     }
 }
 
-/// A number with the decimal sign that it has, if it has one.
+/// A number with its decimal sign, if it has one.
 pub(super) fn number(field: &str, separator: u8) -> Option<(f64, Option<char>)> {
     if let Ok(value) = field.parse() {
         return Some((value, field.contains('.').then_some('.')));
@@ -51,7 +51,7 @@ pub(super) fn number(field: &str, separator: u8) -> Option<(f64, Option<char>)> 
     field.replace(',', ".").parse().ok().map(|value| (value, Some(',')))
 }
 
-/// Whether a line is a row of numbers, at least two fields of which some may be empty, but not all.
+/// Whether a line is a row of numbers: at least two fields, some of which may be empty, but not all.
 pub(super) fn is_row(line: &[u8], separator: u8) -> bool {
     let fields = split(line, separator);
     let is_number = |field: &&[u8]| std::str::from_utf8(field).is_ok_and(|text| number(text, separator).is_some());
@@ -59,7 +59,7 @@ pub(super) fn is_row(line: &[u8], separator: u8) -> bool {
     fields.len() > 1 && filled.clone().count() > 0 && filled.clone().all(is_number)
 }
 
-/// Whether nothing stands in a line, or separators alone.
+/// Whether a line is empty, or has only separators.
 pub(super) fn is_blank(line: &[u8]) -> bool {
     line.iter().all(|byte| matches!(byte, b' ' | b'\t' | b'\r' | b';' | b','))
 }

@@ -1,22 +1,22 @@
-//! Files of programs of the bench that are no text: told by their first bytes, answered by the line that exports them.
+//! Binary files of bench programs: recognised by their first bytes; the help has the line that exports them.
 
 use crate::findings::Findings;
 use specgen_language::diagnostic::codes;
 use specgen_language::shell;
 
-/// Reports a file that is told by its first line; whether it is one.
+/// Reports a file that is recognised by its first line; returns whether it was.
 pub(crate) fn report(first: &[u8], findings: &mut Findings) -> bool {
     report_as(first, "not a text file", findings)
 }
 
-/// The same, with what else is to be said of it.
+/// The same, with an additional text.
 pub(crate) fn report_as(first: &[u8], more: &str, findings: &mut Findings) -> bool {
     let Some((what, help)) = told(first, findings.place()) else { return false };
     findings.add(codes::RECORD_NOT_TEXT, Some(1), format!("is {what}, {more}"), &help);
     true
 }
 
-/// What a file is, and how it becomes CSV. A line for the shell writes a new file, whatever the name of the old one.
+/// Kind of a file, and how to convert it to CSV. A shell line writes a new file, whatever the name of the old one.
 fn told(first: &[u8], path: &str) -> Option<(&'static str, String)> {
     let csv = shell::free(path, ".csv");
     let python = |import: &str, columns: &str| {

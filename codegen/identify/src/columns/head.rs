@@ -1,36 +1,36 @@
-//! Finds the names of the columns in a file: behind a preamble, above a line of units, or in a comment.
+//! Finds the names of the columns in a file: after a preamble, above a line of units, or in a comment.
 
 use super::dialect::{SEPARATORS, decoded, is_blank, is_comment, is_row, split};
 use super::names;
 
-/// Lines in which the names are looked for.
+/// Number of lines in which the names are searched.
 pub(super) const LINES: usize = 300;
 
-/// What stands above the samples.
+/// The lines before the samples.
 #[derive(Debug, PartialEq)]
 pub(super) struct Head {
     /// Names of the columns with their units; empty for a file without names.
     pub(super) names: Vec<String>,
     /// Line of the names, counted from 1.
     pub(super) line: usize,
-    /// Index of the first line behind them.
+    /// Index of the first line after them.
     pub(super) next: usize,
     /// Separator of the samples.
     pub(super) separator: u8,
-    /// Time between the samples that the preamble states, s.
+    /// Sampling interval stated in the preamble, s.
     pub(super) interval: Option<f64>,
 }
 
 /// A line and its number.
 type Line = (usize, Vec<u8>);
 
-/// The head of a file whose first line that is no comment has the names.
+/// The head of a file whose names are in the first line that is not a comment.
 pub(super) fn plain(lines: &[Line]) -> Option<Head> {
     let at = lines.iter().position(|(_, line)| !is_blank(line) && !is_comment(line))?;
     Some(at_line(lines, at, None))
 }
 
-/// The head of a record, which may have a preamble; `None` if nothing stands in it.
+/// The head of a record, which may have a preamble; `None` if the file is empty.
 pub(super) fn of_record(lines: &[Line]) -> Option<Head> {
     let first = lines.iter().position(|(_, line)| !is_blank(line) && !is_comment(line))?;
     let known = |at: usize| names_of(&lines[at].1).iter().filter(|name| names::is_known(name)).count();
@@ -53,7 +53,7 @@ pub(super) fn of_record(lines: &[Line]) -> Option<Head> {
             }),
         },
         Some(row) => {
-            // A number among the fields makes it a row that cannot be read.
+            // A line with a number among its fields is an invalid row of numbers.
             let has_number = |line: &[u8]| names_of(line).iter().any(|name| name.parse::<f64>().is_ok());
             let is_text = |line: &[u8]| !is_blank(line) && !is_comment(line) && !is_units(line) && !has_number(line);
             Some(at_line(lines, above(row, &is_text).unwrap_or(first), interval))
@@ -83,7 +83,7 @@ fn separator_of(line: &[u8]) -> Option<u8> {
     SEPARATORS.into_iter().find(|separator| is_row(line, *separator))
 }
 
-/// The separator that gives most names that are known; of like ones, the one that stands in the line.
+/// The separator that gives most known names; if equal, the one that occurs in the line.
 fn of_names(line: &[u8]) -> u8 {
     let known = |separator: u8| {
         let fields = split(line, separator);

@@ -3,13 +3,13 @@
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read};
 
-/// A longer line, bytes, is no line of numbers.
+/// Longest line of numbers, bytes.
 const LONGEST: usize = 1 << 16;
 
 /// Lines of bytes without their ends.
 pub(super) struct Input<'a> {
     reader: BufReader<Box<dyn Read + 'a>>,
-    /// Lines that were looked at before, with their numbers.
+    /// Lines that were read ahead, with their numbers.
     ahead: VecDeque<(usize, Vec<u8>)>,
     read: usize,
 }
@@ -30,7 +30,8 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// The first lines, at most `count`; they are read again by [`Input::next`] from index `from` on, see [`Input::put_back`].
+    /// The first lines, at most `count`. [`Input::next`] returns them again from index `from` on, see
+    /// [`Input::put_back`].
     pub(super) fn head(&mut self, count: usize) -> io::Result<Vec<(usize, Vec<u8>)>> {
         let mut lines = Vec::new();
         let mut line = Vec::new();
@@ -43,7 +44,7 @@ impl<'a> Input<'a> {
         Ok(lines)
     }
 
-    /// Lines to be read before the rest.
+    /// Returns lines to be read again before the rest.
     pub(super) fn put_back(&mut self, lines: Vec<(usize, Vec<u8>)>) {
         self.ahead = lines.into();
     }

@@ -1,4 +1,4 @@
-//! Where each sample of a file stands: a few numbers, however long the file is.
+//! Line number of each sample of a file, in a few numbers, however long the file is.
 
 /// The line of each sample, in ascending order.
 #[derive(Debug, Clone, Default, PartialEq)]

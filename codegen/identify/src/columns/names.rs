@@ -3,14 +3,14 @@
 /// A quantity that a column may hold.
 #[derive(Debug)]
 pub(crate) struct Quantity {
-    /// As records of this project name it, in its unit.
+    /// Name in records of this project, with its unit.
     pub(crate) name: &'static str,
-    /// What else it is called, in lower case letters and digits.
+    /// Other names, in lower case letters and digits.
     also: &'static [&'static str],
     units: &'static [Unit],
 }
 
-/// Name of a unit, and how many of it are one of the unit of [`Quantity::name`].
+/// Name of a unit, and its number in one unit of [`Quantity::name`].
 type Unit = (&'static str, f64);
 
 const TIME: &[Unit] = &[("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)];
@@ -18,7 +18,7 @@ const VOLTAGE: &[Unit] = &[("V", 1.0), ("mV", 1e3), ("uV", 1e6), ("kV", 1e-3)];
 const LENGTH: &[Unit] = &[("um", 1.0), ("nm", 1e3), ("pm", 1e6), ("mm", 1e-3), ("m", 1e-6)];
 const FORCE: &[Unit] = &[("N", 1.0), ("mN", 1e3), ("kN", 1e-3)];
 
-/// Everything that a record may hold.
+/// Every quantity of a record.
 const QUANTITIES: [Quantity; 7] = [
     Quantity { name: "time_s", also: &["t", "zeit"], units: TIME },
     Quantity { name: "drive_V", also: &["command"], units: VOLTAGE },
@@ -29,9 +29,9 @@ const QUANTITIES: [Quantity; 7] = [
     Quantity { name: "reference_um", also: &["ref"], units: LENGTH },
 ];
 
-/// Names of a column that counts samples.
+/// Names of a column with sample numbers.
 const SAMPLE: [&str; 5] = ["sample", "samples", "index", "samplenumber", "n"];
-/// Time in s as LabVIEW names it.
+/// LabVIEW's name for time in s.
 const X_VALUE: &str = "xvalue";
 
 /// The quantity of a column such as `time_s`.
@@ -44,7 +44,7 @@ pub(crate) fn all() -> impl Iterator<Item = &'static Quantity> {
     QUANTITIES.iter()
 }
 
-/// How well a header fits, the best first.
+/// Quality of a match between header and quantity, the best first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Fit {
     Exact,
@@ -53,7 +53,7 @@ pub(crate) enum Fit {
 }
 
 impl Quantity {
-    /// How `header` names this quantity, and how many of its unit are one of ours; `None` if it does not, or without a unit.
+    /// How well `header` names this quantity, and its units in one of ours; `None` if it does not, or has no unit.
     pub(crate) fn fits(&self, header: &str) -> Option<(Fit, f64)> {
         if header.eq_ignore_ascii_case(self.name) {
             return Some((Fit::Exact, 1.0));
@@ -70,12 +70,12 @@ impl Quantity {
         }
     }
 
-    /// How many of `unit` are one of ours.
+    /// Number of `unit` in one of our units.
     fn per(&self, unit: &str) -> Option<f64> {
         self.units.iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).map(|(_, per)| *per)
     }
 
-    /// The same, of a name such as `drive_mV`; `None` if that is another quantity, or has no unit of it.
+    /// The same for a name such as `drive_mV`; `None` if that is another quantity, or has no unit of it.
     pub(crate) fn per_of(&self, name: &str) -> Option<f64> {
         let (quantity, unit) = parts(name);
         if quantity == self.plain() { self.per(&unit?) } else { None }
@@ -86,19 +86,19 @@ impl Quantity {
         self.name.split('_').next().unwrap_or(self.name)
     }
 
-    /// Names with the units that are read.
+    /// Its names with the units that are accepted.
     pub(crate) fn all_names(&self) -> String {
         let name = |(unit, _): &Unit| format!("`{}_{unit}`", self.plain());
         self.units.iter().map(name).collect::<Vec<_>>().join(", ")
     }
 }
 
-/// Whether a header counts samples.
+/// Whether a header names sample numbers.
 pub(crate) fn is_sample_number(header: &str) -> bool {
     SAMPLE.contains(&plain(header).as_str())
 }
 
-/// Whether a header names anything that a record may hold.
+/// Whether a header names any quantity of a record.
 pub(crate) fn is_known(header: &str) -> bool {
     is_sample_number(header) || QUANTITIES.iter().any(|quantity| quantity.fits(header).is_some())
 }
@@ -114,7 +114,7 @@ fn plain(name: &str) -> String {
     name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
-/// The quantity of a header, and its unit in lower case with `u` for µ; none if nothing looks like one.
+/// The quantity of a header, and its unit in lower case with `u` for µ; none if it has no unit.
 fn parts(header: &str) -> (String, Option<String>) {
     let header = header.trim();
     for (open, close) in [('(', ')'), ('[', ']')] {
@@ -129,7 +129,7 @@ fn parts(header: &str) -> (String, Option<String>) {
 }
 
 fn unit(text: &str) -> String {
-    // `Â` is the first half of a µ in UTF-8 that a program took for Latin-1.
+    // `Â` is the first half of a UTF-8 µ that was read as Latin-1.
     let text = text.trim().replace('Â', "").to_lowercase().replace(['µ', 'μ'], "u");
     match text.as_str() {
         "volt" | "volts" => "v".to_owned(),

@@ -1,9 +1,9 @@
-//! Bytes of a file, one part after the other, and the numbers that they are.
+//! Reads the bytes of a file in sequence, and numbers from them.
 
-/// Why nothing more is read.
+/// Error message for a file that ends early.
 pub(super) const DAMAGED: &str = "it is damaged or cut off";
 
-/// What is left of a file or a part of one.
+/// The rest of a file or of a part of it.
 #[derive(Clone, Copy)]
 pub(super) struct Bytes<'a> {
     pub(super) rest: &'a [u8],
@@ -29,18 +29,19 @@ impl<'a> Bytes<'a> {
         self.array().map(u32::from_le_bytes)
     }
 
-    /// A number of 64 bits that counts bytes or values.
+    /// A 64-bit number of bytes or values.
     pub(super) fn count(&mut self) -> Result<usize, String> {
         usize::try_from(u64::from_le_bytes(self.array()?)).map_err(|_| DAMAGED.to_owned())
     }
 
-    /// All that is left, as numbers: integers with (`i`) or without (`u`) a sign, or `f`, of so many bytes each.
+    /// The rest as numbers: integers with (`i`) or without (`u`) sign, or floating point (`f`), of a number of bytes
+    /// each.
     pub(super) fn numbers(self, form: (char, usize)) -> Vec<f64> {
         macro_rules! numbers {
             ($type:ty) => {{
                 let (values, _) = self.rest.as_chunks();
                 let read = if self.is_big_endian { <$type>::from_be_bytes } else { <$type>::from_le_bytes };
-                // Counters of 64 bits; beyond 2⁵³ none is exact.
+                // 64-bit counters; above 2⁵³ they are not exact.
                 values.iter().map(|value| read(*value) as f64).collect()
             }};
         }

@@ -1,4 +1,4 @@
-//! MAT-files of version 5 (MathWorks, MAT-File Format): elements one after the other, each a type, a length and bytes.
+//! MAT-files of version 5 (MathWorks, MAT-File Format): a sequence of elements, each with type, length and bytes.
 
 use std::io::Read;
 use std::ops::RangeInclusive;
@@ -8,11 +8,11 @@ use flate2::read::ZlibDecoder;
 use super::bytes::{Bytes, DAMAGED};
 use super::{Columns, is_column};
 
-/// Bytes before the first element; the last two tell the order of bytes in a number.
+/// Bytes before the first element; the last two show the byte order.
 const HEADER: usize = 128;
 /// Type of an array, whose parts are elements.
 const ARRAY: u32 = 14;
-/// Type of an element that holds another in zlib's format.
+/// Type of an element that contains another in zlib format.
 const COMPRESSED: u32 = 15;
 /// Classes of arrays of numbers.
 const NUMBERS: RangeInclusive<u8> = 6..=15;
@@ -21,13 +21,13 @@ const NUMBERS: RangeInclusive<u8> = 6..=15;
 fn element<'a>(from: &mut Bytes<'a>) -> Result<(u32, &'a [u8]), String> {
     let kind = from.word()?;
     if kind >> 16 > 0 {
-        // Of four bytes at most, in the place of its length.
+        // At most four bytes, in the place of the length.
         let bytes = from.take(4)?.get(..(kind >> 16) as usize).ok_or(DAMAGED)?;
         return Ok((kind & 0xffff, bytes));
     }
     let length = from.word()? as usize;
     let bytes = from.take(length)?;
-    // All but compressed ones begin at a multiple of eight bytes.
+    // All elements but compressed ones are aligned to eight bytes.
     if kind != COMPRESSED {
         from.rest = from.rest.get(length.wrapping_neg() % 8..).unwrap_or_default();
     }
@@ -53,7 +53,7 @@ fn numbers(from: &mut Bytes) -> Result<Vec<f64>, String> {
     Ok(Bytes { rest, ..*from }.numbers(form))
 }
 
-/// Name and values of an array of these parts; none if it is no column.
+/// Name and values of an array with these parts; none if it is not a column.
 fn column(mut parts: Bytes) -> Result<Option<(String, Vec<f64>)>, String> {
     let (_, flags) = element(&mut parts)?;
     let class = flags.get(if parts.is_big_endian { 3 } else { 0 }).ok_or(DAMAGED)?;
@@ -62,7 +62,7 @@ fn column(mut parts: Bytes) -> Result<Option<(String, Vec<f64>)>, String> {
     }
     let size = numbers(&mut parts)?;
     let (_, name) = element(&mut parts)?;
-    // Of complex ones the real part.
+    // For complex numbers, the real part.
     let values = numbers(&mut parts)?;
     if size.iter().product::<f64>() != values.len() as f64 {
         return Err(DAMAGED.to_owned());

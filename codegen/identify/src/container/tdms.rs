@@ -1,4 +1,5 @@
-//! TDMS files (NI, TDMS File Format Internal Structure): segments, each with what has changed of its objects, and their values.
+//! TDMS files (NI, TDMS File Format Internal Structure): segments, each with the changes of its objects, and their
+//! values.
 
 use super::Columns;
 use super::bytes::{Bytes, DAMAGED};
@@ -7,10 +8,10 @@ use super::bytes::{Bytes, DAMAGED};
 const OBJECTS: u32 = 1 << 1;
 const OBJECTS_ALL_NEW: u32 = 1 << 2;
 const VALUES: u32 = 1 << 3;
-/// One value of each object after the other, in place of all of one object and then all of the next.
+/// Values are interleaved: one value of each object in turn.
 const INTERLEAVED: u32 = 1 << 5;
 const BIG_ENDIAN: u32 = 1 << 6;
-/// A type of any length.
+/// A type of variable length.
 const TEXT: u32 = 0x20;
 
 /// A channel, a group, or the file.
@@ -36,7 +37,7 @@ fn width(kind: u32) -> Result<usize, String> {
     }
 }
 
-/// As [`Bytes::numbers`] has it; none for texts, flags and times.
+/// Format for [`Bytes::numbers`]; none for texts, flags and times.
 fn form(kind: u32) -> Option<(char, usize)> {
     Some(match kind {
         1 => ('i', 1),
@@ -58,7 +59,7 @@ fn text(from: &mut Bytes) -> Result<String, String> {
     Ok(String::from_utf8_lossy(from.take(length)?).into_owned())
 }
 
-/// Reads what has changed of `objects`. `listed` are the places of those with values, in their order.
+/// Reads the changes of `objects`. `listed` are the indices of the objects with values, in their order.
 fn read_objects(mut from: Bytes, objects: &mut Vec<Object>, listed: &mut Vec<usize>) -> Result<(), String> {
     for _ in 0..from.word()? {
         let path = text(&mut from)?;
@@ -110,7 +111,7 @@ pub(super) fn columns(file: &[u8]) -> Result<Columns, String> {
         let has = file.word()?;
         file.is_big_endian = has & BIG_ENDIAN > 0;
         let (_version, length, before_values) = (file.word()?, file.count()?, file.count()?);
-        // A writer that was stopped leaves all bits set.
+        // An interrupted writer leaves all bits set.
         let segment = file.take(if length == usize::MAX { file.rest.len() } else { length })?;
         let (rest, values) = segment.split_at_checked(before_values).ok_or(DAMAGED)?;
         if has & OBJECTS_ALL_NEW > 0 {
@@ -188,7 +189,7 @@ mod tests {
         let new = OBJECTS | OBJECTS_ALL_NEW | VALUES;
         let file = [
             segment(new, &plain),
-            // As before, and a chunk that is cut off.
+            // As before, with a chunk that is cut off.
             segment(VALUES, &plain[..30]),
             segment(new | INTERLEAVED | BIG_ENDIAN, &mixed),
         ];

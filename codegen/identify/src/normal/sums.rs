@@ -1,4 +1,4 @@
-//! Sums over Everett nodes, branch by branch, and their way to sums over cell weights.
+//! Sums over Everett nodes, branch by branch, and their transformation to sums over cell weights.
 
 use nalgebra::DMatrix;
 
@@ -6,9 +6,9 @@ use super::Normal;
 use crate::everett::EverettTable;
 use crate::regressor::{Plane, Term};
 
-/// Running sums over Everett nodes, of one table or of several behind each other.
+/// Running sums over Everett nodes, of one table or of several in sequence.
 pub struct Sums {
-    /// Lower triangle; empty if it is not asked for.
+    /// Lower triangle; empty if it is not needed.
     gram: DMatrix<f64>,
     rhs: Vec<Vec<f64>>,
     energy: Vec<f64>,
@@ -22,13 +22,13 @@ struct BranchSums {
     weight: f64,
     row: Vec<f64>,
     touched: Vec<usize>,
-    /// First value of each target in the branch; targets are taken relative to it, which keeps the sums small.
+    /// First value of each target in the branch. Targets are relative to it, which keeps the sums small.
     origin: Vec<f64>,
     target: Vec<f64>,
 }
 
 impl Sums {
-    /// None yet, over so many unknowns.
+    /// Empty sums for this number of unknowns.
     pub fn new(unknowns: usize, targets: usize) -> Self {
         Self { gram: DMatrix::zeros(unknowns, unknowns), ..Self::without_gram(unknowns, targets) }
     }
@@ -52,7 +52,7 @@ impl Sums {
         }
     }
 
-    /// One sample of the branch under way: its row, its targets, and how much it counts.
+    /// One sample of the present branch: its row, its targets, and its weight.
     pub fn add(&mut self, row: &[Term], targets: &[f64], weight: f64) {
         let branch = &mut self.branch;
         for (k, &target) in targets.iter().enumerate() {

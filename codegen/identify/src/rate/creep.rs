@@ -1,11 +1,11 @@
-//! Creep and dead time behind a table: table and linear part are fitted in turn until neither changes much.
+//! Creep and dead time after a table: table and linear part are fitted in turn until neither changes much.
 //!
-//! With the table fixed, f and its creep states are known signals; scale of f, weights (≥ 0) and a change of the dead time
-//! follow from one small least-squares problem, in which each record has an offset and a line of its own:
-//! y(t + τ) = s f + Σ w_j x_j − δτ ḟ. With those fixed, the table is fitted to y(t + τ) − Σ w_j x_j, with a free offset for each
-//! branch. One offset for a record would be the same least squares in both steps and finds the weights of a leg that creeps
-//! linearly; on one that does not (the reference leg's creep has thresholds) it trades table for creep without bound and
-//! was far worse in the controller.
+//! With the table fixed, f and its creep states are known signals. The scale of f, the weights (≥ 0) and a change of
+//! the dead time follow from a small least-squares problem, in which each record has its own offset and line: y(t + τ)
+//! = s f + Σ w_j x_j − δτ ḟ. With those fixed, the table is fitted to y(t + τ) − Σ w_j x_j, with a free offset for each
+//! branch. With one offset for a record, both steps would be the same least squares, and would find the weights of a
+//! leg with linear creep. But the reference leg's creep has thresholds: on such a leg that method trades table for
+//! creep without bound, and was far worse in the controller.
 
 use nalgebra::DMatrix;
 
@@ -18,15 +18,15 @@ use specgen_numerics::nnls::Failure;
 
 /// Fewest and most creep operators; between them, one a decade of the time constants.
 const TERMS: [f64; 2] = [3.0, 6.0];
-/// Shortest time constant, sampling intervals of the record sampled fastest: anything faster is part of the dead time.
+/// Shortest time constant, sampling intervals of the fastest record: faster creep is part of the dead time.
 const SHORTEST: f64 = 20.0;
-/// Longest time constant, share of the longest record: anything slower is a line.
+/// Longest time constant, as a fraction of the longest record: slower creep is a line.
 const LONGEST: f64 = 1.0 / 3.0;
 const TURNS: usize = 60;
-/// A turn that lowers the residual by less than this share is the last.
+/// An iteration that lowers the residual by less than this fraction is the last.
 const WORTHWHILE: f64 = 2e-4;
 
-/// Fits creep behind the table and dead time of `start`.
+/// Fits creep after the table and dead time of `start`.
 pub(super) fn fit(tables: &Tables, start: &RateModel) -> Result<RateModel, Failure> {
     let (plane, records) = (tables.plane, tables.records);
     let times = time_constants(records, false);
@@ -58,7 +58,7 @@ pub(super) fn fit(tables: &Tables, start: &RateModel) -> Result<RateModel, Failu
     Ok(model)
 }
 
-/// Evenly spaced in their logarithm, slowest first, s; of one weight, as many as a controller takes.
+/// Evenly spaced in their logarithm, slowest first, s. For equal weights, as many as a controller takes.
 pub(super) fn time_constants(records: &[&PreparedRecord], even: bool) -> Vec<f64> {
     let longest = records.iter().map(|p| p.duration()).fold(0.0, |a, b| if b > a { b } else { a }) * LONGEST;
     let shortest = records.iter().map(|p| p.interval).fold(longest, |a, b| if b < a { b } else { a }) * SHORTEST;
@@ -82,7 +82,7 @@ struct Linear {
     weights: Vec<f64>,
     /// δτ, s.
     later: f64,
-    /// Mean square that is left, shares of the records added, m².
+    /// Mean square residual over all records, m².
     residual: f64,
 }
 
@@ -103,7 +103,7 @@ fn linear_part(records: &[&PreparedRecord], signals: &[Vec<Vec<f64>>], dead_time
         columns.iter_mut().for_each(|column| detrend(time, column));
         let share = 1.0 / p.samples() as f64;
         if pass < records.len() {
-            // First pass: the size of each column, so that the small matrix is well scaled.
+            // First pass: the size of each column, to scale the small matrix.
             for (scale, column) in scale_of.iter_mut().zip(&columns) {
                 *scale += share * column.iter().fold(0.0, |sum, x| sum + x * x);
             }

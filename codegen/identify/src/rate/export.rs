@@ -9,7 +9,7 @@ use crate::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 const HEADER: &str = "up_V,down_V,rate_um_s_per_V";
-/// Largest value that is believed, m s/V: a metre at 1 V/s.
+/// Largest valid value, m s/V: a metre at 1 V/s.
 const LARGEST: f64 = 1.0;
 
 /// Γ₁ as CSV text: columns `up_V`, `down_V`, `rate_um_s_per_V`, one line per node with up > down.
@@ -18,10 +18,10 @@ pub fn write_rate_csv(table: &EverettTable) -> String {
     write_nodes(table, HEADER)
 }
 
-/// Reads what [`write_rate_csv`] wrote, m s/V. `shown_as` names the file in messages.
+/// Reads the text of [`write_rate_csv`], m s/V. `shown_as` names the file in messages.
 ///
 /// # Errors
-/// A finding per line that is not as [`write_rate_csv`] writes it.
+/// A finding for each line that does not have the form of [`write_rate_csv`].
 pub fn read_rate_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Diagnostic>> {
     const LINE: [&str; 2] = [
         "is not three numbers in range",
@@ -32,8 +32,8 @@ pub fn read_rate_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Dia
     findings.conclude(table).map(|((table, _), _)| table)
 }
 
-/// The `[hysteresis]` lines of a spec that uses `model`; `table` and `rate_table` name the CSV files. `held` (s) is what of the
-/// dead time was the hold of the records' commands: the controller counts that of its own.
+/// The `[hysteresis]` lines of a spec for `model`; `table` and `rate_table` name the CSV files. `held` (s) is the part
+/// of the dead time that is the hold of the records' commands: the controller adds its own.
 #[must_use]
 pub fn spec_lines(option: RateOption, model: &RateModel, held: f64, table: &str, rate_table: &str) -> String {
     let mut text = format!("grid    = {}\nrecords = [\"{table}\"]\n", model.still.grid);
@@ -58,7 +58,7 @@ pub fn spec_lines(option: RateOption, model: &RateModel, held: f64, table: &str,
     };
     if model.dead_time > held {
         let ms = shown((model.dead_time - held) * 1e3);
-        let _ = writeln!(text, "dead_time = \"{ms} ms\"    # of six legs; with [control] it is control.lead");
+        let _ = writeln!(text, "dead_time = \"{ms} ms\"    # for six legs; with [control] use control.lead");
     }
     if let Some(Inertia { mode, .. }) = model.inertia {
         let (frequency, damping) = (shown(mode.frequency), shown(mode.damping));
@@ -67,7 +67,7 @@ pub fn spec_lines(option: RateOption, model: &RateModel, held: f64, table: &str,
     text
 }
 
-/// Six significant digits, without idle zeros.
+/// Six significant digits, without trailing zeros.
 fn shown(value: f64) -> String {
     let text = format!("{value:.5e}");
     text.parse::<f64>().map_or(text, |rounded| format!("{rounded:?}"))

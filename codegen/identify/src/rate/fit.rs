@@ -12,10 +12,11 @@ use crate::{dead_time, normal, prior};
 use specgen_language::diagnostic::codes;
 use specgen_numerics::nnls::Failure;
 
-/// Smoothness of μ₁ against that of μ₀ ([`prior`]): μ₁ is a small difference between rates, and there are as many unknowns.
+/// Smoothness of μ₁ relative to that of μ₀ ([`prior`]): μ₁ is a small difference between rates, with as many unknowns.
 const RATE_SMOOTHNESS: f64 = 1e3;
 
-/// Every option fitted to the records `chosen`, in the order of [`super::RateOption::ALL`]; the last one if there is a `mode`.
+/// Every option fitted to the records `chosen`, in the order of [`super::RateOption::ALL`]; the last one only with a
+/// `mode`.
 pub(super) fn all(
     plane: &Plane,
     prepared: &[PreparedRecord],
@@ -44,13 +45,13 @@ pub(super) fn all(
         .ok()
 }
 
-/// One table for all records behind `dead_time` (s).
+/// One table for all records with `dead_time` (s).
 fn still(tables: &Tables, dead_time: f64) -> Result<RateModel, Failure> {
     let targets: Vec<Vec<f64>> = tables.records.iter().map(|p| p.delayed(dead_time)).collect();
     Ok(RateModel { still: tables.fit(&targets)?, rate: None, creep: Vec::new(), inertia: None, dead_time })
 }
 
-/// The dead time (s) with which one table fits all records best, bounds of the weights aside; zero if none helps.
+/// The dead time (s) with which one table fits all records best, without the bounds of the weights; zero if none helps.
 fn dead_time(plane: &Plane, records: &[&PreparedRecord]) -> Result<f64, Failure> {
     let longest = |p: &&PreparedRecord| dead_time::longest(p.record, &p.branches);
     let longest = records.iter().map(longest).fold(f64::INFINITY, |least, s| if s < least { s } else { least });
@@ -66,10 +67,10 @@ fn dead_time(plane: &Plane, records: &[&PreparedRecord]) -> Result<f64, Failure>
     found.map(|found| found.dead_time).ok_or(Failure::Singular)
 }
 
-/// (6) behind that of the dead times (s) with which it fits better: μ₀ ≥ 0 and μ₁ of either sign in one fit. What all loops lag by is
-/// the dead time's, which a controller leads by; of what is left little is too much for the inverse.
+/// (6) with the better of the two dead times (s): μ₀ ≥ 0 and μ₁ of either sign in one fit. The common lag of all loops
+/// is dead time, for which the controller has a lead; the rest is then mostly small enough for the inverse.
 fn dynamic(plane: &Plane, records: &[&PreparedRecord], dead_times: [f64; 2]) -> Result<RateModel, Failure> {
-    // Rates of order one, so that both halves of the normal matrix are of one size.
+    // Rates of order one, so that both halves of the normal matrix have the same scale.
     let unit = records.iter().fold(f64::MIN_POSITIVE, |most, p| if p.speed > most { p.speed } else { most });
     let each = records.iter().map(|p| accumulate(plane, p, &dead_times.map(|tau| p.delayed(tau)), Some(unit)));
     let mut normal = each.reduce(|sum, more| sum.add(&more)).ok_or(Failure::Singular)?;
@@ -90,7 +91,7 @@ fn dynamic(plane: &Plane, records: &[&PreparedRecord], dead_times: [f64; 2]) -> 
         let scale = 1.0 / table::size(&normal.rhs[k]);
         let rhs: Vec<f64> = normal.rhs[k].iter().map(|b| b * scale).collect();
         let weights = mixed::solve(&normal.gram, &rhs, nodes)?;
-        // What is explained, by the normal equations: wᵀGw = wᵀb but for weights at their bound, which are zero.
+        // The explained part, by the normal equations: wᵀGw = wᵀb, except for weights at their bound, which are zero.
         let explained = weights.iter().zip(&rhs).fold(0.0, |sum, (w, b)| sum + w * b) / (scale * scale);
         let left = normal.energy[k] - explained;
         if best.as_ref().is_none_or(|(least, _)| left < *least) {

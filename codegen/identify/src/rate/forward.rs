@@ -1,4 +1,4 @@
-//! A rate-dependent model run forward over a record.
+//! Runs a rate-dependent model over a record.
 
 use super::{CreepTerm, Inertia, RateModel};
 use crate::normal;
@@ -8,7 +8,7 @@ use crate::staircase::Staircase;
 
 /// The displacement of the model at each sample from `first` on, m above negative saturation, without the dead time.
 ///
-/// `memory` is what came before that sample; creep has come to rest there.
+/// `memory` is the state before that sample; creep has settled there.
 pub(super) fn predict(model: &RateModel, plane: &Plane, record: &Record, first: usize, memory: Staircase) -> Vec<f64> {
     let (plain, rate) = still(model, plane, &record.time, &record.drive, first, memory);
     let time = &record.time[first..];
@@ -18,7 +18,7 @@ pub(super) fn predict(model: &RateModel, plane: &Plane, record: &Record, first: 
     sum
 }
 
-/// Γ₀ at each sample from `first` on, m, and u̇ Γ₁ where the model has it; `memory` is what came before.
+/// Γ₀ at each sample from `first` on, m, plus u̇ Γ₁ if the model has it; `memory` is the state before.
 pub(crate) fn still(
     model: &RateModel,
     plane: &Plane,
@@ -49,7 +49,7 @@ pub(crate) fn creeping(model: &RateModel, time: &[f64], f: &[f64]) -> Vec<f64> {
     sum
 }
 
-/// Adds to `sum` (m) at `time` (s) what the mode does under `drive` (V), at rest before.
+/// Adds the response of the mode to `drive` (V) to `sum` (m) at `time` (s), starting at rest.
 pub(crate) fn inertia(model: &RateModel, time: &[f64], drive: &[f64], sum: &mut [f64]) {
     let Some(Inertia { mode, gain }) = model.inertia else { return };
     for ((y, moved), u) in sum.iter_mut().zip(mode.behind(time, drive)).zip(drive) {
@@ -57,7 +57,7 @@ pub(crate) fn inertia(model: &RateModel, time: &[f64], drive: &[f64], sum: &mut 
     }
 }
 
-/// x of one creep operator behind `f`, exact for an f that is straight between samples. It starts at rest.
+/// x of one creep operator with input `f`, exact for an f that is linear between samples. It starts at rest.
 pub(super) fn creep(time_constant: f64, time: &[f64], f: &[f64]) -> Vec<f64> {
     let mut x = f.first().copied().unwrap_or(0.0);
     let mut before = x;
@@ -65,7 +65,7 @@ pub(super) fn creep(time_constant: f64, time: &[f64], f: &[f64]) -> Vec<f64> {
     for (k, &f) in f.iter().enumerate() {
         if k > 0 {
             let step = time[k] - time[k - 1];
-            // Behind a ramp x lags by τ times its slope.
+            // After a ramp x lags by τ times its slope.
             let behind = (f - before) / step * time_constant;
             x = f - behind + (x - before + behind) * libm::exp(-step / time_constant);
         }
@@ -102,7 +102,7 @@ pub(super) fn without_creep(model: &RateModel, time: &[f64], y: &[f64]) -> Vec<f
     let mut all = Vec::with_capacity(y.len());
     for (k, y) in y.iter().enumerate() {
         if k > 0 {
-            // x = kept·x + known·f of the last sample + direct·f, as [`creep`] has it.
+            // x = kept·x + known·f of the last sample + direct·f, as in [`creep`].
             let step = time[k] - time[k - 1];
             let (mut carried, mut direct) = (0.0, 1.0);
             let mut parts = [[0.0; 2]; MOST_TERMS];
@@ -124,7 +124,7 @@ pub(super) fn without_creep(model: &RateModel, time: &[f64], y: &[f64]) -> Vec<f
 /// Most creep operators of a model.
 pub(super) const MOST_TERMS: usize = 6;
 
-/// The same terms without those of no weight.
+/// The same terms without those of zero weight.
 pub(super) fn kept(terms: Vec<CreepTerm>) -> Vec<CreepTerm> {
     terms.into_iter().filter(|term| term.weight > 0.0).collect()
 }

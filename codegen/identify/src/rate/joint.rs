@@ -1,8 +1,9 @@
-//! Creep of one weight or of several, dead time and a known mode behind a table, all fitted at once (variable projection).
+//! Creep with one or several weights, dead time and a known mode after a table, all fitted at once (variable
+//! projection).
 //!
-//! For weights and dead time that are tried, the table is the one that fits what creep and mode leave; so the error of the
-//! whole record is a function of these few numbers alone, and Gauss-Newton steps lower it. Differences are taken with the
-//! table fitted anew, so that what the table takes over is not counted for creep.
+//! For given weights and dead time, the table is fitted to the rest after creep and mode. The error of the whole record
+//! is then a function of these few numbers only, which Gauss-Newton steps minimise. The table is refitted for each
+//! difference quotient, so that effects of the table do not count as creep.
 
 use nalgebra::DMatrix;
 
@@ -14,27 +15,28 @@ use super::{CreepTerm, Inertia, RateModel, creep, mixed};
 use crate::mode::Mode;
 use specgen_numerics::nnls::Failure;
 
-/// What stands behind the table.
+/// The model after the table.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shape {
-    /// Whether all time constants have one weight.
+    /// Whether all time constants share one weight.
     pub(super) even: bool,
     /// A known mode.
     pub(super) mode: Option<Mode>,
 }
 
 const STEPS: usize = 12;
-/// A step that lowers the error by less than this share is the last.
+/// A step that lowers the error by less than this fraction is the last.
 const WORTHWHILE: f64 = 1e-3;
-/// Differences are taken over this weight, and this dead time (s).
+/// Steps of the difference quotients: of a weight, and of the dead time (s).
 const WEIGHT: f64 = 2e-3;
 const LATER: f64 = 5e-6;
-/// Weight that is drawn to zero by as much as a ten thousandth of the range draws: what the records do not show stays small.
+/// Weight at which the pull to zero equals an error of a ten thousandth of the range: parameters that the records do
+/// not show stay small.
 const PULL: f64 = 1e-4;
-/// Passes in which the table and the state at the start meet.
+/// Passes in which table and start state converge.
 const PASSES: usize = 2;
 
-/// Weights, gain and dead time that were tried, their model, and what it leaves.
+/// Weights, gain and dead time of an attempt, their model, and its residual.
 type Attempt = (Vec<f64>, RateModel, Vec<f64>);
 
 struct Fit<'a> {
@@ -46,7 +48,7 @@ struct Fit<'a> {
     gain: f64,
 }
 
-/// Fits what `shape` says behind a table, from the table and dead time of `start` on.
+/// Fits `shape` after a table, starting from the table and dead time of `start`.
 pub(super) fn fit(tables: &Tables, start: &RateModel, shape: Shape) -> Result<RateModel, Failure> {
     let records = tables.records;
     let times = creep::time_constants(records, shape.even);
@@ -71,7 +73,7 @@ pub(super) fn fit(tables: &Tables, start: &RateModel, shape: Shape) -> Result<Ra
 }
 
 impl Fit<'_> {
-    /// The model of weights and dead time `at`; `near` is one beside it.
+    /// The model of weights and dead time `at`; `near` is a model close to it.
     fn table(&self, at: &[f64], near: &RateModel) -> Result<RateModel, Failure> {
         let (dead_time, weights) = at.split_last().map_or((0.0, at), |(last, weights)| (*last, weights));
         let weight = |k: usize| weights[if self.shape.even { 0 } else { k }];
@@ -92,7 +94,7 @@ impl Fit<'_> {
         Ok(model)
     }
 
-    /// What the table is to give for the rest of the model to meet the record, m.
+    /// Target of the table so that the complete model fits the record, m.
     fn target(&self, model: &RateModel, p: &PreparedRecord, own: &RecordColumns, started: bool) -> Vec<f64> {
         let time = &p.record.time[p.first..];
         let plain = forward::static_part(model, self.tables.plane, p);
@@ -109,7 +111,7 @@ impl Fit<'_> {
         forward::without_creep(model, time, &target)
     }
 
-    /// Error of each sample as a share of its record's range and size.
+    /// Error of each sample as a fraction of its record's range and size.
     fn left(&self, model: &RateModel) -> Vec<f64> {
         let each = self.tables.records.iter().zip(&self.own).flat_map(|(p, own)| {
             let time = &p.record.time[p.first..];
@@ -125,7 +127,7 @@ impl Fit<'_> {
         each.collect()
     }
 
-    /// Where the linearised error is least, weights ≥ 0.
+    /// Minimum of the linearised error, weights ≥ 0.
     fn step(&self, at: &[f64], model: &RateModel, left: &[f64]) -> Result<Vec<f64>, Failure> {
         let unknowns = at.len();
         let mut columns = Vec::with_capacity(unknowns);
@@ -136,7 +138,7 @@ impl Fit<'_> {
             let moved = self.left(&self.table(&beside, model)?);
             columns.push(moved.iter().zip(left).map(|(a, b)| (b - a) / width).collect::<Vec<f64>>());
         }
-        // left − Σ column·(next − at): of the next values themselves, so that they have their bounds.
+        // left − Σ column·(next − at): in terms of the next values, so that their bounds apply.
         let mut target = left.to_vec();
         for (column, value) in columns.iter().zip(at) {
             target.iter_mut().zip(column).for_each(|(y, x)| *y += value * x);
@@ -153,7 +155,7 @@ impl Fit<'_> {
         Ok(next.iter().zip(&unit).map(|(x, unit)| x * unit).collect())
     }
 
-    /// The first of the whole way, a half, a quarter … to `wanted` that lowers the error.
+    /// The first of the whole step, a half, a quarter … to `wanted` that lowers the error.
     fn along(&self, at: &[f64], wanted: &[f64], model: &RateModel, before: f64) -> Result<Option<Attempt>, Failure> {
         for share in [1.0, 0.5, 0.25] {
             let mut next: Vec<f64> = at.iter().zip(wanted).map(|(a, b)| a + share * (b - a)).collect();
@@ -170,7 +172,7 @@ impl Fit<'_> {
     }
 }
 
-/// Of errors, and of the weights that are drawn to zero.
+/// Sum of squares of errors, and of the weights that are pulled to zero.
 fn square(left: &[f64], at: &[f64]) -> f64 {
     let weights = &at[..at.len() - 1];
     left.iter().fold(0.0, |sum, x| sum + x * x) + weights.iter().fold(0.0, |sum, w| sum + PULL * PULL * w * w)

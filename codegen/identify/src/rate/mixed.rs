@@ -1,7 +1,7 @@
-//! Least squares in which some unknowns are not negative and the others are free.
+//! Least squares in which some unknowns are non-negative and the others are free.
 //!
-//! The free ones are eliminated (Schur complement), the rest is [`nnls`], and the free ones follow from it. The sums are
-//! written out, in order: their bits do not depend on the CPU.
+//! The free ones are eliminated (Schur complement), the rest is [`nnls`], and the free ones follow. The sums are
+//! written out in order: their bits do not depend on the CPU.
 
 use nalgebra::DMatrix;
 use specgen_numerics::Factor;
@@ -22,7 +22,7 @@ pub(super) fn solve(gram: &DMatrix<f64>, rhs: &[f64], bounded: usize) -> Result<
     if bounded == 0 {
         return Ok(free_rhs);
     }
-    // Column c: how the free ones answer to bounded unknown c.
+    // Column c: response of the free unknowns to bounded unknown c.
     let cross: Vec<Vec<f64>> = (0..bounded).map(|c| (0..free).map(|r| gram[(bounded + r, c)]).collect()).collect();
     let answer: Vec<Vec<f64>> = cross.iter().map(|column| solved(column.clone())).collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y);

@@ -1,4 +1,5 @@
-//! Normal equations of a table, and of a second one times the rate, over all branches of one record, each with a free offset.
+//! Normal equations of a table, and of a second one times the rate, over all branches of one record, each with a free
+//! offset.
 
 use nalgebra::DMatrix;
 
@@ -29,8 +30,8 @@ impl Normal {
     }
 }
 
-/// Over the branches of `p`. `targets` are over its used part (m). `rate_unit`: also the second table, with rates in this
-/// unit (V/s).
+/// Over the branches of `p`. `targets` are over its used part (m). With `rate_unit`, also the second table, with rates
+/// in this unit (V/s).
 pub(super) fn accumulate(plane: &Plane, p: &PreparedRecord, targets: &[Vec<f64>], rate_unit: Option<f64>) -> Normal {
     let unknowns = if rate_unit.is_some() { 2 * plane.nodes() } else { plane.nodes() };
     over(Sums::new(unknowns, targets.len()), plane, p, targets, rate_unit)

@@ -1,21 +1,22 @@
-//! What a record shows of the state before it.
+//! Information of a record about the state before it.
 //!
-//! Let y₋ be the model's displacement where every relay that the first drive u₀ leaves open (up > u₀ > down) is off, y₊ where
-//! all are on. D = y₊ − y₋ is the weight of those that the drive has not switched since: it falls as the drive reaches
-//! further than before, and they are switched in one order. So whatever came before, the displacement is y₋ + A(D) with
-//! A(0) = 0 and a slope of A from 0 (those relays were off) to 1 (on). A is taken as straight in [`PARTS`] equal parts of D,
-//! and its slopes are least squares within these bounds, with the offset and the line that the record has anyway, and with the start of creep and mode.
-//! Negative and positive saturation are the slopes 0 and 1, a demagnetised actuator is about ½.
+//! Let y₋ be the model's displacement if every relay that the first drive u₀ leaves open (up > u₀ > down) is off, y₊ if
+//! all are on. D = y₊ − y₋ is the weight of those that the drive has not switched since. It falls as the drive reaches
+//! further than before, and the relays switch in one order. So for any earlier state, the displacement is y₋ + A(D)
+//! with A(0) = 0 and a slope of A from 0 (those relays were off) to 1 (on). A is piecewise linear in [`PARTS`] equal
+//! parts of D. Its slopes are least squares within these bounds, together with the record's offset and line, and the
+//! start states of creep and mode. Negative and positive saturation are the slopes 0 and 1, a demagnetised actuator is
+//! about ½.
 
 use super::start::RecordColumns;
 use crate::staircase::saturate;
 
 /// Parts of A.
 const PARTS: usize = 16;
-/// Pull towards ½ of a slope that the record does not show, as a share of the mean square of what it does.
+/// Pull towards ½ of a slope that the record does not determine, as a fraction of the mean square of the others.
 const PULL: f64 = 1e-6;
 const SWEEPS: usize = 5000;
-/// A sweep that changes no slope by more is the last.
+/// An iteration that changes no slope by more is the last.
 const SETTLED: f64 = 1e-9;
 
 /// The parts of A behind unit slopes: one signal a part, as long as `open` (D, m), which sum to D.
@@ -29,7 +30,7 @@ pub(crate) fn parts(open: &[f64]) -> Vec<Vec<f64>> {
     (0..PARTS).map(part).collect()
 }
 
-/// The slopes with which `rest` ≈ Σ slope·part + what the record has of its `own`.
+/// The slopes with which `rest` ≈ Σ slope·part + the record's own columns.
 pub(crate) fn slopes(rest: &[f64], parts: &[Vec<f64>], own: &RecordColumns) -> Vec<f64> {
     let without_own = |values: &[f64]| -> Vec<f64> {
         let mut values = values.to_vec();

@@ -1,17 +1,18 @@
-//! From which period on a controller can invert (6).
+//! Shortest period at which a controller can invert (6).
 //!
-//! In a tick from u₀ to u the rate term is (u − u₀) Γ₁/T. The controller gives the static inverse where that takes away more than
-//! half of what Γ₀ gains (`runtime/src/dynamic.rs`): on a branch of slope f′, where T < −2 Γ₁/f′. Counted is the displacement that is
-//! travelled on the branches that rise from the lowest drive, and on those that fall from each threshold of the grid.
+//! In a tick from u₀ to u the rate term is (u − u₀) Γ₁/T. The controller uses the static inverse if that takes away
+//! more than half of the gain of Γ₀ (`runtime/src/dynamic.rs`): on a branch of slope f′, if T < −2 Γ₁/f′. The measure
+//! is the displacement on the branches that rise from the lowest drive, and on those that fall from each threshold of
+//! the grid.
 
 use crate::everett::EverettTable;
 
-/// Share of the travel on which the inverse must be that of (6) for a controller to be said to run it.
+/// Least fraction of the travel on which the inverse must be that of (6).
 pub const INVERTED: f64 = 0.8;
 
-/// Which periods the pieces of the branches need.
+/// Periods that the segments of the branches need.
 pub struct Invertible {
-    /// Period that a piece needs, s, and the displacement travelled on it, m; by rising period.
+    /// Period that a segment needs, s, and its displacement, m; by rising period.
     pieces: Vec<[f64; 2]>,
 }
 
@@ -41,7 +42,7 @@ impl Invertible {
         Self { pieces }
     }
 
-    /// Share of the travel on which a controller of `period` (s) inverts (6).
+    /// Fraction of the travel on which a controller of `period` (s) inverts (6).
     #[must_use]
     pub fn share(&self, period: f64) -> f64 {
         let sum = |pieces: &[[f64; 2]]| pieces.iter().fold(0.0, |sum, piece| sum + piece[1]);
@@ -66,7 +67,7 @@ impl Invertible {
 mod tests {
     use super::*;
 
-    /// Straight branches: every piece needs twice the lag that the second table stands for at its end.
+    /// Straight branches: every segment needs twice the lag that the second table has at its end.
     #[test]
     fn a_table_that_lags_needs_twice_its_lag() {
         let table = |value: &dyn Fn(f64) -> f64| EverettTable {

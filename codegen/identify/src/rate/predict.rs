@@ -1,4 +1,4 @@
-//! What a model makes of a drive: the displacement at each of its samples, and how far off it is where the file has it.
+//! Prediction of the displacement for a drive, and its error if the file has a displacement.
 
 use std::path::Path;
 
@@ -20,16 +20,16 @@ use crate::trend::{Line, rms_and_max};
 use crate::{branches, statistics};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
-/// The drive may leave the range of the table by this share of it; it is held at its end there.
+/// Fraction by which the drive may leave the range of the table; it is limited to the range.
 const BEYOND: f64 = 0.05;
 
-/// Fewer samples are not compared.
+/// Least number of compared samples.
 const LEAST: usize = 8;
 
-/// A drive record: reversal curves or anything else, with or without the displacement.
+/// A drive record: reversal curves or any other drive, with or without displacement.
 #[derive(Debug, Clone)]
 pub struct Drive {
-    /// Name of the file as its user knows it.
+    /// Name of the file as the user gave it.
     pub shown_as: String,
     /// s, rising.
     pub time: Vec<f64>,
@@ -37,7 +37,7 @@ pub struct Drive {
     pub drive: Vec<f64>,
     /// m.
     pub displacement: Option<Vec<f64>>,
-    /// Samples that are not compared: glitches and what follows a jump.
+    /// Samples that are not compared: glitches, and those after a jump.
     weightless: Vec<bool>,
     /// Half the interval for which a converter holds a command, s; 0 for a measured voltage.
     pub held: f64,
@@ -57,7 +57,7 @@ impl From<&Record> for Drive {
 }
 
 impl Drive {
-    /// A voltage (V) over `time` (s, rising) of which the displacement is not known.
+    /// A voltage (V) over `time` (s, rising) without a displacement.
     #[must_use]
     pub fn of_voltage(shown_as: &str, time: Vec<f64>, voltage: Vec<f64>) -> Self {
         let weightless = vec![false; time.len()];
@@ -94,12 +94,12 @@ fn of_signals(signals: Signals) -> Drive {
     Drive { shown_as, time, drive, displacement, weightless, held }
 }
 
-/// How far off a prediction is. Lengths in m; percentages are of `range`.
+/// Error of a prediction. Lengths in m; percentages are of `range`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PredictionError {
     /// Samples compared.
     pub samples: usize,
-    /// Samples behind a jump of the drive that are not: the actuator is still ringing.
+    /// Samples after a jump of the drive, not compared because the actuator is still ringing.
     pub samples_after_jumps: usize,
     /// Of the compared displacement.
     pub range: f64,
@@ -111,9 +111,9 @@ pub struct PredictionError {
     pub rms_percent: f64,
     /// `max` in % of the range.
     pub max_percent: f64,
-    /// The linear drift that was taken out, m/s.
+    /// The linear drift that was removed, m/s.
     pub drift: f64,
-    /// What the error consists of.
+    /// Causes of the error.
     pub cause: Cause,
 }
 
@@ -122,20 +122,20 @@ pub struct PredictionError {
 pub struct Prediction {
     /// Name of the record.
     pub record: String,
-    /// Samples at the beginning, before the drive first moves: the displacement is not predicted there.
+    /// Samples before the drive first moves; they have no prediction.
     pub samples_skipped: usize,
-    /// Samples whose drive is outside the range of the table and was held at its end.
+    /// Samples whose drive was outside the table's range and was limited to it.
     pub samples_clipped: usize,
-    /// Time by which the displacement is taken to lag the drive column, s.
+    /// Lag of the displacement behind the drive column, s.
     pub dead_time: f64,
-    /// What a mode was taken to add.
+    /// Assumed contribution of a mode.
     pub inertia: Option<Inertia>,
-    /// Share of the weight that the first drive leaves open which was on before the record: 0 after a rise from the lowest
-    /// drive, 1 after a fall from the highest. From the displacement; ½ without one.
+    /// Fraction of the weight left open by the first drive that was on before the record: 0 after a rise from the
+    /// lowest drive, 1 after a fall from the highest. From the displacement; ½ without one.
     pub start_on: f64,
-    /// Against the displacement of the record, if it has one.
+    /// Comparison with the displacement of the record, if it has one.
     pub compared: Option<PredictionError>,
-    /// Time of each sample behind the skipped ones, s.
+    /// Time of each sample after the skipped ones, s.
     #[serde(skip)]
     pub time: Vec<f64>,
     /// Drive of each, V.
@@ -162,9 +162,9 @@ pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result
 
 /// Runs `model` over `drive`; `model.dead_time` counts from the drive column.
 ///
-/// The state at the start is unknown and taken from the displacement, see [`Prediction::start_on`]. Samples before the drive
-/// first moves are skipped: they say nothing about hysteresis. Not compared are 200 samples from each jump of the drive by
-/// more than 10 % of the table's range in one sampling interval.
+/// The start state is unknown and estimated from the displacement, see [`Prediction::start_on`]. Samples before the
+/// drive first moves are skipped: they have no information on hysteresis. After each jump of the drive by more than 10
+/// % of the table's range in one sampling interval, 200 samples are not compared.
 ///
 /// # Errors
 /// If the drive never moves, or leaves the range of the table by more than 5 %.
@@ -187,7 +187,7 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
     };
     let samples_clipped = drive.drive[first..].iter().filter(|u| **u < bottom || **u > top).count();
     let time = drive.time[first..].to_vec();
-    // Of a drive that begins later than it does: the model's displacements follow it by the dead time.
+    // If the drive starts earlier, the model's displacement follows it by the dead time.
     let run = |full: bool| {
         let mut memory = Staircase::negative_saturation(plane.range);
         if full {
@@ -216,7 +216,7 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
     if let Some(y) = &measured {
         let (low, high) = statistics::extent(&kept(y));
         if low >= high || kept(y).len() < LEAST {
-            let message = "the drive moves by a jump alone, or the displacement stands still".to_owned();
+            let message = "the drive moves only in a jump, or the displacement does not move".to_owned();
             findings.add(codes::VALIDATION_IDLE, None, message, "name a record that moves the drive");
             return Err(findings.into_diagnostics());
         }

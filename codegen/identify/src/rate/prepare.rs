@@ -1,4 +1,4 @@
-//! Records ready for the fits: the usable part, its branches and its rate.
+//! Prepares records for the fits: the usable part, its branches and its rate.
 
 use super::start::RecordColumns;
 use crate::branches::Branch;
@@ -9,7 +9,7 @@ use crate::regressor::Plane;
 use crate::{coverage, dead_time, selection, statistics};
 use specgen_language::diagnostic::codes;
 
-/// Records whose rates differ by less than this factor tell nothing about rate dependence.
+/// Least ratio of the records' rates for an estimate of the rate dependence.
 const RATE_RATIO: f64 = 1.2;
 
 /// A record, its usable part and its rate.
@@ -24,7 +24,7 @@ pub(super) struct PreparedRecord<'a> {
     pub(super) frequency: f64,
     /// Median sampling interval, s.
     pub(super) interval: f64,
-    /// du/dt by backward difference, as the controller forms it, V/s; one value for each sample.
+    /// du/dt by backward difference, as in the controller, V/s; one value for each sample.
     pub(super) slope: Vec<f64>,
 }
 
@@ -38,7 +38,7 @@ impl PreparedRecord<'_> {
         self.record.time[self.record.time.len() - 1] - self.record.time[self.first]
     }
 
-    /// What the record has of its own beside a model with creep of `times` (s) and a mode.
+    /// The record's own columns for a model with creep of `times` (s) and a mode.
     pub(super) fn own(&self, times: &[f64], mode: Option<Mode>) -> RecordColumns {
         let keep = self.record.weightless[self.first..].iter().map(|w| !w).collect();
         RecordColumns::of(&self.record.time[self.first..], keep, times.iter().copied(), mode)
@@ -50,7 +50,7 @@ impl PreparedRecord<'_> {
     }
 }
 
-/// du/dt of each sample by backward difference, drives held within `range` (V), V/s; 0 for the first.
+/// du/dt of each sample by backward difference, with the drive limited to `range` (V), V/s; 0 for the first.
 pub(super) fn slope(time: &[f64], drive: &[f64], range: [f64; 2]) -> Vec<f64> {
     let held = |u: f64| crate::staircase::saturate(u, range);
     let pairs = drive.windows(2).zip(time.windows(2));

@@ -1,4 +1,4 @@
-//! What the comparison of the options tells.
+//! Results of the comparison of the options.
 
 use serde::Serialize;
 
@@ -13,7 +13,7 @@ use crate::regressor::Plane;
 use crate::statistics;
 use specgen_language::diagnostic::Diagnostic;
 
-/// An option beats the static table on a rate if its error there is lower by this share at least.
+/// Least fraction by which an option's error must be below the static table's.
 const BEATS: f64 = 0.02;
 
 /// A record of the comparison.
@@ -31,7 +31,7 @@ pub struct RateRecord {
     pub samples: usize,
     /// Range of the displacement over them, m.
     pub range: f64,
-    /// White noise, % of the range: no model can be better.
+    /// White noise, % of the range: the lower limit of any model's error.
     pub noise_percent: f64,
 }
 
@@ -47,48 +47,49 @@ impl RateRecord {
 /// One option. Errors are rms in % of each record's range.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OptionReport {
-    /// The option that the figures are of.
+    /// The option.
     pub option: RateOption,
-    /// Dead time that was fitted with it, s.
+    /// Its fitted dead time, s.
     pub dead_time: f64,
-    /// Creep terms that were fitted; empty for options without creep.
+    /// Its fitted creep terms; empty for options without creep.
     pub creep: Vec<CreepTerm>,
-    /// Dynamic Preisach: the shortest period at which a controller can invert it, s. At a shorter one `check` refuses it.
+    /// Dynamic Preisach: the shortest period at which a controller can invert it, s. `check` refuses a shorter one.
     pub period: Option<f64>,
     /// Fitted to all records.
     pub fitted: Vec<f64>,
-    /// Each record by the fit to the others.
+    /// Error on each record of the fit to the others.
     pub left_out: Vec<f64>,
-    /// On the record that took part in no fit.
+    /// On the record that was excluded from all fits.
     pub hold_out: Option<f64>,
 }
 
-/// The record that took part in no fit.
+/// The record that was excluded from all fits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HoldOut {
-    /// Name of the record that was held out.
+    /// Name of the record.
     pub record: String,
 }
 
-/// Whether an option predicts a rate that it was not fitted on better than the static table.
+/// Whether an option predicts an unseen rate better than the static table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Of the options that a controller can run, the one with the lowest mean error on rates it was not fitted on.
+    /// Of the options that a controller can run, the one with the lowest mean error on unseen rates.
     pub best: RateOption,
-    /// Options that beat the static table on every such rate, and on the held-out record if there is one.
+    /// Options that are better than the static table on every such rate, and on the held-out record if there is one.
     pub beats_static: Vec<RateOption>,
     /// The same in words.
     pub text: String,
 }
 
-/// Figures of every option on every record, and what follows from them.
+/// Figures of every option on every record, and the conclusions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RateReport {
     /// Intervals per axis of the tables.
     pub grid: usize,
     /// The records, in the order given.
     pub records: Vec<RateRecord>,
-    /// What of each dead time is the hold of the records' commands, s: half a sampling interval, on the mean of the records.
+    /// Part of each dead time that is the hold of the records' commands, s: half a sampling interval, averaged over the
+    /// records.
     pub held: f64,
     /// The mode behind the last option, given or from a ring.
     pub mode: Option<Mode>,

@@ -1,4 +1,4 @@
-//! How far a model is off on a record: % of the displacement's range, after what each record has of its own.
+//! Error of a model on a record: % of the displacement's range, after removal of the record's own columns.
 
 use super::RateModel;
 use super::forward::predict;
@@ -7,7 +7,7 @@ use crate::regressor::Plane;
 use crate::staircase::Staircase;
 use crate::statistics;
 
-/// Root mean square error in % of the range, on a record whose start is known but for creep and mode.
+/// Root mean square error in % of the range, on a record whose start state is known except for creep and mode.
 pub(super) fn on(model: &RateModel, plane: &Plane, p: &PreparedRecord) -> f64 {
     let memory = Staircase::negative_saturation(plane.range);
     let predicted = predict(model, plane, p.record, p.first, memory);

@@ -1,20 +1,20 @@
-//! What a record has of its own: an offset, a line, and the state that creep and mode had at its start.
+//! Columns that belong to a record: an offset, a line, and the start states of creep and mode.
 //!
-//! A creep operator that starts elsewhere than at rest adds a e^(−t/τ), a mode that still rings adds a decaying oscillation: all
-//! linear in what is not known, so that they are estimated with the model, for each record anew, and none of them counts as
-//! its error.
+//! A creep operator that does not start at rest adds a e^(−t/τ); a mode that still rings adds a decaying oscillation.
+//! Both are linear in the unknown start state, so they are estimated with the model, for each record separately, and do
+//! not count as its error.
 
 use crate::mode::Mode;
 
 /// Columns of a record, orthonormal over the samples that count.
 pub(crate) struct RecordColumns {
     basis: Vec<Vec<f64>>,
-    /// So many of them are offset and line.
+    /// Number of these that are offset and line.
     plain: usize,
     keep: Vec<bool>,
 }
 
-/// A column of which the ones before it leave less than this share (of the length) tells nothing more.
+/// A column whose remainder after the ones before it is below this fraction (of the length) has no information.
 const NEW: f64 = 1e-3;
 
 impl RecordColumns {
@@ -35,7 +35,7 @@ impl RecordColumns {
 
     fn add(&mut self, mut column: Vec<f64>) {
         let before = self.dot(&column, &column);
-        // Twice: rounding of the first time leaves a rest.
+        // Twice, to remove the rounding of the first time.
         self.take_out(&mut column);
         self.take_out(&mut column);
         let after = self.dot(&column, &column);
@@ -46,12 +46,12 @@ impl RecordColumns {
         }
     }
 
-    /// `values` without what these columns explain.
+    /// `values` without the part that these columns explain.
     pub(crate) fn take_out(&self, values: &mut [f64]) {
         self.without(0, values);
     }
 
-    /// `values` without what the state at the start explains: offset and line stay.
+    /// `values` without the part that the start state explains: offset and line stay.
     pub(crate) fn take_out_start(&self, values: &mut [f64]) {
         self.without(self.plain, values);
     }
@@ -63,7 +63,7 @@ impl RecordColumns {
         }
     }
 
-    /// Over the samples that count.
+    /// Over the selected samples.
     pub(crate) fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
         a.iter().zip(b).zip(&self.keep).fold(0.0, |sum, ((x, y), keep)| if *keep { sum + x * y } else { sum })
     }

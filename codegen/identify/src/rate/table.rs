@@ -12,7 +12,7 @@ use crate::{normal, prior};
 use specgen_language::interrupt;
 use specgen_numerics::nnls::{self, Failure};
 
-/// Tables for the same drives and one displacement after the other: what only depends on the drives is kept.
+/// Tables for the same drives and different displacements: everything that depends only on the drives is kept.
 pub(super) struct Tables<'a> {
     pub(super) plane: &'a Plane,
     pub(super) records: &'a [&'a PreparedRecord<'a>],
@@ -39,7 +39,7 @@ impl<'a> Tables<'a> {
             };
             sum.iter_mut().zip(rhs).for_each(|(sum, b)| *sum += b);
         }
-        // To order one: the tolerances of the solver are relative, and so small weights keep their digits.
+        // Scaled to order one: the tolerances of the solver are relative, and small weights keep their digits.
         let scale = 1.0 / size(&sum);
         sum.iter_mut().for_each(|b| *b *= scale);
         interrupt::point();

@@ -8,7 +8,7 @@ use super::welch::Bin;
 /// A value and its standard error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
-    /// The value, in the unit of what is estimated.
+    /// The value, in its unit.
     pub value: f64,
     /// Standard error, in its unit; 0 for a parameter held at zero.
     pub error: f64,
@@ -35,9 +35,9 @@ pub struct ResonanceFit {
 
 /// ln K, ln f0, ln ζ, τ/s0, T/s0 with s0 = 1/(2π f0 of the start).
 const N: usize = 5;
-/// Coherence beyond which more is not believed: leakage and jitter are no noise.
+/// Upper limit of the coherence: leakage and jitter are not noise.
 const CAP: f64 = 0.9995;
-/// Share of independent averages among half-overlapped Hann segments.
+/// Fraction of independent averages among half-overlapped Hann segments.
 const OVERLAPPED: f64 = 0.947;
 const STEPS: usize = 200;
 
@@ -104,7 +104,7 @@ pub fn response(fitted: &ResonanceFit, f: f64) -> (f64, f64) {
     (libm::exp(log), phase)
 }
 
-/// Fits to bins that are all to be believed; the reason if there is no fit.
+/// Fits to valid bins; the reason if there is no fit.
 pub(super) fn fit(bins: &[Bin], averages: usize) -> Result<ResonanceFit, String> {
     let count = averages as f64 * OVERLAPPED;
     let weights: Vec<f64> = bins
@@ -142,7 +142,7 @@ pub(super) fn fit(bins: &[Bin], averages: usize) -> Result<ResonanceFit, String>
     let Some((_, mut p)) = best else {
         return Err("the fit of resonance, lag and dead time does not converge".to_owned());
     };
-    // Neither lag nor dead time can be negative: what comes out so is held at zero, the worse one first.
+    // Neither lag nor dead time can be negative: a negative result is held at zero, the worse one first.
     let mut free = vec![0, 1, 2, 3, 4];
     for _ in 0..2 {
         let worst = if p[3] < p[4] { 3 } else { 4 };
@@ -171,7 +171,7 @@ fn minimise(problem: &Problem, start: [f64; N], free: &[usize]) -> (f64, [f64; N
         let step = factor.solve(&slope);
         let mut tried = p;
         for (column, &k) in free.iter().enumerate() {
-            // At most a factor e: a far step would leave the basin.
+            // At most a factor e: a longer step would leave the basin.
             tried[k] -= step[column].clamp(-1.0, 1.0);
         }
         let tried_r = problem.residuals(&tried);
@@ -212,7 +212,7 @@ fn estimates(problem: &Problem, p: &[f64; N], free: &[usize]) -> Result<Resonanc
     let inverse = factor.inverse();
     let freedom = (r.len() - free.len()).max(1) as f64;
     let reduced = r.iter().fold(0.0, |s, v| s + v * v) / freedom;
-    // A misfit of the model widens the errors; a lucky fit does not narrow them.
+    // A misfit of the model widens the errors; a good fit does not narrow them.
     let scale = if reduced > 1.0 { reduced } else { 1.0 };
     let covariance = |a: usize, b: usize| match (free.iter().position(|f| *f == a), free.iter().position(|f| *f == b)) {
         (Some(x), Some(y)) => scale * inverse[(x, y)],

@@ -1,4 +1,4 @@
-//! Which column of a file holds what: as the user says, else by its name.
+//! Assigns the columns of a file: by the user's choice, otherwise by their names.
 
 use super::{ColumnSpec, TIME};
 use crate::columns::names::{self, Quantity};
@@ -7,17 +7,17 @@ use crate::findings::Findings;
 use crate::reading::Reading;
 use specgen_language::diagnostic::codes;
 
-/// Headers closer than this many edits to a wanted one are suggested.
+/// Headers within this edit distance of a requested name are suggested.
 const NEAR: usize = 4;
-/// The drive as it was commanded, and as it was measured.
+/// The drive as commanded, and as measured.
 pub(crate) const DRIVE: &str = "drive_V";
 pub(crate) const MONITOR: &str = "monitor_V";
 
-/// Where the wanted columns are.
+/// Places of the requested columns.
 pub(super) struct Places {
-    /// One for each that is wanted; none if the file does not have it.
+    /// One for each request; none if the file does not have it.
     pub(super) columns: Vec<Option<Column<'static>>>,
-    /// If times are counted: s between samples. The column of times then holds sample numbers, or is none.
+    /// Time between samples, s, if time is computed. The column of times then has sample numbers, or does not exist.
     pub(super) interval: Option<f64>,
 }
 
@@ -77,18 +77,18 @@ impl Search<'_> {
         }
     }
 
-    /// Whether [`Search::place`] has reported why it found none.
+    /// Whether [`Search::place`] has reported why it found no column.
     fn is_reported(&self, name: &'static str) -> bool {
         let mut findings = Findings::new("");
         self.place(name, &mut findings).is_none() && findings.any_error()
     }
 
-    /// The place of the column that the user calls `column`.
+    /// The place of the column that the user named `column`.
     fn chosen(&self, column: &str, name: &str, findings: &mut Findings) -> Option<usize> {
         let names = &self.header.names;
         let named = names.iter().position(|header| header.eq_ignore_ascii_case(column));
         let numbered = || column.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
-        // In a file without names, any line tells whether it is that long.
+        // In a file without names, any line shows whether it is long enough.
         let found = named.or_else(|| numbered().filter(|at| names.is_empty() || *at < names.len()));
         if found.is_none() {
             let message = format!("`--columns` names `{column}` for `{name}`; {}", self.present());
@@ -98,7 +98,7 @@ impl Search<'_> {
         found
     }
 
-    /// s between samples, if times are counted.
+    /// Time between samples, s, if time is computed.
     fn interval(&self, findings: &mut Findings) -> Option<f64> {
         if !self.wanted.iter().any(|w| w.name == TIME) {
             return None;
@@ -106,7 +106,7 @@ impl Search<'_> {
         let given = self.reading.rate().map(|rate| 1.0 / rate);
         let has_time = self.place(TIME, &mut Findings::new("")).is_some();
         if given.is_none() && self.reading.sample_column().is_some() {
-            let message = "`--columns` names sample numbers, and nothing says how fast they are".to_owned();
+            let message = "`--columns` names sample numbers, but the sampling rate is missing".to_owned();
             findings.add(codes::RECORD_HEADER, Some(self.header.line), message, "give `--rate HZ`, too");
         }
         // LabVIEW leaves `X_Value` empty and states the interval.
@@ -115,7 +115,7 @@ impl Search<'_> {
         given.or(stated)
     }
 
-    /// The column that counts samples, if there is one.
+    /// The column with sample numbers, if there is one.
     fn sample_numbers(&self, findings: &mut Findings) -> Option<Column<'static>> {
         let at = match self.reading.sample_column() {
             Some(column) => self.chosen(column, "sample", findings),
@@ -134,7 +134,7 @@ impl Search<'_> {
         }
     }
 
-    /// How a file gets the column `name`.
+    /// How to provide the column `name`.
     fn help(&self, name: &'static str) -> String {
         let names = &self.header.names;
         let wanted: Vec<&str> = self.wanted.iter().filter(|w| w.required).map(|w| w.name).collect();
@@ -175,7 +175,7 @@ impl Search<'_> {
     }
 }
 
-/// Whether `header` names `quantity` with something behind it.
+/// Whether `header` names `quantity` followed by other text.
 fn has_other_unit(header: &str, quantity: &Quantity) -> bool {
     header
         .rsplit_once(['_', ' ', '(', '[', '/'])

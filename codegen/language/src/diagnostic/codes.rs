@@ -48,14 +48,14 @@ impl Code {
         }
     }
 
-    /// What is wrong, in a few words: the heading of the page.
+    /// The problem in a few words: the heading of the page.
     #[must_use]
     pub fn title(self) -> &'static str {
         let heading = self.page.first().and_then(|piece| piece.lines().next()).unwrap_or_default();
         heading.split_once(": ").map_or(heading, |(_, title)| title)
     }
 
-    /// What is checked and why it matters: the text of the page above its example, without headings, as one line.
+    /// What is checked and why it matters: the text of the page before its example, without headings, as one line.
     #[must_use]
     pub fn explanation(self) -> String {
         let page = self.page();
@@ -72,7 +72,7 @@ impl PartialEq<Code> for &str {
     }
 }
 
-// Statics: each crate that names a constant has a copy of its page.
+// Statics: otherwise each crate that names a constant would have a copy of its page.
 macro_rules! codes {
     ($($name:ident = $id:literal;)*) => {
         $(#[doc = include_str!(concat!("../../findings/", $id, ".md"))]

@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-/// The lines of a text, to find the one that a byte is on.
+/// The lines of a text, for finding the line of a byte.
 #[derive(Debug)]
 pub(super) struct Lines<'a> {
     text: &'a str,
     starts: Vec<usize>,
 }
 
-/// Where a span begins, and the part of it on that line.
+/// Start of a span, and its part on that line.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Spot<'a> {
     /// Counted from 1.
@@ -28,13 +28,13 @@ impl<'a> Lines<'a> {
         Self { text, starts: std::iter::once(0).chain(breaks).collect() }
     }
 
-    /// Any range will do: it is cut to the text and to whole characters.
+    /// Any range: it is limited to the text and to whole characters.
     pub(super) fn spot(&self, span: &Range<usize>) -> Spot<'a> {
         let mut start = span.start.min(self.text.len());
         while !self.text.is_char_boundary(start) {
             start -= 1;
         }
-        // The first line starts at 0, so that there is one at or before `start`.
+        // The first line starts at 0, so there is always one at or before `start`.
         let index = self.starts.partition_point(|s| *s <= start) - 1;
         let line_start = self.starts[index];
         let line_end = self.starts.get(index + 1).map_or(self.text.len(), |next| next - 1);
@@ -48,18 +48,18 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// A piece of a line around a span.
+/// A part of a line around a span.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Window {
     pub(super) text: String,
     pub(super) span: Range<usize>,
-    /// Whether the line starts before the piece.
+    /// Whether the line starts before the part.
     pub(super) cut_left: bool,
 }
 
 /// At most about `max` characters of `line` around `span` (byte range on character boundaries).
 pub(super) fn window(line: &str, span: Range<usize>, max: usize) -> Window {
-    // Counting a line of a megabyte in full for each finding would be slow.
+    // Counting a line of a megabyte for each finding would be slow.
     if line.len() <= max || line.chars().nth(max).is_none() {
         return Window { text: line.to_owned(), span, cut_left: false };
     }

@@ -1,4 +1,4 @@
-//! Findings for people: file, line, column, the line itself with a mark below it, and how to fix it.
+//! Findings as text: file, line, column, the line itself with a mark below it, and the fix.
 
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 
@@ -6,13 +6,13 @@ use super::position::{self, Lines};
 use super::{Diagnostic, Place, Severity};
 use crate::SpecSource;
 
-/// Longest piece of a line that is shown, characters. Far below what would make a message unreadable.
+/// Longest part of a line that is shown, characters.
 const MAX_SHOWN: usize = 160;
 
-/// Where a terminal would break; fixed, so that the same findings give the same text everywhere.
+/// Line width; fixed, so that the same findings give the same text everywhere.
 const WIDTH: usize = 140;
 
-/// Every finding in turn, and a last line that counts them; empty if there is none.
+/// All findings in turn, and a last line with their number; empty without findings.
 #[must_use]
 pub fn render(diagnostics: &[Diagnostic], source: &SpecSource, color: bool) -> String {
     let renderer = if color { Renderer::styled() } else { Renderer::plain() }.term_width(WIDTH);
@@ -57,7 +57,7 @@ fn one(diagnostic: &Diagnostic, source: &SpecSource, lines: &Lines<'_>, renderer
             let window = position::window(spot.line_text, spot.in_line.clone(), MAX_SHOWN);
             let path = visible(&source.display_name);
             if window.cut_left {
-                // The snippet would count the column from the cut: say where it is, and show the piece below.
+                // The snippet would count the column from the cut, so state the position and show the part below.
                 let origin = Origin::path(path).line(spot.line).char_column(spot.column);
                 let snippet = Snippet::source(without_c1(&window.text))
                     .line_start(spot.line)
@@ -75,15 +75,15 @@ fn one(diagnostic: &Diagnostic, source: &SpecSource, lines: &Lines<'_>, renderer
     renderer.render(&[group])
 }
 
-/// Control characters (a terminal would obey them) as escapes; line breaks of our own texts stay.
+/// Escapes control characters, which a terminal would interpret; line breaks of our own texts stay.
 fn visible(text: &str) -> String {
     text.chars()
         .flat_map(|c| if c.is_control() && c != '\n' { c.escape_default().collect::<Vec<_>>() } else { vec![c] })
         .collect()
 }
 
-/// U+0080 to U+009F, which the snippet would leave as they are and a terminal may obey, as a mark of the same length in
-/// UTF-8: spans keep their places.
+/// Replaces U+0080 to U+009F, which the snippet would keep and a terminal may interpret, by a mark of the same length
+/// in UTF-8, so that spans stay valid.
 fn without_c1(line: &str) -> String {
     line.chars().map(|c| if matches!(c, '\u{80}'..='\u{9f}') { '\u{bf}' } else { c }).collect()
 }

@@ -130,5 +130,5 @@ fn content_has_a_limit() {
     assert!(matches!(read(&at("huge"), 1 << 16), Err(ReadError::Large(_))));
     assert!(matches!(look(&at("huge")), Err(ReadError::Large(MAX_BYTES))) && look(&at("free.csv")).is_ok());
     fs::write(at("latin"), b"a\nb\xe9\n").unwrap();
-    assert_eq!(text(&at("latin")).unwrap_err().to_string(), "it is no text in UTF-8: byte 3, in line 2");
+    assert_eq!(text(&at("latin")).unwrap_err().to_string(), "it is not UTF-8 text: byte 3, in line 2");
 }

@@ -1,10 +1,10 @@
-//! What a declaration is written with.
+//! The macros and functions of a declaration.
 
 pub(crate) use super::fields::{Fields, Value};
 pub(crate) use super::{Item, Key, Kind, Presence, Range, Section, Shape, join};
 pub(crate) use crate::quantity::Dimension;
 
-/// Declares a section once: its rows in the key table, the struct of the model that it fills, and how that is read.
+/// Declares a section once: its rows in the key table, the struct of the model that it fills, and how it is read.
 ///
 /// ```text
 /// section! {
@@ -36,7 +36,7 @@ macro_rules! section {
     ) => {
         #[doc = $doc]
         $(#[doc = $more])*
-        // `[control]` is a section of a spec and no link.
+        // `[control]` is a section of a spec and not a link.
         #[allow(rustdoc::broken_intra_doc_links)]
         #[derive(Debug, Clone, PartialEq)]
         pub struct $struct {
@@ -76,11 +76,11 @@ macro_rules! section {
     (@toml true) => { "true" };
     (@toml false) => { "false" };
     (@toml $text:ident) => { $text };
-    // Of one line: a longer value is a constant, for `stringify` breaks it.
+    // On one line: a longer value must be a constant, because `stringify` would break it.
     (@toml $literal:tt) => { stringify!($literal) };
 }
 
-/// Declares an enumeration together with the words that a spec has for it.
+/// Declares an enumeration together with its words in a spec.
 macro_rules! choice {
     ($(#[$attribute:meta])+ $enum:ident {$($(#[$of_variant:meta])+ $variant:ident = $word:literal,)+}) => {
         $(#[$attribute])+
@@ -92,7 +92,7 @@ macro_rules! choice {
         impl $enum {
             pub(crate) const WORDS: &[&str] = &[$($word),+];
 
-            /// As the spec says it.
+            /// Its word in a spec.
             #[must_use]
             pub const fn word(self) -> &'static str {
                 match self {

@@ -1,9 +1,9 @@
-//! The values that were read, by key path, in SI.
+//! The values that were read, by key path, in SI units.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// A value that stands where its key wants it, of the right kind and in range.
+/// A valid value of a key.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum KeyValue {
     /// A quantity (SI) or a number; one or a list.
@@ -15,7 +15,7 @@ pub(crate) enum KeyValue {
     Texts(Vec<String>),
 }
 
-/// One value and where it stands.
+/// A value and its place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Field {
     pub(crate) parsed: KeyValue,
@@ -23,16 +23,15 @@ pub(crate) struct Field {
     pub(crate) span: Range<usize>,
     /// The values of a list.
     pub(crate) items: Vec<Range<usize>>,
-    /// Whether it stands in the file.
+    /// Whether it is in the file.
     pub(crate) given: bool,
 }
 
-/// All values of a spec that could be read. What is missing or wrong has its finding already, so that a check
-/// that needs it is simply left out.
+/// All valid values of a spec. A missing or wrong value has its finding already, so a check that needs it is skipped.
 #[derive(Debug, Default)]
 pub(crate) struct Fields {
     map: BTreeMap<String, Field>,
-    /// Tables that stand in the file, by path (`control`, `gauge[2]`), and where.
+    /// Tables in the file, by path (`control`, `gauge[2]`), with their places.
     tables: BTreeMap<String, Range<usize>>,
     /// Tables of each repeated section.
     counts: BTreeMap<&'static str, usize>,
@@ -41,7 +40,7 @@ pub(crate) struct Fields {
 }
 
 impl Fields {
-    /// None yet, of the file `source`.
+    /// No values yet, for the file `source`.
     pub(crate) fn of(source: &str) -> Self {
         Self { source: source.to_owned(), ..Self::default() }
     }
@@ -64,12 +63,12 @@ impl Fields {
         self.counts.insert(section, count);
     }
 
-    /// Where the table at `path` stands, `None` if it is not in the file.
+    /// The place of the table at `path`, `None` if it is not in the file.
     pub(crate) fn table(&self, path: &str) -> Option<Range<usize>> {
         self.tables.get(path).cloned()
     }
 
-    /// How many tables of a repeated section there are.
+    /// Number of tables of a repeated section.
     pub(crate) fn count(&self, section: &str) -> usize {
         self.counts.get(section).copied().unwrap_or(0)
     }
@@ -78,7 +77,7 @@ impl Fields {
         self.map.get(path)
     }
 
-    /// Whether the key stands in the file with a good value.
+    /// Whether the key is in the file with a valid value.
     pub(crate) fn given(&self, path: &str) -> bool {
         self.get(path).is_some_and(|field| field.given)
     }
@@ -155,17 +154,17 @@ impl Fields {
         }
     }
 
-    /// Where the value at `path` stands; the start of the file if it is not known.
+    /// The place of the value at `path`; the start of the file if it is not known.
     pub(crate) fn span(&self, path: &str) -> Range<usize> {
         self.get(path).map_or(0..0, |field| field.span.clone())
     }
 
-    /// Where the value `index` of the list at `path` stands.
+    /// The place of the value `index` of the list at `path`.
     pub(crate) fn item_span(&self, path: &str, index: usize) -> Range<usize> {
         self.get(path).and_then(|field| field.items.get(index).cloned()).unwrap_or_else(|| self.span(path))
     }
 
-    /// Where every table and value stands, lists item by item too: `actuator.voltage` and `actuator.voltage[1]`.
+    /// The places of every table and value, and of list items: `actuator.voltage` and `actuator.voltage[1]`.
     pub(crate) fn spans(&self) -> BTreeMap<String, Range<usize>> {
         let mut spans = self.tables.clone();
         for (path, field) in &self.map {
@@ -227,7 +226,7 @@ impl Value for Vec<String> {
     }
 }
 
-/// What may be left out.
+/// An optional value.
 impl<T: Value> Value for Option<T> {
     fn read(fields: &Fields, path: &str) -> Option<Self> {
         Some(T::read(fields, path))

@@ -30,9 +30,9 @@ section! {
         stack_gain: f64 = one(Dimension::PIEZO_GAIN, Range::closed(1e-12, 1e-4), "um/V"), Required, "rho" ["gain", "d33", "piezo_gain", "displacement_per_volt"], "0.1262 um/V";
         /// Free stroke of a leg.
         stroke: f64 = one(Dimension::LENGTH, Range::closed(1e-9, 0.01), "um"), Required, "" ["travel", "displacement", "range", "elongation"], "60 um";
-        /// Smallest and largest voltage that the controller may ask for.
+        /// Smallest and largest voltage that the controller may output.
         voltage: [f64; 2] = list(&[VOLTS; 2]), Required, "" ["drive", "voltage_range", "U", "limits", "voltage_limits"], ["0 V", "100 V"];
-        /// Fastest change of voltage that amplifier and stack stand.
+        /// Fastest change of voltage that amplifier and stack tolerate.
         slew_rate: f64 = one(Dimension::SLEW_RATE, Range::closed(1e-3, 1e12), "V/ms"), Required, "" ["slew", "max_slew", "rate"], "40 V/ms";
         /// Axial stiffness of a leg.
         axial_stiffness: f64 = one(Dimension::STIFFNESS, Range::closed(1.0, 1e12), "N/m"), Required, "k_a" ["stiffness", "k", "c"], "1e7 N/m";
@@ -40,7 +40,7 @@ section! {
         resonance: f64 = one(Dimension::FREQUENCY, Range::closed(0.1, 1e7), "Hz"), Required, "" ["f_0", "f_r", "natural_frequency", "eigenfrequency", "resonant_frequency", "resonance_frequency"], "870 Hz";
         /// Damping ratio of that resonance.
         damping_ratio: f64 = number(Range::open(0.0, 1.0)), Required, "zeta" ["damping"], 0.1;
-        /// Of all stacks of a leg together, for the current that their voltage takes.
+        /// Capacitance of all stacks of a leg together; used for the amplifier's current.
         capacitance: Option<f64> = one(Dimension::CAPACITANCE, Range::above(0.0, 1.0), "uF"), Optional, "" ["C", "C_p"], "35 uF";
     }
 }
@@ -62,7 +62,7 @@ section! {
         lag: f64 = one(Dimension::TIME, Range::closed(0.0, 10.0), "ms"), Default("0 ms"), "" ["tau", "time_constant", "bandwidth", "delay"], "0.35 ms";
         /// Output noise, rms.
         noise: f64 = one(Dimension::VOLTAGE, Range::closed(0.0, 100.0), "mV"), Default("0 V"), "" ["sigma", "rms", "noise_rms"], "2 mV";
-        /// Largest output current for one leg; slew rate and trajectories are held against it with `actuator.capacitance`.
+        /// Largest output current for one leg; the slew rate and trajectories are checked against it with `actuator.capacitance`.
         current: Option<f64> = one(Dimension::CURRENT, Range::above(0.0, 1e4), "mA"), Optional, "" ["I", "I_max", "max_current", "peak_current"], "2 A";
     }
 }
@@ -80,11 +80,11 @@ section! {
 }
 
 section! {
-    /// Displacement gauge of a leg; with [control], of the six that see the platform.
+    /// Displacement gauge of a leg; with [control], of the six that measure the platform.
     ///
     /// Displacements in m; voltages in V, ±10 V without the key.
     "sensor" ["gauges", "lvdt", "encoder"], Plain => Sensor {
-        /// Smallest and largest displacement that it can report.
+        /// Smallest and largest displacement that it can measure.
         range: [f64; 2] = list(&[READING; 2]), Required, "" ["travel", "measuring_range"], ["-2 um", "48 um"];
         /// Noise, rms.
         noise: f64 = one(Dimension::LENGTH, Range::closed(0.0, 1e-3), "nm"), Default("0 nm"), "" ["sigma", "rms", "noise_rms"], "2.2 nm";
@@ -94,7 +94,7 @@ section! {
         bits: u32 = integer(8, 32), Required, "" ["resolution", "n_bits"], 16;
         /// With a calibration: voltage of its converter at code 0 and at full scale.
         input_range: Option<[f64; 2]> = list(&[VOLTS; 2]), Rule(r#"["-10 V", "10 V"]"#), "", ["0 V", "10 V"];
-        /// With [control]: displacement as a polynomial of the gauge's voltage, lowest power first; the gauge words are then volts. For all six gauges; a gauge may have its own.
+        /// With [control]: displacement as a polynomial of the gauge's voltage, lowest power first; the gauge words are then volts. Applies to all six gauges, unless a gauge has its own.
         calibration = CALIBRATION, Rule("the gauge words are metres"), "", ["-2 um", "5 um/V"];
     }
 }

@@ -1,4 +1,4 @@
-//! The hysteresis of a leg, and the estimates that adapt its inverse from run to run.
+//! The hysteresis of a leg, and the run-to-run adaptation of its inverse.
 
 use crate::keys::declare::*;
 
@@ -18,25 +18,25 @@ section! {
     ///
     /// Times in s.
     "hysteresis" ["preisach", "model"], Plain => Hysteresis {
-        /// Intervals per axis of the Preisach plane; the table grows and the error falls with its square.
+        /// Intervals per axis of the Preisach plane; the size of the table grows, and the error falls, with the square of this number.
         grid: usize = integer(2, MAX_GRID as i64), Default(32), "N" ["n", "cells", "discretization"], 32;
-        /// Reversals that the controller can remember.
+        /// Number of reversals that the controller can store.
         memory: usize = integer(8, 256), Default(64), "" ["depth"], 64;
-        /// Reversal-curve files, relative to the spec: one for all legs, or six. A table that `specgen identify -o` wrote is taken as it is.
+        /// Reversal-curve files, relative to the spec: one for all legs, or six. A table written by `specgen identify -o` is used as it is.
         records: Vec<String> = Shape::Records, Required, "" ["record", "file", "files", "data"], ["records/reference-forc.csv"];
-        /// Rate dependence in model and inverse: none; the dynamic Preisach model (6); creep behind the static model. `specgen identify rate` finds out which is worth it.
+        /// Rate dependence in model and inverse: none; the dynamic Preisach model (6); creep after the static model. `specgen identify rate` compares them.
         rate = one_of(&["static", "dynamic-preisach", "creep"]), Default("static"), "", "creep";
-        /// With "dynamic-preisach": tables of the second weight as `specgen identify rate -o` writes them, one for all legs or six.
+        /// With "dynamic-preisach": tables of the second weight, from `specgen identify rate -o`: one for all legs or six.
         rate_tables = Shape::Records, Rule(r#"error with rate = "dynamic-preisach""#), "mu_1", ["records/leg-mu1.csv"];
         /// With "creep": time constants of up to six creep operators in parallel.
         creep_times = CREEP_TIMES, Rule(r#"error with rate = "creep""#), "", ["0.8 s", "40 ms"];
-        /// With "creep": what each adds in the end, as a share of the static displacement; their sum is below 1.
+        /// With "creep": final contribution of each operator, as a fraction of the static displacement; their sum is below 1.
         creep_weights = CREEP_WEIGHTS, Rule(r#"error with rate = "creep""#), "", [0.03, 0.09];
-        /// Of six legs with their own gauges: time by which the displacement lags the drive. The demand is led by it, less half a period. With [control] it is `control.lead`.
+        /// For six legs with their own gauges: delay of the displacement behind the drive. The demand leads by it, less half a period. With [control], use `control.lead`.
         dead_time: f64 = one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Default("0 ms"), "", "0.13 ms";
     }
     and |fields, _table| {
-        /// How the rate is accounted for.
+        /// Rate dependence of the model.
         rate: RateDependence = rate(fields)?;
     }
 }
@@ -65,7 +65,7 @@ fn rate(fields: &Fields) -> Option<RateDependence> {
 }
 
 choice! {
-    /// How the run-to-run estimate is used.
+    /// Estimates that adapt the inverse.
     AdaptationMode {
         /// Inverse Preisach alone.
         Invhys = "invhys",
@@ -77,7 +77,7 @@ choice! {
 }
 
 section! {
-    /// Run-to-run adaptation, Appendix B. A mode that uses a weight needs it, as weight per run or as bandwidth. With [control] both bandwidths are given, or neither: the compiler then derives them.
+    /// Run-to-run adaptation, Appendix B. A mode needs the weights that it uses, each as weight per run or as bandwidth. With [control] give both bandwidths, or neither: the compiler then derives them.
     ///
     /// A bandwidth in the spec is a weight here: ω = Ω·T_run.
     "adaptation", Plain => Adaptation {
@@ -97,10 +97,10 @@ section! {
         gain_ratio: [f64; 2] = list(&[RATIO; 2]), Default([0.9, 1.1]), "lambda", [0.9, 1.1];
     }
     and |fields, _table| {
-        /// ω (EWMA) or ω1 (PCC), per run, in (0, 1]; 0, which leaves the estimate as it is, if the mode does not use it and the
-        /// spec does not give it.
+        /// ω (EWMA) or ω1 (PCC), per run, in (0, 1]. 0, which leaves the estimate unchanged, if the mode does not use
+        /// it and the spec does not give it.
         level_weight: f64 = Self::weight(fields, "level").unwrap_or(0.0);
-        /// ω2, per run, in (0, 1]; 0 likewise.
+        /// ω2, per run, in (0, 1]; otherwise as above.
         drift_weight: f64 = Self::weight(fields, "drift").unwrap_or(0.0);
     }
 }

@@ -1,4 +1,4 @@
-//! Joint circles (1), (2) to joints. The bytes of the controller depend on these numbers: `libm` alone.
+//! From joint circles (1), (2) to joints. The controller's bytes depend on these numbers, so only `libm` is used.
 
 use core::f64::consts::PI;
 

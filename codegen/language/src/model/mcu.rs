@@ -14,19 +14,19 @@ pub enum Mcu {
 /// What is known of a microcontroller: of that of a board, the table `package.metadata.board` of its manifest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part {
-    /// As the spec names it.
+    /// Its name in a spec.
     pub name: &'static str,
     /// Name of the core, for compiler and emulator.
     pub core: &'static str,
-    /// Whether the FPU computes `f64`; else the compiler calls software for it.
+    /// Whether the FPU computes `f64`; otherwise the compiler calls software for it.
     pub double: bool,
     /// Bytes of flash.
     pub flash: u64,
-    /// Bytes of the RAM that images are linked into: one region, where a part has several.
+    /// Bytes of the RAM that images are linked into: one region of it.
     pub ram: u64,
     /// The board that specgen has firmware for.
     pub board: &'static str,
-    /// As probe-rs names the chip; none for an emulated one.
+    /// Its name in probe-rs; none for an emulated one.
     pub chip: Option<&'static str>,
     /// QEMU's board with this core, where instructions are counted.
     pub emulated: &'static str,
@@ -93,7 +93,7 @@ impl Mcu {
         names
     };
 
-    /// What is known of it.
+    /// Its data.
     #[must_use]
     pub const fn part(self) -> Part {
         match self {
@@ -103,7 +103,7 @@ impl Mcu {
         }
     }
 
-    /// The one that the spec calls `name`.
+    /// The microcontroller called `name` in a spec.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|mcu| mcu.part().name == name)
@@ -130,7 +130,7 @@ mod tests {
         for mcu in Mcu::ALL {
             let part = mcu.part();
             assert_eq!(Mcu::named(part.name), Some(mcu));
-            // Counted on a board of the same core, and flashed only where there is something to flash.
+            // Instructions are counted on a board with the same core; only a real board is flashed.
             let emulated = Mcu::named(part.emulated).unwrap().part();
             assert_eq!((emulated.core, emulated.double), (part.core, part.double));
             assert_eq!(part.chip.is_none(), part.name == part.emulated);

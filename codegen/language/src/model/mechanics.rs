@@ -3,9 +3,9 @@
 use super::joints;
 use crate::keys::declare::*;
 
-/// Furthest that a workspace or a pose may reach from rest, m.
+/// Largest translation of a workspace or pose from rest, m.
 pub const LARGEST_TRAVEL: f64 = 0.1;
-/// The same of angles, rad: the controller's series for small angles are sized by it.
+/// Largest rotation, rad: the controller's small-angle series are sized for it.
 pub const LARGEST_TURN: f64 = 0.5;
 
 const RADIUS: Range = Range::closed(1e-3, 10.0);
@@ -25,7 +25,7 @@ const TURN: Item = item(Dimension::ANGLE, Range::closed(0.0, LARGEST_TURN), "mra
 section! {
     /// Joints of base and platform, on circles as in equations (1) and (2) or one by one, and the pose at rest.
     ///
-    /// Radii and angles of a spec, (1) and (2), are joints here already. Lengths in m.
+    /// The radii and angles of a spec, (1) and (2), are already converted to joints. Lengths in m.
     "geometry" ["hexapod", "stewart", "kinematics"], Plain => Geometry {
         /// Radius of the circle through the six base joints.
         base_radius = one(Dimension::LENGTH, RADIUS, "mm"), Form(CIRCLES), "r_B" ["base_circle", "bottom_radius"], "150 mm";
@@ -37,9 +37,9 @@ section! {
         platform_angle = one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Form(CIRCLES), "alpha_P" ["platform_joint_angle", "top_angle"], "0.012 pi rad";
         /// Height of P_C, the origin of {P}, above that of {B} at rest; with joint circles, of the platform's joint plane above the base's.
         height: f64 = one(Dimension::LENGTH, RADIUS, "mm"), Required, "P_z" ["h", "z0", "z", "rest_height", "H_0"], "180 mm";
-        /// The six base joints in {B}, leg by leg: where the joints lie on no circle.
+        /// The six base joints in {B}, leg by leg, if they do not lie on a circle.
         base_joints = Shape::Rows(6, JOINT), Form(JOINTS), "B_i", BASE_JOINTS;
-        /// The six platform joints in {P}, leg by leg.
+        /// The six platform joints in {P}, leg by leg, if they do not lie on a circle.
         platform_joints = Shape::Rows(6, JOINT), Form(JOINTS), "P_i", PLATFORM_JOINTS;
     }
     and |fields, _table| {
@@ -50,7 +50,7 @@ section! {
     }
 }
 
-/// B_i and P_i in whichever form the spec gives them.
+/// B_i and P_i in either form of the spec.
 fn joints(fields: &Fields) -> Option<[[[f64; 3]; 6]; 2]> {
     let number = |key: &str| fields.number(&join("geometry", key));
     if let Some(base) = fields.rows("geometry.base_joints") {
@@ -83,7 +83,7 @@ section! {
     ///
     /// In kg, kg m² and m; I_xy is −∫xy dm.
     "platform" ["plate", "load", "payload", "body", "top"], Plain => RigidBody {
-        /// Mass with everything that is mounted on it.
+        /// Mass including everything that is mounted on the platform.
         mass: f64 = one(Dimension::MASS, BODY_MASS, "kg"), Required, "m" ["payload", "weight", "load"], "1.195 kg";
         /// Moments of inertia about the centre of mass.
         inertia: [f64; 3] = list(&[item(Dimension::INERTIA, MOMENT, "g mm^2"); 3]), Required, "I_xx I_yy I_zz" ["I", "J", "moments", "moment_of_inertia"], ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e6 g mm^2"];
@@ -111,13 +111,13 @@ section! {
         fixed_center: f64 = LEG_CENTER, Required, "l_s" ["lower_center"], "50 mm";
         /// Mass centre of the platform-side part, from the platform joint.
         extensible_center: f64 = LEG_CENTER, Required, "l_e" ["upper_center"], "50 mm";
-        /// Angle by which the joints of a leg may turn from rest, either way.
+        /// Largest rotation of a leg's joints from rest, in either direction.
         joint_angle: Option<f64> = one(Dimension::ANGLE, Range::above(0.0, 1.5), "mrad"), Optional, "" ["joint_range"], "20 mrad";
     }
 }
 
 section! {
-    /// Bounds on the pose that may be asked for, from rest.
+    /// Bounds on permitted poses, from rest.
     ///
     /// Translations in m, rotations in rad.
     "workspace" ["range", "limits", "travel"], Plain => Workspace {

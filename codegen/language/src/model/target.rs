@@ -1,4 +1,4 @@
-//! What is emitted, at which rate it runs, on what, and within which limits.
+//! The target: arithmetic, rate, device and limits.
 
 use super::Mcu;
 use crate::keys::MAX_TABLES;
@@ -32,7 +32,7 @@ choice! {
 }
 
 choice! {
-    /// What the six set-point numbers are at start-up.
+    /// Meaning of the six set-point numbers at start-up.
     SetpointKind {
         /// Pose from rest, m and rad.
         Pose = "pose",
@@ -46,25 +46,25 @@ section! {
     "controller", Plain => ControllerOptions {
         /// Arithmetic of the controller.
         scalar: Scalar = one_of(Scalar::WORDS), Default("f64"), "", "f64";
-        /// What the six set-point numbers are at start-up: a pose, or leg displacements.
+        /// Meaning of the six set-point numbers at start-up: a pose, or leg displacements.
         setpoint: SetpointKind = one_of(SetpointKind::WORDS), Default("pose"), "", "pose";
     }
 }
 
 section! {
-    /// What the platform is for. A spec that cannot meet it is refused.
+    /// Requirements on the platform. A spec that cannot meet them is refused.
     ///
     /// In m.
     "requirements" ["goals", "specification"], Optional => Requirements {
-        /// Finest displacement that matters. No converter code may move a leg by more, nor half a code on every leg the platform along an axis.
+        /// Finest displacement that matters. A converter code must not move a leg by more, and half a code on every leg must not move the platform along an axis by more.
         precision: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "" ["resolution", "accuracy"], "50 nm";
-        /// Largest noise of the pose at rest: rms of x, y and z, each, as the gauges show it, with what the amplifiers' noise moves. `specgen check`, the main job and the report judge the spec by it.
+        /// Largest noise of the measured pose at rest, including motion from amplifier noise: rms of each of x, y and z. `specgen check`, the main job and the report compare the spec with it.
         noise: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Rule("that of `precision`"), "" ["jitter", "stability", "noise_floor"], "5 nm";
         /// Largest noise at rest of θx, θy and θz, rms, each.
         rotation_noise: Option<f64> = one(Dimension::ANGLE, Range::closed(1e-12, 1e-1), "nrad"), Optional, "", "50 nrad";
     }
     and |fields, _table| {
-        /// How well trajectories are to be followed.
+        /// Limits of the tracking error.
         tracking: Vec<TrackingLimit> = (0..fields.count("requirements.tracking"))
             .map(|index| TrackingLimit::read(fields, &format!("requirements.tracking[{index}]")))
             .collect::<Option<_>>()?;
@@ -72,7 +72,7 @@ section! {
 }
 
 impl Requirements {
-    /// Largest noise at rest of the axis, 0 to 5, m or rad, and the key that sets it; none where the spec sets none.
+    /// Largest noise at rest of the axis, 0 to 5, m or rad, and its key; none if the spec has no limit.
     #[must_use]
     pub fn noise_of(&self, axis: usize) -> Option<(f64, &'static str)> {
         if axis > 2 {
@@ -84,13 +84,13 @@ impl Requirements {
 }
 
 section! {
-    /// How well trajectories are to be followed: largest rms error of the true pose. `specgen report` judges the simulated run by it; without one the error is shown and not judged.
+    /// Limit of the tracking error: largest rms error of the true pose. `specgen report` compares the simulated run with it; without a limit it only shows the error.
     ///
     /// In m and rad.
     "requirements.tracking", Repeated(0, MAX_TABLES) => TrackingLimit {
-        /// The trajectory that it holds for; every one without it.
+        /// The trajectory that the limit applies to; without it, all.
         trajectory: Option<String> = NAME, Optional, "", "circle";
-        /// The operating frequency that it holds for; that of the trajectory without it.
+        /// The operating frequency that the limit applies to; without it, that of the trajectory.
         frequency: Option<f64> = one(Dimension::FREQUENCY, Range::closed(1e-3, 1e3), "Hz"), Optional, "", "10 Hz";
         /// Largest norm of the errors of x, y and z, rms.
         translation: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "", "50 nm";
@@ -102,15 +102,15 @@ section! {
 }
 
 section! {
-    /// What the physical lint lets pass. Nothing of it is in the controller.
+    /// Exceptions from the physical lint. The controller does not use them.
     "lint", Optional => Lint {
-        /// Keys whose values are meant although they do not fit what the other values imply, each with the reason. What is found about them is then a note: also what would be refused because it is off by 7 times and more.
+        /// Keys whose values are intended although they disagree with other values, each with a reason. Findings about them become notes, including those that would be errors because a value is off by a factor of 7 or more.
         allow: Vec<String> = Shape::Reasons, Default([]), "", ["actuator.axial_stiffness: flexures in series, measured"];
     }
 }
 
 impl Lint {
-    /// The reason for which `key`, or the list that it is an item of, is let pass.
+    /// The reason that excepts `key`, or the list that it is an item of.
     #[must_use]
     pub fn reason(&self, key: &str) -> Option<&str> {
         self.reasons().find(|(allowed, _)| covers(allowed, key)).map(|(_, reason)| reason)
@@ -128,21 +128,21 @@ fn covers(allowed: &str, key: &str) -> bool {
 }
 
 section! {
-    /// What it runs on.
+    /// Where the controller runs.
     "target" ["mcu", "board", "hardware"], Plain => Target {
         /// Microcontroller: `mps2-an500` and `stm32h743zi` are a Cortex-M7 with double-precision FPU, `mps2-an386` and `stm32f446re` a Cortex-M4F with single precision; the first of each is emulated.
         mcu: Mcu = one_of(&Mcu::NAMES), Default("mps2-an500"), "" ["processor", "part", "chip", "board", "cpu"], "mps2-an500";
     }
     and |fields, _table| {
-        /// What it may use there.
+        /// Resources that it may use.
         budget: Budget = Budget::read(fields, "target.budget")?;
     }
 }
 
 section! {
-    /// What it may use there; a build that needs more is refused.
+    /// Resources that the controller may use; a build that needs more is refused.
     ///
-    /// In bytes and s; none where the spec does not say.
+    /// In bytes and s; none if the spec has no limit.
     "target.budget", Plain => Budget {
         /// Flash.
         flash: Option<u64> = BYTES, Optional, "", "128 KiB";
@@ -152,13 +152,13 @@ section! {
         stack: Option<u64> = BYTES, Optional, "", "2 KiB";
         /// Mean instructions per tick.
         instructions: Option<u64> = integer(1, 1_000_000_000), Optional, "", 3000;
-        /// Longest tick of a board, as `specgen build` estimates it: what the rest of the period is kept free for. The period where the spec does not say.
+        /// Longest tick on the board, as estimated by `specgen build`; the rest of the period stays free. Without it, the period.
         time: Option<f64> = one(Dimension::TIME, Range::closed(1e-6, 10.0), "us"), Optional, "" ["duration", "tick"], "80 us";
     }
 }
 
 impl Budget {
-    /// No limits but those of the part.
+    /// Only the limits of the part.
     pub const NONE: Self = Self { flash: None, ram: None, stack: None, instructions: None, time: None };
 }
 

@@ -1,4 +1,4 @@
-//! The task-space controller of a spec: what of section 4 of the paper the user chooses.
+//! The task-space controller: the user's choices in section 4 of the paper.
 
 use std::f64::consts::PI;
 
@@ -9,9 +9,9 @@ use super::{LARGEST_TRAVEL, LARGEST_TURN};
 use crate::keys::MAX_TABLES;
 use crate::keys::declare::*;
 
-/// Largest gain and stiffness that a spec may say, in SI units: products with it stay finite in both scalars.
+/// Largest gain and stiffness in a spec, in SI units: products with it stay finite in both scalars.
 pub const LARGEST_GAIN: f64 = 1e15;
-/// Share of half the tick rate that the velocity filter passes if the spec does not say.
+/// Default cutoff of the velocity filter, as a fraction of half the tick rate.
 const CUTOFF_SHARE: f64 = 0.6;
 
 const GAIN: Range = Range::closed(0.0, LARGEST_GAIN);
@@ -57,7 +57,7 @@ choice! {
     ControlMode {
         /// Both.
         PF = "p/f",
-        /// Position feedback alone: no inverse model, no adaptation.
+        /// Position feedback only: no inverse model, no adaptation.
         P = "p",
         /// Feed-forward alone.
         F = "f",
@@ -65,9 +65,9 @@ choice! {
 }
 
 choice! {
-    /// Where the interaction force of the feed-forward comes from.
+    /// Source of the interaction force in the feed-forward.
     Interaction {
-        /// None is fed forward.
+        /// No interaction force.
         None = "none",
         /// K_e (h_d − h_e).
         Modelled = "modelled",
@@ -77,59 +77,59 @@ choice! {
 }
 
 choice! {
-    /// How the load of the legs under motion and gravity is computed.
+    /// Computation of the legs' load under motion and gravity.
     DynamicsChoice {
-        /// To first order where that is proven to do, else by the whole kernel.
+        /// First order if that is proven to be accurate enough, otherwise the full dynamics.
         Cheapest = "cheapest",
-        /// By the whole kernel.
+        /// The full dynamics.
         Whole = "whole",
     }
 }
 
 section! {
-    /// The task-space controller of section 4. With it the six gauges see the platform ([[gauge]]); without it each leg has its own gauge and its own feed-forward.
+    /// The task-space controller of section 4. With it six gauges measure the platform ([[gauge]]); without it each leg has its own gauge and its own feed-forward.
     ///
     /// A pose is x, y, z, θx, θy, θz from rest, m and rad; times in s.
     "control" ["loop", "task_space", "feedback"], Optional => TaskSpace {
-        /// Loops closed at start-up: position feedback and feed-forward, feedback alone, feed-forward alone. How the feed-forward adapts is `adaptation.mode`.
+        /// Control mode at start-up: position feedback and feed-forward, feedback only, or feed-forward only. `adaptation.mode` sets the adaptation of the feed-forward.
         mode: ControlMode = one_of(ControlMode::WORDS), Default("p/f"), "", "p/f";
-        /// Damping ratio of the lowest mode of the platform on its legs. Give what is measured, or less: less is the cautious side.
+        /// Damping ratio of the platform's lowest mode on its legs. Give the measured value or less: a smaller value is conservative.
         modal_damping: f64 = number(Range::open(0.0, 1.0)), Required, "zeta" ["damping", "damping_ratio"], 0.02;
-        /// Whether a modal notch stands in the feedback; without one the bandwidth falls to about a twelfth.
+        /// Whether the feedback has a modal notch; without it the bandwidth falls to about a twelfth.
         notch = FLAG, Default(true), "", true;
-        /// Damping ratio that the notch leaves of each mode, above `modal_damping`.
+        /// Damping ratio that the notch gives to each mode, above `modal_damping`.
         notch_damping = number(Range::above(0.0, 1.0)), Rule("1, with a notch"), "zeta_d", 1.0;
-        /// Whether each mode of the platform is damped by a second-order section on its error, in P/F: the compiler designs it together with gains and bandwidths that the spec leaves out. Needs the notch.
+        /// Whether a second-order section on its error damps each mode of the platform, in P/F. The compiler designs the sections together with gains and bandwidths that the spec leaves out. Needs the notch.
         active_damping = FLAG, Default(false), "", true;
-        /// Largest correction of the request along each axis that a tick takes beside the set-point, for what `specgen learn` finds, about each axis as much at the platform joints; at most a tenth of `actuator.stroke`. It goes from nothing to there in 1 ms at the fastest. Without it a controller has no such input.
+        /// Largest correction of the request along each axis, in addition to the set-point, for `specgen learn`; about each axis, the same at the platform joints. At most a tenth of `actuator.stroke`; its fastest rise takes 1 ms. Without it the controller has no such input.
         correction: Option<f64> = one(Dimension::LENGTH, Range::above(0.0, 1e-3), "um"), Optional, "", "2 um";
-        /// Whether the integral of (7) is handed to the run-to-run estimates whenever the set-point comes to rest, in P/F with EWMA or PCC. The voltages do not move; what the integral gathered on the way is then unlearned by the estimates, which are faster. Steps settle sooner.
+        /// Whether the integral of (7) is transferred to the run-to-run estimates whenever the set-point comes to rest, in P/F with EWMA or PCC. The voltages do not change. The estimates, which are faster, then unlearn the integral of the motion, and steps settle sooner.
         hand_over = FLAG, Default(false), "", true;
         /// First-order low-pass of the pose derivative, below half the tick rate (pi rad / period).
         velocity_cutoff = BANDWIDTH, Rule("0.6 pi rad / period"), "" ["cutoff", "velocity_filter"], "9e3 rad/s";
-        /// Where the interaction force (5) in (7) comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words.
+        /// Source of the interaction force (5) in (7): none, the stiffness of [control.environment], or a force sensor on the `wrench` words.
         interaction: Interaction = one_of(Interaction::WORDS), Default("none"), "", "none";
-        /// How the load of the legs under motion and gravity, J^-T (M ddh + C dh + G) of (7), is computed: to first order in pose and acceleration if the error of that is proven to be within `dynamics_tolerance` for all moves and trajectories, or always by the whole kernel. With an interaction force it is always the whole.
+        /// Computation of the legs' load under motion and gravity, J^-T (M ddh + C dh + G) of (7): to first order in pose and acceleration if its error is proven to be within `dynamics_tolerance` for all moves and trajectories, or always by the full dynamics. With an interaction force it is always the full dynamics.
         dynamics: DynamicsChoice = one_of(DynamicsChoice::WORDS), Default("cheapest"), "", "whole";
-        /// Largest error of a leg's displacement that the first order may make, over the workspace and the limits of moves and trajectories.
+        /// Largest error of a leg's displacement from the first-order computation, over the workspace and the limits of moves and trajectories.
         dynamics_tolerance: Option<f64> = one(Dimension::LENGTH, Range::above(0.0, 1e-3), "nm"), Rule("a tenth of the converter's step, as displacement of a leg"), "", "0.1 nm";
-        /// Time by which the leg displacements are asked for early, in proportion to their rate. Takes out the lag of fast motion; a set-point that steps is overshot by step x lead / period for one tick, which paths with corners may ask to be less.
+        /// Lead time of the leg displacements, in proportion to their rate. It removes the lag of fast motion. A step of the set-point overshoots by step x lead / period for one tick, so paths with corners may need less.
         lead: Option<f64> = one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Rule("the delay from command to pose: `amplifier.lag` and what the modes add, less half a period"), "", "0.2 ms";
-        /// Time constant with which the offset of a change of mode fades, where neither estimates nor an integral on every axis take it over, as in F with Invhys.
+        /// Time constant with which the offset of a change of mode fades, if neither the estimates nor an integral on every axis take it over, as in F with Invhys.
         transfer_time: f64 = one(Dimension::TIME, Range::closed(1e-6, 100.0), "ms"), Default("50 ms"), "", "50 ms";
     }
     and |fields, _table| {
-        /// What the six gauges see, in the order of the words `gauge[0]` to `gauge[5]`.
+        /// Geometry of the six gauges, in the order of the words `gauge[0]` to `gauge[5]`.
         probes: [Probe; 6] = of_gauges(|gauge| Probe::read(fields, &gauge))?;
-        /// Reading of each gauge, a polynomial V → m with the lowest power first, at least two coefficients. None: the
-        /// gauge words are metres.
+        /// Reading of each gauge as a polynomial V → m, lowest power first, at least two coefficients. None: the gauge
+        /// words are metres.
         calibration: Option<[Vec<f64>; 6]> = calibration(fields);
         /// ζ_d of the modal notch, in (0, 1] and above `modal_damping`. None: no notch.
         notch_damping: Option<f64> =
             fields.flag("control.notch")?.then(|| fields.number("control.notch_damping").unwrap_or(1.0));
         /// Whether the modes are damped actively in P/F.
         active_damping: bool = fields.flag("control.active_damping")?;
-        /// Whether the integral is handed to the estimates when the set-point comes to rest.
+        /// Whether the integral is transferred to the estimates when the set-point comes to rest.
         hand_over: bool = fields.flag("control.hand_over")?;
         /// Gains of P and F together. None: the compiler's start rule.
         gains: Option<Gains> = Gains::read(fields, "gains");
@@ -144,9 +144,9 @@ section! {
         };
         /// The work piece of [`Interaction::Modelled`]; zero if the spec gives none.
         environment: Environment = Environment::read(fields, "control.environment").unwrap_or(Environment::NONE);
-        /// What set-points are believed and how fast moves are.
+        /// Limits of set-points and moves.
         setpoint: SetpointRules = SetpointRules::read(fields, "control.setpoint")?;
-        /// Coordinates that set-points are given in.
+        /// Coordinates of set-points.
         frames: Frames = Frames::read(fields, "control.frames")?;
         /// Trajectories by the word `selector`, in the order of the spec; names are unique.
         trajectories: Vec<Trajectory> = (0..fields.count("trajectory"))
@@ -159,12 +159,12 @@ section! {
     }
 }
 
-/// What `each` makes of the table of each gauge, if there are six.
+/// `each` applied to the table of each gauge, if there are six.
 fn of_gauges<T>(each: impl Fn(String) -> Option<T>) -> Option<[T; 6]> {
     (0..6).map(|gauge| each(format!("gauge[{gauge}]"))).collect::<Option<Vec<T>>>()?.try_into().ok()
 }
 
-/// Each gauge's own, or that of all; `None` if the gauge words are metres.
+/// Each gauge's own calibration, or that of all; `None` if the gauge words are metres.
 fn calibration(fields: &Fields) -> Option<[Vec<f64>; 6]> {
     let of_all = fields.numbers("sensor.calibration");
     of_gauges(|gauge| fields.numbers(&join(&gauge, "calibration")).or(of_all).map(<[f64]>::to_vec))
@@ -194,9 +194,9 @@ impl Environment {
 section! {
     /// Limits of the set-point generator, in the order x, y, z, theta_x, theta_y, theta_z of {B}.
     ///
-    /// In m or rad and their time derivatives. Stop limits that are none are derived by the compiler.
+    /// In m or rad and their time derivatives. The compiler derives missing stop limits.
     "control.setpoint", Plain => SetpointRules {
-        /// Pose, from rest, that every set-point is added to: room for corrections downward. It is approached slowly after start-up.
+        /// Pose from rest that is added to every set-point: it leaves room for downward corrections. It is approached slowly after start-up.
         bias: [f64; 6] = list(POSE), Default(NO_POSE), "", ["0 um", "0 um", "10 um", "0 urad", "0 urad", "0 urad"];
         /// Largest speed of bias and point-to-point moves.
         speed: [f64; 6] = list(SPEEDS), Default(SLOW_SPEED), "", SLOW_SPEED;
@@ -204,25 +204,25 @@ section! {
         acceleration: [f64; 6] = list(ACCELERATIONS), Default(SLOW_ACCELERATION), "", SLOW_ACCELERATION;
         /// Their largest jerk.
         jerk: [f64; 6] = list(JERKS), Default(SLOW_JERK), "", SLOW_JERK;
-        /// Largest deceleration of stops: of a stream that runs dry or is not believed, and of any motion that another command ends. The rate falls smoothly, from v to 0 in 1.5 v over this at least, over half of v times that time, and never within less than two thirds of the time that a stop from the largest declared speed takes; `specgen check` states the distances.
+        /// Largest deceleration of stops: of a stream that ends or is refused, and of any motion that another command ends. The rate falls smoothly from v to 0 in at least 1.5 v over this value, over a distance of half of v times that time, and never within less than two thirds of the time that a stop from the largest declared speed takes. `specgen check` states the distances.
         stop_acceleration: Option<[f64; 6]> = list(ACCELERATIONS), Rule("derived from the platform's modes, `amplifier.lag`, `actuator.slew_rate` and `actuator.stroke`, for a stop from `stream_speed`"), "", ["5 m/s^2", "5 m/s^2", "5 m/s^2", "50 rad/s^2", "50 rad/s^2", "50 rad/s^2"];
         /// Their largest jerk.
         stop_jerk: Option<[f64; 6]> = list(JERKS), Rule("the jerk at which a stop from the largest declared speed just reaches `stop_acceleration`"), "", STOP_JERK;
-        /// A streamed set-point further from the last one than this in a period is a jump, and refused.
+        /// A streamed set-point that is further from the last one than this speed allows in a period is a jump, and refused.
         stream_speed: [f64; 6] = list(SPEEDS), Default(STREAM_SPEED), "", STREAM_SPEED;
-        /// A stream that brings nothing new for so many ticks is stale, and the last set-point is held.
+        /// A stream without a new set-point for this number of ticks is stale, and the last set-point is held.
         stale_ticks: u32 = integer(1, 1_000_000), Default(10), "", 10;
     }
 }
 
 section! {
-    /// Coordinates that set-points are given in.
+    /// Coordinates of set-points.
     ///
     /// In m and rad.
     "control.frames", Plain => Frames {
         /// Work frame in {B}, about P_C at rest: offset and angles, R = Rz Ry Rx.
         work: [f64; 6] = list(FRAME), Default(NO_POSE), "", ["0 mm", "0 mm", "0 mm", "0 deg", "0 deg", "30 deg"];
-        /// Tool point in {P}: what set-points place, and what rotations turn about.
+        /// Tool point in {P}: set-points position it, and rotations turn about it.
         tool: [f64; 3] = POINT, Default(["0 mm", "0 mm", "0 mm"]), "", ["0 mm", "0 mm", "40 mm"];
     }
 }
@@ -247,13 +247,13 @@ impl Gains {
 }
 
 section! {
-    /// One of the six gauges that see the platform, in the order of the gauge words; with [control], and with it alone. A gauge fixed in {B} measures along a line to a plane on the platform, from rest.
+    /// One of the six gauges that measure the platform, in the order of the gauge words; only with [control], which needs it. A gauge fixed in {B} measures along a line to a plane on the platform, from rest.
     ///
     /// The reading is the distance (m) from the probe point to the plane along `direction`, from rest.
     "gauge", Repeated(6, 6) => Probe {
         /// A point of the measuring line in {B}.
         point: [f64; 3] = POINT, Required, "" ["position", "location", "place"], ["80 mm", "0 mm", "180 mm"];
-        /// Direction of the line in {B}, of any length: the reading grows when the target moves this way.
+        /// Direction of the line in {B}, of any length: the reading grows when the target moves in this direction.
         direction = list(&[DIRECTION; 3]), Required, "" ["normal", "axis", "n"], [0, 0, 1];
         /// A point of the target plane in {P}.
         target_point = POINT, Rule("`point`, at rest"), "", ["80 mm", "0 mm", "0 mm"];
@@ -263,7 +263,7 @@ section! {
         calibration = CALIBRATION, Rule("`sensor.calibration`"), "", ["-2 um", "5 um/V"];
     }
     and |fields, table| {
-        /// Unit vector of the line in {B}: the reading grows when the target moves this way.
+        /// Unit vector of the line in {B}: the reading grows when the target moves in this direction.
         direction: [f64; 3] = unit(fields.list(&join(table, "direction"))?)?;
         /// A point of the target plane in {P}, m.
         plane_point: [f64; 3] = fields.list(&join(table, "target_point")).or_else(|| facing(fields, table))?;
@@ -275,40 +275,40 @@ section! {
     }
 }
 
-/// What faces the gauge at rest, where {P} differs from {B} by the height alone.
+/// The point of the platform that the gauge faces at rest, where {P} differs from {B} only by the height.
 fn facing(fields: &Fields, gauge: &str) -> Option<[f64; 3]> {
     let [x, y, z] = fields.list(&join(gauge, "point"))?;
     Some([x, y, z - fields.number("geometry.height")?])
 }
 
-/// `vector` with length 1; `None` if it has none worth speaking of.
+/// `vector` with length 1; `None` if its length is almost zero.
 pub(crate) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
     let length = libm::sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
     (length > 1e-9).then(|| vector.map(|component| component / length))
 }
 
 section! {
-    /// A trajectory that the controller can play, numbered from 0 in the order of the file; with [control] alone.
+    /// A trajectory that the controller can play, numbered from 0 in the order of the file; only with [control].
     "trajectory" ["path"], Repeated(0, MAX_TABLES) => Trajectory {
-        /// Its name, once in the file.
+        /// Its name, unique in the file.
         name: String = NAME, Required, "", "circle";
         /// One of the paper's paths, a step, or a table of poses.
         kind = one_of(&["case-1", "case-2", "machining", "step", "waveform"]), Required, "", "case-1";
-        /// Time by which the leg displacements are asked for early while the controller plays it; `specgen check --details` proposes less than control.lead where corners ask for that.
+        /// Lead time of the leg displacements while the controller plays it. `specgen check --details` proposes less than control.lead for paths with corners.
         lead: Option<f64> = one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Rule("that of `control.lead`"), "", "0.2 ms";
-        /// Of a paper's path: operating frequency.
+        /// For a paper's path: operating frequency.
         frequency = one(Dimension::FREQUENCY, Range::closed(1e-3, 1e3), "Hz"), Rule("error for a paper's path"), "f_c" ["f", "rate"], "1 Hz";
-        /// Of a paper's path: the formulas as printed, with their jumps.
+        /// For a paper's path: the formulas as printed, with their jumps.
         as_printed = FLAG, Rule("`false`"), "", false;
-        /// Of a step: the pose that it goes to, from zero, without a corner in its speed.
+        /// For a step: its end pose; it starts at zero and has no corner in its speed.
         to = list(POSE), Rule("error for a step"), "", ["10 um", "0 um", "0 um", "0 urad", "0 urad", "0 urad"];
-        /// Of a step: how long that takes.
+        /// For a step: its duration.
         time = one(Dimension::TIME, Range::closed(1e-5, 3600.0), "ms"), Rule("error for a step"), "", "4 ms";
-        /// Of a waveform: the table of poses, a CSV file relative to the spec.
+        /// For a waveform: the table of poses, a CSV file relative to the spec.
         file = Shape::One(Item::File), Rule("error for a waveform"), "", "waveforms/circle.csv";
-        /// Of a waveform: time from one row to the next.
+        /// For a waveform: time from one row to the next.
         period = one(Dimension::TIME, Range::closed(1e-6, 3600.0), "ms"), Rule("error for a waveform"), "", "1 ms";
-        /// Of a waveform: whether it begins again after the last row.
+        /// For a waveform: whether it starts again after the last row.
         repeat = FLAG, Rule("`false`"), "", false;
     }
     and |fields, table| {
@@ -320,16 +320,16 @@ section! {
 /// Kinds of trajectory.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TrajectoryKind {
-    /// One of the paper's, as corrected in the errata or as printed.
+    /// One of the paper's paths, as corrected in the errata or as printed.
     Paper {
         /// Which.
         path: PaperPath,
-        /// With the jumps of the printed formulas.
+        /// As printed, with jumps.
         as_printed: bool,
         /// f_c, Hz.
         frequency: f64,
     },
-    /// A step from zero, whose speed rises and falls as a period of 1 − cos.
+    /// A step from zero, whose speed is a period of 1 − cos.
     Step {
         /// m and rad.
         to: [f64; 6],
@@ -342,7 +342,7 @@ pub enum TrajectoryKind {
         file: String,
         /// Time between rows, s.
         period: f64,
-        /// Begins again after the last row.
+        /// Starts again after the last row.
         repeat: bool,
     },
 }

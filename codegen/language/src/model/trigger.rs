@@ -3,7 +3,7 @@
 use super::{LARGEST_TRAVEL, LARGEST_TURN};
 use crate::keys::declare::*;
 
-/// Most output lines: as many as the boards have pins for.
+/// Most output lines: the number of pins for them on the boards.
 pub const MAX_OUTPUTS: usize = 4;
 /// And an input.
 pub const MAX_TRIGGERS: usize = MAX_OUTPUTS + 1;
@@ -22,7 +22,7 @@ const ROOM: Shape = one(Dimension::LENGTH, Range::closed(0.0, LARGEST_TRAVEL), "
 const TURN_ROOM: Shape = one(Dimension::ANGLE, Range::closed(0.0, LARGEST_TURN), "nrad");
 
 choice! {
-    /// What an output line shows, or that it is the input.
+    /// Function of an output line, or that the line is the input.
     TriggerKind {
         /// A pulse at each position that the pose passes.
         Position = "position",
@@ -34,35 +34,35 @@ choice! {
         Points = "points",
         /// A pulse at ticks of the run.
         Ticks = "ticks",
-        /// No output: the line whose rising edge starts what was ordered for it.
+        /// Not an output: a rising edge of this line starts the waiting command.
         Input = "input",
     }
 }
 
 choice! {
-    /// Which passages of a position give a pulse.
+    /// Direction of passages that give a pulse.
     TriggerDirection {
         /// All.
         Both = "both",
-        /// Those with the pose rising.
+        /// Only with the pose rising.
         Up = "up",
-        /// Those with the pose falling.
+        /// Only with the pose falling.
         Down = "down",
     }
 }
 
 section! {
-    /// A digital output line, outputs numbered from 0 in the order of the file: pulses at positions that the measured pose passes, at set-points of a wave or at ticks, or a level; or the input line, whose rising edge starts the motion or wave ordered for it; with [control] alone. docs/triggers.md says when it changes and where it is wired to.
+    /// A digital output line: pulses at positions of the measured pose, at set-points of a wave or at ticks, or a level. Outputs are numbered from 0 in the order of the file. Or the input line, whose rising edge starts a waiting motion or wave. Only with [control]. docs/triggers.md describes timing and wiring.
     ///
     /// Positions in m or rad from rest, the bias included; times in s.
     "trigger" ["output", "digital_output", "input"], Repeated(0, MAX_TRIGGERS) => Trigger {
-        /// Its name, once in the file.
+        /// Its name, unique in the file.
         name: String = NAME, Required, "", "camera";
-        /// What it shows: positions passed, the pose within bounds, the set-point in motion, set-points of a stream or wave, ticks of the run; `input` is the input line.
+        /// Function of the line: positions passed, the pose within bounds, the set-point in motion, set-points of a stream or wave, ticks of the run; `input` is the input line.
         kind: TriggerKind = one_of(TriggerKind::WORDS), Required, "" ["mode"], "position";
-        /// Axis of the measured pose that positions and levels are of.
+        /// Axis of the measured pose for positions and levels.
         axis = one_of(AXES), Default("x"), "", "x";
-        /// Of positions: which passages give a pulse.
+        /// For positions: direction of passages that give a pulse.
         direction: TriggerDirection = one_of(TriggerDirection::WORDS), Default("both"), "", "up";
         /// First position, or lower end of a level, from rest.
         start = PLACE, InsteadOf("start_angle"), "" ["begin"], "-20 um";
@@ -72,11 +72,11 @@ section! {
         stop = PLACE, InsteadOf("stop_angle"), "" ["end"], "20 um";
         /// The same of a rotation.
         stop_angle = ANGLE, InsteadOf("stop"), "", "100 urad";
-        /// From position to position, above `hysteresis`.
+        /// Distance between positions, above `hysteresis`.
         step = STEP, InsteadOf("step_angle"), "" ["pitch"], "1 um";
         /// The same of a rotation.
         step_angle = TURN, InsteadOf("step"), "", "10 urad";
-        /// How far the pose has to go from a position that it passed before that counts again, or beyond a level before it ends; ten times the noise of the pose if neither is given.
+        /// Distance that the pose must move away from a passed position before that is armed again, or beyond a level before it ends; ten times the noise of the pose if neither is given.
         hysteresis = ROOM, InsteadOf("hysteresis_angle"), "", "50 nm";
         /// The same of a rotation.
         hysteresis_angle = TURN_ROOM, InsteadOf("hysteresis"), "", "500 nrad";
@@ -84,7 +84,7 @@ section! {
         first: u32 = integer(1, LARGEST_COUNT), Default(1), "", 1;
         /// Set-points or ticks from pulse to pulse.
         every: u32 = integer(1, LARGEST_COUNT), Default(1), "", 10;
-        /// Last set-point or tick that may have a pulse. Without it there is no last one.
+        /// Last set-point or tick with a pulse. Without it there is no last one.
         last: Option<u32> = integer(1, LARGEST_COUNT), Optional, "", 1000;
         /// Length of a pulse, to the nearest tick and at least one.
         width: Option<f64> = one(Dimension::TIME, Range::above(0.0, LONGEST_PULSE), "ms"), Rule("one tick"), "", "0.1 ms";
@@ -103,7 +103,7 @@ section! {
     }
 }
 
-/// Of a translation or of a rotation.
+/// The value for a translation or a rotation.
 fn either(fields: &Fields, table: &str, key: &str) -> Option<f64> {
     fields.number(&join(table, key)).or_else(|| fields.number(&join(table, &format!("{key}_angle"))))
 }

@@ -2,8 +2,8 @@
 
 /// Exponents of m, kg, s, V, rad and byte.
 ///
-/// Volt stands for the electrical base unit and radian is a dimension of its own, so that a torque is not taken
-/// for a rotational stiffness, nor hertz for rad/s.
+/// Volt is the electrical base unit. Radian is a dimension of its own, so that a torque is not taken for a rotational
+/// stiffness, nor hertz for rad/s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Dimension {
     exponents: [i8; 6],

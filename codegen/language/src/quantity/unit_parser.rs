@@ -10,12 +10,12 @@ const MAX_CONSTANTS: usize = 32;
 /// Reads the unit that starts at byte `at` of `text`; a text that ends there has the unit 1.
 ///
 /// # Errors
-/// The first thing that is wrong, with its place in `text`.
+/// The first error, with its place in `text`.
 pub(super) fn parse(text: &str, at: usize) -> Result<Scale, QuantityError> {
     UnitParser { text, at, depth: 0 }.whole()
 }
 
-/// Factor of a unit to SI, and what it measures.
+/// Factor of a unit to SI, and its dimension.
 #[derive(Debug, Clone)]
 pub(super) struct Scale {
     pub(super) dimension: Dimension,
@@ -36,7 +36,7 @@ impl Scale {
             let (times, over) = if power > 0 { (&other.times, &other.over) } else { (&other.over, &other.times) };
             self.times.extend_from_slice(times);
             self.over.extend_from_slice(over);
-            // `pi` has no dimension to run out of range, so that its powers are bounded here.
+            // `pi` has no dimension that could overflow, so its powers are bounded here.
             if self.times.len() + self.over.len() > MAX_CONSTANTS {
                 return None;
             }

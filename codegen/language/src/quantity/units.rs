@@ -29,7 +29,7 @@ pub struct Unit {
     pub constant: Option<Constant>,
 }
 
-/// Which prefixes a unit takes.
+/// The prefixes that a unit takes.
 #[derive(Clone, Copy, PartialEq)]
 enum Prefixes {
     None,
@@ -97,7 +97,7 @@ const BINARY_PREFIXES: &[(&str, Constant)] = &[
     ("Gi", Constant { digits: "1073741824", exponent: 0 }),
 ];
 
-/// Words that people write for a unit, and the unit.
+/// Other words for a unit, and the unit.
 const ALIASES: &[(&str, &str)] = &[
     ("sec", "s"),
     ("second", "s"),
@@ -148,7 +148,7 @@ pub fn find(name: &str) -> Option<Unit> {
                 return Some(Unit { constant: Some(*constant), ..bare(e) });
             }
             if let Some((_, power)) = SI_PREFIXES.iter().find(|(p, _)| *p == prefix) {
-                // A part of a byte means nothing.
+                // A fraction of a byte has no meaning.
                 if e.prefixes == Prefixes::Memory && *power < 3 {
                     continue;
                 }
@@ -159,7 +159,7 @@ pub fn find(name: &str) -> Option<Unit> {
     None
 }
 
-/// What was probably meant by an unknown unit.
+/// The unit that was probably meant by an unknown one.
 #[must_use]
 pub fn suggest(name: &str) -> Option<&'static str> {
     let lower = name.to_lowercase();

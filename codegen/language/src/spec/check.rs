@@ -1,7 +1,7 @@
-//! Checks across several values, none of which needs a record or a long computation.
+//! Checks across several values, without records or long computations.
 //!
-//! Each check reads what it needs; if a value is missing or wrong, that has its own finding and the check is left out
-//! (the `?` on `Option`). So one run finds everything.
+//! Each check reads the values it needs. If a value is missing or wrong, that has its own finding and the check is
+//! skipped (the `?` on `Option`). So one run finds everything.
 
 mod adaptation;
 mod assumed;
@@ -78,19 +78,19 @@ const CHECKS: &[Check] = &[
 /// Runs every check. `dir` is the folder that records are relative to.
 pub(super) fn all(fields: &Fields, dir: &Path, findings: &mut Findings) {
     for check in CHECKS {
-        // `None` says that a value is missing, which is reported already.
+        // `None`: a value is missing, which is already reported.
         let _ = check(fields, findings);
     }
     let _ = records::readable(fields, dir, findings);
 }
 
-/// Reports [`codes::WRONG_ORDER`] unless the first value of `path` is below the second, or equal where that is allowed.
+/// Reports [`codes::WRONG_ORDER`] unless the first value of `path` is below the second, or equal if that is permitted.
 fn in_order(fields: &Fields, findings: &mut Findings, path: &str, equal_allowed: bool) -> Option<()> {
     let [low, high] = fields.list::<2>(path)?;
     if high > low || (equal_allowed && high >= low) {
         return Some(());
     }
-    let message = format!("`{path}` ends where it starts or before: the first value must be the smaller one");
+    let message = format!("`{path}` has its values in the wrong order: the first value must be the smaller one");
     let name = path.rsplit('.').next().unwrap_or(path);
     let turned = match [0, 1].map(|item| fields.literal(path, item)) {
         [Some(first), Some(second)] if low > high => Some(format!("[{second}, {first}]")),

@@ -1,13 +1,13 @@
-//! Collects what a run finds, so that no check has to stop at the first mistake.
+//! Collects findings, so that a check need not stop at the first mistake.
 
 use std::ops::Range;
 
 use crate::diagnostic::{Code, Diagnostic, Place, Severity, codes};
 
-/// More findings than this are cut: a file with so many is not a spec with mistakes.
+/// Further findings are cut: a file with that many is not a spec with mistakes.
 pub(super) const MAX_FINDINGS: usize = 100;
 
-/// More are not even kept: a megabyte of slips would take a hundred megabytes of messages.
+/// Further findings are not even stored: a megabyte of mistakes would need a hundred megabytes of messages.
 const MAX_KEPT: usize = 5000;
 
 /// Findings of one run over one spec.
@@ -18,7 +18,7 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    /// Adds a finding about `key`, as bad as its code.
+    /// Adds a finding about `key`, with the severity of its code.
     pub(super) fn add(&mut self, code: Code, key: &str, span: Range<usize>, message: String, help: String) {
         if self.list.len() >= MAX_KEPT {
             self.left_out += 1;
@@ -27,14 +27,14 @@ impl Findings {
         self.list.push(Diagnostic::new(code, key, Place::Spec(span), message, help));
     }
 
-    /// Says what may stand in the place of the last finding, if that is about `key`.
+    /// Sets the replacement of the last finding, if that is about `key`.
     pub(super) fn replace_by(&mut self, key: &str, text: Option<String>) {
         if let Some(last) = self.list.last_mut().filter(|last| last.key == key) {
             last.replacement = text;
         }
     }
 
-    /// Says that `line` may stand at `place` instead of what the last finding is about, if that is about `key`.
+    /// Sets `line` as the replacement at `place` for the last finding, if that is about `key`.
     pub(super) fn instead(&mut self, key: &str, place: Range<usize>, line: &str) {
         if let Some(last) = self.list.last_mut().filter(|last| last.key == key) {
             last.help = format!("write {line}");
@@ -43,12 +43,12 @@ impl Findings {
         }
     }
 
-    /// Counts findings that were not even made.
+    /// Counts findings that were not created.
     pub(super) fn leave_out(&mut self, count: usize) {
         self.left_out += count;
     }
 
-    /// Drops the findings that `predicate` refuses.
+    /// Keeps only the findings that satisfy `predicate`.
     pub(super) fn retain(&mut self, predicate: impl FnMut(&Diagnostic) -> bool) {
         self.list.retain(predicate);
     }
@@ -82,7 +82,7 @@ impl Findings {
             self.list.sort_by_key(|d| (std::cmp::Reverse(d.severity), start(d)));
             self.list.truncate(MAX_FINDINGS);
         }
-        // Stable: at one place the order of the key table remains.
+        // Stable sort: at one place the order of the key table remains.
         self.list.sort_by_key(start);
         if total > self.list.len() {
             let shown = self.list.len();

@@ -28,7 +28,7 @@ pub(super) fn template_of(key: &Key, path: &str) -> String {
         .map_or_else(|| key.template(), Item::template)
 }
 
-/// What takes the place of `placeholder`.
+/// What replaces `placeholder`.
 pub(super) fn wanted(key: &Key, path: &str, placeholder: &str) -> String {
     if placeholder == "<unit>" {
         return units_of(key, path).unwrap_or_else(|| "a unit".to_owned());
@@ -44,7 +44,7 @@ pub(super) fn wanted(key: &Key, path: &str, placeholder: &str) -> String {
     }
 }
 
-/// How a file is named that was not named relative to the spec.
+/// Help for a file that was not named relative to the spec.
 pub(super) fn beside_the_spec(found: &str) -> String {
     let name = found.rsplit(['/', '\\', ':']).next().unwrap_or_default().trim();
     let name = if name.is_empty() { "<file>" } else { name };
@@ -112,7 +112,8 @@ pub(super) fn units_of(key: &Key, path: &str) -> Option<String> {
     }
 }
 
-/// The time that a rate stands for, where the key takes one: the period of "20 kHz" is "50 us". A lag's rate is its corner.
+/// The time that corresponds to a rate, if the key takes a time: the period of "20 kHz" is "50 us". For a lag, the rate
+/// is its corner frequency.
 pub(super) fn time_of_rate(key: &Key, found: &str) -> Option<String> {
     let Shape::One(Item::Quantity { dimension: Dimension::TIME, unit, range }) = key.shape else { return None };
     let rate = quantity::parse(found).ok().filter(|rate| rate.dimension == Dimension::FREQUENCY)?;
@@ -142,7 +143,7 @@ pub(super) fn wrong_dimension(
     let own =
         if is.without_angle() == wanted.without_angle() { with_angle(key, path, found, is, wanted) } else { None };
     if let Some((own, other)) = own.as_ref().zip(hertz_for_rate(key, path, found, is, wanted)) {
-        let help = format!("mind the angle in the unit: write \"{own}\", or \"{other}\" if that is what was meant");
+        let help = format!("the unit contains an angle: write \"{own}\", or \"{other}\" if that was intended");
         return (message, help);
     }
     let written = own.map_or_else(|| format!("in the form {}", template_of(key, path)), |own| format!("as \"{own}\""));
@@ -151,14 +152,14 @@ pub(super) fn wrong_dimension(
     } else if is.without_angle() != wanted.without_angle() {
         ""
     } else if is == is.without_angle() {
-        "name the angle in the unit; "
+        "the unit needs an angle; "
     } else {
-        "mind the angle in the unit; "
+        "the unit contains an angle; "
     };
     (message, format!("{hint}write {} {written}", wanted.describe()))
 }
 
-/// What was found, in the unit of the key, where the two differ by an angle alone: 20 Hz is 40 pi rad/s, 5 N m is 5 N m/rad.
+/// The value in the key's unit, if the two differ only by an angle: 20 Hz is 40 pi rad/s, 5 N m is 5 N m/rad.
 fn with_angle(key: &Key, path: &str, found: &str, is: Dimension, wanted: Dimension) -> Option<String> {
     let Some(Item::Quantity { unit, range, .. }) = item_of(key, path) else { return None };
     let value = quantity::parse(found).ok()?.value;
@@ -174,7 +175,7 @@ fn with_angle(key: &Key, path: &str, found: &str, is: Dimension, wanted: Dimensi
     range.contains(value).then_some(text)
 }
 
-/// The same number in Hz, for a frequency that is written in rad/s: the likelier slip.
+/// The same number in Hz, for a frequency written in rad/s: the likelier mistake.
 fn hertz_for_rate(key: &Key, path: &str, found: &str, is: Dimension, wanted: Dimension) -> Option<String> {
     let Some(Item::Quantity { range, .. }) = item_of(key, path) else { return None };
     let value = quantity::parse(found).ok()?.value;
@@ -182,7 +183,7 @@ fn hertz_for_rate(key: &Key, path: &str, found: &str, is: Dimension, wanted: Dim
     meant.then(|| format!("{} Hz", text::digits(value)))
 }
 
-/// What a quantity with a comma may mean: decimals behind it, or thousands before it.
+/// Meanings of a quantity with a comma: a decimal comma, or commas between thousands.
 fn without_commas(found: &str) -> String {
     let parts: Vec<&str> = found.split(',').collect();
     let is_group = |part: &&str| {
@@ -197,7 +198,7 @@ fn without_commas(found: &str) -> String {
     match (decimals, thousands) {
         (Some(one), Some(other)) => {
             format!(
-                "write {} if decimals stand behind the comma, {} if it separates thousands",
+                "write {} if the comma is a decimal comma, {} if it separates thousands",
                 written(&one),
                 written(&other)
             )
@@ -232,8 +233,8 @@ pub(super) fn bad_quantity(key: &Key, path: &str, found: &str, problem: &Problem
         ),
         Problem::AmbiguousQuotient => (
             codes::BAD_QUANTITY,
-            format!("{is}: what stands below the slash?"),
-            "group it, as in \"N/(m s)\", or write what stands above first, as in \"N s/m\"".to_owned(),
+            format!("{is}: the product after the slash is ambiguous"),
+            "group it, as in \"N/(m s)\", or write the numerator first, as in \"N s/m\"".to_owned(),
         ),
         Problem::BadPower => (
             codes::BAD_QUANTITY,

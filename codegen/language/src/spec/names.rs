@@ -1,8 +1,8 @@
-//! Names in a table: what they stand for, and where else they exist.
+//! Names in a table: their meaning, and where else they exist.
 
 use super::keys::{Key, SECTIONS, Section};
 
-/// What a name in a table stands for.
+/// Meaning of a name in a table.
 pub(super) enum Meaning {
     Key(&'static Key),
     Section(&'static Section),
@@ -16,7 +16,7 @@ pub(super) fn lookup(section: &'static Section, name: &str) -> Option<Meaning> {
     SECTIONS.iter().find(|inner| child_name(section, inner) == Some(name)).map(Meaning::Section)
 }
 
-/// "budget" for `target.budget` within `target`, `None` if `inner` does not stand directly in `outer`.
+/// "budget" for `target.budget` within `target`; `None` if `inner` is not directly in `outer`.
 pub(super) fn child_name(outer: &Section, inner: &'static Section) -> Option<&'static str> {
     let name = match outer.name {
         "" => inner.name,
@@ -25,7 +25,7 @@ pub(super) fn child_name(outer: &Section, inner: &'static Section) -> Option<&'s
     (!name.is_empty() && !name.contains('.')).then_some(name)
 }
 
-/// The key, or the section within `outer`, that people call `name`: by the symbol of the paper or a common name.
+/// The key, or the section within `outer`, that is also called `name`: by the symbol of the paper or a common name.
 pub(super) fn called(outer: &'static Section, name: &str, is_table: bool) -> Option<&'static str> {
     if is_table {
         return SECTIONS.iter().filter(|inner| inner.is_called(name)).find_map(|inner| child_name(outer, inner));
@@ -33,7 +33,7 @@ pub(super) fn called(outer: &'static Section, name: &str, is_table: bool) -> Opt
     outer.keys.iter().find(|key| key.is_called(name)).map(|key| key.name)
 }
 
-/// A key or section of this name in another place; then one that people call so.
+/// A key or section of this name elsewhere; then one that is also called so.
 pub(super) fn elsewhere(section: &Section, name: &str) -> Option<String> {
     let others = || SECTIONS.iter().filter(|other| other.name != section.name);
     let exact = others().find_map(|other| {

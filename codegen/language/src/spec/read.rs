@@ -14,7 +14,7 @@ use super::{messages, text};
 use crate::diagnostic::codes;
 use crate::keys::fields::{Field, Fields};
 
-/// Reads every value of `root`; what is wrong goes to `findings`.
+/// Reads every value of `root`; errors go to `findings`.
 pub(super) fn read(source: &str, root: &DeTable<'_>, findings: &mut Findings) -> Fields {
     let mut reader = Reader { source, fields: Fields::of(source), findings, seen: BTreeSet::new() };
     if let Some(section) = keys::section("") {
@@ -28,7 +28,7 @@ struct Reader<'a> {
     source: &'a str,
     fields: Fields,
     findings: &'a mut Findings,
-    /// Sections that stand in the file, also under a misspelt name.
+    /// Sections in the file, also under a misspelt name.
     seen: BTreeSet<&'static str>,
 }
 
@@ -37,7 +37,7 @@ impl Reader<'_> {
     fn table(&mut self, section: &'static Section, path: &str, table: &DeTable<'_>, header: Option<Range<usize>>) {
         self.seen.insert(section.name);
         let mut found: BTreeMap<&'static str, Range<usize>> = BTreeMap::new();
-        // A section may hold sections only and no key of its own: its place is then the first name in it.
+        // A section may contain only sections and no key: its place is then its first name.
         let header = header
             .or_else(|| table.iter().map(|(name, _)| text::clamp(self.source, name.span())).min_by_key(|s| s.start));
         let header = header.unwrap_or(0..0);
@@ -66,7 +66,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The form that the keys in `found` are of, the first one if there is none of any; two forms are a finding.
+    /// The form of the keys in `found`, or the first form if there are none; two forms are a finding.
     fn form(
         &mut self,
         section: &'static Section,
@@ -86,10 +86,10 @@ impl Reader<'_> {
                 codes::ALTERNATIVES,
                 &keys::join(path, second.name),
                 found.get(second.name).cloned().unwrap_or(0..0),
-                format!("`{}` stands beside `{}`: each says the same in its own way", second.name, first.name),
-                format!("keep one form whole: {}; or {}", names(&first.presence), names(&second.presence)),
+                format!("`{}` and `{}` are alternatives; give only one", second.name, first.name),
+                format!("give all keys of one form: {}; or {}", names(&first.presence), names(&second.presence)),
             );
-            // What is missing of either is no news.
+            // Missing keys of either form are not reported.
             return None;
         }
         match given.first().map(|key| key.presence) {
@@ -115,7 +115,8 @@ impl Reader<'_> {
         for (i, element) in array.iter().enumerate().take(MAX_TABLES) {
             let path = format!("{}[{i}]", section.name);
             let span = text::clamp(self.source, element.span());
-            // A table of its own spans no more than its header; one written inline spans its keys too.
+            // The span of a table with its own header is only the header; the span of an inline table includes its
+            // keys.
             match element.get_ref() {
                 DeValue::Table(table) => self.table(section, &path, table, Some(span)),
                 other => self.not_repeated(section, &path, span, other),
@@ -133,7 +134,7 @@ impl Reader<'_> {
         );
     }
 
-    /// What `name` stands for; a slip of a known name counts as that name if it is not there itself.
+    /// The meaning of `name`. A misspelt name counts as the known name, if that is not there itself.
     fn meaning(
         &mut self,
         section: &'static Section,
@@ -158,7 +159,7 @@ impl Reader<'_> {
         free.and_then(|meant| lookup(section, meant))
     }
 
-    /// Whether a time was given as a rate under a name of its own, as in `rate = "20 kHz"`: the fix is then the whole line.
+    /// Whether a time was given as a rate under its own name, as in `rate = "20 kHz"`: the fix is then the whole line.
     fn is_rate_of_time(
         &mut self,
         table: &str,
@@ -189,12 +190,12 @@ impl Reader<'_> {
         let place = if section.name.is_empty() { String::new() } else { format!(" in {}", section.header()) };
         let help = match (meant, elsewhere(section, written)) {
             (Some(meant), _) => format!("did you mean `{meant}`?"),
-            (None, _) if let Some(taken) = taken => format!("take it out; `{taken}` says this already"),
+            (None, _) if let Some(taken) = taken => format!("remove it; `{taken}` already sets this"),
             (None, Some(path)) if is_table => format!("did you mean `{path}`?"),
             (None, Some(path)) if path.starts_with('[') => format!("there is a section {path}: does it belong there?"),
             (None, Some(path)) if !path.ends_with(written) => format!("did you mean `{path}`, in its own section?"),
             (None, Some(path)) => format!("`{path}` exists: did it slip out of its section?"),
-            (None, None) => format!("take it out; {}", known_names(section, is_table)),
+            (None, None) => format!("remove it; {}", known_names(section, is_table)),
         };
         let span = text::clamp(self.source, name.span());
         self.findings.add(code, &path, span, format!("unknown {what} {}{place}", text::quote(written)), help);
@@ -231,7 +232,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A key that is not in its section: a default takes its place, or a finding.
+    /// A missing key: its default is used, or there is a finding.
     fn absent(
         &mut self,
         section: &'static Section,
@@ -263,7 +264,7 @@ impl Reader<'_> {
     }
 
     fn default(&mut self, path: String, key: &'static Key, literal: &str, header: &Range<usize>) {
-        // A default is read as if it stood in the file; a test reads every default of the key table.
+        // A default is read as if it were in the file; a test reads every default of the key table.
         let Ok(value) = DeValue::parse(literal) else {
             return;
         };
@@ -289,7 +290,7 @@ impl Reader<'_> {
                     format!("{} Write:\n{}", section.doc, section.template().trim_end()),
                 );
             } else if section.kind == Kind::Plain && self.outer_is_there(section) {
-                // The place of its defaults is the start of the file.
+                // Defaults are placed at the start of the file.
                 for key in section.keys {
                     self.absent(section, section.name, key, None, &(0..0));
                 }
@@ -297,7 +298,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Whether the section that `section` stands in is in the file, or need not be.
+    /// Whether the section that contains `section` is in the file, or optional.
     fn outer_is_there(&self, section: &Section) -> bool {
         let outer = section.name.rsplit_once('.').and_then(|(outer, _)| keys::section(outer));
         outer.is_none_or(|outer| outer.kind == Kind::Plain || self.seen.contains(outer.name))

@@ -56,7 +56,7 @@ pub fn reference_markdown() -> String {
     text
 }
 
-/// One key as Markdown, for an editor: path, symbol, meaning, example, range, what stands if it is left out.
+/// One key as Markdown, for an editor: path, symbol, meaning, example, range, and default.
 #[must_use]
 pub fn key_markdown(path: &str, key: &Key) -> String {
     let symbol = if key.symbol.is_empty() { String::new() } else { format!(", {} in the paper", key.symbol) };
@@ -112,7 +112,7 @@ fn absence(key: &Key) -> String {
     }
 }
 
-/// What else it is called, as a sentence to add.
+/// Its other names, as a sentence.
 fn aliases(key: &Key) -> String {
     if key.aliases.is_empty() { String::new() } else { format!(" Elsewhere: {}.", key.aliases.join(", ")) }
 }

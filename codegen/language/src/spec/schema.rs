@@ -1,7 +1,7 @@
 //! The JSON Schema (draft-07) of a spec, printed from the key table.
 //!
-//! It serves editors: names, kinds, enums and the form of quantities. Dimensions, ranges of quantities and
-//! everything across keys is left to [`super::load`].
+//! For editors: names, kinds, enums and the form of quantities. [`super::load`] checks dimensions, ranges of quantities
+//! and conditions on several keys.
 
 use serde_json::{Map, Value, json};
 
@@ -70,7 +70,7 @@ fn table(name: &str) -> Map<String, Value> {
     object
 }
 
-/// The section that `section` stands in; `None` for the root itself.
+/// The section that contains `section`; `None` for the root itself.
 fn parent(section: &Section) -> Option<&'static str> {
     match section.name.rsplit_once('.') {
         Some((outer, _)) => Some(outer),
@@ -78,7 +78,7 @@ fn parent(section: &Section) -> Option<&'static str> {
     }
 }
 
-/// A pair of keys that must not stand side by side, each pair once.
+/// Pairs of keys that exclude each other, each pair once.
 fn exclusive_pairs(section: &Section) -> Vec<Value> {
     section
         .keys
@@ -104,7 +104,7 @@ fn forms(section: &Section) -> Vec<Value> {
     section.forms().into_iter().map(one_form).collect()
 }
 
-/// The schema of an array of `items`, of which those after the first `least` may be left out.
+/// The schema of an array of `items`; those after the first `least` are optional.
 fn array_schema(items: &[Item], least: usize) -> Map<String, Value> {
     let mut array = Map::new();
     array.insert("type".into(), json!("array"));

@@ -1,6 +1,6 @@
 //! Reads the spec file as text.
 
-// A finding is larger than clippy likes in a Result; there is one per run, and its type is shared by every phase.
+// clippy finds a finding too large for a Result. There is one per run, and every phase shares its type.
 #![expect(clippy::result_large_err)]
 
 use std::path::Path;
@@ -28,7 +28,7 @@ impl SpecSource {
     }
 }
 
-/// Whatever the spec names that is a file belongs to it, whether or not the command reads it: no output replaces it.
+/// Every file that the spec names belongs to it, whether or not the command reads it: no output may replace it.
 fn note_files(text: &str, dir: &Path) {
     fn note(value: &toml::Value, dir: &Path) {
         match value {
@@ -64,7 +64,7 @@ fn read_bytes(path: &Path, shown: &str) -> Result<Vec<u8>, Diagnostic> {
 }
 
 fn into_text(bytes: Vec<u8>, shown: &str) -> Result<String, Diagnostic> {
-    // Of text in another encoding some bytes may still pass for UTF-8; a zero byte is in no text.
+    // Some bytes of a text in another encoding may be valid UTF-8; but no text contains a zero byte.
     if let Some(found) = other_encoding(&bytes, shown) {
         return Err(found);
     }
@@ -72,7 +72,7 @@ fn into_text(bytes: Vec<u8>, shown: &str) -> Result<String, Diagnostic> {
         let offset = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();
         let line = 1 + bytes[..offset].iter().filter(|b| **b == b'\n').count();
-        // `valid_up_to` is before the end: the byte there is the one that failed.
+        // `valid_up_to` is before the end: the byte there is the invalid one.
         let byte = bytes.get(offset).copied().unwrap_or_default();
         Diagnostic::in_file(
             shown,
@@ -95,7 +95,7 @@ fn other_encoding(bytes: &[u8], shown: &str) -> Option<Diagnostic> {
     let offset = if marked { 0 } else { zero.unwrap_or_default() };
     let line = 1 + bytes[..offset].iter().filter(|b| **b == b'\n').count();
     let looks = if marked { "it begins with the mark of UTF-16".to_owned() } else { format!("byte {offset} is zero") };
-    // The first letter of a spec is one of ASCII: half of it is zero.
+    // The first letter of a spec is ASCII, so half of it is zero.
     let encoding = match (marked, offset) {
         (true, _) => Some("UTF-16"),
         (false, 0) => Some("UTF-16BE"),

@@ -1,7 +1,7 @@
-//! TOML text to a tree with spans, and what is wrong with the syntax.
+//! TOML text to a tree with spans, and syntax errors.
 //!
-//! The parser recovers, so that several mistakes are reported in one run. Where all of them leave the tree whole
-//! (a key given twice, a text without quotes), the values are checked as well.
+//! The parser recovers, so that one run reports several mistakes. If they leave the tree complete (a key given twice, a
+//! text without quotes), the values are checked as well.
 
 use std::ops::Range;
 
@@ -32,10 +32,10 @@ pub(super) fn parse<'a>(source: &'a str, findings: &mut Findings) -> ParsedFile<
     ParsedFile { root: root.into_inner(), whole: whole && left_out == 0 }
 }
 
-/// Reports one syntax error; whether the tree is still whole.
+/// Reports one syntax error; returns whether the tree is still complete.
 fn report(source: &str, span: Range<usize>, message: &str, findings: &mut Findings) -> bool {
     let found = &source[span.clone()];
-    // These two phrases are the parser's; a test pins them, so that an update that changes them is noticed.
+    // These two phrases are the parser's. A test pins them, so that an update that changes them is noticed.
     if message.starts_with("duplicate key") {
         duplicate(source, span, findings);
         return true;
@@ -55,7 +55,7 @@ fn report(source: &str, span: Range<usize>, message: &str, findings: &mut Findin
         span,
         if missing_value { "there is no value here".to_owned() } else { format!("this is not TOML: {message}") },
         if missing_value {
-            "write a value after the equals sign, or take the line out".to_owned()
+            "write a value after the equals sign, or remove the line".to_owned()
         } else {
             help_for(message).to_owned()
         },
@@ -63,7 +63,7 @@ fn report(source: &str, span: Range<usize>, message: &str, findings: &mut Findin
     false
 }
 
-/// Reports a text without quotes, once for each place.
+/// Reports a text without quotes, once per place.
 fn unquoted(source: &str, span: Range<usize>, findings: &mut Findings) {
     let place = Place::Spec(span.clone());
     if findings.all().iter().any(|d| d.place == place) {
@@ -76,15 +76,15 @@ fn unquoted(source: &str, span: Range<usize>, findings: &mut Findings) {
         &key,
         span,
         format!("{} is a text without quotes", text::quote(found)),
-        format!("texts and quantities stand in quotes: write \"{}\"", text::shorten(found.trim())),
+        format!("texts and quantities need quotes: write \"{}\"", text::shorten(found.trim())),
     );
-    // Where the key takes no text, quotes are not enough.
+    // If the key takes no text, quotes are not enough.
     let takes_text = keys::key(&key)
         .is_none_or(|key| !matches!(key.shape, Shape::One(Item::Number(_) | Item::Integer(..) | Item::Flag)));
     findings.replace_by(&key, takes_text.then(|| format!("\"{}\"", found.trim())));
 }
 
-/// Path of the key whose value stands at `offset`; empty where the line has no key of its own.
+/// Path of the key whose value is at `offset`; empty if the line has no key of its own.
 fn key_at(source: &str, offset: usize) -> String {
     let line = source[..offset].rfind('\n').map_or(0, |i| i + 1);
     let name = key_name(&source[line..offset]).unwrap_or_default();
@@ -98,7 +98,7 @@ fn key_at(source: &str, offset: usize) -> String {
     text::shorten(&keys::join(&table, name))
 }
 
-/// The text without quotes that the parser took for a bad number or truth value: `150mm`, `f32`, `invhys`.
+/// A text without quotes that the parser took for an invalid number or boolean: `150mm`, `f32`, `invhys`.
 fn bare_word(source: &str, span: &Range<usize>, message: &str) -> Option<Range<usize>> {
     if !SCALAR_PHRASES.iter().any(|phrase| message.starts_with(phrase)) {
         return None;
@@ -111,7 +111,7 @@ fn bare_word(source: &str, span: &Range<usize>, message: &str) -> Option<Range<u
     word.contains(|c: char| c.is_alphabetic()).then_some(start..start + word.len())
 }
 
-/// How the parser speaks of a value that is no number, date or truth value.
+/// The parser's phrases for a value that is not a number, date or boolean.
 const SCALAR_PHRASES: &[&str] =
     &["invalid boolean", "invalid float", "invalid integer", "invalid date-time", "unexpected leading zero"];
 
@@ -148,11 +148,11 @@ fn duplicate(source: &str, span: Range<usize>, findings: &mut Findings) {
         &text::shorten(&key),
         span.clone(),
         format!("{what} {} is given twice{before}", text::quote(name)),
-        format!("keep one of the two: which {what} counts would be a guess"),
+        format!("remove one of the two: specgen does not guess which {what} counts"),
     );
 }
 
-/// The section header that is in force at `offset`, and whether `offset` is on that header itself.
+/// The section header that applies at `offset`, and whether `offset` is on that header itself.
 fn header_before(source: &str, offset: usize) -> (&str, bool) {
     let line_start = source[..offset].rfind('\n').map_or(0, |i| i + 1);
     let line_end = source[offset..].find('\n').map_or(source.len(), |i| offset + i);

@@ -80,11 +80,11 @@ pub(super) fn alternatives(words: &[&str]) -> String {
     }
 }
 
-/// The candidate that `name` is probably a slip of: at a distance of a third of its letters, at least one. None if it is
-/// like none of them.
+/// The candidate that `name` is probably a misspelling of: at an edit distance of up to a third of its letters, at
+/// least one. None if no candidate is close.
 #[must_use]
 pub fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    // Nothing that long is a slip of a key, and the distance costs the product of the lengths.
+    // Nothing that long is a misspelt key, and the computation costs the product of the lengths.
     if name.len() > 64 {
         return None;
     }

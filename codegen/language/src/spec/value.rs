@@ -1,4 +1,4 @@
-//! One TOML value against what its key wants.
+//! Checks one TOML value against its key.
 
 mod number;
 
@@ -21,7 +21,7 @@ pub(super) struct ValueReader<'a> {
     pub(super) findings: &'a mut Findings,
 }
 
-/// A single value that passed.
+/// A single valid value.
 enum Scalar {
     Number(f64),
     Integer(i64),
@@ -31,7 +31,7 @@ enum Scalar {
 }
 
 impl ValueReader<'_> {
-    /// The value as its key wants it; `None` if there is a finding.
+    /// The value in the form that its key requires; `None` if there is a finding.
     pub(super) fn read(&mut self, value: &Spanned<DeValue<'_>>) -> Option<Field> {
         let span = text::clamp(self.source, value.span());
         let (parsed, items) = match self.key.shape {
@@ -61,7 +61,7 @@ impl ValueReader<'_> {
         Some(Field { parsed, span, items, given: true })
     }
 
-    /// An array of `items`, of which those after the first `least` may be left out: numbers and places.
+    /// An array of `items`; those after the first `least` are optional: numbers and places.
     fn list(
         &mut self,
         path: &str,
@@ -140,7 +140,7 @@ impl ValueReader<'_> {
         Some((KeyValue::Texts(texts), spans))
     }
 
-    /// Reports a placeholder that nobody replaced; `None` if `value` is one.
+    /// Reports a placeholder that was not replaced; `None` if `value` is one.
     fn filled_in(&mut self, path: &str, value: &Spanned<DeValue<'_>>) -> Option<()> {
         let DeValue::String(found) = value.get_ref() else { return Some(()) };
         let Some(placeholder) = keys::placeholder(found) else { return Some(()) };
@@ -162,7 +162,7 @@ impl ValueReader<'_> {
             Item::Quantity { .. } => self.quantity(item, path, value).map(Scalar::Number),
             Item::Number(range) => {
                 let number = self.plain_number(path, value)?;
-                // With all its digits where a rounded one would be in range.
+                // With all its digits if a rounded one would be in range.
                 let short = text::number(number);
                 let misleads = short.parse().is_ok_and(|short| range.contains(short));
                 let shown = if misleads { number.to_string() } else { short };

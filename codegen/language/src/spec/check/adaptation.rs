@@ -1,4 +1,4 @@
-//! Weights, bandwidths and modes of the run-to-run adaptation. Stability needs the sampled leg and comes later.
+//! Weights, bandwidths and modes of the run-to-run adaptation. Stability needs the sampled leg and is checked later.
 
 use super::{control, in_order};
 use crate::diagnostic::codes;
@@ -26,8 +26,8 @@ pub(super) fn alternatives(f: &Fields, findings: &mut Findings) -> Option<()> {
                 codes::ALTERNATIVES,
                 &bandwidth,
                 f.span(&bandwidth),
-                format!("`{bandwidth}` stands beside `{weight}`: each sets the weight of the {which} estimate"),
-                "keep one of the two and take the other out".to_owned(),
+                format!("`{bandwidth}` and `{weight}` are alternatives: each sets the weight of the {which} estimate"),
+                "keep one of the two and remove the other".to_owned(),
             );
         }
     }
@@ -35,7 +35,7 @@ pub(super) fn alternatives(f: &Fields, findings: &mut Findings) -> Option<()> {
 }
 
 pub(super) fn weights_for_mode(f: &Fields, findings: &mut Findings) -> Option<()> {
-    // The task-space controller has bandwidths of its own choice, and uses both after a change of mode.
+    // The task-space controller has its own bandwidths, and uses both after a change of mode.
     if control::there(f).is_some() {
         return None;
     }
@@ -104,7 +104,7 @@ pub(super) fn gain_ratio_in_order(f: &Fields, findings: &mut Findings) -> Option
     in_order(f, findings, "adaptation.gain_ratio", true)
 }
 
-/// To four digits and never above `value`: what a message recommends must pass.
+/// To four digits and never above `value`: a recommended value must pass the check.
 fn rounded_down(value: f64) -> String {
     let shown: f64 = number(value).parse().unwrap_or(value);
     if shown <= value { number(value) } else { number(value * (1.0 - 1e-3)) }

@@ -1,4 +1,4 @@
-//! `assumed` names values that the spec has, each once.
+//! `assumed` names values in the spec, each once.
 
 use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
@@ -40,14 +40,14 @@ struct Problem {
     replacement: Option<String>,
 }
 
-/// What an entry names.
+/// Kind of the object that an entry names.
 enum EntryKind {
     Key,
     /// Every table of a repeated section, or one of them.
     Tables,
 }
 
-/// The key or repeated section that `entry` names; none of the keys before the first section.
+/// The key or repeated section that `entry` names; none for a key before the first section.
 fn of(entry: &str) -> Option<EntryKind> {
     let bare = without_indices(entry)?;
     if keys::section(&bare).is_some_and(|section| matches!(section.kind, Kind::Repeated(..))) {
@@ -57,7 +57,7 @@ fn of(entry: &str) -> Option<EntryKind> {
 }
 
 impl EntryKind {
-    /// Whether the spec has what `entry` names, as a default too.
+    /// Whether the spec has the object that `entry` names, also as a default.
     fn stands_in(&self, f: &Fields, entry: &str) -> bool {
         let has = |path: &str| match split_index(path) {
             (list, Some(item)) => f.get(list).is_some_and(|field| item < field.items.len()),
@@ -68,7 +68,7 @@ impl EntryKind {
                 (section, Some(table)) => table < f.count(section),
                 (section, None) => f.count(section) > 0,
             },
-            // `gauge.point` is that of every gauge.
+            // `gauge.point` covers every gauge.
             (Self::Key, Some((section, key))) if f.count(section) > 0 => {
                 (0..f.count(section)).any(|table| has(&format!("{section}[{table}].{key}")))
             }
@@ -77,7 +77,7 @@ impl EntryKind {
     }
 }
 
-/// `gauge[2].point` as `gauge.point`; none if that is no path.
+/// `gauge[2].point` as `gauge.point`; none if that is not a path.
 fn without_indices(entry: &str) -> Option<String> {
     let parts: Option<Vec<&str>> = entry
         .split('.')
@@ -95,7 +95,7 @@ fn split_index(path: &str) -> (&str, Option<usize>) {
     split.map_or((path, None), |(list, index)| (list, index.parse().ok()))
 }
 
-/// Whether `entry` names no more than `other` does.
+/// Whether `other` includes everything that `entry` names.
 fn is_covered(entry: &str, other: &str) -> bool {
     let parts = |path: &str| {
         path.split('.')
@@ -127,7 +127,7 @@ fn twice(entry: &str, other: &str) -> Problem {
     };
     Problem {
         message,
-        help: "take one of the two out: the verdict counts each value once".to_owned(),
+        help: "remove one of the two: the verdict counts each value once".to_owned(),
         replacement: None,
     }
 }
@@ -157,7 +157,7 @@ fn unknown(f: &Fields, entry: &str) -> Problem {
         };
         return Problem { message, help, replacement: None };
     }
-    // A slip of a path; a key without its section; what other people call a key.
+    // A misspelt path; a key without its section; another name of the key.
     let (paths, name) = (paths(), entry.trim().rsplit('.').next().unwrap_or(entry).to_owned());
     if let Some(path) = text::nearest(entry.trim(), paths.iter().map(|(path, _)| path.as_str())) {
         return meant(path.to_owned());
@@ -173,7 +173,7 @@ fn unknown(f: &Fields, entry: &str) -> Problem {
     Problem { message, help, replacement: None }
 }
 
-/// Every path that may stand in the list, without indices.
+/// Every permitted path, without indices.
 fn paths() -> Vec<(String, &'static Key)> {
     let of = |section: &'static Section| section.keys.iter().map(move |key| (section.path(key.name), key));
     SECTIONS.iter().filter(|section| !section.name.is_empty()).flat_map(of).collect()

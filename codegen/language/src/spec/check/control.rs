@@ -1,4 +1,4 @@
-//! The task-space controller: its own values, and what goes with it or without it.
+//! The task-space controller: its own values, and keys that need it or exclude it.
 
 use std::f64::consts::PI;
 
@@ -8,7 +8,7 @@ use crate::spec::findings::Findings;
 use crate::spec::keys;
 use crate::spec::text::number;
 
-/// Largest correction as part of the stroke.
+/// Largest correction as a fraction of the stroke.
 const CORRECTION_SHARE: f64 = 0.1;
 
 /// `Some` in a spec with `[control]`.
@@ -16,7 +16,7 @@ pub(super) fn there(f: &Fields) -> Option<()> {
     f.table("control").map(|_| ())
 }
 
-/// What would silently do nothing without `[control]`.
+/// Sections that would have no effect without `[control]`.
 pub(super) fn parts_need_it(f: &Fields, findings: &mut Findings) -> Option<()> {
     if there(f).is_some() {
         return Some(());
@@ -49,7 +49,7 @@ pub(super) fn parts_need_it(f: &Fields, findings: &mut Findings) -> Option<()> {
     Some(())
 }
 
-/// Weights per run, runs of several ticks and leg set-points are the leg feed-forward's.
+/// Weights per run, runs of several ticks and leg set-points belong to the leg feed-forward.
 pub(super) fn no_leg_keys(f: &Fields, findings: &mut Findings) -> Option<()> {
     there(f)?;
     let mut refuse = |path: &str, why: &str, fix: &str| {
@@ -57,7 +57,7 @@ pub(super) fn no_leg_keys(f: &Fields, findings: &mut Findings) -> Option<()> {
             codes::LEG_KEY_WITH_CONTROL,
             path,
             f.span(path),
-            format!("`{path}` stands beside [control]: {why}"),
+            format!("`{path}` cannot be used with [control]: {why}"),
             fix.to_owned(),
         );
     };
@@ -103,9 +103,9 @@ pub(super) fn both_bandwidths(f: &Fields, findings: &mut Findings) -> Option<()>
         codes::ALTERNATIVES,
         given,
         f.span(given),
-        format!("`{given}` stands without `{missing}`: the adaptation may be changed at run time and needs both"),
+        format!("`{given}` is given without `{missing}`: the adaptation can be changed at run time and needs both"),
         format!(
-            "write {} = \"<number> rad/s\", too, or take this out: the compiler then derives both",
+            "write {} = \"<number> rad/s\", too, or remove this: the compiler then derives both",
             missing.trim_start_matches("adaptation.")
         ),
     );
@@ -121,9 +121,9 @@ pub(super) fn notch(f: &Fields, findings: &mut Findings) -> Option<()> {
             path,
             f.span(path),
             format!(
-                "`{path}` stands beside notch = false: it is designed beside the notch, in the coordinates of the modes"
+                "`{path}` cannot be used with notch = false: it is designed together with the notch, in modal coordinates"
             ),
-            "take one of the two out".to_owned(),
+            "remove one of the two".to_owned(),
         );
     }
     let path = "control.notch_damping";
@@ -133,8 +133,8 @@ pub(super) fn notch(f: &Fields, findings: &mut Findings) -> Option<()> {
             codes::ALTERNATIVES,
             path,
             f.span(path),
-            format!("`{path}` stands beside notch = false: there is no notch to damp"),
-            "take one of the two out".to_owned(),
+            format!("`{path}` cannot be used with notch = false: there is no notch"),
+            "remove one of the two".to_owned(),
         );
         return Some(());
     }
@@ -144,14 +144,14 @@ pub(super) fn notch(f: &Fields, findings: &mut Findings) -> Option<()> {
             codes::NOTCH_DAMPING,
             path,
             f.span(path),
-            format!("`{path}` is {}, not above `control.modal_damping`, {}", number(damping), number(own)),
-            "take notch_damping out: it is then 1; or take the notch out with notch = false".to_owned(),
+            format!("`{path}` is {}, expected more than `control.modal_damping`, {}", number(damping), number(own)),
+            "remove notch_damping: the default is 1; or remove the notch with notch = false".to_owned(),
         );
     }
     Some(())
 }
 
-/// A correction is a small part of what the legs can do: what is more belongs into the set-points.
+/// A correction is a small part of the legs' stroke: larger motions belong in the set-points.
 pub(super) fn small_correction(f: &Fields, findings: &mut Findings) -> Option<()> {
     there(f)?;
     let path = "control.correction";
@@ -228,7 +228,7 @@ pub(super) fn bias_inside_workspace(f: &Fields, findings: &mut Findings) -> Opti
                 number(bound * scale)
             ),
             format!(
-                "the workspace counts from rest with the bias in it: widen `workspace.{}` or reduce the bias; check the units of both",
+                "the workspace counts from rest, including the bias: widen `workspace.{}` or reduce the bias; check the units of both",
                 if axis < 3 { "translation" } else { "rotation" }
             ),
         );

@@ -6,14 +6,15 @@ use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
 use crate::spec::text::number;
 
-/// Stroke and travel further apart than this are refused.
+/// Largest ratio of stroke to travel.
 const LARGEST_MISMATCH: f64 = 4.0;
-/// Noise of a gauge, of what there is to see: strain gauges have a thousandth, capacitive ones a hundred times less.
+/// Largest noise of a gauge, relative to its signal: strain gauges have a thousandth, capacitive ones a hundred times
+/// less.
 const LARGEST_NOISE: f64 = 2e-3;
 
 pub(super) fn limits_in_order(f: &Fields, findings: &mut Findings) -> Option<()> {
     for path in ["actuator.voltage", "dac.range", "sensor.range", "sensor.input_range"] {
-        // A list that is missing has its own finding; the others are still checked.
+        // A missing list has its own finding; the others are still checked.
         let _ = in_order(f, findings, path, false);
     }
     Some(())
@@ -80,7 +81,7 @@ pub(super) fn stroke_fits_gain(f: &Fields, findings: &mut Findings) -> Option<()
     if (1.0 / LARGEST_MISMATCH..=LARGEST_MISMATCH).contains(&ratio) {
         findings.add(codes::STROKE_MISMATCH, key, span, message, check.to_owned());
     } else {
-        let how = if ratio > 1.0 { "the legs would be driven far past it" } else { "they never come near it" };
+        let how = if ratio > 1.0 { "the legs would exceed it by far" } else { "the legs never come near it" };
         findings.add(codes::STROKE_IMPOSSIBLE, key, span, format!("{message}: {how}"), check.to_owned());
     }
     Some(())
@@ -98,7 +99,7 @@ pub(super) fn resonance_below_tick_rate(f: &Fields, findings: &mut Findings) -> 
                 number(resonance),
                 number(1.0 / period)
             ),
-            format!("a period below {} us would show it to the gauges", number(0.5e6 / resonance)),
+            format!("with a period below {} us the gauges could measure it", number(0.5e6 / resonance)),
         );
     }
     Some(())
@@ -143,12 +144,12 @@ pub(super) fn sensor_fits(f: &Fields, findings: &mut Findings) -> Option<()> {
             "sensor.noise",
             f.span("sensor.noise"),
             format!(
-                "a noise of {} nm rms is {} of the {} um that there are to see",
+                "a noise of {} nm rms is {} of the signal of {} um",
                 number(noise * 1e9),
                 number(noise / seen),
                 number(seen * 1e6)
             ),
-            "check the unit, nm or um: gauges of piezo platforms have a tenth of a nanometre to some ten".to_owned(),
+            "check the unit, nm or um: gauges of piezo platforms have 0.1 nm to about 10 nm".to_owned(),
         );
     }
     Some(())

@@ -1,4 +1,4 @@
-//! The six gauges that see the platform. Whether they see every direction needs the lowering.
+//! The six gauges that measure the platform. Whether they observe every direction is checked in the lowering.
 
 use super::control;
 use crate::diagnostic::codes;
@@ -8,9 +8,10 @@ use crate::spec::findings::Findings;
 use crate::spec::keys;
 use crate::spec::text::number;
 
-/// How near to 1 the squares of three direction cosines add up, of angles that are written with a digit or two behind the point.
+/// Tolerance on the sum of squares of three direction cosines that comes from angles with one or two decimals.
 const COSINES: f64 = 2e-3;
-/// Whole angles of directions in a drawing, deg. A vector of these alone, one of which is at least the first, is none.
+/// Round angles in drawings, deg. A vector with only these components, one of them at least as large as the first, is
+/// not a direction.
 const DRAWN: [f64; 10] = [30.0, 45.0, 60.0, 90.0, 120.0, 135.0, 150.0, 180.0, 270.0, 360.0];
 /// Least |cos| between the measuring line and the normal of its target.
 const STEEPEST: f64 = 0.1;
@@ -21,7 +22,7 @@ pub(super) fn six(f: &Fields, findings: &mut Findings) -> Option<()> {
     if count == 6 || findings.mentions(&["gauge"]) {
         return Some(());
     }
-    // The seventh is one too many; without any, [control] asks for them.
+    // A seventh gauge is one too many; without gauges, the finding is about [control], which needs them.
     let path = if count > 6 { "gauge[6]" } else { "gauge" };
     let last = format!("gauge[{}]", count.saturating_sub(1));
     let place = if count > 6 { f.table(path) } else { f.table(&last).or_else(|| f.table("control")) };
@@ -52,7 +53,7 @@ pub(super) fn directions(f: &Fields, findings: &mut Findings) -> Option<()> {
                     codes::BAD_DIRECTION,
                     path,
                     f.span(path),
-                    format!("`{path}` has no length, so that it points nowhere"),
+                    format!("`{path}` is zero, so that it has no direction"),
                     "write the components of a direction, at least one of them not 0: [<number>, <number>, <number>]"
                         .to_owned(),
                 );
@@ -68,11 +69,11 @@ pub(super) fn directions(f: &Fields, findings: &mut Findings) -> Option<()> {
                 &paths[1],
                 f.span(&paths[1]),
                 format!(
-                    "the gauge looks along its target: its direction and the target's normal have a cosine of {}",
+                    "the gauge measures almost parallel to its target: its direction and the target's normal have a cosine of {}",
                     number(cosine)
                 ),
                 format!(
-                    "check `gauge[{gauge}].direction` and `gauge[{gauge}].target_normal`; a target turns to face its gauge where target_normal is left out"
+                    "check `gauge[{gauge}].direction` and `gauge[{gauge}].target_normal`; without target_normal the target faces its gauge"
                 ),
             );
         }
@@ -80,7 +81,7 @@ pub(super) fn directions(f: &Fields, findings: &mut Findings) -> Option<()> {
     Some(())
 }
 
-/// The vector of which `angles` are the angles with x, y and z; none if they are those of no vector, or none at all.
+/// The vector with these `angles` to x, y and z; none if no vector has them.
 fn from_angles(angles: [f64; 3], unit: f64, range: std::ops::RangeInclusive<f64>) -> Option<[f64; 3]> {
     let largest = angles.iter().fold(0.0, |most: f64, angle| if angle.abs() > most { angle.abs() } else { most });
     let cosines = angles.map(|angle| libm::cos(angle * unit));
@@ -88,7 +89,7 @@ fn from_angles(angles: [f64; 3], unit: f64, range: std::ops::RangeInclusive<f64>
     (range.contains(&largest) && (sum - 1.0).abs() <= COSINES).then_some(cosines)
 }
 
-/// Whether a vector of more than unit length is a point, in whatever unit.
+/// Whether a vector longer than a unit vector is a point, in any unit.
 fn is_point(vector: [f64; 3], point: [f64; 3]) -> bool {
     let length = |v: [f64; 3]| libm::sqrt(v.iter().fold(0.0, |sum, one| sum + one * one));
     let (long, far) = (length(vector), length(point));
@@ -97,15 +98,15 @@ fn is_point(vector: [f64; 3], point: [f64; 3]) -> bool {
     oblique && long > 2.0 && along > (1.0 - 1e-9) * long * far
 }
 
-/// A direction is a vector of any length, and angles are three numbers, too. Those with the axes are known by their cosines;
-/// others by being whole angles of a drawing.
+/// A direction is a vector of any length, so three angles look like one. Angles with the axes are recognised by their
+/// cosines, others as round angles of a drawing.
 pub(super) fn not_angles(f: &Fields, findings: &mut Findings) -> Option<()> {
     for (gauge, key) in (0..f.count("gauge")).flat_map(|gauge| ["direction", "target_normal"].map(|key| (gauge, key))) {
         let path = format!("gauge[{gauge}].{key}");
         let Some(vector) = f.list::<3>(&path) else { continue };
-        // Components of a unit vector are no radians, and of one of a few units no degrees.
+        // Components of a unit vector are not radians, and those of a vector of a few units are not degrees.
         let degrees = from_angles(vector, std::f64::consts::PI / 180.0, 10.0..=360.0);
-        // The numbers of the point, which is a place and no direction; along an axis the two are one.
+        // The numbers of the point: a position and not a direction. Along an axis the two are equal.
         let point = f.list::<3>(&format!("gauge[{gauge}].point")).filter(|_| key == "direction");
         if point.is_some_and(|point| is_point(vector, point)) {
             findings.add(
@@ -113,7 +114,7 @@ pub(super) fn not_angles(f: &Fields, findings: &mut Findings) -> Option<()> {
                 &path,
                 f.span(&path),
                 format!("`{path}` has the numbers of `gauge[{gauge}].point`: the line would go through the origin of the base"),
-                "a direction is where the reading grows to, from wherever the gauge stands: write its components".to_owned(),
+                "a direction is a vector along which the reading grows, independent of the gauge's position: write its components".to_owned(),
             );
             continue;
         }
@@ -125,10 +126,10 @@ pub(super) fn not_angles(f: &Fields, findings: &mut Findings) -> Option<()> {
         let shown = vector.map(number).join(", ");
         let help = match vector_of {
             Some(cosines) => format!(
-                "if they are the angles with x, y and z, write {key} = [{}]; a vector may have any length: if one is meant, write it with other numbers",
+                "if they are the angles with x, y and z, write {key} = [{}]; if they are a vector, write it with another length",
                 cosines.map(|cosine| number(if cosine.abs() < 1e-9 { 0.0 } else { cosine })).join(", ")
             ),
-            None => "if they are angles, write the components of the vector; it may have any length: if one is meant, write it with other numbers".to_owned(),
+            None => "if they are angles, write the components of the vector; if they are a vector, write it with another length".to_owned(),
         };
         let message = format!("`{path}` is a vector, and {shown} look like angles");
         findings.add(codes::DIRECTION_ANGLES, &path, f.span(&path), message, help);
@@ -155,7 +156,7 @@ pub(super) fn calibrated_alike(f: &Fields, findings: &mut Findings) -> Option<()
     Some(())
 }
 
-/// `sensor.input_range` is of gauges whose words are volts.
+/// `sensor.input_range` applies only to gauges whose words are volts.
 pub(super) fn input_of_calibrated(f: &Fields, findings: &mut Findings) -> Option<()> {
     let path = "sensor.input_range";
     let calibrated =
@@ -165,8 +166,8 @@ pub(super) fn input_of_calibrated(f: &Fields, findings: &mut Findings) -> Option
             codes::INPUT_WITHOUT_CALIBRATION,
             path,
             f.span(path),
-            "`sensor.input_range` stands beside no calibration: the gauge words are metres, and their converter spans `sensor.range`".to_owned(),
-            "take `input_range` out, or write `calibration`, the displacement as a polynomial of the voltage".to_owned(),
+            "`sensor.input_range` needs a calibration: without one the gauge words are metres, and their converter spans `sensor.range`".to_owned(),
+            "remove `input_range`, or write `calibration`, the displacement as a polynomial of the voltage".to_owned(),
         );
     }
     Some(())

@@ -1,4 +1,4 @@
-//! What `[lint]` lets pass: keys that exist, each with a reason.
+//! The exceptions in `[lint]`: existing keys, each with a reason.
 
 use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
@@ -14,9 +14,9 @@ pub(super) fn reasons(f: &Fields, findings: &mut Findings) -> Option<()> {
         let list = key.rsplit_once('[').filter(|_| key.ends_with(']')).map_or(key, |(list, _)| list);
         let known = keys::key(list);
         let (what, help, shown) = match known {
-            None => ("names no key of a spec", "write the path of the key and why its value is meant:", "<key>"),
+            None => ("names no key of a spec", "write the path of the key and why its value is intended:", "<key>"),
             Some(_) if reason.trim().is_empty() => {
-                ("gives no reason", "write why the value is meant, behind a colon:", key)
+                ("gives no reason", "write why the value is intended, after a colon:", key)
             }
             Some(_) => continue,
         };

@@ -1,4 +1,4 @@
-//! Masses, inertias and geometry: could this platform exist, and does it hold?
+//! Masses, inertias and geometry: whether the platform is physically possible, and whether its legs hold it.
 
 use nalgebra::{Matrix3, Matrix6, RowVector6, Vector3};
 
@@ -29,10 +29,10 @@ fn legs_at_rest(geometry: &Geometry) -> Legs {
     legs
 }
 
-/// Below this length at rest a leg is a mistake, m.
+/// A shorter leg at rest is a mistake, m.
 const SHORTEST_LEG: f64 = 1e-3;
 
-/// Radii of gyration that a platform usually has, in radii of its joint circle.
+/// Usual radii of gyration of a platform, in radii of its joint circle.
 const SOUND: std::ops::RangeInclusive<f64> = 0.1..=3.0;
 
 fn shortest_leg(f: &Fields) -> Option<f64> {
@@ -100,7 +100,7 @@ pub(super) fn platform_inertia(f: &Fields, findings: &mut Findings) -> Option<()
     let mut principal: [f64; 3] = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).symmetric_eigenvalues().into();
     principal.sort_by(f64::total_cmp);
     let [small, middle, large] = principal;
-    // The last digit of a flat plate's data must not decide.
+    // A rounded last digit in the data of a flat plate must not matter.
     let unphysical = if small <= 0.0 {
         "is not positive definite"
     } else if large > (small + middle) * (1.0 + 1e-6) {
@@ -154,7 +154,7 @@ pub(super) fn legs_have_length(f: &Fields, findings: &mut Findings) -> Option<()
         path,
         f.item_span(path, leg),
         format!("the joints of leg {leg} (from 0) are only {} mm apart at rest", number(lengths[leg] * 1e3)),
-        "base joints are in {B}, platform joints in {P}, which `height` puts above {B}: check that neither is given in the other frame".to_owned(),
+        "base joints are in {B}, platform joints in {P}, which is `height` above {B}: check that neither is given in the other frame".to_owned(),
     );
     Some(())
 }
@@ -166,7 +166,7 @@ pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> 
         return None;
     }
     let mut jacobian = legs.jacobian;
-    // Rotations in lengths at the joint circle, so that the condition has no unit.
+    // Rotations as lengths at the joint circle, so that the condition number has no unit.
     for column in 3..6 {
         jacobian.column_mut(column).unscale_mut(geometry.joint_radius());
     }

@@ -25,7 +25,7 @@ pub(super) fn keys_of_option(f: &Fields, findings: &mut Findings) -> Option<()> 
                     &path,
                     f.span(&path),
                     format!("`{path}` belongs to rate = \"{option}\", but rate is \"{chosen}\""),
-                    format!("write rate = \"{option}\", or take `{key}` out"),
+                    format!("write rate = \"{option}\", or remove `{key}`"),
                 );
             } else if !given && option == chosen && !findings.mentions_item(&path) {
                 findings.add(
@@ -59,8 +59,8 @@ pub(super) fn creep_lists(f: &Fields, findings: &mut Findings) -> Option<()> {
             codes::RATE_KEYS,
             path,
             f.span(path),
-            format!("the creep weights add up to {}: the leg would creep by more than it moves", number(sum)),
-            "weights are shares of the static displacement; those of a piezo leg add up to about 0.1".to_owned(),
+            format!("the creep weights add up to {}: the leg would creep by more than its own motion", number(sum)),
+            "weights are fractions of the static displacement; those of a piezo leg add up to about 0.1".to_owned(),
         );
     }
     Some(())
@@ -75,7 +75,7 @@ pub(super) fn dead_time_of_legs(f: &Fields, findings: &mut Findings) -> Option<(
             codes::LEG_KEY_WITH_CONTROL,
             path,
             f.span(path),
-            format!("`{path}` stands beside [control]: there the legs are led by `control.lead`"),
+            format!("`{path}` cannot be used with [control]: there `control.lead` sets the lead of the legs"),
             format!("write control.lead = \"{} ms\", less half a period, in its place", number(dead_time * 1e3)),
         );
     }

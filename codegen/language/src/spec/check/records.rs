@@ -1,4 +1,4 @@
-//! The measurement files that a spec names: their number, their paths, and that they can be opened.
+//! The measurement files in a spec: number, paths, and whether they can be opened.
 
 use std::path::Path;
 

@@ -16,7 +16,7 @@ const RANGES: [&str; 9] = [
     "robust.noise",
 ];
 
-/// One number twice is a factor that is known and differs from 1.
+/// Two equal numbers are a known factor, which then must differ from 1.
 pub(super) fn ranges_in_order(f: &Fields, findings: &mut Findings) -> Option<()> {
     for path in RANGES {
         let _ = in_order(f, findings, path, true);

@@ -1,11 +1,11 @@
-//! What the controller runs on.
+//! The target of the controller.
 
 use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
 use crate::model::Mcu;
 use crate::spec::findings::Findings;
 
-/// In software a multiplication takes some thirty instructions, and a tick ten times as long.
+/// A multiplication in software takes about thirty instructions, and a tick ten times as long.
 pub(super) fn scalar_fits_fpu(f: &Fields, findings: &mut Findings) -> Option<()> {
     let part = Mcu::named(f.choice("target.mcu")?)?.part();
     if !part.double && f.choice("controller.scalar")? == "f64" {
@@ -47,7 +47,7 @@ pub(super) fn budget_in_bytes(f: &Fields, findings: &mut Findings) -> Option<()>
     Some(())
 }
 
-/// A budget that the part does not have would let an image pass that cannot be flashed.
+/// A budget beyond the part would pass an image that cannot be flashed.
 pub(super) fn budget_fits_part(f: &Fields, findings: &mut Findings) -> Option<()> {
     let part = Mcu::named(f.choice("target.mcu")?)?.part();
     for (path, has, what) in [

@@ -1,4 +1,4 @@
-//! The trajectories that the controller can play; what a waveform holds is read later.
+//! The trajectories that the controller can play; the tables of waveforms are read later.
 
 use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
@@ -27,11 +27,11 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
                 &path,
                 f.span(&path),
                 format!("`{path}` has no meaning for a trajectory of kind \"{kind}\""),
-                format!("take it out; kind \"{kind}\" takes {}", own.join(", ")),
+                format!("remove it; kind \"{kind}\" takes {}", own.join(", ")),
             );
         }
         for path in needed.iter().map(|key| keys::join(&table, key)) {
-            // What is wrong within a list is told of its element.
+            // A mistake within a list is reported at its element.
             if f.given(&path) || findings.mentions_item(&path) {
                 continue;
             }
@@ -45,7 +45,7 @@ pub(super) fn names_differ(f: &Fields, findings: &mut Findings) -> Option<()> {
     differ(f, findings, "trajectory")
 }
 
-/// What a table of a repeated section lacks, which its kind needs.
+/// Keys that a table of a repeated section lacks and its kind needs.
 pub(super) fn missing(f: &Fields, findings: &mut Findings, table: &str, path: &str, kind: &str) -> Option<()> {
     let key = keys::key(path)?;
     let section = table.split('[').next()?;
@@ -59,7 +59,7 @@ pub(super) fn missing(f: &Fields, findings: &mut Findings, table: &str, path: &s
     Some(())
 }
 
-/// No two tables of a repeated section have one name.
+/// Names in a repeated section are unique.
 pub(super) fn differ(f: &Fields, findings: &mut Findings, section: &str) -> Option<()> {
     for index in 0..f.count(section) {
         let path = format!("{section}[{index}].name");
@@ -80,9 +80,9 @@ pub(super) fn differ(f: &Fields, findings: &mut Findings, section: &str) -> Opti
     Some(())
 }
 
-/// A limit is for a trajectory that there is, and limits something.
+/// A limit applies to an existing trajectory, and limits something.
 pub(super) fn limits(f: &Fields, findings: &mut Findings) -> Option<()> {
-    // None where one has no name that can be read, which is a finding of its own.
+    // None if a trajectory has no valid name, which is a finding of its own.
     let names: Option<Vec<&str>> =
         (0..f.count("trajectory")).map(|index| f.name(&format!("trajectory[{index}].name"))).collect();
     for index in 0..f.count("requirements.tracking") {
@@ -97,7 +97,7 @@ pub(super) fn limits(f: &Fields, findings: &mut Findings) -> Option<()> {
                 &path,
                 f.span(&path),
                 format!("the spec has {known}, but not \"{name}\""),
-                "name one of its [[trajectory]] tables, or take the key out: then the limit is for all of them"
+                "name one of its [[trajectory]] tables, or remove the key: the limit then applies to all of them"
                     .to_owned(),
             );
         }
@@ -123,7 +123,7 @@ pub(super) fn not_too_many(f: &Fields, findings: &mut Findings) -> Option<()> {
             "trajectory",
             f.table("trajectory[0]").unwrap_or(0..0),
             format!("there are {count} trajectories, expected at most {MAX_TABLES}"),
-            "take some out, or join waveforms that are played one after the other".to_owned(),
+            "remove some, or join waveforms that are played one after the other".to_owned(),
         );
     }
     Some(())

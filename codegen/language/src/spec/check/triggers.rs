@@ -1,4 +1,4 @@
-//! Digital lines: which keys go with which kind and axis, and where positions may lie.
+//! Digital lines: keys of each kind and axis, and permitted positions.
 
 use super::trajectories::{differ, missing};
 use crate::diagnostic::codes;
@@ -12,7 +12,7 @@ use crate::spec::text::number;
 const PLACES: [&str; 4] = ["start", "stop", "step", "hysteresis"];
 const COUNTS: [&str; 3] = ["first", "every", "last"];
 
-/// Keys that a kind takes besides `name` and `kind`; those of [`PLACES`] in either form.
+/// Keys that a kind takes besides `name` and `kind`; for those of [`PLACES`] either form.
 fn keys_of(kind: &str) -> &'static [&'static str] {
     match kind {
         "position" => &["axis", "direction", "start", "stop", "step", "hysteresis", "width"],
@@ -22,7 +22,7 @@ fn keys_of(kind: &str) -> &'static [&'static str] {
     }
 }
 
-/// Keys that it needs.
+/// Keys that it requires.
 fn needed_by(kind: &str) -> &'static [&'static str] {
     match kind {
         "position" => &["start", "step"],
@@ -39,7 +39,7 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
             continue;
         };
         let turns = axis.starts_with("theta");
-        // What a key is called for this axis, and for the others.
+        // Name of a key for this axis, and for the others.
         let forms = |key: &str| {
             if turns { [format!("{key}_angle"), key.to_owned()] } else { [key.to_owned(), format!("{key}_angle")] }
         };
@@ -61,7 +61,7 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
                 refuse(
                     &path,
                     format!("`{path}` has no meaning for a trigger of kind \"{kind}\""),
-                    format!("take it out; kind \"{kind}\" takes {list}"),
+                    format!("remove it; kind \"{kind}\" takes {list}"),
                 );
             } else if PLACES.contains(&key) && form != forms(key)[0] {
                 let what = if turns { ["a length", "a rotation"] } else { ["an angle", "a translation"] };
@@ -89,7 +89,7 @@ pub(super) fn names_differ(f: &Fields, findings: &mut Findings) -> Option<()> {
     differ(f, findings, "trigger")
 }
 
-/// No pose is measured beyond the workspace in good order, so that a position there would never be passed.
+/// In normal operation, no pose is measured beyond the workspace, so a position there would never be passed.
 pub(super) fn inside_workspace(f: &Fields, findings: &mut Findings) -> Option<()> {
     let bounds = [f.list::<3>("workspace.translation")?, f.list::<3>("workspace.rotation")?];
     for index in 0..f.count("trigger") {
@@ -115,7 +115,7 @@ pub(super) fn inside_workspace(f: &Fields, findings: &mut Findings) -> Option<()
                         number(bound * 1e6)
                     ),
                     format!(
-                        "positions count from rest with the bias in them: write \"{} {unit}\", or widen `workspace.{}`",
+                        "positions count from rest, including the bias: write \"{} {unit}\", or widen `workspace.{}`",
                         number(if value < 0.0 { -bound } else { bound } * 1e6),
                         if turns { "rotation" } else { "translation" }
                     ),
@@ -142,7 +142,7 @@ pub(super) fn not_too_many(f: &Fields, findings: &mut Findings) -> Option<()> {
     let (inputs, outputs): (Vec<usize>, Vec<usize>) = (0..f.count("trigger"))
         .partition(|index| f.choice(&format!("trigger[{index}].kind")) == Some(TriggerKind::Input.word()));
     for (lines, most, what, help) in [
-        (outputs, MAX_OUTPUTS, "outputs", "take some out; what a line shows may be changed while the controller runs"),
+        (outputs, MAX_OUTPUTS, "outputs", "remove some; the function of a line can be changed while the controller runs"),
         (inputs, 1, "inputs", "keep one of them"),
     ] {
         if let Some(first) = lines.get(most) {
@@ -152,7 +152,7 @@ pub(super) fn not_too_many(f: &Fields, findings: &mut Findings) -> Option<()> {
                 &path,
                 f.table(&path).unwrap_or(0..0),
                 format!(
-                    "{} triggers are {what}, expected at most {most}: a board has so many pins for them",
+                    "{} triggers are {what}, expected at most {most}, the number of pins on a board",
                     lines.len()
                 ),
                 help.to_owned(),

@@ -50,7 +50,7 @@ impl ValueReader<'_> {
                 let place = self.inside(&span, found, &error.range);
                 let (code, message, help) = messages::bad_quantity(self.key, path, found, &error.problem);
                 let replacement = match &error.problem {
-                    // Where escapes moved it, the place is the whole value.
+                    // If escapes shifted it, the place is the whole value.
                     Problem::UnknownUnit(unit, Some(meant)) if self.source.get(place.clone()) == Some(unit) => {
                         Some((*meant).to_owned())
                     }
@@ -63,7 +63,7 @@ impl ValueReader<'_> {
         }
     }
 
-    /// Where `range` of the text `found` stands in the file; the whole value where escapes moved it.
+    /// Place in the file of `range` in the text `found`; the whole value if escapes shifted it.
     pub(super) fn inside(&self, span: &Range<usize>, found: &str, range: &Range<usize>) -> Range<usize> {
         let written = &self.source[span.clone()];
         match written.find(found) {
@@ -82,7 +82,7 @@ impl ValueReader<'_> {
     pub(super) fn plain_number(&mut self, path: &str, value: &Spanned<DeValue<'_>>) -> Option<f64> {
         let (written, number) = match value.get_ref() {
             DeValue::Float(float) => (float.as_str(), float.as_str().parse::<f64>().ok()),
-            // Through i64, so that 0x10 counts as well.
+            // Through i64, so that 0x10 is valid as well.
             DeValue::Integer(integer) => {
                 (integer.as_str(), i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|i| i as f64))
             }
