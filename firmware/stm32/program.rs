@@ -128,7 +128,7 @@ mod app {
             if crate::specgen_tick(board, exchange, noticed) {
                 timer::restart(local.schedule);
             }
-            exchange.report.took(due.late, timer::now().wrapping_sub(begin), local.schedule.period());
+            exchange.report.record_tick(due.late, timer::now().wrapping_sub(begin), local.schedule.period());
             exchange.orphaned = local.health.is_orphaned();
             if local.health.tick(exchange.beat, due.missed, exchange.report.amplifier_on) {
                 local.watchdog.feed();
@@ -141,12 +141,12 @@ mod app {
         binds = CEC,
         priority = 1,
         shared = [exchange, board],
-        local = [line, endpoint: Endpoint = Endpoint::new(), desk: LinkHandler = LinkHandler::new(CYCLES)]
+        local = [line, endpoint: Endpoint = Endpoint::new(), handler: LinkHandler = LinkHandler::new(CYCLES)]
     )]
     fn link(context: link::Context) {
         let local = context.local;
         let mut shared = (context.shared.exchange, context.shared.board);
-        local.line.serve(local.endpoint, local.desk, &mut |action| {
+        local.line.serve(local.endpoint, local.handler, &mut |action| {
             shared.lock(|exchange, board| action(exchange, board.machine_mut()));
         });
     }

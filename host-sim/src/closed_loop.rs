@@ -1,7 +1,7 @@
 //! Six legs under a controller, tick by tick.
 //!
-//! At tick n (time t_n) the controller gets the set-point for the end of the coming interval, T_{n+1}, and the gauge
-//! readings Y_n; its voltages are held until t_{n+1}, where Y_{n+1} is read.
+//! At tick n (time t_n) the controller gets the set-point for the end of the next interval, T_{n+1}, and the gauge
+//! readings Y_n. Its voltages are held until t_{n+1}, where Y_{n+1} is read.
 
 use std::collections::VecDeque;
 use std::fmt::{self, Write as _};
@@ -22,7 +22,7 @@ pub const LEGS: usize = 6;
 /// Longest control interval, s.
 const LONGEST_INTERVAL: f64 = 60.0;
 
-/// One leg with what surrounds it.
+/// One leg with its amplifier and gauge.
 #[derive(Debug, Clone)]
 struct Channel<P> {
     leg: P,
@@ -35,12 +35,12 @@ struct Channel<P> {
 pub struct Rig<P> {
     channels: [Channel<P>; LEGS],
     latency: usize,
-    /// Voltage from which drives count, and at which the legs stand, V.
+    /// Voltage of zero drive, at which the legs rest, V.
     lowest: f64,
     rest: f64,
 }
 
-/// What is done to the legs before the gauges are zeroed.
+/// History of the legs before the gauges are zeroed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Preparation {
     /// Peak of the saturating pre-cycle 0 → peak → 0, V.
@@ -51,19 +51,19 @@ pub struct Preparation {
     pub settle: f64,
     /// Longest time a drive value is held while ramping, s.
     pub update: f64,
-    /// Drive at which the legs then stand, V, ≥ 0.
+    /// Drive of the legs at rest after that, V, ≥ 0.
     pub rest: f64,
 }
 
 impl Preparation {
-    /// As the parameters of a leg say, to a drive of `rest` (V).
+    /// From the parameters of a leg, to a drive of `rest` (V).
     #[must_use]
     pub fn of(leg: &LegParameters, rest: f64) -> Self {
         Self { peak: leg.u_max, rate: leg.forc_rate_v_per_s, settle: leg.settle_s, update: leg.step_s, rest }
     }
 }
 
-/// What the legs did, in metres.
+/// Motion of the legs, in metres.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracking {
     /// Time between samples, s.
@@ -75,7 +75,7 @@ pub struct Tracking {
 }
 
 impl Tracking {
-    /// How much of the path the samples are.
+    /// The part of the path that the samples cover.
     #[must_use]
     pub fn coverage(&self) -> Coverage {
         Coverage::new(self.samples.len(), self.path, self.interval)
@@ -121,28 +121,28 @@ pub struct Run {
     pub tracking: Tracking,
 }
 
-/// Why a run ended early.
+/// Reason why a run ended early.
 #[derive(Debug)]
 pub enum RunError {
     /// The controller lacks a word that the loop needs, or refuses a configuration.
     Controller(ControllerError),
-    /// It asked for a voltage that is not a number.
+    /// It output a voltage that is not finite.
     NotFinite {
         /// Tick, counted from 0.
         tick: usize,
         /// Leg, counted from 0.
         leg: usize,
     },
-    /// The run cannot be laid out.
+    /// The run has no valid timing.
     Timing {
         /// Control interval, s.
         interval: f64,
         /// Length of the trajectory, s.
         duration: f64,
     },
-    /// A platform controller did not come to its bias pose.
+    /// A platform controller did not reach its bias pose.
     NotReady {
-        /// How long it was given, s.
+        /// Time limit, s.
         limit: f64,
         /// Its status word then.
         status: u32,
@@ -151,12 +151,12 @@ pub enum RunError {
     EndedEarly {
         /// How far it followed.
         coverage: Coverage,
-        /// Status bits: of a set-point that was refused or stale, or those of the last tick.
+        /// Status bits of a refused or stale set-point, or those of the last tick.
         status: u32,
     },
     /// A platform controller is still busy after the last set-point of its path.
     NotEnded {
-        /// How much of it was followed: the whole.
+        /// The covered part of the path: all of it.
         coverage: Coverage,
         /// Its status word then.
         status: u32,
@@ -220,7 +220,7 @@ impl From<DescriptionError> for RunError {
 }
 
 impl Run {
-    /// CSV: the words of the trace, then time, what was wanted of each leg, target less reading, and the status in words.
+    /// CSV: the words of the trace, then time, set-point of each leg, set-point less reading, and the status as text.
     #[must_use]
     pub fn to_csv(&self) -> String {
         let status = self.trace.description().output("status").ok();
@@ -249,7 +249,7 @@ impl Run {
 }
 
 impl<P: Plant + Clone + PartialEq> Rig<P> {
-    /// Legs as built, each with its own stream of noise from one seed.
+    /// Legs as built, each with its own noise stream from one seed.
     #[must_use]
     pub fn new(legs: [P; LEGS], noise: &NoiseParameters, seed: u64) -> Self {
         let mut index = 0;
@@ -262,20 +262,20 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
         Self { channels, latency: 0, lowest: 0.0, rest: 0.0 }
     }
 
-    /// Makes voltages count from `lowest` (V), which is then no drive.
+    /// Sets the voltage of zero drive, `lowest` (V).
     pub fn set_lowest_voltage(&mut self, lowest: f64) {
         self.lowest = lowest;
         self.rest = lowest;
     }
 
-    /// Pre-cycle, rest, then zeroes the gauges; from there to the drive at which the legs are to stand.
+    /// Pre-cycle and rest, then zeroes the gauges, then moves the legs to their rest drive.
     pub fn prepare(&mut self, preparation: &Preparation) {
         let Preparation { peak, rate, settle, update, rest } = *preparation;
         self.rest = self.lowest + rest;
         let built = self.channels.each_ref().map(|channel| channel.leg.clone());
         let mut zeros = [0.0; LEGS];
         for leg in 0..LEGS {
-            // A leg like one before goes through it as that one did.
+            // A leg equal to an earlier one takes the same history.
             if let Some(alike) = (0..leg).find(|before| built[*before] == built[leg]) {
                 zeros[leg] = zeros[alike];
                 self.channels[leg].leg = self.channels[alike].leg.clone();
@@ -319,13 +319,13 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
         Ok(Run { trace, tracking: Tracking { interval, samples, path } })
     }
 
-    /// Makes voltages come `ticks` control intervals late, in every run from here on; that of rest before the first.
+    /// Delays voltages by `ticks` control intervals in every later run; the rest voltage is held before the first.
     pub fn set_latency(&mut self, ticks: usize) {
         self.latency = ticks;
     }
 
-    /// Draws the noise of the next `ticks` ticks and the reading before them now: clones made after this share it. The bits
-    /// of a run stay as they are.
+    /// Draws the noise of the next `ticks` ticks and of the reading before them now, so that later clones share it. The
+    /// bits of a run do not change.
     pub fn draw_ahead(&mut self, ticks: usize) {
         for channel in &mut self.channels {
             channel.gauge.draw_ahead(ticks + 1);
@@ -333,8 +333,8 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
         }
     }
 
-    /// As [`Rig::run`], but keeps nothing: `watch` sees the end of every tick with its words and may end the run. Returns how much
-    /// of the path was seen.
+    /// As [`Rig::run`], but stores nothing: `watch` gets the end of every tick with its words and may end the run.
+    /// Returns the covered part of the path.
     ///
     /// # Errors
     /// As [`Rig::run`].
@@ -361,7 +361,7 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
                 input[wiring.displacement[leg]] = scalar.encode(measured[leg]);
             }
             controller.step(&input, &mut output);
-            // Of the tick, before anything moves: costs nothing unless it is asked for.
+            // From before any motion in the tick; costs nothing unless it is used.
             let words = TickWords { input: &input, output: &output, controller: &*controller };
             let (requested, voltages) = (wiring.requested, wiring.voltage);
             let [requested, voltages] = [requested, voltages].map(|six| six.map(|place| scalar.decode(output[place])));
@@ -386,7 +386,7 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
         }
     }
 
-    /// Where the legs are, from the zeros of their gauges, m.
+    /// Positions of the legs, from the zeros of their gauges, m.
     #[must_use]
     pub fn displacements(&self) -> [f64; LEGS] {
         self.channels.each_ref().map(|channel| channel.gauge.from_zero(channel.leg.displacement()))
@@ -398,7 +398,7 @@ impl<P: Plant + Clone + PartialEq> Rig<P> {
     }
 }
 
-/// Ticks of `interval` (s) of a leg trajectory, and of the path that it is the start of.
+/// Ticks of `interval` (s) of a leg trajectory, and of the whole path.
 fn ticks_of(trajectory: &dyn LegTrajectory, interval: f64) -> Result<(usize, usize), RunError> {
     Ok((ticks_within(trajectory.duration(), interval)?, ticks_within(trajectory.whole(), interval)?))
 }
@@ -408,7 +408,7 @@ fn ticks_of(trajectory: &dyn LegTrajectory, interval: f64) -> Result<(usize, usi
 /// # Errors
 /// If there would be none, or more than 100 million.
 pub fn ticks_within(duration: f64, interval: f64) -> Result<usize, RunError> {
-    // The slack keeps the last tick when the ratio is whole but for rounding.
+    // The slack keeps the last tick if the ratio is a whole number apart from rounding.
     let ticks = libm::floor(duration / interval + 1e-6);
     if interval > 0.0 && interval <= LONGEST_INTERVAL && (1.0..=1e8).contains(&ticks) {
         Ok(ticks as usize)
@@ -417,7 +417,7 @@ pub fn ticks_within(duration: f64, interval: f64) -> Result<usize, RunError> {
     }
 }
 
-/// Places of the words that the loop connects.
+/// Indices of the words that the loop connects.
 struct Wiring {
     setpoint: [usize; LEGS],
     displacement: [usize; LEGS],

@@ -1,5 +1,5 @@
-//! Runs a controller: the shared library of an emitted one ([`Controller::load`]), or whatever else computes its ticks
-//! ([`Controller::of`]). Callers do not see which.
+//! Runs a controller: the shared library of an emitted one ([`Controller::load`]), or any other engine
+//! ([`Controller::of`]). Callers see no difference.
 
 mod engine;
 mod library;
@@ -15,7 +15,7 @@ pub use engine::Engine;
 pub use library::ABI_VERSION;
 pub use supervised::{MachineWord, RestingReadings, SnapshotError, Supervised};
 
-/// Something that runs one control tick: the emitted controller, or a stand-in in a test.
+/// A controller that runs one tick at a time: the emitted one, or a stand-in in a test.
 pub trait TickController {
     /// Names and arithmetic.
     fn description(&self) -> &Description;
@@ -26,7 +26,7 @@ pub trait TickController {
     /// Takes a configuration; state is kept.
     ///
     /// # Errors
-    /// If the number of words is wrong or a word is refused; the configuration in force then stays.
+    /// If the number of words is wrong or a word is refused; the present configuration is then kept.
     fn configure(&mut self, words: &[u64]) -> Result<(), ControllerError>;
 
     /// State as at power-up.
@@ -35,15 +35,15 @@ pub trait TickController {
     /// One tick.
     ///
     /// # Panics
-    /// If `input` or `output` has not as many words as the description names.
+    /// If `input` or `output` does not have the number of words in the description.
     fn step(&mut self, input: &[u64], output: &mut [u64]);
 
     /// Digest of the state.
     fn state_digest(&self) -> u64;
 }
 
-/// A controller of a few lines, for tests: a function of its state, input and output is its tick. It takes any settings and
-/// has none; its digest is its state, which a reset makes 0.
+/// A small controller for tests: a function of its state, input and output is its tick. It accepts any settings and has
+/// none. Its digest is its state, which a reset sets to 0.
 pub struct StandIn<F> {
     /// Names and arithmetic.
     pub description: Description,
@@ -74,7 +74,7 @@ impl<F: FnMut(&mut u64, &[u64], &mut [u64])> TickController for StandIn<F> {
     }
 }
 
-/// Why a controller cannot be run.
+/// Reason why a controller cannot be run.
 #[derive(Debug)]
 pub enum ControllerError {
     /// The library cannot be opened, or lacks a function.
@@ -84,7 +84,7 @@ pub enum ControllerError {
         /// What the loader says.
         cause: libloading::Error,
     },
-    /// It speaks another version of the interface.
+    /// It has another version of the interface.
     Abi {
         /// The library file.
         path: PathBuf,
@@ -141,7 +141,7 @@ impl fmt::Display for ControllerError {
     }
 }
 
-/// An error with the reasons behind it, which the loader keeps apart.
+/// An error with its chain of causes, which the loader keeps separate.
 fn reasons(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut next = error.source();
@@ -171,7 +171,7 @@ impl From<DescriptionError> for ControllerError {
 
 /// A controller with one configuration and one state.
 pub struct Controller {
-    /// What it says of itself, in its own words and parsed.
+    /// Its self-description, as text and parsed.
     text: String,
     description: Description,
     engine: Box<dyn Engine>,
@@ -187,7 +187,7 @@ impl Controller {
     /// Loads the host library of an emitted controller, with the spec's configuration and the power-up state.
     ///
     /// # Errors
-    /// If the file is no such library, speaks another version, or describes itself badly.
+    /// If the file is not such a library, has another version, or an invalid description.
     pub fn load(path: &Path) -> Result<Self, ControllerError> {
         Self::of(Box::new(library::Emitted::load(path)?))
     }
@@ -195,7 +195,7 @@ impl Controller {
     /// Runs `engine`, with the spec's configuration and the power-up state.
     ///
     /// # Errors
-    /// If it describes itself badly or refuses its own configuration.
+    /// If its description is invalid or it refuses its own configuration.
     pub fn of(engine: Box<dyn Engine>) -> Result<Self, ControllerError> {
         let text = engine.text();
         let description = Description::parse(&text)?;
@@ -206,14 +206,14 @@ impl Controller {
         Ok(controller)
     }
 
-    /// What the controller says of itself: `key=value` lines, as files of its records begin with.
+    /// The controller's self-description: `key=value` lines, as at the start of its record files.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// Another controller with the same constants and configuration, in the same state: to continue from here more than once, or
-    /// in another thread.
+    /// Another controller with the same constants, configuration and state: for several continuations from here, also
+    /// in other threads.
     #[must_use]
     pub fn fork(&self) -> Self {
         Self { text: self.text.clone(), description: self.description.clone(), engine: self.engine.fork() }

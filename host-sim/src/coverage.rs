@@ -1,33 +1,33 @@
-//! How much of a path a figure was measured over.
+//! The part of a path that a result covers.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// The time that a figure was measured over, and the length of its path. Every figure of tracking carries one.
+/// The duration of a measurement, and the length of its path. Every tracking result has one.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Coverage {
-    /// Time that was measured over, a whole number of ticks, s.
+    /// Duration of the measurement, a whole number of ticks, s.
     pub seconds: f64,
-    /// Length of the path in whole ticks, s; of one that repeats, of one repetition. Longer than `seconds` where only a part was
-    /// asked for.
+    /// Length of the path in whole ticks, s; for a repeated path, of one repetition. Longer than `seconds` if only a
+    /// part was requested.
     pub path_seconds: f64,
 }
 
 impl Coverage {
-    /// Of so many ticks of an interval (s), of a path of `path` ticks.
+    /// For a number of ticks of an interval (s), of a path of `path` ticks.
     #[must_use]
     pub fn new(ticks: usize, path: usize, interval: f64) -> Self {
         Self { seconds: ticks as f64 * interval, path_seconds: path as f64 * interval }
     }
 
-    /// `1.000/1.000 s`, where there is little room: time measured over, and length of the path.
+    /// `1.000/1.000 s`, a short form: duration, and length of the path.
     #[must_use]
     pub fn brief(&self) -> String {
         format!("{:.3}/{:.3} s", self.seconds, self.path_seconds)
     }
 
-    /// Whether the path was measured from its first set-point to its last, once at least.
+    /// Whether the path was measured completely, at least once.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.seconds >= self.path_seconds

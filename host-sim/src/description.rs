@@ -1,4 +1,4 @@
-//! What a controller says about itself: its spec, its arithmetic and the names of its words.
+//! A controller's self-description: its spec, its arithmetic and the names of its words.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -24,12 +24,12 @@ pub struct Description {
     pub output_names: Vec<String>,
 }
 
-/// Why a description or a name was refused.
+/// Reason why a description or a name was refused.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DescriptionError {
     /// A key is missing.
     Missing(&'static str),
-    /// A key has a value that cannot be.
+    /// A key has an invalid value.
     Bad {
         /// The key.
         key: &'static str,
@@ -38,14 +38,14 @@ pub enum DescriptionError {
         /// What is expected.
         expected: &'static str,
     },
-    /// A word that is asked for is not among the controller's.
+    /// The controller does not have the requested word.
     NoWord {
         /// The name asked for.
         name: String,
         /// The names there are.
         known: Vec<String>,
     },
-    /// A number that the word cannot hold.
+    /// A number that the word cannot represent.
     NotAWord {
         /// The word's name.
         name: String,
@@ -85,10 +85,10 @@ impl Description {
         self.config_names.iter().filter(|name| name.starts_with("trigger_kind[")).count()
     }
 
-    /// Parses `key=value` lines. Keys that are not known are left alone; they may belong to a later version.
+    /// Parses `key=value` lines. Unknown keys are ignored; they may belong to a later version.
     ///
     /// # Errors
-    /// If a key is missing or has a value that cannot be.
+    /// If a key is missing or has an invalid value.
     pub fn parse(text: &str) -> Result<Self, DescriptionError> {
         let fields = fields(text);
         let field = |key: &'static str| fields.get(key).copied().ok_or(DescriptionError::Missing(key));
@@ -128,7 +128,7 @@ impl Description {
         )
     }
 
-    /// Place of an input word.
+    /// Index of an input word.
     ///
     /// # Errors
     /// If there is none of that name.
@@ -136,7 +136,7 @@ impl Description {
         position(&self.input_names, name)
     }
 
-    /// Place of an output word.
+    /// Index of an output word.
     ///
     /// # Errors
     /// If there is none of that name.
@@ -144,7 +144,7 @@ impl Description {
         position(&self.output_names, name)
     }
 
-    /// Places of the six input words `stem[0]` to `stem[5]`.
+    /// Indices of the six input words `stem[0]` to `stem[5]`.
     ///
     /// # Errors
     /// If one is missing.
@@ -152,7 +152,7 @@ impl Description {
         six(&self.input_names, stem)
     }
 
-    /// Places of the six output words `stem[0]` to `stem[5]`.
+    /// Indices of the six output words `stem[0]` to `stem[5]`.
     ///
     /// # Errors
     /// If one is missing.
@@ -163,7 +163,7 @@ impl Description {
     /// Sets one configuration word by name, as a real or an integer according to its kind.
     ///
     /// # Errors
-    /// If there is none of that name, or an integer word is given another number.
+    /// If there is none of that name, or the value of an integer word is not an integer.
     pub fn set_config(&self, words: &mut [u64], name: &str, value: f64) -> Result<(), DescriptionError> {
         let place = position(&self.config_names, name)?;
         if let Some(slot) = words.get_mut(place) {
@@ -187,7 +187,7 @@ impl Description {
     }
 }
 
-/// The `key=value` lines of a text; the last of equal keys holds.
+/// The `key=value` lines of a text; the last of equal keys counts.
 pub(crate) fn fields(text: &str) -> BTreeMap<&str, &str> {
     text.lines().filter_map(|line| line.split_once('=')).collect()
 }

@@ -1,17 +1,17 @@
-//! The reversal-curve experiment: what identification is fed with.
+//! The reversal-curve experiment: input data for identification.
 //!
-//! From 0 V, for k = 1..=N: a ramp up to k·u_max/N and back to 0, all at one speed and without a pause.
-//! N = 32 at 20 V/s takes 165 s, N = 16 takes 85 s.
+//! From 0 V, for k = 1..=N: a ramp up to k·u_max/N and back to 0, all at one speed and without a pause. N = 32 at 20
+//! V/s takes 165 s, N = 16 takes 85 s.
 
 use std::fmt::Write;
 
 use crate::noise::Gauge;
 use crate::plant::{Plant, steps_within};
 
-/// The comment that marks a record as simulated; `specgen_identify::SIMULATED` is the same, and a test holds the two together.
+/// The comment that marks a record as simulated. `specgen_identify::SIMULATED` is equal; a test compares them.
 pub const SIMULATED: &str = "# simulated by specgen: no leg was measured";
 
-/// How the curves are driven and sampled.
+/// Drive and sampling of the curves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReversalExperiment {
     /// N: peaks at u_max/N, 2 u_max/N, ..., u_max.
@@ -40,7 +40,7 @@ impl ReversalExperiment {
         self.drive_max * (n + 1.0) / self.rate
     }
 
-    /// The same with even rows, `sampling` (Hz) of them a second: the slope changes by less than half a row of an interval.
+    /// The same with `sampling` (Hz) rows a second: the slope changes by less than half a row of an interval.
     #[must_use]
     pub fn sampled(self, sampling: f64) -> Self {
         let interval = self.drive_max / f64::from(self.intervals);
@@ -48,8 +48,8 @@ impl ReversalExperiment {
         Self { rows_per_interval: rows as u32, rate: sampling * interval / rows, ..self }
     }
 
-    /// The drive of every row, V, above `lowest`: before the curves it goes there from 0 V at the same slope, and rests for
-    /// `rest` (s).
+    /// The drive of every row, V, above `lowest`. Before the curves it goes there from 0 V at the same slope, and rests
+    /// for `rest` (s).
     #[must_use]
     pub fn drive(&self, lowest: f64, rest: f64) -> Vec<f64> {
         let levels = self.intervals * self.rows_per_interval;
@@ -66,14 +66,14 @@ impl ReversalExperiment {
         drive
     }
 
-    /// Runs on `leg` from its present state, which is to be at 0 V; the first row is that state at time 0.
+    /// Runs on `leg` from its present state, which must be at 0 V. The first row is that state at time 0.
     ///
-    /// The reference figures come from a leg as built: a saturating pre-cycle before the curves leaves creep in them and
+    /// The reference figures are for a leg as built: a saturating pre-cycle before the curves leaves creep in them and
     /// raises the Invhys error at 0.1 Hz from 127 to 138 nm.
     pub fn run<P: Plant>(&self, leg: &mut P, gauge: &mut Gauge) -> ReversalRecord {
         let rows = self.rows_per_interval.max(1);
         let levels = f64::from(self.intervals) * f64::from(rows);
-        // One division, so that a grid node has the same bits whatever the rows between.
+        // A single division, so that a grid node has the same bits for any number of rows between.
         let drive_at = |level: u32| f64::from(level) * self.drive_max / levels;
         let row_time = self.drive_max / levels / self.rate;
         let updates = steps_within(row_time, self.update);
@@ -121,8 +121,9 @@ pub struct ReversalRecord {
 }
 
 impl ReversalRecord {
-    /// CSV with the columns `time_s,drive_V,displacement_um`, and a comment below their names that says that no leg was measured. 1e-8 s, 1e-5 V and 1e-5 µm, which is a tenth of the
-    /// smallest noise here; grid nodes of N = 32 over 100 V are exact.
+    /// CSV with the columns `time_s,drive_V,displacement_um`, and a comment below their names that marks it as
+    /// simulated. Resolutions are 1e-8 s, 1e-5 V and 1e-5 µm, a tenth of the smallest noise here; grid nodes of N = 32
+    /// over 100 V are exact.
     #[must_use]
     pub fn to_csv(&self) -> String {
         let mut out = format!("time_s,drive_V,displacement_um\n{SIMULATED}\n");

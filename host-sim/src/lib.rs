@@ -6,9 +6,9 @@
 //!                    └───────────────────────────── reading ◄────────────────────────────────────┘
 //!                    └─► trace (bits) and tracking (metres) ─► tables
 //! ```
-//! Quantities are in SI units at every public function (m, V, s, Hz) unless a name says otherwise
-//! (`_um`, `_nm`); plant parameter files and records use µm, as measurement files do.
-//! Everything is a function of its parameters and of a seed: two runs give the same bits.
+//! Quantities are in SI units at every public function (m, V, s, Hz) unless a name states another (`_um`, `_nm`). Plant
+//! parameter files and records use µm, as measurement files do. Everything is a function of its parameters and a seed:
+//! two runs give the same bits.
 
 pub mod closed_loop;
 pub mod controller;

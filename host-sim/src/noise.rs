@@ -1,6 +1,6 @@
-//! What stands between leg and controller: gauge noise and quantisation, amplifier noise.
+//! Signal path between leg and controller: gauge noise and quantisation, amplifier noise.
 //!
-//! The drive converter is the controller's: its voltages are exact codes already.
+//! The drive converter belongs to the controller: its voltages are already exact codes.
 
 use std::sync::Arc;
 
@@ -16,13 +16,13 @@ pub struct Gaussian {
     deviation: f64,
     /// The second number of a Box–Muller pair.
     spare: Option<f64>,
-    /// Numbers drawn ahead, shared by clones, and how many of them were given out.
+    /// Numbers drawn in advance, shared by clones, and how many of them are used.
     ahead: Arc<[f64]>,
     given: usize,
 }
 
 impl Gaussian {
-    /// `deviation` in any unit (≥ 0); `stream` separates generators of one seed.
+    /// `deviation` in any unit (≥ 0); `stream` distinguishes generators of one seed.
     #[must_use]
     pub fn new(deviation: f64, seed: u64, stream: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -30,8 +30,8 @@ impl Gaussian {
         Self { rng, deviation, spare: None, ahead: Arc::from([]), given: 0 }
     }
 
-    /// Draws the next `count` numbers now: clones made after this share them, so that runs under the same noise pay for it
-    /// once. The numbers are those that [`Gaussian::draw`] would have given.
+    /// Draws the next `count` numbers now, so that later clones share them: runs with the same noise pay for it once.
+    /// The numbers are those that [`Gaussian::draw`] would return.
     pub fn draw_ahead(&mut self, count: usize) {
         if self.deviation != 0.0 {
             let numbers = (0..count).map(|_| self.draw()).collect();
@@ -42,8 +42,8 @@ impl Gaussian {
 
     /// The next number. Draws nothing when the deviation is 0.
     ///
-    /// Box–Muller over `libm` rather than a library's sampler: those call the platform's `log`, whose last bit differs
-    /// between hosts, and a recorded trace must be made anywhere.
+    /// Box–Muller with `libm` instead of a library's sampler: those call the platform's `log`, whose last bit differs
+    /// between hosts, and a trace must be reproducible on any host.
     pub fn draw(&mut self) -> f64 {
         if self.deviation == 0.0 {
             return 0.0;
@@ -92,7 +92,7 @@ impl Gauge {
         self.noise.draw_ahead(count);
     }
 
-    /// Makes `displacement` (m) read 0. Exact: zeroing averages many readings, so that it adds no noise.
+    /// Makes `displacement` (m) read 0. Exact: zeroing averages many readings, so it adds no noise.
     pub fn zero_at(&mut self, displacement: f64) {
         self.zero = displacement;
     }
@@ -113,7 +113,7 @@ impl Gauge {
 /// The nearest whole number, halves away from 0: [`libm::round`], to the bit, in a third of its time.
 fn nearest(x: f64) -> f64 {
     if x.abs() < (1_u64 << 51) as f64 {
-        // Half less half the last bit of it: what added to the number below a half does not make it whole.
+        // The largest double below a half: added to a number just below a half, it does not reach one.
         let half = 0.499_999_999_999_999_94_f64.copysign(x);
         return ((x + half) as i64 as f64).copysign(x);
     }
@@ -143,7 +143,7 @@ mod tests {
         let beyond = draws.iter().filter(|x| x.abs() > 4.0).count() as f64 / f64::from(count);
         assert!(mean.abs() < 0.02, "{mean}");
         assert!((square.sqrt() - 2.0).abs() < 0.02, "{square}");
-        // A normal distribution has 4.55 % beyond two deviations; a uniform one has none.
+        // 4.55 % of a normal distribution are beyond two deviations, none of a uniform one.
         assert!((beyond - 0.0455).abs() < 0.003, "{beyond}");
     }
 

@@ -1,4 +1,4 @@
-//! What the simulator drives: one leg, from amplifier input to displacement.
+//! The simulated plant: one leg, from amplifier input to displacement.
 
 mod bouc_wen;
 mod bound;
@@ -18,16 +18,16 @@ pub(crate) use parameters::checked;
 pub use parameters::{LegParameters, NoiseParameters, ParameterError, REFERENCE_LEG, SHIPPED};
 pub use stack::Stack;
 
-/// One leg that takes a held voltage and moves.
+/// One leg with a held input voltage.
 pub trait Plant {
     /// Holds `drive` (V, at the amplifier input, gain 1) for `interval` (s, > 0) and returns the
     /// displacement at its end (m, > 0 extends; relative to the leg as built, not to any gauge zero).
     fn hold(&mut self, drive: f64, interval: f64) -> f64;
 
-    /// Displacement now, m, as [`Plant::hold`] returned it last.
+    /// Present displacement, m, as last returned by [`Plant::hold`].
     fn displacement(&self) -> f64;
 
-    /// What a gauge shows of it now, without noise, m.
+    /// Noise-free gauge signal, m.
     fn seen(&self) -> f64 {
         self.displacement()
     }
@@ -45,11 +45,11 @@ pub trait Plant {
     }
 }
 
-/// Number of equal steps, none longer than `longest`, that make up `duration`; at least one.
-/// A ratio within 1e-9 of a whole number counts as that number, so that 0.02 s is 400 steps of 50 µs.
+/// Number of equal steps, none longer than `longest`, that make up `duration`; at least one. A ratio within 1e-9 of a
+/// whole number counts as that number, so that 0.02 s is 400 steps of 50 µs.
 #[must_use]
 pub(crate) fn steps_within(duration: f64, longest: f64) -> u32 {
-    // `as` saturates, and a NaN becomes 0: both end at a sane count.
+    // `as` saturates, and a NaN becomes 0: both give a bounded count.
     (libm::ceil(duration / longest - 1e-9) as u32).max(1)
 }
 

@@ -1,12 +1,12 @@
-//! The platform as a plant: six hysteretic legs under a rigid body, seen by six gauges, pressing on a work part.
+//! The platform as a plant: six hysteretic legs under a rigid body, measured by six gauges, pressing on a work part.
 //!
 //! ```text
 //! voltages ─► amplifier (lag, current) ─► stack (plays, creep, asymmetry) ─► d_i ┐ ×6
 //!                                                  axial stiffness and damping ──┴─► rigid platform ◄─ work part
 //!                                                       gauges ◄─ pose ─────────────────┘      └─► force sensor
 //! ```
-//! Nothing here is of the controller's own making: dynamics from the motion of the bodies, leg lengths and gauge readings
-//! by plain geometry, hysteresis that no Everett table holds. SI units; angles are those of R = Rz Ry Rx.
+//! It is independent of the controller: dynamics from the motion of the bodies, leg lengths and gauge readings by plain
+//! geometry, hysteresis that no Everett table represents. SI units; angles are those of R = Rz Ry Rx.
 
 #![allow(clippy::needless_range_loop, reason = "matrices are indexed as in their formulae")]
 
@@ -43,7 +43,7 @@ pub use sensor::ForceSensor;
 pub use specimen::Specimen;
 pub use structure::{Structure, StructureParameters};
 
-/// The larger of two errors. Unlike `f64::max` it keeps a NaN, which no bound admits.
+/// The larger of two errors. Unlike `f64::max` it keeps a NaN, which no bound accepts.
 #[cfg(test)]
 fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }

@@ -1,7 +1,7 @@
-//! Records: what a recorder left behind, as a file. The format is in [`specgen_runtime::record`].
+//! Records: a recorder's output as a file. The format is in [`specgen_runtime::record`].
 //!
-//! Files are read block by block, so that an hour fits through a small memory. What is damaged is said with the ticks that are
-//! lost, and what is whole before and after it is read all the same.
+//! Files are read block by block, so that an hour fits through a small memory. Damage is reported with the lost ticks;
+//! everything before and after it is still read.
 
 mod csv;
 mod recorded;
@@ -23,12 +23,12 @@ pub use recorded::{RecordedController, RecordingEnd};
 pub use replay::{Divergence, PhaseChange, Replay, ReplayError, replay};
 pub use writer::{Taker, Writer};
 
-/// Most words of a block that is believed: 64 MiB.
+/// Largest valid block, words: 64 MiB.
 const LARGEST_BLOCK: u64 = 1 << 23;
-/// Longest text of a file's beginning, bytes.
+/// Longest text at the start of a file, bytes.
 const LONGEST_TEXT: u32 = 1 << 20;
 
-/// What a record says of the controller that made it.
+/// Description in a record of the controller that made it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
     /// Its words and its spec.
@@ -50,7 +50,7 @@ pub struct Row {
     pub status: u32,
     /// Phase, cause << 8, amplifiers on << 16.
     pub supervisor: u32,
-    /// Digest of the machine after the tick, where it was taken.
+    /// Digest of the machine after the tick, if it was computed.
     pub digest: Option<u64>,
 }
 
@@ -75,33 +75,33 @@ pub struct Block {
     pub rows: Vec<Row>,
 }
 
-/// What a file holds next.
+/// Next item of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FileItem {
     /// A block.
     Block(Block),
-    /// A block that is not as it was written; the next one can be found.
+    /// A damaged block; the next one can be found.
     Damaged {
-        /// Which block of the file, from 1.
+        /// Number of the block in the file, from 1.
         block: usize,
-        /// What is wrong with it.
+        /// Description of the damage.
         reason: String,
     },
     /// The file ends within a block: it was cut off.
     Cut {
-        /// Bytes of that block that are there.
+        /// Bytes of that block that exist.
         bytes: usize,
     },
 }
 
-/// Why a file is not a record.
+/// Reason why a file is not a record.
 #[derive(Debug)]
 pub enum RecordError {
     /// It does not begin as a record does.
     NotARecord,
     /// It is of another version of the format.
     Format(u32),
-    /// Its beginning is cut off or changed.
+    /// Its start is cut off or damaged.
     Header(String),
     /// Its description is unusable.
     Description(DescriptionError),
@@ -136,7 +136,7 @@ impl From<io::Error> for RecordError {
     }
 }
 
-/// Reads a record piece by piece.
+/// Reads a record item by item.
 pub struct Reader<R> {
     source: R,
     header: Header,
@@ -148,7 +148,7 @@ impl<R: Read> Reader<R> {
     /// Reads the beginning.
     ///
     /// # Errors
-    /// It is no record of this version.
+    /// If it is not a record of this version.
     pub fn new(mut source: R) -> Result<Self, RecordError> {
         let mut start = [0; 16];
         let got = fill(&mut source, &mut start)?;
@@ -199,7 +199,7 @@ impl<R: Read> Reader<R> {
         self.header.input_names()
     }
 
-    /// The next piece; none at the end.
+    /// The next item; none at the end.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -220,7 +220,7 @@ impl<R: Read> Reader<R> {
         let mut words = words_of(&start);
         let (magic, length) = (words[0], words[1]);
         if magic != BLOCK_MAGIC || length < HEADER_WORDS as u64 || length > LARGEST_BLOCK {
-            // Where the next one begins is not known either.
+            // The start of the next one is not known either.
             self.ended = true;
             return Ok(Some(
                 self.damaged("it does not begin as a block does, and what follows it cannot be found".to_owned()),
@@ -263,7 +263,7 @@ impl Header {
     }
 }
 
-/// A block from its words, the checksum left out.
+/// A block from its words, without the checksum.
 fn parse(words: &[u64], inputs: usize) -> Result<Block, String> {
     let [_, _, rows, first, reason, digest, layout, trigger, body @ ..] = words else {
         return Err("it has no header".to_owned());
@@ -276,7 +276,7 @@ fn parse(words: &[u64], inputs: usize) -> Result<Block, String> {
     let reason_word = reason & 0xffff_ffff;
     let decimation = (reason >> 32) as u32;
     let reason =
-        Reason::from_word(reason_word).ok_or_else(|| format!("it begins for reason {reason_word}, which is none"))?;
+        Reason::from_word(reason_word).ok_or_else(|| format!("its reason {reason_word} is unknown"))?;
     if decimation == 0 {
         return Err("its decimation is 0".to_owned());
     }
@@ -289,7 +289,7 @@ fn parse(words: &[u64], inputs: usize) -> Result<Block, String> {
     let mut decoded = Vec::new();
     for row in 0..*rows {
         let tick = first.saturating_add(row.saturating_mul(u64::from(decimation)));
-        let row = take_row(&mut rest, &mut last, tick).ok_or_else(|| format!("its row of tick {tick} is not whole"))?;
+        let row = take_row(&mut rest, &mut last, tick).ok_or_else(|| format!("its row of tick {tick} is incomplete"))?;
         decoded.push(row);
     }
     if !rest.is_empty() {
@@ -338,7 +338,7 @@ fn take_row(rest: &mut &[u64], last: &mut [u64], tick: u64) -> Option<Row> {
     })
 }
 
-/// Little-endian words; a rest of fewer than eight bytes is left out.
+/// Little-endian words; a remainder of fewer than eight bytes is ignored.
 fn words_of(bytes: &[u8]) -> Vec<u64> {
     bytes.as_chunks().0.iter().map(|chunk| u64::from_le_bytes(*chunk)).collect()
 }

@@ -7,7 +7,7 @@ use crate::trace::Trace;
 /// Runs `controller`, reset to power-up and configured as it is, over recorded inputs; one row of trace per row of input.
 ///
 /// # Panics
-/// If the recording was made for a controller with another number of input words.
+/// If the recording has another number of input words than the controller.
 pub fn replay(controller: &mut dyn TickController, recording: &InputRecording) -> Trace {
     let mut trace = Trace::new(controller.description().clone());
     let mut output = vec![0; controller.description().output_names.len()];

@@ -26,7 +26,7 @@ pub struct LegScenario {
 }
 
 impl LegScenario {
-    /// Six legs, pre-cycled, settled and zeroed as the parameters of the first leg say.
+    /// Six legs, pre-cycled, settled and zeroed by the parameters of the first leg.
     ///
     /// `noise` replaces the noise in the parameters of all legs (`NoiseParameters::NONE` for none);
     /// `samples_per_period` is N_s (≥ 1): the control interval is 1/(N_s f).
@@ -35,8 +35,8 @@ impl LegScenario {
         Self::resting(legs, noise, seed, samples_per_period, [0.0; 2])
     }
 
-    /// As [`LegScenario::new`] with another lowest voltage than 0 V, at which the gauges are zeroed and from which the legs'
-    /// drive counts, and a rest above it, at which the legs stand before a run; V.
+    /// As [`LegScenario::new`] with another lowest voltage than 0 V, at which the gauges are zeroed and from which the
+    /// legs' drive counts, and a rest voltage above it for the legs before a run; V.
     #[must_use]
     pub fn resting(
         legs: &[LegParameters; LEGS],
@@ -106,7 +106,7 @@ impl LegScenario {
         select(controller, MODES[0].1)?;
         for &frequency in frequencies {
             let run = self.run(controller, frequency)?;
-            // A controller that requests one displacement throughout defines no line and gets no row.
+            // A controller that requests a constant displacement defines no line and gets no row.
             table.push(frequency, &run.tracking, self.samples_per_period as usize);
         }
         Ok(table)

@@ -1,7 +1,8 @@
-//! Input recordings that try a controller's bits: what a host and a target are both fed for the bit-identity check.
+//! Input recordings that exercise a controller's bits: a host and a target get the same ones for the bit-identity
+//! check.
 //!
-//! Not a plausible machine: smooth motion, white steps, demands beyond both limits, reversals on grid thresholds,
-//! and numbers that no sensor gives (±0, subnormals, NaN with several payloads, ±∞, the largest finite ones).
+//! Not a plausible machine: smooth motion, white steps, demands beyond both limits, reversals on grid thresholds, and
+//! numbers that no sensor gives (±0, subnormals, NaN with several payloads, ±∞, the largest finite ones).
 
 mod draw;
 pub mod platform;
@@ -11,15 +12,15 @@ use draw::RandomSource;
 use crate::closed_loop::LEGS;
 use crate::description::{Description, DescriptionError};
 
-/// What the six set-point words are.
+/// Meaning of the six set-point words.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Setpoints {
     /// Leg displacements.
     Leg {
         /// Displacement at full drive E(u_max, 0), m.
         stroke: f64,
-        /// E(u_i, u_j) in m on the grid's thresholds: row i = 0..=N, in each the columns j = 0..=i. A demand made up of
-        /// them reverses on thresholds, in loops within loops. Empty for a controller without a table.
+        /// E(u_i, u_j) in m on the grid's thresholds: row i = 0..=N, in each the columns j = 0..=i. A demand composed
+        /// of them reverses on thresholds, in loops within loops. Empty for a controller without a table.
         everett: Vec<Vec<f64>>,
     },
     /// A pose from rest.
@@ -46,14 +47,14 @@ impl InputRecording {
         self.words.chunks_exact(self.width)
     }
 
-    /// The words in little-endian, as a target reads them; no header.
+    /// The words in little-endian, as a target reads them, without header.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         self.words.iter().flat_map(|word| word.to_le_bytes()).collect()
     }
 }
 
-/// How a stretch of rows is made.
+/// Kind of a stretch of rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Smooth,
@@ -64,8 +65,8 @@ enum Kind {
     Special,
 }
 
-/// Order in which stretches follow each other. Rows that no sensor gives are one stretch in seven, so that a controller
-/// that answers them with a fault is also seen to run and to recover.
+/// Order of the stretches. Rows that no sensor gives are one stretch in seven, so that a controller that faults on them
+/// is also tested while running and recovering.
 const CYCLE: [Kind; 7] =
     [Kind::Smooth, Kind::White, Kind::Thresholds, Kind::Saturating, Kind::Hold, Kind::Special, Kind::White];
 
@@ -90,7 +91,7 @@ pub fn record(
     }))
 }
 
-/// Rows in stretches, whose kinds follow each other as in `cycle`: `begin` says how many rows a stretch has, `fill` makes them.
+/// Rows in stretches, whose kinds follow `cycle`: `begin` returns the number of rows of a stretch, `fill` makes them.
 fn in_stretches<G, K: Copy>(
     description: &Description,
     rows: usize,
@@ -178,7 +179,7 @@ impl<'a> Generator<'a> {
                 Kind::Hold => self.last[leg],
             };
         }
-        // A reading near what was asked for one row ago, as a leg gives, so that the adaptation stays small.
+        // A reading near the demand one row ago, as from a real leg, so that the adaptation stays small.
         let reading = match self.setpoints {
             Setpoints::Leg { .. } if kind == Kind::Thresholds => before,
             Setpoints::Leg { .. } => before.map(|q| q + 0.01 * self.half_stroke * self.draw.symmetric()),
@@ -187,15 +188,15 @@ impl<'a> Generator<'a> {
         (self.last, reading)
     }
 
-    /// The next reversal on the grid: with readings as demanded and no adaptation, the drive turns on a threshold.
-    /// The first demand of a stretch is 0, which wipes out what was before.
+    /// The next reversal on the grid: with readings equal to the demand and no adaptation, the drive reverses on a
+    /// threshold. The first demand of a stretch is 0, which wipes out the history.
     fn threshold(&mut self, leg: usize) -> f64 {
         let grid = match self.setpoints {
             Setpoints::Leg { everett, .. } => everett.len().saturating_sub(1),
             Setpoints::Pose { .. } => 0,
         };
         if grid == 0 {
-            // A pose meets no threshold exactly: its bounds and its centre stand in.
+            // A pose meets no threshold exactly: its bounds and centre are used instead.
             return self.center[leg] + self.half[leg] * (self.draw.below(3) as f64 - 1.0);
         }
         let pick = self.draw.below(grid as u64) as usize;
@@ -206,17 +207,17 @@ impl<'a> Generator<'a> {
     }
 }
 
-/// Reversals of one leg's drive that are not wiped out, as grid levels: minimum 0, maximum, minimum, ...
-/// Empty before the first row of a stretch.
+/// Reversals of one leg's drive that are not wiped out, as grid levels: minimum 0, maximum, minimum, ... Empty before
+/// the first row of a stretch.
 #[derive(Debug, Clone, Default)]
 struct ReversalStack {
     extrema: Vec<usize>,
 }
 
 impl ReversalStack {
-    /// Turns round and moves on by 1 + `pick` levels, or as far as the grid goes; returns the displacement there, m.
+    /// Reverses and moves by 1 + `pick` levels, or to the end of the grid; returns the displacement there, m.
     ///
-    /// Ending exactly on an earlier extremum happens often: there the smallest change decides whether it is wiped out.
+    /// Ending exactly on an earlier extremum is frequent: there the smallest change decides whether it is wiped out.
     fn reverse(&mut self, pick: usize, everett: &[Vec<f64>]) -> f64 {
         let Some(&last) = self.extrema.last() else {
             self.extrema.push(0);

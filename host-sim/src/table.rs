@@ -93,7 +93,7 @@ impl TrackingTable {
         out
     }
 
-    /// Text: a line per mode, a column per frequency, nm rms; below them what was measured.
+    /// Text: a line per mode, a column per frequency, nm rms; the coverage below.
     #[must_use]
     pub fn to_text(&self) -> String {
         let mut modes: Vec<&str> = Vec::new();

@@ -1,4 +1,4 @@
-//! The trace format: what every run leaves behind, on a host or on a target, compared bit for bit.
+//! The trace format: the output of every run, on a host or on a target, compared bit for bit.
 //!
 //! A file is, in little-endian:
 //! ```text
@@ -29,16 +29,16 @@ pub struct Trace {
     words: Vec<u64>,
 }
 
-/// Why a file is not a trace.
+/// Reason why a file is not a trace.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TraceError {
     /// It does not begin as a trace does.
     NotATrace,
     /// It is of another version of the format.
     Version(u32),
-    /// It ends early, or goes on after its last row.
+    /// It is too short, or continues after its last row.
     Length {
-        /// Bytes that its header announces.
+        /// Bytes announced by its header.
         expected: u64,
         /// Bytes that it has.
         found: u64,
@@ -72,7 +72,7 @@ impl Trace {
         Self { description, words: Vec::new() }
     }
 
-    /// A trace from rows that a target recorded.
+    /// A trace from rows recorded by a target.
     ///
     /// # Errors
     /// If `words` is not a whole number of rows.
@@ -131,7 +131,7 @@ impl Trace {
     /// Adds a tick.
     ///
     /// # Panics
-    /// If `input` or `output` has not as many words as the description names.
+    /// If `input` or `output` does not have the number of words in the description.
     pub fn push(&mut self, input: &[u64], output: &[u64], digest: u64) {
         assert_eq!(input.len(), self.description.input_names.len(), "input words");
         assert_eq!(output.len(), self.description.output_names.len(), "output words");
@@ -161,7 +161,7 @@ impl Trace {
     /// Reads a file's bytes.
     ///
     /// # Errors
-    /// If they are not a whole trace of this version.
+    /// If they are not a complete trace of this version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, TraceError> {
         let mut rest = bytes;
         let cut = |expected: u64| TraceError::Length { expected, found: bytes.len() as u64 };
@@ -189,8 +189,8 @@ impl Trace {
         Ok(trace)
     }
 
-    /// CSV for reading and plotting: numbers as shortest decimals that give the same bits, integers as they are, the digest
-    /// in hexadecimal; units in the column names.
+    /// CSV for reading and plotting: numbers as shortest decimals that give the same bits, integers unchanged, the
+    /// digest in hexadecimal; units in the column names.
     #[must_use]
     pub fn to_csv(&self) -> String {
         let titles: Vec<String> = std::iter::once("tick".to_owned()).chain(self.columns().map(title)).collect();
@@ -219,7 +219,7 @@ impl Trace {
 
 /// Column title with the unit: `voltage[2]` becomes `voltage[2]_V`.
 ///
-/// `setpoint` has none: it is a pose or leg displacements as the configuration says, in m and rad.
+/// `setpoint` has none: the configuration selects pose or leg displacements, in m and rad.
 fn title(name: &str) -> String {
     let unit = match name.split('[').next() {
         Some("voltage") => "_V",
@@ -229,7 +229,7 @@ fn title(name: &str) -> String {
     format!("{name}{unit}")
 }
 
-/// Takes the first `N` bytes off.
+/// Removes and returns the first `N` bytes.
 fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
     let (head, tail) = rest.split_first_chunk::<N>()?;
     *rest = tail;

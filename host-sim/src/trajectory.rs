@@ -14,7 +14,7 @@ pub trait LegTrajectory {
     /// Length in s.
     fn duration(&self) -> f64;
 
-    /// Length of the path that this is the start of, s.
+    /// Length of the whole path, s.
     fn whole(&self) -> f64 {
         self.duration()
     }
@@ -28,7 +28,7 @@ pub trait PoseTrajectory {
     /// Length in s.
     fn duration(&self) -> f64;
 
-    /// Length of the path that this is the start of, s.
+    /// Length of the whole path, s.
     fn whole(&self) -> f64 {
         self.duration()
     }
@@ -39,7 +39,7 @@ pub trait PoseTrajectory {
     fn target(&self, time: f64) -> PoseTarget;
 }
 
-/// Where the platform is to be, and how it is to move there.
+/// Set-point of the platform with its derivatives.
 ///
 /// Coordinates h = [x, y, z, θx, θy, θz]: P_C from its rest place in the base frame (m), and the angles of
 /// R = Rz Ry Rx (rad).
@@ -72,7 +72,7 @@ impl PaperLeg {
     const RAMP_END: f64 = 2.0;
     /// Scaled time t·tf of the end: two periods after the ramp.
     const END: f64 = 22.0;
-    /// Relative slack with which a sample at the jump counts as the ramp's last, for t is a rounded product.
+    /// Relative slack with which a sample at the jump counts as the ramp's last, because t is a rounded product.
     const SLACK: f64 = 1e-9;
     /// Mean and amplitude of the sine, µm.
     const CENTER: f64 = 24.0;

@@ -1,4 +1,4 @@
-//! Words: the one currency between controllers, traces and targets.
+//! Words: the common currency of controllers, traces and targets.
 //!
 //! Every input, output and configuration value travels as a `u64`: the bits of an f64, the bits of an f32 with zeros above,
 //! or an integer.
@@ -72,7 +72,7 @@ impl Scalar {
     }
 }
 
-/// What a word of a given name holds.
+/// Content of a word of a given name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WordKind {
     /// A number of the controller's scalar type.
@@ -119,8 +119,9 @@ impl WordKind {
     }
 }
 
-/// A status word as its bits say it, joined by `+`; empty where none is set. Both kinds of controller have the same bits; legs and
-/// gauges count from 0, as words do. A bit without a meaning is named by its number: a word of another version is not read as good.
+/// The bits of a status word as text, joined by `+`; empty if none is set. Both kinds of controller have the same bits;
+/// legs and gauges count from 0, as words do. A bit without a meaning is shown by its number, so that a word of another
+/// version does not look good.
 #[must_use]
 pub fn status_words(status: u32) -> String {
     let mut words = Vec::new();

@@ -1,7 +1,7 @@
 //! What the scalar of the controller costs: rounding errors of leg displacements and of the measured pose, in nanometres per
 //! axis, by analysis and by trial.
 //!
-//! The analysis runs the controller's own kernels on numbers that remember what was rounded where ([`specgen_numerics::Traced`]), over the whole
+//! The analysis runs the controller's own kernels on numbers that remember what was rounded where ([`specgen_numerics::TracedNumber`]), over the whole
 //! workspace in 64 parts. The trial runs them in the controller's scalar at corners and random poses of the workspace, against the same kernels on 106 bits
 //! ([`specgen_numerics::Double`]) with constants, series and passes that are exact there. Both count the rounding of constants and the terms and
 //! steps that are left out. Not counted: the set-point generator, calibration of gauges, and the inverse of the

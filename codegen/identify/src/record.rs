@@ -52,7 +52,7 @@ impl Record {
     /// A record from columns in memory (s, V, m), under the same checks as a file.
     ///
     /// # Errors
-    /// The same findings as [`read_record`]; line k + 2 stands for sample k.
+    /// The same findings as [`read_record`]; line k + 2 is that of sample k.
     pub fn from_columns(
         shown_as: &str,
         time: Vec<f64>,

@@ -104,7 +104,7 @@ pub struct ControlLaw {
     pub notch: Option<Notch>,
     /// Active damping of each mode, if declared.
     pub damping: Option<[Resonator; 6]>,
-    /// Whether the integral is handed to the estimates when the set-point comes to rest.
+    /// Whether the integral is transferred to the estimates when the set-point comes to rest.
     #[serde(skip_serializing_if = "core::ops::Not::not")]
     pub hands_over: bool,
     /// Limits of the correction on each axis, if there is one.
@@ -371,7 +371,7 @@ pub enum Path {
         per_second: f64,
         /// 6 · (rows per s)².
         bend_rate: f64,
-        /// Begins again after the last row.
+        /// Starts again after the last row.
         repeat: bool,
     },
 }

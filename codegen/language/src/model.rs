@@ -94,7 +94,7 @@ const START: Section = Section {
             name: "assumed",
             shape: Shape::Paths,
             presence: Presence::Default("[]"),
-            doc: "Values of this spec that nobody gave or measured, each by the path of its key; a repeated section such as `gauge` stands for all of its tables. The verdict counts them, and a real board or card takes the controller with `--assumed-ok` only. Take an entry out once its value is measured or known. Nothing of it changes the law.",
+            doc: "Values of this spec that are assumed, neither given nor measured, each by the path of its key; a repeated section such as `gauge` means all of its tables. The verdict counts them, and a real board or card accepts the controller only with `--assumed-ok`. Remove an entry once its value is measured or known. Entries do not change the law.",
             symbol: "",
             aliases: &["assumptions", "guessed", "estimated", "unmeasured"],
             example: r#"["sensor.noise"]"#,

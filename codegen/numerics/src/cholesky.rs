@@ -1,16 +1,16 @@
-//! Cholesky factors of large symmetric matrices, by blocks: the same bits on every machine, since every sum has a written
-//! order, and fast, since most of the work is a product of small blocks that stay in registers.
+//! Cholesky factors of large symmetric matrices, by blocks. The bits are the same on every machine, because every sum
+//! has a written order. It is fast, because most of the work is a product of small blocks that stay in registers.
 //!
-//! Row i of the factor depends on the rows above only, so that a matrix of which the first rows are as before is factored
-//! from its first new row on.
+//! Row i of the factor depends only on the rows above it. So a matrix whose first rows are unchanged is factored from
+//! its first new row on.
 
 /// Width of a block, columns.
 const BLOCK: usize = 64;
 /// Rows and columns that are multiplied in registers.
 const TILE: usize = 4;
-/// Right-hand sides that are solved side by side.
+/// Right-hand sides that are solved together.
 const LANES: usize = 8;
-/// Multiplications from which on several threads are quicker than one.
+/// Number of multiplications above which several threads are faster than one.
 const WORTH_A_THREAD: usize = 2_000_000;
 /// Most threads.
 const THREADS: usize = 8;
@@ -18,7 +18,7 @@ const THREADS: usize = 8;
 /// L of A = L Lᵀ.
 #[derive(Debug, Clone, Default)]
 pub struct Factor {
-    /// Rows one behind the other, each `stride` long; what lies above the diagonal has no meaning.
+    /// The rows in sequence, each `stride` long; entries above the diagonal have no meaning.
     rows: Vec<f64>,
     stride: usize,
     size: usize,
@@ -26,7 +26,7 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// An empty factor that may grow to `most` rows.
+    /// An empty factor with room for `most` rows.
     #[must_use]
     pub fn new(most: usize) -> Self {
         let threads = std::thread::available_parallelism().map_or(1, |count| count.get().min(THREADS));
@@ -40,9 +40,9 @@ impl Factor {
         factor.set(0, size, entry).then_some(factor)
     }
 
-    /// Makes this the factor of another matrix of `size` rows, not more than there is room for. Its first `kept` rows are
-    /// those of the matrix before; `entry` (row, column ≤ row) gives the others. `false`, and an empty factor, if the matrix is
-    /// not positive definite.
+    /// Makes this the factor of another matrix of `size` rows, at most the room. Its first `kept` rows equal those of
+    /// the previous matrix; `entry` (row, column ≤ row) gives the others. `false`, with an empty factor, if the matrix
+    /// is not positive definite.
     #[must_use]
     pub fn set(&mut self, kept: usize, size: usize, entry: impl Fn(usize, usize) -> f64) -> bool {
         let (size, stride) = (size.min(self.stride), self.stride);
@@ -58,7 +58,7 @@ impl Factor {
         self.size == size
     }
 
-    /// One block of columns from `first` on: its part of the factor, and what it takes from the columns behind it.
+    /// One block of columns from `first` on: its part of the factor, and its contribution to the columns after it.
     fn block(&mut self, first: usize, kept: usize, size: usize, panel: &mut Vec<f64>) -> bool {
         let stride = self.stride;
         let end = if size - first < BLOCK { size } else { first + BLOCK };
@@ -118,7 +118,7 @@ impl Factor {
         if threads < 2 {
             below.for_each(|(tile, rows)| take(tile, rows));
         } else {
-            // Row by row each sum is what one thread makes of it: how many there are changes no bit.
+            // Each row's sum is the same as with one thread: the number of threads changes no bit.
             let mut shares: Vec<Vec<(usize, &mut [f64])>> = (0..threads).map(|_| Vec::new()).collect();
             below.for_each(|(tile, rows)| shares[tile % threads].push((tile, rows)));
             std::thread::scope(|scope| {
@@ -168,7 +168,7 @@ impl Factor {
 }
 
 impl Factor {
-    /// [`Factor::solve`] for several right-hand sides, side by side: the same bits, sooner.
+    /// [`Factor::solve`] for several right-hand sides together: the same bits, faster.
     pub fn solve_all(&self, right_hand_sides: &mut [Vec<f64>]) {
         for group in right_hand_sides.chunks_mut(LANES) {
             let mut values = vec![[0.0; LANES]; self.size];

@@ -1,20 +1,20 @@
-//! What white noise at the inputs of a sampled system makes of its states in the end.
+//! Steady-state covariance of a sampled system's states under white noise at its inputs.
 
 use crate::matrix::Matrix;
 
 /// Doublings after which the sum has converged or never will: 2⁴⁰ ticks.
 const MOST: u32 = 40;
-/// A term below this share of the sum is left out.
+/// A term below this fraction of the sum is left out.
 const SMALL: f64 = 1e-14;
 
-/// P = A P Aᵀ + B Bᵀ, the covariance of x⁺ = A x + B w in the steady state for each of several inputs B, where w is white and has unit
-/// variance; `inputs` holds one B each, a row a state. Infinite where the system is not stable.
+/// P = A P Aᵀ + B Bᵀ, the steady-state covariance of x⁺ = A x + B w for each of several inputs B, where w is white with
+/// unit variance. `inputs` holds one B each, a row per state. Infinite if the system is not stable.
 #[must_use]
 pub fn steady_covariances<const N: usize>(transition: &Matrix, inputs: [&[Vec<f64>]; N]) -> [Matrix; N] {
     let mut sums = inputs.map(of_input);
     let mut power = transition.clone();
     for _ in 0..MOST {
-        // P over 2n ticks is P over n ticks and what n ticks later is left of it.
+        // P over 2n ticks is P over n ticks plus its propagation over n ticks.
         let transposed = power.transposed();
         let mut converged = true;
         for sum in &mut sums {

@@ -1,4 +1,4 @@
-//! Numbers of 106 bits as unevaluated sums of two doubles: the reference that rounding errors are measured against.
+//! Numbers of 106 bits as unevaluated sums of two doubles: the reference for rounding errors.
 //!
 //! Dekker's and Knuth's error-free sums and products; the relative error of an operation is below 2⁻¹⁰⁰.
 
@@ -49,7 +49,7 @@ impl Double {
         self.high + self.low
     }
 
-    /// The root of a number that is not negative, by a Newton step from the double's.
+    /// The square root of a non-negative number, by a Newton step from the double's.
     #[must_use]
     pub fn sqrt(self) -> Self {
         if self.high <= 0.0 {
@@ -164,7 +164,7 @@ mod tests {
         let two = Double::from(2.0);
         let miss = (two.sqrt() * two.sqrt() - two).value();
         assert!(miss.abs() < 1e-30, "{miss:e}");
-        // A plain double is off by 1e-16: the comparison would see it.
+        // A plain double has an error of 1e-16, which the comparison would detect.
         let plain = Double::from(libm::sqrt(2.0));
         assert!((plain * plain - two).value().abs() > 1e-17);
     }

@@ -3,7 +3,7 @@
 
 use super::matrix::Matrix;
 
-/// QR steps allowed for one eigenvalue; it takes two or three as a rule.
+/// QR steps allowed for one eigenvalue; it usually takes two or three.
 const STEPS: u32 = 60;
 
 /// All eigenvalues as (real, imaginary), in the order they were deflated; none if an entry is not finite or the iteration
@@ -23,10 +23,10 @@ pub fn eigenvalues(matrix: &Matrix) -> Option<Vec<(f64, f64)>> {
     Some(found)
 }
 
-/// Scales rows and columns by powers of two until their norms are alike.
+/// Scales rows and columns by powers of two until their norms are similar.
 fn balance(a: &mut Matrix) {
     let n = a.size();
-    // The iteration always ends; the bound only says so.
+    // The iteration always ends; the bound states it.
     for _ in 0..100 {
         let mut done = true;
         for i in 0..n {
@@ -66,7 +66,7 @@ fn balance(a: &mut Matrix) {
     }
 }
 
-/// Largest magnitude of an eigenvalue; infinite if they cannot be found, NaN if one of them is.
+/// Largest magnitude of an eigenvalue; infinite if they cannot be computed, NaN if one of them is NaN.
 #[must_use]
 pub fn spectral_radius(matrix: &Matrix) -> f64 {
     let Some(values) = eigenvalues(matrix) else {
@@ -82,8 +82,8 @@ pub fn spectral_radius(matrix: &Matrix) -> f64 {
     largest
 }
 
-/// Similar matrix with zeros below the first subdiagonal, by elimination with row pivots. Returns the steps: the row that was exchanged
-/// for row k + 1 in the k-th, and the factors of that row in the ones below.
+/// Similar matrix with zeros below the first subdiagonal, by elimination with row pivots. Returns the steps: for the
+/// k-th, the row that was exchanged with row k + 1, and the factors of that row in the ones below.
 pub(crate) fn reduce(a: &mut Matrix) -> Vec<(usize, Vec<f64>)> {
     let n = a.size();
     let mut steps = Vec::with_capacity(n.saturating_sub(2));
@@ -209,7 +209,7 @@ fn push_pair(found: &mut Vec<(f64, f64)>, [x, y, w]: [f64; 3], shifted: f64) {
 /// One double QR step on rows `start` to `last`.
 fn double_step(a: &mut Matrix, start: usize, last: usize, [x, y, w]: [f64; 3]) {
     let n = a.size();
-    // Two consecutive small subdiagonal entries let the step begin below `start`.
+    // Two consecutive small subdiagonal entries allow the step to begin below `start`.
     let mut m = last - 2;
     let (mut p, mut q, mut r);
     loop {

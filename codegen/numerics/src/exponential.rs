@@ -4,7 +4,7 @@ use super::matrix::Matrix;
 
 /// Terms of the series: 0.5²⁰/20! is far below the rounding of a double.
 const TERMS: u32 = 19;
-/// Squarings at most: a norm of 2⁶⁰ is no longer a sampled system.
+/// Most squarings: a norm of 2⁶⁰ is not a sampled system.
 const LARGEST_EXPONENT: u32 = 60;
 
 /// e^A. Entries are finite for any A whose norm is below 2⁶⁰ and whose exponential is finite.

@@ -1,13 +1,14 @@
 //! Fourier transforms of any length.
 //!
-//! Their table of sines is that of `std`: what they compute is reported, never emitted.
+//! Its sines are those of `std`: the results are reported, never emitted.
 
 use std::sync::Arc;
 
 pub use rustfft::Fft;
 use rustfft::FftDirection;
 pub use rustfft::num_complex::Complex64;
-// Without the `avx`, `sse` features of the crate it is one kernel for every machine. Its planner would bring kernels for all lengths.
+// Without the features `avx` and `sse` of the crate, it is one kernel for every machine. Its planner would link kernels
+// for all lengths.
 use rustfft::algorithm::butterflies::Butterfly8;
 use rustfft::algorithm::{BluesteinsAlgorithm, Radix4};
 
@@ -17,7 +18,7 @@ pub fn forward(length: usize) -> Arc<dyn Fft<f64>> {
     transform(length, FftDirection::Forward)
 }
 
-/// Σ x_n e^(+i 2π k n/N) for N = `length`, at least 1, in place: not over N.
+/// Σ x_n e^(+i 2π k n/N) for N = `length`, at least 1, in place: without the factor 1/N.
 #[must_use]
 pub fn inverse(length: usize) -> Arc<dyn Fft<f64>> {
     transform(length, FftDirection::Inverse)
@@ -31,7 +32,7 @@ fn transform(length: usize, direction: FftDirection) -> Arc<dyn Fft<f64>> {
     Arc::new(BluesteinsAlgorithm::new(length, Arc::new(inner)))
 }
 
-/// Of a power of two, with the base, and so the bits, that the crate's planner has.
+/// For a power of two, with the base, and so the bits, of the crate's planner.
 fn radix4(length: usize, direction: FftDirection) -> Radix4<f64> {
     let exponent = length.trailing_zeros();
     if exponent > 5 && exponent % 2 == 1 {
@@ -67,7 +68,7 @@ mod tests {
         }
     }
 
-    /// What was computed before, by other ways to the same transforms, stays as it is.
+    /// Results that were computed earlier, by other code for the same transforms, keep their bits.
     #[test]
     fn powers_of_two_have_the_bits_of_the_planner() {
         for exponent in 0..15 {

@@ -1,10 +1,11 @@
-//! Ranges of numbers that depend on a pose: an affine form of the six coordinates and a rest, and the interval that holds both.
+//! Ranges of numbers that depend on a pose: an affine form of the six coordinates with a remainder, and an interval
+//! that contains both.
 //!
-//! Intervals alone forget that two numbers move together: the difference of a reading and what a pose makes of it would be
-//! twice as wide instead of next to nothing. Affine arithmetic (de Figueiredo, Stolfi) remembers what is linear in the pose, and
-//! in a micrometre machine almost everything is.
+//! Intervals alone lose correlations: the difference of a reading and its prediction from a pose would be twice as wide
+//! instead of almost zero. Affine arithmetic (de Figueiredo, Stolfi) keeps the linear dependence on the pose, and in a
+//! micrometre machine almost everything is linear.
 
-/// What the arithmetic on forms itself rounds, with room: it is done in doubles.
+/// Bound of the rounding of the arithmetic itself, with margin: it is done in doubles.
 const OWN_ROUNDING: f64 = 1e-15;
 
 /// `centre` + `slope`·p + e for any p in \[−1, 1\]⁶ and some |e| ≤ `rest`; always within `low` and `high`.
@@ -77,7 +78,7 @@ impl Form {
         self.slope.iter().fold(self.rest, |sum, slope| sum + slope.abs())
     }
 
-    /// What the form says, within `bounds`.
+    /// The form's range, limited to `bounds`.
     fn within(self, bounds: [f64; 2]) -> Self {
         let radius = self.radius() * (1.0 + OWN_ROUNDING);
         let (low, high) = (self.centre - radius, self.centre + radius);
@@ -88,7 +89,7 @@ impl Form {
         }
     }
 
-    /// Up to `more` beyond what it was.
+    /// Widened by up to `more`.
     pub(crate) fn widened(self, more: f64) -> Self {
         Self { rest: self.rest + more, low: self.low - more, high: self.high + more, ..self }
     }
@@ -179,7 +180,7 @@ mod tests {
                 reached = [f64::min(reached[0], value), f64::max(reached[1], value)];
             }
         }
-        // And the form is of their size.
+        // And the form has their size.
         assert!(form.high - form.low < 4.0 * (reached[1] - reached[0]));
     }
 }

@@ -1,5 +1,5 @@
-//! The controller's kernels on the compiler's numbers. Generic code is compiled by the crate that names its types: named
-//! here, the kernels are compiled once, and optimised.
+//! The controller's kernels on the compiler's numbers. Generic code is compiled by the crate that names its types. It
+//! is named here, so that the kernels are compiled once, with optimisation.
 
 use specgen_runtime::{Gauges, Legs, Motion, Platform, Real, Series};
 
@@ -41,7 +41,8 @@ pub fn gravity(platform: &Platform<f64>, pose: &[f64; 6]) -> [f64; 6] {
     platform.gravity(pose)
 }
 
-/// How near elimination comes to a pivot of zero at `pose` (m and rad), moments in units of `reach` (m): [`Platform::pivot_ratio`].
+/// Distance of the elimination from a zero pivot at `pose` (m and rad), moments in units of `reach` (m):
+/// [`Platform::pivot_ratio`].
 #[must_use]
 pub fn pivot_ratio(platform: &Platform<f64>, pose: &[f64; 6], reach: f64) -> f64 {
     platform.pivot_ratio(pose, reach)

@@ -1,5 +1,5 @@
-//! Numerics of the host whose results reach emitted bytes: plain loops in a written order, IEEE basic operations and `libm`
-//! only, so that every machine computes the same.
+//! Numerics of the host with an effect on emitted bytes: plain loops in a written order, only IEEE basic operations and
+//! `libm`, so that every machine computes the same.
 //!
 //! | part | what |
 //! |---|---|
@@ -19,7 +19,7 @@
 //! | [`nyquist`] | sensitivity and stability of a loop of one signal |
 //! | [`Kernels`], [`displacements`], [`leg_forces`], [`mass_matrix`] and others | the controller's kernels on these numbers, compiled here |
 //!
-//! A crate of its own because it is optimised for speed, which the rest of the compiler is not.
+//! A separate crate because it is optimised for speed, which the rest of the compiler is not.
 
 mod cholesky;
 mod covariance;

@@ -49,7 +49,7 @@ impl Matrix {
         matrix
     }
 
-    /// How many rows it has, and columns.
+    /// Number of rows, and of columns.
     #[must_use]
     pub fn size(&self) -> usize {
         self.size
@@ -61,7 +61,7 @@ impl Matrix {
         &self.entries[row * self.size..(row + 1) * self.size]
     }
 
-    /// Replaces the entries of one row by as many values.
+    /// Replaces the entries of one row.
     pub fn set_row(&mut self, row: usize, values: &[f64]) {
         self.entries[row * self.size..(row + 1) * self.size].copy_from_slice(values);
     }
@@ -84,7 +84,7 @@ impl Matrix {
         transposed
     }
 
-    /// A B; a product with a zero entry is left out, so blocks that do not couple stay exactly apart.
+    /// A B. Products with a zero entry are left out, so that blocks that do not couple stay exactly separate.
     #[must_use]
     pub fn times(&self, other: &Self) -> Self {
         let mut product = Self::zeros(self.size);

@@ -1,11 +1,11 @@
 //! Non-negative least squares on normal equations: minimise ½ wᵀGw − bᵀw with w ≥ 0.
 //!
-//! Block principal pivoting (Portugal, Júdice and Vicente 1994; Kim and Park 2011): all weights start free, and all that have
-//! the wrong sign change sides at once. That takes about ten factorisations, but may cycle. When their number has not
-//! fallen for a while, projected Newton steps (Bertsekas 1982) take over: the same factorisation, with a search along the
-//! projected line, so that the objective falls in every step and no set of free weights comes twice.
+//! Block principal pivoting (Portugal, Júdice and Vicente 1994; Kim and Park 2011): all weights start free, and all
+//! with the wrong sign change sides at once. That takes about ten factorisations, but may cycle. If their number stops
+//! falling, projected Newton steps (Bertsekas 1982) take over: the same factorisation, with a search along the
+//! projected line. The objective then falls in every step, and no set of free weights repeats.
 //!
-//! The free weights are ordered by size, so that those which change sides stand at the end and a step factors little anew.
+//! The free weights are ordered by size, so that those which change sides are at the end and a step refactors little.
 //! Every sum has a written order: the result has the same bits on every machine.
 
 use nalgebra::DMatrix;
@@ -16,14 +16,14 @@ use crate::cholesky::Factor;
 const TRIALS: usize = 3;
 /// Relative tolerance of the sign tests, on a problem scaled to unit diagonal.
 const TOLERANCE: f64 = 1e-11;
-/// Share of the decrease that the gradient promises with which a projected step is taken.
+/// Least fraction of the decrease predicted by the gradient with which a projected step is accepted.
 const DECREASE: f64 = 1e-4;
 /// Halvings of a projected step.
 const HALVINGS: usize = 60;
-/// The order of the free weights is renewed where less than this share of the factor would be kept.
+/// The order of the free weights is renewed if less than this fraction of the factor would be kept.
 const KEPT: f64 = 0.5;
 
-/// Non-negative weights, and how they were found.
+/// Non-negative weights, and statistics of the solution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     /// w, every entry ≥ 0.
@@ -32,7 +32,7 @@ pub struct Solution {
     pub iterations: usize,
 }
 
-/// Why there is no solution.
+/// Reason why there is no solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Failure {
     /// G is not positive definite.
@@ -44,13 +44,13 @@ pub enum Failure {
 /// Solves for a symmetric positive definite `gram` and `rhs` of the same size.
 ///
 /// # Errors
-/// [`Failure::Singular`] if a principal submatrix of `gram` is not positive definite, else see [`Failure`].
+/// [`Failure::Singular`] if a principal submatrix of `gram` is not positive definite; otherwise see [`Failure`].
 pub fn solve(gram: &DMatrix<f64>, rhs: &[f64]) -> Result<Solution, Failure> {
     solve_with(gram, rhs, vec![true; rhs.len()], TRIALS)
 }
 
 /// [`solve`], started with the weights that are zero in `near`, the solution of a similar problem, held at zero. The
-/// solution is the same (the problem is strictly convex); it is found in fewer factorisations.
+/// solution is the same (the problem is strictly convex), with fewer factorisations.
 ///
 /// # Errors
 /// As [`solve`].
@@ -93,7 +93,7 @@ fn solve_with(gram: &DMatrix<f64>, rhs: &[f64], mut free: Vec<bool>, trials: usi
         let found = shares().find_map(|share| {
             let next: Vec<f64> = weights.iter().zip(&wanted).map(|(w, z)| positive(w + share * (z - w))).collect();
             let slope = problem.gradient(&next);
-            // Exact for a quadratic, and free of the cancellation of a difference of objectives.
+            // Exact for a quadratic, and without the cancellation of a difference of objectives.
             let (mut promised, mut change) = (0.0, 0.0);
             for (((w, z), g), h) in weights.iter().zip(&next).zip(&gradient).zip(&slope) {
                 promised += g * (z - w);
@@ -107,7 +107,7 @@ fn solve_with(gram: &DMatrix<f64>, rhs: &[f64], mut free: Vec<bool>, trials: usi
     Err(Failure::Iterations)
 }
 
-/// Shares of a step that are tried: all of it, then halves.
+/// Fractions of a step that are tried: all of it, then halves.
 fn shares() -> impl Iterator<Item = f64> {
     core::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVINGS)
 }
@@ -173,7 +173,7 @@ impl<'a> Problem<'a> {
         Ok(self.last.clone())
     }
 
-    /// Free weights below zero and held ones whose gradient asks for growth, in ascending order.
+    /// Free weights below zero, and held ones whose gradient demands growth, in ascending order.
     fn wrong_signs(&self, free: &[bool], weights: &[f64], gradient: &[f64]) -> Vec<usize> {
         let wrong = |&k: &usize| (if free[k] { weights[k] } else { gradient[k] }) < -self.tolerance;
         (0..free.len()).filter(wrong).collect()
@@ -221,7 +221,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::{Rng, SeedableRng};
 
-    /// Lawson and Hanson's algorithm as they print it: another program for the same problem.
+    /// Lawson and Hanson's published algorithm: an independent program for the same problem.
     fn lawson_hanson(gram: &DMatrix<f64>, rhs: &[f64]) -> Vec<f64> {
         let n = rhs.len();
         let (mut x, mut passive) = (vec![0.0; n], Vec::<usize>::new());
@@ -247,7 +247,7 @@ mod tests {
         }
     }
 
-    /// Regular problems, and such whose columns are sums of each other's, as those of a table are.
+    /// Regular problems, and problems whose columns are sums of one another, as those of a table are.
     fn problems() -> impl Iterator<Item = (DMatrix<f64>, Vec<f64>)> {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut uniform = move || (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
@@ -281,7 +281,7 @@ mod tests {
                     assert!((x - w).abs() < 1e-9 * (1.0 + w.abs()), "{n}: {x} against {w}");
                 }
             }
-            // Another weight at zero is no solution, and the certificate says so.
+            // With another weight at zero it is not a solution, and the certificate shows it.
             let mut wrong = exchanged.weights;
             *wrong.iter_mut().find(|w| **w > 1e-3).unwrap() = 0.0;
             assert!(kkt_violation(&gram, &rhs, &wrong) > 1e-6);

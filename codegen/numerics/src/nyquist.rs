@@ -1,4 +1,4 @@
-//! A loop of one signal in the frequency domain.
+//! A single loop in the frequency domain.
 
 /// Re and Im.
 pub type Complex = [f64; 2];
@@ -34,10 +34,11 @@ pub fn square(a: Complex) -> f64 {
 
 /// |S|² at each frequency, S = 1/(1 + P C), to `seen`; whether the closed loop is stable by Nyquist's criterion.
 ///
-/// The responses are those of plant and controller at rising frequencies from near 0 to half the rate of sampling, close enough
-/// together that the phase turns by less than half a turn from one to the next. P is stable; C is so but for integrators: `controller` is
-/// C times (1 − z⁻¹) for each of them, and `cancelled` that factor. Then (1 − z⁻¹)ⁿ (1 + P C) has no pole outside the unit circle, begins and
-/// ends on the positive real axis, and as many zeros outside as it crosses the negative one more often upwards than downwards.
+/// The responses are those of plant and controller at rising frequencies from near 0 to half the sampling rate, so
+/// close together that the phase changes by less than half a turn between neighbours. P is stable; C is stable apart
+/// from integrators: `controller` is C times (1 − z⁻¹) for each of them, and `cancelled` that factor. Then (1 − z⁻¹)ⁿ
+/// (1 + P C) has no pole outside the unit circle, and begins and ends on the positive real axis. Its number of zeros
+/// outside is the number of upward crossings of the negative real axis less that of downward ones.
 pub fn sensitivity(
     plant: &[Complex],
     controller: &[Complex],
@@ -50,7 +51,7 @@ pub fn sensitivity(
         let value = plus(*one, times(*p, *c));
         seen(k, square(*one) / square(value));
         if (last[1] < 0.0) != (value[1] < 0.0) {
-            // Where the step crosses the real axis.
+            // The intersection of the step with the real axis.
             let crossing = last[0] * value[1] - value[0] * last[1];
             let upwards = last[1] < 0.0;
             if (crossing < 0.0) == upwards {

@@ -1,16 +1,16 @@
-//! (z − A)⁻¹ B of a real matrix at many points z: what a sampled system answers at each frequency.
+//! (z − A)⁻¹ B of a real matrix at many points z: the frequency response of a sampled system.
 
 use crate::eigenvalues::reduce;
 use crate::matrix::Matrix;
 use crate::nyquist::{Complex, over, square, times};
 
-/// A system x⁺ = A x + B u of six inputs, reduced once to Hessenberg form, so that a point costs n² operations.
+/// A system x⁺ = A x + B u with six inputs, reduced once to Hessenberg form, so that a point costs n² operations.
 #[derive(Debug, Clone)]
 pub struct Resolvent {
     hessenberg: Matrix,
     /// B in its coordinates.
     input: Vec<[f64; 6]>,
-    /// Rows that were exchanged and the factors of each elimination, to come back.
+    /// Exchanged rows and factors of each elimination, for the inverse transformation.
     steps: Vec<(usize, Vec<f64>)>,
     rows: Vec<Vec<Complex>>,
     right: Vec<[Complex; 6]>,
@@ -37,7 +37,7 @@ impl Resolvent {
         Self { hessenberg, input, steps, rows: vec![vec![[0.0; 2]; size]; size], right: vec![[[0.0; 2]; 6]; size] }
     }
 
-    /// (z − A)⁻¹ B, a row a state, where z is no eigenvalue of A.
+    /// (z − A)⁻¹ B, a row per state, for z that is not an eigenvalue of A.
     pub fn at(&mut self, z: Complex) -> &[[Complex; 6]] {
         let size = self.input.len();
         for (index, row) in self.rows.iter_mut().enumerate() {
@@ -71,7 +71,7 @@ impl Resolvent {
                 *value = over(*value, self.rows[k][k]);
             }
         }
-        // Back to the states: x = P₁L₁⁻¹ P₂L₂⁻¹ … of the reduced ones.
+        // Back to the original states: x = P₁L₁⁻¹ P₂L₂⁻¹ … of the reduced ones.
         for (at, (pivot, factors)) in self.steps.iter().enumerate().rev() {
             let row = at + 1;
             let leading = self.right[row];
@@ -112,7 +112,7 @@ mod tests {
             f64::from(state >> 8) / f64::from(1 << 24) - 0.5
         };
         for row in 0..size {
-            // Half of it empty, as a controller's is.
+            // Half of it zero, as in a controller.
             let values: Vec<f64> = (0..size).map(|_| if draw() > 0.0 { draw() } else { 0.0 }).collect();
             a.set_row(row, &values);
         }

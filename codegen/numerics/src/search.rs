@@ -1,9 +1,9 @@
-//! Where a condition ceases to hold.
+//! Boundary of a condition, and minimum of a function.
 
-/// Bisections of a travel: 2⁻⁴⁰ of it is far below an atom.
+/// Bisections of a travel: 2⁻⁴⁰ of it is far smaller than an atom.
 const BISECTIONS: u32 = 40;
 
-/// Largest value up to `far` below which `holds`, by bisection; 0 if nowhere.
+/// Largest value up to `far` up to which `holds`, by bisection; 0 if there is none.
 pub fn largest(far: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(far) {
         return far;
@@ -16,8 +16,8 @@ pub fn largest(far: f64, holds: impl Fn(f64) -> bool) -> f64 {
     good
 }
 
-/// Where `cost` is least near `start`, by the simplex method of Nelder and Mead (Computer Journal 7, 1965) with a first simplex of `steps`,
-/// after about `most` values of it; and its value there.
+/// Minimum of `cost` near `start`, by the simplex method of Nelder and Mead (Computer Journal 7, 1965) with a first
+/// simplex of `steps`, after about `most` evaluations; and the cost there.
 pub fn simplex(start: &[f64], steps: &[f64], most: usize, mut cost: impl FnMut(&[f64]) -> f64) -> (Vec<f64>, f64) {
     let size = start.len();
     let mut points: Vec<(Vec<f64>, f64)> = Vec::with_capacity(size + 1);
@@ -31,7 +31,7 @@ pub fn simplex(start: &[f64], steps: &[f64], most: usize, mut cost: impl FnMut(&
     }
     let mut spent = size + 1;
     while spent < most {
-        // Stable: of points alike the older one comes first.
+        // Stable: of equal points the older one comes first.
         points.sort_by(|a, b| a.1.total_cmp(&b.1));
         let worst = points[size].clone();
         let middle: Vec<f64> = (0..size)
@@ -82,7 +82,7 @@ mod tests {
         };
         let (found, least) = simplex(&[-1.2, 1.0], &[0.1, 0.1], 400, cost);
         assert!(least < 1e-9 && (found[0] - 1.0).abs() < 1e-4, "{found:?}");
-        // A cost that says no with infinity is never taken.
+        // A point with infinite cost is never accepted.
         let (found, _) = simplex(&[0.5], &[0.1], 60, |x| if x[0] > 0.7 { f64::INFINITY } else { -x[0] });
         assert!(found[0] <= 0.7 && found[0] > 0.69, "{found:?}");
     }

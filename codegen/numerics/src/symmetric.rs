@@ -4,14 +4,15 @@
 
 use super::matrix::{Matrix6, multiply6, transpose6};
 
-/// Sweeps at most; a 6 × 6 matrix needs fewer than ten, a larger one hardly more.
+/// Most sweeps; a 6 × 6 matrix needs fewer than ten, a larger one only a few more.
 const SWEEPS: usize = 40;
-/// Two ω² closer than this, relatively, are one: which vectors span their plane is chosen by axes, not by rounding.
+/// Two ω² with a smaller relative difference count as equal: axes, not rounding, select the vectors that span their
+/// space.
 const EQUAL: f64 = 1e-9;
-/// Shares of an axis closer than this are a tie, which the first axis wins.
+/// Shares of an axis with a smaller difference are a tie, which the first axis wins.
 const TIE: f64 = 1e-6;
 
-/// Eigenvalues (in no order) and eigenvectors (columns) of a symmetric matrix. Only its upper triangle counts.
+/// Eigenvalues (unordered) and eigenvectors (columns) of a symmetric matrix. Only its upper triangle is used.
 #[must_use]
 pub fn symmetric_eigen(matrix: &Matrix6) -> ([f64; 6], Matrix6) {
     let mut a = *matrix;
@@ -36,7 +37,7 @@ pub fn diagonalize<R: AsRef<[f64]> + AsMut<[f64]>>(a: &mut [R], vectors: &mut [R
         for p in 0..a.len() {
             for q in p + 1..a.len() {
                 let at = |i: usize, j: usize| a[i].as_ref()[j];
-                // Off-diagonal entries that no longer change the diagonal are zero.
+                // Off-diagonal entries that no longer change the diagonal count as zero.
                 if at(p, q).abs() <= f64::EPSILON * 0.125 * libm::sqrt((at(p, p) * at(q, q)).abs()) {
                     a[p].as_mut()[q] = 0.0;
                     a[q].as_mut()[p] = 0.0;
@@ -133,8 +134,8 @@ fn solve_upper(l: &Matrix6, b: &Matrix6) -> Matrix6 {
 /// ω² in rising order and V (columns) of K v = ω² M v with Vᵀ M V = I; none unless M is positive definite and every number
 /// finite.
 ///
-/// V is unique: the vector of a single ω² has a positive M-share of the axis that it shares most; the vectors of equal ω²
-/// are projections of axes onto their common space, the axis with the largest share first.
+/// V is unique. The vector of a single ω² has a positive M-share of the axis with its largest share. The vectors of
+/// equal ω² are projections of axes onto their common space, the axis with the largest share first.
 #[must_use]
 pub fn generalized_modes(stiffness: &Matrix6, mass: &Matrix6) -> Option<([f64; 6], Matrix6)> {
     let l = cholesky(mass)?;
@@ -183,12 +184,12 @@ fn dot(a: &[f64; 6], b: &[f64; 6]) -> f64 {
     sum
 }
 
-/// Replaces an M-orthonormal set by the one that axes single out.
+/// Replaces an M-orthonormal set by the one selected by axes.
 fn canonical(modes: &mut [[f64; 6]], mass: &Matrix6) {
     let given: Vec<[f64; 6]> = modes.to_vec();
     let mut found: Vec<[f64; 6]> = Vec::with_capacity(given.len());
     for _ in 0..given.len() {
-        // Projection of each axis onto what is left of the space; its share is what remains of its M-norm.
+        // Projection of each axis onto the rest of the space; its share is the remaining M-norm.
         let mut best: Option<(f64, [f64; 6])> = None;
         for (axis, row) in mass.iter().enumerate() {
             let mut projection = [0.0; 6];
@@ -205,7 +206,7 @@ fn canonical(modes: &mut [[f64; 6]], mass: &Matrix6) {
             }
         }
         if let Some((_, mut vector)) = best {
-            // Twice: the second time removes what rounding left of the vectors before.
+            // Twice: the second pass removes the rounding errors of the first.
             for mode in &found {
                 let along = dot(mode, &apply(mass, &vector));
                 add(&mut vector, -along, mode);
@@ -234,7 +235,7 @@ mod tests {
     use super::*;
 
     fn random(seed: u64) -> Matrix6 {
-        // A small multiplicative generator is enough here; the matrices only have to be general.
+        // A small multiplicative generator is sufficient: the matrices need only be general.
         let mut state = seed;
         core::array::from_fn(|_| {
             core::array::from_fn(|_| {
@@ -254,7 +255,7 @@ mod tests {
 
     fn largest_difference(a: &Matrix6, b: &Matrix6) -> f64 {
         let apart = a.iter().flatten().zip(b.iter().flatten()).map(|(x, y)| (x - y).abs());
-        // A NaN stays, as no bound admits it.
+        // A NaN stays, because no bound accepts it.
         apart.fold(0.0, |largest: f64, apart| if largest.is_nan() || apart <= largest { largest } else { apart })
     }
 

@@ -1,10 +1,11 @@
-//! Functions of a motion as polynomials of second degree with a rest: Taylor models (Makino, Berz).
+//! Functions of a motion as polynomials of second degree with a remainder: Taylor models (Makino, Berz).
 //!
 //! ```text
 //! f(ξ) = c + Σ g_i ξ_i + Σ_{i≤j} b_ij ξ_i ξ_j + e,   |e| ≤ rest,   for every ξ in [−1, 1]¹⁸
 //! ```
-//! The controller's kernels, run on these numbers, give their own expansion at rest and a bound on all that stands behind it. In a
-//! micrometre machine the third order is a thousandth of the second, so the bound is hardly larger than what can be found.
+//! The controller's kernels, run on these numbers, give their own expansion at rest and a bound on all higher terms. In
+//! a micrometre machine the third order is a thousandth of the second, so the bound is only slightly above the true
+//! value.
 
 use core::cmp::Ordering;
 use core::num::NonZeroU32;
@@ -18,10 +19,10 @@ use specgen_runtime::snapshot::Field;
 const COUNT: usize = 18;
 /// Products of two of them.
 const PAIRS: usize = COUNT * (COUNT + 1) / 2;
-/// What the arithmetic rounds, with room: it is done in doubles.
+/// Bound of the rounding of the arithmetic, with margin: it is done in doubles.
 const OWN_ROUNDING: f64 = 1e-15;
 
-/// A polynomial and the bound of what it leaves out.
+/// A polynomial and the bound of its remainder.
 #[derive(Debug, Clone)]
 pub struct Expansion {
     centre: f64,
@@ -122,7 +123,7 @@ impl Expansion {
         product
     }
 
-    /// 1/f = (1 − δ + δ² − δ³/(1 + δ))/c with δ = f/c − 1; without bound where f may be zero.
+    /// 1/f = (1 − δ + δ² − δ³/(1 + δ))/c with δ = f/c − 1; unbounded if f may be zero.
     fn inverse(&self) -> Self {
         let inverse = 1.0 / self.centre;
         let mut off = self.scaled(inverse);
@@ -136,22 +137,22 @@ impl Expansion {
 }
 
 thread_local! {
-    /// [`Real`] is `Copy + 'static`, so the numbers name what they stand for by its place here.
+    /// [`Real`] is `Copy + 'static`, so the numbers refer to their expansion by its index here.
     static EXPANSIONS: RefCell<Vec<Expansion>> = const { RefCell::new(Vec::new()) };
 }
 
 /// A number of a computation under [`expand`]: a constant, or an expansion of that computation.
 ///
-/// Small, and its operations are calls: the kernels are thousands of them.
+/// Small, and its operations are calls, because the kernels have thousands of them.
 #[derive(Debug, Clone, Copy)]
 pub struct Taylor {
     constant: f64,
-    /// Of its expansion, counted from 1.
+    /// Index of its expansion, from 1.
     place: Option<NonZeroU32>,
 }
 
-/// Expands what `run` makes of eighteen variables, each within ± its `width` of zero. Also the number of operations on anything
-/// but constants.
+/// Expands the results of `run` in eighteen variables, each within ± its `width` of zero. Also returns the number of
+/// operations on anything but constants.
 pub fn expand<const N: usize>(
     widths: &[f64; COUNT],
     run: impl FnOnce([Taylor; COUNT]) -> [Taylor; N],
@@ -260,7 +261,7 @@ impl Div for Taylor {
 }
 
 impl PartialEq for Taylor {
-    /// The kernels that are run on this type compare with constants only.
+    /// The kernels that run on this type compare only with constants.
     #[inline(never)]
     fn eq(&self, other: &Self) -> bool {
         self.known().is_some() && self.known() == other.known()
@@ -350,7 +351,7 @@ mod tests {
             }
         }
         assert!(worst <= bound && bound < 1.1 * worst, "{worst:e} {bound:e}");
-        // A slope that is a millionth off is no slope of it: what is left grows by that.
+        // With a slope that is wrong by a millionth, the remainder grows by as much.
         slope[0] *= 1.0 + 1e-6;
         assert!(found.left_by(&slope) > bound + 0.9e-6 * slope[0]);
     }

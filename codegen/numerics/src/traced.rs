@@ -1,11 +1,12 @@
-//! Numbers that remember how they were made: the kernels of the controller, run on them, give a bound on their own rounding
-//! errors over a box of poses.
+//! Numbers with a record of their computation: the controller's kernels, run on them, give a bound on their own
+//! rounding errors over a box of poses.
 //!
-//! Each operation leaves a [`Node`]: what it may round off itself, and by how much its result moves with its operands. What
-//! the controller computes, less what it would compute without rounding, is the sum over all nodes of their own error times
-//! the result's derivative by that node. Both are known as ranges over the box, so one sweep backwards bounds the error, and an
-//! error that reaches the result by several ways counts once, with its sign. Derivatives are those of the numbers as computed;
-//! what is left, products of two errors, is part of the nodes' own errors: nothing is neglected.
+//! Each operation adds a [`Node`]: its own largest rounding error, and the derivatives of its result by the operands.
+//! The difference between the controller's result and the result without rounding is the sum over all nodes of their
+//! own error times the result's derivative by that node. Both are known as ranges over the box, so one backward sweep
+//! bounds the error. An error that reaches the result by several paths counts once, with its sign. The derivatives are
+//! those of the computed numbers; the remaining products of two errors belong to the nodes' own errors, so nothing is
+//! neglected.
 
 use core::cmp::Ordering;
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -16,24 +17,24 @@ use specgen_runtime::snapshot::Field;
 
 use super::form::{Form, magnitude, times};
 
-/// What is computed lies in `form`; without any rounding it would differ by `error` at most.
+/// The computed value lies in `form`; without any rounding it would differ by at most `error`.
 ///
 /// `SINGLE`: the controller computes in `f32`.
 #[derive(Debug, Clone, Copy)]
 pub struct TracedNumber<const SINGLE: bool> {
     form: Form,
     error: f64,
-    /// Its node; none for what is exact.
+    /// Its node; none for an exact number.
     node: Option<u32>,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Node {
-    /// Operands that may be off, with the derivative of the result by each.
+    /// Operands with an error, with the derivative of the result by each.
     by: [Option<(u32, [f64; 2])>; 2],
     /// Largest own error, of either sign.
     own: f64,
-    /// Own error that is known: that of a rounded constant.
+    /// Known own error: that of a rounded constant.
     known: [f64; 2],
 }
 
@@ -45,7 +46,7 @@ thread_local! {
 /// The record of a computation.
 pub struct Trace(Vec<Node>);
 
-/// Runs a computation and keeps its record.
+/// Runs a computation and returns its record.
 pub fn trace<R>(run: impl FnOnce() -> R) -> (R, Trace) {
     NODES.with(|nodes| nodes.borrow_mut().clear());
     let result = run();
@@ -61,19 +62,19 @@ fn record(node: Node) -> Option<u32> {
     })
 }
 
-/// The bounds themselves are computed in doubles: a part in 10¹³ covers that.
+/// The bounds themselves are computed in doubles; a part in 10¹³ covers their rounding.
 const ROUND_UP: f64 = 1.0 + 1e-13;
-/// Exponent bits of a double: what is left of a positive number is the power of two below it.
+/// Exponent bits of a double: they give the power of two at or below a positive number.
 const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
 
 impl Trace {
-    /// The record so far, while it is being made.
+    /// The record during the computation.
     pub fn peek<R>(look: impl FnOnce(&Self) -> R) -> R {
         let record = Self(NODES.with(|nodes| nodes.borrow().clone()));
         look(&record)
     }
 
-    /// How much Σ `weights`·results may be off.
+    /// Largest error of Σ `weights`·results.
     pub fn error<const SINGLE: bool>(&self, results: &[(TracedNumber<SINGLE>, f64)]) -> f64 {
         let derivatives = self.derivatives(results);
         let mut own = 0.0;
@@ -105,7 +106,7 @@ impl Trace {
                 *at = [at[0] + weight, at[1] + weight];
             }
         }
-        // Operands come before what is made of them.
+        // Operands come before their results.
         for id in (0..self.0.len()).rev() {
             let derivative = derivatives[id];
             for (operand, by) in self.0[id].by.into_iter().flatten() {
@@ -119,25 +120,25 @@ impl Trace {
 }
 
 impl<const SINGLE: bool> TracedNumber<SINGLE> {
-    /// Half a last bit of 1.
+    /// Half a unit in the last place of 1.
     const UNIT: f64 = if SINGLE { 5.960_464_477_539_063e-8 } else { 1.110_223_024_625_156_5e-16 };
 
-    /// Coordinate `axis` of the pose, anywhere from `low` to `high`, exact.
+    /// Coordinate `axis` of the pose, from `low` to `high`, exact.
     pub fn coordinate(axis: usize, low: f64, high: f64) -> Self {
         Self { form: Form::coordinate(axis, [low, high]), error: 0.0, node: None }
     }
 
-    /// A constant of the controller; what it stands for is smaller by something from `low` to `high`.
+    /// A constant of the controller; the exact value is smaller by `low` to `high`.
     pub fn constant(value: f64, [low, high]: [f64; 2]) -> Self {
         Self::exact(Form::constant(value)).off_by([low, high])
     }
 
-    /// The same, counted as exact: an input of what follows. It keeps a node, to take derivatives by.
+    /// The same, counted as exact: an input of a later computation. It keeps a node for derivatives.
     pub fn given(self) -> Self {
         Self::exact(self.form.widened(self.error)).noted()
     }
 
-    /// A number that an exact one is `low` to `high` below.
+    /// A number that exceeds an exact one by `low` to `high`.
     pub fn off_by(self, known: [f64; 2]) -> Self {
         if known == [0.0; 2] {
             return self;
@@ -150,7 +151,7 @@ impl<const SINGLE: bool> TracedNumber<SINGLE> {
         }
     }
 
-    /// Anywhere up to `more` from where it was.
+    /// Widened by up to `more`.
     pub fn widened(self, more: f64) -> Self {
         Self { form: self.form.widened(more), ..self }
     }
@@ -178,9 +179,9 @@ impl<const SINGLE: bool> TracedNumber<SINGLE> {
         self.form.point() == Some(0.0) && self.error == 0.0
     }
 
-    /// The result of an operation. `most`: no more than this is rounded off. `crossed`: product of the errors of two operands.
+    /// The result of an operation. `most`: largest rounding error. `crossed`: product of the errors of two operands.
     fn rounded(form: Form, by: [(Self, [f64; 2]); 2], most: f64, crossed: f64) -> Self {
-        // Half a last bit is the same all over a binade: that of its lower end.
+        // Half a unit in the last place is constant over a binade: that of its lower end.
         let largest = form.magnitude() * ROUND_UP;
         let half_bit = Self::UNIT * f64::from_bits(largest.to_bits() & EXPONENT);
         let rounding = if half_bit < most { half_bit } else { most };
@@ -202,7 +203,7 @@ impl<const SINGLE: bool> Add for TracedNumber<SINGLE> {
         if other.nothing() {
             return self;
         }
-        // Rounding moves a sum less than its smaller part: keeping the larger would be as near.
+        // Rounding changes a sum by less than its smaller part: the larger one would be as close.
         let (a, b) = (self.magnitude(), other.magnitude());
         let most = if a < b { a } else { b };
         Self::rounded(self.form.plus(other.form), [(self, [1.0; 2]), (other, [1.0; 2])], most, 0.0)
@@ -272,7 +273,7 @@ impl<const SINGLE: bool> Div for TracedNumber<SINGLE> {
 }
 
 impl<const SINGLE: bool> PartialEq for TracedNumber<SINGLE> {
-    /// The kernels that are run on this type compare with zero constants only.
+    /// The kernels that run on this type compare only with zero.
     #[inline(never)]
     fn eq(&self, other: &Self) -> bool {
         self.error == 0.0
@@ -325,7 +326,7 @@ impl<const SINGLE: bool> Real for TracedNumber<SINGLE> {
         match self.partial_cmp(&Self::ZERO) {
             Some(Ordering::Less) => -self,
             Some(_) => self,
-            // Of either sign: the derivative is somewhere from −1 to 1.
+            // Of either sign: the derivative is between −1 and 1.
             None => {
                 let half = 0.5 * self.magnitude();
                 let form = Form::constant(half).widened(half);
@@ -347,7 +348,7 @@ mod tests {
 
     type Single = TracedNumber<true>;
 
-    /// Bound of what `run` makes of two coordinates from 1 to 1.001.
+    /// Bound of the result of `run` for two coordinates from 1 to 1.001.
     fn bound(run: impl Fn(Single, Single) -> Single) -> f64 {
         let (result, trace) = trace(|| run(Single::coordinate(0, 1.0, 1.001), Single::coordinate(1, 1.0, 1.001)));
         trace.error(&[(result, 1.0)])
@@ -355,7 +356,7 @@ mod tests {
 
     #[test]
     fn single_precision_stays_within_its_bound_and_near_it() {
-        // x² − y² where much cancels, over x + y: f32 against f64.
+        // x² − y² with much cancellation, over x + y: f32 against f64.
         let bound = bound(|x, y| (x * x - y * y) / (x + y));
         let mut worst = 0.0_f64;
         for k in 0..20_000_u32 {
@@ -369,7 +370,7 @@ mod tests {
 
     #[test]
     fn an_error_that_comes_twice_counts_with_its_sign() {
-        // The same product taken and given back: nothing of its rounding is left but that of the sum.
+        // The same product added and subtracted: only the rounding of the sum remains.
         let twice = bound(|x, y| {
             let product = x * y;
             (product + x) - product

@@ -77,7 +77,7 @@ pub struct Running {
 pub struct Link {
     uart: BufferedUart<'static>,
     endpoint: Endpoint,
-    desk: LinkHandler,
+    handler: LinkHandler,
 }
 
 /// Clocks, pins, converters: the board at power-up, its amplifiers off. `machine` is at reset. None if something is not as it has
@@ -119,7 +119,7 @@ pub fn start(
     // Contacts to ground: open is a stop, a fault of the amplifiers.
     let (stop, fault) = (Input::new(p.PB12, Pull::Up), Input::new(p.PB13, Pull::Up));
     let running = Running { board, exchange, schedule, health: Health::new(), watchdog, stop, fault };
-    Some((running, Link { uart, endpoint: Endpoint::new(), desk: LinkHandler::new(Stopwatch::NONE) }))
+    Some((running, Link { uart, endpoint: Endpoint::new(), handler: LinkHandler::new(Stopwatch::NONE) }))
 }
 
 /// 8 MHz from outside, core 400 MHz, timers 200 MHz, SPI 100 MHz.
@@ -166,7 +166,7 @@ impl Running {
             timer::arm(self.schedule.restart(timer::now()));
         }
         let report = &mut self.exchange.report;
-        report.took(due.late, timer::now().wrapping_sub(begin), PERIOD.get());
+        report.record_tick(due.late, timer::now().wrapping_sub(begin), PERIOD.get());
         if self.health.tick(self.exchange.beat, due.missed, report.amplifier_on) {
             self.watchdog.pet();
         }
@@ -191,8 +191,8 @@ impl Link {
             // A frame in which a byte was lost has a wrong CRC, and the host asks again.
             let Ok(count) = self.uart.read(&mut bytes) else { break };
             for byte in bytes.iter().take(count) {
-                let mut visit = RequestContext { desk: &mut self.desk, with: &mut *with };
-                if let Some(answer) = self.endpoint.push(*byte, &mut visit) {
+                let mut context = RequestContext { handler: &mut self.handler, with: &mut *with };
+                if let Some(answer) = self.endpoint.push(*byte, &mut context) {
                     let _ = self.uart.write_all(answer);
                 }
             }

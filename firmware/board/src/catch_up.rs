@@ -1,11 +1,12 @@
-//! What the recorder owes is written by the background, while ticks go on.
+//! The background writes the recorder's pending data while ticks go on.
 
 use crate::exchange::{Access, Exchange};
 use crate::recording::{PIECE, PREAMBLE};
 
-/// Work of the background, best after each tick: keeps the machine where the recorder wants one, and writes down what is owed then.
-/// The tick is held off for each piece that is written, and for the copy: one that begins late finds the conversion over, which is a
-/// fault. So nothing is copied unless `calm` says that no tick is due meanwhile. Blocks are whole, and can be fetched, after it.
+/// Background task, best called after each tick: copies the machine if the recorder wants a copy, and then writes the
+/// pending data. The copy and each written piece hold off the tick. A tick that begins late finds the conversion
+/// already finished, which is a fault. So nothing is copied unless `calm` confirms that no tick is due meanwhile. After
+/// this task, blocks are complete and can be fetched.
 pub fn catch_up(with: &mut Access<'_>, calm: impl Fn() -> bool) {
     let (mut taken, mut block) = (None, false);
     with(&mut |exchange, machine| {
@@ -21,7 +22,7 @@ pub fn catch_up(with: &mut Access<'_>, calm: impl Fn() -> bool) {
             taken = kept.take();
         }
     });
-    // Nothing owed; or another one is at it, whom this one has interrupted.
+    // Nothing is pending; or another call, which this one has interrupted, is writing it.
     let Some(kept) = taken else { return };
     let digest = kept.digest();
     let mut first = if block { 0 } else { PREAMBLE };

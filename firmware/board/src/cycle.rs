@@ -15,41 +15,41 @@ use crate::exchange::{self, Exchange, TickCommand};
 use crate::report::Report;
 use crate::words::GAUGE_BITS;
 
-/// What the target noticed since the last tick.
+/// Observations of the target since the last tick.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct TargetStatus {
-    /// Ticks in a row that never came.
+    /// Number of consecutive missed ticks.
     pub missed: u32,
     /// The emergency stop is open.
     pub stop: bool,
-    /// An amplifier reports a fault, or its line is broken.
+    /// An amplifier reports a fault, or the wire of that line is broken.
     pub amplifier: bool,
 }
 
-/// The machine with its converters. Owned by the interrupt that ticks.
+/// The machine with its converters. Owned by the tick's interrupt.
 #[derive(Debug)]
 pub struct Board<'m, G, A, L = ()> {
     gauges: G,
     amplifiers: A,
     lines: L,
-    /// Not a part of it: some kilobytes, which no move is to carry over the stack.
+    /// A reference, because it has some kilobytes and moving it would use the stack.
     machine: &'m mut Machine,
-    /// Whether tables and settings in flash are what the compiler wrote.
+    /// Whether tables and settings in flash are as the compiler wrote them.
     intact: bool,
-    /// Whether both converters were started and proved.
+    /// Whether both converters were started and tested.
     started: bool,
-    /// Events that came up after the supervisor had been called: for the next tick.
+    /// Events after the call of the supervisor, for the next tick.
     carried: u32,
-    /// The request of the last tick, to see a new one.
+    /// The request of the last tick, to detect a new one.
     request: Request,
-    /// What the last tick read. Here and not on the stack, which the law needs.
+    /// Input of the last tick. Here and not on the stack, which the law needs.
     input: Option<MachineInput>,
-    /// Codes that went out last; none before the first tick.
+    /// The last codes written; none before the first tick.
     codes: Option<[i32; CHANNELS]>,
 }
 
 impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
-    /// [`Self::with_lines`], of a spec without triggers.
+    /// [`Self::with_lines`] for a spec without triggers.
     #[must_use]
     pub const fn new(gauges: G, amplifiers: A, machine: &'m mut Machine, intact: bool) -> Self {
         Self::with_lines(gauges, amplifiers, (), machine, intact)
@@ -57,12 +57,12 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
 }
 
 impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
-    /// Bits that a code of the ADC has more than the controller expects.
+    /// Additional bits of an ADC code that the controller does not use.
     const SPARE_BITS: u32 = {
         assert!(GAUGE_BITS <= G::BITS, "sensor.bits of the spec is more than the ADC of this board has");
         G::BITS - GAUGE_BITS
     };
-    /// Codes go out as they are, so full scale of spec and DAC must be the same.
+    /// Codes are written unchanged, so spec and DAC must have the same full scale.
     const SAME_CODES: () =
         assert!(controller::limits::DAC_BITS == A::BITS, "dac.bits of the spec is not what the DAC of this board has");
 
@@ -96,10 +96,10 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         }
     }
 
-    /// Brings the converters into their working state, amplifiers disabled. May take a millisecond.
-    /// What fails stands in the report, and as an event of every tick until a start succeeds.
+    /// Brings the converters into their working state, amplifiers disabled. May take a millisecond. A failure is in the
+    /// report, and is an event of every tick until a start succeeds.
     pub fn start(&mut self, report: &mut Report) {
-        // The line first, whatever the parts say, and both parts even if one fails.
+        // First the line, whatever the converters report; then both converters, even if one fails.
         let disabled = self.amplifiers.enable(false);
         let amplifiers = self.amplifiers.start().and_then(|()| self.rest());
         let gauges = self.gauges.start();
@@ -110,17 +110,18 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         }
     }
 
-    /// The codes that the machine holds, at once: a DAC starts at code 0, which need not be where the legs rest.
+    /// Writes the codes that the machine holds, at once: a DAC starts at code 0, which may differ from the rest code.
     fn rest(&mut self) -> Result<(), Fault> {
         let codes = self.machine.state.legs.each_ref().map(|leg| leg.code);
         if codes == [0; CHANNELS] { Ok(()) } else { self.amplifiers.write(&codes) }
     }
 
-    /// One tick. True if it started the converters again and so took longer than a tick may: then the schedule begins anew.
+    /// One tick. True if it started the converters again and therefore took longer than a tick: then the schedule
+    /// starts afresh.
     ///
-    /// A new request to acknowledge starts the converters again while the amplifiers are off, whatever the cause was: both are
-    /// proved before they get power again. The supervisor hears of the request in the tick after that, when nothing that was
-    /// read before the start is left to contradict it.
+    /// A new request to acknowledge starts the converters again while the amplifiers are off, whatever the cause: both
+    /// are tested before they get power again. The supervisor gets the request in the tick after that, when no reading
+    /// from before the start is left.
     pub fn tick(&mut self, exchange: &mut Exchange, noticed: TargetStatus) -> bool {
         self.timed_tick(exchange, noticed, || 0)
     }
@@ -169,12 +170,12 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             Err(fault) => {
                 report.converter(fault);
                 events |= CONVERTER;
-                // What was not read is not believed: no number stands for it.
+                // A reading that failed is invalid: it is passed as NaN.
                 [Real::NAN; CHANNELS]
             }
         };
 
-        // Sampled beside the gauges; none of the supervisor's business.
+        // Sampled with the gauges; the supervisor does not use it.
         let rose = triggers::INPUT
             && pending.sense(self.lines.input().map_err(|fault| {
                 report.converter(fault);
@@ -184,15 +185,15 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         let input = take(&mut self.input, orders, &readings, request, seen);
         let output = exchange::step(config, self.machine, input);
 
-        // Off before the codes change, on only after they are out.
+        // Off before the codes change; on only after they are written.
         if !output.amplifier_on {
             self.done(report, |amplifiers| amplifiers.enable(false));
         }
         self.codes = Some(output.tick.dac_code);
         self.done(report, |amplifiers| amplifiers.write(&output.tick.dac_code));
         self.show(report, triggers::lines(output.tick.status));
-        report.gave_out(now().wrapping_sub(sampled));
-        // Converters that did not answer do not get power, whatever the supervisor has not seen yet.
+        report.record_output(now().wrapping_sub(sampled));
+        // Converters that did not respond get no power, whatever the supervisor knows.
         if output.amplifier_on && self.started {
             self.done(report, |amplifiers| amplifiers.enable(true));
         }
@@ -209,7 +210,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         report.health.events |= events;
         report.conditions(self.machine.supervisor.conditions);
         report.missed = report.missed.saturating_add(noticed.missed);
-        // What need not be done before the outputs change.
+        // Work that can wait until the outputs have changed.
         if let (Some(recorder), Some(input)) = (recorder, &self.input) {
             record_after(self.machine, input, &output, recorder);
         }
@@ -217,7 +218,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             exchange.keep_pass(self.machine, output.tick.status);
         }
         if let Some(samples) = &mut exchange.samples {
-            // Those that never came count, too.
+            // Missed ticks count, too.
             let due = exchange.report.tick + u64::from(exchange.report.missed);
             samples.keep(due - 1, self.machine, &output);
         }
@@ -225,8 +226,8 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         restart
     }
 
-    /// A tick while the host steps the machine: amplifiers off, codes as they are, which is at rest. A host that falls silent
-    /// gives the machine back.
+    /// A tick while the host steps the machine: amplifiers off, codes unchanged, which is at rest. If the host falls
+    /// silent, the machine returns to the ticks.
     fn stand_by(&mut self, exchange: &mut Exchange, noticed: TargetStatus) {
         let report = &mut exchange.report;
         self.done(report, |amplifiers| amplifiers.enable(false));
@@ -263,12 +264,12 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         self.machine
     }
 
-    /// The same, for a host that steps it.
+    /// The same, for a host that steps the machine.
     pub const fn machine_mut(&mut self) -> &mut Machine {
         self.machine
     }
 
-    /// Does something to the amplifiers; a fault is an event of the next tick.
+    /// Performs an amplifier operation; a fault is an event of the next tick.
     fn done(&mut self, report: &mut Report, action: impl FnOnce(&mut A) -> Result<(), Fault>) {
         if let Err(fault) = action(&mut self.amplifiers) {
             report.converter(fault);
@@ -277,7 +278,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
     }
 }
 
-/// What the tick is to read, in `slot`. In a frame of its own, which is done with before the law needs the stack.
+/// Writes the tick's input to `slot`. It has its own stack frame, which is released before the law needs the stack.
 #[inline(never)]
 fn take<'a>(
     slot: &'a mut Option<MachineInput>,

@@ -1,26 +1,26 @@
-//! The record as the bytes of its file, piece by piece: header, then blocks with their checksums. Nothing of the file is in memory
-//! but the blocks themselves, so that a piece costs the tick no more than its copy.
+//! The record as the bytes of its file, piece by piece: header, then blocks with their checksums. Only the blocks are
+//! in memory, so a piece costs the tick no more than its copy.
 
 use controller::DESCRIPTION;
 use controller::snapshot::recorder::Recorder;
 use specgen_runtime::Crc32;
 use specgen_runtime::record::write_header;
 
-/// Words of a piece at most.
+/// Most words of a piece.
 pub(crate) const WORDS: usize = 64;
-/// So many of them are copied while the tick is held off: an H7 takes a microsecond for it.
+/// Words that are copied at a time with the tick held off: an H7 takes a microsecond for it.
 const AT_ONCE: usize = 16;
 const WORD: usize = size_of::<u64>();
 /// Bytes of the file before its first block: magic, format and length of the text, the text, padding, checksum.
 const HEADER: usize = 16 + DESCRIPTION.len().next_multiple_of(WORD) + WORD;
 
-/// Where a byte of the file is.
+/// Place of a byte in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Place {
     Header,
-    /// Of a block: its number, its words, the byte in it.
+    /// In a block: its number, its words, the byte in it.
     Block(usize, usize, usize),
-    /// Of the checksum behind a block: its number and words, the byte in it.
+    /// In the checksum after a block: its number and words, the byte in it.
     Checksum(usize, usize, usize),
     End,
 }
@@ -34,7 +34,7 @@ pub(crate) struct Download {
     summed: usize,
 }
 
-/// What the background may do while the tick is held off: it gets the recorder, none if it records or there is none.
+/// Access of the background to the recorder with the tick held off; none if it records or does not exist.
 pub(crate) trait RecorderAccess: FnMut(&mut dyn FnMut(&Recorder<'static>)) -> bool {}
 impl<F: FnMut(&mut dyn FnMut(&Recorder<'static>)) -> bool> RecorderAccess for F {}
 
@@ -43,8 +43,8 @@ impl Download {
         Self { crc: Crc32::new(), block: 0, summed: 0 }
     }
 
-    /// Length of the file and its bytes from `offset` on, in `piece`: as many as a piece has or as there are of one kind. None if
-    /// `look` finds no recorder that stands still. Bytes in order cost least: the checksum is then at hand.
+    /// Length of the file and its bytes from `offset` on, in `piece`: as many as fit and are of one kind. None if
+    /// `look` finds no stopped recorder. Reading in order costs least, because the checksum is then available.
     pub(crate) fn read<'p>(
         &mut self,
         offset: u32,
@@ -83,7 +83,7 @@ impl Download {
         Some((total, piece.get(range).unwrap_or_default()))
     }
 
-    /// Adds words of a block to its checksum, if they come next.
+    /// Adds words of a block to its checksum, if they are next in order.
     fn sum(&mut self, block: usize, first: usize, words: &[u64]) {
         if first == 0 {
             (self.crc, self.block, self.summed) = (Crc32::new(), block, 0);
@@ -94,7 +94,7 @@ impl Download {
         }
     }
 
-    /// Brings the checksum of a block to its end, where not every piece was asked for in order. None if it records again.
+    /// Completes the checksum of a block if its pieces were not read in order. None if it records again.
     fn catch_up(&mut self, block: usize, length: usize, look: &mut impl RecorderAccess) -> Option<()> {
         if self.block != block || self.summed > length {
             (self.crc, self.block, self.summed) = (Crc32::new(), block, 0);
@@ -128,7 +128,7 @@ fn header(offset: usize, piece: &mut [u8]) -> core::ops::Range<usize> {
     }
 }
 
-/// Where the byte is, and the length of the file.
+/// The place of the byte, and the length of the file.
 fn find(recorder: &Recorder<'static>, offset: usize) -> (Place, usize) {
     let (mut place, mut start) = (Place::End, HEADER);
     if offset < HEADER {
@@ -150,7 +150,7 @@ fn find(recorder: &Recorder<'static>, offset: usize) -> (Place, usize) {
     (place, start)
 }
 
-/// Copies words of a block, a few at a time; how many. None if it records again.
+/// Copies words of a block, a few at a time; returns their number. None if it records again.
 fn copied(block: usize, first: usize, out: &mut [u64; WORDS], look: &mut impl RecorderAccess) -> Option<usize> {
     let mut count = 0;
     for few in out.chunks_exact_mut(AT_ONCE) {

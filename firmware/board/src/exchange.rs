@@ -1,4 +1,4 @@
-//! What lies between the tick and the background.
+//! Data shared by the tick and the background.
 
 use controller::snapshot::recorder::Recorder;
 use controller::supervised::{Machine, MachineInput, MachineOutput, Phase, Request, machine_at_reset, supervise};
@@ -18,64 +18,65 @@ use crate::samples::{self, SampleMemory, Samples};
 #[cfg(feature = "lockstep")]
 use crate::words::PERIOD_NANOSECONDS;
 
-/// A lock-step is over after so long without a request, ns: 2 s, for its host also computes, and nothing moves meanwhile.
+/// Time without a request after which a lock-step ends, ns: 2 s, because its host also computes, and nothing moves
+/// meanwhile.
 #[cfg(feature = "lockstep")]
 const LOCKSTEP_TIMEOUT: u32 = 2_000_000_000;
 
-/// What the background wants of the ticks to come.
+/// Command of the background to the next ticks.
 #[derive(Debug, Clone, Copy)]
 pub struct TickCommand {
-    /// Input words of the controller that are no measurements.
+    /// Input words of the controller, without the measured ones.
     pub command: [u64; COMMAND_WORDS],
-    /// Of the supervisor; it holds for as long as it stands here.
+    /// Request to the supervisor. It applies to every tick while it is here.
     pub request: Request,
 }
 
-/// What waits for the edge of the input line.
+/// A command that waits for the edge of the input line.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum EdgeCommand {
     /// This command.
     Command([u64; COMMAND_WORDS]),
-    /// The wave of [`Exchange::wave`], which has not begun.
+    /// The wave in [`Exchange::wave`], which has not started.
     Wave,
 }
 
-/// Orders one way, reports the other. Whoever holds it holds off the tick: copy and let go.
+/// Commands in one direction, reports in the other. Its lock holds off the tick: copy and release.
 #[derive(Debug)]
 pub struct Exchange {
     /// What is wanted.
     pub orders: TickCommand,
     /// Settings in force.
     pub config: Config,
-    /// Settings that came: in force after the next tick, see [`Exchange::prepare`].
+    /// New settings, which take effect after the next tick, see [`Exchange::prepare`].
     pub next: Option<Config>,
-    /// How it stands.
+    /// Its status.
     pub report: Report,
-    /// What times and stack are measured with.
+    /// Probes of times and stack.
     pub probes: Probes,
-    /// Counted up by the background, so that the tick sees it alive.
+    /// Counter that the background increments to show that it is alive.
     pub beat: u32,
-    /// The background is dead, and with it whoever could ask for anything: the tick ramps down.
+    /// The background is dead, and with it the host's access: the tick ramps down.
     pub orphaned: bool,
-    /// Whether the host is still there.
+    /// Time since the host was heard.
     pub silence: Silence,
-    /// Keeps what the ticks do, where a memory was given for it.
+    /// The recorder, if it was given memory.
     pub recorder: Option<Recorder<'static>>,
-    /// What it owes is written from this, see [`catch_up`](crate::catch_up); none while the background has it.
+    /// Source of the recorder's pending data, see [`catch_up`](crate::catch_up); none while the background uses it.
     pub(crate) kept: Option<&'static mut MachineSnapshot>,
-    /// Makes the set-points while it is under way.
+    /// Generates the set-points while it is under way.
     pub wave: Option<Wave>,
-    /// The input line, and what waits for it.
+    /// The input line, and the command that waits for it.
     pub(crate) pending: EdgeWait<EdgeCommand>,
-    /// Corrects the motion while a pass is under way, where a memory was given for it.
+    /// Corrects the motion while a pass is under way, if it was given memory.
     pub player: Option<Player<'static, Real>>,
-    /// How the player stands while the background has it, which learns.
+    /// Status of the player while the background uses it for learning.
     pub(crate) away: Option<PassStatus>,
-    /// Shows the ticks to a host that looks on, where a memory was given for it.
+    /// Samples for a subscribed host, if they were given memory.
     pub(crate) samples: Option<Samples>,
-    /// The host steps the machine, and the ticks do not: how long it has been silent.
+    /// Lock-step: the host steps the machine, and the ticks do not. Time since its last request.
     pub lockstep: Option<Silence>,
-    /// The machine ran in the last tick.
+    /// Whether the machine ran in the last tick.
     ran: bool,
 }
 
@@ -85,11 +86,11 @@ impl Default for Exchange {
     }
 }
 
-/// Gives access to the exchange and the machine, with the tick held off for as long as that takes.
+/// Gives access to exchange and machine, with the tick held off meanwhile.
 pub type Access<'a> = dyn FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine)) + 'a;
 
 impl Exchange {
-    /// At power-up: nothing wanted, the spec's settings, the link lost until the host sends something, nothing recorded.
+    /// At power-up: no command, the spec's settings, the link lost until the host sends something, nothing recorded.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -113,33 +114,33 @@ impl Exchange {
         }
     }
 
-    /// Records into this memory from here on, waiting for a fault; then as much is kept after it as before. Nothing is recorded
-    /// if not even two blocks fit, which a controller of very long memory may do to a small part. The background has to call
-    /// [`catch_up`](crate::catch_up).
+    /// Starts to record into this memory and waits for a fault; half of the memory is for rows after it. Nothing is
+    /// recorded if not even two blocks fit, for example with a controller of very long memory on a small part. The
+    /// background must call [`catch_up`](crate::catch_up).
     pub fn record(&mut self, memory: &'static mut [u64], kept: &'static mut MachineSnapshot) {
         self.recorder = recorder(memory);
         self.kept = Some(kept);
     }
 
-    /// Makes passes in this memory from here on, if the controller takes a correction.
+    /// Provides memory for passes, if the controller takes a correction.
     pub fn play(&mut self, memory: &'static mut [Knot]) {
         if passes::POSSIBLE {
             self.player = Some(Player::new(memory));
         }
     }
 
-    /// Has samples for a host in this memory from here on, over a line of `baud` bits a second, if the controller has a pose. The
-    /// background has to call [`gather`](crate::gather).
+    /// Provides memory for samples over a line of `baud` bits a second, if the controller has a pose. The background
+    /// must call [`gather`](crate::gather).
     pub fn show(&mut self, memory: &'static mut SampleMemory, baud: u32) {
         if samples::POSSIBLE {
             self.samples = Some(Samples::new(memory, baud));
         }
     }
 
-    /// Samples in rows of `every` ticks from here on, none with 0.
+    /// Starts samples in rows of `every` ticks; 0 stops them.
     ///
     /// # Errors
-    /// There is no memory for it, no pose, or no room on the line; the row is too long.
+    /// If there is no memory for it, no pose, or not enough capacity on the line, or the row is too long.
     pub fn watch(&mut self, every: u32) -> Result<(), Refusal> {
         self.samples.as_mut().map_or(Err(Refusal::Unsupported), |samples| samples.start(every))
     }
@@ -164,7 +165,7 @@ impl Exchange {
         self.waves() || self.player.as_ref().is_some_and(Player::is_running)
     }
 
-    /// The newest settings, whether or not they are in force yet.
+    /// The newest settings, in force or not.
     #[must_use]
     pub const fn settings(&self) -> &Config {
         match &self.next {
@@ -173,10 +174,10 @@ impl Exchange {
         }
     }
 
-    /// What a tick leaves until its codes are out, and the first one needs to find done: settings that came, the set-point of a wave
-    /// or what a pass corrects in the next tick.
+    /// Work after a tick's codes are written, needed by the next tick: new settings, the next set-point of a wave, or
+    /// the next correction of a pass.
     pub fn prepare(&mut self) {
-        // A block begins with settings: not before the one that is owed is written.
+        // New settings start a block, which must wait until the pending one is written.
         let owes = self.recorder.as_ref().is_some_and(Recorder::owes);
         if let Some(next) = &self.next {
             if !owes {
@@ -196,12 +197,12 @@ impl Exchange {
         }
         let runs = self.report.phase == Phase::Running;
         if core::mem::replace(&mut self.ran, runs) && !runs {
-            // What was commanded before is not followed when it runs again.
+            // An old command must not take effect when the machine runs again.
             waves::rest(&[0.0; 6], &mut self.orders.command);
         }
     }
 
-    /// Begins what waited, with the tick that follows that of the edge. A machine that does not run waits for nothing.
+    /// Starts the waiting command in the tick after the edge. If the machine does not run, nothing waits.
     #[inline(never)]
     fn begin_awaited(&mut self) {
         if self.report.phase != Phase::Running {
@@ -227,7 +228,7 @@ impl Exchange {
         self.pending.settle(self.report.tick - 1, begun);
     }
 
-    /// Nothing waits for the edge any more.
+    /// Removes the waiting command.
     pub(crate) fn cancel_awaited(&mut self) {
         self.pending.cancel();
         if !self.waves() {
@@ -235,10 +236,10 @@ impl Exchange {
         }
     }
 
-    /// Waits for the edge, in place of what waited.
+    /// Waits for the edge, in place of another waiting command.
     ///
     /// # Errors
-    /// The machine does not run at rest, or plays something; there is no input line.
+    /// If the machine does not run at rest, or plays something, or there is no input line.
     pub(crate) fn wait_for_edge(&mut self, awaited: EdgeCommand, wave: Option<Wave>) -> Result<(), Refusal> {
         if !triggers::INPUT {
             return Err(Refusal::Unsupported);
@@ -252,8 +253,8 @@ impl Exchange {
         Ok(())
     }
 
-    /// Writes the set-point of a wave into the command, from where it stays when the wave has ended; only a running machine
-    /// follows one. Not inlined: what it works with is done with before the law needs the stack.
+    /// Writes the set-point of a wave into the command, and the hold when the wave has ended. Only a running machine
+    /// follows one. Not inlined, so that its stack frame is released before the law needs the stack.
     #[inline(never)]
     fn advance_wave(&mut self) {
         let Some(wave) = self.wave.as_mut().filter(|wave| wave.stage() != Stage::Idle) else { return };
@@ -270,7 +271,7 @@ impl Exchange {
     /// Begins a pass with the next tick.
     ///
     /// # Errors
-    /// The machine does not run, or not at rest; a wave or a pass is under way; this is no pass, or too long.
+    /// If the machine does not run at rest, a wave or a pass is under way, or the pass is invalid or too long.
     pub(crate) fn begin_pass(&mut self, course: Course) -> Result<(), Refusal> {
         let runs = self.report.phase == Phase::Running && !self.in_lockstep() && !self.is_engaged();
         if !runs || self.away.is_some() || !passes::may_begin(self.report.status, &self.orders.command) {
@@ -285,7 +286,7 @@ impl Exchange {
         Ok(())
     }
 
-    /// Writes what a pass corrects in the next tick into the command. Only a running machine makes one.
+    /// Writes the next correction of a pass into the command. Only a running machine has one.
     #[inline(never)]
     pub(crate) fn advance_pass(&mut self) {
         if self.report.phase != Phase::Running {
@@ -296,7 +297,7 @@ impl Exchange {
         }
     }
 
-    /// Keeps what a tick of a pass showed; after the last one nothing is corrected.
+    /// Records a tick of a pass; after the last one the correction ends.
     #[inline(never)]
     pub(crate) fn keep_pass(&mut self, machine: &Machine, status: u32) {
         if let (Some(player), Some([target, pose])) = (&mut self.player, passes::shown(&machine.state)) {
@@ -309,7 +310,7 @@ impl Exchange {
         }
     }
 
-    /// Ends the pass under way, if there is one: nothing is corrected from here on.
+    /// Ends the pass under way, if there is one, and its correction.
     pub(crate) fn abort_pass(&mut self) {
         if let Some(player) = &mut self.player {
             if player.is_running() {
@@ -319,12 +320,13 @@ impl Exchange {
         }
     }
 
-    /// Whether the host steps the machine. Never in a program without the feature: the compiler then drops what is for it.
+    /// Whether the host steps the machine. Always false in a program without the feature: the compiler then drops its
+    /// code.
     pub(crate) const fn in_lockstep(&self) -> bool {
         cfg!(feature = "lockstep") && self.lockstep.is_some()
     }
 
-    /// The host steps the machine from here on. Only while nothing can move: false, and nothing changed, if something can.
+    /// Starts a lock-step. Only while nothing can move: false, with nothing changed, if something can.
     #[cfg(feature = "lockstep")]
     pub(crate) fn enter_lockstep(&mut self) -> bool {
         let at_rest = self.report.tick > 0 && self.report.phase == Phase::Disarmed && !self.report.amplifier_on;
@@ -339,7 +341,7 @@ impl Exchange {
         at_rest
     }
 
-    /// Ends a lock-step, if there is one: machine and settings are as at power-up, which the recorder notes.
+    /// Ends a lock-step, if there is one: machine and settings return to power-up, which the recorder notes.
     pub(crate) fn leave_lockstep(&mut self, machine: &mut Machine) {
         if self.in_lockstep() {
             self.lockstep = None;
@@ -352,7 +354,7 @@ impl Exchange {
     }
 }
 
-/// The machine at power-up, in flash: made at run time it would first lie on the stack, which has no room for it.
+/// The machine at power-up, in flash: built at run time it would need room on the stack.
 static AT_RESET: Machine = machine_at_reset();
 
 /// As at power-up.
@@ -361,8 +363,8 @@ pub(crate) fn reset(machine: &mut Machine) {
     *machine = AT_RESET;
 }
 
-/// The supervised tick. Where lock-steps take it, too, a function of its own, so that its code is there once; else compiled as
-/// the program is, for speed.
+/// The supervised tick. If lock-steps use it, too, it is a separate function, so that its code exists once; otherwise
+/// it is compiled with the program, for speed.
 #[cfg_attr(feature = "lockstep", inline(never))]
 #[cfg_attr(not(feature = "lockstep"), inline(always))]
 pub(crate) fn step(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {

@@ -1,14 +1,15 @@
-//! Samples made of what the ticks left, in the background.
+//! Makes samples from the ticks' copies, in the background.
 
 use crate::exchange::Access;
 use crate::samples::{COPIES, Rows};
 
-/// Work of the background, best after each tick: makes rows of what the ticks left. The tick is held off for each copy that is taken.
+/// Background task, best called after each tick: makes rows from the ticks' copies. Each copy holds off the tick.
 pub fn gather(with: &mut Access<'_>) {
     with_rows(with, |_| {});
 }
 
-/// Brings the rows up to date and does something with them; nothing if another one is at it, whom this one has interrupted.
+/// Updates the rows and applies a function to them; does nothing if another call, which this one has interrupted, is
+/// using them.
 pub(crate) fn with_rows(with: &mut Access<'_>, action: impl FnOnce(&mut Rows)) {
     let mut taken = None;
     with(&mut |exchange, _| {
@@ -19,7 +20,7 @@ pub(crate) fn with_rows(with: &mut Access<'_>, action: impl FnOnce(&mut Rows)) {
         }
     });
     let Some(rows) = taken else { return };
-    // No more than a ring of them, so that it ends.
+    // At most the length of the ring, so that it ends.
     for _ in 0..COPIES {
         let (mut copied, mut anew) = (None, None);
         with(&mut |exchange, _| {

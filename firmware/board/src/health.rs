@@ -1,4 +1,4 @@
-//! Whether the watchdog may be fed.
+//! Decides whether the watchdog is fed.
 
 use controller::limits::CODES;
 use controller::supervision::SUPERVISION;
@@ -7,18 +7,19 @@ use crate::words::PERIOD_NANOSECONDS;
 
 /// Ticks in a second.
 const SECOND: u32 = 1_000_000_000 / PERIOD_NANOSECONDS + 1;
-/// Ticks without a sign of the background after which it is dead: one second. Nobody can ask for anything any more, so the tick
-/// ramps down; once the amplifiers are off the watchdog is starved.
+/// Ticks without a sign of the background after which it counts as dead: one second. The host then has no access, so
+/// the tick ramps down. Once the amplifiers are off, the watchdog is no longer fed.
 pub const BACKGROUND_SILENCE: u32 = SECOND;
-/// Ticks after which it is starved even with the amplifiers on: a second to come to rest, and a ramp over all codes.
+/// Ticks after which it is not fed even with the amplifiers on: a second to stop, plus a ramp over all codes.
 pub const RAMPED_DOWN: u32 = {
     let steps = CODES[1].abs_diff(CODES[0]) / SUPERVISION.ramp_step.unsigned_abs() + 1;
     BACKGROUND_SILENCE.saturating_add(SECOND).saturating_add(steps.saturating_mul(SUPERVISION.ramp_every))
 };
-/// Ticks in a row with missed ones before them, after which the watchdog is starved: the controller is too slow for good.
+/// Consecutive ticks with missed ticks before them after which the watchdog is not fed: the controller is permanently
+/// too slow.
 pub const MISSES_IN_A_ROW: u32 = 64;
 
-/// Counts what is wrong for long.
+/// Counters of persistent faults.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Health {
     beat: u32,
@@ -33,8 +34,8 @@ impl Health {
         Self { beat: 0, silent: 0, misses: 0 }
     }
 
-    /// A tick has run to its end. `beat` is what the background counts up; `missed` are the ticks lost before this one.
-    /// Whether the watchdog is to be fed.
+    /// End of a tick. `beat` is the background's counter; `missed` are the ticks missed before this one. Returns
+    /// whether to feed the watchdog.
     pub const fn tick(&mut self, beat: u32, missed: u32, amplifier_on: bool) -> bool {
         self.silent = if beat == self.beat { self.silent.saturating_add(1) } else { 0 };
         self.beat = beat;
@@ -43,7 +44,7 @@ impl Health {
         self.silent < silence && self.misses < MISSES_IN_A_ROW
     }
 
-    /// Whether the background is dead: the next tick is to ramp down.
+    /// Whether the background is dead: the next tick must ramp down.
     #[must_use]
     pub const fn is_orphaned(&self) -> bool {
         self.silent >= BACKGROUND_SILENCE

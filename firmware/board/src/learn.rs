@@ -2,14 +2,14 @@
 
 use controller::passes;
 
-use crate::desk::standing;
 use crate::exchange::Access;
+use crate::handler::standing;
 
-/// Steps at a time, so that the record, samples and the sign of life are not late: each is some thousand products at most.
+/// Steps per call, at most a few thousand products each, so that record, samples and the sign of life are not late.
 const STEPS: u32 = 2;
 
-/// Learns a little, where there is something to learn: to be called by the background, again and again. The tick is held off only while the player
-/// is taken and given back, and plays no pass meanwhile.
+/// Does a few steps of learning, if there is something to learn. The background calls it repeatedly. The tick is held
+/// off only while the player is taken and returned; it plays no pass meanwhile.
 pub fn learn(with: &mut Access<'_>) {
     if !passes::POSSIBLE {
         return;

@@ -1,13 +1,13 @@
-//! What all boards have in common: one control tick on real converters, when it is due, and what is said over the link.
+//! The common part of all boards: one control tick on real converters, its schedule, and the link commands.
 //!
 //! ```text
 //! timer ─► Schedule ─missed─► Board::tick: Gauges ─codes─► supervise ─codes─► Amplifiers
-//!                                  ▲ orders, wave │ report, record ▼
-//! link  ◄─► Endpoint ◄─► Desk ◄── Exchange ────────────────────────┘
+//!                                  ▲ commands,wave│ report, record ▼
+//! link  ◄─► Endpoint ◄─► LinkHandler ◄── Exchange ────────────────────────┘
 //! ```
-//! The interrupt of the timer owns [`Board`], the background owns the link; [`Exchange`] lies between them, and is locked
-//! for as long as it takes to copy what changed. Every decision about control is the supervisor's: a board collects what
-//! went wrong and hands it over as events.
+//! The timer's interrupt owns [`Board`], the background owns the link. [`Exchange`] connects them; its lock is held
+//! only for copies. The supervisor makes every decision about control: a board collects faults and reports them as
+//! events.
 //!
 //! Nothing here allocates, panics or loops without a bound.
 #![no_std]
@@ -16,10 +16,10 @@
 
 mod catch_up;
 mod cycle;
-mod desk;
 mod download;
 mod exchange;
 mod gather;
+mod handler;
 mod health;
 mod learn;
 mod recording;
@@ -32,9 +32,9 @@ mod words;
 pub use catch_up::catch_up;
 pub use controller::COMMAND_WORDS;
 pub use cycle::{Board, TargetStatus};
-pub use desk::{LinkHandler, RequestContext};
 pub use exchange::{Access, Exchange, TickCommand};
 pub use gather::gather;
+pub use handler::{LinkHandler, RequestContext};
 pub use health::{BACKGROUND_SILENCE, Health, RAMPED_DOWN};
 pub use learn::learn;
 pub use recording::MachineSnapshot;

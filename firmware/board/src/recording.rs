@@ -1,4 +1,4 @@
-//! The recorder of a board: how its memory is cut, and what it does from power-up on.
+//! The recorder of a board: the division of its memory, and its settings from power-up on.
 
 use controller::snapshot::recorder::{Activity, Recorder, Settings, Trigger};
 use controller::snapshot::{RECORD_LAYOUT, digest, save_piece};
@@ -6,16 +6,16 @@ use controller::supervised::{Machine, machine_at_reset};
 use controller::{CONFIG_WORDS, Config};
 use specgen_link::{RecorderAction, RecorderStatus};
 
-/// Most blocks. The oldest is given up when a new one begins, so many of them keep more of what was before the trigger.
+/// Most blocks. A new block replaces the oldest, so more blocks keep more rows from before the trigger.
 const BLOCKS: usize = 8;
-/// A block has so many times the words that it begins with, or more: settings and snapshot are not to fill the memory.
+/// Least ratio of a block's size to its preamble: settings and snapshot must not fill the memory.
 const PREAMBLES: usize = 4;
-/// One row in so many ends with a digest, which costs as much as three rows do. Codes, status and phase of every tick are compared
-/// all the same.
+/// Every n-th row ends with a digest, which costs as much as three rows. A replay compares codes, status and phase of
+/// every tick anyway.
 const DIGEST_EVERY: u32 = 16;
 
-/// A recorder in this memory that waits for a fault, and then keeps as much after it as before. None if not even two blocks fit,
-/// which a controller of very long memory may do to a small part.
+/// A recorder in this memory that waits for a fault; half of the memory is for rows after it. None if not even two
+/// blocks fit, for example with a controller of very long memory on a small part.
 #[must_use]
 pub(crate) fn recorder(memory: &'static mut [u64]) -> Option<Recorder<'static>> {
     let most = memory.len() / (PREAMBLES * RECORD_LAYOUT.preamble());
@@ -25,7 +25,7 @@ pub(crate) fn recorder(memory: &'static mut [u64]) -> Option<Recorder<'static>> 
     Some(recorder)
 }
 
-/// A fault triggers; `after` rows follow it.
+/// A fault triggers; `after` rows follow.
 const fn settings(after: u32) -> Settings {
     Settings {
         streaming: false,
@@ -36,7 +36,7 @@ const fn settings(after: u32) -> Settings {
     }
 }
 
-/// Does what is asked and says how it stands.
+/// Carries out an action and returns the status.
 pub(crate) fn act(recorder: &mut Recorder<'static>, action: RecorderAction) -> RecorderStatus {
     match action {
         RecorderAction::Look => {}
@@ -52,12 +52,12 @@ pub(crate) fn act(recorder: &mut Recorder<'static>, action: RecorderAction) -> R
     }
 }
 
-/// Whether what it holds stays as it is.
+/// Whether its content can no longer change.
 pub(crate) fn is_stopped(recorder: &Recorder<'static>) -> bool {
     matches!(recorder.activity(), Activity::Stopped | Activity::Complete) && !recorder.owes()
 }
 
-/// A machine and its settings as they were after a tick: what the recorder owes is written from it, while ticks go on.
+/// Copy of a machine and its settings after a tick: source of the recorder's pending data while ticks go on.
 #[derive(Debug)]
 pub struct MachineSnapshot {
     config: Config,
@@ -77,24 +77,24 @@ impl MachineSnapshot {
         Self { config: Config::new(), machine: machine_at_reset() }
     }
 
-    /// Of this machine, under the settings of the spec.
+    /// A copy of this machine, with the settings of the spec.
     #[must_use]
     pub fn of(machine: &Machine) -> Self {
         Self { config: Config::new(), machine: *machine }
     }
 
-    /// Takes a copy: what holds a tick off longest.
+    /// Takes a copy: the longest time for which a tick is held off.
     pub fn keep(&mut self, config: &Config, machine: &Machine) {
         self.config = *config;
         self.machine = *machine;
     }
 
-    /// Digest of the machine as it was.
+    /// Digest of the copied machine.
     pub(crate) fn digest(&self) -> u64 {
         digest(&self.machine)
     }
 
-    /// Words of what a block begins with, settings and state, from the `first`-th on.
+    /// Words of a block's preamble, settings and state, from the `first`-th on.
     #[inline(never)]
     pub(crate) fn words(&self, first: usize, words: &mut [u64; PIECE]) -> usize {
         let left = PREAMBLE.saturating_sub(first);
@@ -111,6 +111,6 @@ impl MachineSnapshot {
     }
 }
 
-/// Words of what a block begins with besides its header, and of a piece that is written while the tick is held off.
+/// Words of a block's preamble after its header, and of a piece that is written with the tick held off.
 pub(crate) const PREAMBLE: usize = RECORD_LAYOUT.config + RECORD_LAYOUT.state;
 pub(crate) const PIECE: usize = 32;

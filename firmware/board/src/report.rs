@@ -1,27 +1,27 @@
-//! What the ticks have to say, and what they measure it with.
+//! Results of the ticks, and the probes that measure them.
 
 use controller::supervised::{Cause, Phase};
 use specgen_hal::Fault;
 use specgen_link::Health;
 use specgen_runtime::supervisor::OF_GAUGES;
 
-/// What times and stack are measured with.
+/// Probes of times and stack.
 #[derive(Debug, Clone, Copy)]
 pub struct Probes {
-    /// Counts in a second of the counter that ticks are timed with; 0 where nothing counts.
+    /// Frequency of the counter that times ticks, Hz; 0 without a counter.
     pub hertz: u32,
-    /// Most bytes of the stack seen in use, and bytes there are. Takes some µs: for the background.
+    /// Peak use of the stack and its size, bytes. Takes some µs: for the background.
     pub stack: fn() -> [u32; 2],
-    /// Why the program began: bits of [`reset_cause`](specgen_link::reset_cause).
+    /// Reset cause: bits of [`reset_cause`](specgen_link::reset_cause).
     pub reset_cause: u8,
 }
 
 impl Probes {
-    /// Where nothing is measured: on a host.
+    /// No probes: on a host.
     pub const NONE: Self = Self { hertz: 0, stack: || [0; 2], reset_cause: 0 };
 }
 
-/// What the ticks have to say.
+/// Results of the ticks.
 #[derive(Debug, Clone, Copy)]
 pub struct Report {
     /// Ticks since power-up.
@@ -30,7 +30,7 @@ pub struct Report {
     pub phase: Phase,
     /// Why.
     pub cause: Cause,
-    /// What the wiring check found, if that is why.
+    /// Finding of the wiring check, if that is the cause.
     pub finding: u16,
     /// Whether the amplifiers are enabled.
     pub amplifier_on: bool,
@@ -38,36 +38,36 @@ pub struct Report {
     pub status: u32,
     /// Ticks that never came.
     pub missed: u32,
-    /// The last tick, by [`Self::tick`], in which the gauges were read and believed; none if there was none.
+    /// The last tick, by [`Self::tick`], with valid gauge readings; none if there was none.
     pub measured: Option<u64>,
     /// All else.
     pub health: Counts,
 }
 
-/// What is counted since power-up, and times in counts of [`Probes::hertz`].
+/// Counters since power-up, and times in counts of [`Probes::hertz`].
 #[derive(Debug, Clone, Copy)]
 pub struct Counts {
-    /// Events since the host asked last.
+    /// Events since the host's last request.
     pub events: u32,
     /// Faults of converters, and a bit for each kind.
     pub converter_faults: u32,
     /// See [`Self::converter_faults`].
     pub faults: u32,
-    /// Ticks with a gauge that was not believed.
+    /// Ticks with an invalid gauge.
     pub gauge_faults: u32,
-    /// Ticks that ended after the next one was due.
+    /// Ticks that ended after the start time of the next one.
     pub overruns: u32,
-    /// A tick, the last and the longest; zeros until one was timed.
+    /// Duration of a tick, the last and the longest; zeros before the first.
     pub tick: [u32; 2],
-    /// From gauges to outputs, the same.
+    /// Time from gauges to outputs, the last and the longest.
     pub output: [u32; 2],
-    /// Largest delay of a tick's beginning.
+    /// Largest delay of a tick's start.
     pub latest: u32,
 }
 
 impl Counts {
-    /// As the link says it. What nothing counts, and what was not timed yet, is none.
-    pub(crate) fn told(&self, probes: &Probes) -> Health {
+    /// As a message of the link. Values without a counter, or not timed yet, are none.
+    pub(crate) fn health(&self, probes: &Probes) -> Health {
         let Self { events, converter_faults, faults, gauge_faults, overruns, tick, output, latest } = *self;
         let timed = |times: [u32; 2]| {
             let [_, longest] = times;
@@ -115,8 +115,8 @@ impl Report {
         },
     };
 
-    /// A tick has run: when it began after it was due, how long it took, and when after that the next one was due; counts.
-    pub const fn took(&mut self, late: u32, duration: u32, period: u32) {
+    /// A tick has run: its delay, its duration, and the time from its end to the next one; counts.
+    pub const fn record_tick(&mut self, late: u32, duration: u32, period: u32) {
         let health = &mut self.health;
         if late > health.latest {
             health.latest = late;
@@ -127,18 +127,18 @@ impl Report {
         }
     }
 
-    /// The codes were written so many counts after the gauges were sampled.
-    pub(crate) const fn gave_out(&mut self, after: u32) {
+    /// Time from sampling the gauges to writing the codes, counts.
+    pub(crate) const fn record_output(&mut self, after: u32) {
         last_and_longest(&mut self.health.output, after);
     }
 
-    /// A converter was not believed.
+    /// A converter was not valid.
     pub(crate) const fn converter(&mut self, fault: Fault) {
         self.health.converter_faults = self.health.converter_faults.saturating_add(1);
         self.health.faults |= fault.bit();
     }
 
-    /// The supervisor saw these conditions.
+    /// Conditions of the supervisor.
     pub(crate) const fn conditions(&mut self, conditions: u32) {
         if conditions & OF_GAUGES != 0 {
             self.health.gauge_faults = self.health.gauge_faults.saturating_add(1);

@@ -1,4 +1,4 @@
-//! Samples for a host that looks on: a tick leaves a copy of what it showed, the background makes rows of the copies.
+//! Samples for a subscribed host: a tick stores a copy of its results, the background makes rows of the copies.
 
 use controller::limits::DAC;
 use controller::supervised::{Machine, MachineOutput};
@@ -8,13 +8,13 @@ use specgen_link::samples::{AXES, Block, Collector, MOST_EVERY, ROW, ROW_OF_ONE,
 
 use crate::words::PERIOD_NANOSECONDS;
 
-/// Copies that may wait: what comes while the background makes a frame of 1 KiB.
+/// Most waiting copies: enough for the time in which the background makes a frame of 1 KiB.
 pub(crate) const COPIES: usize = 32;
 /// Blocks: one that is being filled, and two that wait.
 const BLOCKS: usize = 3;
 /// Bits that a byte takes on the line.
 const BITS: u64 = 10;
-/// What the frame of a block of five rows holds besides them, for each of them.
+/// Overhead of a frame with five rows, per row.
 const FRAME: usize = 8;
 /// Whether there is a pose: six legs have none.
 pub(crate) const POSSIBLE: bool = PLACE_WORDS > 0;
@@ -73,17 +73,17 @@ impl SampleMemory {
 /// Samples between tick and background.
 #[derive(Debug)]
 pub(crate) struct Samples {
-    /// Ticks of a row; 0 while nobody looks on.
+    /// Ticks per row; 0 without a subscriber.
     pub(crate) every: u32,
-    /// Rows begin anew; also at power-up, when nothing is known of their memory.
+    /// Whether rows start afresh; also at power-up, when their memory is not initialised.
     pub(crate) anew: bool,
-    /// A ring: the oldest, and how many wait.
+    /// A ring: the oldest, and the number of waiting copies.
     copies: &'static mut [TickSample; COPIES],
     first: usize,
     waiting: usize,
-    /// None while the background is at it.
+    /// None while the background uses it.
     pub(crate) rows: Option<&'static mut Rows>,
-    /// Bits a second of the line.
+    /// Bits per second of the line.
     baud: u32,
 }
 
@@ -93,7 +93,7 @@ impl Samples {
         Self { every: 0, anew: true, copies, first: 0, waiting: 0, rows: Some(rows), baud }
     }
 
-    /// Rows of `every` ticks from here on, none with 0.
+    /// Starts rows of `every` ticks; 0 stops them.
     pub(crate) fn start(&mut self, every: u32) -> Result<(), Refusal> {
         if every > MOST_EVERY {
             return Err(Refusal::Word { index: 0 });
@@ -105,7 +105,7 @@ impl Samples {
         Ok(())
     }
 
-    /// Keeps a copy of what a tick showed, if anybody looks on. What finds no room is left out: a gap between ticks.
+    /// Stores a copy of a tick's results, if a host is subscribed. Without room it is dropped: a gap between ticks.
     #[inline]
     pub(crate) fn keep(&mut self, tick: u64, machine: &Machine, output: &MachineOutput) {
         if self.every > 0 {
@@ -131,15 +131,15 @@ impl Samples {
     }
 }
 
-/// Whether rows of so many ticks take half of the line at most: the rest is for requests.
+/// Whether rows of this many ticks take at most half of the line; the rest is for requests.
 fn fits(every: u32, baud: u32) -> bool {
     let row = if every == 1 { ROW_OF_ONE } else { ROW };
-    // In ns: the time of the bits of a row, twice, and that of its ticks.
+    // In ns: twice the time of a row's bits, and the time of its ticks.
     let line = 2 * BITS * (row + FRAME) as u64 * 1_000_000_000;
     line <= u64::from(every) * u64::from(PERIOD_NANOSECONDS) * u64::from(baud)
 }
 
-/// The shortest rows of several ticks that fit, unless those of one do.
+/// The shortest rows of several ticks that fit, or of one if those fit.
 fn least(baud: u32) -> u32 {
     let (mut low, mut high) = (0, MOST_EVERY);
     while high - low > 1 {

@@ -1,15 +1,15 @@
-//! When ticks are due, by a free-running counter that wraps around.
+//! Schedule of the ticks, by a free-running counter that wraps around.
 
 use core::num::NonZeroU32;
 
 /// A tick that is due now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DueTick {
-    /// Counts from when it was due until it began.
+    /// Counts between its start time and its actual start.
     pub late: u32,
-    /// Ticks between the last and this one that never came.
+    /// Missed ticks between the last and this one.
     pub missed: u32,
-    /// Counter value at which the next one is due: to go into the compare register.
+    /// Counter value of the next tick, for the compare register.
     pub next: u32,
 }
 
@@ -27,7 +27,7 @@ impl Schedule {
         Self { period, due: now.wrapping_add(period.get()) }
     }
 
-    /// Counter value at which the next tick is due.
+    /// Counter value of the next tick.
     #[must_use]
     pub const fn next(&self) -> u32 {
         self.due
@@ -39,9 +39,10 @@ impl Schedule {
         self.period.get()
     }
 
-    /// The tick begins at counter value `now`.
+    /// The tick starts at counter value `now`.
     pub const fn begin(&mut self, now: u32) -> DueTick {
-        // Before its time, by a spurious interrupt, counts as in time. By more than a period it is one that was stopped for long.
+        // A tick before its time, by a spurious interrupt, counts as in time. A difference above a period means a long
+        // stop.
         let early = self.due.wrapping_sub(now) <= self.period.get();
         let late = if early { 0 } else { now.wrapping_sub(self.due) };
         // Divided by a number that is not zero.
@@ -50,7 +51,7 @@ impl Schedule {
         DueTick { late: late - missed * self.period.get(), missed, next: self.due }
     }
 
-    /// Begins anew: what passed since is not counted as missed. For a tick that had to take longer.
+    /// Starts afresh: the time since then is not counted as missed. For a tick that had to take longer.
     pub const fn restart(&mut self, now: u32) -> u32 {
         self.due = now.wrapping_add(self.period.get());
         self.due

@@ -1,4 +1,4 @@
-//! The machine of a board as one that a host steps, and what a tick costs.
+//! A board's machine stepped by a host, and the cost of a tick.
 
 use controller::snapshot::digest;
 use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, MachineInput, machine_output_words};
@@ -10,21 +10,21 @@ use crate::exchange::{self, Access};
 /// Name of the whole tick.
 const WHOLE: &str = "supervise";
 
-/// Counts what a tick costs.
+/// Counter of a tick's cost.
 #[derive(Debug, Clone, Copy)]
 pub struct Stopwatch {
     /// What it counts.
     pub counted: CostUnit,
-    /// The count, which wraps around. Read while nothing interrupts.
+    /// The counter, which wraps around. Read while nothing interrupts.
     pub now: fn() -> u32,
 }
 
 impl Stopwatch {
-    /// Where nothing is counted: on a host.
+    /// No counter: on a host.
     pub const NONE: Self = Self { counted: CostUnit::Nothing, now: || 0 };
 }
 
-/// What ticks have cost since power-up.
+/// Cost of ticks since power-up.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Costs {
     calls: u64,
@@ -48,10 +48,10 @@ impl Costs {
         }
     }
 
-    /// As the link says it.
+    /// As a message of the link.
     pub(crate) fn stage(&self) -> Stage<'static> {
         let Self { calls, smallest, sum, largest } = *self;
-        // Seen from outside only: on a board the stack is not painted.
+        // Measured only from outside: the stack is not painted on a board.
         Stage { name: WHOLE, calls, smallest: if calls > 0 { smallest } else { 0 }, sum, largest, stack: None }
     }
 }
@@ -84,7 +84,7 @@ impl lockstep::Machine for Stepper<'_, '_> {
         let words = config.first_chunk().ok_or(CONFIG_WORDS)?;
         let config = Config::from_words(words).map_err(|error| error.word)?;
         (self.with)(&mut |exchange, _| {
-            // While the host steps the machine no tick takes them over.
+            // While the host steps the machine, no tick takes them over.
             if exchange.in_lockstep() { exchange.config = config } else { exchange.next = Some(config) }
         });
         Ok(())

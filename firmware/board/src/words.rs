@@ -1,4 +1,4 @@
-//! What the converters must be able to do: from the controller's own constants, when it is compiled.
+//! Requirements on the converters, from the controller's constants, at compile time.
 
 use controller::PERIOD_SECONDS;
 use controller::sensing::CONVERTER;

@@ -5,22 +5,22 @@ use core::fmt;
 use serde::de::{Deserialize, Deserializer, Error, Visitor};
 use serde::ser::{Serialize, Serializer};
 
-/// Most words that a message holds: more than any controller has of inputs, outputs or settings.
+/// Most words of a message: more than any controller has inputs, outputs or settings.
 pub const WORDS: usize = 120;
 const WORD: usize = size_of::<u64>();
-/// Most knots that a message holds: six numbers of 32 bits each, little endian.
+/// Most knots of a message: six numbers of 32 bits each, little endian.
 pub const KNOTS: usize = 20;
 const NUMBER: usize = size_of::<i32>();
 /// Bytes of a knot.
 pub const KNOT: usize = 6 * NUMBER;
 const _: () = assert!(KNOTS * KNOT + 16 < crate::MESSAGE);
 
-/// Bytes that a message carries as they are.
+/// Raw bytes in a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Bytes<'a>(pub &'a [u8]);
 
 impl<'a> Bytes<'a> {
-    /// Words, if the bytes are `count` of them.
+    /// The words, if the bytes are `count` of them.
     #[must_use]
     pub fn words(self, count: usize) -> Option<impl Iterator<Item = u64> + 'a> {
         let words = self.0.chunks_exact(WORD);
@@ -28,7 +28,7 @@ impl<'a> Bytes<'a> {
         whole.then(|| words.map(|word| u64::from_le_bytes(word.try_into().unwrap_or_default())))
     }
 
-    /// Fills `words`; false, with nothing written, if the bytes are not as many words.
+    /// Fills `words`; false, with nothing written, if the number of bytes does not match.
     #[must_use]
     pub fn read_words(self, words: &mut [u64]) -> bool {
         let Some(values) = self.words(words.len()) else { return false };
@@ -38,7 +38,7 @@ impl<'a> Bytes<'a> {
         true
     }
 
-    /// Knots, if the bytes are whole ones.
+    /// The knots, if the bytes are whole ones.
     #[must_use]
     pub fn knots(self) -> Option<impl ExactSizeIterator<Item = [i32; 6]> + 'a> {
         let knots = self.0.chunks_exact(KNOT);
@@ -54,7 +54,7 @@ fn knot(bytes: &[u8]) -> [i32; 6] {
     knot
 }
 
-/// The bytes of `knots` from `offset` on, in `buffer`: as many as there are and as fit.
+/// The bytes of `knots` from `offset` on, in `buffer`: as many as there are and fit.
 #[must_use]
 pub fn put_knots<'a>(knots: &[[i32; 6]], offset: usize, buffer: &'a mut [u8]) -> &'a [u8] {
     let skipped = offset / KNOT;

@@ -18,10 +18,10 @@ pub trait Port {
     /// What the system says.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Waits for bytes, at most `limit`; how many there are in `buffer`, 0 if none came in time.
+    /// Waits for bytes, at most `limit`; returns how many are in `buffer`, 0 on a timeout.
     ///
     /// # Errors
-    /// What the system says; `UnexpectedEof` if the other side is gone.
+    /// The error of the operating system; `UnexpectedEof` if the other side is gone.
     fn receive(&mut self, buffer: &mut [u8], limit: Duration) -> io::Result<usize>;
 }
 
@@ -40,24 +40,24 @@ impl<P: Port + ?Sized> Port for std::boxed::Box<P> {
 pub struct Timeout {
     /// For an answer.
     pub limit: Duration,
-    /// How often a request is sent, at most.
+    /// Most attempts per request.
     pub attempts: u32,
 }
 
 impl Timeout {
-    /// For a serial line: an answer comes within milliseconds, and noise may eat a frame. A short request is sent again after a
-    /// quarter of the limit: a machine whose host asks every 20 ms has it before it takes the host for lost
-    /// (`supervisor.host_lost`, 100 ms).
+    /// For a serial line: an answer comes within milliseconds, and noise may destroy a frame. A short request is
+    /// repeated after a quarter of the limit, so that a machine whose host asks every 20 ms gets it before it takes the
+    /// host for lost (`supervisor.host_lost`, 100 ms).
     pub const SERIAL: Self = Self { limit: Duration::from_millis(250), attempts: 8 };
-    /// For a socket of this computer: nothing is lost on it, who is gone closes it, and who serves it may be slow, as an emulated board
-    /// on a loaded computer is. What is sent again too early only waits in line there.
+    /// For a socket of this computer: it loses nothing, and a closed connection is noticed. The server may be slow, as
+    /// an emulated board on a loaded computer is. An early repetition would only queue up.
     pub const SOCKET: Self = Self { limit: Duration::from_secs(1), attempts: 60 };
     /// For a pipe, which loses nothing: an answer comes, or the other side hangs.
     pub const PIPE: Self = Self { limit: Duration::from_secs(10), attempts: 1 };
 }
 
 impl Timeout {
-    /// What is sent in pieces, or computed for, gets its whole limit: asked for again too early it would only be slower.
+    /// Requests with pieces or long computations get their whole limit: an early repetition would only delay them.
     fn of(self, request: &Request<'_>) -> Self {
         let short = matches!(
             request,
@@ -78,16 +78,16 @@ impl Timeout {
     }
 }
 
-/// Why there is no answer.
+/// Reason why there is no answer.
 #[derive(Debug)]
 pub enum ClientError {
-    /// Nothing came, or nothing whole.
+    /// No complete answer arrived.
     Silent {
         /// How long in all.
         waited: Duration,
-        /// How often the request was sent.
+        /// Number of attempts.
         attempts: u32,
-        /// Frames that came damaged meanwhile.
+        /// Damaged frames in the meantime.
         damaged: u32,
     },
     /// The line broke.
@@ -97,11 +97,11 @@ pub enum ClientError {
         /// Its version.
         found: u8,
     },
-    /// The device does not do it.
+    /// The device refuses the request.
     Refused(Refusal),
-    /// An answer to something else.
+    /// An answer to another request.
     Unexpected,
-    /// The request is longer than a message can be.
+    /// The request is longer than the longest message.
     TooLong,
 }
 
@@ -111,7 +111,7 @@ impl fmt::Display for ClientError {
             Self::Silent { waited, attempts, damaged } => {
                 write!(f, "no answer within {:.1} s ({attempts} attempts)", waited.as_secs_f64())?;
                 if *damaged > 0 {
-                    write!(f, "; {damaged} frames came damaged: check baud rate, cable and ground")?;
+                    write!(f, "; {damaged} frames were damaged: check baud rate, cable and ground")?;
                 }
                 Ok(())
             }
@@ -121,8 +121,8 @@ impl fmt::Display for ClientError {
                 "the device speaks version {found} of the link, expected {VERSION}: build and flash it with this specgen"
             ),
             Self::Refused(refusal) => write!(f, "the device refuses: {}", words(*refusal)),
-            Self::Unexpected => f.write_str("the device answers something else: build and flash it with this specgen"),
-            Self::TooLong => f.write_str("the request is longer than a message of the link can be"),
+            Self::Unexpected => f.write_str("the device sent an unexpected answer: build and flash it with this specgen"),
+            Self::TooLong => f.write_str("the request is longer than the longest message of the link"),
         }
     }
 }
@@ -142,20 +142,20 @@ fn words(refusal: Refusal) -> String {
         Refusal::Unsupported => {
             "it does not do that; flash an image that does (for lock-step: `specgen flash --lockstep`)".into()
         }
-        Refusal::NoSession => "no session is open; it restarted, or another host talks to it".into(),
-        Refusal::Sequence => "requests came out of order; does another host talk to it?".into(),
+        Refusal::NoSession => "no session is open; it restarted, or another host opened one".into(),
+        Refusal::Sequence => "requests arrived out of order; is another host connected?".into(),
         Refusal::Version => "another version of the link".into(),
         Refusal::Message => "it cannot read the message; flash an image of this specgen".into(),
         Refusal::Length { expected } => format!("expected {expected} words; is it the controller of this spec?"),
         Refusal::Word { index } => format!("word {index} is out of its range"),
         Refusal::State => "not in its present state".into(),
         Refusal::TooLong => "its answer does not fit into a message".into(),
-        Refusal::Busy => "another host has the orders; hold, ramp-down and stop are taken from every host, all else once that one has ended its session".into(),
-        Refusal::Rate { least } => format!("its line has no room for so many samples; the most are rows of {least} ticks"),
+        Refusal::Busy => "another host is in control; hold, ramp-down and stop are accepted from every host, other requests once that host has ended its session".into(),
+        Refusal::Rate { least } => format!("its line cannot carry that many samples; use rows of at least {least} ticks"),
     }
 }
 
-/// Asks a device, one request at a time.
+/// Sends requests to a device, one at a time.
 pub struct Client<P> {
     port: P,
     timeout: Timeout,
@@ -169,7 +169,7 @@ pub struct Client<P> {
 }
 
 impl<P: Port> Client<P> {
-    /// Opens a session; `session` is best another number than last time. Who is there.
+    /// Opens a session and returns the device's identity; `session` should differ from the last one.
     ///
     /// # Errors
     /// As [`Client::ask`].
@@ -185,10 +185,10 @@ impl<P: Port> Client<P> {
             damaged: 0,
             telemetry: None,
         };
-        // Ends whatever the line has made up before.
+        // Ends any garbage on the line.
         client.port.send(&[0]).map_err(ClientError::Port)?;
         let identity = match client.hello() {
-            // The device's last session had, by chance, the same number.
+            // By chance, the device's last session had the same number.
             Err(ClientError::Refused(Refusal::Sequence)) => {
                 client.session = client.session.wrapping_add(1);
                 client.hello()?
@@ -205,10 +205,10 @@ impl<P: Port> Client<P> {
         }
     }
 
-    /// Sends a request, again if need be, and waits for its answer.
+    /// Sends a request, repeatedly if needed, and waits for its answer.
     ///
     /// # Errors
-    /// No answer, a broken line, another version, or a refusal.
+    /// If there is no answer, the line is broken, the version differs, or the device refuses.
     pub fn ask(&mut self, request: &Request<'_>) -> Result<Reply<'_>, ClientError> {
         let header = Header { version: VERSION, kind: Kind::Request, session: self.session, sequence: self.sequence };
         if !self.request.set(&header, request) {
@@ -244,14 +244,14 @@ impl<P: Port> Client<P> {
         }
     }
 
-    /// Keeps the message of the answer to a request; false if it does not come in time.
+    /// Stores the message of the answer to a request; false if it does not come in time.
     fn wait(&mut self, asked: &Header, limit: Duration) -> Result<bool, ClientError> {
         let start = Instant::now();
         let mut buffer = [0; 4096];
         loop {
             let left = limit.saturating_sub(start.elapsed());
             let count = self.port.receive(&mut buffer, left).map_err(ClientError::Port)?;
-            // What follows an answer is of no request that is still open.
+            // Bytes after an answer belong to no open request.
             for byte in &buffer[..count] {
                 match self.receiver.push(*byte) {
                     None => {}
@@ -267,7 +267,7 @@ impl<P: Port> Client<P> {
                         self.answer.extend_from_slice(message);
                         return Ok(true);
                     }
-                    // Of an earlier request, late.
+                    // A late answer to an earlier request.
                     Some(Ok(_)) => {}
                 }
             }
@@ -277,17 +277,17 @@ impl<P: Port> Client<P> {
         }
     }
 
-    /// The whole of something that comes in pieces: `request` makes the request for the piece at an offset.
+    /// Fetches the whole of something in pieces: `request` makes the request for the piece at an offset.
     ///
     /// # Errors
-    /// As [`Client::ask`], and if the pieces do not make a whole.
+    /// As [`Client::ask`], or if the pieces do not make a whole.
     pub fn fetch(&mut self, request: impl Fn(u32) -> Request<'static>) -> Result<Vec<u8>, ClientError> {
         let mut whole = Vec::new();
         while !self.fetch_on(&request, &mut whole)? {}
         Ok(whole)
     }
 
-    /// The next piece of something longer, behind what there is of it; whether it is complete.
+    /// Fetches the next piece and appends it; returns whether it is complete.
     ///
     /// # Errors
     /// As [`Client::ask`]; a device that does not go on where it was is [`ClientError::Unexpected`].
@@ -308,13 +308,13 @@ impl<P: Port> Client<P> {
         Ok(complete)
     }
 
-    /// What the device said last of itself, unasked.
+    /// The last telemetry of the device.
     #[must_use]
     pub fn telemetry(&self) -> Option<&Status> {
         self.telemetry.as_ref()
     }
 
-    /// Frames from the device that came damaged.
+    /// Damaged frames from the device.
     #[must_use]
     pub fn damaged(&self) -> u32 {
         self.damaged

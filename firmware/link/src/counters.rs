@@ -1,29 +1,29 @@
-//! What an endpoint has seen. Every received byte ends in exactly one of these, so that nothing is lost silently.
+//! Counters of an endpoint. Every received byte is counted in exactly one of them, so that no loss is silent.
 
 use serde::{Deserialize, Serialize};
 
 use crate::frame::Damage;
 
-/// Frames by what became of them; counts stand still at their largest.
+/// Frames by outcome; counters saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counters {
     /// Requests carried out or refused by the device.
     pub executed: u32,
-    /// Requests that came again and were only answered again.
+    /// Repeated requests, which were only answered again.
     pub repeated: u32,
-    /// Frames longer than any can be.
+    /// Frames longer than the longest valid one.
     pub overlong: u32,
-    /// Frames that are not what COBS makes, or too short for header and CRC.
+    /// Frames that are not valid COBS, or too short for header and CRC.
     pub malformed: u32,
-    /// Frames with another CRC than they carry.
+    /// Frames whose CRC is wrong.
     pub checksum: u32,
-    /// Whole frames of another version of the protocol.
+    /// Valid frames of another version of the protocol.
     pub version: u32,
-    /// Whole frames that are no request.
+    /// Valid frames that are not requests.
     pub kind: u32,
-    /// Whole frames whose message cannot be read.
+    /// Valid frames with an unreadable message.
     pub message: u32,
-    /// Requests of another session, or before any.
+    /// Requests of another session, or before the first.
     pub session: u32,
     /// Requests out of sequence.
     pub sequence: u32,
@@ -44,7 +44,7 @@ impl Counters {
         sequence: 0,
     };
 
-    /// Frames that were not believed.
+    /// Invalid frames.
     #[must_use]
     pub fn errors(&self) -> u32 {
         [

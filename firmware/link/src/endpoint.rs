@@ -5,31 +5,31 @@ use crate::frame::{self, FRAME, Frame, Header, Kind, VERSION};
 use crate::message::{Refusal, Reply, Request, Status};
 use crate::receiver::Receiver;
 
-/// What carries requests out: the program around a controller.
+/// Carries out requests: the program around a controller.
 pub trait Device {
-    /// Carries a request out, or refuses it and changes nothing. Never called twice for one request.
+    /// Carries out a request, or refuses it and changes nothing. Never called twice for one request.
     ///
     /// [`Status::link`] of an answer is filled in by the endpoint.
     fn execute(&mut self, request: &Request<'_>) -> Reply<'_>;
 }
 
-/// A session and the last request in it.
+/// A session and its last request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Session {
     number: u16,
     sequence: u16,
 }
 
-/// Longest frame of a refusal: header, three bytes, CRC, and what COBS adds.
+/// Longest frame of a refusal: header, three bytes, CRC, and COBS overhead.
 const REFUSAL: usize = 24;
 
-/// Takes bytes from the host and gives the answers to send, one at most for each byte.
+/// Takes bytes from the host and returns the answers to send, at most one for each byte.
 pub struct Endpoint {
     receiver: Receiver,
     session: Option<Session>,
-    /// The last answer, kept for a request that comes again.
+    /// The last answer, kept for a repeated request.
     reply: Frame,
-    /// What else is answered, so that the last answer is kept.
+    /// Other answers, so that the last answer is kept.
     refusal: Frame<REFUSAL>,
     counters: Counters,
 }
@@ -53,15 +53,16 @@ impl Endpoint {
         }
     }
 
-    /// What was seen so far.
+    /// The counters.
     #[must_use]
     pub fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// Takes a byte from the host. If it ends a request, `device` carries it out, and the bytes are the answer to send.
+    /// Takes a byte from the host. If it ends a request, `device` carries it out, and the returned bytes are the answer
+    /// to send.
     ///
-    /// One copy of it, compiled as this crate is and not as its caller: hence `dyn` and not inlined.
+    /// `dyn` and not inlined, so that there is one copy, compiled with this crate's options.
     #[inline(never)]
     pub fn push(&mut self, byte: u8, device: &mut dyn Device) -> Option<&[u8]> {
         let (header, message) = match self.receiver.push(byte)? {
@@ -71,7 +72,7 @@ impl Endpoint {
                 return None;
             }
         };
-        // In a version to come all but the first byte may mean something else.
+        // In a future version all but the first byte may have another meaning.
         if header.version != VERSION {
             count(&mut self.counters.version);
             return refuse(&mut self.refusal, &header, Refusal::Version);
@@ -119,7 +120,7 @@ fn refuse<'a>(frame: &'a mut Frame<REFUSAL>, header: &Header, refusal: Refusal) 
     frame.set(&header, &Reply::Refused(refusal)).then(|| frame.bytes())
 }
 
-/// Writes a frame that says, unasked, how the device stands; its bytes.
+/// Writes a frame of telemetry with the status of the device; returns its bytes.
 #[must_use]
 pub fn telemetry<'a>(status: &Status, sequence: u16, out: &'a mut [u8; FRAME]) -> &'a [u8] {
     let header = Header { version: VERSION, kind: Kind::Telemetry, session: 0, sequence };

@@ -1,8 +1,8 @@
 //! Frames: COBS(version, kind, session, sequence, message, CRC-32C), 0x00. Numbers are little endian.
 //!
-//! The CRC is that of Castagnoli (RFC 3720): it finds any five flipped bits in up to 655 bytes and any three in the
-//! longest frame. What COBS makes of a damaged frame can differ in more; 2⁻³² of those pass, and then the length, the
-//! session and the sequence number must be right as well.
+//! The CRC is that of Castagnoli (RFC 3720): it detects any five flipped bits in up to 655 bytes and any three in the
+//! longest frame. COBS may turn a damaged frame into one with more errors. A fraction of 2⁻³² of those pass; length,
+//! session and sequence number must then be right as well.
 
 use crc::{CRC_32_ISCSI, Crc, Table};
 
@@ -13,7 +13,7 @@ pub const FRAME: usize = 1024;
 /// Longest message, bytes.
 pub const MESSAGE: usize = BODY - HEADER - CHECKSUM;
 
-/// What COBS adds to the longest body: one byte, and one more for every 254.
+/// COBS overhead of the longest body: one byte, and one more for every 254.
 const STUFFING: usize = 5;
 /// Longest body, bytes.
 pub(crate) const BODY: usize = FRAME - 1 - STUFFING;
@@ -21,8 +21,8 @@ const HEADER: usize = 6;
 const CHECKSUM: usize = 4;
 const _: () = assert!(BODY.div_ceil(254) <= STUFFING);
 
-/// Bit by bit where flash is short: a frame of 1 KiB takes some 30,000 instructions of the background then, and 11 ms on the
-/// line of a board.
+/// Bit by bit if flash is scarce: a frame of 1 KiB then takes some 30,000 instructions of the background, and 11 ms on
+/// the line of a board.
 #[cfg(feature = "small")]
 type Remainders = Table<0>;
 /// Byte by byte, with a table of 1 KiB.
@@ -40,7 +40,7 @@ pub enum Kind {
     Reply,
     /// From the device, unasked.
     Telemetry,
-    /// Of no kind that this version knows.
+    /// A kind unknown to this version.
     Unknown(u8),
 }
 
@@ -64,31 +64,31 @@ impl Kind {
     }
 }
 
-/// What stands before a message.
+/// The header of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
-    /// Of the sender's protocol. Only the place of this byte is the same in every version.
+    /// Version of the sender's protocol. Only the place of this byte is the same in every version.
     pub version: u8,
     /// What the frame is.
     pub kind: Kind,
-    /// Chosen by the host when it opens the session: what is left in some buffer of an earlier one is not believed.
+    /// Chosen by the host when it opens the session, so that old bytes in a buffer are not accepted.
     pub session: u16,
     /// Counts requests; a repeated one has the same number.
     pub sequence: u16,
 }
 
-/// Why bytes between two zeros are no frame.
+/// Reason why bytes between two zeros are not a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Damage {
-    /// Longer than a body can be.
+    /// Longer than the longest body.
     Overlong,
-    /// Not what COBS makes, or too short.
+    /// Not valid COBS, or too short.
     Malformed,
-    /// Another CRC than they carry.
+    /// The CRC is wrong.
     Checksum,
 }
 
-/// A frame in memory of its own, of at most N bytes.
+/// A frame with its own memory, of at most N bytes.
 pub(crate) struct Frame<const N: usize = FRAME> {
     bytes: [u8; N],
     length: usize,
@@ -103,14 +103,14 @@ impl<const N: usize> Frame<N> {
         self.bytes.get(..self.length).unwrap_or_default()
     }
 
-    /// Makes the frame of a message; false, and nothing to send, if the message is too long.
+    /// Makes the frame of a message; false, with nothing to send, if the message is too long.
     pub(crate) fn set(&mut self, header: &Header, message: &impl serde::Serialize) -> bool {
         self.length = encode(header, message, &mut self.bytes).unwrap_or(0);
         self.length > 0
     }
 }
 
-/// Writes a frame with its zero; its length, or none if the message is too long.
+/// Writes a frame with its zero; returns its length, or none if the message is too long.
 pub(crate) fn encode(header: &Header, message: &impl serde::Serialize, out: &mut [u8]) -> Option<usize> {
     let mut body = [0; BODY];
     let [session_low, session_high] = header.session.to_le_bytes();
@@ -147,7 +147,7 @@ pub(crate) fn open(body: &[u8]) -> Result<(Header, &[u8]), Damage> {
     Ok((header, message))
 }
 
-/// The message of a frame, if it is one from its first byte to its last.
+/// The message of a frame, if it is valid from the first byte to the last.
 pub(crate) fn message<'a, T: serde::Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
     let (message, rest) = postcard::take_from_bytes(bytes).ok()?;
     rest.is_empty().then_some(message)
@@ -157,7 +157,7 @@ pub(crate) fn message<'a, T: serde::Deserialize<'a>>(bytes: &'a [u8]) -> Option<
 mod tests {
     use super::*;
 
-    /// Boards and hosts have different tables, and must agree.
+    /// The tables of boards and hosts differ, but must agree.
     #[test]
     fn the_checksum_is_that_of_the_catalogue_with_and_without_a_table() {
         let (bare, table) = (Crc::<u32, Table<0>>::new(&CRC_32_ISCSI), Crc::<u32, Table<1>>::new(&CRC_32_ISCSI));

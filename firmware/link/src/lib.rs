@@ -4,9 +4,9 @@
 //! request ─postcard→ message ─┬ header, CRC-32C ─COBS→ frame, 0x00 ─► Endpoint ─► Device (the controller's program)
 //! Client ◄─ reply ◄───────────┴──────────────────────────────────◄──────┘
 //! ```
-//! The host asks, the device answers: one request is under way at a time, and the device says nothing of itself but
-//! telemetry. Everything is in fixed memory; nothing allocates, nothing can panic. What arrives damaged is counted and
-//! dropped, never half believed; a request that is repeated is answered again, not executed again.
+//! The host asks, the device answers. One request is under way at a time; the device sends only telemetry by itself.
+//! Everything is in fixed memory; nothing allocates, nothing can panic. A damaged frame is counted and dropped as a
+//! whole. A repeated request is answered again, not executed again.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]

@@ -1,5 +1,5 @@
-//! Lock-step with a host: the device computes a tick whenever the host asks for one. The host's plant closes the loop, and
-//! the device's converters stay where they are.
+//! Lock-step with a host: the device computes a tick for each request of the host. The host's plant closes the loop;
+//! the device's converters do not change.
 
 use crate::bytes::{Bytes, WORDS, put_words};
 use crate::endpoint::Device;
@@ -13,34 +13,34 @@ pub trait Machine {
     /// Words of its settings, inputs and outputs: at most [`WORDS`] each.
     fn words(&self) -> [usize; 3];
 
-    /// Stages that are counted, the whole tick first.
+    /// Number of counted stages, the whole tick first.
     fn stages(&self) -> usize;
 
-    /// In what they are counted.
+    /// Unit of the counts.
     fn counted(&self) -> CostUnit;
 
-    /// Takes settings; what it remembers stays.
+    /// Takes settings; the state is unchanged.
     ///
     /// # Errors
-    /// The place of the first word out of range; nothing has changed then.
+    /// The index of the first word out of range; nothing has changed then.
     fn configure(&mut self, config: &[u64]) -> Result<(), usize>;
 
-    /// As at power-up, with the settings in force.
+    /// Resets to power-up, with the present settings.
     fn reset(&mut self);
 
-    /// One tick; the digest after it, and what it cost.
+    /// One tick; returns the digest after it, and its cost.
     fn step(&mut self, input: &[u64], output: &mut [u64]) -> (u64, u32);
 
-    /// What a stage has cost so far.
+    /// Total cost of a stage so far.
     fn stage(&self, index: usize) -> Option<Stage<'_>>;
 }
 
-/// What a lock-step keeps besides the machine, for one of up to N words of settings, inputs and outputs each.
+/// State of a lock-step besides the machine, for one of up to N words of settings, inputs and outputs each.
 #[derive(Debug)]
 pub struct Session<const N: usize = WORDS> {
     /// Of the answer.
     bytes: [[u8; size_of::<u64>()]; N],
-    /// Whether it was put at reset: before that there are no settings to step with.
+    /// Whether it was reset: before that there are no settings.
     ready: bool,
 }
 
@@ -57,17 +57,17 @@ impl<const N: usize> Session<N> {
         Self { bytes: [[0; size_of::<u64>()]; N], ready: false }
     }
 
-    /// Steps are refused until the next reset.
+    /// Refuses steps until the next reset.
     pub const fn end(&mut self) {
         self.ready = false;
     }
 
-    /// Room for the bytes of an answer, while it is made.
+    /// Room for the bytes of an answer.
     pub fn buffer(&mut self) -> &mut [u8] {
         self.bytes.as_flattened_mut()
     }
 
-    /// Words as the bytes of an answer; none if there are more than there is room for.
+    /// Words as the bytes of an answer; none if they do not fit.
     pub fn answer(&mut self, words: &[u64]) -> Option<Bytes<'_>> {
         put_words(words, self.bytes.as_flattened_mut())
     }
@@ -134,7 +134,7 @@ impl<M: Machine> Lockstep<M> {
         &self.machine
     }
 
-    /// The machine, to change it behind the link's back.
+    /// The machine, for changes outside the link.
     pub fn machine_mut(&mut self) -> &mut M {
         &mut self.machine
     }
@@ -152,7 +152,7 @@ impl<M: Machine> Lockstep<M> {
     }
 }
 
-/// Bytes of a text that one answer carries.
+/// Bytes of text in one answer.
 const PIECE: usize = 512;
 
 impl<M: Machine> Device for Lockstep<M> {
@@ -171,7 +171,7 @@ impl<M: Machine> Device for Lockstep<M> {
     }
 }
 
-/// The bytes of something longer from `offset` on, as many as an answer carries.
+/// The bytes of something longer from `offset` on, as many as an answer can have.
 #[must_use]
 pub fn piece(whole: &[u8], offset: u32) -> Reply<'_> {
     let rest = whole.get(offset as usize..).unwrap_or_default();

@@ -1,5 +1,5 @@
-//! What host and device say to each other. The order of the variants is the format: new ones go to the end, and a change
-//! of an old one is another [`VERSION`](crate::VERSION).
+//! Messages between host and device. The order of the variants is the format: new ones are added at the end, and a
+//! change of an old one needs another [`VERSION`](crate::VERSION).
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use crate::counters::Counters;
 /// From the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Request<'a> {
-    /// Opens a session. Answered by [`Reply::Identity`]; nothing else is answered before it.
+    /// Opens a session. Answered by [`Reply::Identity`]; required before any other request.
     Hello,
     /// The controller's own description from this byte on. Answered by [`Reply::Chunk`].
     Describe {
@@ -18,13 +18,13 @@ pub enum Request<'a> {
     },
     /// Answered by [`Reply::Status`].
     Status,
-    /// What the supervisor is asked for from now on: the number of `supervisor::Request`. It holds as long as the link
-    /// does. Answered by [`Reply::Done`].
+    /// The request to the supervisor from now on: the number of a `supervisor::Request`. It stays in force as long as
+    /// the link. Answered by [`Reply::Done`].
     Supervise {
         /// 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge.
         request: u8,
     },
-    /// What the controller is asked for from the next tick on: the input words that are no measurements, in their order.
+    /// The command from the next tick on: the controller's input words, without the measured ones, in their order.
     /// Answered by [`Reply::Done`].
     Setpoint {
         /// The words.
@@ -33,7 +33,8 @@ pub enum Request<'a> {
     },
     /// Answered by [`Reply::Config`].
     ReadConfig,
-    /// Settings, all at once, from the next tick on. Answered by [`Reply::Done`], or [`Refusal::Word`] and nothing changed.
+    /// Settings, all at once, from the next tick on. Answered by [`Reply::Done`], or by [`Refusal::Word`] with nothing
+    /// changed.
     WriteConfig {
         /// The words.
         #[serde(borrow)]
@@ -51,37 +52,39 @@ pub enum Request<'a> {
         #[serde(borrow)]
         input: Bytes<'a>,
     },
-    /// Lock-step: what a stage has cost since the device started. Answered by [`Reply::Stage`].
+    /// Lock-step: cost of a stage since the device started. Answered by [`Reply::Stage`].
     LockstepStage {
         /// Number of the stage; the first is the whole tick.
         index: u8,
     },
     /// Answered by [`Reply::Recorder`].
     Recorder {
-        /// What the recorder is to do.
+        /// Action of the recorder.
         action: RecorderAction,
     },
-    /// The record, as the bytes of its file, from this one on. Answered by [`Reply::Chunk`].
+    /// The record as the bytes of its file, from this byte on. Answered by [`Reply::Chunk`].
     Download {
         /// First byte wanted.
         offset: u32,
     },
     /// Answered by [`Reply::Done`].
     Wave {
-        /// What the wave generator is to do.
+        /// Action of the wave generator.
         action: WaveAction,
         /// Words of its settings, for [`WaveAction::Start`] and [`WaveAction::StartOnEdge`].
         #[serde(borrow)]
         words: Bytes<'a>,
     },
-    /// Ramp down, then end the program that serves the link. A board has no such end: [`Refusal::Unsupported`]. Answered by
-    /// [`Reply::Done`], whoever asks; the connection is closed once the amplifiers are off.
+    /// Ramps down, then ends the program that serves the link. A board refuses it: [`Refusal::Unsupported`]. Answered
+    /// by [`Reply::Done`], for any host; the connection is closed once the amplifiers are off.
     Stop,
-    /// Answered by [`Reply::Health`]; its events are then forgotten, and those of [`Reply::Status`] with them.
+    /// Answered by [`Reply::Health`]; this clears its events, and those of [`Reply::Status`].
     Health,
-    /// Where the platform is. Six legs know of none: [`Refusal::Unsupported`]. Answered by [`Reply::Place`].
+    /// The platform's pose. Refused by six legs, which have none: [`Refusal::Unsupported`]. Answered by
+    /// [`Reply::Place`].
     Place,
-    /// Knots of the correction of passes, from this one on. Answered by [`Reply::Done`], or [`Refusal::Word`] where there is no room.
+    /// Knots of the correction of passes, from this index on. Answered by [`Reply::Done`], or [`Refusal::Word`] if
+    /// there is no room.
     Knots {
         /// Number of the first.
         first: u32,
@@ -91,29 +94,30 @@ pub enum Request<'a> {
     },
     /// Answered by [`Reply::Pass`].
     Pass {
-        /// What the player of passes is to do.
+        /// Action of the player of passes.
         action: PassAction,
     },
-    /// What the last pass kept of the error, as the bytes of its knots, from this byte on. Answered by [`Reply::Chunk`].
+    /// Errors of the last pass, as the bytes of its knots, from this byte on. Answered by [`Reply::Chunk`].
     Errors {
         /// First byte wanted.
         offset: u32,
     },
-    /// Samples for this host from the next tick on, none with 0: see [`samples`](crate::samples). Answered by [`Reply::Done`], or
-    /// [`Refusal::Rate`] where the line or the device has no room for so many.
+    /// Starts samples for this host with the next tick; 0 stops them: see [`samples`](crate::samples). Answered by
+    /// [`Reply::Done`], or by [`Refusal::Rate`] if line or device cannot carry that many.
     Stream {
         /// Ticks of a row.
         every: u32,
     },
-    /// The oldest block of samples that was not fetched. Answered by [`Reply::Samples`].
+    /// The oldest unread block of samples. Answered by [`Reply::Samples`].
     Samples,
-    /// The correction that the next pass plays, as the bytes of its knots, from this byte on. Answered by [`Reply::Chunk`].
+    /// The correction of the next pass, as the bytes of its knots, from this byte on. Answered by [`Reply::Chunk`].
     Correction {
         /// First byte wanted.
         offset: u32,
     },
-    /// As [`Request::Setpoint`], from the tick after the rising edge of the input line on. One order waits, the last one; any that is in force
-    /// at once drops it. The machine runs, at rest then and at the edge. Answered by [`Reply::Done`].
+    /// As [`Request::Setpoint`], from the tick after the rising edge of the input line on. Only the last such command
+    /// waits; any immediate command drops it. The machine must run at rest, now and at the edge. Answered by
+    /// [`Reply::Done`].
     SetpointOnEdge {
         /// The words.
         #[serde(borrow)]
@@ -121,21 +125,21 @@ pub enum Request<'a> {
     },
     /// Answered by [`Reply::Edge`].
     Edge {
-        /// Drop what waits, before the answer.
+        /// Drop the waiting command, before the answer.
         drop: bool,
     },
 }
 
-/// What a player of passes is to do.
+/// Action of a player of passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PassAction {
-    /// Only say how it stands.
+    /// Only report the status.
     Look,
-    /// Begin with the next tick, under the correction of the knots that were sent. The machine runs, at rest.
+    /// Start a pass with the next tick, under the correction of the knots that were sent. The machine must run at rest.
     Begin {
         /// Ticks from knot to knot.
         spacing: u32,
-        /// Ticks of rest before the trajectory.
+        /// Ticks at rest before the trajectory.
         before: u32,
         /// Ticks in all.
         ticks: u32,
@@ -144,52 +148,53 @@ pub enum PassAction {
     },
     /// End it at once; the correction fades out, the trajectory goes on.
     Abort,
-    /// Make the correction of the next pass, in the background, of the one that came to its end, with the plan that was sent behind its knots.
+    /// Compute the correction of the next pass in the background, from the pass that completed and the plan that was
+    /// sent after its knots.
     Learn {
-        /// Knots that the plan reaches to both sides.
+        /// Knots that the plan reaches to each side.
         reach: u32,
         /// Knots over which the correction fades in and out.
         fade: [u32; 2],
     },
 }
 
-/// What a recorder is to do.
+/// Action of a recorder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RecorderAction {
-    /// Only say how it stands.
+    /// Only report the status.
     Look,
-    /// Forget what there is and record anew, until so many ticks after the trigger.
+    /// Clear the memory and record, until this many ticks after the trigger.
     Arm {
         /// Ticks after the trigger.
         after: u32,
     },
     /// Trigger now.
     Trigger,
-    /// Stop at once; what there is stays.
+    /// Stop at once; the memory is kept.
     Stop,
 }
 
-/// What a wave generator is to do.
+/// Action of a wave generator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum WaveAction {
-    /// Start the wave of the words.
+    /// Start the wave with these words.
     Start,
     /// Come to rest.
     Stop,
-    /// As [`WaveAction::Start`], but begin as [`Request::SetpointOnEdge`] says.
+    /// As [`WaveAction::Start`], but at the edge, as with [`Request::SetpointOnEdge`].
     StartOnEdge,
 }
 
 /// From the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reply<'a> {
-    /// Not done, and nothing changed.
+    /// Not carried out, and nothing changed.
     Refused(Refusal),
     /// Done.
     Done,
     /// Who is there.
     Identity(Identity),
-    /// How it stands.
+    /// Its status.
     Status(Status),
     /// Settings in force.
     Config {
@@ -199,7 +204,7 @@ pub enum Reply<'a> {
     },
     /// What a tick gave.
     Stepped {
-        /// What it cost, in the unit of [`Identity::counted`]; 0 if it was not counted.
+        /// Its cost, in the unit of [`Identity::counted`]; 0 if it was not counted.
         cost: u32,
         /// Digest of the machine after the tick.
         digest: u64,
@@ -207,14 +212,14 @@ pub enum Reply<'a> {
         #[serde(borrow)]
         output: Bytes<'a>,
     },
-    /// What a stage has cost.
+    /// Cost of a stage.
     #[serde(borrow)]
     Stage(Stage<'a>),
-    /// How the recorder stands.
+    /// Status of the recorder.
     Recorder(RecorderStatus),
     /// A piece of something longer.
     Chunk {
-        /// Place of its first byte.
+        /// Index of its first byte.
         offset: u32,
         /// Length of the whole, bytes.
         total: u32,
@@ -222,9 +227,9 @@ pub enum Reply<'a> {
         #[serde(borrow)]
         bytes: Bytes<'a>,
     },
-    /// What it noticed of itself.
+    /// The device's health.
     Health(Health),
-    /// Where the platform was at the end of a tick.
+    /// Pose and set-point of the platform at the end of a tick.
     Place {
         /// Ticks since power-up.
         tick: u64,
@@ -232,40 +237,41 @@ pub enum Reply<'a> {
         phase: u8,
         /// The controller's status word.
         status: u32,
-        /// Since the gauges were last read and believed, which is when the pose was measured, µs; none if they never were.
+        /// Time since the last valid gauge readings, which is the age of the pose, µs; none if there were none.
         measured: Option<u64>,
-        /// The controller's `place_words`: pose measured, set-point, set-point in the user's coordinates, voltages of the legs.
+        /// The controller's `place_words`: measured pose, set-point, set-point in the user's coordinates, voltages of
+        /// the legs.
         #[serde(borrow)]
         words: Bytes<'a>,
     },
-    /// How the player of passes stands.
+    /// Status of the player of passes.
     Pass(PassStatus),
     /// A block of samples.
     Samples {
-        /// Its number; what is missing before it was given up.
+        /// Its number; a gap in the numbers means lost blocks.
         number: u32,
         /// First tick of its first row.
         tick: u64,
         /// Ticks of each row.
         every: u32,
-        /// Whether a whole block waits behind it.
+        /// Whether a complete block waits after it.
         more: bool,
-        /// Its rows, for [`samples::rows`](crate::samples::rows); empty where there is none.
+        /// Its rows, for [`samples::rows`](crate::samples::rows); empty if there are none.
         #[serde(borrow)]
         rows: Bytes<'a>,
     },
-    /// How it stands with the input line.
+    /// Status of the input line.
     Edge(EdgeStatus),
 }
 
-/// Why a request was not carried out.
+/// Reason why a request was not carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
-    /// This device does not do that.
+    /// This device does not support it.
     Unsupported,
-    /// No session is open, or another one: say [`Request::Hello`].
+    /// No session is open, or another one: send [`Request::Hello`].
     NoSession,
-    /// Not the next sequence number: requests were lost, or two hosts talk at once.
+    /// Not the next sequence number: requests were lost, or two hosts are sending.
     Sequence,
     /// Another version of the protocol; the header of this reply has the device's.
     Version,
@@ -276,25 +282,26 @@ pub enum Refusal {
         /// What it has.
         expected: u16,
     },
-    /// A word is out of its range.
+    /// A word is out of range.
     Word {
-        /// Its place, counted from 0.
+        /// Its index, counted from 0.
         index: u16,
     },
-    /// Not in this state: say [`Request::Status`].
+    /// Not in this state: send [`Request::Status`].
     State,
     /// The answer does not fit into a message.
     TooLong,
-    /// Another host has the orders, or there are more of them than are carried out: hold, ramp-down and stop are taken all the same.
+    /// Another host is in control, or too many requests are waiting. Hold, ramp-down and stop are accepted all the
+    /// same.
     Busy,
-    /// Samples more often than there is room for.
+    /// The samples exceed the capacity of the line.
     Rate {
-        /// Ticks of a row at least.
+        /// Least number of ticks per row.
         least: u32,
     },
 }
 
-/// What a device counts where it says what something cost.
+/// Unit of the costs that a device reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CostUnit {
     /// Nothing.
@@ -305,16 +312,16 @@ pub enum CostUnit {
     Cycles,
 }
 
-/// Who is there. Numbers of words are those of the emitted controller.
+/// Identity of the device. Numbers of words are those of the emitted controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// Settings.
     pub config_words: u16,
     /// Inputs of the machine: those of a tick, then request and events.
     pub input_words: u16,
-    /// Outputs of the machine: those of a tick, then what the supervisor says.
+    /// Outputs of the machine: those of a tick, then those of the supervisor.
     pub output_words: u16,
-    /// Stages that are counted, the whole tick included.
+    /// Number of counted stages, the whole tick included.
     pub stages: u8,
     /// In what.
     pub counted: CostUnit,
@@ -322,7 +329,7 @@ pub struct Identity {
     pub description: u32,
 }
 
-/// How a device stands.
+/// Status of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Status {
     /// Ticks since power-up.
@@ -331,51 +338,52 @@ pub struct Status {
     pub phase: u8,
     /// Number of `supervisor::Cause`.
     pub cause: u8,
-    /// Word of what the wiring check found, if that is the cause, or of what the law has fallen back to, a `supervisor::Finding`; else 0.
+    /// Word of a `supervisor::Finding`: of the wiring check, if that is the cause, or of the law's fallback stage;
+    /// otherwise 0.
     pub finding: u16,
     /// Whether the amplifiers are enabled.
     pub amplifier_on: bool,
     /// The controller's status word.
     pub status: u32,
-    /// Events seen since the host asked for [`Request::Health`] last. The status does not forget them.
+    /// Events since the last [`Request::Health`]. The status does not clear them.
     pub events: u32,
-    /// Ticks that came late since power-up.
+    /// Late ticks since power-up.
     pub late: u32,
-    /// Since the tick that all of this is of, µs; none before the first.
+    /// Age of this status since its tick, µs; none before the first tick.
     pub age: Option<u64>,
-    /// What the link has counted; filled in by the endpoint.
+    /// Counters of the link; the endpoint fills them in.
     pub link: Counters,
 }
 
-/// What a device noticed of itself since power-up. Times are in counts of [`Health::clock`], the last one and the longest; what is not measured is
-/// none.
+/// Health of a device since power-up. Times are in counts of [`Health::clock`], the last and the longest; values that
+/// are not measured are none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Health {
-    /// Events seen since the host asked last.
+    /// Events since the host's last request.
     pub events: u32,
-    /// Faults of converters, and each kind that there was: bit `specgen_hal::Fault::number`.
+    /// Faults of converters, and each kind that occurred: bit `specgen_hal::Fault::number`.
     pub converter_faults: u32,
-    /// See [`Health::converter_faults`]; 0 where kinds are not told apart.
+    /// See [`Health::converter_faults`]; 0 if the device does not distinguish kinds.
     pub faults: u32,
     /// Ticks in which a gauge was not finite, out of range, stuck, or in disagreement.
     pub gauge_faults: u32,
-    /// Ticks that ended after the next one was due; none where time waits for them.
+    /// Ticks that ended after the start time of the next one; none if time waits for the ticks.
     pub overruns: Option<u32>,
     /// Counts in a second.
     pub clock: u32,
-    /// A tick, from its beginning to its end.
+    /// Duration of a tick.
     pub tick: Option<[u64; 2]>,
-    /// From the sampling of the gauges until the outputs changed.
+    /// Time from sampling the gauges to the change of the outputs.
     pub output: Option<[u64; 2]>,
-    /// Largest delay of a tick's beginning.
+    /// Largest delay of a tick's start.
     pub latest: Option<u64>,
-    /// Most bytes of the stack seen in use, and bytes there are.
+    /// Peak use of the stack and its size, bytes.
     pub stack: Option<[u32; 2]>,
-    /// Why its program began: bits of [`reset_cause`](crate::reset_cause); 0 where that is not known.
+    /// Reset cause: bits of [`reset_cause`](crate::reset_cause); 0 if it is not known.
     pub reset_cause: u8,
 }
 
-/// What a stage has cost.
+/// Cost of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Stage<'a> {
     /// Its name.
@@ -388,11 +396,11 @@ pub struct Stage<'a> {
     pub sum: u64,
     /// Most of a call.
     pub largest: u64,
-    /// For the whole tick: most stack seen in use, bytes; none where that is not measured.
+    /// For the whole tick: peak stack, bytes; none if it is not measured.
     pub stack: Option<u32>,
 }
 
-/// How a recorder stands.
+/// Status of a recorder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RecorderStatus {
     /// Whether it records.
@@ -401,32 +409,32 @@ pub struct RecorderStatus {
     pub triggered: bool,
     /// Ticks that it holds.
     pub ticks: u32,
-    /// Most that it can hold.
+    /// Its capacity.
     pub capacity: u32,
 }
 
-/// How it stands with the input line, and with what waits for its edge.
+/// Status of the input line, and of the command that waits for its edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct EdgeStatus {
-    /// Number of the `pending::Stage` of the last order.
+    /// Number of the `pending::Stage` of the last command.
     pub stage: u8,
     /// Rising edges since power-up.
     pub edges: u32,
-    /// Tick of the edge at which that order began or was refused.
+    /// Tick of the edge at which that command was begun or refused.
     pub tick: u64,
 }
 
 impl EdgeStatus {
-    /// No edge seen, nothing ordered for one.
+    /// No edge seen, no command for one.
     pub const NONE: Self = Self { stage: 0, edges: 0, tick: 0 };
 }
 
-/// How a player of passes stands.
+/// Status of a player of passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PassStatus {
-    /// Number of the `pass::Stage` of the last one.
+    /// Number of the `pass::Stage` of the last pass.
     pub stage: u8,
-    /// All status bits that the controller gave in it.
+    /// Union of the controller's status bits in it.
     pub status: u32,
     /// Knots of its error.
     pub knots: u32,

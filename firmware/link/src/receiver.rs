@@ -1,4 +1,4 @@
-//! Bytes in, frames out. A zero ends a frame whatever was before it, so that garbage costs one frame at most.
+//! Bytes in, frames out. A zero ends a frame in any case, so that garbage costs at most one frame.
 
 use cobs::{DecodeResult, DecoderState};
 
@@ -8,7 +8,7 @@ use crate::frame::{self, BODY, Damage, Header};
 pub struct Receiver {
     decoder: DecoderState,
     body: [u8; BODY],
-    /// Bytes of it so far, counted no further than the room.
+    /// Bytes of it so far, counted up to the room.
     length: usize,
     overlong: bool,
 }
@@ -26,8 +26,8 @@ impl Receiver {
         Self { decoder: DecoderState::Idle, body: [0; BODY], length: 0, overlong: false }
     }
 
-    /// Takes a byte. At the zero after some others: header and message, or why they are none. Zeros between frames are
-    /// nothing: a sender may put some to end what a line had made up.
+    /// Takes a byte. At a zero after other bytes: header and message, or the damage. Zeros between frames are ignored:
+    /// a sender may use some to end garbage on the line.
     #[inline]
     pub fn push(&mut self, byte: u8) -> Option<Result<(Header, &[u8]), Damage>> {
         let whole = match self.decoder.feed(byte) {

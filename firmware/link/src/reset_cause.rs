@@ -1,6 +1,7 @@
-//! Why a device's program began, as bits of [`Health::reset_cause`](crate::Health::reset_cause).
+//! Reset cause of a device, as bits of [`Health::reset_cause`](crate::Health::reset_cause).
 
-/// What each bit means, from the lowest on. The last is none of the reset: the part runs on its own oscillator, for there was no other.
+/// Meaning of each bit, from the lowest. The last is not a reset cause: the part runs on its internal oscillator,
+/// because there was no other.
 pub const NAMES: [&str; 8] =
     ["power-up", "brown-out", "reset pin", "software", "watchdog", "window watchdog", "low power", "no external clock"];
 

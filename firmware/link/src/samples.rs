@@ -1,12 +1,13 @@
-//! Samples of a machine for whoever looks on: ticks become rows, rows blocks, and blocks wait in fixed memory until the host asks.
+//! Samples of a machine for subscribed hosts: ticks become rows, rows blocks, and blocks wait in fixed memory until the
+//! host asks.
 //!
 //! ```text
 //! every tick ─ Sample ─► Collector ── Row of `every` ticks ──► Block of rows ──► ring ──► Reply::Samples
 //!                        least, mean, most                      numbered          the oldest is given up
 //! ```
-//! A block is made whether or not anybody fetches it, and has the next number: what was given up is a gap in the numbers. Ticks that
-//! did not reach the collector are a gap between the ticks of two blocks. Where a gap cuts a row off, its ticks are a row of their
-//! own, in a block that says how many they are: nothing that was seen is left out.
+//! Blocks are made and numbered whether or not a host fetches them: a lost block is a gap in the numbers. Ticks that
+//! did not reach the collector are a gap between the ticks of two blocks. If a gap cuts a row off, its ticks are a row
+//! of their own, in a block with that length: no sampled tick is left out.
 
 use serde::Serialize;
 
@@ -22,13 +23,13 @@ pub const ROW: usize = 4 + 1 + (2 + 3 + 3) * AXES * NUMBER;
 pub const BLOCK: usize = 5 * ROW;
 
 const NUMBER: usize = size_of::<f32>();
-/// Values of a row that are spread over its ticks.
+/// Values of a row with least, mean and most over its ticks.
 const SPREADS: usize = 2 * AXES;
-// What else a reply with a block holds: variant, number, tick, ticks a row, whether there are more, length.
+// Overhead of a reply with a block: variant, number, tick, ticks per row, whether there are more, length.
 const _: () = assert!(BLOCK + (1 + 5 + 10 + 3 + 1 + 2) <= crate::MESSAGE);
 const _: () = assert!(MOST_EVERY < 1 << 21, "three bytes in a message");
 
-/// What a tick showed. Poses are the platform's own: from rest and with the bias.
+/// Results of a tick. Poses are the platform's: from rest and with the bias.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// Ticks since power-up.
@@ -41,33 +42,33 @@ pub struct Sample {
     pub pose: [f32; AXES],
     /// Set-point, m and rad.
     pub target: [f32; AXES],
-    /// Set-point less pose, subtracted before it was rounded to 32 bits, m and rad.
+    /// Set-point less pose, rounded to 32 bits after the subtraction, m and rad.
     pub error: [f32; AXES],
     /// Voltage of each leg, V.
     pub volts: [f32; AXES],
 }
 
-/// A value over the ticks of a row.
+/// Statistics of a value over the ticks of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Spread {
     /// The least.
     pub least: f32,
-    /// The mean: the sum in order, with its rounding error carried along, by the number of ticks.
+    /// The mean: the sum in order with compensated rounding (Kahan), divided by the number of ticks.
     pub mean: f32,
     /// The most.
     pub most: f32,
 }
 
-/// Some ticks, one behind the other.
+/// Consecutive ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Row {
-    /// Every bit that the status word had in any of them.
+    /// Union of their status words.
     pub status: u32,
-    /// Number of the phase in the last one.
+    /// Number of the last phase.
     pub phase: u8,
-    /// Pose measured in the last one, m and rad.
+    /// Last measured pose, m and rad.
     pub pose: [f32; AXES],
-    /// Set-point of the last one, m and rad.
+    /// Last set-point, m and rad.
     pub target: [f32; AXES],
     /// Set-point less pose, m and rad.
     pub error: [Spread; AXES],
@@ -75,10 +76,10 @@ pub struct Row {
     pub volts: [Spread; AXES],
 }
 
-/// Rows as bytes, and which they are.
+/// Rows as bytes, with their numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Block {
-    /// Counts the blocks that were made.
+    /// Number of the block.
     pub number: u32,
     /// First tick of the first row.
     pub tick: u64,
@@ -103,7 +104,7 @@ impl Block {
     }
 }
 
-/// Bytes of a row of so many ticks.
+/// Bytes of a row of this many ticks.
 #[must_use]
 pub const fn row_of(every: u32) -> usize {
     if every == 1 { ROW_OF_ONE } else { ROW }
@@ -142,7 +143,7 @@ struct Sum {
     least: f32,
     most: f32,
     sum: f32,
-    /// What rounding has taken from the sum.
+    /// Rounding error of the sum.
     lost: f32,
 }
 
@@ -151,7 +152,7 @@ impl Sum {
         Self { least: value, most: value, sum: value, lost: 0.0 }
     }
 
-    /// One more, by Kahan's summation.
+    /// Adds a value by Kahan's summation.
     fn add(&mut self, value: f32) {
         if value < self.least {
             self.least = value;
@@ -166,22 +167,22 @@ impl Sum {
     }
 }
 
-/// Makes blocks of the ticks that it is shown, in the memory `S` of two blocks or more: one is being filled.
+/// Makes blocks of the ticks, in the memory `S` of at least two blocks: one is being filled.
 #[derive(Debug)]
 pub struct Collector<S> {
     ring: S,
-    /// Of the blocks that wait: the oldest, and how many. The one behind them is being filled.
+    /// Waiting blocks: the oldest, and their number. The one after them is being filled.
     first: usize,
     waiting: usize,
-    /// Number of the one that is being filled.
+    /// Number of the block being filled.
     number: u32,
-    /// Ticks of a row; 0 while nobody looks on.
+    /// Ticks per row; 0 without a subscriber.
     every: u32,
-    /// Ticks of the row that is being made, its first one, and the tick that comes next.
+    /// Ticks of the open row, its first one, and the next tick.
     count: u32,
     begun: u64,
     next: u64,
-    /// The last of them, with all status bits that there were.
+    /// The last of them, with the union of their status bits.
     last: Sample,
     sums: [Sum; SPREADS],
 }
@@ -197,7 +198,7 @@ impl<S: AsRef<[Block]> + AsMut<[Block]>> Collector<S> {
         Self { ring, first: 0, waiting: 0, number: 0, every: 0, count: 0, begun: 0, next: 0, last, sums }
     }
 
-    /// Rows of `every` ticks from here on, none with 0. What waited is given up; blocks are numbered from 0.
+    /// Starts rows of `every` ticks; 0 stops them. Waiting blocks are dropped; numbers restart at 0.
     pub fn start(&mut self, every: u32) {
         (self.every, self.number) = (every, 0);
         (self.first, self.waiting, self.count) = (0, 0, 0);
@@ -206,7 +207,7 @@ impl<S: AsRef<[Block]> + AsMut<[Block]>> Collector<S> {
         }
     }
 
-    /// Ticks of a row; 0 while nobody looks on.
+    /// Ticks per row; 0 without a subscriber.
     #[must_use]
     pub const fn every(&self) -> u32 {
         self.every
@@ -246,7 +247,7 @@ impl<S: AsRef<[Block]> + AsMut<[Block]>> Collector<S> {
         }
     }
 
-    /// The oldest block, which is given up with that: a whole one, else what there is of the one that is being filled. None if there
+    /// Removes and returns the oldest block: a complete one, otherwise the part of the one being filled. None if there
     /// are no rows.
     pub fn take(&mut self) -> Option<&Block> {
         if self.waiting == 0 {
@@ -267,7 +268,7 @@ impl<S: AsRef<[Block]> + AsMut<[Block]>> Collector<S> {
         }
     }
 
-    /// Writes the row that is being made, whatever ticks it has.
+    /// Writes the open row, however many ticks it has.
     fn put(&mut self) {
         let Self { last, sums, count, begun, number, .. } = *self;
         self.count = 0;
@@ -279,7 +280,7 @@ impl<S: AsRef<[Block]> + AsMut<[Block]>> Collector<S> {
         let ends = last.pose.into_iter().chain(last.target);
         let spreads = sums.into_iter().flat_map(|Sum { least, most, sum, .. }| {
             let mean = sum / count as f32;
-            // Rounding is not to lead out of what was there.
+            // Rounding must not put the mean outside the range of the values.
             let mean = if mean < least { least } else { mean };
             [least, if mean > most { most } else { mean }, most].into_iter().take(if count == 1 { 1 } else { 3 })
         });
@@ -293,7 +294,7 @@ impl<S: AsRef<[Block]> + AsMut<[Block]>> Collector<S> {
         }
     }
 
-    /// The block that is being filled waits from here on, if it has rows. Without room the oldest is given up.
+    /// Closes the block being filled, if it has rows. Without room the oldest block is dropped.
     fn close(&mut self) {
         if self.open().is_none_or(|block| block.length == 0) {
             return;
@@ -314,7 +315,7 @@ impl<S: AsRef<[Block]> + AsMut<[Block]>> Collector<S> {
         self.ring.as_mut().get_mut(place)
     }
 
-    /// Where the block is that stands so many behind the oldest.
+    /// Place of the block at this distance after the oldest.
     fn place(&self, behind: usize) -> usize {
         (self.first + behind).checked_rem(self.ring.as_ref().len()).unwrap_or(0)
     }

@@ -1,4 +1,4 @@
-//! Whether the host is still there, in control ticks.
+//! Time since the host was last heard, in control ticks.
 
 /// Counts ticks since the host was heard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +19,7 @@ impl Silence {
         self.ticks = 0;
     }
 
-    /// One tick has passed; whether the link is lost: then the supervisor gets its `LINK_LOST`.
+    /// A tick has passed. Returns whether the link is lost: then the supervisor gets its `LINK_LOST`.
     pub fn tick(&mut self) -> bool {
         self.ticks = self.ticks.saturating_add(1);
         self.ticks > self.limit

@@ -1,5 +1,5 @@
-//! A made-up machine for tests: legs that follow their codes, gauges that see the legs, and the faults that a test injects. The loop runs on
-//! it as fast as it can, in the thread of the test.
+//! A simulated machine for tests: legs that follow their codes, gauges that measure the legs, and injected faults. The
+//! loop runs on it as fast as possible, in the thread of the test.
 
 use core::sync::atomic::Ordering;
 
@@ -22,12 +22,12 @@ use crate::operator::SupervisorReport;
 
 /// Gauges in the middle of their range.
 const MIDDLE: i32 = 1 << 16;
-/// Rows and calls that find room without an allocation.
+/// Rows and calls that fit without an allocation.
 const ROOM: usize = 1 << 16;
 /// Time waits for the loop, which never sleeps.
 pub const FAST: Timing = Timing { period: 1, limit: 1_000_000_000, silence: 1 << 40, elastic: true };
 
-/// What the loop did to the amplifiers.
+/// A call of the loop to the amplifiers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Call {
     Write([i32; CHANNELS]),
@@ -44,7 +44,7 @@ pub struct InjectedFaults {
     pub disable: bool,
 }
 
-/// What a test does at the beginning of every tick.
+/// Action of a test at the beginning of every tick.
 type Script = Box<dyn FnMut(&mut Bench) + Send>;
 
 pub struct Bench {
@@ -61,7 +61,7 @@ pub struct Bench {
     pub sets: usize,
     /// In order, with the tick of each.
     pub calls: Vec<(u64, Call)>,
-    /// What the loop handed over, in order.
+    /// Rows from the loop, in order.
     pub rows: Vec<Row>,
     pub outer: Outer,
     pub shared: &'static Shared,
@@ -94,7 +94,7 @@ impl Bench {
         self.shared.stop.store(true, Ordering::Relaxed);
     }
 
-    /// An order for the loop, which takes it after this tick.
+    /// A command for the loop, which takes it after this tick.
     pub fn order(&mut self, order: LoopCommand) {
         self.outer.orders.push(order).expect("room for an order");
     }
@@ -108,7 +108,7 @@ impl Bench {
         self.rows.last().map_or(Phase::Disarmed, phase)
     }
 
-    /// Arms and runs, and runs again when it holds; ticks since it ran first, none before.
+    /// Arms and runs, and runs again after a hold; returns the ticks since the first run, none before.
     pub fn arm_and_run(&mut self) -> Option<u64> {
         match (self.tick, self.phase()) {
             (1, _) => self.ask(Request::Arm),
@@ -120,7 +120,7 @@ impl Bench {
         self.ran.map(|ran| self.tick - ran)
     }
 
-    /// Ticks that it has been in a phase.
+    /// Ticks since it entered a phase.
     fn since(&self, wanted: Phase) -> usize {
         self.rows.iter().rev().take_while(|row| phase(row) == wanted).count()
     }
@@ -131,7 +131,7 @@ impl Bench {
     }
 }
 
-/// What a tick of a machine that does nothing hands over.
+/// Row of a tick of an idle machine.
 pub fn row(tick: u64) -> Row {
     Row {
         tick,
@@ -150,7 +150,7 @@ pub fn row(tick: u64) -> Row {
     }
 }
 
-/// What the supervisor said in tick 7.
+/// Report of the supervisor in tick 7.
 pub fn said(phase: Phase) -> SupervisorReport {
     SupervisorReport {
         phase,
@@ -245,7 +245,7 @@ impl Lines for Bench {
 
 impl Device for Bench {
     fn tick(&mut self, tick: u64) {
-        // The script is none of the loop's own work.
+        // The script is not part of the loop.
         allocation::leave();
         self.tick = tick;
         self.collect();

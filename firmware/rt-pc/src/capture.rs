@@ -1,4 +1,4 @@
-//! The recorder of the loop, as the service sees it: away while it records, here once it has what it was to record.
+//! The recorder of the loop, as the service sees it: away while it records, here once its record is complete.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -13,7 +13,7 @@ use crate::record;
 /// Blocks of the memory, and words of each: together 4 MiB.
 const BLOCKS: usize = 8;
 const BLOCK: usize = 1 << 16;
-/// Ticks that fit whatever they hold: one block is always about to be given up.
+/// Ticks that always fit: one block may be about to be replaced.
 pub const CAPACITY: u32 = {
     let words = if BLOCK > 4 * RECORD_LAYOUT.preamble() { BLOCK } else { 4 * RECORD_LAYOUT.preamble() };
     ((BLOCKS - 1) * ((words - RECORD_LAYOUT.preamble()) / RECORD_LAYOUT.longest_row())) as u32
@@ -31,17 +31,17 @@ pub struct Capture {
     here: Option<Tape>,
     settings: Settings,
     standing: CaptureState,
-    /// Number of the order by which it was last started anew while it was away.
+    /// Number of the command that last restarted it while it was away.
     restarted: Option<u32>,
-    /// File of what it holds, as bytes; made when it is first asked for.
+    /// File of its content, as bytes; made on first use.
     image: Vec<u8>,
-    /// Where it is written each time it is complete.
+    /// File that is written each time the record is complete.
     file: Option<PathBuf>,
-    /// What was written, or why not.
+    /// The written file, or the error.
     pub written: Option<(PathBuf, io::Result<u64>)>,
 }
 
-/// What is recorded: everything until `after` ticks behind the first fault.
+/// Settings: everything until `after` ticks after the first fault.
 fn settings(after: u32) -> Settings {
     Settings {
         streaming: false,
@@ -56,7 +56,7 @@ impl Capture {
     /// The service's side and a recorder that waits for a fault. `file` is written each time it is complete.
     ///
     /// # Errors
-    /// In words, if there is no recorder for this controller.
+    /// As text, if there is no recorder for this controller.
     pub fn new(file: Option<&Path>) -> Result<(Self, Tape), String> {
         let words = if BLOCK > 4 * RECORD_LAYOUT.preamble() { BLOCK } else { 4 * RECORD_LAYOUT.preamble() };
         let mut tape = Box::new(record::recorder(BLOCKS, words)?);
@@ -78,7 +78,7 @@ impl Capture {
         self.standing
     }
 
-    /// The loop said how its recorder stands.
+    /// Status of the recorder from the loop.
     pub fn update(&mut self, recorded: Option<u64>, triggered: bool) {
         if let Some(ticks) = recorded {
             if self.here.is_none() {
@@ -87,7 +87,8 @@ impl Capture {
         }
     }
 
-    /// The order to the loop to record anew, until `after` ticks behind the trigger. `number` is what the order will have.
+    /// The command to record again, until `after` ticks after the trigger. `number` is the number that the command will
+    /// have.
     pub fn arm(&mut self, after: u32, number: u32) -> LoopCommand {
         self.settings = settings(after);
         self.standing = CaptureState { running: true, ..CaptureState::default() };
@@ -104,8 +105,8 @@ impl Capture {
         }
     }
 
-    /// The recorder came back after the loop had taken `taken` orders. An order, if it is to go again: it was started anew when
-    /// it was already on its way.
+    /// The recorder came back after the loop had taken `taken` commands. Returns a command if it must be sent again: it
+    /// was restarted while it was already on its way.
     pub fn receive(&mut self, mut tape: Tape, taken: u32) -> Option<LoopCommand> {
         if self.restarted.take().is_some_and(|number| (number.wrapping_sub(taken) as i32) > 0) {
             tape.start(self.settings);
@@ -113,7 +114,7 @@ impl Capture {
         }
         let triggered = self.standing.triggered || tape.activity() == Activity::Complete;
         self.standing = CaptureState { running: false, triggered, ticks: tape.rows() };
-        // One that was only stopped is written by nobody but the host that downloads it.
+        // A record that was only stopped is written only by a host that downloads it.
         if let Some(path) = self.file.as_ref().filter(|_| triggered) {
             self.written = Some((path.clone(), write(path, &tape)));
         }
@@ -137,7 +138,8 @@ fn put(out: &mut impl Write, tape: &Tape) -> io::Result<()> {
     (0..tape.blocks()).filter_map(|index| tape.block(index)).try_for_each(|block| record::add(out, block))
 }
 
-/// Writes what it holds to a file, whole or not at all; its ticks. The draft beside it replaces no file that was there.
+/// Writes its content to a file, completely or not at all; returns the number of ticks. The temporary file beside it
+/// replaces no existing file.
 fn write(path: &Path, tape: &Tape) -> io::Result<u64> {
     let mut draft = path.as_os_str().to_owned();
     draft.push(format!(".{}.part", std::process::id()));
@@ -239,7 +241,7 @@ mod tests {
 
     #[test]
     fn a_recorder_that_came_back_before_it_was_started_anew_goes_again() {
-        // The order to start anew has number 5; the loop had taken so many when it gave the recorder back.
+        // The command to restart has number 5; the loop had taken `taken` commands when it returned the recorder.
         for (taken, goes) in [(4, true), (5, false), (6, false)] {
             let (mut capture, tape) = Capture::new(None).unwrap();
             assert!(matches!(capture.arm(3, 5), LoopCommand::Record(settings) if settings.after == 3));

@@ -1,5 +1,5 @@
-//! Everything that may be asked of a run, whoever asks: operator, settings, waves, recorder. What is to be done by the loop goes
-//! out as orders, in the order in which it was asked for.
+//! Everything that can be requested of a run, from any source: operator, settings, waves, recorder. Work for the loop
+//! goes out as commands, in the order of the requests.
 
 use std::collections::VecDeque;
 
@@ -18,14 +18,14 @@ use crate::operator::{Operator, SupervisorReport};
 use crate::passes::Passes;
 use crate::words::Command;
 
-/// Orders that may wait for room in the ring: the loop takes one a tick.
+/// Commands that may wait for room in the ring: the loop takes one a tick.
 const MOST_ORDERS: usize = 64;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rejection {
     /// Not in this state of the machine, of the wave, of the pass or of the recorder.
     State,
-    /// This word of what was asked for.
+    /// This word of the request.
     Word(usize),
 }
 
@@ -34,27 +34,27 @@ pub struct Console {
     pub capture: Capture,
     pub passes: Passes,
     pub said: Option<SupervisorReport>,
-    /// Where the platform was then.
+    /// Pose and set-point at that time.
     pub place: [u64; PLACE_WORDS],
-    /// When that came, and when one last came whose gauges were read and believed, ns.
+    /// Time of that tick, and of the last one with valid gauges, ns.
     pub ticked: Option<u64>,
     pub measured: Option<u64>,
-    /// What the loop noticed of itself.
+    /// Health of the loop.
     pub health: Health,
-    /// Stops that hosts asked for so far.
+    /// Number of stops from hosts.
     pub stops: u64,
-    /// Settings that are in force once all orders are taken.
+    /// Settings in force once all commands are taken.
     config: Config,
     /// Events that were not yet reported over the link.
     events: u32,
     orders: VecDeque<LoopCommand>,
-    /// Number of the last order that was put there; the first is 1.
+    /// Number of the last queued command; the first is 1.
     number: u32,
-    /// Number of the order that began the last wave.
+    /// Number of the command that started the last wave.
     wave: Option<u32>,
-    /// How it stands with the input line.
+    /// Status of the input line.
     pub edge: EdgeStatus,
-    /// Number of the last order that is to wait for it, and its command; none for a wave.
+    /// Number of the last command that waits for it, and the command itself; none for a wave.
     awaited: Option<(u32, Option<Command>)>,
 }
 
@@ -82,7 +82,7 @@ impl Console {
         }
     }
 
-    /// Takes what a tick gave, at this time, ns.
+    /// Takes a tick's results, at this time, ns.
     pub fn update(&mut self, row: &Row, said: SupervisorReport, now: u64) {
         self.said = Some(said);
         self.place = row.place;
@@ -115,7 +115,7 @@ impl Console {
         &self.config
     }
 
-    /// Events since this was called last.
+    /// Events since the last call.
     pub fn take_events(&mut self) -> u32 {
         std::mem::take(&mut self.events)
     }
@@ -126,12 +126,12 @@ impl Console {
         self.order(LoopCommand::Configure(config));
     }
 
-    /// Whether the control law is at work, as far as is known.
+    /// Whether the control law runs, as far as is known.
     pub fn runs(&self) -> bool {
         self.said.is_some_and(|said| said.phase == Phase::Running)
     }
 
-    /// What was to move and has not gone out yet is not done any more.
+    /// Cancels motions that have not been sent to the loop.
     pub fn stop(&mut self) {
         self.stops += 1;
         let mut number = self.number.wrapping_sub(self.orders.len() as u32);
@@ -140,7 +140,7 @@ impl Console {
             match order {
                 LoopCommand::OperatorRequest(wish) => wish.command = None,
                 LoopCommand::Wave(_) | LoopCommand::Await(_) => {
-                    // In its place, so that numbers stay.
+                    // In its place, so that numbers are unchanged.
                     *order = LoopCommand::StopWave;
                     self.wave.take_if(|wave| *wave == number);
                     self.awaited.take_if(|(awaited, _)| *awaited == number);
@@ -158,7 +158,8 @@ impl Console {
     /// Begins a wave.
     ///
     /// # Errors
-    /// The machine does not run, or plays something else; a wave or a pass is under way; the word of the axis that would go beyond its limits.
+    /// If the machine does not run, or plays something else; if a wave or a pass is under way; or the word of the axis
+    /// that would exceed its limits.
     pub fn start_wave(&mut self, settings: &Settings<Real>, on_edge: bool) -> Result<(), Rejection> {
         let limits = waves::limits(&self.config);
         let running = self.said.filter(|said| said.phase == Phase::Running);
@@ -166,7 +167,7 @@ impl Console {
         Wave::new(limits).set(settings).map_err(|refused| refused.word().map_or(Rejection::State, Rejection::Word))?;
         waves::may_begin(said.status, self.operator.command(), &settings.center, &limits)
             .map_err(|_| Rejection::State)?;
-        // What is wanted when it is over goes first.
+        // The command after the wave is sent first.
         self.operator.rest_at(&settings.center);
         self.wish();
         if on_edge {
@@ -178,10 +179,10 @@ impl Console {
         Ok(())
     }
 
-    /// Has a command wait for the edge of the input line.
+    /// Makes a command wait for the edge of the input line.
     ///
     /// # Errors
-    /// The machine does not run at rest; a wave or a pass is under way.
+    /// If the machine does not run at rest, or a wave or a pass is under way.
     pub fn command_on_edge(&mut self, command: Command) -> Result<(), Rejection> {
         let rests = self
             .said
@@ -195,20 +196,20 @@ impl Console {
         Ok(())
     }
 
-    /// Nothing waits for the edge any more.
+    /// Removes the waiting command.
     pub fn stop_waiting(&mut self) {
         self.order(LoopCommand::StopWaiting);
     }
 
-    /// Brings the wave to rest, if there is one.
+    /// Stops the wave, if there is one.
     pub fn stop_wave(&mut self) {
         self.order(LoopCommand::StopWave);
     }
 
-    /// Takes knots of the correction of passes.
+    /// Stores knots of the correction of passes.
     ///
     /// # Errors
-    /// A pass is under way, or learned from; there is no room for them.
+    /// If a pass or learning is under way, or they do not fit.
     pub fn put_knots(&mut self, first: u32, knots: impl ExactSizeIterator<Item = Knot>) -> Result<(), Rejection> {
         match self.passes.is_busy() {
             true => Err(Rejection::State),
@@ -220,7 +221,7 @@ impl Console {
     /// Begins a pass.
     ///
     /// # Errors
-    /// The machine does not run, or not at rest; a wave or a pass is under way; this is no pass, or too long.
+    /// If the machine does not run at rest, a wave or a pass is under way, or the pass is invalid or too long.
     pub fn begin_pass(&mut self, course: Course) -> Result<(), Rejection> {
         let running = self.said.filter(|said| said.phase == Phase::Running);
         let said = running.filter(|_| !self.is_engaged()).ok_or(Rejection::State)?;
@@ -238,7 +239,7 @@ impl Console {
         self.order(LoopCommand::AbortPass);
     }
 
-    /// Takes the player back: what its pass began is what is commanded, while the machine runs.
+    /// Takes the player back. The trajectory that its pass began becomes the command, while the machine runs.
     pub fn receive_player(&mut self, player: Player) {
         if let Some(trajectory) = self.passes.receive(player) {
             if self.runs() {
@@ -247,10 +248,10 @@ impl Console {
         }
     }
 
-    /// Records anew, until `after` ticks behind the trigger.
+    /// Records again, until `after` ticks after the trigger.
     ///
     /// # Errors
-    /// There is no room for so many.
+    /// If that many do not fit.
     pub fn arm_recorder(&mut self, after: u32) -> Result<(), Rejection> {
         if after > CAPACITY {
             return Err(Rejection::Word(0));
@@ -268,26 +269,26 @@ impl Console {
         self.order(LoopCommand::StopRecorder);
     }
 
-    /// Whether the loop has orders enough for now.
+    /// Whether the queue of commands is full.
     pub fn is_full(&self) -> bool {
         self.orders.len() >= MOST_ORDERS
     }
 
-    /// Puts an order behind the others; its number.
+    /// Queues a command; returns its number.
     pub fn order(&mut self, order: LoopCommand) -> u32 {
         self.number = self.number.wrapping_add(1);
         self.orders.push_back(order);
         self.number
     }
 
-    /// Puts the operator's wish behind the other orders, if it changed.
+    /// Queues the operator's request, if it changed.
     pub fn wish(&mut self) {
         if let Some(wish) = self.operator.wish() {
             self.order(LoopCommand::OperatorRequest(wish));
         }
     }
 
-    /// Orders that are not sent yet, the oldest first, and the number of the oldest.
+    /// Commands that are not sent yet, the oldest first, and the number of the oldest.
     pub fn outgoing(&mut self) -> (&mut VecDeque<LoopCommand>, u32) {
         let first = self.number.wrapping_sub(self.orders.len() as u32).wrapping_add(1);
         (&mut self.orders, first)

@@ -1,7 +1,7 @@
 //! The real-time thread: read, control, write, hand over; no allocation, no lock, no file.
 //!
-//! No control decision is made here: what a missed tick, a silent gauge or an operator who is gone means is the supervisor's
-//! business, which sees it as event bits.
+//! No control decision is made here: the supervisor decides the reaction to a missed tick, an invalid gauge or a lost
+//! operator, which it gets as event bits.
 
 mod keeper;
 mod setpoints;
@@ -31,10 +31,11 @@ use setpoints::Setpoints;
 const LEAD: u64 = 20_000_000;
 /// A machine that slept this long was suspended, ns.
 const SLEPT: u64 = 1_000_000;
-/// Without a sign of life of the service for so long the operator's link is lost, ns. The service gives one every few ms.
+/// Time without a sign of life of the service after which the operator's link is lost, ns. The service gives one every
+/// few ms.
 const SERVICE_TIMEOUT: u64 = 2_000_000_000;
 
-/// Where and how fast the loop runs.
+/// Timing of the loop.
 #[derive(Debug, Clone, Copy)]
 pub struct Timing {
     /// Control period, ns.
@@ -43,11 +44,12 @@ pub struct Timing {
     pub limit: u64,
     /// Ticks without a request after which a link is lost.
     pub silence: u64,
-    /// Time waits for the loop: no tick is skipped, the next one is planned for when it can be. For machines that are simulated.
+    /// Time waits for the loop: no tick is skipped, the next one is planned as soon as possible. For simulated
+    /// machines.
     pub elastic: bool,
 }
 
-/// The loop with everything that it owns.
+/// The loop with its data.
 pub struct Loop<'a, D> {
     pub device: &'a mut D,
     pub config: Config,
@@ -60,7 +62,7 @@ pub struct Loop<'a, D> {
 }
 
 impl<D: Device> Loop<'_, D> {
-    /// Runs until [`Shared::stop`]; then the amplifiers are off. `account` is the book of the run.
+    /// Runs until [`Shared::stop`]; then the amplifiers are off. `account` is the account of the run.
     pub fn run(mut self, account: &mut Account) {
         scheduling::touch_stack();
         let mut machine = machine_at_reset();
@@ -69,7 +71,7 @@ impl<D: Device> Loop<'_, D> {
         let mut keeper = Keeper::new(outlets, self.tape.take(), self.shared, (&machine, &self.config));
         let mut phase = Phase::Disarmed;
         let mut enabled = false;
-        // An output of the last tick may not be what was asked for.
+        // Whether an output of the last tick failed.
         let mut undriven = false;
         let mut link = Link { number: 0, asked: 0, silence: self.timing.silence };
         let mut count = 0;
@@ -92,7 +94,7 @@ impl<D: Device> Loop<'_, D> {
             if over > 0 {
                 events |= MISSED_TICK;
             }
-            // In a PC that sleeps this clock stands still, too.
+            // In a PC that sleeps this clock stops, too.
             if over > u64::from(STALL_TICKS) || (suspended && !elastic) {
                 events |= STALLED;
             }
@@ -131,10 +133,10 @@ impl<D: Device> Loop<'_, D> {
                     codes.map(|code| sensing::CONVERTER.reading(code)),
                     self.device.wrench().map(|value| value as Real),
                 ),
-                // What was not read is not believed: no number stands for it.
+                // A reading that failed is invalid: it is passed as NaN.
                 Err(_) => ([Real::NAN; LEGS], [Real::NAN; LEGS]),
             };
-            // None of the supervisor's business, and in every record.
+            // The supervisor ignores it, but every record has it.
             let seen = if rose { events | EDGE } else { events };
             let input = measured_input(&command, &gauge, &wrench, setpoints.request(), seen);
             let output = supervise(&self.config, &mut machine, &input);
@@ -151,7 +153,7 @@ impl<D: Device> Loop<'_, D> {
                 driven = driven.and(self.device.set(triggers::lines(output.tick.status)));
             }
             if output.amplifier_on && !enabled && driven.is_ok() {
-                // The codes are there before the amplifiers show them. They may be on whatever it answers.
+                // The codes are set before the amplifiers use them. After any answer they may be on.
                 driven = self.device.enable(true);
                 enabled = true;
             }
@@ -212,7 +214,7 @@ impl<D: Device> Loop<'_, D> {
             }
             let usage = Usage::of_this_thread().since(usage);
             let done = clock::now();
-            self.shared.took([planned, woken, sensed, written, done], period, elastic);
+            self.shared.record_tick([planned, woken, sensed, written, done], period, elastic);
             account.tick(&Stamps { planned, woken, read: sensed, computed, written, done }, &usage, suspended);
             planned += period;
             if elastic && planned < done {
@@ -220,7 +222,7 @@ impl<D: Device> Loop<'_, D> {
             }
             tick += 1;
         }
-        // Twice: a bus that failed once may work now. A failure here can be reported to nothing.
+        // Twice: a bus that failed once may work now. There is nowhere to report a failure here.
         let _ = self.device.enable(false).or_else(|_| self.device.enable(false));
         keeper.finish();
         allocation::leave();
@@ -230,16 +232,16 @@ impl<D: Device> Loop<'_, D> {
 
 /// Whether the host at the other end of a link is still there.
 struct Link {
-    /// Number of the last request seen; 0 where no host's silence matters.
+    /// Number of the last request; 0 if no host's silence matters.
     number: u64,
-    /// Tick in which it was.
+    /// Tick of that request.
     asked: u64,
-    /// Ticks of silence that are none yet.
+    /// Ticks of silence that are tolerated.
     silence: u64,
 }
 
 impl Link {
-    /// `number` is that of the last request, `tick` is now: skipped ticks are silence, too.
+    /// `number` is that of the last request, `tick` is now: skipped ticks count as silence, too.
     fn is_lost(&mut self, number: u64, tick: u64) -> bool {
         if number != self.number {
             (self.number, self.asked) = (number, tick);
@@ -248,12 +250,12 @@ impl Link {
     }
 }
 
-/// What a record keeps of a tick's outputs.
+/// The outputs of a tick in a record.
 fn row_of(output: &MachineOutput) -> recorder::Row {
     recorder::Row { codes: output.tick.dac_code, status: output.tick.status, supervisor: output.supervisor_word() }
 }
 
-/// The event bit of tables or settings that are not what the compiler made.
+/// The event bit for tables or settings that have changed.
 #[must_use]
 pub fn integrity_event(intact: bool) -> u32 {
     if intact { 0 } else { INTEGRITY }
@@ -413,7 +415,7 @@ mod tests {
         assert!(bench.calls.iter().all(|(tick, call)| *call != Call::Enable(false) || *tick == bench.tick));
     }
 
-    /// What the enable line sees of a machine that is told to arm while something is broken for one tick.
+    /// State of the enable line of a machine that arms while something fails for one tick.
     fn armed(break_it: fn(&mut Bench)) -> (Bench, u64) {
         let (bench, _) = run(FAST, move |bench| {
             bench.broken = crate::bench::InjectedFaults::default();

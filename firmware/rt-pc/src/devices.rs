@@ -1,4 +1,4 @@
-//! What the loop reads and writes: gauges and amplifiers behind the traits of `hal`, and what a PC needs beyond.
+//! Inputs and outputs of the loop: gauges and amplifiers behind the traits of `hal`, and the additional lines of a PC.
 
 #[cfg(feature = "comedi")]
 pub mod comedi;
@@ -6,7 +6,7 @@ pub mod simulated;
 
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges, Lines};
 
-/// What the contacts of a machine show.
+/// State of a machine's contacts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Contacts {
     /// The emergency stop is open.
@@ -15,20 +15,21 @@ pub struct Contacts {
     pub fault: bool,
 }
 
-/// A machine as the loop sees it.
+/// A machine as seen by the loop.
 pub trait Device: Gauges + Amplifiers + Lines {
-    /// Tick `tick`, counted from 0, begins. Called once before its [`Gauges::read`]; numbers rise, and leave out skipped ticks.
+    /// Tick `tick`, counted from 0, begins. Called once before its [`Gauges::read`]; numbers increase, and skipped
+    /// ticks have none.
     fn tick(&mut self, tick: u64);
 
-    /// Shows outside that this tick is run, and reads the contacts. Called once a tick.
+    /// Toggles the heartbeat and reads the contacts. Called once a tick.
     ///
     /// # Errors
     /// The lines cannot be set or read.
     fn beat(&mut self) -> Result<Contacts, Fault>;
 
-    /// Force and torque on the platform that were read with the gauges, N and N m; zeros without a sensor.
+    /// Force and torque on the platform, read with the gauges, N and N m; zeros without a sensor.
     fn wrench(&self) -> [f64; CHANNELS];
 
-    /// What it is, for the summary.
+    /// Description for the summary.
     fn describe(&self) -> String;
 }

@@ -1,4 +1,4 @@
-//! What the real-time thread and the service hand to each other: by value, through rings that never wait.
+//! Data between the real-time thread and the service: by value, through rings that never block.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
@@ -14,14 +14,14 @@ use crate::words::Command;
 
 /// Rows between the threads: 0.8 s at 10 kHz.
 const ROWS: usize = 8192;
-/// Orders between the threads; the loop takes one a tick.
+/// Commands between the threads; the loop takes one a tick.
 const ORDERS: usize = 64;
 /// States between the threads, one for [`SNAPSHOT_EVERY`] rows and one for every change of the settings.
 const SNAPSHOTS: usize = 16;
-/// A block of the record of a run has so many rows.
+/// Rows per block of a run's record.
 pub const SNAPSHOT_EVERY: u32 = 2048;
 
-/// A recorder with its memory, for as long as the program runs: whoever holds the box uses it.
+/// A recorder with its memory, for the life of the program. The owner of the box uses it.
 pub type Tape = Box<Recorder<'static>>;
 
 /// A player of passes with its memory, as a [`Tape`].
@@ -36,9 +36,9 @@ pub struct Row {
     pub count: u64,
     pub input: MachineInput,
     pub output: recorder::Row,
-    /// Where the platform is after the tick.
+    /// Pose and set-point after the tick.
     pub place: [u64; PLACE_WORDS],
-    /// Digest of the machine after the tick; 0 where nothing records the run.
+    /// Digest of the machine after the tick; 0 if the run is not recorded.
     pub digest: u64,
     /// Ticks before it that were late.
     pub late: u64,
@@ -48,7 +48,7 @@ pub struct Row {
     pub opens: bool,
     /// Whether the set-point is a wave's.
     pub waving: bool,
-    /// How it stands with the input line.
+    /// Status of the input line.
     pub edge: EdgeStatus,
     /// Rows that the recorder of the loop holds, if it has one.
     pub recorded: Option<u64>,
@@ -64,15 +64,15 @@ pub struct Snapshot {
     pub state: [u64; MACHINE_STATE_WORDS],
 }
 
-/// What the operator wants from the next tick on: the words that are his, and the request.
+/// The operator's command words and request from the next tick on.
 #[derive(Debug, Clone, Copy)]
 pub struct OperatorRequest {
-    /// None where only the request is another.
+    /// None if only the request changes.
     pub command: Option<Command>,
     pub request: Request,
 }
 
-/// What waits for the edge of the input line.
+/// A command that waits for the edge of the input line.
 // As orders: a box would have to be released by the real-time thread.
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone, Copy)]
@@ -81,26 +81,26 @@ pub enum EdgeCommand {
     Wave(wave::Settings<Real>),
 }
 
-/// Something for the loop to do between two ticks.
-// The largest variant lies in the ring in any case: a box would have to be released by the real-time thread.
+/// A command for the loop, carried out between two ticks.
+// The ring has room for the largest variant anyway: a box would have to be released by the real-time thread.
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug)]
 pub enum LoopCommand {
     OperatorRequest(OperatorRequest),
     Configure(Config),
-    /// A wave begins, if none is under way.
+    /// Starts a wave, if none is under way.
     Wave(wave::Settings<Real>),
     StopWave,
-    /// To begin at the edge, in place of what waited.
+    /// To be started at the edge, in place of another waiting command.
     Await(EdgeCommand),
     /// Nothing waits any more.
     StopWaiting,
-    /// The pass that this player was told begins, if no wave is under way.
+    /// Starts the pass that this player was prepared for, if no wave is under way.
     Pass(Player),
     /// End the pass under way.
     AbortPass,
     Tape(Tape),
-    /// Begin anew with the recorder that the loop has.
+    /// Restarts the recorder of the loop.
     Record(recorder::Settings),
     Trigger,
     /// Stop the recorder and hand it back.
@@ -113,27 +113,27 @@ pub struct Shared {
     pub ended: AtomicBool,
     /// Last sign of life of the service, ns of [`specgen_rt::clock::now`].
     pub service_alive: AtomicU64,
-    /// Another number with every request over a link whose silence matters; 0 without one.
+    /// Changes with every request over a link whose silence matters; 0 without one.
     pub link: AtomicU64,
-    /// Ticks whose rows found no room.
+    /// Ticks whose rows were lost.
     pub lost_rows: AtomicU64,
-    /// Readings or outputs that the device did not make.
+    /// Failed readings and outputs of the device.
     pub device_faults: AtomicU64,
-    /// Ticks in which the supervisor saw something wrong with a gauge.
+    /// Ticks with a gauge fault.
     pub gauge_faults: AtomicU32,
-    /// Of a tick, from waking up to its end.
+    /// Duration of a tick, from waking up to its end.
     pub tick: LastAndLongest,
-    /// From the readings to the outputs.
+    /// Time from the readings to the outputs.
     pub output: LastAndLongest,
-    /// Delay of waking up; of none where time waits for the loop.
+    /// Delay of waking up; none if time waits for the loop.
     pub delay: LastAndLongest,
-    /// Ticks that ended after the next one was due.
+    /// Ticks that ended after the planned time of the next one.
     pub overruns: AtomicU32,
 }
 
 impl Shared {
-    /// A tick that was planned, woken up for, read, written and done at these times. Where time waits for the loop nothing is late.
-    pub fn took(&self, [planned, woken, read, written, done]: [u64; 5], period: u64, elastic: bool) {
+    /// Times at which a tick was planned, woken, read, written and done. If time waits for the loop, nothing is late.
+    pub fn record_tick(&self, [planned, woken, read, written, done]: [u64; 5], period: u64, elastic: bool) {
         self.tick.add(done.saturating_sub(woken));
         self.output.add(written.saturating_sub(read));
         if !elastic {
@@ -144,13 +144,13 @@ impl Shared {
         }
     }
 
-    /// What the link says of it; events are kept for each host on its own.
+    /// As a message of the link; events are stored for each host separately.
     pub fn health(&self) -> Health {
         let now = |count: &AtomicU32| count.load(Ordering::Relaxed);
         Health {
             events: 0,
             converter_faults: u32::try_from(self.device_faults.load(Ordering::Relaxed)).unwrap_or(u32::MAX),
-            // A device says that it failed, not how; the stack of a thread has a guard.
+            // A device reports only that it failed; the stack of a thread has a guard.
             faults: 0,
             gauge_faults: now(&self.gauge_faults),
             overruns: self.delay.get().map(|_| now(&self.overruns)),
@@ -186,12 +186,12 @@ impl LastAndLongest {
     }
 }
 
-/// The loop's ends of the rings that lead out.
+/// The loop's outgoing rings.
 pub struct Outlets {
     pub rows: Producer<Row>,
     /// States for the record of the run; none if there is no such record.
     pub snapshots: Option<Producer<Snapshot>>,
-    /// Recorders that have what they were to record, and the orders that had been taken when they were handed over.
+    /// Recorders with complete records, and the number of commands taken until then.
     pub tapes: Producer<(Tape, u32)>,
 }
 
@@ -235,10 +235,10 @@ mod tests {
         let shared = Shared::default();
         assert_eq!(shared.health(), Health { overruns: None, clock: 1_000_000_000, ..Health::default() });
         // Planned, woken, read, written, done; the second one ends when the next one is due, the third one later.
-        shared.took([100, 103, 110, 130, 150], 100, false);
-        shared.took([200, 207, 210, 240, 300], 100, false);
+        shared.record_tick([100, 103, 110, 130, 150], 100, false);
+        shared.record_tick([200, 207, 210, 240, 300], 100, false);
         assert_eq!(shared.health().overruns, Some(0));
-        shared.took([300, 301, 310, 320, 401], 100, false);
+        shared.record_tick([300, 301, 310, 320, 401], 100, false);
         shared.device_faults.store(1 << 40, Ordering::Relaxed);
         shared.gauge_faults.store(4, Ordering::Relaxed);
         let health = shared.health();
@@ -256,7 +256,7 @@ mod tests {
     #[test]
     fn where_time_waits_nothing_is_late() {
         let shared = Shared::default();
-        shared.took([100, 150, 160, 170, 900], 100, true);
+        shared.record_tick([100, 150, 160, 170, 900], 100, true);
         let health = shared.health();
         assert_eq!((health.latest, health.overruns, health.tick), (None, None, Some([750; 2])));
         assert_eq!(shared.overruns.load(Ordering::Relaxed), 0);

@@ -6,8 +6,8 @@
 //!        ▼                                     │
 //! main thread        record to a file, link, plan, signals                               service.rs, console.rs, operator.rs
 //! ```
-//! The machine outside is a data acquisition card or a simulated one (devices/). What is late is entered in a book and
-//! has a cause; the summary shows it.
+//! The machine is a data acquisition card or a simulated one (devices/). Every late tick is entered in an account with
+//! its cause; the summary shows it.
 
 #[cfg(test)]
 mod bench;
@@ -50,14 +50,14 @@ use options::{Invocation, Options};
 use service::{Link, Service};
 use summary::Summary;
 
-/// Notices if the real-time thread allocates.
+/// Detects allocations of the real-time thread.
 #[global_allocator]
 static ALLOCATOR: WatchedAllocator = WatchedAllocator;
 
 /// Bytes of the real-time thread's stack.
 const STACK: usize = 2 * scheduling::STACK + (1 << 20);
 
-/// Why it cannot run, by exit code.
+/// Reason why it cannot run, by exit code.
 enum Failure {
     Run(String),
     Usage(String),
@@ -65,7 +65,7 @@ enum Failure {
 }
 
 fn main() -> ExitCode {
-    // A record that outgrows the limit brings the machine down in order.
+    // A record that exceeds the limit stops the machine normally.
     specgen_rt::signals::ignore_file_size();
     let asked = options::parse(std::env::args_os()).map_err(Failure::Usage);
     let done = asked.and_then(|asked| match asked {
@@ -112,7 +112,7 @@ fn open(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// A card drives a real machine: what the controller rests on is measured, or accepted as it is.
+/// A card drives a real machine: assumed values must be measured, or accepted.
 #[cfg(feature = "comedi")]
 fn accept_assumptions(assumed: &[&str], accepted: bool) -> Result<(), String> {
     if accepted || assumed.is_empty() {
@@ -135,7 +135,7 @@ fn signals() -> Result<Arc<AtomicBool>, Failure> {
     Ok(signal)
 }
 
-/// Times of the loop, and of the hosts, by a period in ns.
+/// Times of the loop and of the hosts, from a period in ns.
 fn times(options: &Options, period: u64) -> (Timing, Timeout) {
     let silence = options.link_silence.map_or(u64::from(HOST_TICKS), |silence| silence.div_ceil(period));
     let limit = (period as f64 * options.late_after) as u64;
@@ -151,7 +151,7 @@ fn run<D: Device + Send>(options: &Options, device: &mut D, signal: Arc<AtomicBo
     let config = configure(&options.config).map_err(usage)?;
     let period = words::period().ok_or_else(|| environment("the controller does not state its period".to_owned()))?;
     let (timing, timeout) = times(options, period);
-    // A host or a time ends it, not a fault.
+    // A host or a time limit ends it, not a fault.
     let attended = options.link.is_some() || options.duration.is_some();
     let mut operator = Operator::new(attended, timeout);
     if options.arm {
@@ -227,12 +227,12 @@ fn run<D: Device + Send>(options: &Options, device: &mut D, signal: Arc<AtomicBo
         missing_rights: missing.iter().map(ToString::to_string).collect(),
     };
     let printed = outputs::print(&if options.json { summary.to_json() } else { summary.to_text() });
-    // What became of the machine counts more than who reads it.
+    // The state of the machine counts more than the reader of the output.
     summary.failure().map_or(Ok(()), |failure| Err(Failure::Run(failure)))?;
     printed.map_err(environment)
 }
 
-/// Rights of the whole process: what is missing, and what keeps processors awake. That one is a courtesy, not a need.
+/// Privileges of the whole process: missing ones, and the one that keeps processors awake, which is optional.
 fn prepare_process() -> (Vec<MissingPrivilege>, Option<AwakeProcessors>) {
     let awake = match AwakeProcessors::request() {
         Ok(awake) => Some(awake),
@@ -244,7 +244,7 @@ fn prepare_process() -> (Vec<MissingPrivilege>, Option<AwakeProcessors>) {
     (scheduling::lock_memory().err().into_iter().collect(), awake)
 }
 
-/// Rights of the calling thread: what is missing.
+/// Missing privileges of the calling thread.
 fn prepare_thread(cpu: Option<usize>, priority: u8) -> Vec<MissingPrivilege> {
     let pinned = cpu.map_or(Ok(()), scheduling::pin);
     pinned.err().into_iter().chain(scheduling::set_fifo(priority).err()).collect()
@@ -349,7 +349,7 @@ mod tests {
         assert_eq!(done, Ok(()));
         assert!(bench.tick >= 40 && bench.calls.iter().all(|(_, call)| *call != Call::Enable(true)));
 
-        // A right that is missing, such as to a processor that there is not, is an error unless it is said to be none.
+        // A missing privilege, such as a processor that does not exist, is an error unless the option permits it.
         let cpu = "--elastic --json --priority 1 --cpu 4000 --seconds 0.05";
         let (done, _, bench) = run_on(cpu, |_| {});
         assert!(matches!(&done, Err((3, text)) if text.contains("may not run in real time")), "{done:?}");

@@ -1,8 +1,8 @@
-//! What is asked of the machine, and when: by the command line's plan, over the link, by signals.
+//! Requests to the machine: by the command line's plan, over the link, by signals.
 //!
-//! There is one state of it, whoever asks. A host that has ordered something has the orders for as long as it is not silent and
-//! goes on ordering; others may then only slow the machine down. An operator only asks: whether a request is granted is the
-//! supervisor's business, and each step here waits for its answer.
+//! There is a single state for all sources. A host that has sent a command is in control as long as it is not silent
+//! and keeps sending commands; other hosts can then only slow the machine down. An operator only requests: the
+//! supervisor decides, and each step here waits for its answer.
 
 use controller::supervised::{Cause, Finding, MACHINE_INPUT_NAMES, Phase, Request};
 use controller::supervision::LOOK_ALIKE;
@@ -13,31 +13,32 @@ use specgen_runtime::supervisor::FindingText;
 use crate::handover::OperatorRequest;
 use crate::words::{Command, place, word_of};
 
-/// How long a step of the plan may take before it is given up, ns.
+/// Time limit of a step of the plan, ns.
 const STEP_LIMIT: u64 = 120 * SECOND;
-/// How long ramping down may take before the loop ends all the same, ns.
+/// Time limit of a ramp-down, after which the loop ends anyway, ns.
 const DOWN_LIMIT: u64 = 30 * SECOND;
 
-/// What the supervisor last said.
+/// The supervisor's last report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SupervisorReport {
     pub phase: Phase,
     pub cause: Cause,
-    /// What the wiring check found, if that is the cause.
+    /// Finding of the wiring check, if that is the cause.
     pub finding: Finding,
     pub on: bool,
     /// Status of the control law.
     pub status: u32,
     pub tick: u64,
-    /// Orders that the loop had taken by then.
+    /// Number of commands that the loop had taken by then.
     pub orders: u32,
-    /// The set-point was a wave's.
+    /// Whether the set-point was a wave's.
     pub waving: bool,
-    /// Ticks that were late so far.
+    /// Number of late ticks so far.
     pub late: u64,
 }
 
-/// A cause in words, with what the wiring check found and what looks like it on this geometry, or what the law has fallen back to.
+/// A cause as text, with the finding of the wiring check and its alternatives on this geometry, or with the fallback
+/// stage.
 pub fn why(cause: Cause, finding: Finding) -> String {
     match finding {
         Finding::None => cause.name().to_owned(),
@@ -49,7 +50,7 @@ pub fn why(cause: Cause, finding: Finding) -> String {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HostId(pub u64);
 
-/// Why a host does not get the orders.
+/// Reason why a host does not get control.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ControlRefusal {
     /// The program is ramping down to end.
@@ -57,16 +58,16 @@ pub enum ControlRefusal {
     Others,
 }
 
-/// For how long a host has the orders, ns.
+/// For how long a host stays in control, ns.
 #[derive(Debug, Clone, Copy)]
 pub struct Timeout {
-    /// It may be silent for so long.
+    /// Longest silence.
     pub silence: u64,
-    /// It may be there without ordering anything for so long.
+    /// Longest time without a command.
     pub idle: u64,
 }
 
-/// Who gave the last order.
+/// Source of the last command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Owner {
     /// The plan, or none.
@@ -74,7 +75,7 @@ enum Owner {
     /// A host over the link.
     Host {
         id: HostId,
-        /// When it last sent a request, and when it last ordered something, ns.
+        /// Times of its last request, and of its last command, ns.
         seen: u64,
         ordered: u64,
         left: bool,
@@ -89,9 +90,9 @@ enum Step {
     Arming,
     /// Asked to run, until it does.
     Starting,
-    /// Running; what was to be played is asked for.
+    /// Running; the trajectory was requested.
     Playing,
-    /// Asked to ramp down, until it is off.
+    /// A ramp-down was requested; ends when it is off.
     GoingDown,
     /// Nothing left to ask.
     Over,
@@ -105,26 +106,26 @@ pub struct Operator {
     since: u64,
     /// Input words to set once it runs, by place.
     assignments: Vec<(usize, u64)>,
-    /// Why the plan could not be carried out.
+    /// Reason why the plan failed.
     pub failure: Option<String>,
     /// Since the last wish.
     changed: bool,
     commanded: bool,
     owner: Owner,
     requests: u64,
-    /// The host from which the orders were taken last.
+    /// The host that lost control last.
     evicted: Option<HostId>,
     timeout: Timeout,
-    /// Another host stopped the machine while it was armed, where nothing that the owner asks shows it.
+    /// Another host stopped the machine while it was armed, in a way that the owner's replies do not show.
     is_overruled: bool,
-    /// In which the machine was when it was looked at last.
+    /// Phase of the machine at the last check.
     phase: Phase,
-    /// An operator is present: after a fault the loop goes on instead of ending.
+    /// An operator is present: after a fault the loop continues instead of ending.
     attended: bool,
 }
 
 impl Operator {
-    /// An operator without a plan. If the plan fails the loop goes on where it is `attended`, else it ends.
+    /// An operator without a plan. If the plan fails, the loop continues if it is `attended`, otherwise it ends.
     #[must_use]
     pub fn new(attended: bool, timeout: Timeout) -> Self {
         Self {
@@ -149,7 +150,7 @@ impl Operator {
     /// Plans: arm, run, then set `assignments` (such as `command=3`).
     ///
     /// # Errors
-    /// An assignment that makes no sense.
+    /// An invalid assignment.
     pub fn plan(&mut self, assignments: &[String], now: u64) -> Result<(), String> {
         for assignment in assignments {
             self.assignments.push(self.assignment(assignment)?);
@@ -158,23 +159,23 @@ impl Operator {
         Ok(())
     }
 
-    /// Asks to ramp down; then the loop may end.
+    /// Requests a ramp-down, after which the loop may end.
     pub fn ramp_down(&mut self, now: u64) {
         if !self.is_ending() {
             self.go(Step::GoingDown, Request::RampDown, now);
         }
     }
 
-    /// Whether nothing is left to wait for before the loop ends.
+    /// Whether the loop may end now.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.step == Step::Over
     }
 
-    /// Goes on with the plan by what the supervisor said.
+    /// Continues the plan by the supervisor's report.
     pub fn update(&mut self, said: &SupervisorReport, now: u64) {
         if std::mem::replace(&mut self.phase, said.phase) == Phase::Running && said.phase != Phase::Running {
-            // What was commanded before is not followed when it runs again.
+            // An old command must not take effect when the machine runs again.
             waves::rest(&[0.0; 6], &mut self.command);
             (self.changed, self.commanded) = (true, true);
         }
@@ -211,7 +212,7 @@ impl Operator {
         }
     }
 
-    /// Asks for something by hand: a plan is over, but for the way down.
+    /// A manual request: a plan ends, except for its ramp-down.
     fn ask(&mut self, request: Request) {
         if !self.is_ending() {
             self.step = Step::Free;
@@ -225,7 +226,7 @@ impl Operator {
         matches!(self.step, Step::GoingDown | Step::Over)
     }
 
-    /// Whether a host has the orders: it is there, and has ordered something lately.
+    /// Whether a host is in control: it is not silent, and has sent a command recently.
     #[must_use]
     pub fn linked(&self, now: u64) -> bool {
         match self.owner {
@@ -237,24 +238,24 @@ impl Operator {
         }
     }
 
-    /// Whether the silence of the link matters: a host has ordered something.
+    /// Whether the silence of the link matters: a host has sent a command.
     fn is_links(&self) -> bool {
         matches!(self.owner, Owner::Host { .. })
     }
 
-    /// Whether this host gave the last order.
+    /// Whether this host sent the last command.
     #[must_use]
     pub fn is_hosts(&self, host: HostId) -> bool {
         matches!(self.owner, Owner::Host { id, .. } if id == host)
     }
 
-    /// Whether the orders were taken from this host.
+    /// Whether this host has lost control.
     #[must_use]
     pub fn is_evicted(&self, host: HostId) -> bool {
         self.evicted == Some(host)
     }
 
-    /// Another number with every request of the host that has the orders; 0 where no host's silence matters.
+    /// Changes with every request of the host in control; 0 if no host's silence matters.
     #[must_use]
     pub fn link_number(&self) -> u64 {
         if self.is_links() { self.requests } else { 0 }
@@ -270,14 +271,14 @@ impl Operator {
         }
     }
 
-    /// A host comes anew: what one that is not there any more asked for is not asked for on its behalf.
+    /// A host connects: requests of a host that is gone are not continued for it.
     pub fn connected(&mut self, host: HostId, now: u64) {
         if self.is_links() && self.may_order(host, now) && !self.is_ending() {
             self.ask(Request::None);
         }
     }
 
-    /// A host has gone. A machine that is off does not miss it.
+    /// A host has disconnected. A machine that is off ignores it.
     pub fn left(&mut self, host: HostId, last: Option<&SupervisorReport>) {
         if let Owner::Host { id, left, .. } = &mut self.owner {
             if *id == host {
@@ -289,16 +290,16 @@ impl Operator {
         }
     }
 
-    /// Whether nobody else has the orders.
+    /// Whether no other host is in control.
     #[must_use]
     pub fn may_order(&self, host: HostId, now: u64) -> bool {
         self.is_hosts(host) || !self.linked(now)
     }
 
-    /// A host gets the orders.
+    /// Gives control to a host.
     ///
     /// # Errors
-    /// There are none to give, or another host has them.
+    /// If the program is ending, or another host is in control.
     pub fn take_for_host(&mut self, host: HostId, now: u64) -> Result<(), ControlRefusal> {
         if self.is_ending() {
             return Err(ControlRefusal::Ending);
@@ -308,7 +309,7 @@ impl Operator {
         }
         if !self.is_hosts(host) {
             self.requests += 1;
-            // A host that had them is to come anew.
+            // A host that was in control must reconnect.
             if let Owner::Host { id, .. } = self.owner {
                 self.evicted = Some(id);
             }
@@ -318,7 +319,7 @@ impl Operator {
         Ok(())
     }
 
-    /// A host asks: it has the orders, or slows the machine down.
+    /// A request of a host: it must be in control, or slow the machine down.
     pub fn ask_by_link(&mut self, request: Request, host: HostId) {
         let rises = matches!(self.phase, Phase::Disarmed | Phase::Arming)
             && matches!(self.request, Request::Arm | Request::Run);
@@ -326,36 +327,36 @@ impl Operator {
         self.ask(request);
     }
 
-    /// The words that are no measurements, in their order, from the link.
+    /// The command words from the link, in their order.
     pub fn set_by_link(&mut self, words: Command) {
         self.command = words;
         (self.changed, self.commanded) = (true, true);
     }
 
-    /// What waited for the edge has begun, and is what is commanded.
+    /// The waiting command has started and is now the command.
     pub fn has_begun_at_edge(&mut self, command: &Command) {
         self.command = *command;
     }
 
-    /// The command as it is wanted.
+    /// The present command.
     #[must_use]
     pub fn command(&self) -> &Command {
         &self.command
     }
 
-    /// What is wanted once a wave about `center` has come to rest: to stay there.
+    /// Command after a wave around `center`: stay there.
     pub fn rest_at(&mut self, center: &[Real; 6]) {
         waves::rest(center, &mut self.command);
         (self.changed, self.commanded) = (true, true);
     }
 
-    /// A pass has begun this trajectory: it is what is wanted until another order.
+    /// A pass has started this trajectory: it is the command until another one.
     pub fn has_begun(&mut self, trajectory: u32) {
         passes::begin(trajectory, &mut self.command);
         (self.changed, self.commanded) = (true, true);
     }
 
-    /// What is to be sent to the loop, if it changed since the last call.
+    /// The request for the loop, if it changed since the last call.
     pub fn wish(&mut self) -> Option<OperatorRequest> {
         let command = std::mem::take(&mut self.commanded).then_some(self.command);
         std::mem::take(&mut self.changed).then_some(OperatorRequest { command, request: self.request })
@@ -365,7 +366,7 @@ impl Operator {
         (self.step, self.request, self.since, self.changed) = (step, request, now, true);
     }
 
-    /// Why it cannot go on: ramp down, and end where it is not attended.
+    /// Reason why it cannot continue: ramp down, and end if it is not attended.
     pub fn give_up(&mut self, text: String, now: u64) {
         self.failure.get_or_insert(text);
         if self.attended {
@@ -375,7 +376,7 @@ impl Operator {
         }
     }
 
-    /// Place and word of `name=value`.
+    /// Index and word of `name=value`.
     fn assignment(&self, text: &str) -> Result<(usize, u64), String> {
         let (name, value) =
             text.split_once('=').ok_or_else(|| format!("expected NAME=VALUE such as `command=3`, found `{text}`"))?;
@@ -537,7 +538,7 @@ mod tests {
         operator.ask_by_link(Request::Hold, B);
         assert_eq!(operator.take_for_host(A, 2), Err(ControlRefusal::Others));
         assert_eq!(operator.take_for_host(A, 2), Ok(()));
-        // Where the phase shows it, nobody has to be told.
+        // If the phase shows it, no host needs a notice.
         operator.update(&said(Phase::Running, true), 3);
         operator.ask_by_link(Request::Hold, B);
         assert_eq!(operator.take_for_host(A, 4), Ok(()));
@@ -635,7 +636,7 @@ mod tests {
         };
         assert_eq!(connected(Some(A), SILENCE), None, "it is still there");
         assert_eq!(connected(Some(A), SILENCE + 1), Some(Request::None));
-        assert_eq!(connected(Some(B), 0), Some(Request::None), "it comes anew itself");
+        assert_eq!(connected(Some(B), 0), Some(Request::None), "it reconnects by itself");
         assert_eq!(connected(None, SILENCE + 1), None, "a plan goes on");
         let mut operator = Operator::new(true, ATTENDED);
         operator.take_for_host(A, 0).unwrap();
@@ -694,7 +695,7 @@ mod tests {
             operator.ask_by_link(Request::Hold, who);
             assert_eq!(operator.take_for_host(A, 2).is_err(), told, "{phase:?} {request:?}");
         }
-        // Under a plan there is no host to be told.
+        // Under a plan no host needs a notice.
         let mut operator = operator();
         operator.plan(&[], 0).unwrap();
         operator.ask_by_link(Request::Hold, B);

@@ -23,12 +23,12 @@ Machine
   --comedi-out-range LOW:HIGH
                        voltages that the range of an amplifier's output must
                        hold (default -10:10)
-  --assumed-ok         with --comedi: the machine may rest on what nobody
-                       measured: assumed values of the spec, simulated records
+  --assumed-ok         with --comedi: accept assumed values of the spec and
+                       simulated records
   --comedi-library FILE
                        another libcomedi than the system's
-  --sim-timeout MS     how long a reading of the simulated machine may take
-                       before it counts as broken (default 20)
+  --sim-timeout MS     time limit of a reading of the simulated machine
+                       (default 20)
   --sim-edge-every S   the input line of the simulated machine rises every S
                        seconds (default: never)
 
@@ -40,8 +40,8 @@ Time
   --elastic            with --sim: a late tick moves the next ones, none is
                        skipped, for PCs that cannot keep the period
   --cpu N              keep the loop on processor N (default: not pinned)
-  --allow-no-rt        run without the rights for real time, after saying which
-                       are missing
+  --allow-no-rt        run without real-time privileges; the missing ones are
+                       reported
 
 Operation
   --arm                arm and run at once; else wait for a host over the link
@@ -50,24 +50,24 @@ Operation
   --config NAME=VALUE  a setting for this run, such as mode=6
   --link PATH          answer the link protocol of boards, for
                        `specgen operate --socket PATH`
-  --link-silence MS    a host that ordered something over the link and is silent
-                       for so long is lost (default: host_lost of the spec)
-  --link-idle S        a host that ordered nothing for so long loses the orders
-                       to the next that does (default 60)
+  --link-silence MS    a host in control is lost after this silence
+                       (default: host_lost of the spec)
+  --link-idle S        a host without a command for this time loses control to
+                       the next host with one (default 60)
   --record FILE        write every tick of the run to FILE, for `specgen replay`
-  --capture FILE       write what the recorder kept around a fault, or a trigger
-                       over the link, to FILE
+  --capture FILE       write the recording around a fault, or a trigger over
+                       the link, to FILE
   --json               print the summary as JSON
   --help, --version
 
 SIGINT or SIGTERM ramps down and ends; a second one ends at once with the
 amplifiers off.
-Exit codes: 0 good, 1 the machine faulted or held for a cause, a record is not
-whole, the book does not balance or a card would be driven on assumptions,
-2 usage, 3 environment.
+Exit codes: 0 good, 1 the machine faulted or held for a cause, a record is
+incomplete, the account does not balance or a card would be driven with assumed
+values, 2 usage, 3 environment.
 ";
 
-/// What the controller runs on.
+/// The hardware of the controller.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Hardware {
     Simulated(String),
@@ -83,8 +83,7 @@ pub struct Options {
     /// Of inputs and of outputs, V.
     pub comedi_ranges: [[f64; 2]; 2],
     pub comedi_library: Option<PathBuf>,
-    /// What a fault of an amplifier leads to; none switches off at once.
-    /// A card may be driven by a controller that rests on assumptions.
+    /// Accept assumed values: a controller with assumed values may drive a card.
     pub assumed_ok: bool,
     /// ns.
     pub sim_timeout: u64,
@@ -94,7 +93,7 @@ pub struct Options {
     pub duration: Option<u64>,
     /// Share of the period.
     pub late_after: f64,
-    /// Late ticks move the next ones.
+    /// A late tick delays the next ones.
     pub elastic: bool,
     /// 1 to 99.
     pub priority: u8,
@@ -106,7 +105,7 @@ pub struct Options {
     pub link: Option<PathBuf>,
     /// ns.
     pub link_silence: Option<u64>,
-    /// A host that is there may order nothing for so long, ns.
+    /// Longest time without a command for a host in control, ns.
     pub link_idle: u64,
     /// File of the record.
     pub record: Option<PathBuf>,
@@ -115,7 +114,7 @@ pub struct Options {
     pub json: bool,
 }
 
-/// What the command line asks for.
+/// Result of the command line.
 #[derive(Debug)]
 pub enum Invocation {
     Run(Box<Options>),

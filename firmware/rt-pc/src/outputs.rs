@@ -1,4 +1,4 @@
-//! Files that a run writes, looked at before anything moves.
+//! Output files of a run, checked before anything moves.
 
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Write};
@@ -12,11 +12,11 @@ use crate::Failure;
 /// Links to other links that are followed, as the system does.
 const MOST_LINKS: usize = 40;
 
-/// Whether a record and a capture can be written to these files: they are two, nobody has protected them, and what replaces a
-/// file replaces no device.
+/// Checks that a record and a capture can be written to these files: they differ, are not write-protected, and do not
+/// replace a device.
 ///
 /// # Errors
-/// Two names for one file are a mistake of the call; a file that cannot be written is one of the environment.
+/// If both name one file, which is a usage error; or if a file cannot be written, which is an error of the environment.
 pub fn check(record: Option<&Path>, capture: Option<&Path>) -> Result<(), Failure> {
     let same = |a: &Metadata, b: &Metadata| (a.dev(), a.ino()) == (b.dev(), b.ino());
     let (recorded, captured) = (found(record), found(capture));
@@ -40,7 +40,7 @@ pub fn check(record: Option<&Path>, capture: Option<&Path>) -> Result<(), Failur
     Ok(())
 }
 
-/// The same name for the same file, which need not be there: through links, too, to a file or a folder.
+/// A unique name of a file, existing or not: links to the file or its folder are resolved.
 fn whole(path: &Path) -> PathBuf {
     let mut path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     for _ in 0..MOST_LINKS {
@@ -55,7 +55,7 @@ fn found(path: Option<&Path>) -> Option<(&Path, Metadata)> {
     path.and_then(|path| Some((path, std::fs::metadata(path).ok()?)))
 }
 
-/// A new file, or one that is replaced. A pipe that nobody reads is an error, not a wait.
+/// Creates or replaces a file. A pipe without a reader is an error, not a wait.
 ///
 /// # Errors
 /// What the system says.
@@ -69,7 +69,7 @@ pub fn create(path: &Path) -> io::Result<File> {
 /// Prints a result whole.
 ///
 /// # Errors
-/// In words, unless the reader has read enough.
+/// As text, unless the reader has closed the output.
 pub fn print(text: &str) -> Result<(), String> {
     put(&mut io::stdout(), text)
 }
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
     use std::os::unix::fs::PermissionsExt;
 
-    /// Takes so many bytes, then fails.
+    /// Accepts a number of bytes, then fails.
     struct Out(usize, io::ErrorKind);
 
     impl Write for Out {

@@ -10,7 +10,7 @@ use crate::handover::Player;
 
 /// Knots of its memory, one half of them for corrections: 3 MiB.
 const MEMORY: usize = 1 << 17;
-/// Steps of learning in a round of the service, which has others to serve: some milliseconds.
+/// Steps of learning per round of the service, which also serves others: some milliseconds.
 const STEPS: u32 = 1000;
 
 /// The player's other side.
@@ -19,61 +19,61 @@ pub struct Passes {
 }
 
 impl Passes {
-    /// With a player, where the controller takes a correction.
+    /// With a player, if the controller takes a correction.
     pub fn new() -> Self {
         let memory = || vec![[0; 6]; MEMORY].leak();
         Self { here: passes::POSSIBLE.then(|| Box::new(pass::Player::new(memory()))) }
     }
 
-    /// Whether a pass is under way, or the order for it.
+    /// Whether a pass is under way, or commanded.
     pub fn is_running(&self) -> bool {
         passes::POSSIBLE && self.here.is_none()
     }
 
-    /// Whether a pass is under way, or learned from.
+    /// Whether a pass is under way, or learning from one.
     pub fn is_busy(&self) -> bool {
         passes::POSSIBLE && self.here.as_ref().is_none_or(|player| player.is_busy())
     }
 
-    /// How it stands; none where there are no passes.
+    /// Its status; none if there are no passes.
     pub fn status(&self) -> Option<PassStatus> {
         let away = PassStatus { stage: Stage::Running.word(), status: 0, knots: 0, capacity: MEMORY as u32 / 2 };
         passes::POSSIBLE.then(|| self.here.as_ref().map_or(away, standing))
     }
 
-    /// Takes knots of the correction; false during a pass, or where there is no room.
+    /// Stores knots of the correction; false during a pass, or if they do not fit.
     pub fn put(&mut self, first: u32, knots: impl ExactSizeIterator<Item = Knot>) -> bool {
         self.here.as_mut().is_some_and(|player| player.put(first as usize, knots))
     }
 
-    /// The player for a pass; none during another one, or if it cannot make this one.
+    /// The player for a pass; none during another one, or if the pass is invalid.
     pub fn begin(&mut self, course: Course) -> Option<Player> {
         self.here.take_if(|player| player.begin(course))
     }
 
-    /// What the last pass kept of the error; none during one.
+    /// Errors of the last pass; none during one.
     pub fn errors(&self) -> Option<&[Knot]> {
         self.here.as_ref().map(|player| player.errors())
     }
 
-    /// The correction that the next pass plays; none during one.
+    /// The correction of the next pass; none during one.
     pub fn correction(&self) -> Option<&[Knot]> {
         self.here.as_ref().map(|player| player.correction())
     }
 
-    /// Makes the correction of the next pass from here on; false if no pass came to its end, or there is no plan for it.
+    /// Starts to compute the correction of the next pass; false if no pass is complete, or there is no plan for it.
     pub fn learn(&mut self, settings: Settings) -> bool {
         self.here.as_mut().is_some_and(|player| player.learn(settings))
     }
 
-    /// Learns a little, where there is something to learn.
+    /// Does some steps of learning, if there are any.
     pub fn work(&mut self) {
         if let Some(player) = &mut self.here {
             player.work(STEPS);
         }
     }
 
-    /// The player comes back; the trajectory that it began.
+    /// Takes the player back; returns the trajectory that it started.
     pub fn receive(&mut self, player: Player) -> Option<u32> {
         let begun = player.begun();
         self.here = Some(player);
@@ -92,7 +92,7 @@ fn standing(player: &Player) -> PassStatus {
 
 #[cfg(test)]
 impl Passes {
-    /// With a player of so many knots, even where the controller takes no correction.
+    /// With a player of this many knots, even if the controller takes no correction.
     pub fn with(knots: usize) -> Self {
         Self { here: Some(Box::new(pass::Player::new(vec![[0; 6]; knots].leak()))) }
     }

@@ -1,7 +1,7 @@
-//! The record of a whole run: what comes through the ring, in the format of recorders, block by block into a file.
+//! The record of a whole run: rows from the ring, in the format of recorders, block by block into a file.
 //!
-//! The blocks are made here, so that the loop spends no more on them than a state now and then. Ticks that were skipped have no
-//! row; the tick after them carries the event. Rows that were lost are a gap, behind which the record goes on with a state.
+//! The blocks are made here, so that the loop only adds a state now and then. Skipped ticks have no row; the next tick
+//! has the event. Lost rows are a gap, after which the record continues with a state.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -22,7 +22,7 @@ const BLOCKS: usize = 2;
 /// Words of a block: its rows always fit.
 const BLOCK: usize = RECORD_LAYOUT.preamble() + SNAPSHOT_EVERY as usize * RECORD_LAYOUT.longest_row();
 
-/// Writes the beginning of a record of this controller.
+/// Writes the start of a record of this controller.
 ///
 /// # Errors
 /// If it cannot be written.
@@ -38,10 +38,10 @@ pub fn add(out: &mut impl Write, block: &[u64]) -> io::Result<()> {
     write_block(block, |piece| out.write_all(piece))
 }
 
-/// A recorder whose memory is there for as long as the program runs, so that it can be handed from thread to thread.
+/// A recorder with memory for the life of the program, so that it can be passed between threads.
 ///
 /// # Errors
-/// In words, if the memory is too small for this controller.
+/// As text, if the memory is too small for this controller.
 pub fn recorder(blocks: usize, words: usize) -> Result<Recorder<'static>, String> {
     let memory = vec![0; blocks * words].leak();
     Recorder::new(memory, blocks, RECORD_LAYOUT).map_err(|unfit| format!("no recorder for this controller: {unfit:?}"))
@@ -51,7 +51,7 @@ pub fn recorder(blocks: usize, words: usize) -> Result<Recorder<'static>, String
 pub struct Writer {
     file: BufWriter<File>,
     recorder: Recorder<'static>,
-    /// Settings that are or will be in force, by the number of orders that were taken before their first tick.
+    /// Settings, present or future, by the number of commands that were taken before their first tick.
     configs: VecDeque<(u32, [u64; CONFIG_WORDS])>,
     /// Settings of the open block.
     config: [u64; CONFIG_WORDS],
@@ -62,18 +62,18 @@ impl Writer {
     /// A new file; one of this name is replaced.
     ///
     /// # Errors
-    /// In words, if it cannot be written.
+    /// As text, if it cannot be written.
     pub fn create(path: &Path, config: &Config) -> Result<Self, String> {
         let named = |error: io::Error| format!("{}: {error}", path.display());
         let mut file = BufWriter::with_capacity(1 << 16, outputs::create(path).map_err(named)?);
-        // At once, so that a disk without room is known before anything moves.
+        // At once, so that a full disk is noticed before anything moves.
         begin(&mut file).and_then(|()| file.flush()).map_err(named)?;
         let mut recorder = recorder(BLOCKS, BLOCK)?;
         recorder.start(Settings::STREAM);
         Ok(Self { file, recorder, configs: VecDeque::new(), config: config.to_words(), rows: 0 })
     }
 
-    /// Order number `order` brings other settings.
+    /// Command number `order` changes the settings.
     pub fn configured(&mut self, order: u32, config: &Config) {
         self.configs.push_back((order, config.to_words()));
     }
@@ -114,7 +114,7 @@ impl Writer {
         Ok(())
     }
 
-    /// Writes what is left; returns the number of ticks.
+    /// Writes the remainder; returns the number of ticks.
     ///
     /// # Errors
     /// If it cannot be written.

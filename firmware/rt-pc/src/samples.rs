@@ -1,5 +1,5 @@
-//! Ticks for hosts that look on, each in rows as it wants them. Made by the service of the rows that it is handed anyway: the loop
-//! knows nothing of it.
+//! Ticks for subscribed hosts, each with its own row length. The service makes them from the loop's rows; the loop is
+//! not involved.
 
 use controller::{PLACE_WORDS, Real};
 use specgen_link::samples::{AXES, Block, Collector, MOST_EVERY, Sample};
@@ -13,15 +13,15 @@ const BLOCKS: usize = 1024;
 /// Whether there is a pose: six legs have none.
 const POSSIBLE: bool = PLACE_WORDS >= 4 * AXES;
 
-/// What a host looks on with; nothing until it first asks for it.
+/// Stream of a subscribed host; nothing until its first request.
 #[derive(Default)]
 pub struct Stream(Option<Collector<Vec<Block>>>);
 
 impl Stream {
-    /// Rows of `every` ticks from here on, none with 0.
+    /// Starts rows of `every` ticks; 0 stops them.
     ///
     /// # Errors
-    /// There is no pose; a row is too long.
+    /// If there is no pose, or a row is too long.
     pub fn start(&mut self, every: u32) -> Result<(), Refusal> {
         if !POSSIBLE {
             return Err(Refusal::Unsupported);
@@ -37,7 +37,7 @@ impl Stream {
         Ok(())
     }
 
-    /// Takes what a tick showed.
+    /// Takes the results of a tick.
     pub fn add(&mut self, row: &Row) {
         if let Some(collector) = &mut self.0 {
             collector.add(&sample(row));
@@ -105,18 +105,18 @@ mod tests {
         for tick in 1..=100 {
             stream.add(&shown(tick));
         }
-        // All of them, in blocks; that another whole one waits is said with each but the last two.
-        let (mut next, mut told) = (1, Vec::new());
+        // All of them, in blocks; all but the last two report that another complete block waits.
+        let (mut next, mut flags) = (1, Vec::new());
         while next <= 100 {
             let Reply::Samples { number, tick, every: 1, more, rows: bytes } = stream.take() else { panic!("samples") };
-            assert_eq!((number as usize, tick), (told.len(), next));
+            assert_eq!((number as usize, tick), (flags.len(), next));
             next += rows(1, bytes.0).unwrap().len() as u64;
-            told.push(more);
+            flags.push(more);
         }
         // Behind the last but one there is only what is being filled.
-        let others = told.len() - 2;
-        assert!(next == 101 && others > 0, "{told:?}");
-        assert_eq!(told, [vec![true; others], vec![false; 2]].concat());
+        let others = flags.len() - 2;
+        assert!(next == 101 && others > 0, "{flags:?}");
+        assert_eq!(flags, [vec![true; others], vec![false; 2]].concat());
         stream.add(&shown(101));
         assert_eq!(stream.start(0), Ok(()));
         assert_eq!(stream.take(), none);

@@ -1,7 +1,7 @@
-//! The thread beside the loop, without a deadline: writes the record, serves the link, carries the plan on.
+//! The thread beside the loop, without a deadline: writes the record, serves the link, continues the plan.
 
 mod clients;
-mod desk;
+mod handler;
 mod link;
 mod listener;
 
@@ -21,49 +21,49 @@ use crate::operator::SupervisorReport;
 use crate::record;
 pub use link::{Link, Traffic};
 
-/// Between two rounds, unless a host sends something: the ring holds many times what comes in it.
+/// Pause between two rounds, unless a host sends something: the ring holds many times the rows of a round.
 const ROUND: Timespec = Timespec { tv_sec: 0, tv_nsec: 2_000_000 };
 
 pub struct Service<'a> {
     pub rings: Outer,
     pub shared: &'a Shared,
     pub console: Console,
-    /// Where ticks are written, if anywhere.
+    /// Destination of the ticks, if any.
     pub record: Option<(PathBuf, record::Writer)>,
-    /// Where frames come from, if anywhere.
+    /// Source of frames, if any.
     pub link: Option<Link>,
-    /// Set by a signal, taken back here.
+    /// Set by a signal, cleared here.
     pub signal: Arc<AtomicBool>,
     pub signals: u32,
-    /// Ask to ramp down at this time, ns.
+    /// Time at which to request a ramp-down, ns.
     pub until: Option<u64>,
 }
 
-/// Something that the supervisor did for a cause.
+/// A reaction of the supervisor, with its cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Incident {
     pub tick: u64,
-    /// Phase that it led to.
+    /// The resulting phase.
     pub phase: Phase,
     pub cause: Cause,
-    /// What the wiring check found, if that is the cause.
+    /// Finding of the wiring check, if that is the cause.
     pub finding: Finding,
 }
 
-/// What is known at the end.
+/// Results at the end.
 #[derive(Debug, Default)]
 pub struct Outcome {
     pub last: Option<SupervisorReport>,
-    /// Faults, holds for a cause, and what the law fell back to, in order.
+    /// Faults, holds with a cause, and fallbacks, in order.
     pub incidents: Vec<Incident>,
-    /// The record's rows, or why it is not whole.
+    /// The record's rows, or the reason why it is incomplete.
     pub record: Option<(PathBuf, io::Result<u64>)>,
-    /// The last file of the recorder, and its ticks or why it could not be written.
+    /// The last file of the recorder, and its ticks or the error.
     pub capture: Option<(PathBuf, io::Result<u64>)>,
-    /// What came over the link, if there was one.
+    /// Statistics of the link, if there was one.
     pub link: Option<Traffic>,
     pub rows: u64,
-    /// Why the plan was given up.
+    /// Reason why the plan failed.
     pub failure: Option<String>,
 }
 
@@ -72,7 +72,7 @@ impl Service<'_> {
     pub fn run(mut self) -> Outcome {
         let mut outcome = Outcome::default();
         loop {
-            // Asked before the rows are drained: none can come after it.
+            // Read before the rows are drained: no row can come after it.
             let ended = self.shared.ended.load(Ordering::Acquire);
             let now = clock::now();
             self.shared.service_alive.store(now, Ordering::Relaxed);
@@ -105,7 +105,7 @@ impl Service<'_> {
         outcome
     }
 
-    /// Serves the hosts, and says whose silence the loop is to watch.
+    /// Serves the hosts, and sets whose silence the loop watches.
     fn serve(&mut self, now: u64) {
         if let Some(link) = &mut self.link {
             self.console.health = self.shared.health();
@@ -115,7 +115,7 @@ impl Service<'_> {
         self.shared.link.store(number, Ordering::Relaxed);
     }
 
-    /// Sends what was asked for, as far as there is room.
+    /// Sends queued commands, as far as there is room.
     fn send(&mut self) {
         self.console.wish();
         let (orders, mut number) = self.console.outgoing();
@@ -125,16 +125,16 @@ impl Service<'_> {
                 writer.configured(number, config);
             }
             number = number.wrapping_add(1);
-            // There is room, and nothing else puts orders there.
+            // There is room, and nothing else sends commands.
             let _ = self.rings.orders.push(order);
         }
     }
 
-    /// Until a host sends something, or for a round.
+    /// Waits until a host sends something, or for a round.
     fn wait(&self) {
         let all: Vec<BorrowedFd<'_>> = self.link.iter().flat_map(Link::descriptors).collect();
         let mut files: Vec<PollFd<'_>> = all.iter().map(|file| PollFd::new(file, PollFlags::IN)).collect();
-        // A signal ends it early, and whatever else it says there is a next round.
+        // A signal ends it early; in any case a next round follows.
         let _ = poll(&mut files, Some(&ROUND));
     }
 
@@ -174,7 +174,7 @@ impl Service<'_> {
                 let _ = self.rings.snapshots.pop();
             }
         }
-        // After the rows: what they say of the recorder is older.
+        // After the rows, which have older information on the recorder.
         while let Ok((tape, taken)) = self.rings.tapes.pop() {
             if let Some(order) = self.console.capture.receive(tape, taken) {
                 self.console.order(order);

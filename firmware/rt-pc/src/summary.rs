@@ -1,4 +1,4 @@
-//! What a run leaves to be read: the book of its ticks, the machine's phases, the record.
+//! The summary of a run: the account of its ticks, the machine's phases, the record.
 
 use std::fmt::{self, Display, Formatter, Write as _};
 
@@ -13,7 +13,7 @@ use crate::service::{Incident, Outcome, Traffic};
 pub struct Summary<'a> {
     pub account: &'a Account,
     pub outcome: &'a Outcome,
-    /// Rows that found no room.
+    /// Rows that were lost.
     pub lost_rows: u64,
     /// Readings or outputs that failed.
     pub device_faults: u64,
@@ -24,7 +24,7 @@ pub struct Summary<'a> {
 }
 
 impl Summary<'_> {
-    /// What makes the run a failed one, if anything does.
+    /// Reason why the run failed, if it did.
     #[must_use]
     pub fn failure(&self) -> Option<String> {
         let outcome = self.outcome;
@@ -59,7 +59,7 @@ impl Summary<'_> {
         outcome.incidents.first().map(words)
     }
 
-    /// What is said of a run, in order: its name and value for programs, and the lines for people, if any.
+    /// The facts of a run, in order: name and value for programs, and text lines, if any.
     fn facts(&self) -> Vec<(&'static str, Json, String)> {
         let (account, outcome) = (self.account, self.outcome);
         let silent = |name, value| (name, value, String::new());
@@ -75,7 +75,7 @@ impl Summary<'_> {
             let numbers = [("hosts", hosts), ("requests", requests), ("errors", errors), ("closed_hosts", closed)];
             let numbers = Json::object(numbers.map(|(name, number)| (name, number.into())));
             let text = format!(
-                "link: {requests} requests of {hosts} hosts, {errors} frames not believed, {closed} hosts closed: others took the orders or the room\n"
+                "link: {requests} requests of {hosts} hosts, {errors} invalid frames, {closed} connections closed: others took control or the room\n"
             );
             (numbers, text)
         });
@@ -150,7 +150,7 @@ impl Summary<'_> {
         self.facts().into_iter().map(|(.., lines)| lines).collect()
     }
 
-    /// For programs, a line for each name.
+    /// JSON for programs, a line for each name.
     #[must_use]
     pub fn to_json(&self) -> String {
         let lines: Vec<String> =
@@ -181,7 +181,7 @@ fn hertz(period: u64) -> f64 {
     (1e12 / period as f64).round() / 1e3
 }
 
-/// By hand: a few numbers are no reason for a library.
+/// Written by hand: a few numbers do not justify a library.
 enum Json {
     Null,
     Flag(bool),
@@ -364,7 +364,7 @@ mod tests {
             "the machine faulted at tick 41: emergency stop\n",
             "record: 3 ticks in /r\\x\n",
             "recorder: /c is not whole: full\n",
-            "link: 30 requests of 2 hosts, 4 frames not believed, 5 hosts closed",
+            "link: 30 requests of 2 hosts, 4 invalid frames, 5 connections closed",
         ] {
             assert!(text.contains(part), "{part}\n{text}");
         }

@@ -1,14 +1,14 @@
-//! What an operator may set, by the names that the controller gives its words, so that this is the same for six legs and for platforms.
+//! Words that an operator may set, by the controller's names, so that this is the same for six legs and for platforms.
 
 use controller::permitted;
 use controller::supervised::MACHINE_INPUT_NAMES;
 use controller::{COMMAND_WORDS, Real};
 use specgen_runtime::PermittedRange;
 
-/// Words of a command: what an operator may set, for the others are measured or have a source of their own.
+/// Words of a command: those that an operator may set. The others are measured or have their own source.
 pub type Command = [u64; COMMAND_WORDS];
 
-/// Why there is no such word.
+/// There is no word of this name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnknownWord(pub String);
 
@@ -18,7 +18,7 @@ impl std::fmt::Display for UnknownWord {
     }
 }
 
-/// The place of a named input word.
+/// The index of a named input word.
 ///
 /// # Errors
 /// If there is none of this name.
@@ -40,7 +40,7 @@ pub fn word_of(index: usize, value: f64) -> Option<u64> {
     if name.contains('[') { Some(word(value as Real)) } else { integer(value) }
 }
 
-/// The word of `value` in the setting with this place in `CONFIG_NAMES`.
+/// The word of `value` in the setting at this index of `CONFIG_NAMES`.
 #[must_use]
 pub fn setting(place: usize, value: f64) -> Option<u64> {
     match PermittedRange::of(&permitted::SETTINGS, place)? {
@@ -49,7 +49,7 @@ pub fn setting(place: usize, value: f64) -> Option<u64> {
     }
 }
 
-/// What the setting with this place may be, in words.
+/// The permitted range of the setting at this index, as text.
 #[must_use]
 pub fn range(place: usize) -> String {
     match PermittedRange::of(&permitted::SETTINGS, place) {
@@ -66,7 +66,7 @@ fn integer(value: f64) -> Option<u64> {
     whole.then_some(value as u64)
 }
 
-/// Control period, ns, as the controller describes itself.
+/// Control period, ns, from the controller's description.
 #[must_use]
 pub fn period() -> Option<u64> {
     let text = controller::DESCRIPTION.lines().find_map(|line| line.strip_prefix("period="))?;

@@ -1,9 +1,10 @@
-//! The book of a run: every planned tick is on time, late or skipped, and each that is not on time has a cause.
+//! The account of a run: every planned tick is on time, late or skipped, and each late or skipped tick has a cause.
 //!
-//! A tick is planned at a time, and has a **limit** after it by which its outputs are to be written. It is *late* if they were
-//! written after that. If the loop comes to a tick a whole period or more after its time, the ticks whose periods are over are
-//! *skipped*: their outputs were never made, the old ones stayed. The cause is the phase that took longest beyond what it
-//! usually takes, and for phases of work what the kernel counted about the thread meanwhile.
+//! A tick has a planned time, and a **limit** after it for the writing of its outputs. It is *late* if they were
+//! written after the limit. If the loop reaches a tick a whole period or more after its planned time, the ticks whose
+//! periods have passed are *skipped*: their outputs were never computed, and the old ones stayed. The cause is the
+//! phase with the largest excess over its usual duration, and for phases of work also the kernel's counters of the
+//! thread.
 //!
 //! Always: planned = on time + late + skipped. [`Account::balances`] is checked at the end of every run.
 
@@ -12,24 +13,24 @@ use crate::histogram::{Histogram, known_text, time_text};
 
 use std::fmt::Write as _;
 
-/// Why a tick was late or skipped.
+/// Cause of a late or skipped tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
     /// The loop was woken late.
     Wake,
     /// The whole machine slept.
     Suspended,
-    /// The processor was taken away during a tick.
+    /// The thread was preempted during a tick.
     Preempted,
-    /// A page of memory was missing during a tick.
+    /// A page fault occurred during a tick.
     PageFault,
     /// The gauges took long.
     Input,
-    /// The controller took long, without losing the processor to a thread.
+    /// The controller took long without preemption.
     Computation,
     /// The amplifiers took long.
     Output,
-    /// Handing the record over took long.
+    /// Handing over the record took long.
     HandOver,
 }
 
@@ -68,8 +69,8 @@ impl Cause {
             Self::Wake => "scheduler, interrupts or hypervisor: PREEMPT_RT, isolcpus, governor; see `specgen doctor`",
             Self::Suspended => "forbid suspend while the machine runs: systemd-inhibit",
             Self::Preempted => "a thread of higher priority, or no SCHED_FIFO: raise --priority, pin with --cpu",
-            Self::PageFault => "memory was not locked: see the lines about rights at the start",
-            Self::Input => "bus or device driver, or a simulated machine that has too little processor",
+            Self::PageFault => "memory was not locked: see the lines about privileges at the start",
+            Self::Input => "bus or device driver, or a simulated machine without enough processor time",
             Self::Computation => {
                 "interrupts, system management or hypervisor on this processor, or too slow a processor"
             }
@@ -79,10 +80,10 @@ impl Cause {
     }
 }
 
-/// When the phases of a tick ended, ns of [`crate::clock::now`].
+/// End of each phase of a tick, ns of [`crate::clock::now`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stamps {
-    /// When it should have begun.
+    /// Planned start.
     pub planned: u64,
     /// The loop runs again.
     pub woken: u64,
@@ -90,22 +91,22 @@ pub struct Stamps {
     pub read: u64,
     /// The controller is done.
     pub computed: u64,
-    /// The amplifiers have their codes.
+    /// The codes were written to the amplifiers.
     pub written: u64,
-    /// The record is handed over.
+    /// The record was handed over.
     pub done: u64,
 }
 
 /// How a tick went.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// Outputs written by the limit.
+    /// Outputs were written within the limit.
     OnTime,
     /// Written later, and why.
     Late(Cause),
 }
 
-/// The book. Fixed memory; nothing allocates but the text.
+/// The account. Fixed memory; only the text allocates.
 #[derive(Debug, Clone)]
 pub struct Account {
     /// Length of a period, ns.
@@ -116,10 +117,10 @@ pub struct Account {
     on_time: u64,
     late: [u64; Cause::ALL.len()],
     skipped: [u64; Cause::ALL.len()],
-    /// Ticks that gave the processor up between reading and sleeping: a lock or a file in the wrong place.
+    /// Ticks in which the thread blocked between reading and sleeping: a lock or a file in the wrong place.
     blocked: u64,
     worst: [Option<(u64, Stamps)>; Cause::ALL.len()],
-    /// End of the last tick and why it was late, if it was.
+    /// End of the last tick, and the cause if it was late.
     previous: Option<(u64, Option<Cause>)>,
     wake: Histogram,
     input: Histogram,
@@ -150,8 +151,8 @@ impl Account {
         }
     }
 
-    /// The loop has come to the tick planned at `planned` (ns) at the time `woken`: enters the ticks whose periods are over as
-    /// skipped, and returns how many they are. `suspended`: the machine slept since the last tick.
+    /// The loop has reached the tick planned at `planned` (ns) at the time `woken`. Enters the ticks whose periods have
+    /// passed as skipped, and returns their number. `suspended`: the machine slept since the last tick.
     pub fn arrive(&mut self, planned: u64, woken: u64, suspended: bool) -> u64 {
         let over = woken.saturating_sub(planned) / self.period;
         if over > 0 {
@@ -164,7 +165,8 @@ impl Account {
         over
     }
 
-    /// Enters a tick that was run. `usage` is what the kernel counted from its reading to its end, `suspended` as in [`Account::arrive`].
+    /// Enters a completed tick. `usage` are the kernel's counters from its reading to its end, `suspended` as in
+    /// [`Account::arrive`].
     pub fn tick(&mut self, stamps: &Stamps, usage: &Usage, suspended: bool) -> Verdict {
         let Stamps { planned, woken, read, computed, written, done } = *stamps;
         self.planned += 1;
@@ -195,7 +197,7 @@ impl Account {
             phase => during(phase, usage),
         };
         let late = response > self.limit;
-        // What makes the next tick late, if this one reaches into it.
+        // The cause for the next tick, if this one delays it.
         let carried = if late { cause } else { during(Cause::HandOver, usage) };
         self.previous = Some((done, Some(carried)));
         if late {
@@ -208,7 +210,7 @@ impl Account {
         }
     }
 
-    /// Why the loop was late at a tick: the tick before it if that had not ended, else the wait.
+    /// Cause of a late arrival at a tick: the previous tick if that had not ended, otherwise the wait.
     fn cause_of_arrival(&self, planned: u64, suspended: bool) -> Cause {
         match self.previous {
             _ if suspended => Cause::Suspended,
@@ -248,7 +250,7 @@ impl Account {
         self.skipped
     }
 
-    /// Ticks that gave the processor up during their work.
+    /// Ticks in which the thread blocked during its work.
     #[must_use]
     pub fn blocked(&self) -> u64 {
         self.blocked
@@ -273,7 +275,7 @@ impl Account {
         ]
     }
 
-    /// planned = on time + late + skipped, by counts that were kept apart, and a response of every tick that was run.
+    /// planned = on time + late + skipped, by independent counters, with a response time for every completed tick.
     #[must_use]
     pub fn balances(&self) -> bool {
         let late: u64 = self.late.iter().sum();
@@ -319,7 +321,7 @@ impl Account {
     }
 }
 
-/// What the kernel says about a phase of work that took long.
+/// Cause of a long phase of work, by the kernel's counters.
 fn during(phase: Cause, usage: &Usage) -> Cause {
     if usage.major_faults > 0 || usage.minor_faults > 0 {
         Cause::PageFault
@@ -384,12 +386,12 @@ mod tests {
         let mut account = Account::new(100, 50);
         assert_eq!(account.arrive(1_000, 1_005, false), 0);
         assert_eq!(account.tick(&stamps(1_000, [5, 2, 350, 1, 1]), &QUIET, false), Verdict::Late(Cause::Computation));
-        // It ended at 1359: the ticks of 1100 and 1200 are over, that of 1300 is late.
+        // It ended at 1359: the ticks of 1100 and 1200 have passed, that of 1300 is late.
         assert_eq!(account.arrive(1_100, 1_360, false), 2);
         let next = stamps(1_300, [60, 2, 5, 1, 1]);
         assert_eq!(account.tick(&next, &QUIET, false), Verdict::Late(Cause::Computation));
         assert_eq!((account.planned(), account.skipped()[Cause::Computation as usize]), (4, 2));
-        // A hand-over that takes long is told from a late wake.
+        // A long hand-over is distinguished from a late wake-up.
         assert_eq!(account.tick(&stamps(1_400, [5, 2, 5, 1, 300]), &QUIET, false), Verdict::OnTime);
         assert_eq!(account.arrive(1_500, 1_715, false), 2);
         assert_eq!(account.skipped()[Cause::HandOver as usize], 2);

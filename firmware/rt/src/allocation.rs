@@ -1,7 +1,8 @@
-//! An allocator that notices when a real-time thread uses it.
+//! An allocator that detects its use by a real-time thread.
 //!
-//! Every binary with a control loop installs it. It is the system's allocator but for one counter: allocations, growths and
-//! releases by a thread between [`enter`] and [`leave`]. The count belongs to the summary of every run, where it has to be 0.
+//! Every binary with a control loop installs it. It is the system's allocator with a counter of allocations,
+//! reallocations and releases by a thread between [`enter`] and [`leave`]. The summary of every run has the count,
+//! which must be 0.
 #![allow(unsafe_code)] // An allocator is unsafe by its interface; every call is passed on as it came.
 
 use core::alloc::{GlobalAlloc, Layout};
@@ -10,26 +11,27 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use std::alloc::System;
 
 thread_local! {
-    // Without a destructor and with a constant start: reading it never allocates.
+    // No destructor, and a constant initial value, so that reading it never allocates.
     static WATCHED: Cell<bool> = const { Cell::new(false) };
 }
 static NOTICED: AtomicU64 = AtomicU64::new(0);
 
-/// The system's allocator, watched. Install it with `#[global_allocator]`.
+/// The system's allocator with a counter. Install it with `#[global_allocator]`.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct WatchedAllocator;
 
-/// From here on the calling thread must not allocate or release memory.
+/// From now on the calling thread must not allocate or release memory.
 pub fn enter() {
     WATCHED.set(true);
 }
 
-/// From here on it may.
+/// From now on it may.
 pub fn leave() {
     WATCHED.set(false);
 }
 
-/// Allocations, growths and releases of all threads while they must not; always 0 where [`WatchedAllocator`] is not installed.
+/// Allocations, reallocations and releases by threads that must not make them; always 0 if [`WatchedAllocator`] is not
+/// installed.
 #[must_use]
 pub fn noticed() -> u64 {
     NOTICED.load(Ordering::Relaxed)
@@ -41,7 +43,7 @@ fn notice() {
     }
 }
 
-// SAFETY: every call, of its functions too, goes to the system's allocator with the arguments that came.
+// SAFETY: every call is passed to the system's allocator with its arguments unchanged.
 unsafe impl GlobalAlloc for WatchedAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         notice();
@@ -88,7 +90,7 @@ mod tests {
         drop(kept);
         leave();
         assert_eq!(noticed(), before + 2);
-        // Another thread's business is its own.
+        // Other threads are not affected.
         enter();
         let count = noticed();
         leave();

@@ -1,4 +1,4 @@
-//! Monotonic time in nanoseconds, absolute sleeps, and what the kernel counts about a thread.
+//! Monotonic time in nanoseconds, absolute sleeps, and the kernel's counters of a thread.
 #![allow(unsafe_code)] // Calls of the C library; each says why it is sound.
 
 use core::mem::MaybeUninit;
@@ -6,19 +6,19 @@ use core::mem::MaybeUninit;
 /// Nanoseconds in a second.
 pub const SECOND: u64 = 1_000_000_000;
 
-/// `CLOCK_MONOTONIC`, ns: never set back, never stepped, stands still while the machine sleeps.
+/// `CLOCK_MONOTONIC`, ns: never set back, never stepped; it stops while the machine sleeps.
 #[must_use]
 pub fn now() -> u64 {
     read(libc::CLOCK_MONOTONIC)
 }
 
-/// `CLOCK_BOOTTIME`, ns: as [`now`], but goes on while the machine sleeps.
+/// `CLOCK_BOOTTIME`, ns: as [`now`], but it continues while the machine sleeps.
 #[must_use]
 pub fn since_boot() -> u64 {
     read(libc::CLOCK_BOOTTIME)
 }
 
-/// How fine the clock of [`now`] is, ns; more than 1 means that there is no high-resolution timer.
+/// Resolution of [`now`], ns; more than 1 means that there is no high-resolution timer.
 #[must_use]
 pub fn resolution() -> u64 {
     let mut time = MaybeUninit::<libc::timespec>::zeroed();
@@ -30,32 +30,32 @@ pub fn resolution() -> u64 {
     nanoseconds(&time)
 }
 
-/// Sleeps until [`now`] is `deadline`, ns; returns at once if that is past. Signals do not end it early.
+/// Sleeps until [`now`] is `deadline`, ns; returns at once if that is past. A signal does not end it early.
 pub fn sleep_until(deadline: u64) {
     let time =
         libc::timespec { tv_sec: (deadline / SECOND) as libc::time_t, tv_nsec: (deadline % SECOND) as libc::c_long };
-    // SAFETY: the call reads one timespec; no remainder is asked for, which absolute sleeps do not have.
+    // SAFETY: the call reads one timespec; it has no remainder, as absolute sleeps have none.
     while unsafe {
         libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &raw const time, core::ptr::null_mut())
     } == libc::EINTR
     {}
 }
 
-/// What the kernel counted about one thread since it began.
+/// The kernel's counters of one thread since its start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Usage {
-    /// Pages that had to be mapped, without the disk.
+    /// Page faults without disk access.
     pub minor_faults: u64,
-    /// Pages that had to be read from a disk.
+    /// Page faults with disk access.
     pub major_faults: u64,
-    /// Times it gave the processor up: sleeps, and waits for locks and files.
+    /// Voluntary context switches: sleeps, and waits for locks and files.
     pub voluntary_switches: u64,
-    /// Times the processor was taken from it.
+    /// Involuntary context switches.
     pub involuntary_switches: u64,
 }
 
 impl Usage {
-    /// Of the calling thread, now.
+    /// Counters of the calling thread, now.
     #[must_use]
     pub fn of_this_thread() -> Self {
         let mut usage = MaybeUninit::<libc::rusage>::zeroed();
@@ -73,7 +73,7 @@ impl Usage {
         }
     }
 
-    /// What was counted between `earlier` and this.
+    /// Counts between `earlier` and this.
     #[must_use]
     pub fn since(self, earlier: Self) -> Self {
         Self {

@@ -1,24 +1,24 @@
 //! Shared memory between a controller and the machine that it moves.
 //!
-//! One file of 64-bit words, mapped by both. The machine's side makes it; a controller opens it. Two blocks, each written by one
-//! side and read by the other under a counter that is odd while the block changes:
+//! One file of 64-bit words, mapped by both sides. The machine's side creates it; a controller opens it. It has two
+//! blocks, each written by one side and read by the other, with a counter that is odd while the block changes:
 //!
 //! ```text
 //! actuation  controller → machine   session, tick, enable, six converter codes
 //! sensing    machine → controller   session, tick, six converter codes, wrench (six words)
 //! ```
-//! Time is counted in ticks of the controller. After the actuation of tick n the machine goes on by one period under it and gives
-//! the sensing of tick n + 1 out ahead of time. A controller that skipped ticks asks for the sensing of a later one by the word
-//! `wanted`: the machine then goes on under the codes that it has, as a real one would have.
+//! Time is counted in ticks of the controller. After the actuation of tick n, the machine runs for one period with it
+//! and publishes the sensing of tick n + 1 in advance. A controller that skipped ticks requests the sensing of a later
+//! one by the word `wanted`: the machine then continues with the codes that it has, as a real one would.
 //!
-//! Whoever waits looks at the words for a while, then sleeps on a futex, so that neither side needs a processor of its own. Only a
-//! side that sleeps is woken: a call of the system costs the real-time thread more than all the rest of a tick.
+//! A waiting side polls the words for a while and then sleeps on a futex, so that neither side needs its own processor.
+//! Only a sleeping side is woken: a system call costs the real-time thread more than the rest of a tick.
 #![allow(unsafe_code)] // Mapping and futex calls; each says why it is sound. The words themselves are atomics.
 
 mod mapping;
 mod words;
 
-// `words` takes these from here.
+// `words` uses these from here.
 use core::hint;
 use core::sync::atomic::{self, Ordering};
 use std::fmt;
@@ -33,25 +33,25 @@ pub use words::{Actuation, Sensing};
 /// "SPGPLANT" in little-endian bytes.
 const MAGIC: u64 = u64::from_le_bytes(*b"SPGPLANT");
 const VERSION: u64 = 1;
-/// How long a controller that waits looks before it sleeps, ns.
+/// Polling time of a waiting controller before it sleeps, ns.
 const LOOK: u64 = 30_000;
-/// Tries to read a block while the other side writes it; a block takes some 50 ns to write.
+/// Attempts to read a block while the other side writes it; a write takes some 50 ns.
 const TRIES: usize = 10_000;
 
 /// Six legs, six gauges.
 pub const CHANNELS: usize = 6;
 
-/// Why a machine cannot be reached.
+/// Reason why a machine cannot be reached.
 #[derive(Debug)]
 pub enum OpenError {
-    /// No such file, or no right to it.
+    /// The file does not exist, or access is denied.
     File {
         /// The file.
         path: PathBuf,
         /// The system's answer.
         cause: io::Error,
     },
-    /// Another user can change the file, or what it leads to.
+    /// Another user can change the file, or a folder above it.
     NotOwn {
         /// The file.
         path: PathBuf,
@@ -70,7 +70,7 @@ pub enum OpenError {
         /// First half of its digest.
         found: String,
     },
-    /// A machine of this name is served already.
+    /// A machine of this name is already being served.
     Served {
         /// The file.
         path: PathBuf,
@@ -130,7 +130,7 @@ impl OpenError {
 /// The file of a machine's name. Names are of letters, digits, `-` and `_`.
 ///
 /// # Errors
-/// If the name has anything else in it, with what is expected.
+/// If the name has other characters; states what is expected.
 pub fn path_of(name: &str) -> Result<PathBuf, String> {
     let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if name.is_empty() || name.len() > 64 || !name.chars().all(fits) {
@@ -139,7 +139,7 @@ pub fn path_of(name: &str) -> Result<PathBuf, String> {
     Ok(Path::new("/dev/shm").join(format!("specgen-plant-{name}")))
 }
 
-/// First half of a SHA-256 in hex as two words; 0 for what is no hex.
+/// First half of a SHA-256 in hex as two words; 0 for invalid hex.
 fn half_digest(digest: &str) -> [u64; 2] {
     [0, 16].map(|at| digest.get(at..at + 16).and_then(|part| u64::from_str_radix(part, 16).ok()).unwrap_or(0))
 }
@@ -157,10 +157,12 @@ pub struct Client {
 }
 
 impl Server {
-    /// Makes the file, for the machine of the spec with `digest` (SHA-256 in hex). It is removed when this is dropped.
+    /// Creates the file, for the machine of the spec with `digest` (SHA-256 in hex). It is removed when this is
+    /// dropped.
     ///
     /// # Errors
-    /// If a machine of this name is served, something that is not this user's own has that name, or the file cannot be made.
+    /// If a machine of this name is being served, the name belongs to another user's file, or the file cannot be
+    /// created.
     pub fn create(path: &Path, digest: &str) -> Result<Self, OpenError> {
         let failed = |cause| OpenError::File { path: path.to_owned(), cause };
         match Mapping::<SharedWords>::open(path) {
@@ -170,7 +172,7 @@ impl Server {
                     return Err(OpenError::Served { path: path.to_owned(), process });
                 }
             }
-            // What is left of another version, or nothing.
+            // Left over from another version, or by an interrupted start.
             Err(MapError::Size) => {}
             Err(MapError::File(cause)) if cause.kind() == io::ErrorKind::NotFound => {}
             Err(unfit) => return Err(OpenError::of(unfit, path)),
@@ -190,7 +192,8 @@ impl Server {
         Ok(Self { mapping, path: path.to_owned() })
     }
 
-    /// A new file, made under another name and then renamed: nobody maps half a file, and who still maps an old one keeps that.
+    /// A new file, created under another name and then renamed: nobody maps an incomplete file, and a process that maps
+    /// an old one keeps it.
     fn fresh(path: &Path) -> Result<(Mapping<SharedWords>, PathBuf), OpenError> {
         let fresh = path.with_extension(format!("{}.part", std::process::id()));
         let failed = |cause| OpenError::File { path: fresh.clone(), cause };
@@ -198,7 +201,7 @@ impl Server {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             made => return made.map(|mapping| (mapping, fresh.clone())).map_err(failed),
         }
-        // Of a process of this number that was killed, if it is this user's own.
+        // Left over from a killed process with this number, if it belongs to this user.
         match Mapping::<SharedWords>::open(&fresh) {
             Ok(_) | Err(MapError::Size) => std::fs::remove_file(&fresh).map_err(failed)?,
             Err(unfit) => return Err(OpenError::of(unfit, &fresh)),
@@ -206,14 +209,15 @@ impl Server {
         Mapping::create(&fresh).map(|mapping| (mapping, fresh.clone())).map_err(failed)
     }
 
-    /// The latest actuation and what the controller waits for (session, tick), once the counter of either has moved on from
-    /// `seen`; none after `timeout` (ns). It looks for `look` (ns) before it sleeps.
+    /// The latest actuation and the requested sensing (session, tick), once the counter of either differs from `seen`;
+    /// none after `timeout` (ns). It polls for `look` (ns) before it sleeps.
     #[must_use]
     pub fn wait(&self, seen: &mut u32, look: u64, timeout: u64) -> Option<(Actuation, [u64; 2])> {
         self.mapping.words().wait(seen, look, timeout)
     }
 
-    /// Whether the memory is lost: the file was made shorter, or its mark overwritten. Nothing is heard of a controller any more.
+    /// Whether the memory is lost: the file was truncated, or its magic word overwritten. The controller cannot be
+    /// heard any more.
     #[must_use]
     pub fn is_lost(&self) -> bool {
         self.mapping.words().magic.load(Ordering::Acquire) != MAGIC
@@ -236,7 +240,7 @@ impl Client {
     /// Opens the machine of the spec with `digest` (SHA-256 in hex).
     ///
     /// # Errors
-    /// If there is none, or it is of another spec.
+    /// If there is none, or it belongs to another spec.
     pub fn open(path: &Path, digest: &str) -> Result<Self, OpenError> {
         let mapping = Mapping::<SharedWords>::open(path).map_err(|unfit| OpenError::of(unfit, path))?;
         let words = mapping.words();
@@ -248,23 +252,23 @@ impl Client {
             let found = format!("{:016x}", found[0]);
             return Err(OpenError::OtherSpec { path: path.to_owned(), found });
         }
-        // Ticks count from 0 again; the machine sees by this that it is another run.
+        // Ticks start at 0 again; the session shows the machine that it is another run.
         let session = clock::now() ^ (u64::from(std::process::id()) << 40);
         Ok(Self { mapping, session })
     }
 
-    /// The reading at the beginning of `tick`; none if the machine does not give it within `timeout` (ns).
+    /// The reading at the beginning of `tick`; none if the machine does not publish it within `timeout` (ns).
     #[must_use]
     pub fn sense(&self, tick: u64, timeout: u64) -> Option<Sensing> {
         self.mapping.words().sense(self.session, tick, timeout)
     }
 
-    /// Gives codes out for the interval that begins with `tick`.
+    /// Publishes codes for the interval that begins with `tick`.
     pub fn actuate(&self, tick: u64, enable: bool, codes: &[i32; CHANNELS]) {
         self.mapping.words().actuate(self.session, tick, enable, codes);
     }
 
-    /// Whether the machine's process has ended, in order or not.
+    /// Whether the machine's process has ended, normally or not.
     #[must_use]
     pub fn is_abandoned(&self) -> bool {
         let process = self.mapping.words().server.load(Ordering::Acquire);

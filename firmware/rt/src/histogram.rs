@@ -1,10 +1,10 @@
-//! Times in fixed memory: every value to within 1/16 of itself, the extremes exactly. Nothing here allocates but the text.
+//! Times in fixed memory: every value with an error of at most 1/16, the extremes exact. Only the text allocates.
 
 use core::fmt::Write as _;
 
 /// Steps per doubling.
 const STEPS: usize = 16;
-/// Doublings that are told apart: up to 2^40 ns, 18 minutes.
+/// Number of doublings: up to 2^40 ns, 18 minutes.
 const OCTAVES: usize = 36;
 const BINS: usize = STEPS * (OCTAVES + 1);
 /// Characters of the longest bar.
@@ -48,13 +48,14 @@ impl Histogram {
         self.count
     }
 
-    /// The longest, ns; none of none.
+    /// The longest, ns; none if empty.
     #[must_use]
     pub fn largest(&self) -> Option<u64> {
         (self.count > 0).then_some(self.largest)
     }
 
-    /// A time that at least the share `share` (0 to 1) of all does not exceed, ns: at most 1/16 too long, never too short; none of none.
+    /// A time that at least the fraction `share` (0 to 1) of all values does not exceed, ns: at most 1/16 too long,
+    /// never too short; none if empty.
     #[must_use]
     pub fn quantile(&self, share: f64) -> Option<u64> {
         let wanted = (share * self.count as f64).ceil() as u64;
@@ -75,7 +76,7 @@ impl Histogram {
         (first..last).map(|octave| (upper_end((octave + 1) * STEPS - 1) + 1, counts[octave])).collect()
     }
 
-    /// A line per doubling with its count and a bar whose length is the logarithm of it, so that a single one is seen.
+    /// A line per doubling with its count and a bar of logarithmic length, so that a single value is visible.
     #[must_use]
     pub fn to_text(&self) -> String {
         let mut text = String::new();
@@ -90,7 +91,7 @@ impl Histogram {
     }
 }
 
-/// A time with a unit that suits it: `850 ns`, `12.4 µs`, `3.05 ms`, `2.1 s`.
+/// A time with a suitable unit: `850 ns`, `12.4 µs`, `3.05 ms`, `2.1 s`.
 #[must_use]
 pub fn time_text(nanoseconds: u64) -> String {
     let ns = nanoseconds as f64;
@@ -107,7 +108,7 @@ pub fn time_text(nanoseconds: u64) -> String {
     }
 }
 
-/// The same, `-` where nothing was timed.
+/// The same; `-` if nothing was timed.
 #[must_use]
 pub fn known_text(nanoseconds: Option<u64>) -> String {
     nanoseconds.map_or_else(|| "-".to_owned(), time_text)

@@ -1,4 +1,5 @@
-//! What a control loop needs of Linux, without a controller: the real-time target, `specgen plant` and `specgen doctor` share it.
+//! Linux services for a control loop, without a controller: shared by the real-time target, `specgen plant` and
+//! `specgen doctor`.
 //!
 //! ```text
 //! clock        monotonic time, absolute sleeps, what happened to a thread in between
@@ -9,7 +10,8 @@
 //! exchange     shared memory between a controller and the machine that it moves
 //! signals      those that are no reason to end
 //! ```
-//! Linux alone. The calls of the system are in `clock`, `scheduling`, `exchange`, `allocation` and `signals`, the only modules with unsafe code.
+//! Linux only. System calls are in `clock`, `scheduling`, `exchange`, `allocation` and `signals`, the only modules with
+//! unsafe code.
 
 pub mod account;
 pub mod allocation;

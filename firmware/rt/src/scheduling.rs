@@ -1,4 +1,4 @@
-//! What a thread asks of the system before it runs in real time, and in words what to do where it is refused.
+//! Privileges and resources of a real-time thread, with instructions for each that is missing.
 #![allow(unsafe_code)] // Calls of the C library; each says why it is sound.
 
 use std::fmt;
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// Bytes of stack that are touched before the loop starts.
 pub const STACK: usize = 512 * 1024;
 
-/// A right that the system did not give.
+/// A privilege that the system denied.
 #[derive(Debug)]
 pub struct MissingPrivilege {
     /// What was asked for.
@@ -28,29 +28,29 @@ impl fmt::Display for MissingPrivilege {
 
 impl std::error::Error for MissingPrivilege {}
 
-/// How real-time priority is given to a user, or to a program.
+/// How to grant real-time priority to a user, or to a program.
 pub const FIX_PRIORITY: &str = "put `@realtime - rtprio 95` into /etc/security/limits.d/realtime.conf and join group \
      `realtime` (log in again), or `sudo setcap cap_sys_nice,cap_ipc_lock+ep` on this program";
-/// How memory may be locked.
+/// How to permit locked memory.
 pub const FIX_MEMORY: &str = "put `@realtime - memlock unlimited` into /etc/security/limits.d/realtime.conf and join group \
      `realtime` (log in again), or `sudo setcap cap_sys_nice,cap_ipc_lock+ep` on this program";
 
 /// Puts the calling thread under `SCHED_FIFO` at `priority` (1 to 99).
 ///
 /// # Errors
-/// Without the right to, or if the priority is none.
+/// If the privilege is missing, or the priority is invalid.
 pub fn set_fifo(priority: u8) -> Result<(), MissingPrivilege> {
     // SAFETY: an all-zero sched_param is valid (some C libraries have more fields); the call reads it.
     let answer = unsafe {
         let mut parameters: libc::sched_param = core::mem::zeroed();
         parameters.sched_priority = libc::c_int::from(priority);
-        // Children of this thread, if there ever are any, are ordinary ones.
+        // Child threads, if there are any, get normal scheduling.
         libc::sched_setscheduler(0, libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, &raw const parameters)
     };
     refused(answer, || format!("SCHED_FIFO at priority {priority}"), FIX_PRIORITY)
 }
 
-/// Keeps every page of this process in memory, those mapped later too.
+/// Keeps every page of this process in memory, including later ones.
 ///
 /// # Errors
 /// Without the right to.
@@ -60,7 +60,7 @@ pub fn lock_memory() -> Result<(), MissingPrivilege> {
     refused(answer, || "locking memory (mlockall)".to_owned(), FIX_MEMORY)
 }
 
-/// Lets the system take pages away again.
+/// Lets the system page memory out again.
 pub fn unlock_memory() {
     // SAFETY: takes no pointers.
     unsafe { libc::munlockall() };
@@ -69,7 +69,7 @@ pub fn unlock_memory() {
 /// Keeps the calling thread on one processor.
 ///
 /// # Errors
-/// If there is no such processor, or it is not among those of this process.
+/// If the processor does not exist, or is not available to this process.
 pub fn pin(processor: usize) -> Result<(), MissingPrivilege> {
     let fix = "choose one that `taskset -p $$` allows; `nproc --all` counts them from 0";
     if processor >= libc::CPU_SETSIZE as usize {
@@ -85,7 +85,7 @@ pub fn pin(processor: usize) -> Result<(), MissingPrivilege> {
     refused(answer, || format!("processor {processor}"), fix)
 }
 
-/// Processors that this process may run on, in ascending order.
+/// Processors available to this process, in ascending order.
 #[must_use]
 pub fn processors() -> Vec<usize> {
     // SAFETY: an all-zero set is the empty one; the call writes it, the query stays within it.
@@ -98,7 +98,8 @@ pub fn processors() -> Vec<usize> {
     }
 }
 
-/// Soft and hard limit of a resource (`libc::RLIMIT_…`); none if the system does not say. `u64::MAX` is no limit.
+/// Soft and hard limit of a resource (`libc::RLIMIT_…`); none if the system does not return them. `u64::MAX` means no
+/// limit.
 #[must_use]
 pub fn limit(resource: Resource) -> Option<[u64; 2]> {
     let name = match resource {
@@ -121,28 +122,28 @@ pub enum Resource {
     LockedMemory,
 }
 
-/// Touches [`STACK`] bytes of the calling thread's stack, so that no page of it is missing later.
+/// Touches [`STACK`] bytes of the calling thread's stack, to avoid page faults later.
 #[inline(never)]
 pub fn touch_stack() {
     let mut pages = [0_u8; STACK];
-    // Volatile by way of `black_box`: the compiler may not leave the writes out.
+    // `black_box` keeps the compiler from removing the writes.
     for page in std::hint::black_box(&mut pages).chunks_mut(4096) {
         page[0] = 1;
     }
     std::hint::black_box(&pages);
 }
 
-/// Keeps processors out of deep sleep for as long as this lives.
+/// Keeps processors out of deep sleep while it exists.
 #[derive(Debug)]
 pub struct AwakeProcessors {
     _file: File,
 }
 
 impl AwakeProcessors {
-    /// Asks for a wake-up latency of 0 µs by `/dev/cpu_dma_latency`.
+    /// Requests a wake-up latency of 0 µs by `/dev/cpu_dma_latency`.
     ///
     /// # Errors
-    /// If the device is not there or not writable.
+    /// If the device does not exist or is not writable.
     pub fn request() -> Result<Self, MissingPrivilege> {
         let path = PathBuf::from("/dev/cpu_dma_latency");
         let ask = || {

@@ -3,8 +3,8 @@
 //! ```text
 //! e_k = 1/D Σ (h_d(n) − h(n)),  n = k D … (k + 1) D − 1        D: ticks from knot to knot, of errors as of corrections
 //! ```
-//! A pass begins with rest, in which the correction may already lead; then a trajectory is played, and the rest behind it belongs to the pass. What it
-//! kept is for whoever learns from it, between passes: the host, or the [background](crate::learning) of the device itself.
+//! A pass begins at rest, where the correction may already be active. Then a trajectory is played, and the rest after it
+//! belongs to the pass. Between passes, the host or the device's [background](crate::learning) learns from the stored error.
 
 use crate::learning::{Learning, Settings};
 use crate::playback::{self, Knot, UNIT};

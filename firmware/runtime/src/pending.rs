@@ -13,7 +13,7 @@ choice! {
     /// Outcome of the last command that was to wait.
     pub enum Stage {
         /// There was no such command.
-        None = 0 => "nothing was ordered for the edge",
+        None = 0 => "no command for the edge",
         /// It waits.
         Waiting = 1 => "waits for the edge",
         /// It took effect in the tick of the edge.

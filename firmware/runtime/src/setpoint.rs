@@ -32,7 +32,7 @@ pub use trajectory::{Axis, Row, Segment, Table, Trajectory};
 choice! {
     /// Kind of a command.
     pub enum CommandKind or Unknown {
-        /// Stand still.
+        /// Hold the present set-point.
         Hold = 0,
         /// Follow the streamed set-points.
         Stream = 1,

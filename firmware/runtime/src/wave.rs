@@ -256,7 +256,7 @@ fn smooth<T: Real>(tick: i32, ticks: i32) -> Sample<T> {
 }
 
 impl<T: Real> Settings<T> {
-    /// Stands still at zero.
+    /// Constant zero.
     #[must_use]
     pub const fn still() -> Self {
         Self {

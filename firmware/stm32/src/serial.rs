@@ -97,13 +97,13 @@ impl<P: Port> Line<P> {
 
     /// Takes what has come in, and answers it, for as long as no answer is on its way: the end of one is an interrupt, which comes back
     /// here.
-    pub fn serve(&mut self, endpoint: &mut Endpoint, desk: &mut LinkHandler, with: &mut Access<'_>) {
+    pub fn serve(&mut self, endpoint: &mut Endpoint, handler: &mut LinkHandler, with: &mut Access<'_>) {
         if FAILED.swap(false, Ordering::Relaxed) {
             self.next = self.end();
         }
         while !DMA1.st(P::SEND).cr().read().en() {
             let Some(byte) = self.take() else { return };
-            if let Some(reply) = endpoint.push(byte, &mut RequestContext { desk: &mut *desk, with: &mut *with }) {
+            if let Some(reply) = endpoint.push(byte, &mut RequestContext { handler: &mut *handler, with: &mut *with }) {
                 self.send(reply);
             }
         }

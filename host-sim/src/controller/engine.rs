@@ -1,14 +1,14 @@
-//! What computes the ticks of a controller.
+//! The engine that computes the ticks of a controller.
 
 use std::alloc::Layout;
 use std::any::Any;
 
-/// One configuration, one state of the control law, and one machine: the law under its supervisor. All numbers are words, as in the
-/// C interface of emitted libraries.
+/// One configuration, one state of the control law, and one machine (the law under its supervisor). All numbers are
+/// words, as in the C interface of emitted libraries.
 ///
-/// Callers give slices of the lengths that the description says.
+/// Callers pass slices of the lengths in the description.
 pub trait Engine: Send + Sync {
-    /// What the controller says of itself, `key=value` lines.
+    /// The controller's self-description, `key=value` lines.
     fn text(&self) -> String;
     /// Sizes and alignments of a state, a configuration, and a machine.
     fn layouts(&self) -> [Layout; 3];
@@ -19,7 +19,7 @@ pub trait Engine: Send + Sync {
     /// # Panics
     /// If `other` has other constants.
     fn take_over(&mut self, other: &dyn Engine);
-    /// To tell engines from each other.
+    /// For distinguishing engines.
     fn as_any(&self) -> &dyn Any;
 
     /// Configuration of the spec.
@@ -27,7 +27,7 @@ pub trait Engine: Send + Sync {
     /// Takes a configuration.
     ///
     /// # Errors
-    /// Index of the first word that is refused; the configuration in force then stays.
+    /// Index of the first refused word; the present configuration is then kept.
     fn configure(&mut self, words: &[u64]) -> Result<(), usize>;
     /// The law as at power-up.
     fn reset(&mut self);
@@ -36,7 +36,7 @@ pub trait Engine: Send + Sync {
     /// Digest of the law's state.
     fn digest(&self) -> u64;
 
-    /// The machine as at power-up: disarmed. It comes before every other use of the machine.
+    /// Resets the machine to power-up: disarmed. Required before any other use of the machine.
     fn reset_machine(&mut self);
     /// One supervised tick.
     fn step_machine(&mut self, input: &[u64], output: &mut [u64]);
@@ -49,7 +49,7 @@ pub trait Engine: Send + Sync {
     /// Takes a snapshot.
     ///
     /// # Errors
-    /// Index of the first word that no machine holds; the machine then stays as it is.
+    /// Index of the first invalid word; the machine is then unchanged.
     fn load_machine(&mut self, words: &[u64]) -> Result<(), usize>;
 
     /// Word of each gauge (rows) per displacement of each leg (columns) near these words.

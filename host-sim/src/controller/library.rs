@@ -1,4 +1,5 @@
-//! The shared library of an emitted controller; the only module with unsafe code but for one that picks instructions.
+//! The shared library of an emitted controller. Apart from one for CPU instructions, this is the only module with
+//! unsafe code.
 //!
 //! The library's C interface, version 2: `specgen_abi_version`, `_describe`, `_config_default`, `_config_check`,
 //! `_config_load`, `_state_reset`, `_step`, `_state_digest`, and under the supervisor `_machine_reset`,
@@ -17,7 +18,7 @@ use super::ControllerError;
 use super::engine::Engine;
 use crate::description::{DescriptionError, fields};
 
-/// Version of the C interface that this module speaks.
+/// Version of the C interface in this module.
 pub const ABI_VERSION: u32 = 2;
 
 type Reset = unsafe extern "C" fn(*mut u8);
@@ -51,14 +52,15 @@ pub(super) struct Emitted {
     machine: Buffer,
     /// Words of a machine's snapshot.
     machine_words: usize,
-    /// Last, so that it is unloaded after everything else.
+    /// Last, so that it is unloaded after all other fields.
     library: Arc<Library>,
 }
 
-// SAFETY: the buffers belong to one controller each and hold plain values without pointers (`Config`, `State` and `Machine` of an
-// emitted crate are `Copy`); the library's functions touch nothing but what they are given, and the library has no state.
+// SAFETY: the buffers belong to one controller each and hold plain values without pointers (`Config`, `State` and
+// `Machine` of an emitted crate are `Copy`). The library's functions access only their arguments, and the library has
+// no state.
 unsafe impl Send for Emitted {}
-// SAFETY: what takes a shared reference only reads configuration, state and machine.
+// SAFETY: methods with a shared reference only read configuration, state and machine.
 unsafe impl Sync for Emitted {}
 
 impl Emitted {
@@ -66,11 +68,12 @@ impl Emitted {
     /// [`Engine::reset_machine`].
     pub(super) fn load(path: &Path) -> Result<Self, ControllerError> {
         let failed = |cause| ControllerError::Load { path: path.to_owned(), cause };
-        // SAFETY: loading runs the library's initialisers. The caller names a controller library; an emitted one has none.
+        // SAFETY: loading runs the library's initialisers. The caller names a controller library; an emitted one has
+        // none.
         let library = unsafe { Library::new(path) }.map_err(failed)?;
 
-        // SAFETY: the types are those of the interface version; the version function itself is the same in every version,
-        // and is asked before any other is called. The pointers are used only while `library` lives, see `Emitted`.
+        // SAFETY: the types are those of the interface version. The version function is the same in every version, and
+        // is called before any other. The pointers are used only while `library` lives, see `Emitted`.
         let (describe, functions) = unsafe {
             let abi_version: unsafe extern "C" fn() -> u32 = *library.get(b"specgen_abi_version\0").map_err(failed)?;
             let found = abi_version();
@@ -150,27 +153,28 @@ impl Engine for Emitted {
     }
 
     fn default_config(&self, words: &mut [u64]) {
-        // SAFETY: as many words as the library says it writes.
+        // SAFETY: the library writes this number of words.
         unsafe { (self.functions.config_default)(words.as_mut_ptr()) };
     }
 
     fn configure(&mut self, words: &[u64]) -> Result<(), usize> {
-        // SAFETY: as many words as the library says it reads.
+        // SAFETY: the library reads this number of words.
         let mut bad = unsafe { (self.functions.config_check)(words.as_ptr()) };
         if bad == 0 {
-            // SAFETY: the buffer has the size and alignment that the library asks for; the words as above.
+            // SAFETY: the buffer has the size and alignment that the library requires; the words as above.
             bad = unsafe { (self.functions.config_load)(self.config.start(), words.as_ptr()) };
         }
         refused(bad)
     }
 
     fn reset(&mut self) {
-        // SAFETY: the buffer has the size and alignment that the library asks for.
+        // SAFETY: the buffer has the size and alignment that the library requires.
         unsafe { (self.functions.state_reset)(self.state.start()) };
     }
 
     fn step(&mut self, input: &[u64], output: &mut [u64]) {
-        // SAFETY: `Controller::of` initialised both buffers; the slices have the lengths that the library says, checked by the caller.
+        // SAFETY: `Controller::of` initialised both buffers; the slices have the lengths in the description, checked by
+        // the caller.
         unsafe {
             (self.functions.step)(self.config.start(), self.state.start(), input.as_ptr(), output.as_mut_ptr());
         }
@@ -182,12 +186,13 @@ impl Engine for Emitted {
     }
 
     fn reset_machine(&mut self) {
-        // SAFETY: the buffer has the size and alignment that the library asks for.
+        // SAFETY: the buffer has the size and alignment that the library requires.
         unsafe { (self.functions.machine_reset)(self.machine.start()) };
     }
 
     fn step_machine(&mut self, input: &[u64], output: &mut [u64]) {
-        // SAFETY: `Supervised::new` initialised the machine; the slices have the lengths that the library says, checked by the caller.
+        // SAFETY: `Supervised::new` initialised the machine; the slices have the lengths in the description, checked by
+        // the caller.
         unsafe {
             (self.functions.machine_step)(
                 self.config.start(),
@@ -208,13 +213,13 @@ impl Engine for Emitted {
     }
 
     fn save_machine(&self, words: &mut [u64]) {
-        // SAFETY: the machine is initialised; there are as many words as the library says it writes, checked by the caller.
+        // SAFETY: the machine is initialised; the library writes this number of words, checked by the caller.
         unsafe { (self.functions.machine_save)(self.machine.start(), words.as_mut_ptr()) };
     }
 
     fn load_machine(&mut self, words: &[u64]) -> Result<(), usize> {
-        // SAFETY: the buffer has the size and alignment that the library asks for; there are as many words as it reads, checked by the
-        // caller.
+        // SAFETY: the buffer has the size and alignment that the library requires; the library reads this number of
+        // words, checked by the caller.
         refused(unsafe { (self.functions.machine_load)(self.machine.start(), words.as_ptr()) })
     }
 
@@ -226,7 +231,7 @@ impl Engine for Emitted {
     }
 }
 
-/// The index of a refused word, of what the library returns: one more, or 0.
+/// The index of a refused word, from the library's result: the result less 1; none for 0.
 fn refused(bad: i32) -> Result<(), usize> {
     usize::try_from(bad).unwrap_or(usize::MAX).checked_sub(1).map_or(Ok(()), Err)
 }
@@ -277,7 +282,7 @@ impl Drop for Buffer {
 fn size(text: &str, key: &'static str) -> Result<usize, DescriptionError> {
     let fields = fields(text);
     let value = fields.get(key).ok_or(DescriptionError::Missing(key))?;
-    // A gigabyte is far beyond any controller, and an allocation that would abort the process.
+    // A gigabyte is far beyond any controller, and a failed allocation would abort the process.
     value.parse().ok().filter(|size| *size <= 1 << 30).ok_or_else(|| DescriptionError::Bad {
         key,
         value: (*value).to_owned(),

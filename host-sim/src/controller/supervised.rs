@@ -1,4 +1,4 @@
-//! The supervised tick of a controller: what the other targets run.
+//! The supervised tick of a controller, which the other targets run.
 
 mod snapshot;
 mod standing;
@@ -12,12 +12,12 @@ use super::{Controller, ControllerError, TickController};
 pub use snapshot::SnapshotError;
 pub use standing::RestingReadings;
 
-/// Words that the supervised tick takes beyond those of the control law: request, events.
+/// Additional input words of the supervised tick: request, events.
 const MORE_INPUTS: usize = 2;
-/// Words that it gives beyond them: the supervisor's, conditions.
+/// Additional output words: the supervisor's, conditions.
 const MORE_OUTPUTS: usize = 2;
 
-/// The supervisor's word of an output row, taken apart.
+/// The supervisor's word of an output row, decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MachineWord {
     /// 0 disarmed, 1 arming, 2 running, 3 holding, 4 ramping down, 5 faulted.
@@ -26,9 +26,9 @@ pub struct MachineWord {
     /// 7 slew saturation, 8 missed tick, 9 link lost, 10 integrity, 11 converter, 12 emergency stop, 13 host gone, 14 wiring,
     /// 15 stalled, 16 oscillation.
     pub cause: u8,
-    /// Whether the amplifiers are to be on.
+    /// Whether the amplifiers are on.
     pub amplifier_on: bool,
-    /// Word of what the wiring check found, or of what the law has fallen back to, a [`Finding`]; 0 is nothing.
+    /// Word of a [`Finding`]: of the wiring check, or the fallback stage; 0 is nothing.
     pub finding: u32,
 }
 
@@ -41,7 +41,7 @@ impl MachineWord {
     }
 }
 
-/// Phase and, if there is one, cause in words; a number where there is no such.
+/// Phase and, if there is one, cause as text; unknown values as numbers.
 impl fmt::Display for MachineWord {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.among::<[u32; 0]>(&[]))
@@ -49,7 +49,8 @@ impl fmt::Display for MachineWord {
 }
 
 impl MachineWord {
-    /// The same with what the wiring check found or the law has fallen back to, and which faults look like it: `alike` are sets of such, as words of [`Finding`].
+    /// The same with the finding of the wiring check or the fallback stage, and its alternatives: `alike` are sets of
+    /// equivalent faults, as words of [`Finding`].
     #[must_use]
     pub fn among<S: AsRef<[u32]>>(&self, alike: &[S]) -> String {
         let Self { phase, cause, finding, .. } = *self;
@@ -73,14 +74,14 @@ pub struct Supervised {
 }
 
 impl Supervised {
-    /// Puts a controller under its supervisor, disarmed.
+    /// A controller under its supervisor, disarmed.
     #[must_use]
     pub fn new(mut controller: Controller) -> Self {
         controller.engine.reset_machine();
         Self { controller }
     }
 
-    /// The controller underneath: its description and configuration. Its own state is not that of the machine.
+    /// The inner controller: its description and configuration. Its own state is not that of the machine.
     #[must_use]
     pub fn controller(&self) -> &Controller {
         &self.controller
@@ -89,7 +90,7 @@ impl Supervised {
     /// Takes a configuration; the machine is kept.
     ///
     /// # Errors
-    /// If the number of words is wrong or a word is refused; the configuration in force then stays.
+    /// If the number of words is wrong or a word is refused; the present configuration is then kept.
     pub fn configure(&mut self, words: &[u64]) -> Result<(), ControllerError> {
         self.controller.configure(words)
     }
@@ -118,7 +119,7 @@ impl Supervised {
     /// One supervised tick; returns the supervisor's word of the output.
     ///
     /// # Panics
-    /// If `input` or `output` has not two words more than the description names.
+    /// If `input` or `output` does not have two words more than the description.
     pub fn step(&mut self, input: &[u64], output: &mut [u64]) -> MachineWord {
         let description = &self.controller.description;
         assert_eq!(input.len(), description.input_names.len() + MORE_INPUTS, "input words");
@@ -133,7 +134,7 @@ impl Supervised {
         self.controller.engine.machine_digest()
     }
 
-    /// Another machine in the same state: to continue from here more than once.
+    /// Another machine in the same state, for several continuations from here.
     #[must_use]
     pub fn fork(&self) -> Self {
         Self { controller: self.controller.fork() }

@@ -8,7 +8,7 @@ use super::bound::Bound;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoucWenParameters {
-    /// α: what the hysteresis takes of a small change of voltage, in (0, 1).
+    /// α: fraction of a small change of voltage that the hysteresis takes, in (0, 1).
     pub alpha: f64,
     /// β, 1/V, > 0.
     #[serde(rename = "beta_per_V")]
@@ -19,13 +19,13 @@ pub struct BoucWenParameters {
 }
 
 impl BoucWenParameters {
-    /// The same loop, `factor` (> 0) times as wide and as long.
+    /// The same loop, wider and longer by `factor` (> 0).
     pub(super) fn widen(&mut self, factor: f64) {
         self.beta_per_v /= factor;
         self.gamma_per_v /= factor;
     }
 
-    /// What is wrong with it.
+    /// Findings about its values.
     pub(super) fn findings(&self) -> Vec<String> {
         let Self { alpha, beta_per_v, gamma_per_v } = *self;
         let ranges = [
@@ -41,7 +41,8 @@ impl BoucWenParameters {
         found
     }
 
-    /// Steepest dh/dv, in a branch that begins where the last one ended: from 1 on the leg would shorten while its voltage rises.
+    /// Steepest dh/dv, in a branch that continues the previous one: from 1 on the leg would shorten while its voltage
+    /// rises.
     fn steepest(&self) -> f64 {
         let turned = 2.0 * self.alpha * self.beta_per_v / (self.beta_per_v + self.gamma_per_v);
         if turned > self.alpha { turned } else { self.alpha }
@@ -50,8 +51,8 @@ impl BoucWenParameters {
 
 /// x = v − h with dh = α dv − β |dv| h − γ dv |h| (exponent 1), exact for a voltage that is monotonic over a step; V.
 ///
-/// Independent of the rate. Loops are smooth and close only in the limit of many cycles, so no Everett table holds them. As built,
-/// v and h are 0.
+/// Rate-independent. Loops are smooth and close only in the limit of many cycles, so no Everett table represents them.
+/// As built, v and h are 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoucWen {
     of: BoucWenParameters,
@@ -72,7 +73,7 @@ impl BoucWen {
         self.voltage - self.lost
     }
 
-    /// dx/dv of a voltage that goes the way of `way` from here.
+    /// dx/dv for a voltage in the direction of `way` from here.
     pub(super) fn slope(&self, way: f64) -> f64 {
         let BoucWenParameters { alpha, beta_per_v: beta, gamma_per_v: gamma } = self.of;
         let g = if way < 0.0 { -self.lost } else { self.lost };
@@ -84,7 +85,8 @@ impl BoucWen {
         let BoucWenParameters { alpha, beta_per_v: beta, gamma_per_v: gamma } = self.of;
         let way = v - self.voltage;
         let direction = if way < 0.0 { -1.0 } else { 1.0 };
-        // g = h along the way s ≥ 0: dg/ds = α − β g − γ |g|, which is linear on either side of 0 and rises through it.
+        // g = h along the distance s ≥ 0: dg/ds = α − β g − γ |g|, which is linear on either side of 0 and rises
+        // through it.
         let (mut g, mut left) = (direction * self.lost, way.abs());
         if g < 0.0 {
             let rate = beta - gamma;
@@ -111,7 +113,7 @@ fn grown(rate: f64, way: f64) -> f64 {
     if rate == 0.0 { way } else { -libm::expm1(-rate * way) / rate }
 }
 
-/// The way after which [`grown`] is `value`; infinite if it never is.
+/// The distance after which [`grown`] is `value`; infinite if it is never reached.
 fn time_of(rate: f64, value: f64) -> f64 {
     if rate == 0.0 {
         value

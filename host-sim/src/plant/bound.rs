@@ -1,4 +1,4 @@
-//! Ranges of parameters, and what is wrong with a value outside.
+//! Ranges of parameters, and findings about values outside.
 
 use std::fmt;
 
@@ -21,7 +21,7 @@ impl Bound {
         }
     }
 
-    /// What is wrong with `value`, which is to keep both bounds. A NaN holds no bound, so it is found too.
+    /// Finding about a `value` that violates a bound. A NaN violates every bound.
     pub(crate) fn and(self, other: Self, field: &str, value: f64) -> Option<String> {
         let good = self.holds(value) && other.holds(value);
         (!good).then(|| format!("`{field}` is {value}; expected a number {self} and {other}"))

@@ -3,8 +3,8 @@
 /// Creep operators ċ = a_j · dead(v − c, r_k) for every rate a_j and threshold r_k,
 /// where dead(x, r) is x − r above r, x + r below −r and 0 between.
 ///
-/// The weight of a rate is shared equally by its thresholds: Σ_j w_j · mean_k c_jk.
-/// A leg as built has every c at 0.
+/// The weight of a rate is divided equally among its thresholds: Σ_j w_j · mean_k c_jk. A leg as built has every c at
+/// 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CreepBank {
     /// a_j, 1/s.
@@ -31,7 +31,7 @@ impl CreepBank {
         }
     }
 
-    /// Fixes the length of the steps that follow, s.
+    /// Sets the length of the following steps, s.
     pub fn set_step(&mut self, step: f64) {
         for (gain, rate) in self.gains.iter_mut().zip(&self.rates) {
             *gain = -libm::expm1(-rate * step);

@@ -16,7 +16,7 @@ impl Lag {
         Self { time_constant, decay: 0.0, output: 0.0 }
     }
 
-    /// Fixes the length of the steps that follow, s.
+    /// Sets the length of the following steps, s.
     pub fn set_step(&mut self, step: f64) {
         self.decay = self.decay_over(step);
     }
@@ -33,15 +33,15 @@ impl Lag {
     }
 }
 
-/// The same lag behind something that moves smoothly and whose rate is known: τ ẏ = u − y.
+/// The same lag with a smooth input whose rate is known: τ ẏ = u − y.
 ///
-/// Exact for an input that is a cubic over a step, the one through its values and rates at both ends. Against an oscillation
-/// at ω that is off by (ω step)⁴/384 of its amplitude at most.
+/// Exact for an input that is a cubic over a step, given by its values and rates at both ends. For an oscillation at ω
+/// the error is at most (ω step)⁴/384 of its amplitude.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SmoothLag {
     time_constant: f64,
     step: f64,
-    /// Of the input's values at the beginning and the end of a step, and of its rates there.
+    /// Factors of the input's values at the beginning and the end of a step, and of its rates there.
     values: [f64; 2],
     rates: [f64; 2],
     output: f64,
@@ -54,14 +54,14 @@ impl SmoothLag {
         Self { time_constant, step: 0.0, values: [0.0; 2], rates: [0.0; 2], output: 0.0 }
     }
 
-    /// Fixes the length of the steps that follow, s.
+    /// Sets the length of the following steps, s.
     pub fn set_step(&mut self, step: f64) {
         if step.to_bits() == self.step.to_bits() {
             return;
         }
         self.step = step;
-        // m_n = r ∫ e^(−r (1−s)) sⁿ ds over 0 to 1: m_0 = 1 − e^(−r), m_n = 1 − n m_(n−1)/r. Upwards that loses digits where
-        // r is small, downwards where it is large.
+        // m_n = r ∫ e^(−r (1−s)) sⁿ ds over 0 to 1: m_0 = 1 − e^(−r), m_n = 1 − n m_(n−1)/r. The upward recursion loses
+        // digits if r is small, the downward one if it is large.
         let r = step / self.time_constant;
         let mut moments = [-libm::expm1(-r), 0.0, 0.0, 0.0];
         if r > 4.0 {
@@ -89,14 +89,14 @@ impl SmoothLag {
         self.output
     }
 
-    /// Puts it where it stays for this input.
+    /// Sets it to the steady state of this input.
     pub fn rest_at(&mut self, input: f64) {
         self.output = input;
     }
 
-    /// One step over which the input goes from `before` to `after`, each its value and rate (1/s).
+    /// One step over which the input goes from `before` to `after`, each as value and rate (1/s).
     pub fn advance(&mut self, before: [f64; 2], after: [f64; 2]) {
-        // As differences from the output: what stands still keeps its bits.
+        // As differences from the output: a constant value keeps its bits.
         self.output += (self.values[0] * (before[0] - self.output) + self.values[1] * (after[0] - self.output))
             + (self.rates[0] * before[1] + self.rates[1] * after[1]);
     }
@@ -125,7 +125,7 @@ impl Resonance {
         }
     }
 
-    /// Fixes the length of the steps that follow, s.
+    /// Sets the length of the following steps, s.
     pub fn set_step(&mut self, step: f64) {
         let sigma = self.damping * self.natural;
         let damped = self.natural * libm::sqrt(1.0 - self.damping * self.damping);
@@ -137,7 +137,7 @@ impl Resonance {
         ];
     }
 
-    /// Position now, in the unit of the input.
+    /// Present position, in the unit of the input.
     #[must_use]
     pub fn position(&self) -> f64 {
         self.position
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_smooth_lag_follows_an_oscillation_as_the_closed_form_says_whatever_the_step() {
-        // 10.6 µs is a corner of 15 kHz, 10 ms the longest that a spec may have.
+        // 10.6 µs is a corner of 15 kHz, 10 ms the longest lag of a spec.
         for (time_constant, frequency) in [(1e-7, 800.0), (10.6e-6, 800.0), (0.3e-3, 800.0), (10e-3, 10.0)] {
             let w = core::f64::consts::TAU * frequency;
             let wave = |time: f64| [libm::sin(w * time), w * libm::cos(w * time)];

@@ -1,27 +1,27 @@
-//! The stacks of six legs side by side: the equations of [`Stack`], a lane each, in steps as long as a control interval.
+//! The stacks of six legs in parallel: the equations of [`Stack`], a lane each, in steps of a control interval.
 //!
-//! Behind an amplifier that holds its input the voltage of a leg is monotonic over a step, and neither plays nor Bouc-Wen
-//! hysteresis depend on the rate of a monotonic voltage: their state at its end is exact however long the step is. The creep
-//! takes the mean voltage of the step instead of the last one.
+//! After an amplifier that holds its input, the voltage of a leg is monotonic over a step, and neither plays nor
+//! Bouc-Wen hysteresis depend on the rate of a monotonic voltage. Their state at the end of a step is therefore exact
+//! for any length. The creep uses the mean voltage of the step instead of the last one.
 //!
-//! What drives a structure is the whole way within a step, not its end alone. A play that is taken along from somewhere
-//! within the step bends that way; left out, such bends ring the structure by some tenths of a nanometre. They are told as
-//! moments, see [`StepShape`].
+//! The motion within a step drives a structure, not only its end. A play that starts to move within the step bends that
+//! motion. If such bends were neglected, they would make the structure ring by some tenths of a nanometre. They are
+//! represented by moments, see [`StepShape`].
 
 use super::Stack;
 use super::bouc_wen::BoucWen;
 
-/// Lanes: six legs, and two that idle, for the width of vector registers.
+/// Lanes: six legs, and two idle ones, to fill vector registers.
 pub(crate) const LANES: usize = 8;
 /// A number of each leg.
 pub(crate) type Lane = [f64; LANES];
-/// By how much thresholds may be wider or narrower than their rate says: 4 pm of a leg that moves 60 µm.
+/// Largest deviation of the thresholds from their rate-dependent width: 4 pm for a leg that moves 60 µm.
 const WIDENING_TOLERANCE: f64 = 1e-6;
-/// Lags of the voltage in a step from which on all plays that move do so at once.
+/// Number of lags in a step above which all moving plays start at once.
 const AT_ONCE: f64 = 5.0;
 
-/// How something goes over a step of length 1, a lane a leg: to `end`, and on the way off the shape that the amplifier's lag
-/// gives by a `mean` and by a `skew`, its first moment about the middle of the step.
+/// A motion over a step of length 1, a lane per leg: its `end`, and its deviation from the shape of the amplifier's
+/// lag, as a `mean` and as `skew`, the first moment about the middle of the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StepShape {
     pub(crate) end: Lane,
@@ -29,8 +29,8 @@ pub(crate) struct StepShape {
     pub(crate) skew: Lane,
 }
 
-/// How the displacements of plays that are taken along only over the last part f of a way, of which they miss 1 − f, are off
-/// the shape of the way: mean and skew are `mean[0]` (1 − f) + `mean[1]` (1 − f²) of what they move, and likewise.
+/// Shape of plays that move only during the last part f of a motion, and so miss 1 − f: their mean is `mean[0]` (1 − f)
+/// + `mean[1]` (1 − f²) times their displacement, and likewise the skew.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LateShape {
     mean: [Lane; 2],
@@ -38,10 +38,11 @@ pub(crate) struct LateShape {
 }
 
 impl LateShape {
-    /// Behind amplifiers whose voltage has so many lags in a step.
+    /// For amplifiers with this number of lags in a step.
     pub(crate) fn behind(lags: &[f64; 6]) -> Self {
-        // With r lags in a step the voltage has the last z of its way before it for ln(1 + z (e^r − 1))/r of the step. That
-        // is taken as z + bend z (1 − z), true at 0, 1/2 and 1; with very many the way is over at once.
+        // With r lags in a step, the last fraction z of the voltage's change takes ln(1 + z (e^r − 1))/r of the step.
+        // This is approximated by z + bend z (1 − z), exact at 0, 1/2 and 1. With very many lags the change is
+        // immediate.
         let late = |r: f64| if r < AT_ONCE { 1.0 } else { 0.0 };
         let bend = |r: f64| if r < AT_ONCE { 4.0 * libm::log1p(0.5 * libm::expm1(r)) / r - 2.0 } else { 0.0 };
         Self {
@@ -50,7 +51,7 @@ impl LateShape {
         }
     }
 
-    /// One leg goes straight for so much of the step, and rests.
+    /// One leg moves linearly for this fraction of the step, and then rests.
     pub(crate) fn straight(&mut self, leg: usize, part: f64) {
         let square = part * part;
         self.mean[0][leg] = -0.5 * part;
@@ -60,7 +61,7 @@ impl LateShape {
     }
 }
 
-/// The plays of six legs, or another hysteresis of each.
+/// The plays of six legs, or another hysteresis model.
 #[derive(Debug, Clone, PartialEq)]
 enum Hysteresis {
     /// Threshold, weight and state of every play.
@@ -86,14 +87,14 @@ pub(crate) struct StackLanes {
     gain: Lane,
 }
 
-/// A number of each leg, 0 in the idle lanes.
+/// A number for each leg, 0 in the idle lanes.
 pub(crate) fn lane(of: impl Fn(usize) -> f64) -> Lane {
     std::array::from_fn(|leg| if leg < 6 { of(leg) } else { 0.0 })
 }
 
 impl StackLanes {
-    /// Six stacks as they are, for steps of `step` (s). None if they have different numbers of operators, or not all plays
-    /// or all Bouc-Wen hysteresis.
+    /// Copies six stacks, for steps of `step` (s). None if their numbers of operators differ, or some have plays and
+    /// others Bouc-Wen hysteresis.
     pub(crate) fn of(stacks: &[&Stack; 6], step: f64) -> Option<Self> {
         let first = stacks[0];
         let operators = |s: &Stack| [s.plays.states.len(), s.creep.rates.len(), s.creep.thresholds.len()];
@@ -142,7 +143,7 @@ impl StackLanes {
         Some(out)
     }
 
-    /// Puts the states back into stacks of the same legs.
+    /// Copies the states back into stacks of the same legs.
     pub(crate) fn put(&self, leg: usize, stack: &mut Stack) {
         stack.rate.output = self.rate[leg];
         stack.widening = self.widening[leg];
@@ -159,7 +160,7 @@ impl StackLanes {
         }
     }
 
-    /// Whether the rates have changed so much that the thresholds want to be widened anew.
+    /// Whether the rates have changed so much that the thresholds must be updated.
     #[inline(always)]
     fn stale(&self) -> bool {
         let mut stale = false;
@@ -179,7 +180,7 @@ impl StackLanes {
         }
     }
 
-    /// One step, over which the voltages go from `before` along `voltage` (V) with `mean` as their mean, where plays are
+    /// One step, over which the voltages go from `before` along `voltage` (V) with mean `mean`, with plays that start
     /// `late`; free displacements over it, µm.
     // Inlined into functions that are compiled for several instruction sets.
     #[inline(always)]
@@ -196,7 +197,7 @@ impl StackLanes {
         let mut per_way = [0.0; LANES];
         for k in 0..LANES {
             way[k] = after[k] - before[k];
-            // Too short a way to tell when anything on it began.
+            // Too short to determine when a play started to move.
             per_way[k] = if way[k].abs() > 1e-100 { 1.0 / way[k] } else { 0.0 };
         }
         let mut sum = [0.0; LANES];
@@ -205,11 +206,11 @@ impl StackLanes {
         let mut skew_off = [0.0; LANES];
         match &mut self.hysteresis {
             Hysteresis::Plays(plays) => {
-                // Of what plays moved, times the part of the way that they missed, and times the part of its square.
+                // Sums over moved plays: displacement times the missed fraction, and times its square.
                 let (mut missed, mut squared) = ([0.0; LANES], [0.0; LANES]);
                 let (widening, after) = (self.widening, *after);
                 for [threshold, weight, state] in plays {
-                    // In short loops over values at hand, which compilers take as vectors.
+                    // Short loops over local values, which compilers vectorise.
                     let (threshold, weight, last) = (*threshold, *weight, *state);
                     let mut next = [0.0; LANES];
                     for k in 0..LANES {
@@ -241,7 +242,7 @@ impl StackLanes {
             }
             Hysteresis::BoucWen(legs) => {
                 for (k, leg) in legs.iter_mut().enumerate() {
-                    // A parabola between the slopes at both ends, as long as the voltage is under way.
+                    // A parabola between the slopes at both ends, while the voltage changes.
                     let under_way = -2.0 * late.mean[0][k] - 3.0 * late.mean[1][k];
                     let (last, first) = (leg.output(), leg.slope(way[k]));
                     sum[k] = leg.advance(after[k]);
@@ -253,7 +254,7 @@ impl StackLanes {
         let mut crept = [0.0; LANES];
         for [gain, weight, threshold, state] in &mut self.creep {
             for k in 0..LANES {
-                // The dead zone without a branch: x less x held to ± r.
+                // The dead zone without a branch: x less x limited to ± r.
                 let x = mean[k] - state[k];
                 let held = if x > threshold[k] { threshold[k] } else { x };
                 let held = if held < -threshold[k] { -threshold[k] } else { held };

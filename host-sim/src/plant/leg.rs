@@ -1,4 +1,4 @@
-//! The reference leg: a plant that is not of the controller's model class.
+//! The reference leg: a plant outside the controller's model class.
 //!
 //! With u the drive (V), v the stack voltage (V), x and c in V, displacement y in µm:
 //!
@@ -11,17 +11,18 @@
 //! gauge        τ_gauge ṁ = y − m                 shows m
 //! ```
 //!
-//! With `bouc_wen` in its file a leg has x = v − h in place of the plays, dh = α dv − β |dv| h − γ dv |h|: another class of loop.
+//! A file with `bouc_wen` gives x = v − h in place of the plays, dh = α dv − β |dv| h − γ dv |h|: another class of
+//! loop.
 //!
-//! The creep makes the loop depend on rate and on minutes of history, and the quadratic term breaks congruency:
-//! an Everett table cannot hold either. The feasibility study that calibrated the parameters gives the chain in words;
-//! this reading of it (weights shared by the thresholds, asymmetry on the plays alone, reversal curves taken from the leg
-//! as built) is the one that returns its figures, see `scenario.rs`.
+//! Creep makes the loop depend on rate and on minutes of history, and the quadratic term breaks congruency: an Everett
+//! table represents neither. The feasibility study that calibrated the parameters describes the chain in words. This
+//! interpretation (weights divided among the thresholds, asymmetry only on the plays, reversal curves from the leg as
+//! built) reproduces its figures, see `scenario.rs`.
 //!
-//! Step: linear parts and creep are exact for a held input; the plays see the voltage at the end of a step and the leg
-//! sees their sum held over it. The chain so leads by half a step. `step_s` belongs to the plant: halving the reference
+//! Step: linear parts and creep are exact for a held input. The plays get the voltage at the end of a step, and the leg
+//! holds their sum over it, so the chain leads by half a step. `step_s` belongs to the plant: half of the reference
 //! leg's 50 µs changes tracking errors at 10 Hz by less than 2 %, at 1 Hz and below by less than 0.1 % (tested in
-//! `scenario.rs`); in the limit of small steps the 10 Hz errors are 2 to 3 % above those of 50 µs.
+//! `scenario.rs`). In the limit of small steps the 10 Hz errors are 2 to 3 % above those of 50 µs.
 
 use super::filter::{Lag, Resonance, SmoothLag};
 use super::{LegParameters, Plant, Stack, steps_within};
@@ -32,7 +33,7 @@ pub struct LegPlant {
     amplifier: Lag,
     stack: Stack,
     structure: Resonance,
-    /// What the gauge makes of the displacement, µm; none: it shows it at once.
+    /// Lag of the gauge, µm; none: no lag.
     gauge: Option<SmoothLag>,
     longest_step: f64,
     step: f64,

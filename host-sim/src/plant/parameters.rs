@@ -13,10 +13,10 @@ use super::bound::Bound;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LegParameters {
-    /// What the plant is called in reports.
+    /// Name of the plant in reports.
     #[serde(default)]
     pub name: String,
-    /// Must be `"V, um, s"`: the units of the fields that do not name theirs.
+    /// Must be `"V, um, s"`: the units of fields without a unit in their name.
     pub units: String,
     /// Full drive u_max, V.
     pub u_max: f64,
@@ -34,7 +34,7 @@ pub struct LegParameters {
     pub tau_rate_s: f64,
     /// Lag of the amplifier, s.
     pub tau_amp_s: f64,
-    /// Lag of the gauge and the filter behind it, s; 0 for none. Of a platform the first leg's counts, for all six gauges.
+    /// Lag of the gauge and its filter, s; 0 for none. On a platform the first leg's value is for all six gauges.
     #[serde(default)]
     pub gauge_lag_s: f64,
     /// Axial resonance, Hz.
@@ -47,12 +47,12 @@ pub struct LegParameters {
     /// w_i of the plays.
     #[serde(default)]
     pub play_weights: Vec<f64>,
-    /// Bouc-Wen hysteresis; there are no plays then.
+    /// Bouc-Wen hysteresis, in place of plays.
     #[serde(default)]
     pub bouc_wen: Option<BoucWenParameters>,
     /// a_j of the creep, 1/s.
     pub creep_rates_per_s: Vec<f64>,
-    /// w_j of the creep, one per rate, shared by the thresholds.
+    /// w_j of the creep, one per rate, divided among the thresholds.
     pub creep_weights: Vec<f64>,
     /// r_k of the creep, V.
     #[serde(rename = "creep_thresholds_V")]
@@ -77,7 +77,7 @@ pub struct NoiseParameters {
     pub sensor_nm_rms: f64,
     /// Gauge converter, nm per code; 0 for none.
     pub adc_lsb_nm: f64,
-    /// Drive converter, mV per code. The controller outputs exact codes, so the plant does not use it.
+    /// Drive converter, mV per code. The controller outputs exact codes, so the plant ignores it.
     #[serde(rename = "dac_lsb_mV")]
     pub dac_lsb_mv: f64,
     /// Amplifier, white, per held voltage, mV rms.
@@ -94,7 +94,7 @@ fn default_step() -> f64 {
     5e-5
 }
 
-/// Why a parameter file was refused.
+/// Reason why a parameter file was refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ParameterError {
     /// The file.
@@ -130,7 +130,7 @@ impl LegParameters {
         Self::known(name, text)
     }
 
-    /// The shipped leg with Bouc-Wen hysteresis and creep alike over five decades of time.
+    /// The shipped leg with Bouc-Wen hysteresis and equal creep over five decades of time.
     #[must_use]
     pub fn bouc_wen() -> Self {
         let [_, (name, text)] = SHIPPED;
@@ -140,15 +140,16 @@ impl LegParameters {
     fn known(name: &str, text: &str) -> Self {
         match Self::from_json(text, name) {
             Ok(parameters) => parameters,
-            // The texts are part of the crate and a test parses them; no input of a user leads here.
+            // The texts are part of the crate and tested; no input of a user leads here.
             Err(error) => unreachable!("{error}"),
         }
     }
 
-    /// The shipped leg of that name, or what a file of it says, whose text `read` gives.
+    /// The shipped leg of that name, or the leg in the file that `read` returns as text.
     ///
     /// # Errors
-    /// If the file cannot be read, is not JSON of this shape, or a value is out of range: all findings, each with its field.
+    /// If the file cannot be read, is not JSON of this form, or a value is out of range: all findings, each with its
+    /// field.
     pub fn named<E: fmt::Display>(
         name: &Path,
         read: impl FnOnce(&Path) -> Result<String, E>,
@@ -168,7 +169,7 @@ impl LegParameters {
         }
     }
 
-    /// Makes its hysteresis `factor` (> 0) times as wide, V for V.
+    /// Scales the width of its hysteresis by `factor` (> 0).
     pub fn widen(&mut self, factor: f64) {
         self.play_thresholds_v.iter_mut().for_each(|threshold| *threshold *= factor);
         if let Some(bouc_wen) = &mut self.bouc_wen {
@@ -179,7 +180,7 @@ impl LegParameters {
     /// Parses and checks the text of a parameter file; `file` names it in errors.
     ///
     /// # Errors
-    /// If it is not JSON of this shape, or a value is out of range: all findings, each with its field.
+    /// If it is not JSON of this form, or a value is out of range: all findings, each with its field.
     pub fn from_json(text: &str, file: &str) -> Result<Self, ParameterError> {
         checked(text, file, "reference-leg.json", Self::findings)
     }

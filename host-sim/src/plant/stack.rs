@@ -39,7 +39,7 @@ impl Stack {
         }
     }
 
-    /// Fixes the length of the steps that follow, s.
+    /// Sets the length of the following steps, s.
     pub fn set_step(&mut self, step: f64) {
         self.step = step;
         self.rate.set_step(step);
@@ -53,8 +53,8 @@ impl Stack {
         self.displacement(v)
     }
 
-    /// As [`Stack::advance`], with the thresholds as wide as they were last: the rate that widens them is filtered over
-    /// milliseconds, so that steps in between need not work them out anew.
+    /// As [`Stack::advance`], with the last widths of the thresholds: the rate that widens them is filtered over
+    /// milliseconds, so they need not be computed at every step.
     pub fn advance_on(&mut self, before: f64, v: f64) -> f64 {
         self.rate.advance((v - before) / self.step);
         self.displacement(v)

@@ -1,13 +1,13 @@
 //! Amplifier of one leg: first-order lag and a limited current into the capacitance of the stacks.
 
-/// τ v̇ = u − v, but |v̇| ≤ I/C. Exact for a held input, whichever of the two holds.
+/// τ v̇ = u − v, but |v̇| ≤ I/C. Exact for a held input, in both regimes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Amplifier {
     /// τ, s.
     pub(super) time_constant: f64,
     /// I/C, V/s.
     pub(super) slew: f64,
-    /// Largest |u − v| that the lag alone may have, V.
+    /// Largest |u − v| without current limit, V.
     pub(super) reach: f64,
     step: f64,
     decay: f64,
@@ -16,14 +16,14 @@ pub struct Amplifier {
 }
 
 impl Amplifier {
-    /// `time_constant` τ in s (≥ 0; 0 leaves the current alone), `slew` = I/C in V/s (> 0, infinite for no limit).
+    /// `time_constant` τ in s (≥ 0; 0: only the current limit), `slew` = I/C in V/s (> 0, infinite for no limit).
     #[must_use]
     pub fn new(time_constant: f64, slew: f64) -> Self {
         let reach = if slew.is_finite() { slew * time_constant } else { f64::INFINITY };
         Self { time_constant, slew, reach, step: 0.0, decay: 0.0, voltage: 0.0 }
     }
 
-    /// Fixes the length of the steps that follow, s.
+    /// Sets the length of the following steps, s.
     pub fn set_step(&mut self, step: f64) {
         self.step = step;
         self.decay = if self.time_constant > 0.0 { libm::exp(-step / self.time_constant) } else { 0.0 };
@@ -32,7 +32,7 @@ impl Amplifier {
     /// Holds `input` (V) for one step; returns the stack voltage at its end.
     pub fn advance(&mut self, input: f64) -> f64 {
         let gap = self.voltage - input;
-        // Where the lag alone would draw more than the limit, the voltage runs straight.
+        // While the lag would exceed the limit, the voltage changes linearly.
         let excess = gap.abs() - self.reach;
         if excess <= 0.0 {
             self.voltage = input + gap * self.decay;
@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn a_large_step_runs_at_the_current_limit_and_then_settles_as_the_lag() {
-        // 40 kV/s and 0.35 ms: the limit binds while more than 14 V are missing.
+        // 40 kV/s and 0.35 ms: the limit is active while the voltage is more than 14 V away.
         let amplifier = Amplifier::new(0.35e-3, 40e3);
         for steps in [1, 3, 100] {
             assert!((after(&amplifier, 100.0, 1e-3, steps) - 40.0).abs() < 1e-9, "{steps}");

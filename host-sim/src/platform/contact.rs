@@ -1,4 +1,4 @@
-//! A work part that the tip on the platform presses into.
+//! A work part under the tip of the platform.
 
 use super::geometry::{angles, point_jacobian, rate_matrix, rotation};
 use super::linear::{Matrix3, Matrix6, Six, Three, apply, congruent, cross};
@@ -10,12 +10,12 @@ pub struct WorkPart {
     pub stiffness: Three,
     /// Tip in {P}, m.
     pub tip: Three,
-    /// Whether the part only presses: no force while the tip is below the place of contact.
+    /// Whether the part only pushes: no force while the tip is below the point of contact.
     pub one_sided: bool,
 }
 
 impl WorkPart {
-    /// Diamond tip 40 mm above P_C on a part of `stiffness` k (N/m): K = diag(0.8, 0.8, 1) k, held both ways.
+    /// Diamond tip 40 mm above P_C on a part of `stiffness` k (N/m): K = diag(0.8, 0.8, 1) k, in both directions.
     #[must_use]
     pub const fn of_stiffness(stiffness: f64) -> Self {
         Self { stiffness: [0.8 * stiffness, 0.8 * stiffness, stiffness], tip: [0.0, 0.0, 0.04], one_sided: false }
@@ -41,7 +41,7 @@ impl WorkPart {
     }
 }
 
-/// A work part in touch: its spring is unloaded at the pose of contact.
+/// A work part in contact: its spring is unloaded at the pose of contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// The part.
@@ -95,20 +95,20 @@ impl Contact {
         Self { part, pose: *pose, arm: apply(&rotation(angles(pose)), &part.tip) }
     }
 
-    /// How far the tip is from the place of contact, m.
+    /// Displacement of the tip from the point of contact, m.
     #[must_use]
     pub fn deflection(&self, pose: &Six) -> Three {
         let arm = apply(&rotation(angles(pose)), &self.part.tip);
         [0, 1, 2].map(|k| (pose[k] - self.pose[k]) + (arm[k] - self.arm[k]))
     }
 
-    /// Whether the part bears on the tip.
+    /// Whether the part pushes on the tip.
     #[must_use]
     pub fn closed(&self, pose: &Six) -> bool {
         !self.part.one_sided || self.deflection(pose)[2] > 0.0
     }
 
-    /// (5): what the closed contact does to the platform, whether or not it is closed.
+    /// (5): force of the closed contact on the platform, computed whether or not it is closed.
     #[must_use]
     pub fn wrench_when_closed(&self, pose: &Six) -> Wrench {
         let deflection = self.deflection(pose);
@@ -116,7 +116,7 @@ impl Contact {
         Wrench { force, torque: cross(apply(&rotation(angles(pose)), &self.part.tip), force) }
     }
 
-    /// What the part does to the platform.
+    /// Force of the part on the platform.
     #[must_use]
     pub fn wrench(&self, pose: &Six) -> Wrench {
         if self.closed(pose) { self.wrench_when_closed(pose) } else { Wrench::default() }

@@ -1,4 +1,4 @@
-//! User coordinates: what a set-point means for P_C when the work frame is turned and rotations turn about a tool point.
+//! User coordinates: from a set-point to P_C, with a rotated work frame and rotations about a tool point.
 
 use super::geometry::{angles, rotation};
 use super::linear::{Matrix3, Six, Three, apply, product, transposed};
@@ -11,14 +11,14 @@ pub struct UserFrames {
 }
 
 impl UserFrames {
-    /// Work axes turned by `angles` (rad, R = Rz Ry Rx) from those of {B}; the tool point in {P}, m.
+    /// Work axes rotated by `angles` (rad, R = Rz Ry Rx) from those of {B}; the tool point in {P}, m.
     #[must_use]
     pub fn new(angles: &Three, tool: Three) -> Self {
         Self { axes: rotation(*angles), tool }
     }
 
     /// Pose of P_C, without the bias, at which the tool point has moved by the first three numbers along the work axes
-    /// and the platform has turned about them by the angles of the last three.
+    /// and the platform has rotated about them by the last three.
     #[must_use]
     pub fn pose(&self, user: &Six) -> Six {
         if *self == Self::new(&[0.0; 3], [0.0; 3]) {
@@ -28,7 +28,7 @@ impl UserFrames {
         let back = transposed(w);
         let turn = product(&product(w, &rotation(angles(user))), &back);
         let shift = apply(w, &[user[0], user[1], user[2]]);
-        // The tool point goes from c to t + R c.
+        // The tool point moves from c to t + R c.
         let tool = apply(&turn, &self.tool);
         let at: Three = std::array::from_fn(|k| shift[k] + (self.tool[k] - tool[k]));
         let x = libm::atan2(turn[2][1], turn[2][2]);

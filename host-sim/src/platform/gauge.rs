@@ -1,4 +1,4 @@
-//! Six gauges that see the platform: exact readings of any pose.
+//! Six gauges that measure the platform: exact readings at any pose.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ pub struct Probe {
     /// A point of the line in {B}, m.
     #[serde(rename = "point_m")]
     pub point: Three,
-    /// Unit vector of the line in {B}; the reading grows when the target moves that way.
+    /// Unit vector of the line in {B}; the reading grows when the target moves in this direction.
     pub direction: Three,
     /// A point of the target plane in {P}, m.
     #[serde(rename = "plane_point_m")]
@@ -89,7 +89,7 @@ impl ProbeLanes {
     }
 }
 
-/// How displacements become the words of a controller.
+/// Conversion of displacements to the words of a controller.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GaugeSignal {
     /// Metres.
@@ -109,7 +109,7 @@ impl GaugeSignal {
     }
 }
 
-/// x with p(x) = `value`, by Newton steps from the straight line; p is to rise or fall throughout.
+/// x with p(x) = `value`, by Newton steps from the straight line; p must be monotonic.
 fn invert(polynomial: &[f64], value: f64) -> f64 {
     let slope_at_zero = polynomial.get(1).copied().unwrap_or(0.0);
     let mut x = (value - polynomial.first().copied().unwrap_or(0.0)) / slope_at_zero;

@@ -1,4 +1,4 @@
-//! Where joints are, how long legs are: exact, for any pose.
+//! Positions of joints and lengths of legs: exact, at any pose.
 //!
 //! A pose h = [x, y, z, θx, θy, θz] counts from rest: P_C is at [x, y, height + z] in the base frame {B}, and
 //! R = Rz(θz) Ry(θy) Rx(θx) takes the platform frame {P} to {B}.
@@ -18,7 +18,7 @@ pub struct Geometry {
     pub height: f64,
 }
 
-/// sin and cos. Piezo platforms turn by less than a milliradian, where a short series is exact to the last bit or so.
+/// sin and cos. Piezo platforms rotate by less than a milliradian, where a short series is exact to about the last bit.
 #[inline]
 fn sincos(angle: f64) -> (f64, f64) {
     if angle.abs() > 1e-2 {
@@ -126,7 +126,7 @@ impl Geometry {
         })
     }
 
-    /// Δl: how much longer each leg is than at rest, m, exact but for rounding at 1e-17 m.
+    /// Δl: extension of each leg from rest, m, exact apart from rounding at 1e-17 m.
     #[must_use]
     pub fn extensions(&self, pose: &Six) -> Six {
         self.extensions_and_jacobian(pose).0
@@ -144,7 +144,7 @@ impl Geometry {
         self.extensions_and_jacobian_from(&self.rest_lengths(), pose)
     }
 
-    /// The same with the leg lengths at rest at hand.
+    /// The same from known leg lengths at rest.
     pub(crate) fn extensions_and_jacobian_from(&self, rest_lengths: &Six, pose: &Six) -> (Six, Matrix6) {
         let (turn, rates) = attitude(angles(pose));
         let mut extensions = [0.0; 6];

@@ -1,7 +1,7 @@
 //! Mass matrix and weight of platform and legs, from the motion of every body: M(h) = Σ Jᵀ m J + Jωᵀ I Jω.
 //!
-//! A leg is two bodies on one line: the fixed part turns about the base joint, the extensible part slides along it. Legs
-//! do not spin about their own line (`docs/errata.md`, consistent form of Appendix I).
+//! A leg consists of two bodies on one line: the fixed part rotates about the base joint, the extensible part slides
+//! along it. Legs do not spin about their own line (`docs/errata.md`, consistent form of Appendix I).
 
 use super::geometry::{Geometry, angles, point_jacobian, rate_matrix, rotation};
 use super::linear::{Matrix3, Matrix6, Six, Three, add_congruent, apply, dot, product, transposed};
@@ -31,7 +31,7 @@ pub struct Masses {
     pub gravity: f64,
 }
 
-/// Bodies of a leg at a pose: ∂/∂h of both centres of mass and of the angle through which the leg turns.
+/// Bodies of a leg at a pose: ∂/∂h of both centres of mass and of the leg's angle.
 struct LegBodies {
     fixed: [Six; 3],
     extensible: [Six; 3],

@@ -81,7 +81,7 @@ pub(crate) fn transposed<const R: usize, const C: usize>(matrix: &[[f64; C]; R])
     std::array::from_fn(|column| std::array::from_fn(|row| matrix[row][column]))
 }
 
-/// Solves A X = B by Gauss elimination with row pivoting; a singular A gives numbers that are not finite.
+/// Solves A X = B by Gauss elimination with row pivoting. A singular A gives numbers that are not finite.
 pub(crate) fn solve<const C: usize>(a: &Matrix6, b: &[[f64; C]; 6]) -> [[f64; C]; 6] {
     let (mut a, mut b) = (*a, *b);
     for step in 0..6 {
@@ -156,7 +156,7 @@ pub fn exponential(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let scaled: Vec<Vec<f64>> = matrix.iter().map(|row| row.iter().map(|x| x * scale).collect()).collect();
     let identity = |row: usize, column: usize| if row == column { 1.0 } else { 0.0 };
     let mut out: Vec<Vec<f64>> = (0..n).map(|row| (0..n).map(|column| identity(row, column)).collect()).collect();
-    // Horner from the 14th power: the first one left out is below 1e-21 of the sum.
+    // Horner from the 14th power: the next term is below 1e-21 of the sum.
     for power in (1..=14).rev() {
         out = multiply(&scaled, &out);
         for (row, values) in out.iter_mut().enumerate() {

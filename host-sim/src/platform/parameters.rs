@@ -1,5 +1,5 @@
-//! Parameter file of a platform plant: JSON, SI units. What the paper does not give is assumed, as in the spec of the
-//! reference platform; the legs have a file of their own ([`LegParameters`]).
+//! Parameter file of a platform plant: JSON, SI units. Values that the paper does not give are assumed, as in the spec
+//! of the reference platform. The legs have their own file ([`LegParameters`]).
 
 use serde::{Deserialize, Serialize};
 
@@ -25,7 +25,7 @@ pub struct Joints {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlatformParameters {
-    /// What the plant is called in reports.
+    /// Name of the plant in reports.
     #[serde(default)]
     pub name: String,
     /// Must be `"SI"`.
@@ -73,12 +73,12 @@ pub struct PlatformParameters {
     pub modal_damping: f64,
     /// Capacitance of the stacks of a leg, F.
     pub stack_capacitance_f: f64,
-    /// Largest current of an amplifier, A: the stack voltage changes by no more than this over the capacitance.
+    /// Largest current of an amplifier, A: with the capacitance it limits the rate of the stack voltage.
     pub amplifier_current_a: f64,
-    /// Lowest voltage, V: the legs' own drive counts from there, and gauges are zeroed there.
+    /// Lowest voltage, V: zero of the legs' drive; gauges are zeroed there.
     #[serde(default)]
     pub lowest_voltage_v: f64,
-    /// Voltage at which the legs stand before a run, V, not below the lowest.
+    /// Voltage of the legs before a run, V, not below the lowest.
     #[serde(default)]
     pub rest_voltage_v: f64,
     /// The six gauges.
@@ -102,7 +102,7 @@ impl PlatformParameters {
     pub fn reference() -> Self {
         match Self::from_json(REFERENCE_PLATFORM, "reference-platform.json") {
             Ok(parameters) => parameters,
-            // The text is part of the crate and a test parses it; no input of a user leads here.
+            // The text is part of the crate and tested; no input of a user leads here.
             Err(error) => unreachable!("{error}"),
         }
     }
@@ -110,7 +110,7 @@ impl PlatformParameters {
     /// Parses and checks the text of a parameter file; `file` names it in errors.
     ///
     /// # Errors
-    /// If it is not JSON of this shape, or a value is out of range: all findings, each with its field.
+    /// If it is not JSON of this form, or a value is out of range: all findings, each with its field.
     pub fn from_json(text: &str, file: &str) -> Result<Self, ParameterError> {
         checked(text, file, "reference-platform.json", Self::findings)
     }

@@ -9,7 +9,7 @@ use super::whole_tick::WholeTick;
 use crate::closed_loop::Preparation;
 use crate::plant::{SmoothLag, Stack, steps_within};
 
-/// How much longer long steps are than the longest small one, and those of the pre-cycle.
+/// Ratio of long steps to the longest small one, and to that of the pre-cycle.
 const LONG: f64 = 5.0;
 
 /// Amplifier and stacks of one leg.
@@ -44,18 +44,19 @@ impl Actuator {
     }
 }
 
-/// A platform that takes six held voltages and moves.
+/// A platform with six held voltages as inputs.
 ///
-/// Poses count from where it stands without drive after the pre-cycle of [`PlatformPlant::prepare`].
+/// Poses count from rest without drive after the pre-cycle of [`PlatformPlant::prepare`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlatformPlant {
     actuators: [Actuator; 6],
     structure: Structure,
-    /// What the gauges make of each coordinate of the pose; none: they show it at once.
+    /// Lag of the gauges for each coordinate of the pose; none: no lag.
     gauges: Option<[SmoothLag; 6]>,
     longest_step: f64,
     step: f64,
-    /// Whether long steps are wanted, see [`PlatformPlant::step_whole_ticks`], and in use instead of actuators and structure.
+    /// Whether long steps are requested, see [`PlatformPlant::step_whole_ticks`]; and their state, in place of
+    /// actuators and structure, while in use.
     long_steps: bool,
     whole_tick: Option<Box<WholeTick>>,
 }
@@ -92,25 +93,26 @@ impl PlatformPlant {
         self.longest_step = step;
     }
 
-    /// From here on steps are five times as long as the longest small one, with the legs side by side: some ten times as fast,
-    /// and not of the same bits. What happens within a step of 100 µs is taken into account: the pose stays within 0.02 nm of that
-    /// of the finest small steps at 56 µm and 10 Hz, where small steps of 20 µs are off by 0.13 nm; behind amplifiers that are faster than
-    /// a step within 0.3 nm, and at their current limit within 1 nm.
+    /// From here on steps are five times as long as the longest small one, with the legs in parallel: about ten times
+    /// as fast, with other bits. The motion within a step of 100 µs is taken into account. At 56 µm and 10 Hz the pose
+    /// stays within 0.02 nm of that of the finest small steps, while small steps of 20 µs are off by 0.13 nm. With
+    /// amplifiers faster than a step it stays within 0.3 nm, and at their current limit within 1 nm.
     ///
-    /// A part in touch that may let go and a disturbance are simulated in small steps, and so are legs that differ in the number of their operators or
-    /// the class of their hysteresis. `interval` (s) is that of the holds to come; others may follow.
+    /// Small steps remain in use for a contact that may open, for a disturbance, and for legs that differ in the number
+    /// of their operators or the class of their hysteresis. `interval` (s) is that of the following holds; others are
+    /// possible.
     pub fn step_whole_ticks(&mut self, interval: f64) {
         self.long_steps = true;
         self.lengthen(interval / f64::from(steps_within(interval, LONG * self.longest_step)));
     }
 
-    /// Back to steps of at most the longest small one, of which the plant is made and which long ones are held against.
+    /// Back to small steps: the plant's own, with which long ones are compared.
     pub fn step_small(&mut self) {
         self.long_steps = false;
         self.shorten();
     }
 
-    /// Makes long steps of `step` (s) if they can be had.
+    /// Starts long steps of `step` (s) if possible.
     fn lengthen(&mut self, step: f64) {
         self.shorten();
         let amplifiers = self.actuators.each_ref().map(|actuator| &actuator.amplifier);
@@ -119,7 +121,7 @@ impl PlatformPlant {
         self.whole_tick = WholeTick::of(&amplifiers, &stacks, &rest, &self.structure, step).map(Box::new);
     }
 
-    /// Puts the state of long steps back.
+    /// Copies the state of long steps back.
     fn shorten(&mut self) {
         let Some(whole) = self.whole_tick.take() else { return };
         for (leg, actuator) in self.actuators.iter_mut().enumerate() {
@@ -129,10 +131,10 @@ impl PlatformPlant {
         whole.put_structure(&mut self.structure);
     }
 
-    /// Pre-cycle of the free legs, all at once, and rest; then the platform stands still at the pose from which poses
-    /// count, and goes from there to the drive at which it is to stand. The peak is held to each leg's own full drive.
+    /// Pre-cycle of all free legs at once, and rest. Then the platform rests at the pose from which poses count, and
+    /// moves from there to its rest drive. The peak is limited to each leg's full drive.
     ///
-    /// Quasi-static for the structure, which follows the legs without error: it is put to rest at the end.
+    /// Quasi-static for the structure, which follows the legs without error: it is set to rest at the end.
     pub fn prepare(&mut self, preparation: &Preparation) {
         let Preparation { rate, settle, update, rest, .. } = *preparation;
         self.shorten();
@@ -176,8 +178,9 @@ impl PlatformPlant {
         }
     }
 
-    /// The same of all legs at once in long steps, if they can be had and the peaks are equal; whether that is so. A ramp is
-    /// monotonic, and what ends in rest does not show how it got there: free displacements are the same within 0.01 nm.
+    /// The same for all legs at once in long steps, if possible and if the peaks are equal; returns whether it was
+    /// done. A ramp is monotonic, and the final rest hides how it was reached: free displacements are equal within 0.01
+    /// nm.
     fn cycle_long(&mut self, &Preparation { peak, rate, settle, update, .. }: &Preparation) -> bool {
         let own = self.actuators[0].peak;
         if self.actuators.iter().any(|actuator| actuator.peak != own) {
@@ -233,7 +236,7 @@ impl PlatformPlant {
         }
     }
 
-    /// The pose that the gauges show: h behind their lag, which differs from the lag of each reading by less than 1e-14 m.
+    /// The pose of the gauges: h with their lag, which differs from the lag of each reading by less than 1e-14 m.
     #[must_use]
     pub fn seen(&self) -> Six {
         self.gauges.as_ref().map_or_else(|| self.pose(), |gauges| gauges.each_ref().map(SmoothLag::output))
@@ -251,7 +254,7 @@ impl PlatformPlant {
         self.whole_tick.as_ref().map_or_else(|| self.structure.rate(), |whole| whole.rate())
     }
 
-    /// d_i: what each leg would have moved without load since rest, m.
+    /// d_i: displacement of each leg without load since rest, m.
     #[must_use]
     pub fn free_displacements(&self) -> Six {
         match &self.whole_tick {
@@ -269,7 +272,7 @@ impl PlatformPlant {
         }
     }
 
-    /// The structure, as it was when long steps began if these are in use.
+    /// The structure; while long steps are in use, its state when they began.
     #[must_use]
     pub fn structure(&self) -> &Structure {
         &self.structure
@@ -287,7 +290,7 @@ impl PlatformPlant {
         self.structure.release();
     }
 
-    /// Puts a wrench on the platform, besides that of a part, until it is changed.
+    /// Applies a wrench to the platform, in addition to that of a part, until it is changed.
     pub fn disturb(&mut self, wrench: &Wrench) {
         if *wrench != self.structure.disturbance() {
             self.shorten();
@@ -295,7 +298,7 @@ impl PlatformPlant {
         }
     }
 
-    /// What part and disturbance put on the platform.
+    /// Wrench of part and disturbance on the platform.
     #[must_use]
     pub fn wrench(&self) -> Wrench {
         let disturbance = self.structure.disturbance();
@@ -303,7 +306,7 @@ impl PlatformPlant {
     }
 }
 
-/// Holds six voltages (V) for so many long steps.
+/// Holds six voltages (V) for a number of long steps.
 fn hold_long(whole: &mut WholeTick, gauges: &mut Option<[SmoothLag; 6]>, voltages: &Six, steps: u32) {
     for _ in 0..steps {
         let before = [whole.pose(), whole.rate()];
@@ -312,7 +315,7 @@ fn hold_long(whole: &mut WholeTick, gauges: &mut Option<[SmoothLag; 6]>, voltage
     }
 }
 
-/// Lets gauges with a lag follow a step (s) from one pose and rate to another.
+/// Gauges with a lag follow a step (s) from one pose and rate to another.
 fn gauges_follow(gauges: &mut Option<[SmoothLag; 6]>, before: &[Six; 2], after: &[Six; 2], step: f64) {
     for (k, gauge) in gauges.iter_mut().flatten().enumerate() {
         gauge.set_step(step);

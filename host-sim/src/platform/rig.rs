@@ -1,4 +1,4 @@
-//! A plant with gauges, converters and noise, and what a controller does to it.
+//! A plant with gauges, converters and noise, as a controller sees it.
 //!
 //! ```text
 //! PlatformRig   the plant as a controller sees it
@@ -42,7 +42,7 @@ impl Noise {
     }
 }
 
-/// What is wrong with a gauge.
+/// Fault of a gauge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum GaugeFault {
     /// It repeats its last reading.
@@ -94,7 +94,7 @@ impl PlatformRig {
         }
     }
 
-    /// Makes the gauges speak volts, or metres again.
+    /// Sets the gauges' signal: volts, or metres.
     #[must_use]
     pub fn with_signal(mut self, signal: GaugeSignal) -> Self {
         self.signal = signal;
@@ -106,7 +106,7 @@ impl PlatformRig {
         self.plant.prepare(preparation);
     }
 
-    /// Draws the noise of the next `ticks` ticks now: clones made after this share it. The bits of a run stay as they are.
+    /// Draws the noise of the next `ticks` ticks now, so that later clones share it. The bits of a run do not change.
     pub fn draw_ahead(&mut self, ticks: usize) {
         self.gauges.iter_mut().for_each(|gauge| gauge.draw_ahead(ticks));
         self.amplifiers.iter_mut().for_each(|noise| noise.draw_ahead(ticks));
@@ -124,7 +124,7 @@ impl PlatformRig {
         &mut self.plant
     }
 
-    /// Makes gauge `index` faulty, or whole again.
+    /// Makes gauge `index` faulty, or repairs it.
     pub fn set_fault(&mut self, index: usize, fault: Option<GaugeFault>) {
         if let Some(slot) = self.faults.get_mut(index) {
             *slot = fault;
@@ -137,7 +137,7 @@ impl PlatformRig {
         let distances = self.probes.distances(self.height, &pose, &rotation(angles(&pose)));
         let [low, high] = self.range;
         for k in 0..6 {
-            // Drawn whatever the fault, so that a fault does not shift the noise of a run.
+            // Drawn in any case, so that a fault does not shift the noise of a run.
             let reading = self.gauges[k].read(distances[k] - self.rest_distances[k]);
             let held = if reading > high {
                 high

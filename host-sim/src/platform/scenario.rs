@@ -21,7 +21,7 @@ pub const FREE_MODES: [(&str, u32); 3] = [PLATFORM_MODES[4], PLATFORM_MODES[5], 
 /// The modes of Table 9.
 pub const MACHINING_MODES: [(&str, u32); 2] = [PLATFORM_MODES[0], PLATFORM_MODES[6]];
 
-/// A trajectory with what its rows are called.
+/// A trajectory with its name in tables.
 pub struct NamedTrajectory<'a> {
     /// Name: `case-1` and `case-2` are the paper's.
     pub name: &'a str,
@@ -35,12 +35,12 @@ pub struct NamedTrajectory<'a> {
 #[derive(Debug, Clone)]
 pub struct PlatformScenario {
     prepared: PlatformRig,
-    /// How its runs are made.
+    /// Settings of its runs.
     pub options: RunOptions,
 }
 
 impl PlatformScenario {
-    /// A plant, pre-cycled, settled and zeroed as the parameters of its first leg say, with noise from `seed`.
+    /// A plant, pre-cycled, settled and zeroed by the parameters of its first leg, with noise from `seed`.
     #[must_use]
     pub fn new(specimen: &Specimen, noise: &Noise, seed: u64, options: RunOptions) -> Self {
         let mut prepared = PlatformRig::new(specimen, noise, seed);
@@ -72,7 +72,7 @@ impl PlatformScenario {
         self.prepared.clone().run(controller, trajectory, &self.options)
     }
 
-    /// Lets the controller play one of its own trajectories, see [`PlatformRig::play`].
+    /// Lets the controller play one of its stored trajectories, see [`PlatformRig::play`].
     ///
     /// # Errors
     /// As [`PlatformRig::play`].

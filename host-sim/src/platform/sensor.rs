@@ -7,7 +7,7 @@ use crate::noise::Gaussian;
 /// First noise stream of the sensor; those below belong to gauges and amplifiers.
 const FIRST_STREAM: u64 = 12;
 
-/// Reads the wrench that the part puts on the platform, in base axes at P_C.
+/// Reads the wrench of the part on the platform, in base axes at P_C.
 #[derive(Debug, Clone)]
 pub struct ForceSensor {
     noise: [Gaussian; 6],
@@ -26,7 +26,7 @@ impl ForceSensor {
         self.noise.iter_mut().for_each(|noise| noise.draw_ahead(count));
     }
 
-    /// Reading of `wrench`: force, torque; held at the range.
+    /// Reading of `wrench`: force, torque; limited to the range.
     pub fn read(&mut self, wrench: &Wrench) -> Six {
         let truth = wrench.numbers();
         std::array::from_fn(|k| {

@@ -25,10 +25,10 @@ const DAMPING_RANGE: [f64; 2] = [0.01, 0.05];
 const TOLERANCE_STREAM: u64 = 1 << 32;
 const NOMINAL_STREAM: u64 = 2 << 32;
 
-/// A machine: its nominal data, and what its legs really are.
+/// A machine: its nominal data, and the actual legs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Specimen {
-    /// What a spec of this machine says: `axial_stiffness_n_per_m` and `modal_damping` are its nominal values.
+    /// Values of a spec for this machine: `axial_stiffness_n_per_m` and `modal_damping` are its nominal values.
     pub nominal: PlatformParameters,
     /// The legs.
     pub legs: [LegParameters; 6],
@@ -47,8 +47,8 @@ impl Specimen {
         }
     }
 
-    /// Every leg's gain, asymmetry, width of hysteresis, creep and amplifier lag within ±10 %, each on its own; its stiffness
-    /// within ±5 %.
+    /// Gain, asymmetry, width of hysteresis, creep and amplifier lag of every leg within ±10 %, independently; its
+    /// stiffness within ±5 %.
     #[must_use]
     pub fn within_tolerances(nominal: &PlatformParameters, leg: &LegParameters, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -74,8 +74,8 @@ impl Specimen {
         Self::within_tolerances(&PlatformParameters::reference(), &LegParameters::reference(), 1)
     }
 
-    /// Random machine `number` of `seed`: nominal stiffness 0.7 to 1.4 times the reference platform's, damping ratio 1 to
-    /// 5 %, and tolerances as ever.
+    /// Random machine `number` of `seed`: nominal stiffness 0.7 to 1.4 times the reference platform's, damping ratio 1
+    /// to 5 %, and tolerances as usual.
     #[must_use]
     pub fn random(seed: u64, number: u32) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -85,7 +85,7 @@ impl Specimen {
         nominal.axial_stiffness_n_per_m *= within(STIFFNESS_RANGE);
         nominal.modal_damping = within(DAMPING_RANGE);
         nominal.name = format!("random-{seed}-{number}");
-        // Far from the seeds that people use.
+        // Far from the seeds in common use.
         let tolerances = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(u64::from(number));
         Self::within_tolerances(&nominal, &LegParameters::reference(), tolerances)
     }

@@ -26,7 +26,7 @@ pub(super) use lanes::StructureLanes;
 /// Coordinates and rates.
 const STATES: usize = 12;
 
-/// What a structure is made of.
+/// Parameters of a structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructureParameters {
     /// Joints.
@@ -59,7 +59,7 @@ impl StructureParameters {
         (squares.map(libm::sqrt), shapes)
     }
 
-    /// ∂/∂h of what weight and static leg forces leave over near rest, where they balance.
+    /// ∂/∂h of the imbalance of weight and static leg forces near rest, where they balance.
     fn weight_stiffness(&self) -> Matrix6 {
         // Static forces f0 with Jᵀ f0 = G at rest.
         let transposed = super::linear::transposed(&self.geometry.jacobian(&[0.0; 6]));

@@ -1,7 +1,7 @@
-//! Many runs of one platform from one state: armed and settled once, then cloned, with the noise of the runs drawn once.
+//! Many runs of one platform from one state: armed and settled once, then cloned, with common noise.
 //!
-//! A run takes other settings over while the controller stands at its bias pose, which it does without a bump, and then
-//! follows the trajectory as a stream. The plant takes long steps, see [`super::PlatformPlant::step_whole_ticks`], or small ones.
+//! A run changes the settings while the controller rests at its bias pose, which is bumpless, and then follows the
+//! trajectory as a stream. The plant uses long steps, see [`super::PlatformPlant::step_whole_ticks`], or small ones.
 
 use std::ops::ControlFlow;
 
@@ -13,15 +13,15 @@ use crate::controller::{Controller, TickController};
 use crate::coverage::Coverage;
 use crate::trajectory::{PoseTarget, PoseTrajectory};
 
-/// A platform at its bias pose with a trajectory before it.
+/// A platform at its bias pose, ready for a trajectory.
 pub struct PlatformStudy {
     rig: PlatformRig,
     controller: Controller,
     paused: BenchState,
     interval: f64,
-    /// Set-points of each tick with the true pose that they ask for.
+    /// Set-points of each tick with the corresponding true pose.
     targets: Vec<(PoseTarget, Six)>,
-    /// Ticks of the path that they are the start of.
+    /// Ticks of the whole path.
     path: usize,
 }
 
@@ -37,8 +37,8 @@ pub struct Moment<'a> {
 }
 
 impl PlatformStudy {
-    /// Arms a fork of `controller`, configured as it is, on a plant of `scenario` in steps of whole ticks or in small
-    /// ones, and settles it. Runs follow `trajectory` from there.
+    /// Arms and settles a fork of `controller`, with its configuration, on a plant of `scenario` in steps of whole
+    /// ticks or in small ones. Runs follow `trajectory` from there.
     ///
     /// # Errors
     /// As [`PlatformRig::run`].
@@ -87,11 +87,11 @@ impl PlatformStudy {
         self.controller.fork()
     }
 
-    /// Runs the trajectory with the settings `words`. `watch` sees the end of every tick and may end the run. Returns how much of
-    /// the path was seen.
+    /// Runs the trajectory with the settings `words`. `watch` gets the end of every tick and may end the run. Returns
+    /// the covered part of the path.
     ///
     /// # Errors
-    /// If the controller refuses the settings or gives a voltage that is not finite.
+    /// If the controller refuses the settings or outputs a voltage that is not finite.
     ///
     /// # Panics
     /// If `controller` is not from [`PlatformStudy::controller`].

@@ -15,7 +15,7 @@ fn norms([x, y, z, a, b, c]: Six) -> [f64; 2] {
     [libm::sqrt(x * x + y * y + z * z), libm::sqrt(a * a + b * b + c * c)]
 }
 
-/// Errors of a pose over a run, added up as it goes.
+/// Accumulated errors of a pose over a run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PoseErrors {
     count: usize,
@@ -29,7 +29,7 @@ pub struct PoseErrors {
 }
 
 impl PoseErrors {
-    /// None yet, of a path of so many ticks of an interval (s).
+    /// No errors yet, for a path with a number of ticks of an interval (s).
     #[must_use]
     pub fn over(path: usize, interval: f64) -> Self {
         Self { interval, path, ..Self::default() }
@@ -58,7 +58,7 @@ impl PoseErrors {
         self.count
     }
 
-    /// How much of the path they are of.
+    /// The part of the path that they cover.
     #[must_use]
     pub fn coverage(&self) -> Coverage {
         Coverage::new(self.count, self.path, self.interval)

@@ -1,12 +1,13 @@
-//! The plant in steps as long as a control interval, legs in lanes: what simulations run on.
+//! The plant in steps of a control interval, legs in lanes: used by simulations.
 //!
-//! The same equations as the plant of small steps. What a step of 20 µs may leave out is taken into account: the shape that
-//! the amplifiers' lag and their current limit give to the free displacements within a step, the plays that start late in it
-//! ([`StructureLanes`], [`StackLanes`]). Small steps are the judge: `tests/tests/platform_tables/steps.rs` compares tables.
+//! The same equations as the plant of small steps. Effects that a step of 20 µs may neglect are included: the shape of
+//! free displacements within a step from the amplifiers' lag and current limit, and plays that start late in it
+//! ([`StructureLanes`], [`StackLanes`]). `tests/tests/platform_tables/steps.rs` compares the tables with those of small
+//! steps.
 //!
-//! The step is compiled a second time for AVX2, of which additions and multiplications have the same bits as any other:
-//! nothing is fused, sums keep their written order.
-// Unsafe: the call of that second version, behind the question whether the processor has it.
+//! The step is compiled a second time for AVX2, whose additions and multiplications give the same bits: nothing is
+//! fused, sums keep their written order.
+// Unsafe: the call of that second version, after a check that the processor supports it.
 #![allow(unsafe_code)]
 
 use super::amplifier::Amplifier;
@@ -22,7 +23,7 @@ pub(super) struct WholeTick {
     voltage: Lane,
     /// e^(−T/τ).
     decay: Lane,
-    /// The part of its way that a voltage has come on average over a step, and the first moment of that about the middle.
+    /// Mean of the voltage over a step as a fraction of its change, and its first moment about the middle.
     mean: Lane,
     skew: Lane,
     reach: Lane,
@@ -47,8 +48,9 @@ fn skew_of(r: f64) -> f64 {
 }
 
 impl WholeTick {
-    /// The plant as it is, for steps of `step` (s). `rest` is the free displacement at rest of each leg, µm. None if the legs
-    /// have different numbers of operators or classes of hysteresis, or a part is in touch that may let go, or something else pushes.
+    /// Copies the plant, for steps of `step` (s). `rest` is the free displacement at rest of each leg, µm. None if the
+    /// legs differ in the number of operators or the class of hysteresis, if a contact may open, or if there is a
+    /// disturbance.
     pub(super) fn of(
         amplifiers: &[&Amplifier; 6],
         stacks: &[&Stack; 6],
@@ -87,7 +89,7 @@ impl WholeTick {
     pub(super) fn advance(&mut self, voltages: &Six) {
         #[cfg(target_arch = "x86_64")]
         if std::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has what the function is compiled for.
+            // SAFETY: the processor supports the instructions of the function.
             return unsafe { self.advance_avx2(voltages) };
         }
         self.advance_anywhere(voltages);
@@ -127,8 +129,8 @@ impl WholeTick {
         self.structure.advance(&free);
     }
 
-    /// The legs whose amplifiers are at their current limit, see [`Amplifier::advance`]: straight on, and with the lag where
-    /// the limit ends.
+    /// Legs whose amplifiers are at their current limit, see [`Amplifier::advance`]: linear, then with the lag after
+    /// the limit.
     fn limited(&self, input: &Lane, way: &mut StepShape, mean: &mut Lane, late: &mut LateShape) {
         for k in 0..6 {
             let before = self.voltage[k];
@@ -138,11 +140,11 @@ impl WholeTick {
                 continue;
             }
             let climb = if gap > 0.0 { -self.slew[k] } else { self.slew[k] } * self.step;
-            // Of the step, as all times here.
+            // As a fraction of the step, as all times here.
             let time = excess / (self.slew[k] * self.step);
             let straight = if time < 1.0 { time } else { 1.0 };
             let left = 1.0 - straight;
-            // What is left of the way then, and over the lag.
+            // The remaining change then, and after the lag.
             let (rest, lag) = (before + climb * straight - input[k], self.lag[k] / self.step);
             let decay = if lag > 0.0 { libm::exp(-left / lag) } else { 0.0 };
             let settled = left * straight * 0.5 + left * 0.5;
@@ -155,7 +157,7 @@ impl WholeTick {
             if time >= 1.0 {
                 way.end[k] = before + climb;
             }
-            // Plays start late on the straight part, or on the other where that is longer.
+            // Plays start late on the linear part, or on the other if that is longer.
             if lag == 0.0 || straight > 0.5 {
                 late.straight(k, if lag == 0.0 { straight } else { 1.0 });
             }
@@ -176,7 +178,7 @@ impl WholeTick {
         self.structure.rate()
     }
 
-    /// Puts the state of one leg back.
+    /// Copies the state of one leg back.
     pub(super) fn put_leg(&self, leg: usize, amplifier: &mut Amplifier, stack: &mut Stack) {
         amplifier.voltage = self.voltage[leg];
         self.stacks.put(leg, stack);
@@ -187,7 +189,7 @@ impl WholeTick {
         (self.structure.displacement(leg) * 1e6 + self.rest[leg], self.voltage[leg])
     }
 
-    /// Puts the state of the structure back.
+    /// Copies the state of the structure back.
     pub(super) fn put_structure(&self, structure: &mut Structure) {
         self.structure.put(structure);
     }

@@ -1,4 +1,4 @@
-//! A record as CSV: time, inputs, what came out, and where it was run again also volts, pose, target and error. Numbers as the
+//! A record as CSV: time, inputs, outputs, and after a replay also volts, pose, target and error. Numbers as the
 //! shortest decimals that give the same bits; units in the names.
 
 use std::io::{self, Write};
@@ -13,19 +13,19 @@ use crate::word::{Scalar, WordKind, status_words};
 const OUTPUTS: &str = "dac_code[0],dac_code[1],dac_code[2],dac_code[3],dac_code[4],dac_code[5],status,phase,cause,\
                        amplifiers_on,supervisor_text,status_text";
 
-/// What a controller that runs a block again gives at each of its rows.
+/// Outputs of a controller that replays a block, for each of its rows.
 #[derive(Debug, Clone, Copy)]
 pub struct ReplayedRows<'a> {
     /// Names of its output words.
     pub names: &'a [String],
-    /// Its output words, row by row; fewer rows than the block has where it was not run to the end.
+    /// Its output words, row by row; fewer rows than in the block if it was not replayed to the end.
     pub rows: &'a [Vec<u64>],
 }
 
-/// The rows of a block; with the line of names before them for the `first` block. All blocks of a file have `again`, or none.
+/// The rows of a block, with the line of names before the `first` block. All blocks of a file have `again`, or none.
 ///
 /// # Errors
-/// The sink does not take them.
+/// If the sink fails.
 pub fn write_csv(
     sink: &mut impl Write,
     header: &Header,
@@ -98,7 +98,7 @@ fn real(sink: &mut impl Write, scalar: Scalar, word: u64) -> io::Result<()> {
     }
 }
 
-/// A column of what was run again.
+/// A column from the replay.
 struct Column {
     title: String,
     of: ColumnSource,
@@ -116,7 +116,7 @@ enum ColumnSource {
 }
 
 impl Column {
-    /// Volts, then for a platform pose, target, what its `lines` missed and error, for legs demand and error.
+    /// Volts; then for a platform pose, target, missed pulses of its `lines` and error; for legs demand and error.
     fn all(inputs: &[String], outputs: &[String], lines: usize) -> Vec<Self> {
         let place =
             |names: &[String], stem: &str, k: usize| names.iter().position(|name| *name == format!("{stem}[{k}]"));
@@ -151,7 +151,7 @@ impl Column {
     }
 }
 
-/// A name with its unit, where it is one and the same: a set-point is a pose (m, rad) or a displacement, a gauge gives m or V.
+/// A name with its unit, if the unit is unique: a set-point is a pose (m, rad) or a displacement, a gauge gives m or V.
 fn title(name: &str) -> String {
     let (stem, index) = name.split_once('[').unwrap_or((name, ""));
     let turns = matches!(index.trim_end_matches(']'), "3" | "4" | "5");

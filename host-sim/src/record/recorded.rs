@@ -1,4 +1,4 @@
-//! A supervised controller whose every tick is recorded: it closes the loop of any scenario.
+//! A supervised controller with a recorder: it closes the loop of any scenario.
 
 use std::io;
 
@@ -8,7 +8,7 @@ use super::Taker;
 use crate::controller::{ControllerError, MachineWord, Supervised, TickController};
 use crate::description::Description;
 
-/// Ticks that arming may take.
+/// Most ticks of arming.
 const ARMING: u64 = 1_000_000;
 /// Phases of the supervisor.
 const DISARMED: u8 = 0;
@@ -19,14 +19,14 @@ const ARM: u64 = 1;
 const RUN: u64 = 2;
 const RAMP_DOWN: u64 = 4;
 
-/// Why a recording ended early.
+/// Reason why a recording ended early.
 #[derive(Debug)]
 pub enum RecordingEnd {
-    /// The block cannot be kept.
+    /// The block cannot be stored.
     Io(io::Error),
     /// The machine cannot be saved.
     Controller(ControllerError),
-    /// The supervisor did not come to its running phase, or left it.
+    /// The supervisor did not reach its running phase, or left it.
     Supervisor {
         /// Tick of the record.
         tick: u64,
@@ -35,10 +35,12 @@ pub enum RecordingEnd {
     },
 }
 
-/// A controller under its supervisor, with a recorder. After a reset the first tick is preceded by those that arm the machine, with
-/// the readings of that tick and what the legs add to them in the wiring check, by the controller's model; they are recorded too.
+/// A controller under its supervisor, with a recorder. After a reset the first tick is preceded by arming ticks, with
+/// the readings of that tick plus the motion of the legs in the wiring check by the controller's model. They are
+/// recorded too.
 ///
-/// Where something fails it gives voltages that are no numbers, which ends every scenario at once; [`RecordedController::ended`] says why.
+/// After a failure it outputs voltages that are not finite, which ends any scenario at once;
+/// [`RecordedController::ended`] has the reason.
 pub struct RecordedController<'r, 'm> {
     machine: Supervised,
     recorder: &'r mut Recorder<'m>,
@@ -46,7 +48,7 @@ pub struct RecordedController<'r, 'm> {
     config: Vec<u64>,
     input: Vec<u64>,
     output: Vec<u64>,
-    /// Places of codes and status in an output.
+    /// Indices of codes and status in an output.
     codes: [usize; 6],
     status: usize,
     supervisor: usize,
@@ -55,10 +57,10 @@ pub struct RecordedController<'r, 'm> {
 }
 
 impl<'r, 'm> RecordedController<'r, 'm> {
-    /// Records `machine`; `recorder` was started as a stream, and its blocks go to `taker`.
+    /// Records `machine`; `recorder` must be started as a stream, and its blocks go to `taker`.
     ///
     /// # Errors
-    /// The controller has no codes or no status.
+    /// If the controller has no codes or no status.
     pub fn new(
         machine: Supervised,
         recorder: &'r mut Recorder<'m>,
@@ -83,7 +85,7 @@ impl<'r, 'm> RecordedController<'r, 'm> {
         })
     }
 
-    /// Why it ended early, if it did.
+    /// Reason why it ended early, if it did.
     #[must_use]
     pub fn ended(&self) -> Option<&RecordingEnd> {
         self.ended.as_ref()
@@ -150,7 +152,7 @@ impl<'r, 'm> RecordedController<'r, 'm> {
                 if self.recorder.tick() - start >= ARMING {
                     return Err(RecordingEnd::Supervisor { tick: self.recorder.tick() - 1, word });
                 }
-                // A request to arm that could not be followed at once waits for as long as it is given.
+                // A request to arm that could not be followed at once waits as long as it is given.
                 standing.show(&self.machine, &self.output, &mut input);
                 word = self.tick(&input, if word.phase == DISARMED { ARM } else { RUN })?;
             }

@@ -1,4 +1,4 @@
-//! Runs a record again on the host and compares every tick by bits.
+//! Replays a record on the host and compares every tick bit by bit.
 
 use std::fmt;
 use std::io::Read;
@@ -14,9 +14,9 @@ const SUPERVISOR: usize = 0;
 /// What a replay found.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Replay {
-    /// Ticks that were run again.
+    /// Replayed ticks.
     pub ticks: u64,
-    /// Of these, ticks whose digest of the machine was compared, too.
+    /// Those of them whose digest of the machine was compared, too.
     pub digests: u64,
     /// Blocks that were run.
     pub blocks: u64,
@@ -24,11 +24,11 @@ pub struct Replay {
     pub span: Option<(u64, u64)>,
     /// The first tick that differs.
     pub divergence: Option<Divergence>,
-    /// Stretches of ticks that are missing between blocks, the second not included.
+    /// Ranges of missing ticks between blocks, the end excluded.
     pub gaps: Vec<(u64, u64)>,
-    /// Blocks that are damaged: which (from 1), and how.
+    /// Damaged blocks: number (from 1), and damage.
     pub damaged: Vec<(usize, String)>,
-    /// The file ends within a block; the tick from which on nothing is known.
+    /// The file ends within a block; the first unknown tick.
     pub cut: Option<u64>,
     /// Ticks of triggers.
     pub triggers: Vec<u64>,
@@ -39,7 +39,7 @@ pub struct Replay {
 /// The first difference.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Divergence {
-    /// Its tick; for a state, that of the tick it stands before.
+    /// Its tick; for a state, that of the following tick.
     pub tick: u64,
     /// What differs.
     pub signal: String,
@@ -71,12 +71,12 @@ pub struct PhaseChange {
     pub supervisor: u32,
 }
 
-/// Why a record cannot be run again.
+/// Reason why a record cannot be replayed.
 #[derive(Debug)]
 pub enum ReplayError {
     /// It is no record.
     Record(RecordError),
-    /// It is another controller's: which line of the description, in the record, in the library.
+    /// It belongs to another controller: the differing line of the description, in the record and in the library.
     Other {
         /// What differs.
         field: &'static str,
@@ -117,13 +117,13 @@ impl From<RecordError> for ReplayError {
     }
 }
 
-/// Runs a record again on `machine` and calls `each` with every block and the output words of the rows that were run.
+/// Replays a record on `machine` and calls `each` with every block and the output words of the replayed rows.
 ///
-/// After a difference the rest is only read, not run. Where a block follows the one before it without a gap, the machine goes on as
-/// it is, and must then be what the block says it was.
+/// After a difference the rest is only read, not replayed. If a block follows the one before it without a gap, the
+/// machine continues, and must then equal the state in the block.
 ///
 /// # Errors
-/// It is no record of this controller, or one that cannot be replayed.
+/// If the record does not belong to this controller, or cannot be replayed.
 pub fn replay<R: Read>(
     reader: &mut Reader<R>,
     machine: &mut Supervised,
@@ -192,7 +192,7 @@ impl Run<'_> {
             return Err(ReplayError::Decimated(block.decimation));
         }
         let adjoins = self.next == Some(block.first);
-        // A controller that was reset begins anew.
+        // A controller that was reset starts afresh.
         let follows = adjoins && block.reason != Reason::Started;
         if let Some(next) = self.next
             && !adjoins
@@ -225,14 +225,14 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Puts the machine where the block begins, or compares it with that.
+    /// Sets the machine to the start of the block, or compares it with that.
     fn begin(&mut self, block: &Block, follows: bool) -> Option<Divergence> {
         let differs =
             |signal: String, recorded, replayed| Some(Divergence { tick: block.first, signal, recorded, replayed });
         if !follows && let Err(error) = self.machine.load(&block.state) {
             return match error {
                 SnapshotError::Word { index, word } => {
-                    differs(format!("state word {index} (no state holds it)"), word, 0)
+                    differs(format!("state word {index} (invalid)"), word, 0)
                 }
                 SnapshotError::Length { given, expected } => {
                     differs("number of state words".to_owned(), given as u64, expected as u64)

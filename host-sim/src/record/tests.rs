@@ -166,9 +166,9 @@ fn a_memory_that_is_too_small_is_refused_with_what_is_needed() {
     is_right(&blocks, |_| 2, 1);
 }
 
-/// Any byte of a file, changed to anything: said, never believed, never a crash.
+/// Any byte of a file, changed to any value: an error, never accepted, never a crash.
 #[test]
-fn a_changed_byte_is_always_said() {
+fn a_changed_byte_is_always_reported() {
     let mut memory = vec![0; 4 * 200];
     let mut recorder = Recorder::new(&mut memory, 4, LAYOUT).unwrap();
     recorder.start(Settings::STREAM);

@@ -1,11 +1,11 @@
-//! Writes a record: what a recorder hands out, block by block.
+//! Writes a record from a recorder's blocks.
 
 use std::io::{self, Write};
 
 use specgen_runtime::record::{write_block, write_header};
 use specgen_runtime::recorder::Recorder;
 
-/// Something that takes closed blocks.
+/// Receives closed blocks.
 pub trait Taker {
     /// Takes a block.
     ///
@@ -13,10 +13,10 @@ pub trait Taker {
     /// It cannot be kept.
     fn take(&mut self, block: &[u64]) -> io::Result<()>;
 
-    /// Takes all closed blocks of a recorder, and releases them.
+    /// Writes all closed blocks of a recorder, and releases them.
     ///
     /// # Errors
-    /// As [`Taker::take`]; what was taken is released.
+    /// As [`Taker::take`]; blocks that were written are released.
     fn drain(&mut self, recorder: &mut Recorder<'_>) -> io::Result<()> {
         while let Some(block) = recorder.block(0) {
             self.take(block)?;
@@ -26,16 +26,16 @@ pub trait Taker {
     }
 }
 
-/// A record on its way into a file.
+/// Writes a record to a file.
 pub struct Writer<W> {
     sink: W,
 }
 
 impl<W: Write> Writer<W> {
-    /// Begins the record of the controller that says `description` of itself.
+    /// Starts the record of the controller with the self-description `description`.
     ///
     /// # Errors
-    /// The sink does not take it.
+    /// If the sink fails.
     pub fn new(mut sink: W, description: &str) -> io::Result<Self> {
         write_header(description, |piece| sink.write_all(piece))?;
         Ok(Self { sink })
@@ -54,7 +54,7 @@ impl<W: Write> Writer<W> {
 impl<W: Write> Taker for Writer<W> {
     fn take(&mut self, block: &[u64]) -> io::Result<()> {
         let mut bytes = Vec::with_capacity(block.len() * 8 + 8);
-        // Into memory, which takes everything: a sink that is a file is asked once.
+        // Into memory, which cannot fail: a file then needs a single write.
         let Ok(()) = write_block(block, |piece| {
             bytes.extend_from_slice(piece);
             Ok::<(), std::convert::Infallible>(())

@@ -1,4 +1,4 @@
-//! Random numbers of a recording, and words that are now and then no number of a sensor.
+//! Random numbers of a recording, with occasional words that no sensor gives.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -40,7 +40,7 @@ impl RandomSource {
         2.0 * self.unit() - 1.0
     }
 
-    /// Word of `value`, or, where there is to be any, now and then of a special number.
+    /// Word of `value`, or occasionally of a special number, if those are enabled.
     pub(super) fn word(&mut self, scalar: Scalar, special: bool, value: f64) -> u64 {
         if special && self.below(SPECIAL_SHARE) == 0 {
             let specials = specials(scalar);
@@ -50,7 +50,7 @@ impl RandomSource {
         scalar.encode(value)
     }
 
-    /// `value`, or, where there is to be any, now and then any bits.
+    /// `value`, or occasionally any bits, if those are enabled.
     pub(super) fn integer(&mut self, special: bool, value: u64) -> u64 {
         if special && self.below(SPECIAL_SHARE) == 0 { self.0.next_u64() } else { value }
     }

@@ -1,5 +1,5 @@
-//! Input recordings for a controller in task space: streams that are smooth, jump, leave the workspace or dry up, moves,
-//! trajectories, gauges and force sensors that disagree with all of it, and numbers that no sensor gives.
+//! Input recordings for a controller in task space: streams that are smooth, jump, leave the workspace or stop, moves,
+//! trajectories, inconsistent gauges and force sensors, and numbers that no sensor gives.
 
 use core::f64::consts::TAU;
 
@@ -11,9 +11,9 @@ use crate::description::{Description, DescriptionError};
 const COMMAND: [&str; 3] = ["command", "selector", "sequence"];
 /// Vectors of a row, in the order of [`Row::vectors`].
 const VECTORS: [&str; 5] = ["setpoint", "setpoint_rate", "setpoint_acceleration", "gauge", "wrench"];
-/// The vector that only some controllers take.
+/// The vector of controllers with corrections.
 const CORRECTION: &str = "correction";
-/// Corrections: some are larger than the limits let pass, m and rad.
+/// Corrections: some exceed the limits, m and rad.
 const CORRECTED: [f64; 2] = [3e-6, 3e-5];
 
 /// What the platform takes.
@@ -25,13 +25,13 @@ pub struct PlatformInputs {
     pub bias: [f64; 6],
     /// Control period, s.
     pub period: f64,
-    /// Lowest and highest word of each gauge that is believed (V or m).
+    /// Lowest and highest valid word of each gauge (V or m).
     pub gauge: [f64; 2],
     /// Trajectories on board.
     pub trajectories: u32,
 }
 
-/// How a stretch of rows is made.
+/// Kind of a stretch of rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Smooth,
@@ -138,7 +138,7 @@ impl<'a> Generator<'a> {
     }
 
     fn begin(&mut self, kind: Kind) -> u64 {
-        // A move or a trajectory takes its time.
+        // A move or a trajectory needs many rows.
         let times = if matches!(kind, Kind::Move | Kind::Trajectory | Kind::Smooth) { 8 } else { 1 };
         let length = times * self.draw.stretch();
         for axis in 0..6 {
@@ -190,7 +190,7 @@ impl<'a> Generator<'a> {
         std::array::from_fn(|order| axes.map(|of_axis| of_axis[order]))
     }
 
-    /// Readings that change by a thousandth of the range and are now and then beyond its ends.
+    /// Readings that change by a thousandth of the range and are occasionally out of range.
     fn wander(&mut self) {
         let [low, high] = self.inputs.gauge;
         let span = high - low;

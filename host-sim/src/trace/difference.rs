@@ -5,12 +5,12 @@ use std::fmt;
 use super::Trace;
 use crate::word::{Scalar, WordKind};
 
-/// How two traces differ first.
+/// The first difference of two traces.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Difference {
-    /// They are not of the same controller.
+    /// They belong to different controllers.
     Header {
-        /// Which field of the description.
+        /// The differing field of the description.
         field: &'static str,
         /// In the first trace.
         a: String,

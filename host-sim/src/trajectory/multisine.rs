@@ -1,4 +1,4 @@
-//! A smooth motion that looks like no case of the paper: what a controller is tuned on, so that it can be scored on those.
+//! A smooth motion unlike any case of the paper: controllers are tuned on it, so that the cases can score them.
 
 use core::f64::consts::{PI, TAU};
 
@@ -8,18 +8,19 @@ use rand_chacha::rand_core::SeedableRng;
 use super::{LegTrajectory, PoseTarget, PoseTrajectory};
 use crate::noise::unit;
 
-/// Frequencies against the highest; no two are in a small whole ratio, so that nothing repeats within a run.
+/// Frequencies relative to the highest. No two have a ratio of small whole numbers, so that nothing repeats within a
+/// run.
 const RATIOS: [f64; 5] = [0.083, 0.217, 0.393, 0.641, 1.0];
 /// Part of the run over which the motion fades in.
 const FADE: f64 = 0.1;
 /// Stream of the phases.
 const PHASES: u64 = 3 << 32;
 
-/// Six coordinates, each a sum of five sines with phases of its own, faded in from rest.
+/// Six coordinates, each a sum of five sines with individual phases, faded in from rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Multisine {
     duration: f64,
-    /// What each coordinate swings about after the fade, in its unit.
+    /// Mean of each coordinate after the fade, in its unit.
     center: [f64; 6],
     /// Angular frequency (rad/s), amplitude and phase of each sine.
     sines: [[[f64; 3]; 5]; 6],
@@ -28,13 +29,13 @@ pub struct Multisine {
 }
 
 impl Multisine {
-    /// `duration` in s; the fastest sine has `frequency` (Hz); each coordinate stays within `center` ± `reach` (m or rad)
-    /// once it is faded in. Amplitudes fall with frequency; phases come from `seed`.
+    /// `duration` in s. The fastest sine has `frequency` (Hz). Each coordinate stays within `center` ± `reach` (m or
+    /// rad) after the fade. Amplitudes fall with frequency; phases come from `seed`.
     #[must_use]
     pub fn new(duration: f64, frequency: f64, center: [f64; 6], reach: [f64; 6], seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(PHASES);
-        // 1, 1/2 … of the slowest would be a drift; half of it to the slow ones, half to the fast ones.
+        // Shares of 1, 1/2 … for the slowest would be a drift: half to the slow ones, half to the fast ones.
         let shares = [0.3, 0.2, 0.15, 0.15, 0.2];
         let sines = reach.map(|reach| {
             core::array::from_fn(|k| [TAU * frequency * RATIOS[k], reach * shares[k], TAU * unit(&mut rng)])
@@ -42,8 +43,8 @@ impl Multisine {
         Self { duration, center, sines, corners: false }
     }
 
-    /// The same with a zigzag in place of the fastest sine, of the same frequency and half of the whole amplitude: its slope
-    /// jumps, as that of the paper's platform trajectories does.
+    /// The same with a zigzag in place of the fastest sine, with the same frequency and half of the total amplitude:
+    /// its slope jumps, as in the paper's platform trajectories.
     #[must_use]
     pub fn with_corners(mut self) -> Self {
         for sines in &mut self.sines {
@@ -80,7 +81,7 @@ impl Multisine {
         if time >= fade {
             return sum;
         }
-        // s − sin(2πs)/2π: at rest, and not accelerated, at both ends.
+        // s − sin(2πs)/2π: at rest and not accelerated at both ends.
         let s = time / fade;
         let (sin, cos) = libm::sincos(TAU * s);
         let w = [s - sin / TAU, (1.0 - cos) / fade, 2.0 * PI * sin / (fade * fade)];

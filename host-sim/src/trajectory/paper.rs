@@ -13,12 +13,12 @@
 //! | 0.5 ≤ s ≤ 2.5 | x = 2.5 + (5 + 8s/5)(1 + cos 2π f_c t)/2, y = 2.5 + (5 + 8s/5) cos(2π f_c t − π/2), z = 12s, θx = A sin 2π f_c t, θy = A + A cos 2π f_c t, θz = A/2 sin 2π f_c t | θy: 0.0436 for the first A |
 //! | 2.5 ≤ s ≤ 3.5 | x = y = 2.5 − 2.5(s−2.5), z = 30 − 30(s−2.5) | |
 //!
-//! The corrected paths are continuous but for 0.364 nm in y of case 1 at s = 5: the phase 1.918666 is the errata's, the
-//! continuous one would be 1.918744. Their *slopes* jump, as the paper's do. 0.0436 stands for π/72 and is taken as that:
-//! left as printed, θy would jump by −33 nrad.
+//! The corrected paths are continuous except for 0.364 nm in y of case 1 at s = 5: the phase 1.918666 is the errata's,
+//! the continuous one would be 1.918744. Their *slopes* jump, as the paper's do. 0.0436 means π/72 and is used as that:
+//! as printed, θy would jump by −33 nrad.
 //!
-//! At a joint a piece begins (also where the print of machining says that the one before ends). Before the start and
-//! from the end on the platform rests.
+//! At a joint a piece begins (also where the print of machining ends the one before). Before the start and after the
+//! end the platform rests.
 
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -32,11 +32,11 @@ pub enum PaperPath {
     Case1,
     /// Moving along z and turning about x and y.
     Case2,
-    /// The spiral over a work part, and home again.
+    /// The spiral over a work part, and back.
     Machining,
 }
 
-/// Which of its two forms.
+/// Corrected or printed form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reading {
     /// Continuous, as in the errata.
@@ -71,13 +71,13 @@ pub struct Jump {
 
 /// A = π/72, mrad.
 const AMPLITUDE: f64 = PI / 72.0;
-/// The same as the paper prints it where it is an offset.
+/// The same as printed by the paper as an offset.
 const PRINTED_OFFSET: f64 = 0.0436;
 /// Time shift of y in case 1, in s.
 const SHIFT: f64 = 1.918_666;
-/// Relative slack with which a sample counts as one at a joint, for time is a rounded product.
+/// Relative slack with which a sample counts as one at a joint, because time is a rounded product.
 const SLACK: f64 = 1e-9;
-/// A pose difference at a joint that is rounding, not a jump: 1 pm, 1 prad.
+/// A smaller pose difference at a joint is rounding, not a jump: 1 pm, 1 prad.
 const ROUNDING: f64 = 1e-12;
 /// µm and mrad.
 const UNITS: [f64; 6] = [1e-6, 1e-6, 1e-6, 1e-3, 1e-3, 1e-3];
@@ -105,7 +105,7 @@ impl PaperPose {
         }
     }
 
-    /// Coordinates in µm and mrad of one piece, which is defined at every time.
+    /// Coordinates in µm and mrad of one piece, extended to all times.
     fn piece(&self, piece: usize, time: f64) -> [Jet; 6] {
         let t = Jet::time(time);
         let s = t * self.time_factor();
@@ -143,7 +143,7 @@ impl PaperPose {
         [x, radius * y_phase.sin(), (z - 5.0) * 1.6 + 8.0, rest, rest, rest]
     }
 
-    /// Piece in force at `time`, none at rest before or after.
+    /// Piece at `time`, none at rest before or after.
     fn piece_at(&self, time: f64) -> Option<usize> {
         let s = time * self.time_factor();
         let piece = self.ends().iter().position(|end| s < end * (1.0 - SLACK))?;
@@ -156,8 +156,8 @@ impl PaperPose {
         PoseTarget { pose: of(|j| j.value), rate: of(|j| j.rate), acceleration: of(|j| j.acceleration) }
     }
 
-    /// Every jump of pose or slope, in the order of time and axis; start and end, where the slope jumps from and to
-    /// rest, included.
+    /// Every jump of pose or slope, in the order of time and axis, including start and end, where the slope jumps from
+    /// and to rest.
     #[must_use]
     pub fn jumps(&self) -> Vec<Jump> {
         let ends = self.ends();

@@ -157,7 +157,7 @@ fn device(mut script: &[u8]) {
     exchange.record(words, kept);
     exchange.show(samples, 921_600);
     board.start(&mut exchange.report);
-    let (mut desk, mut endpoint, mut host) = (LinkHandler::new(Stopwatch::NONE), Endpoint::new(), Receiver::new());
+    let (mut handler, mut endpoint, mut host) = (LinkHandler::new(Stopwatch::NONE), Endpoint::new(), Receiver::new());
     let (mut sequence, mut ticks) = (0, 0);
     while let Some((what, bytes)) = next(&mut script) {
         let sent = match what % 4 {
@@ -186,7 +186,7 @@ fn device(mut script: &[u8]) {
         for byte in sent {
             let mut with =
                 |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(&mut exchange, board.machine_mut());
-            let reply = endpoint.push(byte, &mut RequestContext { desk: &mut desk, with: &mut with });
+            let reply = endpoint.push(byte, &mut RequestContext { handler: &mut handler, with: &mut with });
             for byte in reply.unwrap_or_default() {
                 if let Some(answer) = host.push(*byte) {
                     assert_eq!(answer.unwrap().0.kind, Kind::Reply);

@@ -98,7 +98,7 @@ pub struct Rig {
     pub board: Board<'static, Parts, Parts, Parts>,
     pub exchange: Exchange,
     pub parts: Parts,
-    desk: LinkHandler,
+    handler: LinkHandler,
     endpoint: Endpoint,
     noise: ChaCha8Rng,
     answers: VecDeque<u8>,
@@ -135,7 +135,7 @@ impl Line {
             board,
             exchange,
             parts,
-            desk: LinkHandler::new(Stopwatch::NONE),
+            handler: LinkHandler::new(Stopwatch::NONE),
             endpoint: Endpoint::new(),
             noise: ChaCha8Rng::seed_from_u64(3),
             answers: VecDeque::new(),
@@ -212,9 +212,9 @@ impl Port for Line {
         let mut rig = self.0.borrow_mut();
         for byte in bytes {
             let Some(byte) = rig.spoil(*byte) else { continue };
-            let Rig { board, exchange, desk, endpoint, .. } = &mut *rig;
+            let Rig { board, exchange, handler, endpoint, .. } = &mut *rig;
             let mut with = |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(exchange, board.machine_mut());
-            let answer = endpoint.push(byte, &mut RequestContext { desk, with: &mut with }).map(<[u8]>::to_vec);
+            let answer = endpoint.push(byte, &mut RequestContext { handler, with: &mut with }).map(<[u8]>::to_vec);
             for byte in answer.unwrap_or_default() {
                 if let Some(byte) = rig.spoil(byte) {
                     rig.answers.push_back(byte);

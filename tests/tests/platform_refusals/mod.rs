@@ -172,9 +172,9 @@ fn converters_that_do_not_see_their_gauge() {
         case(
             "volts for words in metres",
             &[(NOISE, "noise = \"2.2 nm\"\ninput_range = [\"0 V\", \"2 V\"]")],
-            ("E0475", "[\"0 V\", \"2 V\"]", "stands beside no calibration"),
+            ("E0475", "[\"0 V\", \"2 V\"]", "needs a calibration"),
             |help, bad, _| {
-                assert!(help.contains("take `input_range` out"), "{help}");
+                assert!(help.contains("remove `input_range`"), "{help}");
                 put(bad, INPUT, "")
             },
         ),

@@ -75,7 +75,7 @@ fn an_edge_of_the_input_line_starts_what_waits_for_it_in_the_next_tick() {
     let operated = operate.wait();
     let (said, errors) = (String::from_utf8_lossy(&operated.stdout), String::from_utf8_lossy(&operated.stderr));
     println!("{said}{errors}");
-    for text in ["nothing was ordered for the edge; ", "dropped before the edge; ", "begun at the edge of tick "] {
+    for text in ["no command for the edge; ", "dropped before the edge; ", "begun at the edge of tick "] {
         assert!(said.contains(text), "{text}: {said}");
     }
     assert!(said.contains("it moves when it runs"), "{said}");

@@ -11,13 +11,13 @@ pub(crate) fn report(first: &[u8], findings: &mut Findings) -> bool {
 
 /// The same, with an additional text.
 pub(crate) fn report_as(first: &[u8], more: &str, findings: &mut Findings) -> bool {
-    let Some((what, help)) = told(first, findings.place()) else { return false };
+    let Some((what, help)) = identify(first, findings.place()) else { return false };
     findings.add(codes::RECORD_NOT_TEXT, Some(1), format!("is {what}, {more}"), &help);
     true
 }
 
 /// Kind of a file, and how to convert it to CSV. A shell line writes a new file, whatever the name of the old one.
-fn told(first: &[u8], path: &str) -> Option<(&'static str, String)> {
+fn identify(first: &[u8], path: &str) -> Option<(&'static str, String)> {
     let csv = shell::free(path, ".csv");
     let python = |import: &str, columns: &str| {
         let packages = import.split('.').next().unwrap_or(import);

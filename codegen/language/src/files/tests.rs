@@ -64,7 +64,7 @@ fn what_is_write_protected_stays_as_it_is() {
     assert_eq!(refusal(&at("free.csv")), OutputError::Protected.to_string());
 }
 
-/// Nothing waits for whoever is not there.
+/// Nothing waits for a process that does not exist.
 #[test]
 fn the_kind_is_seen_before_the_file_is_opened() {
     let (_folder, at) = folder();

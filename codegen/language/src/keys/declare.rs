@@ -8,12 +8,12 @@ pub(crate) use crate::quantity::Dimension;
 ///
 /// ```text
 /// section! {
-///     /// What the section is: the text of the reference, and of the struct.
-///     "path.of.section" ["what else people call it"], Plain => Struct {
-///         /// What the key is: the text of the reference, and of the field.
-///         key: Type = shape, Required, "symbol of the paper, or nothing" ["what else people call it"], "an example as it stands in a spec";
-///         /// A key without a field: what it says goes into one of those below.
-///         key = shape, Default(as it stands in a spec), "", an example;
+///     /// Meaning of the section: the text of the reference, and of the struct.
+///     "path.of.section" ["other names"], Plain => Struct {
+///         /// Meaning of the key: the text of the reference, and of the field.
+///         key: Type = shape, Required, "symbol of the paper, or nothing" ["other names"], "an example as in a spec";
+///         /// A key without a field: it is used by a field below.
+///         key = shape, Default(as in a spec), "", an example;
 ///     }
 ///     and |fields, table| {
 ///         /// A field that several keys decide about.

@@ -442,7 +442,7 @@ fn times_of_a_tick_are_the_last_and_the_longest_and_overruns_are_counted() {
     assert_eq!(exchange.report.health.output, [3, 3], "over the end of the counter");
     let report = &mut exchange.report;
     for (late, duration, overruns) in [(0, 100, 0), (1, 99, 0), (1, 100, 1), (40, 20, 1), (0, u32::MAX, 2)] {
-        report.took(late, duration, 100);
+        report.record_tick(late, duration, 100);
         assert_eq!((report.health.tick[0], report.health.overruns), (duration, overruns));
     }
     assert_eq!((report.health.tick[1], report.health.latest), (u32::MAX, 40));

@@ -3,7 +3,7 @@
 #[path = "../../../../tests/tests/board_support/mod.rs"]
 mod board_support;
 mod cycle;
-mod desk;
+mod handler;
 mod link;
 mod record;
 mod samples;

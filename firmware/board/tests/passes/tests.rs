@@ -24,5 +24,5 @@ fn ask<R>(
     look: impl FnOnce(Reply<'_>) -> R,
 ) -> R {
     let mut with = |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(exchange, machine);
-    look(RequestContext { desk: &mut LinkHandler::new(Stopwatch::NONE), with: &mut with }.execute(&request))
+    look(RequestContext { handler: &mut LinkHandler::new(Stopwatch::NONE), with: &mut with }.execute(&request))
 }

@@ -1,7 +1,7 @@
-//! What the loop leaves behind of every tick: a row for the service, and a recorder of its own.
+//! Results of every tick: a row for the service, and a recorder of the loop.
 //!
-//! Both are filled after the outputs are written, and where a block of a record is to begin, its state is taken then, for the
-//! tick to come: nothing of it lies between reading the gauges and driving the amplifiers.
+//! Both are filled after the outputs are written. If a block of a record must begin, its state is taken then, for the
+//! next tick, so that no work lies between reading the gauges and driving the amplifiers.
 
 use core::sync::atomic::Ordering;
 
@@ -12,22 +12,22 @@ use controller::supervised::Machine;
 
 use crate::handover::{Outlets, Row, SNAPSHOT_EVERY, Shared, Snapshot, Tape};
 
-/// The loop's recorder, and its ends of the rings that lead out.
+/// The loop's recorder, and its outgoing rings.
 pub struct Keeper<'a> {
     outlets: Outlets,
     tape: Option<Tape>,
     taken: u32,
     shared: &'a Shared,
-    /// The row to come begins a block of the record of the run, and its state was handed over.
+    /// The next row begins a block of the run's record, and its state was handed over.
     opens: bool,
-    /// It would have to, but there was no room for the state: it is lost.
+    /// It should begin a block, but there was no room for the state: the row is lost.
     lost: bool,
     /// Rows of the block so far.
     since: u32,
 }
 
 impl<'a> Keeper<'a> {
-    /// With the state of a `machine` at power-up as the beginning of the record.
+    /// The state of `machine` at power-up begins the record.
     pub fn new(
         outlets: Outlets,
         tape: Option<Tape>,
@@ -53,7 +53,7 @@ impl<'a> Keeper<'a> {
         tape.begin(count);
         if let Some(other) = self.tape.replace(tape) {
             if let Err(rtrb::PushError::Full(other)) = self.outlets.tapes.push((other, self.taken)) {
-                // Not reached: there is one tape. Released here it would be by the real-time thread.
+                // Not reached: there is one tape. A release here would be in the real-time thread.
                 core::mem::forget(other);
             }
         }
@@ -78,7 +78,7 @@ impl<'a> Keeper<'a> {
         }
     }
 
-    /// Keeps a tick; a recorder that has what it was to record is handed over.
+    /// Stores a tick; a recorder with a complete record is handed over.
     pub fn keep(&mut self, mut row: Row) {
         if let Some(tape) = &mut self.tape {
             tape.push(&row.input.to_words(), &row.output, || row.digest);
@@ -89,12 +89,12 @@ impl<'a> Keeper<'a> {
         self.since += 1;
         if self.lost || self.outlets.rows.push(row).is_err() {
             self.shared.lost_rows.fetch_add(1, Ordering::Relaxed);
-            // What follows a gap begins with a state.
+            // After a gap the record continues with a state.
             self.since = SNAPSHOT_EVERY;
         }
     }
 
-    /// Before tick number `count` of those that are run, under `config`; `changed` says that these settings are new.
+    /// Before tick number `count`, under `config`; `changed`: these settings are new.
     pub fn prepare(&mut self, machine: &Machine, config: &Config, count: u64, changed: bool) {
         self.give_back();
         if let Some(tape) = &mut self.tape {
@@ -106,7 +106,7 @@ impl<'a> Keeper<'a> {
         (self.opens, self.lost) = (false, false);
         if let Some(snapshots) = &mut self.outlets.snapshots {
             if changed || self.since >= SNAPSHOT_EVERY {
-                // With room for both the row cannot fail to follow.
+                // With room for both, the row is certain to follow.
                 if self.outlets.rows.slots() > 0 && snapshots.slots() > 0 {
                     let mut snapshot = Snapshot { count, digest: machine.digest(), state: [0; MACHINE_STATE_WORDS] };
                     machine.save(&mut snapshot.state);
@@ -128,7 +128,7 @@ impl<'a> Keeper<'a> {
         }
     }
 
-    /// Hands the recorder over, whatever it has: the loop ends.
+    /// Hands the recorder over in any state: the loop ends.
     pub fn finish(mut self) {
         self.stop();
         self.give_back();

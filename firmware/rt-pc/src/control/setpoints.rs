@@ -1,4 +1,4 @@
-//! What the operator wants of the tick to come: the command, set-points of a wave, or what a pass corrects.
+//! Source of the next tick's command: the operator's command, set-points of a wave, or corrections of a pass.
 
 use controller::supervised::{Phase, Request};
 use controller::waves::{self, Wave};
@@ -16,12 +16,13 @@ pub struct Setpoints {
     command: Command,
     request: Request,
     wave: Wave,
-    /// Set-points given by waves so far: a new wave goes on counting, or its first would look like an old one's last.
+    /// Number of set-points from waves: a new wave continues the count, or its first set-point would look like an old
+    /// one.
     sequence: u32,
     waving: bool,
-    /// Of the pass under way; or one that is over, until it is handed back.
+    /// The player of the pass under way, or of a completed one until it is handed back.
     player: Option<Player>,
-    /// The input line, and what waits for it.
+    /// The input line, and the command that waits for it.
     pending: EdgeWait<EdgeCommand>,
 }
 
@@ -38,7 +39,7 @@ impl Setpoints {
         }
     }
 
-    /// During a pass the command is its own: only the request is taken.
+    /// A pass has its own command: only the request is taken.
     pub fn wish(&mut self, wish: OperatorRequest) {
         if let Some(command) = wish.command.filter(|_| !self.passes()) {
             self.pending.cancel();
@@ -60,14 +61,14 @@ impl Setpoints {
         self.pending.cancel();
     }
 
-    /// How it stands with the input line.
+    /// Status of the input line.
     pub fn edge(&self) -> EdgeStatus {
         let pending = &self.pending;
         EdgeStatus { stage: pending.stage().word() as u8, edges: pending.edges(), tick: pending.tick() }
     }
 
-    /// Behind a tick: begins what waited, with the next one, if the line rose in this one, which ended with this phase and status. A machine
-    /// that does not run waits for nothing.
+    /// After a tick with this phase and status: starts the waiting command with the next tick, if the line rose in this
+    /// one. If the machine does not run, nothing waits.
     pub fn begin_awaited(&mut self, tick: u64, phase: Phase, status: u32, config: &Config) {
         if phase != Phase::Running {
             self.pending.cancel();
@@ -100,7 +101,8 @@ impl Setpoints {
         self.request
     }
 
-    /// Begins a wave, in place of what waits for the edge, if none is under way. What it asks for was looked at when it was ordered, and is looked at again here.
+    /// Starts a wave, if none is under way; it replaces a waiting command. Its limits were checked when it was
+    /// requested, and are checked again here.
     pub fn start(&mut self, settings: &Settings<Real>, config: &Config) {
         self.pending.cancel();
         if self.wave.stage() == Stage::Idle {
@@ -116,14 +118,14 @@ impl Setpoints {
         self.wave.stop();
     }
 
-    /// Begins the pass that a player was told, if no wave is under way. The loop never has two.
+    /// Starts the pass that the player was prepared for, if no wave is under way. The loop never has two players.
     pub fn pass(&mut self, mut player: Player) {
         self.pending.cancel();
         if self.wave.stage() != Stage::Idle {
             player.abort();
         }
         if let Some(other) = self.player.replace(player) {
-            // Not reached: there is one player. Released here it would be by the real-time thread.
+            // Not reached: there is one player. A release here would be in the real-time thread.
             core::mem::forget(other);
         }
     }
@@ -134,21 +136,21 @@ impl Setpoints {
         }
     }
 
-    /// Keeps what a tick of a pass showed.
+    /// Records a tick of a pass.
     pub fn keep(&mut self, state: &State, status: u32) {
         if let (Some(player), Some([target, pose])) = (&mut self.player, passes::shown(state)) {
             player.keep(&target, &pose, status);
         }
     }
 
-    /// The player of a pass that is over: nothing is corrected from here on.
+    /// The player of a completed pass: the correction ends.
     pub fn take_player(&mut self) -> Option<Player> {
         let player = self.player.take_if(|player| !player.is_running())?;
         passes::end(&mut self.command);
         Some(player)
     }
 
-    /// Back, where it could not be handed over yet.
+    /// Takes it back if it could not be handed over yet.
     pub fn put_player(&mut self, player: Player) {
         self.player = Some(player);
     }
@@ -158,8 +160,8 @@ impl Setpoints {
         self.waving
     }
 
-    /// Command of the tick to come. A machine that does not run, by its last `phase`, follows no wave and no pass: they end at once, for
-    /// going on later would be a jump.
+    /// Command of the next tick. If the machine does not run, by its last `phase`, wave and pass end at once: to
+    /// continue later would be a jump.
     pub fn next(&mut self, phase: Phase, config: &Config) -> Command {
         if phase != Phase::Running {
             self.abort_pass();

@@ -1,10 +1,10 @@
 //! Data acquisition cards by libcomedi: single synchronous readings and outputs, no streams.
 //!
-//! Gauges are the first six differential inputs of one card, amplifiers the first outputs of one or more cards (an NI PCI-6229
-//! has four), and the enable line is the first digital line of the first card, high for on; the triggers of the spec are the lines
-//! behind it, its input the last of them. Behind these are the heartbeat, which changes in every tick, the emergency stop and the fault of
-//! the amplifiers, both high where all is well: a broken wire stops. Codes are straight binary over the range of the channel: what volts
-//! they are, the spec says.
+//! Gauges are the first six differential inputs of one card. Amplifiers are the first outputs of one or more cards (an
+//! NI PCI-6229 has four). The enable line is the first digital line of the first card, high for on. The next lines are
+//! the triggers of the spec, then its input, then the heartbeat, which changes in every tick, then emergency stop and
+//! amplifier fault, both high in normal operation, so that a broken wire stops the machine. Codes are straight binary
+//! over the range of the channel; the spec sets their volts.
 
 pub mod library;
 
@@ -30,7 +30,7 @@ pub struct Settings {
     pub output_volts: [f64; 2],
 }
 
-/// Digital line of the input, behind the enable line and the outputs.
+/// Digital line of the input, after the enable line and the outputs.
 const INPUT_LINE: u32 = LINES as u32 + 1;
 /// Digital lines of heartbeat, emergency stop and amplifier fault, behind those.
 const HEARTBEAT: u32 = INPUT_LINE + INPUT as u32;
@@ -64,7 +64,7 @@ impl<'a> Comedi<'a> {
     /// Opens the cards; amplifiers are off.
     ///
     /// # Errors
-    /// In words: what is missing, and what to do.
+    /// As text: what is missing, and how to fix it.
     pub fn open(library: &'a Comedilib, settings: &Settings) -> Result<Self, String> {
         let path = settings.input.display();
         let input = library.card(&settings.input)?;
@@ -204,7 +204,7 @@ impl Amplifiers for Comedi<'_> {
     }
 }
 
-/// A call of the system each, so that only those that change are set.
+/// Each is a system call, so only changed lines are set.
 impl Lines for Comedi<'_> {
     const COUNT: usize = LINES;
     const INPUT: bool = true;

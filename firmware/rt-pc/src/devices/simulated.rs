@@ -10,14 +10,14 @@ use specgen_rt::exchange::Client;
 
 use super::{Contacts, Device};
 
-/// How long the first reading may take, ns: the machine may be pre-cycling.
+/// Time limit of the first reading, ns: the machine may be pre-cycling.
 const FIRST: u64 = 60_000_000_000;
 
 pub struct SimulatedDevices {
     client: Client,
     path: String,
     tick: u64,
-    /// How long a reading may take, ns. While the machine is silent it is not waited for.
+    /// Time limit of a reading, ns. A silent machine is not waited for.
     timeout: u64,
     silent: bool,
     wrench: [f64; CHANNELS],
@@ -28,10 +28,11 @@ pub struct SimulatedDevices {
 }
 
 impl SimulatedDevices {
-    /// Opens it and waits until it gives its first reading. Later ones may take `timeout`, ns. Its input line rises every `edges` ticks.
+    /// Opens it and waits for its first reading. Later ones may take `timeout`, ns. Its input line rises every `edges`
+    /// ticks.
     ///
     /// # Errors
-    /// In words: if there is no such machine, it is of another spec, or it does not answer.
+    /// As text: if there is no such machine, it has another spec, or it does not respond.
     pub fn open(path: &Path, timeout: u64, edges: Option<u64>) -> Result<Self, String> {
         let client = Client::open(path, controller::SPEC_DIGEST).map_err(|error| error.to_string())?;
         let start = clock::now();
@@ -98,7 +99,7 @@ impl Amplifiers for SimulatedDevices {
     }
 }
 
-/// A simulated machine has nothing that outputs lead to: they stand in the record.
+/// The outputs of a simulated machine lead nowhere; the record has them.
 impl Lines for SimulatedDevices {
     const COUNT: usize = LINES;
     const INPUT: bool = true;
@@ -143,7 +144,7 @@ mod tests {
 
     const TIMEOUT: u64 = 50_000_000;
 
-    /// The machine's side: answers with what is asked for until it is told to be silent.
+    /// The machine's side: publishes requested sensings until it is silenced.
     struct Machine {
         path: PathBuf,
         silent_from: Arc<AtomicU64>,

@@ -1,8 +1,8 @@
-//! Clients of a socket: a few at once, and none that keeps others out.
+//! Clients of a socket: several at once, and none that locks others out.
 //!
-//! A new client always gets in. Where there is no room, the client process with the most connections loses one of them, and of
-//! those the one that has been silent for longest; one that has the orders is spared. What a client may send in a round is
-//! bounded, so that one that sends without end delays no other.
+//! A new client is always accepted. Without room, the process with the most connections loses the one that has been
+//! silent for longest; the client in control is spared. The bytes per client and round are bounded, so that a client
+//! that sends continuously delays no other.
 
 use std::io::{self, ErrorKind, Read};
 use std::os::fd::{AsFd, BorrowedFd};
@@ -13,16 +13,16 @@ use rustix::net::sockopt::socket_peercred;
 use super::listener::Listener;
 
 pub const MOST: usize = 8;
-/// Connections that are taken in a round.
+/// Connections accepted per round.
 const TAKEN: usize = 16;
-/// Bytes that are read from a client in a round.
+/// Bytes read from a client per round.
 const ROUND: usize = 4096;
 
 pub struct Client<T> {
     /// The connection, which never waits.
     pub stream: UnixStream,
     pub state: T,
-    /// Its process, as the system says; 0 if it does not.
+    /// Its process, by the operating system; 0 if it is not known.
     process: i32,
     /// When it last sent something, ns.
     last: u64,
@@ -38,8 +38,8 @@ impl<T> Clients<T> {
         Self { listener, all: Vec::with_capacity(MOST) }
     }
 
-    /// Takes who came since the last call, with `fresh` states; gives back those that had to make room. A client that `keeps` its
-    /// place is spared.
+    /// Accepts new clients with `fresh` states; returns those that had to make room. A client that `keeps` its place is
+    /// spared.
     pub fn accept(&mut self, now: u64, mut fresh: impl FnMut() -> T, keeps: impl Fn(&T) -> bool) -> Vec<T> {
         let mut gone = Vec::new();
         for _ in 0..TAKEN {
@@ -55,17 +55,17 @@ impl<T> Clients<T> {
         gone
     }
 
-    /// The one that is missed least.
+    /// The client to drop.
     fn least(&self, now: u64, keeps: impl Fn(&T) -> bool) -> Option<usize> {
         let connections = |process| self.all.iter().filter(|client| client.process == process).count();
-        // The newest is not to make room for itself.
+        // Never the newest itself.
         let others = self.all.iter().enumerate().rev().skip(1).filter(|(_, client)| !keeps(&client.state));
         others
             .max_by_key(|(_, client)| (connections(client.process), now.saturating_sub(client.last)))
             .map(|(index, _)| index)
     }
 
-    /// Lets each be served; gives back those whose service failed.
+    /// Serves each client; returns those whose service failed.
     pub fn serve(&mut self, mut service: impl FnMut(&mut Client<T>) -> io::Result<()>) -> Vec<T> {
         let (mut gone, mut index) = (Vec::new(), 0);
         while let Some(client) = self.all.get_mut(index) {
@@ -94,7 +94,7 @@ impl<T> Clients<T> {
 }
 
 impl<T> Client<T> {
-    /// What came since the last call, as much of it as one may send in a round. Never waits.
+    /// Reads new bytes, up to the limit of a round. Never waits.
     ///
     /// # Errors
     /// The client has gone.
@@ -167,7 +167,7 @@ mod tests {
             assert_eq!(hall.clients.descriptors().count(), number + 2);
         }
         assert!(hall.clients.iter().all(|client| client.process == std::process::id() as i32));
-        // The first two say something, and the third has the orders.
+        // The first two send something, and the third is in control.
         for number in [0, 1] {
             hall.lines[number].write_all(b"here").unwrap();
         }

@@ -1,4 +1,4 @@
-//! The link on a Unix socket: the frames of `specgen-link`. Several hosts may look; one has the orders.
+//! The link on a Unix socket: the frames of `specgen-link`. Several hosts may connect; one is in control.
 
 use std::io::{self, Write};
 use std::os::fd::BorrowedFd;
@@ -8,25 +8,25 @@ use rustix::io::ioctl_fionread;
 use specgen_link::{Counters, Endpoint};
 
 use super::clients::{Client, Clients, room};
-use super::desk::LinkHandler;
+use super::handler::LinkHandler;
 use super::listener::Listener;
 use crate::console::Console;
 use crate::handover::Row;
 use crate::operator::HostId;
 use crate::samples::Stream;
 
-/// Bytes that a connection may leave unread: more than any answer, and hosts ask one thing at a time.
+/// Largest unread output of a connection: more than any answer, because hosts send one request at a time.
 const UNREAD: usize = 1 << 14;
 
-/// What came over the link in a run.
+/// Statistics of the link in a run.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Traffic {
     pub hosts: u64,
     /// Requests carried out or refused.
     pub requests: u64,
-    /// Frames that were not believed.
+    /// Invalid frames.
     pub errors: u64,
-    /// Hosts that were closed: they lost the orders, or others needed the room.
+    /// Connections that were closed: they lost control, or others needed the room.
     pub closed: u64,
 }
 
@@ -46,7 +46,7 @@ struct Line {
     id: HostId,
     endpoint: Box<Endpoint>,
     unsent: Vec<u8>,
-    /// What it sends was sent before a stop of another host, until nothing of it is left.
+    /// Its requests were sent before a stop of another host, until all of them are read.
     is_late: bool,
     /// Events that were not yet reported to this host.
     events: u32,
@@ -63,14 +63,14 @@ impl Link {
         Ok(Self { hosts, traffic: Traffic::default() })
     }
 
-    /// Shows a tick to the hosts that look on.
+    /// Passes a tick to the subscribed hosts.
     pub fn show(&mut self, row: &Row) {
         for client in self.hosts.iter_mut() {
             client.state.stream.add(row);
         }
     }
 
-    /// Answers what came since the last call. Never waits.
+    /// Answers new requests. Never waits.
     pub fn serve(&mut self, console: &mut Console, now: u64) {
         let Self { hosts, traffic } = self;
         let fresh = || {
@@ -90,7 +90,7 @@ impl Link {
         let (before, mut stopper) = (console.stops, None);
         let gone = hosts.serve(|client| {
             client.state.events |= events;
-            // One that another took the orders from is to come anew, so that it does not go on as if nothing had happened.
+            // A host that lost control must reconnect, so that it does not continue unaware.
             if console.operator.is_evicted(client.state.id) {
                 traffic.closed += 1;
                 return Err(io::ErrorKind::ConnectionAborted.into());
@@ -107,12 +107,12 @@ impl Link {
             send(client)
         });
         if console.stops != before {
-            // A stop is answered when it is known what the others sent before it: what comes after the answer counts.
+            // A stop is answered once it is known what the others sent before it: later requests count.
             for client in hosts.iter_mut().filter(|client| Some(client.state.id) != stopper) {
                 client.find_late();
             }
             for client in hosts.iter_mut().filter(|client| Some(client.state.id) == stopper) {
-                // The next call finds out what became of a line that fails.
+                // The next call detects a failed line.
                 let _ = send(client);
             }
         }
@@ -136,22 +136,22 @@ impl Link {
 }
 
 impl Client<Line> {
-    /// Whether something that was sent by now is still to be read.
+    /// Whether bytes that were sent by now are still unread.
     fn find_late(&mut self) {
         self.state.is_late = ioctl_fionread(&self.stream).is_ok_and(|unread| unread > 0);
     }
 }
 
-/// Does what the host asks for. An error ends the connection, here and below.
+/// Carries out the host's requests. An error ends the connection, here and below.
 fn obey(client: &mut Client<Line>, console: &mut Console, now: u64) -> io::Result<()> {
     if client.state.unsent.len() < UNREAD {
         let mut bytes = room();
         let said = client.read(&mut bytes, now)?;
         let Line { id, endpoint, unsent, is_late, events, stream } = &mut client.state;
         *is_late &= !said.is_empty();
-        let mut desk = LinkHandler::new(console, *id, *is_late, events, stream, now);
+        let mut handler = LinkHandler::new(console, *id, *is_late, events, stream, now);
         for byte in said {
-            if let Some(answer) = endpoint.push(*byte, &mut desk) {
+            if let Some(answer) = endpoint.push(*byte, &mut handler) {
                 unsent.extend_from_slice(answer);
             }
         }
@@ -159,14 +159,14 @@ fn obey(client: &mut Client<Line>, console: &mut Console, now: u64) -> io::Resul
     Ok(())
 }
 
-/// Sends what there is for the host, as far as it takes it.
+/// Sends output to the host, as much as it takes.
 fn send(client: &mut Client<Line>) -> io::Result<()> {
     while !client.state.unsent.is_empty() {
         match client.stream.write(&client.state.unsent) {
             Ok(count) => {
                 client.state.unsent.drain(..count);
             }
-            // A host that does not read is not waited for; what it asked for last is still there for it.
+            // A host that does not read is not waited for; its last answer is kept for it.
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) => return Err(error),

@@ -1,4 +1,4 @@
-//! A Unix socket that is listened to without waiting, and is gone when the program is.
+//! A Unix socket with a non-blocking listener, which is removed when the program ends.
 
 use std::fs::Permissions;
 use std::io;
@@ -19,8 +19,8 @@ pub struct Listener {
 }
 
 impl Listener {
-    /// Listens at `path`, for this user alone whatever the umask. What a killed run left there is replaced; what is served is
-    /// not.
+    /// Listens at `path`, for this user only, whatever the umask. A socket left by a killed run is replaced; one in use
+    /// is not.
     ///
     /// # Errors
     /// If another program listens there, or the path cannot be used.
@@ -46,7 +46,7 @@ impl Listener {
         fchmod(&socket, Mode::RUSR | Mode::WUSR)?;
         net::bind(&socket, &net::SocketAddrUnix::new(path)?)?;
         let this = Self { listener: UnixListener::from(socket), path: path.to_owned() };
-        // Less what the umask takes, which this gives back.
+        // Restores the permissions that the umask removes.
         std::fs::set_permissions(path, Permissions::from_mode(0o600))?;
         net::listen(&this.listener, BACKLOG)?;
         Ok(this)

@@ -1,7 +1,7 @@
 //! A file of plain atomic words in memory, and the futex calls on them.
 //!
-//! Whoever may write the file may make it shorter, which takes the memory away from all who map it: the system then sends `SIGBUS`
-//! when a word is touched. The mapping is replaced by zeros of this process, in which nothing answers any more.
+//! Any process that may write the file may truncate it, which removes the memory from all mappings: the system then
+//! sends `SIGBUS` on access. The mapping is replaced by zeros of this process, so that the other side appears silent.
 
 use core::ffi::{c_int, c_void};
 use core::marker::PhantomData;
@@ -15,24 +15,25 @@ use std::path::Path;
 
 use crate::clock::SECOND;
 
-/// A shared mapping of one `T`, which is made of atomic integers alone: any bytes are a `T`, and other processes may change them.
+/// A shared mapping of one `T`, which consists only of atomic integers: any bytes are a valid `T`, and other processes
+/// may change them.
 pub(super) struct Mapping<T> {
     start: NonNull<T>,
     kind: PhantomData<T>,
 }
 
-/// Start and length of every mapping, zeros where there is none: more than a program has at a time.
+/// Start and length of every mapping, zeros for free entries: more than a program uses at a time.
 static MAPPED: [[AtomicUsize; 2]; 16] = [const { [const { AtomicUsize::new(0) }; 2] }; 16];
 
 /// Read and written by its owner.
 const MODE: u32 = 0o600;
 
-/// Why a file is not mapped.
+/// Reason why a file is not mapped.
 #[derive(Debug)]
 pub(super) enum MapError {
-    /// Somebody else can change it, or what it leads to.
+    /// Another user can change it, or a folder above it.
     NotOwn(String),
-    /// It has another size than a `T`.
+    /// Its size differs from that of a `T`.
     Size,
     /// The system's answer.
     File(io::Error),
@@ -59,17 +60,17 @@ unsafe impl<T: Sync> Send for Mapping<T> {}
 unsafe impl<T: Sync> Sync for Mapping<T> {}
 
 impl<T> Mapping<T> {
-    /// A new file of zeros, for this user alone; `AlreadyExists` if anything has that name.
+    /// A new file of zeros, for this user only; `AlreadyExists` if the name is taken.
     pub(super) fn create(path: &Path) -> io::Result<Self> {
         let file = OpenOptions::new().read(true).write(true).create_new(true).mode(MODE).open(path)?;
-        // Less what the umask takes, which this gives back.
+        // Restores the permissions that the umask removes.
         file.set_permissions(Permissions::from_mode(MODE))?;
         file.set_len(size_of::<T>() as u64)?;
         Self::of(&file)
     }
 
-    /// A file that is there. It has to be as [`Mapping::create`] makes it: whoever else may write it may make it shorter too, and
-    /// then reading the mapping ends the process.
+    /// Opens an existing file. It must be as [`Mapping::create`] makes it: any other user who may write it may truncate
+    /// it, and reading the mapping would then end the process.
     pub(super) fn open(path: &Path) -> Result<Self, MapError> {
         let file = OpenOptions::new()
             .read(true)
@@ -97,7 +98,7 @@ impl<T> Mapping<T> {
     }
 
     fn of(file: &File) -> io::Result<Self> {
-        // SAFETY: a new mapping, wherever the kernel likes; the file is at least as long.
+        // SAFETY: a new mapping at an address chosen by the kernel; the file is at least as long.
         let start = unsafe {
             libc::mmap(
                 core::ptr::null_mut(),
@@ -134,7 +135,7 @@ impl<T> Drop for Mapping<T> {
     }
 }
 
-/// Lets the process go on when the file of this mapping becomes shorter.
+/// Keeps the process alive when the file of this mapping is truncated.
 fn survive(start: usize, length: usize) {
     for [place, size] in &MAPPED {
         if place.compare_exchange(0, start, Ordering::AcqRel, Ordering::Relaxed).is_ok() {
@@ -146,13 +147,13 @@ fn survive(start: usize, length: usize) {
     let mut action: libc::sigaction = unsafe { core::mem::zeroed() };
     action.sa_sigaction = taken_away as *const () as usize;
     action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;
-    // SAFETY: the handler is of the kind that the flags say, and does only what one may do.
+    // SAFETY: the handler has the type that the flags state, and is async-signal-safe.
     unsafe { libc::sigaction(libc::SIGBUS, &raw const action, core::ptr::null_mut()) };
 }
 
-/// Puts zeros where the memory of a mapping was taken away. Whatever else ends the process, as without a handler.
+/// Maps zeros in place of a mapping that was truncated. Any other fault ends the process, as without a handler.
 extern "C" fn taken_away(_: c_int, info: *mut libc::siginfo_t, _: *mut c_void) {
-    // SAFETY: the system hands over what it knows of the fault.
+    // SAFETY: the system passes valid fault information.
     let at = unsafe { (*info).si_addr() }.addr();
     for [start, length] in &MAPPED {
         let (start, length) = (start.load(Ordering::Acquire), length.load(Ordering::Acquire));
@@ -160,22 +161,22 @@ extern "C" fn taken_away(_: c_int, info: *mut libc::siginfo_t, _: *mut c_void) {
             let (rights, kind) =
                 (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_PRIVATE | libc::MAP_ANONYMOUS | libc::MAP_FIXED);
             let place = core::ptr::with_exposed_provenance_mut(start);
-            // SAFETY: in the place of a mapping of this length, which stays mapped; any bytes are its words.
+            // SAFETY: replaces a mapping of this length, which stays mapped; any bytes are valid words.
             unsafe { libc::mmap(place, length, rights, kind, -1, 0) };
             return;
         }
     }
-    // SAFETY: touches no memory; the fault comes again, without a handler.
+    // SAFETY: touches no memory; the fault occurs again, without a handler.
     unsafe { libc::signal(libc::SIGBUS, libc::SIG_DFL) };
 }
 
-/// Wakes whoever sleeps on `bell`, in any process.
+/// Wakes all sleepers on `bell`, in any process.
 pub(super) fn wake(bell: &AtomicU32) {
     // SAFETY: the address is that of a live word; the other arguments are plain numbers.
     unsafe { libc::syscall(libc::SYS_futex, bell.as_ptr(), libc::FUTEX_WAKE, i32::MAX) };
 }
 
-/// Sleeps until [`wake`], at most `timeout` (ns); not at all if `bell` is no more `seen`. May end early.
+/// Sleeps until [`wake`], at most `timeout` (ns); not at all if `bell` differs from `seen`. May end early.
 pub(super) fn sleep(bell: &AtomicU32, seen: u32, timeout: u64) {
     let time =
         libc::timespec { tv_sec: (timeout / SECOND) as libc::time_t, tv_nsec: (timeout % SECOND) as libc::c_long };

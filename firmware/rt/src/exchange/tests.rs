@@ -106,7 +106,7 @@ fn what_cannot_be_opened_says_what_to_do() {
     assert!(refusal(&path, DIGEST).contains("not a simulated machine"));
     put(&path, &[0; size_of::<SharedWords>()], 0o600);
     assert!(refusal(&path, DIGEST).contains("not a simulated machine"));
-    // What is left of a machine that was killed does not stand in the way.
+    // Remains of a killed machine are replaced.
     drop(Server::create(&path, DIGEST).unwrap());
     assert!(path_of("../x").unwrap_err().contains("letters, digits"));
 }
@@ -163,7 +163,7 @@ fn a_file_that_others_may_write_or_own_is_refused() {
     std::fs::remove_dir(&path).unwrap();
 }
 
-/// A file shorter than its mapping would end whoever reads that.
+/// A file shorter than its mapping would end the process that reads it.
 #[test]
 fn a_file_that_is_mapped_is_never_made_shorter() {
     let path = name("mapped");
@@ -189,7 +189,7 @@ fn a_file_that_becomes_shorter_ends_no_process() {
     assert_eq!(client.sense(1, 1_000_000).map(|sensing| sensing.codes), Some([7; 6]));
     assert!(!server.is_lost() && !client.is_abandoned());
     std::fs::OpenOptions::new().write(true).open(&path).unwrap().set_len(0).unwrap();
-    // Nothing answers, whoever waits for it.
+    // Nothing answers any more.
     assert!(client.sense(2, 1_000_000).is_none() && client.is_abandoned());
     client.actuate(2, true, &[1; 6]);
     assert!(server.wait(&mut 0, 0, 1_000_000).is_none() && server.is_lost());

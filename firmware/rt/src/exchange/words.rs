@@ -1,15 +1,15 @@
-//! The words that both sides share, and how they are written, read and waited for.
+//! The shared words, and how they are written, read and waited for.
 //!
-//! Whatever orders memory is in this file, and takes its atomics from the module above: `tests/loom` puts those of a model checker
-//! there, which tries every order that the processor and the compiler may choose.
+//! All memory ordering is in this file, which takes its atomics from the module above. `tests/loom` replaces them by
+//! those of a model checker, which tries every order that processor and compiler may choose.
 
 use super::atomic::{AtomicU32, AtomicU64, Ordering, fence};
 use super::{CHANNELS, LOOK, TRIES, clock, hint, mapping};
 
-/// What the controller gives out.
+/// Data from the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Actuation {
-    /// A number that differs from one run of a controller to the next.
+    /// A number that differs between runs of a controller.
     pub session: u64,
     /// Tick of the session whose interval begins, from 0.
     pub tick: u64,
@@ -19,7 +19,7 @@ pub struct Actuation {
     pub codes: [i32; CHANNELS],
 }
 
-/// What the machine gives out.
+/// Data from the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Sensing {
     /// Session that it follows.
@@ -40,7 +40,7 @@ pub(super) struct SharedWords {
     pub(super) version: AtomicU64,
     /// First half of the SHA-256 of the spec.
     pub(super) digest: [AtomicU64; 2],
-    /// Process of the machine's side; 0 once it has ended in order.
+    /// Process of the machine's side; 0 after a normal end.
     pub(super) server: AtomicU64,
     /// Session and tick that the controller waits for.
     wanted: [AtomicU64; 2],
@@ -48,11 +48,11 @@ pub(super) struct SharedWords {
     actuation: [AtomicU64; 3 + CHANNELS],
     sensing_count: AtomicU64,
     sensing: [AtomicU64; 2 + 2 * CHANNELS],
-    /// What the machine's side sleeps on, and the controller's.
+    /// Bells on which the machine's side and the controller sleep.
     bells: [Bell; 2],
 }
 
-/// A count that the other side raises, and whether somebody sleeps on it.
+/// A counter that the other side increments, and whether somebody sleeps on it.
 #[derive(Default)]
 #[repr(C)]
 struct Bell {
@@ -61,12 +61,12 @@ struct Bell {
 }
 
 impl SharedWords {
-    /// For the machine: the latest actuation and what the controller waits for (session, tick), once the counter of either has
-    /// moved on from `seen`; none after `timeout` (ns). It looks for `look` (ns) before it sleeps.
+    /// For the machine: the latest actuation and the requested sensing (session, tick), once the counter of either
+    /// differs from `seen`; none after `timeout` (ns). It polls for `look` (ns) before it sleeps.
     pub(super) fn wait(&self, seen: &mut u32, look: u64, timeout: u64) -> Option<(Actuation, [u64; 2])> {
         *seen = wait_for(&self.bells[0], *seen, look, timeout)?;
-        // First what is waited for: an actuation read before it could lack the tick that the controller ended just before it
-        // asked, and the machine would go through that tick under the codes of the one before.
+        // Read the request first. An actuation read before it could be older than the tick that the controller
+        // completed just before the request, and the machine would run that tick with old codes.
         let wanted = [&self.wanted[0], &self.wanted[1]].map(|word| word.load(Ordering::Acquire));
         let mut block = [0; 3 + CHANNELS];
         read_block(&self.actuation_count, &self.actuation, &mut block)?;
@@ -74,7 +74,7 @@ impl SharedWords {
         Some((Actuation { session, tick, enable: enable == 1, codes: codes.map(|code| code as i32) }, wanted))
     }
 
-    /// For the machine: gives a reading out.
+    /// For the machine: publishes a reading.
     pub(super) fn publish(&self, sensing: &Sensing) {
         let mut block = [0; 2 + 2 * CHANNELS];
         (block[0], block[1]) = (sensing.session, sensing.tick);
@@ -86,7 +86,8 @@ impl SharedWords {
         ring(&self.bells[1]);
     }
 
-    /// For the controller: the reading at the beginning of `tick`; none if the machine does not give it within `timeout` (ns).
+    /// For the controller: the reading at the beginning of `tick`; none if the machine does not publish it within
+    /// `timeout` (ns).
     pub(super) fn sense(&self, session: u64, tick: u64, timeout: u64) -> Option<Sensing> {
         let deadline = clock::now().saturating_add(timeout);
         let mut asked = false;
@@ -107,7 +108,7 @@ impl SharedWords {
                 });
             }
             if !asked {
-                // Who sees this tick sees the actuation of the one before.
+                // A reader that sees this tick also sees the actuation before it.
                 self.wanted[1].store(tick, Ordering::Release);
                 self.wanted[0].store(session, Ordering::Release);
                 ring(&self.bells[0]);
@@ -121,7 +122,7 @@ impl SharedWords {
         }
     }
 
-    /// For the controller: gives codes out for the interval that begins with `tick`.
+    /// For the controller: publishes codes for the interval that begins with `tick`.
     pub(super) fn actuate(&self, session: u64, tick: u64, enable: bool, codes: &[i32; CHANNELS]) {
         let mut block = [0; 3 + CHANNELS];
         (block[0], block[1], block[2]) = (session, tick, u64::from(enable));
@@ -133,7 +134,7 @@ impl SharedWords {
     }
 }
 
-/// Writes a block that one side alone writes: the counter is odd meanwhile.
+/// Writes a block that has only one writer: the counter is odd meanwhile.
 fn write_block<const N: usize>(count: &AtomicU64, words: &[AtomicU64; N], block: &[u64; N]) {
     let before = count.load(Ordering::Relaxed);
     count.store(before.wrapping_add(1), Ordering::Relaxed);
@@ -144,7 +145,7 @@ fn write_block<const N: usize>(count: &AtomicU64, words: &[AtomicU64; N], block:
     count.store(before.wrapping_add(2), Ordering::Release);
 }
 
-/// A block that belongs together; none if the other side is stuck halfway.
+/// A consistent block; none if the other side is stuck in the middle of a write.
 fn read_block<const N: usize>(count: &AtomicU64, words: &[AtomicU64; N], block: &mut [u64; N]) -> Option<()> {
     for _ in 0..TRIES {
         let before = count.load(Ordering::Acquire);
@@ -163,14 +164,14 @@ fn read_block<const N: usize>(count: &AtomicU64, words: &[AtomicU64; N], block: 
 }
 
 fn ring(bell: &Bell) {
-    // In one order with the sleeper's: either it sees the new count, or it is seen here.
+    // Sequentially consistent with the sleeper: either it sees the new count, or it is seen here.
     bell.count.fetch_add(1, Ordering::SeqCst);
     if bell.sleepers.load(Ordering::SeqCst) > 0 {
         mapping::wake(&bell.count);
     }
 }
 
-/// The bell's count once it is no more `seen`; none after `timeout` (ns). Sleeps after `look` (ns).
+/// The bell's count once it differs from `seen`; none after `timeout` (ns). Sleeps after `look` (ns).
 fn wait_for(bell: &Bell, seen: u32, look: u64, timeout: u64) -> Option<u32> {
     let start = clock::now();
     loop {

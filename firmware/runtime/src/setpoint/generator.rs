@@ -6,17 +6,17 @@
 //!                        └─► stream ◄──────────┐              │
 //!          any motion, on another command ─► stop ────────────┘
 //! ```
-//! * **Bias**: from rest to the bias pose, as a move, before anything else is looked at.
-//! * **Hold**: stands still.
+//! * **Bias**: a move from rest to the bias pose, before any command is followed.
+//! * **Hold**: the set-point is constant.
 //! * **Move**: one straight motion of limited speed, acceleration and jerk ([`Profile`]) to the pose of the command,
-//!   latched when it begins. While the command stays, a changed pose is gone to once the move has ended.
-//! * **Trajectory**: first a move to its start, then the trajectory, once; again after another command or selector.
-//! * **Stream**: a fresh set-point is followed at once if it and its derivatives are believed: finite, within the
+//!   which is latched at the start. If the pose changes under the same command, another move follows.
+//! * **Trajectory**: a move to its start, then the trajectory, once. It is played again after another command or selector.
+//! * **Stream**: a fresh set-point is followed at once if it and its derivatives are valid: finite, within the
 //!   workspace, no step beyond the stream's speed. Between fresh ones the last rate is continued, for fewer than
-//!   `stale_ticks` ticks. Then, or at a set-point that is not believed, the platform stops ([`Stop`]); it follows again as
-//!   soon as a fresh one is within a step of where it is.
-//! * **Stop**: any other command during a motion; obeyed when standing. A motion that would leave the workspace after
-//!   all (the frames bend the way) is frozen at its last pose.
+//!   `stale_ticks` ticks. Then, or at an invalid set-point, the platform stops ([`Stop`]). It follows again as soon as a
+//!   fresh set-point is within a step of its pose.
+//! * **Stop**: another command during a motion stops it first. A motion that would leave the workspace (because the
+//!   frames bend the path) is frozen at its last pose.
 //!
 //! [`BUSY`] stays set from the first to the last of several motions. It also stays set in the tick in which a motion
 //! ends if the command begins another with the next tick.

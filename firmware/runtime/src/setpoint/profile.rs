@@ -68,7 +68,7 @@ pub(super) fn largest<T: Real>(values: &[T; 6], factors: &[T; 6]) -> T {
 }
 
 /// The least n in 1..=[`LONGEST`] that is `enough`; none if there is none. `enough` must be monotone, and hold at the
-/// first power of two above `known` (≥ 0, or NaN if 1 is enough).
+/// next power of two above `known` (≥ 0, or NaN if 1 is enough).
 pub(super) fn least<T: Real>(known: T, enough: impl Fn(T) -> bool) -> Option<i32> {
     let mut too_few = 0;
     // Start the bisection at that power of two.

@@ -213,7 +213,7 @@ mod tests {
             assert_eq!(Cause::of_lowest(cause.bit()), cause);
         }
         for bits in [0, 1 << 16, 1 << 22, 1 << 29, 1 << 30, 0x6fff_0000] {
-            assert_eq!(Cause::of_lowest(bits), Cause::None, "gauges, legs, and what else stands there");
+            assert_eq!(Cause::of_lowest(bits), Cause::None, "gauges, legs, and other bits");
         }
         assert_eq!([Cause::Oscillation.bit(), Cause::AmplifierFault.bit()], [1 << 28, 1 << 31]);
         assert_eq!((Phase::from_word(6), Cause::from_word(18)), (None, None));

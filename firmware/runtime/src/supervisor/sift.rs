@@ -7,7 +7,7 @@
 //!              oscillation is suspected, which no straight line predicts; afterwards as long as it is above 1. Else it decays, to
 //!              nothing. Where a prediction is remembered for a word, 3 s: so much may the next one be off a line through it
 //! replaced     |y(n) − prediction| > (1 + 2 s) leap; times 3, 6, … where y(n−1), y(n−2), … were missing or repeated. Not where y(n) is as near
-//!              to y(n−2): then it was y(n−1) that leapt, by less than the bound, and the middle stands for it from here on
+//!              to y(n−2): then it was y(n−1) that leapt, by less than the bound, and the middle replaces it from here on
 //! repeated     all six words are those of the sample before, or of the one before that
 //! ```
 //! Both are leaky counters: 4 up for a tick with the condition, 1 down for one without. Three replaced samples in a row

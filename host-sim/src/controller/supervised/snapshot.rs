@@ -4,17 +4,17 @@ use std::fmt;
 
 use super::Supervised;
 
-/// Why words are not taken for a machine.
+/// Reason why words are not a valid machine.
 #[derive(Debug)]
 pub enum SnapshotError {
-    /// They are not as many as a machine of this controller has.
+    /// Their number differs from that of this controller's machine.
     Length {
         /// How many.
         given: usize,
         /// How many it has.
         expected: usize,
     },
-    /// A word that no machine holds.
+    /// An invalid word.
     Word {
         /// Its index.
         index: usize,
@@ -27,7 +27,7 @@ impl fmt::Display for SnapshotError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Length { given, expected } => write!(f, "a state of {given} words; this controller's has {expected}"),
-            Self::Word { index, word } => write!(f, "word {index} of the state is {word:016x}, which no state holds"),
+            Self::Word { index, word } => write!(f, "word {index} of the state is {word:016x}, which is invalid"),
         }
     }
 }
@@ -52,7 +52,7 @@ impl Supervised {
     /// Takes the machine that [`Supervised::save`] wrote.
     ///
     /// # Errors
-    /// If the words are none of a machine of this controller; it then stays as it is.
+    /// If the words are not a machine of this controller; it is then unchanged.
     pub fn load(&mut self, words: &[u64]) -> Result<(), SnapshotError> {
         let expected = self.state_words();
         if words.len() != expected {

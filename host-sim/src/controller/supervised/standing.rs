@@ -1,12 +1,12 @@
-//! Gauges of a machine that has no plant yet: what they show while it is armed, when each leg in turn makes a small pulse.
+//! Gauges of a machine without a plant: their readings while it is armed, when each leg in turn makes a small pulse.
 
 use super::Supervised;
 use crate::controller::{ControllerError, TickController};
 
-/// Readings that stand but for what the legs move by the controller's own model.
+/// Constant readings, plus the motion of the legs by the controller's own model.
 #[derive(Debug, Clone)]
 pub struct RestingReadings {
-    /// Places of the gauges' words in an input, and of the legs' displacements in an output.
+    /// Indices of the gauges' words in an input, and of the legs' displacements in an output.
     gauges: usize,
     requested: usize,
     words: [f64; 6],
@@ -16,7 +16,7 @@ pub struct RestingReadings {
 }
 
 impl Supervised {
-    /// Of a machine that stands at rest, as this input reads.
+    /// For a machine at rest, with the readings of this input.
     ///
     /// # Errors
     /// A word is missing.
@@ -36,7 +36,7 @@ impl Supervised {
 }
 
 impl RestingReadings {
-    /// Puts what the gauges show after a tick with this output into an input.
+    /// Writes the readings after a tick with this output into an input.
     pub fn show(&mut self, machine: &Supervised, output: &[u64], input: &mut [u64]) {
         let scalar = machine.controller.description().scalar;
         let moved =

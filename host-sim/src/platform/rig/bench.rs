@@ -1,8 +1,8 @@
 //! A rig and a controller that run together, tick by tick.
 //!
-//! At tick n (time t_n) the controller gets the set-point for the end of the coming interval, the gauge readings and the
-//! wrench of t_n; its voltages are held until t_{n+1}, where the pose is scored. With latency they are held one or more
-//! intervals later.
+//! At tick n (time t_n) the controller gets the set-point for the end of the next interval, the gauge readings and the
+//! wrench of t_n. Its voltages are held until t_{n+1}, where the pose is scored. With latency they are delayed by one
+//! or more intervals.
 
 use std::collections::VecDeque;
 
@@ -18,10 +18,10 @@ use crate::word::Scalar;
 
 /// Status bit of a generator that is busy with bias, move or trajectory.
 pub const BUSY: u32 = 1 << 18;
-/// Status bits of set-points that were refused or stale: the controller held instead of following.
+/// Status bits of refused or stale set-points: the controller held instead of following.
 pub const NOT_FOLLOWED: u32 = 3 << 16;
 
-/// What the controller is asked for.
+/// Command to the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Command {
     /// Stay.
@@ -55,11 +55,11 @@ pub struct Request {
     pub command: Command,
     /// Number of the trajectory.
     pub selector: u32,
-    /// Whether the set-point is a new one: the stream counter then moves on.
+    /// Whether the set-point is a new one: the stream counter is then incremented.
     pub fresh: bool,
     /// The set-point.
     pub target: PoseTarget,
-    /// Correction of the request, m and rad; for controllers that take one.
+    /// Correction of the request, m and rad; for controllers with corrections.
     pub correction: Six,
 }
 
@@ -78,7 +78,7 @@ pub struct Tick {
     pub status: u32,
     /// The controller's target at the end of the tick, with the bias.
     pub target: Six,
-    /// The pose that the controller found at the beginning of the tick.
+    /// The pose that the controller computed at the beginning of the tick.
     pub measured: Six,
     /// Its voltages, V.
     pub voltage: Six,
@@ -88,7 +88,7 @@ pub struct Tick {
     pub wrench: Wrench,
 }
 
-/// Where a bench stopped: what [`Bench::resume`] needs besides rig and controller.
+/// State of a stopped bench, which [`Bench::resume`] needs besides rig and controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BenchState {
     sequence: u64,
@@ -128,7 +128,7 @@ impl<'a> Bench<'a> {
         Self::resume(rig, controller, interval, &BenchState { sequence: 0, ticks: 0, underway })
     }
 
-    /// Goes on from where a bench stopped, with clones of its rig and controller.
+    /// Continues a stopped bench, with clones of its rig and controller.
     ///
     /// # Errors
     /// As [`Bench::new`].
@@ -155,13 +155,13 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Ends it where [`Bench::resume`] can go on.
+    /// Ends it, with the state for [`Bench::resume`].
     #[must_use]
     pub fn pause(self) -> BenchState {
         BenchState { sequence: self.sequence, ticks: self.ticks, underway: self.underway }
     }
 
-    /// Keeps every word from here on.
+    /// Stores every word from here on.
     pub fn record(&mut self) {
         self.trace = Some(Trace::new(self.controller.description().clone()));
     }
@@ -238,7 +238,7 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Holds until the controller is at its bias pose, at most `limit` (s); returns how long that took, s.
+    /// Holds until the controller is at its bias pose, at most `limit` (s); returns the time, s.
     ///
     /// # Errors
     /// If it takes longer, or as [`Bench::tick`].
@@ -246,7 +246,7 @@ impl<'a> Bench<'a> {
         self.until_arrived(&Request::default(), limit).map(|(ticks, _)| ticks as f64 * self.interval)
     }
 
-    /// Moves to a pose of the user's frames (m and rad), at most for `limit` (s); returns the status bits that were seen.
+    /// Moves to a pose of the user's frames (m and rad), at most for `limit` (s); returns the union of the status bits.
     ///
     /// # Errors
     /// As [`Bench::arm`].
@@ -256,7 +256,7 @@ impl<'a> Bench<'a> {
         self.until_arrived(&request, limit).map(|(_, seen)| seen)
     }
 
-    /// Asks until nothing moves: how many ticks that took, and the status bits that were seen.
+    /// Repeats the request until nothing moves; returns the number of ticks, and the union of the status bits.
     fn until_arrived(&mut self, request: &Request, limit: f64) -> Result<(usize, u32), RunError> {
         let (mut status, mut seen) = (0, 0);
         for tick in 1..=ticks_within(limit, self.interval)? {
@@ -270,7 +270,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Places of the words that the bench connects.
+/// Indices of the words that the bench connects.
 struct Wiring {
     command: usize,
     selector: usize,
@@ -278,7 +278,7 @@ struct Wiring {
     pose: [usize; 6],
     rate: [usize; 6],
     acceleration: [usize; 6],
-    /// None where the controller takes no correction.
+    /// None if the controller takes no correction.
     correction: Option<[usize; 6]>,
     gauge: [usize; 6],
     wrench: [usize; 6],

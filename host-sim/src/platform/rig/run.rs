@@ -1,4 +1,4 @@
-//! A trajectory run by a rig and a controller, scored against the true pose.
+//! A trajectory run with a rig and a controller, scored by the true pose.
 
 use std::fmt::Write as _;
 
@@ -13,10 +13,10 @@ use crate::trace::Trace;
 use crate::trajectory::{PoseTarget, PoseTrajectory};
 use crate::word::status_words;
 
-/// A path that repeats is followed for as many whole repetitions as fit into this time, once at least, s.
+/// Duration for repeated paths: as many whole repetitions as fit, at least one, s.
 const REPEATED: f64 = 60.0;
 
-/// What a run keeps besides its errors.
+/// Data of a run besides its errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Record {
     /// Nothing.
@@ -28,7 +28,7 @@ pub enum Record {
     Trace,
 }
 
-/// How a trajectory is run.
+/// Settings of a trajectory run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunOptions {
     /// Control interval, s.
@@ -37,15 +37,15 @@ pub struct RunOptions {
     pub bias: Six,
     /// Frames of the controller, in which the trajectory is given; none: parallel to {B}, about P_C.
     pub frames: Option<UserFrames>,
-    /// How long the controller may take to its bias pose, s.
+    /// Time limit for the controller to reach its bias pose, s.
     pub arming: f64,
     /// Rest between that and the trajectory, s.
     pub settle: f64,
-    /// Intervals by which voltages come late.
+    /// Delay of voltages, intervals.
     pub latency: usize,
-    /// Touched, unloaded, when the trajectory starts.
+    /// Part that is touched, unloaded, when the trajectory starts.
     pub part: Option<WorkPart>,
-    /// Gauge faults: gauge, from and to time of the trajectory (s), kind.
+    /// Gauge faults: gauge, start and end in the time of the trajectory (s), kind.
     pub faults: Vec<(usize, f64, f64, GaugeFault)>,
     /// What is kept.
     pub record: Record,
@@ -68,21 +68,21 @@ impl RunOptions {
         }
     }
 
-    /// The true pose that a set-point asks for, from rest.
+    /// The true pose for a set-point, from rest.
     pub(in crate::platform) fn pose_of(&self, wanted: &PoseTarget) -> Six {
         let moved = self.frames.map_or(wanted.pose, |frames| frames.pose(&wanted.pose));
         std::array::from_fn(|k| self.bias[k] + moved[k])
     }
 }
 
-/// A trajectory of the controller's own, as the controller has it.
+/// A trajectory stored in the controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OnBoard {
     /// Its number.
     pub selector: u32,
-    /// Where it begins, in the user's frames, m and rad; none where that is the bias pose.
+    /// Its start, in the user's frames, m and rad; none if that is the bias pose.
     pub approach: Option<Six>,
-    /// Ticks of the path; of one that repeats, of one repetition.
+    /// Ticks of the path; for a repeated path, of one repetition.
     pub ticks: usize,
     /// Whether it begins again at its end.
     pub repeats: bool,
@@ -114,24 +114,25 @@ pub struct PoseSample {
 /// A run of a platform.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlatformRun {
-    /// True pose against bias and trajectory, up to where the controller no longer followed; see [`PlatformRun::scored`].
+    /// True pose against bias and trajectory, up to where the controller stopped following; see
+    /// [`PlatformRun::scored`].
     pub errors: PoseErrors,
-    /// One per tick of the trajectory, if they are kept.
+    /// One per tick of the trajectory, if they are stored.
     pub samples: Vec<PoseSample>,
-    /// Every word, if it is kept.
+    /// Every word, if they are stored.
     pub trace: Option<Trace>,
-    /// Status bits seen during the trajectory.
+    /// Union of the status bits during the trajectory.
     pub status: u32,
-    /// How long the way to the bias pose took, s.
+    /// Time to reach the bias pose, s.
     pub arming: f64,
 }
 
 impl PlatformRig {
-    /// Runs `controller`, reset to power-up: way to the bias pose, rest, contact, then `trajectory` as a stream.
+    /// Runs `controller`, reset to power-up: move to the bias pose, rest, contact, then `trajectory` as a stream.
     ///
     /// # Errors
-    /// If the controller lacks a word, does not come to its bias pose, gives a voltage that is not finite, or there would
-    /// be no tick.
+    /// If the controller lacks a word, does not reach its bias pose, outputs a voltage that is not finite, or there
+    /// would be no tick.
     pub fn run(
         &mut self,
         controller: &mut dyn TickController,
@@ -164,12 +165,12 @@ impl PlatformRig {
         Ok(PlatformRun { errors, samples, trace: bench.into_trace(), status: seen, arming })
     }
 
-    /// Runs `controller` likewise, but lets it play a trajectory of its own: moves to its start, then plays it from its first
-    /// set-point to its last, or at most `limit` (s) of it. True poses are scored against its own targets; the way to the start
-    /// is not. A run whose set-points the controller refused ends there, see [`PlatformRun::is_followed`].
+    /// Runs `controller` likewise, but lets it play a stored trajectory: moves to its start, then plays it completely,
+    /// or at most `limit` (s) of it. True poses are scored against the controller's targets; the move to the start is
+    /// not scored. A run with a refused set-point ends there, see [`PlatformRun::is_followed`].
     ///
     /// # Errors
-    /// As [`PlatformRig::run`], and if the trajectory ends before its last set-point, or not with it.
+    /// As [`PlatformRig::run`], or if the trajectory does not end with its last set-point.
     pub fn play(
         &mut self,
         controller: &mut dyn TickController,
@@ -208,7 +209,7 @@ impl PlatformRig {
         Ok(PlatformRun { errors, samples, trace: bench.into_trace(), status: seen, arming })
     }
 
-    /// A bench with the controller at its bias pose, rested, in contact; and how long the way took, s.
+    /// A bench with the controller at its bias pose, settled, in contact; and the time to reach it, s.
     pub(in crate::platform) fn ready<'a>(
         &'a mut self,
         controller: &'a mut dyn TickController,
@@ -232,13 +233,13 @@ impl PlatformRig {
 }
 
 impl PlatformRun {
-    /// Whether the controller followed every set-point: refused none, and found none stale.
+    /// Whether the controller followed every set-point: none was refused or stale.
     #[must_use]
     pub fn is_followed(&self) -> bool {
         self.status & NOT_FOLLOWED == 0
     }
 
-    /// The errors, if they are those of the path.
+    /// The errors, if they cover the path.
     ///
     /// # Errors
     /// If the controller held instead of following.
@@ -249,8 +250,8 @@ impl PlatformRun {
         Err(RunError::EndedEarly { coverage: self.errors.coverage(), status: self.status })
     }
 
-    /// CSV, one line per tick that was kept: what was wanted, where it was and by how much that is off, what the controller saw,
-    /// did and said. SI units.
+    /// CSV, one line per stored tick: target, pose and error, the controller's measurement, outputs and status. SI
+    /// units.
     #[must_use]
     pub fn to_csv(&self) -> String {
         let six = |stem: &str| (0..6).map(|k| format!(",{stem}[{k}]")).collect::<String>();

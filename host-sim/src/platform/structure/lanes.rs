@@ -1,4 +1,4 @@
-//! The structure of [`Structure`] in steps as long as a control interval: legs in lanes.
+//! The structure of [`Structure`] in steps of a control interval: legs in lanes.
 //!
 //! Behind amplifiers that hold their inputs a free displacement goes, over one step, along the exponential of its
 //! amplifier's lag and not along a straight line. Here each leg has that shape, and by how much it is off that on the way as
@@ -34,7 +34,7 @@ pub(in crate::platform) struct StructureLanes {
     damping: Lane,
     /// Columns of J at rest.
     jacobian: [Lane; 6],
-    /// What never lets go, with its stiffness in coordinates h.
+    /// A contact that never opens, with its stiffness in coordinates h.
     contact: Option<(Contact, Matrix6)>,
     state: Column,
     displacement: Lane,
@@ -48,8 +48,8 @@ fn lane(of: impl Fn(usize) -> f64) -> Lane {
 }
 
 impl StructureLanes {
-    /// The structure as it is, for steps of `step` (s); `lag` of each leg's amplifier, s. A part in touch is taken
-    /// as one that holds both ways.
+    /// Copies the structure, for steps of `step` (s); `lag` of each leg's amplifier, s. A part in contact acts in both
+    /// directions.
     pub(in crate::platform) fn of(structure: &Structure, step: f64, lag: &Six) -> Self {
         let parameters = &structure.parameters;
         let geometry = &parameters.geometry;

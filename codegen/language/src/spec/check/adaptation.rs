@@ -61,7 +61,7 @@ pub(super) fn weights_for_mode(f: &Fields, findings: &mut Findings) -> Option<()
                 path,
                 f.span(path),
                 format!("mode \"{word}\" does not use `{path}`: it is checked, and there for a change of mode while running"),
-                "take it out, or choose the mode that uses it: \"ewma\" takes the level, \"pcc\" level and drift".to_owned(),
+                "remove it, or choose the mode that uses it: \"ewma\" takes the level, \"pcc\" level and drift".to_owned(),
             ),
             _ => {}
         }

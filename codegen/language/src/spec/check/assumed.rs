@@ -151,7 +151,7 @@ fn unknown(f: &Fields, entry: &str) -> Problem {
         let there = section.keys.iter().map(|key| section.path(key.name)).filter(|path| f.given(path));
         let list: Vec<String> = there.take(MOST_LISTED).map(|path| format!("\"{path}\"")).collect();
         let help = if list.is_empty() {
-            format!("take it out: this spec gives no value of {}", section.header())
+            format!("remove it: this spec gives no value of {}", section.header())
         } else {
             format!("{} is a section: name its assumed keys one by one, such as {}", section.header(), list.join(", "))
         };

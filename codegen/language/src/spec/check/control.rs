@@ -66,7 +66,7 @@ pub(super) fn no_leg_keys(f: &Fields, findings: &mut Findings) -> Option<()> {
         if f.given(&path) {
             refuse(
                 &path,
-                "a weight per run is another controller at another period",
+                "per-run weights change behaviour when the period changes",
                 &format!("write {which}_bandwidth in rad/s, or leave both bandwidths to the compiler"),
             );
         }
@@ -75,7 +75,7 @@ pub(super) fn no_leg_keys(f: &Fields, findings: &mut Findings) -> Option<()> {
         refuse(
             "adaptation.run_interval",
             "the task-space controller adapts in every tick",
-            "take it out; a smaller bandwidth does what a longer run would",
+            "remove it; a smaller bandwidth has the effect of a longer run",
         );
     }
     if f.choice("controller.setpoint") == Some("leg") {

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use libloading::Library;
 
-/// Where the library is looked for, if no file is named.
+/// Names of the library, if no file is given.
 const NAMES: [&str; 2] = ["libcomedi.so.0", "libcomedi.so"];
 
 /// Kinds of subdevices.
@@ -89,21 +89,21 @@ pub struct Card<'a> {
     handle: Handle,
 }
 
-// SAFETY: a handle may be used from any thread, from one at a time, which the borrow checker sees to.
+// SAFETY: a handle may be used from any thread, but from one at a time, which the borrow checker ensures.
 unsafe impl Send for Card<'_> {}
-// SAFETY: the functions are plain code without state of a thread.
+// SAFETY: the functions have no thread-local state.
 unsafe impl Sync for Comedilib {}
 
 impl Comedilib {
     /// Opens `file`, or the system's library.
     ///
     /// # Errors
-    /// In words: what was looked for, and how to install it.
+    /// As text: the names tried, and how to install it.
     pub fn open(file: Option<&Path>) -> Result<Self, String> {
         let names: Vec<&Path> = file.map_or_else(|| NAMES.iter().map(Path::new).collect(), |file| vec![file]);
         let mut answers = Vec::new();
         for name in names {
-            // SAFETY: loading runs the library's initialisers: libcomedi has none that matter.
+            // SAFETY: loading runs the library's initialisers; those of libcomedi are harmless.
             match unsafe { Library::new(name) } {
                 Ok(library) => {
                     // SAFETY: the library is comedilib by its name, the types are those of its headers.

@@ -1,4 +1,4 @@
-//! What a board answers over the link.
+//! The link commands of a board.
 
 use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
 use controller::waves::{self, Wave};
@@ -24,35 +24,35 @@ use crate::samples;
 use crate::stepper::{Costs, Stepper, Stopwatch};
 use crate::words::PERIOD_NANOSECONDS;
 
-/// Words of the longest answer: settings, what a step gives, a piece of a record or of errors.
+/// Words of the longest reply: settings, the result of a step, a piece of a record or of errors.
 const WORDS: usize = {
     let words = larger(larger(CONFIG_WORDS, MACHINE_OUTPUT_WORDS), larger(MACHINE_INPUT_WORDS, download::WORDS));
     if passes::POSSIBLE { larger(words, KNOTS * KNOT / size_of::<u64>()) } else { words }
 };
 
-/// Knots that are fetched while the tick is held off, of [`KNOTS`]: an H7 takes a microsecond for it.
+/// Knots, of [`KNOTS`], that are copied at a time with the tick held off: an H7 takes a microsecond for it.
 const KNOTS_AT_ONCE: usize = 4;
 
 const fn larger(a: usize, b: usize) -> usize {
     if a > b { a } else { b }
 }
 
-/// What lies behind the desk of the background. Everything else is in the [`Exchange`], which it looks into for as long as a copy
-/// takes.
+/// State of the link command handler, in the background. Everything else is in the [`Exchange`], which it locks only
+/// for a copy.
 #[derive(Debug)]
 pub struct LinkHandler {
     stopwatch: Stopwatch,
     costs: Costs,
     session: Session<WORDS>,
     download: Download,
-    /// Of the last answer with samples.
+    /// Block of the last reply with samples.
     block: Block,
 }
 
-/// A desk while bytes are looked at. `dyn`, so that there is one copy of it, compiled as this crate is.
+/// A handler while it processes bytes. `dyn`, so that there is one copy of it, compiled with this crate's options.
 pub struct RequestContext<'d, 'a> {
-    /// The desk.
-    pub desk: &'d mut LinkHandler,
+    /// The handler.
+    pub handler: &'d mut LinkHandler,
     /// The access.
     pub with: &'d mut Access<'a>,
 }
@@ -65,13 +65,13 @@ impl LinkHandler {
     }
 }
 
-/// What takes much of the stack is not inlined: only one of it is then there at a time, and nothing of it while the answer is
-/// written.
+/// Functions with large stack frames are not inlined: only one of them is then on the stack at a time, and none while
+/// the reply is written.
 impl RequestContext<'_, '_> {
     fn identity(&mut self) -> Identity {
-        self.desk.session.end();
+        self.handler.session.end();
         (self.with)(&mut |exchange, machine| {
-            // A host that comes anew has asked for nothing yet.
+            // A new session has no request yet.
             exchange.orders.request = Wanted::None;
             exchange.leave_lockstep(machine);
             exchange.cancel_awaited();
@@ -85,8 +85,8 @@ impl RequestContext<'_, '_> {
             config_words: CONFIG_WORDS as u16,
             input_words: MACHINE_INPUT_WORDS as u16,
             output_words: MACHINE_OUTPUT_WORDS as u16,
-            stages: u8::from(self.desk.stopwatch.counted != CostUnit::Nothing),
-            counted: self.desk.stopwatch.counted,
+            stages: u8::from(self.handler.stopwatch.counted != CostUnit::Nothing),
+            counted: self.handler.stopwatch.counted,
             description: DESCRIPTION.len() as u32,
         }
     }
@@ -117,10 +117,10 @@ impl RequestContext<'_, '_> {
         let (mut counts, mut probes) = (Report::NONE.health, Probes::NONE);
         (self.with)(&mut |exchange, _| {
             (counts, probes) = (exchange.report.health, exchange.probes);
-            // An answer that is lost is given again as it is.
+            // A lost reply is sent again unchanged.
             exchange.report.health.events = 0;
         });
-        Reply::Health(counts.told(&probes))
+        Reply::Health(counts.health(&probes))
     }
 
     #[inline(never)]
@@ -133,7 +133,7 @@ impl RequestContext<'_, '_> {
             words = place_words(&machine.state);
         });
         let since = |measured: u64| tick.saturating_sub(measured).saturating_mul(u64::from(PERIOD_NANOSECONDS)) / 1000;
-        match self.desk.session.answer(&words) {
+        match self.handler.session.answer(&words) {
             Some(words) if PLACE_WORDS > 0 => {
                 Reply::Place { tick, phase: phase.word() as u8, status, measured: measured.map(since), words }
             }
@@ -141,7 +141,7 @@ impl RequestContext<'_, '_> {
         }
     }
 
-    /// Asks for something of the ticks, unless the host steps the machine or `order` refuses.
+    /// Changes the command of the ticks, unless the host steps the machine or `order` refuses.
     fn order(&mut self, mut order: impl FnMut(&mut Exchange) -> bool) -> Reply<'static> {
         let mut reply = Reply::Refused(Refusal::State);
         (self.with)(&mut |exchange, _| {
@@ -173,7 +173,7 @@ impl RequestContext<'_, '_> {
             return self.wait_for_edge(EdgeCommand::Command(command), None);
         }
         self.order(|exchange| {
-            // What came before it runs would be followed when nobody expects it any more.
+            // A command from before the run must not take effect later.
             let free = !exchange.is_engaged() && exchange.report.phase == Phase::Running;
             if free {
                 exchange.cancel_awaited();
@@ -207,7 +207,7 @@ impl RequestContext<'_, '_> {
         let mut config = None;
         (self.with)(&mut |exchange, _| config = Some(*exchange.settings()));
         let words = config.map(|config| config.to_words()).unwrap_or([0; CONFIG_WORDS]);
-        match self.desk.session.answer(&words) {
+        match self.handler.session.answer(&words) {
             Some(words) => Reply::Config { words },
             None => Reply::Refused(Refusal::TooLong),
         }
@@ -229,7 +229,7 @@ impl RequestContext<'_, '_> {
         // What it stopped with.
         catch_up(with, || false);
         let mut refusal = Refusal::Unsupported;
-        let LinkHandler { download, session, .. } = &mut *self.desk;
+        let LinkHandler { download, session, .. } = &mut *self.handler;
         let found = download.read(offset, session.buffer(), |action: &mut dyn FnMut(&_)| {
             let mut stands = false;
             with(&mut |exchange, _| {
@@ -263,7 +263,7 @@ impl RequestContext<'_, '_> {
         }
     }
 
-    /// Checks a wave while ticks go on, then hands it over.
+    /// Checks a wave while ticks go on, then passes it to them.
     #[inline(never)]
     fn start_wave(&mut self, bytes: Bytes<'_>, on_edge: bool) -> Reply<'static> {
         let mut limits = None;
@@ -276,7 +276,7 @@ impl RequestContext<'_, '_> {
         }
     }
 
-    /// Hands a wave over, if the machine runs and none is under way.
+    /// Passes a wave to the ticks, if the machine runs and no wave is under way.
     #[inline(never)]
     fn begin_wave(&mut self, limits: wave::Limits<Real>, settings: &Settings<Real>, on_edge: bool) -> Reply<'static> {
         let mut wave = Wave::new(limits);
@@ -306,11 +306,11 @@ impl RequestContext<'_, '_> {
         reply
     }
 
-    /// Takes knots of the correction of passes, a message of them at a time.
+    /// Stores knots of the correction of passes, one message at a time.
     #[inline(never)]
     fn knots(&mut self, first: u32, knots: Bytes<'_>) -> Reply<'static> {
         let Some(given) = knots.knots().filter(|given| given.len() <= KNOTS) else {
-            // Not as a message that nobody can read, whose number is used again.
+            // Not [`Refusal::Message`]: the sequence number of an unreadable message is used again.
             return Reply::Refused(Refusal::Length { expected: (KNOTS * KNOT / size_of::<u64>()) as u16 });
         };
         let (mut taken, count) = ([[0; 6]; KNOTS], given.len());
@@ -358,7 +358,7 @@ impl RequestContext<'_, '_> {
         reply
     }
 
-    /// Knots of what a pass kept, or of what the next one plays.
+    /// Knots of the last pass's error, or of the next one's correction.
     #[inline(never)]
     fn fetched(&mut self, offset: u32, knots: impl for<'p> Fn(&'p Player<'static, Real>) -> &'p [Knot]) -> Reply<'_> {
         let (mut taken, mut count, mut total) = ([[0; 6]; KNOTS], 0, 0);
@@ -386,7 +386,7 @@ impl RequestContext<'_, '_> {
             return Reply::Refused(refusal);
         }
         let taken = taken.get(..count).unwrap_or_default();
-        let bytes = Bytes(put_knots(taken, offset as usize - first * KNOT, self.desk.session.buffer()));
+        let bytes = Bytes(put_knots(taken, offset as usize - first * KNOT, self.handler.session.buffer()));
         Reply::Chunk { offset, total: total as u32, bytes }
     }
 
@@ -398,7 +398,7 @@ impl RequestContext<'_, '_> {
 
     #[inline(never)]
     fn samples(&mut self) -> Reply<'_> {
-        let (block, mut more) = (&mut self.desk.block, false);
+        let (block, mut more) = (&mut self.handler.block, false);
         *block = Block::EMPTY;
         with_rows(&mut *self.with, |rows| {
             more = rows.waiting() > 1;
@@ -422,10 +422,10 @@ impl RequestContext<'_, '_> {
         if !may {
             return Reply::Refused(Refusal::State);
         }
-        let LinkHandler { stopwatch, costs, session, .. } = &mut *self.desk;
+        let LinkHandler { stopwatch, costs, session, .. } = &mut *self.handler;
         let reply = session.reset(&mut Stepper { stopwatch: *stopwatch, costs, with: &mut *self.with }, config);
         if reply != Reply::Done && !was {
-            // Settings that were refused have changed nothing.
+            // Refused settings have changed nothing.
             (self.with)(&mut |exchange, _| exchange.lockstep = None);
         }
         reply
@@ -439,12 +439,12 @@ impl RequestContext<'_, '_> {
         if !steps {
             return Reply::Refused(Refusal::State);
         }
-        let LinkHandler { stopwatch, costs, session, .. } = &mut *self.desk;
+        let LinkHandler { stopwatch, costs, session, .. } = &mut *self.handler;
         session.step(&mut Stepper { stopwatch: *stopwatch, costs, with: &mut *self.with }, input)
     }
 }
 
-/// How a player stands.
+/// Status of a player.
 pub(crate) fn standing(player: &Player<'_, Real>) -> PassStatus {
     PassStatus {
         stage: player.stage().word(),
@@ -454,14 +454,14 @@ pub(crate) fn standing(player: &Player<'_, Real>) -> PassStatus {
     }
 }
 
-/// The settings of a wave, whose words are done with before the wave is made. None if there are too few or too many.
+/// The settings of a wave; the words are released before the wave is built. None if their number is wrong.
 #[inline(never)]
 fn settings(bytes: Bytes<'_>) -> Option<Result<Settings<Real>, wave::Refusal>> {
     let mut words = [0; wave::WORDS];
     bytes.read_words(&mut words).then(|| Settings::from_words(&words))
 }
 
-/// Why a wave is refused, as the link says it.
+/// The link's code for the refusal of a wave.
 fn refusal(refused: wave::Refusal) -> Refusal {
     refused.word().map_or(Refusal::State, |index| Refusal::Word { index: index as u16 })
 }
@@ -482,7 +482,7 @@ impl Device for RequestContext<'_, '_> {
             Request::Edge { drop } => self.edge(drop),
             Request::ReadConfig => self.config(),
             Request::WriteConfig { words } => {
-                let LinkHandler { stopwatch, costs, session, .. } = &mut *self.desk;
+                let LinkHandler { stopwatch, costs, session, .. } = &mut *self.handler;
                 session.configure(&mut Stepper { stopwatch: *stopwatch, costs, with: &mut *self.with }, words)
             }
             #[cfg(feature = "lockstep")]
@@ -490,8 +490,8 @@ impl Device for RequestContext<'_, '_> {
             #[cfg(feature = "lockstep")]
             Request::LockstepStep { input } => self.step(input),
             #[cfg(feature = "lockstep")]
-            Request::LockstepStage { index: 0 } if self.desk.stopwatch.counted != CostUnit::Nothing => {
-                Reply::Stage(self.desk.costs.stage())
+            Request::LockstepStage { index: 0 } if self.handler.stopwatch.counted != CostUnit::Nothing => {
+                Reply::Stage(self.handler.costs.stage())
             }
             #[cfg(not(feature = "lockstep"))]
             Request::LockstepReset { .. } | Request::LockstepStep { .. } => Reply::Refused(Refusal::Unsupported),

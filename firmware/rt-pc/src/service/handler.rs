@@ -1,4 +1,4 @@
-//! What is answered over the link.
+//! The link commands of a run.
 
 use controller::supervised::{Cause, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
 use controller::{COMMAND_WORDS, CONFIG_WORDS, Config, DESCRIPTION, PLACE_WORDS, Real, passes, triggers};
@@ -23,14 +23,14 @@ const _: () = assert!(CHUNK + 24 < specgen_link::MESSAGE);
 
 /// The console as the device of a link.
 pub struct LinkHandler<'a> {
-    /// What is asked of the run.
+    /// The console of the run.
     pub console: &'a mut Console,
     pub host: HostId,
-    /// What it asks for was sent before a stop of another host.
+    /// Its requests were sent before a stop of another host.
     pub is_late: bool,
     /// Events that were not yet reported to this host.
     pub events: &'a mut u32,
-    /// What it looks on with.
+    /// Its samples.
     pub stream: &'a mut Stream,
     /// Now, ns.
     pub now: u64,
@@ -89,9 +89,9 @@ impl<'a> LinkHandler<'a> {
         }
     }
 
-    /// Gives the orders to this host, then does `what`.
+    /// Gives control to this host, then does `what`.
     fn ordered(&mut self, what: impl FnOnce(&mut Self) -> Result<(), Refusal>) -> Reply<'static> {
-        // One that orders faster than the loop obeys is not to delay what others have to say.
+        // A host that sends commands faster than the loop takes them must not delay other hosts.
         let done = if self.console.is_full() { Err(Refusal::Busy) } else { self.take().and_then(|()| what(self)) };
         done.map_or_else(Reply::Refused, |()| Reply::Done)
     }
@@ -106,7 +106,7 @@ impl<'a> LinkHandler<'a> {
         })
     }
 
-    /// What slows the machine down is obeyed whoever has the orders.
+    /// A request that slows the machine down is accepted from every host.
     fn supervise(&mut self, request: u8) -> Result<(), Refusal> {
         let wanted = Wanted::from_word(u64::from(request));
         if wanted.word() != u64::from(request) {
@@ -125,7 +125,7 @@ impl<'a> LinkHandler<'a> {
     }
 
     fn command(&mut self, words: Bytes<'_>) -> Result<(), Refusal> {
-        // A wave makes the set-points, and a pass: two at once would be a contradiction.
+        // A wave or a pass makes the set-points: two sources would conflict.
         if self.console.is_engaged() {
             return Err(Refusal::State);
         }
@@ -133,7 +133,7 @@ impl<'a> LinkHandler<'a> {
         if !words.read_words(&mut command) {
             return Err(Refusal::Length { expected: COMMAND_WORDS as u16 });
         }
-        // What came before it runs would be followed when nobody expects it any more.
+        // A command from before the run must not take effect later.
         if !self.console.runs() {
             return Err(Refusal::State);
         }
@@ -161,8 +161,8 @@ impl<'a> LinkHandler<'a> {
 
     fn edge(&mut self, drop: bool) -> Reply<'static> {
         if drop {
-            let dropped = self.ordered(|desk| {
-                desk.console.stop_waiting();
+            let dropped = self.ordered(|handler| {
+                handler.console.stop_waiting();
                 Ok(())
             });
             if dropped != Reply::Done {
@@ -192,7 +192,7 @@ impl<'a> LinkHandler<'a> {
     }
 
     fn knots(&mut self, first: u32, knots: Bytes<'_>) -> Result<(), Refusal> {
-        // Not as a message that nobody can read, whose number is used again.
+        // Not [`Refusal::Message`]: the sequence number of an unreadable message is used again.
         let whole = Refusal::Length { expected: (KNOTS * KNOT / size_of::<u64>()) as u16 };
         let knots = knots.knots().ok_or(whole)?;
         self.console.put_knots(first, knots).map_err(refusal)
@@ -222,7 +222,7 @@ impl<'a> LinkHandler<'a> {
         self.console.passes.status().map_or(Reply::Refused(Refusal::Unsupported), Reply::Pass)
     }
 
-    /// Knots of what a pass kept, or of what the next one plays.
+    /// Knots of the last pass's error, or of the next one's correction.
     fn fetched(&mut self, offset: u32, knots: impl Fn(&Passes) -> Option<&[Knot]>) -> Reply<'_> {
         let Some(knots) = knots(&self.console.passes) else { return Reply::Refused(Refusal::State) };
         let total = u32::try_from(knots.len() * KNOT).unwrap_or(u32::MAX);
@@ -293,29 +293,29 @@ impl Device for LinkHandler<'_> {
             Request::Health => self.health(),
             Request::Place => self.place(),
             Request::Supervise { request } => self.supervise(request).map_or_else(Reply::Refused, |()| Reply::Done),
-            Request::Setpoint { words } => self.ordered(|desk| desk.command(words)),
+            Request::Setpoint { words } => self.ordered(|handler| handler.command(words)),
             Request::SetpointOnEdge { .. } | Request::Edge { .. } if !triggers::INPUT => {
                 Reply::Refused(Refusal::Unsupported)
             }
-            Request::SetpointOnEdge { words } => self.ordered(|desk| desk.command_on_edge(words)),
+            Request::SetpointOnEdge { words } => self.ordered(|handler| handler.command_on_edge(words)),
             Request::Edge { drop } => self.edge(drop),
             Request::ReadConfig => match put_words(&self.console.config().to_words(), &mut self.words) {
                 Some(words) => Reply::Config { words },
                 None => Reply::Refused(Refusal::TooLong),
             },
-            Request::WriteConfig { words } => self.ordered(|desk| desk.configure(words)),
+            Request::WriteConfig { words } => self.ordered(|handler| handler.configure(words)),
             Request::Recorder { action } => self.recorder(action),
             Request::Download { offset } => match self.console.capture.image() {
                 Some(image) => piece(image, offset),
                 None => Reply::Refused(Refusal::State),
             },
-            Request::Wave { action, words } => self.ordered(|desk| desk.wave(action, words)),
+            Request::Wave { action, words } => self.ordered(|handler| handler.wave(action, words)),
             Request::Knots { .. } | Request::Pass { .. } | Request::Errors { .. } | Request::Correction { .. }
                 if !passes::POSSIBLE =>
             {
                 Reply::Refused(Refusal::Unsupported)
             }
-            Request::Knots { first, knots } => self.ordered(|desk| desk.knots(first, knots)),
+            Request::Knots { first, knots } => self.ordered(|handler| handler.knots(first, knots)),
             Request::Pass { action } => self.pass(action),
             Request::Errors { offset } => self.fetched(offset, Passes::errors),
             Request::Correction { offset } => self.fetched(offset, Passes::correction),
@@ -325,7 +325,7 @@ impl Device for LinkHandler<'_> {
                 self.console.operator.ramp_down(self.now);
                 Reply::Done
             }
-            // The machine of a PC is the host's own: it is tried by `specgen sim` and `specgen replay`.
+            // The machine of a PC runs on the host itself: `specgen sim` and `specgen replay` test it.
             Request::LockstepReset { .. } | Request::LockstepStep { .. } | Request::LockstepStage { .. } => {
                 Reply::Refused(Refusal::Unsupported)
             }
@@ -356,8 +356,8 @@ mod tests {
     /// What a host is answered, as text; a piece of something longer as its bytes.
     fn ask_as(console: &mut Console, host: HostId, is_late: bool, request: &Request<'_>) -> String {
         let (mut events, mut stream) = (0, Stream::default());
-        let mut desk = LinkHandler::new(console, host, is_late, &mut events, &mut stream, NOW);
-        format!("{:?}", desk.execute(request))
+        let mut handler = LinkHandler::new(console, host, is_late, &mut events, &mut stream, NOW);
+        format!("{:?}", handler.execute(request))
     }
 
     fn ask(console: &mut Console, request: &Request<'_>) -> String {
@@ -376,8 +376,8 @@ mod tests {
         let mut all = Vec::new();
         loop {
             let (mut events, mut stream) = (0, Stream::default());
-            let mut desk = LinkHandler::new(console, A, false, &mut events, &mut stream, NOW);
-            let Reply::Chunk { offset, total, bytes } = desk.execute(&request(all.len() as u32)) else {
+            let mut handler = LinkHandler::new(console, A, false, &mut events, &mut stream, NOW);
+            let Reply::Chunk { offset, total, bytes } = handler.execute(&request(all.len() as u32)) else {
                 panic!("no piece")
             };
             assert_eq!(offset as usize, all.len());
@@ -418,8 +418,8 @@ mod tests {
         let blind = crate::operator::SupervisorReport { status: controller::GAUGE_FAULT, ..said(Phase::Running) };
         console.update(&shown, blind, NOW);
         let (mut events, mut stream) = (0, Stream::default());
-        let mut desk = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
-        let Reply::Place { tick, phase, status, measured, words } = desk.execute(&Request::Place) else {
+        let mut handler = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let Reply::Place { tick, phase, status, measured, words } = handler.execute(&Request::Place) else {
             panic!("no place")
         };
         assert_eq!((tick, phase, status, measured), (8, 2, controller::GAUGE_FAULT, Some(3000)));
@@ -432,9 +432,9 @@ mod tests {
         let mut console = console(Phase::Holding);
         console.health.overruns = Some(5);
         let (mut events, mut stream) = (6, Stream::default());
-        let mut desk = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let mut handler = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
         for expected in [6, 0] {
-            let Reply::Health(health) = desk.execute(&Request::Health) else { panic!("no health") };
+            let Reply::Health(health) = handler.execute(&Request::Health) else { panic!("no health") };
             assert_eq!((health.events, health.overruns), (expected, Some(5)));
         }
     }
@@ -500,8 +500,8 @@ mod tests {
             matches!(console.outgoing().0.back(), Some(LoopCommand::Configure(config)) if config.to_words() == words)
         );
         let (mut events, mut stream) = (0, Stream::default());
-        let mut desk = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
-        let Reply::Config { words: found } = desk.execute(&Request::ReadConfig) else { panic!("no settings") };
+        let mut handler = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let Reply::Config { words: found } = handler.execute(&Request::ReadConfig) else { panic!("no settings") };
         assert_eq!(found.0, bytes(&words));
     }
 
@@ -600,19 +600,19 @@ mod tests {
         console.operator.wish();
         let (mut events, mut stream) = (0, Stream::default());
         let words = bytes(&[1; COMMAND_WORDS]);
-        let mut desk = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let mut handler = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
         let expected = COMMAND_WORDS as u16;
-        assert_eq!(desk.command_on_edge(Bytes(&words[8..])), Err(Refusal::Length { expected }));
-        assert_eq!(desk.command_on_edge(Bytes(&words)), Ok(()));
-        assert!(matches!(desk.edge(false), Reply::Edge(_)));
-        assert_eq!(desk.console.outgoing().0.len(), 1);
-        assert!(matches!(desk.edge(true), Reply::Edge(_)));
-        assert!(matches!(desk.console.outgoing().0.back(), Some(LoopCommand::StopWaiting)));
-        desk.is_late = true;
-        assert_eq!(desk.edge(true), Reply::Refused(Refusal::Busy));
+        assert_eq!(handler.command_on_edge(Bytes(&words[8..])), Err(Refusal::Length { expected }));
+        assert_eq!(handler.command_on_edge(Bytes(&words)), Ok(()));
+        assert!(matches!(handler.edge(false), Reply::Edge(_)));
+        assert_eq!(handler.console.outgoing().0.len(), 1);
+        assert!(matches!(handler.edge(true), Reply::Edge(_)));
+        assert!(matches!(handler.console.outgoing().0.back(), Some(LoopCommand::StopWaiting)));
+        handler.is_late = true;
+        assert_eq!(handler.edge(true), Reply::Refused(Refusal::Busy));
         let mut resting = self::console(Phase::Holding);
-        let mut desk = LinkHandler::new(&mut resting, A, false, &mut events, &mut stream, NOW);
-        assert_eq!(desk.command_on_edge(Bytes(&words)), Err(Refusal::State));
+        let mut handler = LinkHandler::new(&mut resting, A, false, &mut events, &mut stream, NOW);
+        assert_eq!(handler.command_on_edge(Bytes(&words)), Err(Refusal::State));
     }
 
     #[test]
@@ -620,30 +620,30 @@ mod tests {
         let mut console = console(Phase::Running);
         console.passes = Passes::with(8);
         let (mut events, mut stream) = (0, Stream::default());
-        let mut desk = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
+        let mut handler = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
         let whole = (KNOTS * KNOT / size_of::<u64>()) as u16;
         let knots: Vec<u8> = (1..=12_i32).flat_map(i32::to_le_bytes).collect();
-        assert_eq!(desk.knots(0, Bytes(&knots[1..])), Err(Refusal::Length { expected: whole }));
-        assert_eq!(desk.knots(0, Bytes(&knots)), Ok(()));
-        assert_eq!(desk.knots(4, Bytes(&knots)), Err(Refusal::Word { index: 0 }));
+        assert_eq!(handler.knots(0, Bytes(&knots[1..])), Err(Refusal::Length { expected: whole }));
+        assert_eq!(handler.knots(0, Bytes(&knots)), Ok(()));
+        assert_eq!(handler.knots(4, Bytes(&knots)), Err(Refusal::Word { index: 0 }));
         // Of a course of one knot, as long as there was no other.
         for (offset, piece) in [(0, &knots[..KNOT]), (KNOT, &[])] {
             let piece = Reply::Chunk { offset: offset as u32, total: KNOT as u32, bytes: Bytes(piece) };
-            assert_eq!(desk.fetched(offset as u32, Passes::correction), piece);
+            assert_eq!(handler.fetched(offset as u32, Passes::correction), piece);
         }
         // This controller has no correction: what is done otherwise ends with that.
         let done = Reply::Refused(Refusal::Unsupported);
-        assert_eq!(desk.pass(PassAction::Look), done);
-        assert_eq!(desk.pass(PassAction::Abort), done);
-        assert!(matches!(desk.console.outgoing().0.back(), Some(LoopCommand::AbortPass)));
-        assert_eq!(desk.pass(PassAction::Learn { reach: 1, fade: [0, 0] }), Reply::Refused(Refusal::State));
+        assert_eq!(handler.pass(PassAction::Look), done);
+        assert_eq!(handler.pass(PassAction::Abort), done);
+        assert!(matches!(handler.console.outgoing().0.back(), Some(LoopCommand::AbortPass)));
+        assert_eq!(handler.pass(PassAction::Learn { reach: 1, fade: [0, 0] }), Reply::Refused(Refusal::State));
         let begin = PassAction::Begin { spacing: 1, before: 0, ticks: 2, trajectory: 0 };
-        assert_eq!(desk.pass(begin), Reply::Refused(Refusal::State));
-        desk.host = B;
-        assert_eq!(desk.pass(PassAction::Abort), Reply::Refused(Refusal::Busy));
-        assert_eq!(desk.pass(PassAction::Look), done);
+        assert_eq!(handler.pass(begin), Reply::Refused(Refusal::State));
+        handler.host = B;
+        assert_eq!(handler.pass(PassAction::Abort), Reply::Refused(Refusal::Busy));
+        assert_eq!(handler.pass(PassAction::Look), done);
         let mut away = self::console(Phase::Running);
-        let mut desk = LinkHandler::new(&mut away, A, false, &mut events, &mut stream, NOW);
-        assert_eq!(desk.fetched(0, Passes::errors), Reply::Refused(Refusal::State));
+        let mut handler = LinkHandler::new(&mut away, A, false, &mut events, &mut stream, NOW);
+        assert_eq!(handler.fetched(0, Passes::errors), Reply::Refused(Refusal::State));
     }
 }

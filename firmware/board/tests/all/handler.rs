@@ -15,7 +15,7 @@ fn bytes(words: &[u64]) -> Vec<u8> {
 struct Bench {
     exchange: Exchange,
     machine: Box<Machine>,
-    desk: LinkHandler,
+    handler: LinkHandler,
 }
 
 impl Bench {
@@ -23,15 +23,15 @@ impl Bench {
         Self {
             exchange: Exchange::new(),
             machine: Box::new(machine_at_reset()),
-            desk: LinkHandler::new(Stopwatch::NONE),
+            handler: LinkHandler::new(Stopwatch::NONE),
         }
     }
 
     /// Asks, and looks at the answer.
     fn ask<R>(&mut self, request: &Request<'_>, look: impl FnOnce(Reply<'_>) -> R) -> R {
-        let Self { exchange, machine, desk } = self;
+        let Self { exchange, machine, handler } = self;
         let mut with = |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(exchange, machine);
-        look(RequestContext { desk, with: &mut with }.execute(request))
+        look(RequestContext { handler, with: &mut with }.execute(request))
     }
 
     fn expect(&mut self, request: &Request<'_>, expected: Reply<'_>) {
@@ -208,7 +208,7 @@ fn counter() -> u32 {
 #[test]
 fn what_the_steps_of_a_lock_step_cost_is_told() {
     let mut bench = Bench::new();
-    bench.desk = LinkHandler::new(Stopwatch { counted: CostUnit::Cycles, now: counter });
+    bench.handler = LinkHandler::new(Stopwatch { counted: CostUnit::Cycles, now: counter });
     bench.ask(&Request::Hello, |reply| {
         let Reply::Identity(identity) = reply else { unreachable!() };
         assert_eq!((identity.counted, identity.stages), (CostUnit::Cycles, 1));
