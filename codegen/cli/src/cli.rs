@@ -22,6 +22,7 @@ mod line;
 mod lsp;
 mod named;
 mod new;
+mod number;
 mod operate;
 mod panel;
 mod pil;

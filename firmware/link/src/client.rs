@@ -121,7 +121,9 @@ impl fmt::Display for ClientError {
                 "the device speaks version {found} of the link, expected {VERSION}: build and flash it with this specgen"
             ),
             Self::Refused(refusal) => write!(f, "the device refuses: {}", words(*refusal)),
-            Self::Unexpected => f.write_str("the device sent an unexpected answer: build and flash it with this specgen"),
+            Self::Unexpected => {
+                f.write_str("the device sent an unexpected answer: build and flash it with this specgen")
+            }
             Self::TooLong => f.write_str("the request is longer than the longest message of the link"),
         }
     }

@@ -343,7 +343,10 @@ mod tests {
         let mut console = console(Phase::Running);
         console.operator.wish();
         console.order(LoopCommand::Trigger);
-        console.order(LoopCommand::OperatorRequest(OperatorRequest { command: Some([7; COMMAND_WORDS]), request: Request::Run }));
+        console.order(LoopCommand::OperatorRequest(OperatorRequest {
+            command: Some([7; COMMAND_WORDS]),
+            request: Request::Run,
+        }));
         console.start_wave(&Settings::still(), true).unwrap();
         console.start_wave(&Settings::still(), false).unwrap();
         assert_eq!(console.command_on_edge([1; COMMAND_WORDS]), Err(Rejection::State), "under a wave");

@@ -9,6 +9,7 @@ use specgen_studies::reversal_curves::Experiment;
 
 use super::identify::range;
 use super::named::{InputFile, OutputFile};
+use super::number::number;
 use super::plot::Plot;
 use super::sim::PlantArguments;
 
@@ -27,7 +28,7 @@ pub struct Arguments {
     grid: Option<u32>,
     /// Slope of the drive, V/s; a fifth of the voltage range if not given. Records at several rates are what `identify rate`
     /// needs.
-    #[arg(long, value_name = "V/S", allow_negative_numbers = true, value_parser = slope)]
+    #[arg(long, value_name = "V/S", allow_negative_numbers = true, value_parser = number("", "a slope from 0.1 to 100000 V/s", 0.1..=1e5))]
     rate: Option<f64>,
     /// Write the drive alone, for a generator: from 0 V to the lowest voltage, a second there, then the curves.
     #[arg(long, conflicts_with_all = ["plot", "seed", "no_noise"])]
@@ -36,23 +37,12 @@ pub struct Arguments {
     #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true, requires = "drive_only")]
     drive: Option<[f64; 2]>,
     /// Samples per second of --drive-only, Hz.
-    #[arg(long, value_name = "HZ", requires = "drive_only", default_value_t = 10_000.0, value_parser = sampling, allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", requires = "drive_only", default_value_t = 10_000.0, value_parser = number("", "1 to 1000000 samples per second", 1.0..=1e6), allow_negative_numbers = true)]
     sampling: f64,
     #[command(flatten)]
     plot: Plot,
     #[command(flatten)]
     plant: PlantArguments,
-}
-
-/// Slopes from one sweep in hours to one in milliseconds.
-fn slope(text: &str) -> Result<f64, String> {
-    let expected = || format!("expected a slope from 0.1 to 100000 V/s, found `{text}`");
-    text.parse().ok().filter(|rate| (0.1..=1e5).contains(rate)).ok_or_else(expected)
-}
-
-fn sampling(text: &str) -> Result<f64, String> {
-    let expected = || format!("expected 1 to 1000000 samples per second, found `{text}`");
-    text.parse().ok().filter(|rate| (1.0..=1e6).contains(rate)).ok_or_else(expected)
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {

@@ -11,6 +11,7 @@ use specgen_language::ui::Ui;
 use specgen_report::identify::{Bench, everett, gains, gauge, linear, predict, rate, response, stiffness};
 
 use super::named::{InputFile, OutputFile, OutputFolder};
+use super::number::number;
 use super::plot::Plot;
 
 /// Arguments of `identify`.
@@ -77,10 +78,10 @@ struct LinearArguments {
     #[arg(required = true)]
     records: Vec<InputFile>,
     /// Frequencies of the records, Hz, in their order; found in the records if not given.
-    #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = frequency)]
+    #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = number("Hz", "a frequency in Hz above zero", 1e-6..=1e6))]
     frequency: Vec<f64>,
     /// Frequency at which the model's gain ρ̂ is taken, Hz; the lowest one if not given.
-    #[arg(long, value_name = "HZ", value_parser = frequency)]
+    #[arg(long, value_name = "HZ", value_parser = number("Hz", "a frequency in Hz above zero", 1e-6..=1e6))]
     reference: Option<f64>,
     /// Judge the weights of this spec, on its sampled loop, over the λ found.
     #[arg(long, value_name = "SPEC")]
@@ -146,7 +147,7 @@ struct PredictArguments {
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=5), allow_negative_numbers = true)]
     leg: u8,
     /// Time by which the displacement lags the voltage, ms; that of the spec, or none, if not given.
-    #[arg(long, value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS", value_parser = number("", "milliseconds from 0 to 10", 0.0..=10.0), allow_negative_numbers = true)]
     dead_time: Option<f64>,
     /// Resonance behind the model, frequency in Hz and damping ratio, such as 735:0.015, or `none`; if not given that of the
     /// spec, or with a table that of a ring in the record.
@@ -201,7 +202,7 @@ struct BenchArguments {
     #[arg(long, value_name = "NAME=COLUMN,…", value_delimiter = ',')]
     columns: Vec<String>,
     /// Samples per second, Hz: counts the time from sample numbers, or from the rows of a file.
-    #[arg(long, value_name = "HZ", value_parser = sampling, allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", value_parser = number("Hz", "samples per second above zero", 1e-3..=1e9), allow_negative_numbers = true)]
     rate: Option<f64>,
     #[command(flatten)]
     plot: Plot,
@@ -212,13 +213,6 @@ impl BenchArguments {
         let reading = Reading::new(&self.columns, self.rate);
         let reading = reading.map_err(|why| Failure::Usage(format!("--columns: {why}")))?;
         Ok(Bench { reading, plot: self.plot.place() })
-    }
-}
-
-fn sampling(text: &str) -> Result<f64, String> {
-    match text.trim().trim_end_matches("Hz").trim().parse::<f64>() {
-        Ok(rate) if (1e-3..=1e9).contains(&rate) => Ok(rate),
-        _ => Err(format!("expected samples per second above zero, found `{text}`")),
     }
 }
 
@@ -242,19 +236,6 @@ pub(super) fn range(text: &str) -> Result<[f64; 2], String> {
 /// Any whole number: which sizes can be identified is for identification to say.
 fn grid(text: &str) -> Result<usize, String> {
     text.parse().map_err(|_| format!("expected a whole number, found `{text}`"))
-}
-
-fn frequency(text: &str) -> Result<f64, String> {
-    match text.trim().trim_end_matches("Hz").trim().parse::<f64>() {
-        Ok(f) if (1e-6..=1e6).contains(&f) => Ok(f),
-        _ => Err(format!("expected a frequency in Hz above zero, found `{text}`")),
-    }
-}
-
-/// Up to the 10 ms that `hysteresis.dead_time` may be; in s.
-fn milliseconds(text: &str) -> Result<f64, String> {
-    let expected = || format!("expected milliseconds from 0 to 10, found `{text}`");
-    text.parse::<f64>().ok().filter(|ms| (0.0..=10.0).contains(ms)).map(|ms| ms * 1e-3).ok_or_else(expected)
 }
 
 /// A mode, or that there is none.
@@ -296,7 +277,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
                 model: one.model.to_path_buf(),
                 drive: one.drive.to_path_buf(),
                 leg: one.leg,
-                dead_time: one.dead_time,
+                dead_time: one.dead_time.map(|ms| ms * 1e-3),
                 mode: one.mode.map(|Given(mode)| mode),
                 output: one.output.as_deref().map(Into::into),
             };

@@ -5,6 +5,7 @@ use specgen_compiler::{lower, spec_file};
 use specgen_rt::exchange;
 
 use super::named::InputFile;
+use super::number::number;
 use super::sim::PlantArguments;
 use specgen_compiler::compile::Compilation;
 use specgen_language::outcome::Failure;
@@ -26,7 +27,7 @@ pub struct Arguments {
     #[arg(long, default_value = "plant")]
     name: String,
     /// End after this time, s; at Ctrl-C if not given.
-    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", value_parser = number("", "a time from 0.01 to 10000000 s", 0.01..=1e7), allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Keep it on this processor: another one than the controller's.
     #[arg(long, value_name = "N")]
@@ -56,11 +57,6 @@ fn faults(text: &str) -> Result<Faults, String> {
         ));
     }
     Ok(Faults(found))
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    let expected = || format!("expected a time from 0.01 to 10000000 s, found `{text}`");
-    text.parse().ok().filter(|time| (0.01..=1e7).contains(time)).ok_or_else(expected)
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {

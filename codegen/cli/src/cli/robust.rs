@@ -10,6 +10,7 @@ use specgen_studies::robust::Shard;
 use specgen_studies::robust::factors::UserRange;
 
 use super::named::{InputFile, OutputFolder};
+use super::number::number;
 use super::plot::Plot;
 use super::sim::{PlantArguments, frequency};
 
@@ -85,7 +86,7 @@ struct StudyArguments {
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true, requires = "learn")]
     max_learned: Option<f64>,
     /// Quantile of the draws that the gate compares, %; the largest of draws and corners if not given.
-    #[arg(long, value_name = "PERCENT", value_parser = percent, allow_negative_numbers = true)]
+    #[arg(long, value_name = "PERCENT", value_parser = number("%", "a percentage above 0, up to 100", f64::MIN_POSITIVE..=100.0), allow_negative_numbers = true)]
     quantile: Option<f64>,
     /// Error beyond which a run counts as diverged; 5 % of the stroke if not given.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
@@ -119,11 +120,6 @@ fn length(text: &str) -> Result<f64, String> {
 
 fn angle(text: &str) -> Result<f64, String> {
     measure(text, Dimension::ANGLE, "nrad")
-}
-
-fn percent(text: &str) -> Result<f64, String> {
-    let found = text.trim().trim_end_matches('%').trim().parse().ok().filter(|x| *x > 0.0 && *x <= 100.0);
-    found.ok_or_else(|| format!("expected a percentage above 0, up to 100, found `{text}`"))
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {

@@ -9,6 +9,7 @@ use specgen_report::sim::{self as report, Options};
 use specgen_studies::machine::PlantOptions;
 
 use super::named::{InputFile, OutputFile, OutputFolder};
+use super::number::number;
 use super::plot::Plot;
 
 /// Arguments of `sim`.
@@ -62,9 +63,7 @@ pub struct Arguments {
 
 /// A frequency at which a trajectory has a sensible length.
 pub(super) fn frequency(text: &str) -> Result<f64, String> {
-    let expected = || format!("expected a frequency from 0.001 to 1000 Hz, found `{text}`");
-    let hertz: f64 = text.trim().trim_end_matches("Hz").trim().parse().map_err(|_| expected())?;
-    if (1e-3..=1e3).contains(&hertz) { Ok(hertz) } else { Err(expected()) }
+    number("Hz", "a frequency from 0.001 to 1000 Hz", 1e-3..=1e3)(text)
 }
 
 /// Which leg is simulated.

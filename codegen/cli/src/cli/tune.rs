@@ -8,6 +8,7 @@ use specgen_studies::tuning::TunedNumbers;
 use specgen_studies::tuning::space::GivenBounds;
 
 use super::named::{InputFile, OutputFolder};
+use super::number::number;
 use super::plot::Plot;
 use super::sim::{PlantArguments, frequency};
 
@@ -39,13 +40,13 @@ pub struct Arguments {
     #[arg(long, value_name = "HZ", default_value = "10", value_parser = frequency, allow_negative_numbers = true)]
     frequency: f64,
     /// Length of the multisine, s.
-    #[arg(long, value_name = "S", default_value = "2", value_parser = seconds, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value = "2", value_parser = number("", "a time from 0.01 to 1000 s", 0.01..=1000.0), allow_negative_numbers = true)]
     seconds: f64,
     /// Factor on all gains and bandwidths at which a candidate must still be stable.
-    #[arg(long, default_value = "2", value_parser = at_least_one, allow_negative_numbers = true)]
+    #[arg(long, default_value = "2", value_parser = number("", "a factor from 1 to 20", 1.0..=20.0), allow_negative_numbers = true)]
     gain_margin: f64,
     /// Ticks of further delay at which it must still be stable; for a spec with [control].
-    #[arg(long, default_value = "0.5", value_parser = ticks, allow_negative_numbers = true)]
+    #[arg(long, default_value = "0.5", value_parser = number("", "a number of ticks from 0 to 5", 0.0..=5.0), allow_negative_numbers = true)]
     delay_margin: f64,
     /// Bounds of a group of numbers, such as `ki=10:1000`: kp and kv over the stiffness of the axis, ki likewise in 1/s;
     /// level and drift in rad/s with [control], as weights without.
@@ -100,23 +101,6 @@ enum TrajectoryArgument {
     #[value(name = "case-2")]
     Case2,
     Machining,
-}
-
-fn number(text: &str, what: &str, good: impl Fn(f64) -> bool) -> Result<f64, String> {
-    let value = text.trim().parse().ok().filter(|value| good(*value));
-    value.ok_or_else(|| format!("expected {what}, found `{text}`"))
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    number(text, "a time from 0.01 to 1000 s", |s| (0.01..=1000.0).contains(&s))
-}
-
-fn at_least_one(text: &str) -> Result<f64, String> {
-    number(text, "a factor from 1 to 20", |x| (1.0..=20.0).contains(&x))
-}
-
-fn ticks(text: &str) -> Result<f64, String> {
-    number(text, "a number of ticks from 0 to 5", |x| (0.0..=5.0).contains(&x))
 }
 
 fn bounds(text: &str) -> Result<GivenBounds, String> {

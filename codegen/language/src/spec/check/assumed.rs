@@ -125,11 +125,7 @@ fn twice(entry: &str, other: &str) -> Problem {
     } else {
         format!("\"{entry}\" and \"{other}\" name the same value")
     };
-    Problem {
-        message,
-        help: "remove one of the two: the verdict counts each value once".to_owned(),
-        replacement: None,
-    }
+    Problem { message, help: "remove one of the two: the verdict counts each value once".to_owned(), replacement: None }
 }
 
 fn absent(entry: &str) -> Problem {

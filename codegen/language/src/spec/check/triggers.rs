@@ -142,7 +142,12 @@ pub(super) fn not_too_many(f: &Fields, findings: &mut Findings) -> Option<()> {
     let (inputs, outputs): (Vec<usize>, Vec<usize>) = (0..f.count("trigger"))
         .partition(|index| f.choice(&format!("trigger[{index}].kind")) == Some(TriggerKind::Input.word()));
     for (lines, most, what, help) in [
-        (outputs, MAX_OUTPUTS, "outputs", "remove some; the function of a line can be changed while the controller runs"),
+        (
+            outputs,
+            MAX_OUTPUTS,
+            "outputs",
+            "remove some; the function of a line can be changed while the controller runs",
+        ),
         (inputs, 1, "inputs", "keep one of them"),
     ] {
         if let Some(first) = lines.get(most) {
@@ -151,10 +156,7 @@ pub(super) fn not_too_many(f: &Fields, findings: &mut Findings) -> Option<()> {
                 codes::TOO_MANY_TRIGGERS,
                 &path,
                 f.table(&path).unwrap_or(0..0),
-                format!(
-                    "{} triggers are {what}, expected at most {most}, the number of pins on a board",
-                    lines.len()
-                ),
+                format!("{} triggers are {what}, expected at most {most}, the number of pins on a board", lines.len()),
                 help.to_owned(),
             );
         }
