@@ -40,7 +40,7 @@ fn at_most(what: &str, ours: [f64; 3], limit: [f64; 3]) {
 fn table_2_on_the_reference_plant() {
     let mut controller = Emitted::new("paper", "legs.toml", &[]).at_run_time();
     let noise = LegParameters::reference().noise;
-    for seed in [SEED, 2, 3] {
+    for seed in [SEED, 2, 3].into_iter().take(specgen_tests::length(1, 3)) {
         let table = scenario(&noise, seed).tracking(&mut controller, &MODES, &TRACKING_FREQUENCIES).expect("a run");
         let (invhys, ewma, pcc) = (row(&table, "invhys"), row(&table, "ewma"), row(&table, "pcc"));
         within("Invhys against the paper", invhys, [127.0, 232.0, 504.5], 0.10);

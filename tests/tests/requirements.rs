@@ -7,7 +7,7 @@ use specgen::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen::lower::leg_jacobian;
 use specgen::outcome::Refusal;
 use specgen::requirements::{Steps, steps};
-use specgen_tests::{repository, worse};
+use specgen_tests::{length, repository, worse};
 
 /// The spec with edits, and what the compiler says.
 fn verdict(spec: &str, edits: &[(&str, &str)]) -> (String, Result<Steps, Vec<Diagnostic>>) {
@@ -48,7 +48,8 @@ fn a_converter_too_coarse_is_refused_with_the_bits_that_would_do() {
         let asking = |nanometres: f64| format!("[requirements]\nprecision = \"{nanometres} nm\"\n\n[timing]");
         let (_, met) = verdict(spec, &[("[timing]", &asking(largest * 1e9 * (1.0 + 1e-9)))]);
         assert!(met.is_ok(), "{met:?}");
-        for (factor, bits) in [(0.999, 17), (0.26, 18), (0.1, 20)] {
+        let factors = [(0.999, 17), (0.26, 18), (0.1, 20)];
+        for &(factor, bits) in &factors[..length(1, factors.len())] {
             let missed = asking(largest * 1e9 * factor);
             let (text, refused) = verdict(spec, &[("[timing]", &missed)]);
             let findings = refused.unwrap_err();
@@ -97,7 +98,8 @@ fn the_step_of_the_platform_is_the_worst_of_all_roundings() {
 #[test]
 fn microcontrollers_that_do_not_fit_are_refused_with_a_fix_that_is_accepted() {
     let mcu = "mcu = \"mps2-an500\"";
-    for (part, flash, ram) in [("stm32f446re", 512, 128), ("mps2-an386", 4096, 4096)] {
+    let parts = [("stm32f446re", 512, 128), ("mps2-an386", 4096, 4096)];
+    for &(part, flash, ram) in &parts[..length(1, parts.len())] {
         let single = format!("mcu = \"{part}\"");
         let (text, refused) = verdict("legs.toml", &[(mcu, &single)]);
         let findings = refused.unwrap_err();

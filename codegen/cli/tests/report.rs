@@ -325,12 +325,12 @@ fn a_recorded_run_stands_beside_the_simulation_of_its_commands() {
     }
 }
 
-/// The whole list but for a short search, in the full run twice; away from the repository, for the specs are in the binary.
+/// The whole list but for a short search; away from the repository, for the specs are in the binary.
 #[test]
+#[ignore = "long: every experiment of the paper, twice; `paper_tables` holds its figures in the short run"]
 fn reproduce_gives_the_same_bytes_twice_and_every_table() {
     let folder = Folder::new();
-    let outputs = ["first", "second"];
-    for output in support::length(&outputs[..1], &outputs) {
+    for output in ["first", "second"] {
         let run = folder.run(&["reproduce", "--generations", "1", "-o", output]);
         assert_eq!(run.code, 0, "{}", run.stderr);
         assert!(
@@ -341,8 +341,7 @@ fn reproduce_gives_the_same_bytes_twice_and_every_table() {
     }
     let first = support::contents(&folder.path("first"));
     assert_eq!(first.len(), 4);
-    let last = support::contents(&folder.path(support::length("first", "second")));
-    assert!(first == last, "two runs, two results");
+    assert!(first == support::contents(&folder.path("second")), "two runs, two results");
     let csv = folder.read("first/reproduction.csv");
     let mut rows = 0;
     for record in csv::Reader::from_reader(csv.as_bytes()).records() {

@@ -181,15 +181,16 @@ fn what_cannot_be_run_is_refused_with_a_fix_and_nothing_is_written() {
     }
 }
 
-/// Parts in `files`, each with what it is called and its content.
+/// A part of the study; its file.
+fn part(folder: &Folder, index: u32, of: u32) -> String {
+    let (shard, file) = (format!("{index}/{of}"), format!("part-{index}-{of}.json"));
+    let run = folder.run(&[&STUDY[..], &["--threads", "1", "--shard", &shard, "-o", &file]].concat());
+    assert_eq!(run.code, 0, "{run:#?}");
+    file
+}
+
 fn parts(folder: &Folder, of: u32) -> Vec<String> {
-    let part = |index: u32| {
-        let (shard, file) = (format!("{index}/{of}"), format!("part-{index}-{of}.json"));
-        let run = folder.run(&[&STUDY[..], &["--threads", "1", "--shard", &shard, "-o", &file]].concat());
-        assert_eq!(run.code, 0, "{run:#?}");
-        file
-    };
-    (1..=of).map(part).collect()
+    (1..=of).map(|index| part(folder, index, of)).collect()
 }
 
 const STUDY: [&str; 12] = [
@@ -262,7 +263,7 @@ fn parts_that_do_not_fit_are_refused_by_name() {
     // What was cut off, or counts in other parts.
     folder.write("other.json", &text[..text.len() / 2]);
     refused(&[one, "other.json", three], 1, "`other.json` is no JSON");
-    refused(&[one, &parts(&folder, 2)[1], three], 1, "is part 2 of 2, `part-1-3.json` one of 3");
+    refused(&[one, &part(&folder, 2, 2), three], 1, "is part 2 of 2, `part-1-3.json` one of 3");
     // One figure of the copy is another.
     let value: Value = serde_json::from_str(&text).unwrap();
     let mut changed = value.clone();

@@ -100,7 +100,7 @@ impl Bench {
     }
 
     pub fn ask(&mut self, request: Request) {
-        self.order(LoopCommand::OperatorRequest(OperatorRequest { command: None, request }));
+        self.order(LoopCommand::Request(OperatorRequest { command: None, request }));
     }
 
     /// Phase after the last tick.

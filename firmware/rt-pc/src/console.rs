@@ -138,7 +138,7 @@ impl Console {
         for order in &mut self.orders {
             number = number.wrapping_add(1);
             match order {
-                LoopCommand::OperatorRequest(wish) => wish.command = None,
+                LoopCommand::Request(wish) => wish.command = None,
                 LoopCommand::Wave(_) | LoopCommand::Await(_) => {
                     // In its place, so that numbers are unchanged.
                     *order = LoopCommand::StopWave;
@@ -284,7 +284,7 @@ impl Console {
     /// Queues the operator's request, if it changed.
     pub fn wish(&mut self) {
         if let Some(wish) = self.operator.wish() {
-            self.order(LoopCommand::OperatorRequest(wish));
+            self.order(LoopCommand::Request(wish));
         }
     }
 
@@ -343,10 +343,8 @@ mod tests {
         let mut console = console(Phase::Running);
         console.operator.wish();
         console.order(LoopCommand::Trigger);
-        console.order(LoopCommand::OperatorRequest(OperatorRequest {
-            command: Some([7; COMMAND_WORDS]),
-            request: Request::Run,
-        }));
+        console
+            .order(LoopCommand::Request(OperatorRequest { command: Some([7; COMMAND_WORDS]), request: Request::Run }));
         console.start_wave(&Settings::still(), true).unwrap();
         console.start_wave(&Settings::still(), false).unwrap();
         assert_eq!(console.command_on_edge([1; COMMAND_WORDS]), Err(Rejection::State), "under a wave");
@@ -357,7 +355,7 @@ mod tests {
         assert_eq!((console.outgoing().0.len(), console.outgoing().1), numbers);
         for order in console.outgoing().0.iter() {
             let moves = match order {
-                LoopCommand::OperatorRequest(wish) => wish.command.is_some(),
+                LoopCommand::Request(wish) => wish.command.is_some(),
                 LoopCommand::Wave(_) | LoopCommand::Await(_) => true,
                 _ => false,
             };
@@ -405,7 +403,7 @@ mod tests {
         // What is wanted once it is over goes first: to hold.
         let orders = console.outgoing().0;
         assert!(
-            matches!(orders[0], LoopCommand::OperatorRequest(OperatorRequest { command: Some(command), .. }) if command[0] == 0)
+            matches!(orders[0], LoopCommand::Request(OperatorRequest { command: Some(command), .. }) if command[0] == 0)
         );
         assert!(matches!(orders[1], LoopCommand::Wave(_)));
         console.stop_wave();

@@ -192,7 +192,7 @@ impl<D: Device> Loop<'_, D> {
             if let Ok(order) = orders.pop() {
                 keeper.ordered();
                 match order {
-                    LoopCommand::OperatorRequest(wish) => setpoints.wish(wish),
+                    LoopCommand::Request(wish) => setpoints.wish(wish),
                     LoopCommand::Configure(config) => (self.config, configured) = (config, true),
                     LoopCommand::Wave(settings) => setpoints.start(&settings, &self.config),
                     LoopCommand::StopWave => setpoints.stop(),

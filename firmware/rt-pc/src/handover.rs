@@ -86,7 +86,7 @@ pub enum EdgeCommand {
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug)]
 pub enum LoopCommand {
-    OperatorRequest(OperatorRequest),
+    Request(OperatorRequest),
     Configure(Config),
     /// Starts a wave, if none is under way.
     Wave(wave::Settings<Real>),

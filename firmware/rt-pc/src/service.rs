@@ -329,7 +329,7 @@ mod tests {
         service.send();
         let orders: Vec<_> = std::iter::from_fn(|| inner.orders.pop().ok()).collect();
         assert!(
-            matches!(orders[room - 2..], [LoopCommand::Configure(_), LoopCommand::OperatorRequest(wish)] if wish.request == Request::RampDown)
+            matches!(orders[room - 2..], [LoopCommand::Configure(_), LoopCommand::Request(wish)] if wish.request == Request::RampDown)
         );
         assert!(service.console.outgoing().0.is_empty());
     }
@@ -393,7 +393,7 @@ mod tests {
             let (mut asked, mut tick) = (Request::None, 0);
             while !shared.stop.load(Ordering::Relaxed) && clock::now() < start + 5 * SECOND {
                 while let Ok(order) = inner.orders.pop() {
-                    if let LoopCommand::OperatorRequest(wish) = order {
+                    if let LoopCommand::Request(wish) = order {
                         asked = wish.request;
                     }
                 }

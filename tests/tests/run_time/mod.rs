@@ -343,12 +343,13 @@ fn a_platform_with_every_part_of_the_law_has_the_bits_of_the_emitted_one() {
 }
 
 #[test]
-#[ignore = "long: creep; the dynamic model is in the short run"]
+#[ignore = "long: a controller with creep"]
 fn six_legs_with_creep_have_the_bits_of_the_emitted_ones() {
     alike("creep", "legs.toml", &[("memory  = 64", CREEP)]);
 }
 
 #[test]
+#[ignore = "long: a controller; images of the dynamic model have the bits of the run-time law in the short run"]
 fn six_legs_of_the_dynamic_model_in_single_precision_have_the_bits_of_the_emitted_ones() {
     alike("dynamic", "legs.toml", &[("memory  = 64", DYNAMIC), ("scalar   = \"f64\"", "scalar   = \"f32\"")]);
 }

@@ -25,6 +25,7 @@ fn link(features: &[&str]) -> Result<(), String> {
 }
 
 #[test]
+#[ignore = "long: two builds; the image of `specgen pil` proves the same in the test run"]
 fn nothing_in_the_device_can_panic_and_the_proof_fails_where_something_can() {
     if let Err(printed) = link(&[]) {
         panic!("{printed}");
