@@ -7,11 +7,10 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use host_sim::controller::TickController;
 use host_sim::plant::LegParameters;
-use host_sim::platform::rig::{Bench, Noise, Request};
-use host_sim::platform::{PlatformRig, PlatformScenario};
+use host_sim::platform::PlatformRig;
+use host_sim::platform::rig::{Bench, Request};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTrajectory};
-use specgen::machine;
-use specgen_tests::Emitted;
+use specgen_tests::{Emitted, scenario};
 
 /// Ticks of a bench: a quarter of a second of the machine.
 const TICKS: usize = 2500;
@@ -19,13 +18,6 @@ const INTERVAL: f64 = 1e-4;
 
 fn main() {
     divan::main();
-}
-
-fn scenario(emitted: &Emitted) -> PlatformScenario {
-    let model = &emitted.compiled.model;
-    let task = model.task_space.as_ref().expect("a controller in task space");
-    let specimen = machine::specimen(model, task, &LegParameters::reference(), Some(1));
-    machine::scenario(model, task, &specimen, &Noise::of(&specimen), 1)
 }
 
 /// The plant alone under six voltages that change every tick, in long steps or in small ones.
@@ -44,7 +36,7 @@ fn plant(bencher: Bencher, steps: &str) {
 
 /// The machine in long steps or in small ones.
 fn stepped(emitted: &Emitted, steps: &str) -> PlatformRig {
-    let mut rig = scenario(emitted).rig().clone();
+    let mut rig = scenario(&emitted.compiled, &LegParameters::reference(), 1).rig().clone();
     if steps == "small" {
         rig.plant_mut().step_small();
     }
@@ -55,14 +47,14 @@ fn stepped(emitted: &Emitted, steps: &str) -> PlatformRig {
 #[divan::bench]
 fn preparation(bencher: Bencher) {
     let emitted = Emitted::new("bench-preparation", "reference.toml", &[]);
-    bencher.bench_local(|| black_box(scenario(&emitted).rig().plant().pose()));
+    bencher.bench_local(|| black_box(scenario(&emitted.compiled, &LegParameters::reference(), 1).rig().plant().pose()));
 }
 
 /// Six gauges, their noise and their converters.
 #[divan::bench]
 fn gauges(bencher: Bencher) {
     let emitted = Emitted::new("bench-gauges", "reference.toml", &[]);
-    let mut rig = scenario(&emitted).rig().clone();
+    let mut rig = scenario(&emitted.compiled, &LegParameters::reference(), 1).rig().clone();
     bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
         for _ in 0..TICKS {
             black_box(rig.read_gauges());
@@ -74,7 +66,7 @@ fn gauges(bencher: Bencher) {
 #[divan::bench]
 fn force_sensor(bencher: Bencher) {
     let emitted = Emitted::new("bench-force", "reference.toml", &[]);
-    let mut rig = scenario(&emitted).rig().clone();
+    let mut rig = scenario(&emitted.compiled, &LegParameters::reference(), 1).rig().clone();
     bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
         for _ in 0..TICKS {
             black_box(rig.read_wrench());

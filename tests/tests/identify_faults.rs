@@ -1,13 +1,10 @@
 //! Faults injected into a good record of reversal curves: each is refused or gets no weight, and is named with its time.
 //! The choice of the grid and the account of the residual, on records whose truth is known.
 
-use crate::identify_support::{Drive, generator, normal, random_table, uniform};
+use crate::identify_support::{self, Drive, expect, generator, normal, random_table, uniform};
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
-use specgen::identify::regressor::{Plane, evaluate};
-use specgen::identify::{
-    DeadTime, Identification, Options, Record, Source, Staircase, choose_grid, identify, validate,
-};
+use specgen::identify::{DeadTime, Identification, Options, Record, Source, Staircase, choose_grid, identify, validate};
 use specgen::report::identification;
 use specgen_tests::worse;
 
@@ -16,17 +13,7 @@ const RATE: f64 = 1000.0;
 
 /// Displacement (m) of `table` under `drive`.
 fn response(table: &EverettTable, drive: &[f64]) -> Vec<f64> {
-    let plane = Plane { grid: table.grid, range: RANGE };
-    let mut memory = Staircase::negative_saturation(RANGE);
-    let mut row = Vec::new();
-    drive
-        .iter()
-        .map(|u| {
-            memory.push(*u);
-            plane.row(&memory, &mut row);
-            evaluate(&row, &table.nodes)
-        })
-        .collect()
+    identify_support::response(table, Staircase::negative_saturation(RANGE), drive)
 }
 
 struct Columns {
@@ -58,11 +45,6 @@ fn with(change: impl FnOnce(&mut Columns)) -> Result<Identification, Vec<Diagnos
     let mut columns = Columns::good();
     change(&mut columns);
     columns.identified()
-}
-
-fn expect(all: &[Diagnostic], code: &str, text: &str) {
-    let found = all.iter().find(|d| d.code == code && d.message.contains(text));
-    assert!(found.is_some_and(|d| !d.help.is_empty()), "no {code} with `{text}` in {all:#?}");
 }
 
 #[test]

@@ -3,8 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
-use crate::identify_support::{generator, normal};
-use specgen::diagnostic::Diagnostic;
+use crate::identify_support::{expect, generator, normal};
 use specgen::identify::response::{ResponseReport, respond_text};
 use specgen::identify::{Record, gauge, linear, parse_record, stiffness};
 
@@ -14,13 +13,6 @@ fn csv<const N: usize>(header: &str, rows: &[[f64; N]]) -> String {
         writeln!(text, "{}", cells.join(",")).unwrap();
         text
     })
-}
-
-fn expect<'a>(all: &'a [Diagnostic], code: &str, text: &str) -> &'a Diagnostic {
-    let fitting = all.iter().find(|d| d.code == code && d.message.contains(text));
-    let found = fitting.unwrap_or_else(|| panic!("no {code} with `{text}` in {all:#?}"));
-    assert!(!found.help.is_empty(), "{found:?}");
-    found
 }
 
 // ---- linear relation

@@ -1,9 +1,8 @@
 //! Identification of actuators whose truth is known: exact Preisach planes, and a play-and-creep plant outside the model class.
 
-use crate::identify_support::{Drive, generator, normal, random_table, uniform};
+use crate::identify_support::{Drive, generator, normal, random_table, response, uniform};
 use specgen::everett::EverettTable;
 use specgen::identify::rate::RateModel;
-use specgen::identify::regressor::{Plane, evaluate};
 use specgen::identify::{
     Branches, DeadTime, Identification, Options, Record, Staircase, identify, parse_drive, parse_record, predict,
     read_table_csv, validate, write_table_csv,
@@ -13,20 +12,6 @@ use specgen_tests::worse;
 use std::time::Instant;
 
 const NM: f64 = 1e-9;
-
-/// Displacement of a table along a drive (m), from a memory.
-fn response(table: &EverettTable, mut memory: Staircase, drive: &[f64]) -> Vec<f64> {
-    let plane = Plane { grid: table.grid, range: [table.drive_min, table.drive_max] };
-    let mut row = Vec::new();
-    drive
-        .iter()
-        .map(|&u| {
-            memory.push(u);
-            plane.row(&memory, &mut row);
-            evaluate(&row, &table.nodes)
-        })
-        .collect()
-}
 
 fn found(drive: &Drive, displacement: Vec<f64>, options: &Options) -> Identification {
     let record = Record::from_columns("made.csv", drive.time(), drive.samples.clone(), displacement).unwrap();

@@ -3,7 +3,7 @@
 //!
 //! `cargo test --release -p specgen-tests platform_budgets -- --nocapture` prints them.
 
-use crate::budgets::print;
+use crate::budgets::{TICKS, measured};
 use crate::figures;
 use host_sim::controller::TickController;
 use specgen::model::Mcu;
@@ -12,8 +12,6 @@ use specgen::verify;
 use specgen_tests::{Emitted, host_trace};
 
 const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
-/// Way to the bias pose, then tracking of the first on-board trajectory in closed loop, with noise, P/F with PCC.
-const TICKS: u32 = 20_000;
 /// The stage whose code is held against [`DYNAMICS_BYTES`].
 const DYNAMICS: &str = "specgen_law::platform::stages::dynamics::<controller::identity::Constants>";
 /// Bytes of stack of a tick.
@@ -46,13 +44,7 @@ fn a_tick_keeps_its_promises_and_grows_no_stage() {
     for Budget { name, edits, mcu, tick: promised_tick, dynamics: promised_dynamics } in
         BUDGETS.iter().step_by(specgen_tests::length(2, 1))
     {
-        let emitted = Emitted::new(&format!("platform-budget-{}", name.replace(' ', "-")), "reference.toml", edits);
-        let Some(image) = emitted.image(*mcu) else { continue };
-        let mut controller = emitted.at_run_time();
-        let host = verify::exercise(&mut controller, &emitted.compiled.model, &emitted.compiled.ir, TICKS).unwrap();
-        let m = verify::measure(&image, &controller.default_config(), &host).unwrap();
-        assert_eq!(m.first_difference, None, "{name}");
-        print(name, &m);
+        let Some((emitted, image, m)) = measured("reference.toml", name, edits, *mcu) else { continue };
         let code = stack::bound(&image.elf, DYNAMICS).unwrap().code_bytes;
         let constants = 6 * NUMBERS_OF_A_LEG * u64::from(emitted.compiled.ir.scalar.bits() / 8);
         let bound = stack::bound(&image.elf, stack::STEP_SYMBOL).unwrap();

@@ -7,18 +7,17 @@ use std::io::Cursor;
 use crate::figures;
 use host_sim::controller::{Supervised, TickController};
 use host_sim::plant::LegParameters;
-use host_sim::platform::rig::{BUSY, Bench, Noise, Request};
+use host_sim::platform::rig::{BUSY, Bench, Request};
 use host_sim::record::{FileItem, Reader, RecordedController, Replay, Row, Writer, replay};
 use host_sim::trajectory::PoseTarget;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen::machine;
 use specgen::model::Mcu;
 use specgen::target;
 use specgen_runtime::record::{HEADER_WORDS, Layout, checksum};
 use specgen_runtime::recorder::{Recorder, Row as Out, Settings};
 use specgen_runtime::wave::{AxisWave, Limits, Settings as WaveSettings, Shape, Tone, Wave, step_of};
-use specgen_tests::{Emitted, length, skipped};
+use specgen_tests::{Emitted, length, scenario, skipped};
 
 /// Words of a block; the firmware of the test has the same.
 const BLOCK: usize = 8192;
@@ -47,9 +46,8 @@ fn closed_loop(emitted: &Emitted) -> Vec<u8> {
     let mut recorded = RecordedController::new(machine, &mut recorder, &mut writer).unwrap();
 
     let (model, ir) = (&emitted.compiled.model, &emitted.compiled.ir);
-    let (task, setpoints) = (model.task_space.as_ref().unwrap(), &ir.task_space.as_ref().unwrap().setpoints);
-    let specimen = machine::specimen(model, task, &LegParameters::reference(), Some(1));
-    let mut rig = machine::scenario(model, task, &specimen, &Noise::of(&specimen), 1).rig().clone();
+    let setpoints = &ir.task_space.as_ref().unwrap().setpoints;
+    let mut rig = scenario(&emitted.compiled, &LegParameters::reference(), 1).rig().clone();
     let mut settings = WaveSettings::still();
     for (axis, wave) in settings.axes.iter_mut().enumerate() {
         let tone = Tone { amplitude: 0.02 * ir.bounds.pose[axis], phase: 0, step: step_of(7.0, model.timing.period) };

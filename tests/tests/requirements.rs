@@ -1,28 +1,14 @@
 //! What the spec asks of converter and microcontroller: refused with a fix, and the fix put into the spec is accepted.
 
-use std::fs;
-
-use specgen::compile::compile;
 use specgen::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen::lower::leg_jacobian;
-use specgen::outcome::Refusal;
 use specgen::requirements::{Steps, steps};
-use specgen_tests::{length, repository, worse};
+use specgen_tests::{compile_text, edited, length, worse};
 
 /// The spec with edits, and what the compiler says.
 fn verdict(spec: &str, edits: &[(&str, &str)]) -> (String, Result<Steps, Vec<Diagnostic>>) {
-    let folder = tempfile::tempdir().unwrap();
-    let specs = repository().join("specs");
-    fs::create_dir(folder.path().join("records")).unwrap();
-    fs::copy(specs.join("records/reference-forc.csv"), folder.path().join("records/reference-forc.csv")).unwrap();
-    let mut text = fs::read_to_string(specs.join(spec)).unwrap();
-    for (old, new) in edits {
-        assert!(text.contains(old), "no `{old}`");
-        text = text.replacen(old, new, 1);
-    }
-    let path = folder.path().join("platform.toml");
-    fs::write(&path, &text).unwrap();
-    let found = compile(&path).map(|compiled| steps(&compiled.model)).map_err(|refused: Refusal| refused.findings);
+    let text = edited(spec, edits);
+    let found = compile_text(&text).map(|compiled| steps(&compiled.model));
     (text, found)
 }
 
@@ -77,7 +63,7 @@ fn a_converter_too_coarse_is_refused_with_the_bits_that_would_do() {
 /// The platform's step by brute force: every combination of half codes up or down, through the solved linear equations.
 #[test]
 fn the_step_of_the_platform_is_the_worst_of_all_roundings() {
-    let compiled = compile(&repository().join("specs/reference.toml")).unwrap();
+    let compiled = compile_text(&edited("reference.toml", &[])).unwrap();
     let found = steps(&compiled.model);
     let jacobian = nalgebra::Matrix6::from_fn(|i, j| leg_jacobian(&compiled.model.geometry).unwrap()[i][j]);
     let solved = jacobian.lu();

@@ -5,13 +5,12 @@ use std::fs;
 use host_sim::controller::{Controller, TickController};
 use host_sim::coverage::Coverage;
 use host_sim::plant::LegParameters;
-use host_sim::platform::rig::Noise;
 use host_sim::trajectory::{PaperPose, PoseTrajectory};
 use specgen::machine;
 use specgen::model;
 use specgen::waveform;
 use specgen_runtime::setpoint::BUSY;
-use specgen_tests::{Emitted, compile_edited, length, repository, worse};
+use specgen_tests::{Emitted, compile_edited, length, repository, scenario, worse};
 
 use crate::setpoint::{F32, PATHS, assert_whole, eight};
 
@@ -111,9 +110,7 @@ fn the_emitted_controller_plays_the_papers_paths_and_a_table() {
 /// The simulation scores that path, and nothing else.
 fn scored_whole(emitted: &Emitted, controller: &mut Controller) {
     let model = &emitted.compiled.model;
-    let task = model.task_space.as_ref().unwrap();
-    let specimen = machine::specimen(model, task, &LegParameters::reference(), Some(1));
-    let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), 1);
+    let scenario = scenario(&emitted.compiled, &LegParameters::reference(), 1);
     let path = machine::on_board(&emitted.compiled, 4).unwrap();
     assert_eq!((path.ticks, path.repeats, path.approach.unwrap()[0]), (10_000, false, -3e-6));
     let run = scenario.play(controller, &path, None).unwrap();

@@ -1,30 +1,17 @@
 //! An unstable spec is refused with the largest weight that would do: that weight is accepted, a little more is not, and
 //! the emitted controller on a simulated leg agrees.
 
-use specgen::compile::compile;
 use specgen::diagnostic::Severity;
-use specgen_tests::repository;
-use std::fs;
+use specgen_tests::{compile_text, edited};
 
 /// Compiles the reference spec after edits; the findings' code and help if it is refused.
 fn verdict(edits: &[(&str, String)]) -> Result<(), (String, String)> {
-    let folder = tempfile::tempdir().unwrap();
-    let specs = repository().join("specs");
-    let mut text = fs::read_to_string(specs.join("legs.toml")).unwrap();
-    for (old, new) in edits {
-        assert!(text.contains(old), "no `{old}`");
-        text = text.replace(old, new);
-    }
-    fs::create_dir(folder.path().join("records")).unwrap();
-    let record = "records/reference-forc.csv";
-    fs::copy(specs.join(record), folder.path().join(record)).unwrap();
-    let path = folder.path().join("platform.toml");
-    fs::write(&path, text).unwrap();
-    match compile(&path) {
+    let edits: Vec<(&str, &str)> = edits.iter().map(|(old, new)| (*old, new.as_str())).collect();
+    match compile_text(&edited("legs.toml", &edits)) {
         Ok(_) => Ok(()),
-        Err(refused) => {
-            let errors = refused.findings.iter().filter(|finding| finding.severity == Severity::Error);
-            let [finding] = errors.collect::<Vec<_>>()[..] else { panic!("{:?}", refused.findings) };
+        Err(findings) => {
+            let errors = findings.iter().filter(|finding| finding.severity == Severity::Error);
+            let [finding] = errors.collect::<Vec<_>>()[..] else { panic!("{findings:?}") };
             assert!(matches!(finding.place, specgen::diagnostic::Place::Spec(_)), "{finding:?}");
             Err((finding.code.to_owned(), finding.help.clone()))
         }

@@ -6,16 +6,15 @@ use std::time::Duration;
 
 use host_sim::controller::{Supervised, TickController};
 use host_sim::plant::LegParameters;
-use host_sim::platform::rig::{BUSY, Bench, Command, Noise, Request};
+use host_sim::platform::rig::{BUSY, Bench, Command, Request};
 use host_sim::record::{Reader, RecordedController, Writer, replay};
 use host_sim::trajectory::PoseTarget;
-use specgen::machine;
 use specgen::model::Mcu;
 use specgen::target;
 use specgen_runtime::record::Layout;
 use specgen_runtime::recorder::{Recorder, Settings};
 use specgen_runtime::trigger::lines;
-use specgen_tests::{Emitted, length, skipped};
+use specgen_tests::{Emitted, length, scenario, skipped};
 
 const RUNNING: u32 = 2;
 /// Ends of a sweep, m: beyond the first and the last position.
@@ -73,9 +72,7 @@ fn record(emitted: &Emitted) -> Vec<u8> {
     let mut writer = Writer::new(Vec::new(), &text).unwrap();
     let mut recorded = RecordedController::new(machine, &mut recorder, &mut writer).unwrap();
     let model = &emitted.compiled.model;
-    let task = model.task_space.as_ref().unwrap();
-    let specimen = machine::specimen(model, task, &LegParameters::reference(), Some(1));
-    let mut rig = machine::scenario(model, task, &specimen, &Noise::of(&specimen), 1).rig().clone();
+    let mut rig = scenario(&emitted.compiled, &LegParameters::reference(), 1).rig().clone();
     let mut bench = Bench::new(&mut rig, &mut recorded, model.timing.period, 0).unwrap();
     let mut status = BUSY;
     while status & BUSY != 0 {

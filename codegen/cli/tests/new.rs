@@ -40,32 +40,11 @@ fn plausible(rng: &mut ChaCha8Rng) -> Vec<String> {
 fn a_platform_from_its_data_sheet_passes_check_in_the_first_round() {
     let folder = Folder::new();
     // An engineer's card: symbols of the paper, a rate in kHz, capacitive gauges.
-    let made = folder.run(&[
-        "new",
-        "mine",
-        "--like",
-        "reference",
-        "--r_B",
-        "200 mm",
-        "--r_P",
-        "120 mm",
-        "--alpha_B",
-        "10 deg",
-        "--m",
-        "2.4 kg",
-        "--I",
-        "0.012 kg m^2, 0.012 kg m^2, 0.02 kg m^2",
-        "--stroke",
-        "100 um",
-        "--voltage",
-        "-20 V, 120 V",
-        "--stiffness",
-        "25 N/um",
-        "--gauge-noise",
-        "1 nm",
-        "--rate",
-        "20 kHz",
-    ]);
+    let made = folder.line(
+        "new mine --like reference --r_B '200 mm' --r_P '120 mm' --alpha_B '10 deg' --m '2.4 kg' --I \
+         '0.012 kg m^2, 0.012 kg m^2, 0.02 kg m^2' --stroke '100 um' --voltage '-20 V, 120 V' --stiffness \
+         '25 N/um' --gauge-noise '1 nm' --rate '20 kHz'",
+    );
     assert_eq!(made.code, 0, "{}{}", made.stdout, made.stderr);
     assert_eq!(made.stdout.lines().filter(|line| line.starts_with("  specgen ")).count(), 3, "{}", made.stdout);
     assert!(made.stdout.lines().all(|line| line.chars().count() <= 80), "{}", made.stdout);
@@ -128,18 +107,7 @@ fn questions_are_asked_again_until_the_answer_holds_and_blank_lines_take_what_is
 #[test]
 fn what_cannot_be_is_refused_by_its_option_and_nothing_of_the_users_is_touched() {
     let folder = Folder::new();
-    let slips = folder.run(&[
-        "new",
-        "mine",
-        "--like",
-        "reference",
-        "--stroke",
-        "100",
-        "--rate",
-        "20 kg",
-        "--inertia",
-        "0.0012",
-    ]);
+    let slips = folder.line("new mine --like reference --stroke 100 --rate '20 kg' --inertia 0.0012");
     assert_eq!(slips.code, 2);
     for option in ["--stroke", "--rate", "--inertia"] {
         assert!(slips.stderr.contains(option), "{option}: {}", slips.stderr);

@@ -199,45 +199,15 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
     operate(&["reference.toml", MOVE]).says(1, &["disarmed: it moves when it runs"]);
     operate(&["on-edge"]).says(1, &["no input line; declare one in its spec: [[trigger]] with name = \"start\""]);
 
-    let script = [
-        "wait arrived 20",
-        MOVE,
-        "wait arrived 20",
-        "jog z=-500nm rx=2urad",
-        "wait arrived 20",
-        "move y=1um",
-        "wait arrived 20",
-        "mark here",
-        "goto zero",
-        "wait arrived 20",
-        "can-i-go z=5um speed=100um/s",
-        "can-i-go z=5um speed=101um/s",
-        "can-i-go z=5um rx=1urad speed=1mrad/s",
-        "can-i-go z=43um",
-        "can-i-go z=-11um",
-        "frame tool z=-10mm",
-        "move ry=50urad",
-        "wait arrived 20",
-        "where",
-        "frame work rz=5deg x=1um",
-        "frame none",
-        "where",
-        "goto here",
-        "wait arrived 20",
-        "where",
-        "limits",
-        "mode pf-ewma",
-        "gains",
-        "gains ki[2]=7e9",
-        "status",
-        "record arm 100",
-        "record trigger",
-        "wait 0.5",
-        "record stop",
-        "record download run.rec",
-        "ramp-down",
-        "wait disarmed 60",
-    ];
+    let script = format!(
+        "wait arrived 20; {MOVE}; wait arrived 20; jog z=-500nm rx=2urad; wait arrived 20; move y=1um; \
+         wait arrived 20; mark here; goto zero; wait arrived 20; can-i-go z=5um speed=100um/s; \
+         can-i-go z=5um speed=101um/s; can-i-go z=5um rx=1urad speed=1mrad/s; can-i-go z=43um; can-i-go z=-11um; \
+         frame tool z=-10mm; move ry=50urad; wait arrived 20; where; frame work rz=5deg x=1um; frame none; where; \
+         goto here; wait arrived 20; where; limits; mode pf-ewma; gains; gains ki[2]=7e9; status; record arm 100; \
+         record trigger; wait 0.5; record stop; record download run.rec; ramp-down; wait disarmed 60"
+    );
+    let script: Vec<&str> = script.split("; ").collect();
     let run = operate(&[&UP[..], &script].concat());
     run.says(0, &[]);
     assert!(run.stdout.contains("moves to x 0.000 um, y 1.000 um, z 1.500 um, rx 2.000 urad"), "{run:?}");

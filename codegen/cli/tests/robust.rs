@@ -193,19 +193,10 @@ fn parts(folder: &Folder, of: u32) -> Vec<String> {
     (1..=of).map(|index| part(folder, index, of)).collect()
 }
 
+#[rustfmt::skip]
 const STUDY: [&str; 12] = [
-    "robust",
-    "legs.toml",
-    "--draws",
-    "7",
-    "--frequency",
-    "20",
-    "--seed",
-    "18446744073709551615",
-    "--vary",
-    "mass=20%",
-    "--max-error",
-    "1 nm",
+    "robust", "legs.toml", "--draws", "7", "--frequency", "20", "--seed", "18446744073709551615", "--vary", "mass=20%",
+    "--max-error", "1 nm",
 ];
 
 #[test]

@@ -56,25 +56,9 @@ fn the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads() {
     for &(spec, optimiser) in &cases[..support::length(1, 2)] {
         let folder = Folder::new();
         let run = |threads: &str, output: &str, seed: &str| {
-            let arguments = [
-                "tune",
-                spec,
-                "--evaluations",
-                "24",
-                "--population",
-                "8",
-                "--seconds",
-                "0.3",
-                "--optimiser",
-                optimiser,
-                "--threads",
-                threads,
-                "-o",
-                output,
-                "--seed",
-                seed,
-            ];
-            let run = folder.run(&arguments);
+            let study = "--evaluations 24 --population 8 --seconds 0.3 --optimiser";
+            let run =
+                folder.line(&format!("tune {spec} {study} {optimiser} --threads {threads} -o {output} --seed {seed}"));
             assert_eq!(run.code, 0, "{run:#?}");
             (run.stdout, contents(&folder.path(output)))
         };

@@ -2,8 +2,10 @@
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
-use specgen::identify::{Reading, Record, read_record};
+use specgen::identify::regressor::{Plane, evaluate};
+use specgen::identify::{Reading, Record, Staircase, read_record};
 use specgen_tests::skipped;
 use std::path::Path;
 
@@ -20,6 +22,26 @@ pub fn uniform(random: &mut ChaCha8Rng) -> f64 {
 pub fn normal(random: &mut ChaCha8Rng) -> f64 {
     let radius = (-2.0 * (1.0 - uniform(random)).ln()).sqrt();
     radius * (std::f64::consts::TAU * uniform(random)).cos()
+}
+
+/// A finding with a code and a part of its message; it has a help.
+pub fn expect<'a>(all: &'a [Diagnostic], code: &str, text: &str) -> &'a Diagnostic {
+    let fitting = all.iter().find(|d| d.code == code && d.message.contains(text));
+    let found = fitting.unwrap_or_else(|| panic!("no {code} with `{text}` in {all:#?}"));
+    assert!(!found.help.is_empty(), "{found:?}");
+    found
+}
+
+/// Displacement of a table along a drive (m), from a memory.
+pub fn response(table: &EverettTable, mut memory: Staircase, drive: &[f64]) -> Vec<f64> {
+    let plane = Plane { grid: table.grid, range: [table.drive_min, table.drive_max] };
+    let mut row = Vec::new();
+    let displacement = |u: &f64| {
+        memory.push(*u);
+        plane.row(&memory, &mut row);
+        evaluate(&row, &table.nodes)
+    };
+    drive.iter().map(displacement).collect()
 }
 
 /// A measured record of real hardware; none, and a line that says so, where the data is absent.

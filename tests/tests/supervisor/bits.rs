@@ -4,50 +4,34 @@ use super::bench::*;
 use super::sequences;
 use specgen::model::Mcu;
 use specgen::target;
-use specgen_tests::{Emitted, compile_edited};
+use specgen_tests::{Emitted, Row, assert_same_machine, compile_edited, machine_difference};
 use std::time::Duration;
 
 const LIMIT: Duration = Duration::from_secs(600);
 
-/// Rows of input, of output with the digest, and the settings.
-struct Recording {
-    inputs: Vec<Vec<u64>>,
-    outputs: Vec<Vec<u64>>,
-    digests: Vec<u64>,
-    config: Vec<u64>,
-}
-
-fn record(kind: Kind, emitted: &Emitted, sequences: u32) -> Recording {
+/// Rows of a machine in random sequences, and its settings.
+fn record(kind: Kind, emitted: &Emitted, sequences: u32) -> (Vec<Row>, Vec<u64>) {
     let settings: &[(&str, f64)] = if kind == Kind::Legs { &[("setpoint_kind", 1.0)] } else { &[] };
     let mut bench = Bench::new(kind, emitted, settings);
-    let config = bench.config().to_vec();
-    let mut recording = Recording { inputs: Vec::new(), outputs: Vec::new(), digests: Vec::new(), config };
+    let (config, mut rows) = (bench.config().to_vec(), Vec::new());
     sequences::run(&mut bench, 9, sequences, |bench, _| {
-        recording.inputs.push(bench.input.clone());
-        recording.outputs.push(bench.output.clone());
-        recording.digests.push(bench.machine.digest());
+        rows.push((bench.input.clone(), bench.output.clone(), bench.machine.digest()));
     });
-    recording
-}
-
-/// The first tick that differs.
-fn difference(host: &Recording, outputs: &[Vec<u64>], digests: &[u64]) -> Option<usize> {
-    (0..host.inputs.len()).find(|tick| host.outputs[*tick] != outputs[*tick] || host.digests[*tick] != digests[*tick])
+    (rows, config)
 }
 
 fn compare(name: &str, kind: Kind, more: &[(&str, &str)], mcu: Mcu, sequences: u32) {
     let emitted = emitted(name, kind.spec(), more);
-    let host = record(kind, &emitted, sequences);
-    let running = host.outputs.iter().filter(|row| row[row.len() - 2] as u8 == RUNNING).count();
-    assert!(running > host.inputs.len() / 20, "{name}: {running} of {} ticks run", host.inputs.len());
+    let (rows, config) = record(kind, &emitted, sequences);
+    let running = rows.iter().filter(|(_, row, _)| row[row.len() - 2] as u8 == RUNNING).count();
+    assert!(running > rows.len() / 20, "{name}: {running} of {} ticks run", rows.len());
     let Some(image) = emitted.image(mcu) else { return };
-    let result = target::replay_machine(&image, &host.config, &host.inputs, LIMIT).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(difference(&host, &result.outputs, &result.digests), None, "{name}: the first tick that differs");
+    let result = assert_same_machine(name, &image, &config, &rows);
     let mean = |stage: &str| result.stats.stage(stage).map_or(0.0, |stage| stage.mean());
     println!(
         "{name}: {sequences} sequences, {} ticks equal in every bit; {running} run: {:.0} instructions mean, {:.0} of them the law, \
          {:.0} the supervisor; other phases {:.0} mean; most of any tick {}; stack {} bytes",
-        host.inputs.len(),
+        rows.len(),
         mean("supervise"),
         mean("law"),
         mean("supervise") - mean("law"),
@@ -84,9 +68,8 @@ fn one_ulp_of_a_constant_of_the_supervisor_is_found() {
     let keep = &mut bad.ir.supervision.approach_keep;
     *keep = keep.next_up();
     let bad = Emitted::of("supervisor-ulp-bad", bad.into());
-    let host = record(Kind::Legs, &bad, 200);
-    let result = target::replay_machine(&image, &host.config, &host.inputs, LIMIT).unwrap_or_else(|e| panic!("{e}"));
-    let found = difference(&host, &result.outputs, &result.digests);
+    let (rows, config) = record(Kind::Legs, &bad, 200);
+    let (found, _) = machine_difference(&image, &config, &rows);
     println!("one ulp of `approach_keep` shows in tick {found:?}");
     assert!(found.is_some(), "the flipped ulp was not seen");
 }

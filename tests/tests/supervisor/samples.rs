@@ -6,18 +6,15 @@ use host_sim::closed_loop::Rig;
 use host_sim::controller::{MachineWord, Supervised, TickController};
 use host_sim::plant::{LegParameters, LegPlant};
 use host_sim::platform::PlatformRig;
-use host_sim::platform::rig::Noise;
 use host_sim::word::Scalar;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::compile::Compilation;
 use specgen::machine;
 use specgen::model::{Mcu, SetpointKind};
-use specgen::target;
 use specgen_runtime::supervisor::{CONVERTER, Cause, SAMPLE_REPEATED, SAMPLE_REPLACED};
-use specgen_tests::{Emitted, repository};
+use specgen_tests::{Emitted, Row, assert_same_machine, leg_class, repository, scenario};
 use std::fs;
-use std::time::Duration;
 
 type Six = [f64; 6];
 
@@ -31,14 +28,12 @@ enum Plant {
 impl Plant {
     fn new(compiled: &Compilation, leg: &LegParameters, seed: u64) -> Self {
         let model = &compiled.model;
-        let Some(task) = &model.task_space else {
+        if model.task_space.is_none() {
             let leg = machine::leg(model, leg);
             let scenario = machine::legs(model, &std::array::from_fn(|_| leg.clone()), &leg.noise, seed, 1);
             return Self::Legs(Box::new(scenario.rig().clone()));
-        };
-        let specimen = machine::specimen(model, task, leg, Some(seed));
-        let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), seed);
-        Self::Platform(Box::new(scenario.rig().clone()))
+        }
+        Self::Platform(Box::new(scenario(compiled, leg, seed).rig().clone()))
     }
 
     fn read(&mut self) -> Six {
@@ -288,6 +283,9 @@ fn one_wrong_sample_moves_the_platform_by_less_than_20_nm_from_bit_15_on() {
     assert!(replaced == 12 && sifted <= 20e-9, "{replaced}: {sifted:e}");
 }
 
+/// What is wrong with a sample, of which the two before are known.
+type Spoil = fn(&mut Six, &[Six; 2]);
+
 /// Ticks until it is a fault, and the cause; none in 2,000. How many samples were shown as replaced, repeated and not finite.
 fn lasts(steady: &Loop, spoil: impl Fn(usize, &mut Six, &[Six; 2])) -> (Option<(usize, u8)>, [u32; 3]) {
     let mut machine = steady.fork();
@@ -317,49 +315,35 @@ fn samples_that_are_stale_missing_or_leap_are_counted_and_a_fault_if_it_goes_on(
         let (stuck, disagree) = (Cause::GaugeStuck.word() as u8, Cause::GaugeDisagreement.word() as u8);
         let print = |what: &str, found: &(Option<(usize, u8)>, [u32; 3])| println!("{name}, {what}: {found:?}");
 
-        let once = lasts(&steady, |tick, words, came| {
-            if tick == 100 {
-                *words = came[0]
-            }
-        });
-        print("one duplicated sample", &once);
-        assert_eq!(once, (None, [0, 1, 0]));
-        let missing = lasts(&steady, |tick, words, _| {
-            if tick == 100 {
-                words[2] = f64::NAN
-            }
-        });
-        print("one missing sample", &missing);
-        assert_eq!(missing, (None, [0, 0, 1]));
-        let one = lasts(&steady, |tick, words, _| {
-            if tick == 100 {
-                words[2] += 10e-6
-            }
-        });
-        print("one that leaps", &one);
-        assert_eq!(one, (None, [1, 0, 0]));
-
-        let dead = lasts(&steady, |tick, words, came| {
-            if tick > 0 {
-                *words = came[0]
-            }
-        });
-        print("no new sample", &dead);
-        assert!(dead.0.is_some_and(|(ticks, cause)| ticks < 5 && cause == stuck));
-        let half = lasts(&steady, |tick, words, came| {
-            if tick % 2 == 1 {
-                *words = came[0]
-            }
-        });
-        print("a stale value in every second sample", &half);
-        assert!(half.0.is_some_and(|(ticks, cause)| ticks < 15 && cause == stuck));
-        let buffer = lasts(&steady, |tick, words, came| {
-            if tick > 2 && tick % 2 == 1 {
-                *words = came[1]
-            }
-        });
-        print("one of two buffers dead", &buffer);
-        assert!(buffer.0.is_some_and(|(ticks, cause)| ticks < 15 && cause == stuck));
+        let stale: Spoil = |words, came| *words = came[0];
+        let once: [(&str, Spoil, [u32; 3]); 3] = [
+            ("one duplicated sample", stale, [0, 1, 0]),
+            ("one missing sample", |words, _| words[2] = f64::NAN, [0, 0, 1]),
+            ("one that leaps", |words, _| words[2] += 10e-6, [1, 0, 0]),
+        ];
+        for (what, spoil, shown) in once {
+            let found = lasts(&steady, |tick, words, came| {
+                if tick == 100 {
+                    spoil(words, came)
+                }
+            });
+            print(what, &found);
+            assert_eq!(found, (None, shown), "{what}");
+        }
+        let again: [(&str, fn(usize) -> bool, Spoil, usize); 3] = [
+            ("no new sample", |tick| tick > 0, stale, 5),
+            ("a stale value in every second sample", |tick| tick % 2 == 1, stale, 15),
+            ("one of two buffers dead", |tick| tick > 2 && tick % 2 == 1, |words, came| *words = came[1], 15),
+        ];
+        for (what, when, spoil, most) in again {
+            let found = lasts(&steady, |tick, words, came| {
+                if when(tick) {
+                    spoil(words, came)
+                }
+            });
+            print(what, &found);
+            assert!(found.0.is_some_and(|(ticks, cause)| ticks < most && cause == stuck), "{what}");
+        }
         for (every, most) in [(1, 3), (2, 10), (3, 16)] {
             let leaps = lasts(&steady, |tick, words, _| {
                 if tick % every == 0 {
@@ -496,22 +480,6 @@ impl Path {
     }
 }
 
-/// Three classes of legs.
-fn class(number: u64) -> LegParameters {
-    let [plays, bouc_wen] = [LegParameters::reference(), LegParameters::bouc_wen()];
-    match number % 3 {
-        0 => plays,
-        1 => bouc_wen,
-        _ => LegParameters {
-            kappa: 0.02,
-            creep_rates_per_s: bouc_wen.creep_rates_per_s,
-            creep_weights: bouc_wen.creep_weights,
-            creep_thresholds_v: bouc_wen.creep_thresholds_v,
-            ..plays
-        },
-    }
-}
-
 /// Runs a spec's machines of three classes without a fault; how many ticks in each phase, and samples replaced and repeated.
 fn fault_free(spec: &str, ticks: u64) -> ([u64; 6], [u64; 2]) {
     let name = spec.trim_end_matches(".toml").replace('/', "-");
@@ -522,7 +490,7 @@ fn fault_free(spec: &str, ticks: u64) -> ([u64; 6], [u64; 2]) {
     let emitted = Emitted::new(&format!("supervisor-samples-free-{name}"), spec, &edits);
     let (mut phases, mut seen) = ([0; 6], [0; 2]);
     for number in 0..3 {
-        let mut machine = Loop::new(&emitted, &class(number), 100 + number);
+        let mut machine = Loop::new(&emitted, &leg_class(number), 100 + number);
         let mut path = Path::new(number);
         for tick in 0..ticks / 3 {
             path.lead(&mut machine);
@@ -584,7 +552,7 @@ fn spoiled_samples_have_the_same_bits_on_the_mcu() {
         let mut machine = Loop::new(&emitted, &LegParameters::reference(), 3);
         let config = machine.machine.controller().default_config();
         let mut draw = ChaCha8Rng::seed_from_u64(9);
-        let (mut inputs, mut outputs, mut digests) = (Vec::new(), Vec::new(), Vec::new());
+        let mut rows: Vec<Row> = Vec::new();
         let (mut path, mut came, mut seen) = (Path::new(1), [[0.0; 6]; 2], [0; 2]);
         for tick in 0..specgen_tests::length(9000, 60_000) {
             path.lead(&mut machine);
@@ -602,16 +570,10 @@ fn spoiled_samples_have_the_same_bits_on_the_mcu() {
             });
             seen[0] += u32::from(machine.status() & SAMPLE_REPLACED != 0);
             seen[1] += u32::from(machine.status() & SAMPLE_REPEATED != 0);
-            inputs.push(machine.input.clone());
-            outputs.push(machine.output.clone());
-            digests.push(machine.machine.digest());
+            rows.push((machine.input.clone(), machine.output.clone(), machine.machine.digest()));
         }
         assert!(seen[0] > 100 && seen[1] > 20, "{seen:?}");
-        let result = target::replay_machine(&image, &config, &inputs, Duration::from_secs(600)).unwrap();
-        assert_eq!(result.outputs.len(), inputs.len());
-        let differs = (0..inputs.len())
-            .find(|tick| outputs[*tick] != result.outputs[*tick] || digests[*tick] != result.digests[*tick]);
-        assert_eq!(differs, None, "{name}: the first tick that differs");
-        println!("{name}: {} ticks equal in every bit; replaced, repeated {seen:?}", inputs.len());
+        assert_same_machine(name, &image, &config, &rows);
+        println!("{name}: {} ticks equal in every bit; replaced, repeated {seen:?}", rows.len());
     }
 }

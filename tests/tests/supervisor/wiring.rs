@@ -8,16 +8,13 @@ use host_sim::controller::{MachineWord, Supervised, TickController};
 use host_sim::noise::Gaussian;
 use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
 use host_sim::platform::PlatformRig;
-use host_sim::platform::rig::Noise;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::compile::Compilation;
 use specgen::machine;
 use specgen::model::Mcu;
-use specgen::target;
 use specgen_runtime::supervisor::{Fault, Finding, FindingText, with};
-use specgen_tests::Emitted;
-use std::time::Duration;
+use specgen_tests::{Emitted, Row, assert_same_machine, leg_class, scenario};
 
 type Six = [f64; 6];
 type Matrix = [Six; 6];
@@ -48,17 +45,14 @@ struct ArmedMachine {
     ticks: u32,
     /// Largest displacement of a leg, m.
     moved: f64,
-    /// Rows of input and output, and digests of the machine, of every tick.
-    inputs: Vec<Vec<u64>>,
-    outputs: Vec<Vec<u64>>,
-    digests: Vec<u64>,
+    rows: Vec<Row>,
 }
 
 fn arm(supervised: &mut Supervised, machine: &mut dyn Machine, compiled: &Compilation) -> ArmedMachine {
     arm_until(supervised, machine, compiled, u32::MAX, ARM)
 }
 
-/// Armed, and asked for something else from a tick on.
+/// ArmedMachine, and asked for something else from a tick on.
 fn arm_until(
     supervised: &mut Supervised,
     machine: &mut dyn Machine,
@@ -75,14 +69,7 @@ fn arm_until(
     let voltages = place(&outputs, "voltage[0]");
     let request = place(&inputs, "request");
     let (mut input, mut output) = (vec![0; inputs.len()], vec![0; outputs.len()]);
-    let mut armed = ArmedMachine {
-        word: MachineWord::of(0),
-        ticks: 0,
-        moved: 0.0,
-        inputs: Vec::new(),
-        outputs: Vec::new(),
-        digests: Vec::new(),
-    };
+    let mut armed = ArmedMachine { word: MachineWord::of(0), ticks: 0, moved: 0.0, rows: Vec::new() };
     for tick in 0..20_000 {
         for (slot, reading) in input[gauges..].iter_mut().zip(machine.read()) {
             *slot = scalar.encode(reading);
@@ -94,9 +81,7 @@ fn arm_until(
         };
         let word = supervised.step(&input, &mut output);
         (armed.word, armed.ticks) = (word, tick);
-        armed.inputs.push(input.clone());
-        armed.outputs.push(output.clone());
-        armed.digests.push(supervised.digest());
+        armed.rows.push((input.clone(), output.clone(), supervised.digest()));
         if matches!(word.phase, HOLDING | FAULTED) || tick > 0 && word.phase == DISARMED {
             return armed;
         }
@@ -227,9 +212,7 @@ fn every_single_fault_of_a_platform_is_refused_and_named() {
     let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
     let compiled = &emitted.compiled;
     let mut supervised = Supervised::new(emitted.at_run_time());
-    let task = compiled.model.task_space.as_ref().unwrap();
-    let specimen = machine::specimen(&compiled.model, task, &LegParameters::reference(), Some(5));
-    let scenario = machine::scenario(&compiled.model, task, &specimen, &Noise::of(&specimen), 5);
+    let scenario = scenario(compiled, &LegParameters::reference(), 5);
     let ArmedMachine { word, ticks, moved, .. } =
         arm(&mut supervised, &mut Platform::new(scenario.rig(), Finding::None), compiled);
     assert_eq!((word.phase, word.cause, finding(word)), (HOLDING, 0, Finding::None));
@@ -301,25 +284,12 @@ fn inverse(a: &Matrix) -> Matrix {
     std::array::from_fn(|row| std::array::from_fn(|column| inverse[(row, column)]))
 }
 
-/// Three classes of legs: plays with creep, Bouc-Wen with creep over five decades, plays that depend on the rate with the same creep.
-fn class(model: &specgen::model::Model, number: usize) -> LegParameters {
-    let [plays, bouc_wen] = [LegParameters::reference(), LegParameters::bouc_wen()];
-    let mixed = LegParameters {
-        kappa: 0.02,
-        creep_rates_per_s: bouc_wen.creep_rates_per_s.clone(),
-        creep_weights: bouc_wen.creep_weights.clone(),
-        creep_thresholds_v: bouc_wen.creep_thresholds_v.clone(),
-        ..plays.clone()
-    };
-    machine::leg(model, &[plays, bouc_wen, mixed][number])
-}
-
 /// A machine without a fault, as the study draws it: gauge gains ±5 %, tilts of 20 mrad, gauges 2 mm off, stiffness ±20 %, joints of
 /// up to 5 % of the legs' stiffness in every axis, leg gains ±15 %, small motions of 0.5 to 0.95 of the spec's gain.
 fn random(compiled: &Compilation, number: u64) -> Legs {
     let model = &compiled.model;
     let mut draw = RandomSource(ChaCha8Rng::seed_from_u64(4600 + number));
-    let parameters = class(model, (number % 3) as usize);
+    let parameters = machine::leg(model, &leg_class(number));
     let small = {
         let mut leg = Legs::new(&parameters, &[1.0; 6], IDENTITY, number);
         let mut most = 0.0_f64;
@@ -378,9 +348,7 @@ fn what_all_of_them_have_in_common_is_refused() {
     let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
     let compiled = &emitted.compiled;
     let mut supervised = Supervised::new(emitted.at_run_time());
-    let task = compiled.model.task_space.as_ref().unwrap();
-    let specimen = machine::specimen(&compiled.model, task, &LegParameters::reference(), Some(5));
-    let scenario = machine::scenario(&compiled.model, task, &specimen, &Noise::of(&specimen), 5);
+    let scenario = scenario(compiled, &LegParameters::reference(), 5);
     let mut found = |gauges: f64, legs: f64| {
         let scaled = |by: f64| IDENTITY.map(|row| row.map(|entry| by * entry));
         let mut platform = Platform { rig: scenario.rig().clone(), gauges: scaled(gauges), legs: scaled(legs) };
@@ -408,11 +376,10 @@ fn a_stop_ends_the_pulses_at_once() {
     for then in [HOLD, RAMP_DOWN] {
         for &until in specgen_tests::length(&[600, 1250][..], &[600, 1250, 1251, 1600, 3900]) {
             let mut legs = random(compiled, 1);
-            let ArmedMachine { word, ticks, outputs, .. } =
-                arm_until(&mut supervised, &mut legs, compiled, until, then);
+            let ArmedMachine { word, ticks, rows, .. } = arm_until(&mut supervised, &mut legs, compiled, until, then);
             assert_eq!((word.phase, word.cause, word.amplifier_on), (DISARMED, 0, false), "{then} at {until}");
             let away = |tick: u32| -> i64 {
-                outputs[tick as usize][codes_at..][..6].iter().map(|code| (*code as i64 - rest).abs()).sum()
+                rows[tick as usize].1[codes_at..][..6].iter().map(|code| (*code as i64 - rest).abs()).sum()
             };
             assert!((until..ticks).all(|tick| away(tick) <= away(tick - 1)), "{then} at {until}: it moves on");
             assert!(until == 600 || until == 1600 || away(until - 1) > 100, "{then} at {until}: not in a pulse");
@@ -461,20 +428,12 @@ fn a_check_has_the_same_bits_on_the_mcu() {
             let mut legs = Legs::new(&parameters, &[1.0; 6], with(&readings, fault), 3);
             let host = arm(&mut supervised, &mut legs, compiled);
             assert_eq!(finding(host.word), fault);
-            let result = target::replay_machine(&image, &config, &host.inputs, Duration::from_secs(600)).unwrap();
-            let equal = |tick: &usize| {
-                host.outputs[*tick] == result.outputs[*tick] && host.digests[*tick] == result.digests[*tick]
-            };
-            assert!(host.inputs.len() == result.outputs.len() && host.inputs.len() > 1000);
-            assert_eq!(
-                (0..host.inputs.len()).find(|tick| !equal(tick)),
-                None,
-                "{name}, {fault}: the first tick that differs"
-            );
+            assert!(host.rows.len() > 1000);
+            let result = assert_same_machine(&format!("{name}, {fault}"), &image, &config, &host.rows);
             let stage = result.stats.stage("other phases").expect("no tick runs");
             println!(
                 "{name}, {fault}: {} ticks equal in every bit; instructions {:.0} mean, {} at most; Machine {} bytes",
-                host.inputs.len(),
+                host.rows.len(),
                 stage.mean(),
                 stage.largest,
                 result.stats.state_bytes

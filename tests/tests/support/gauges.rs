@@ -7,9 +7,8 @@ use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
 use specgen::ir::{Ir, Sensing};
 use specgen::lower::{self, Origin};
-use specgen::model::{
-    ControlMode, DynamicsChoice, Environment, Frames, Interaction, Model, Probe, Scalar, SetpointRules, TaskSpace,
-};
+use specgen::model::{Model, Probe, Scalar, SetpointRules, TaskSpace};
+use specgen::spec::{self, SpecSource};
 use specgen::stability::platform::{self, RestDynamics};
 use specgen_runtime::{Gauges, Legs, Real, Series};
 use specgen_tests::repository;
@@ -22,23 +21,11 @@ pub fn model(probes: [Probe; 6]) -> Model {
     assert_eq!(model.geometry.height, HEIGHT);
     model.sensor.range = [-70e-6, 70e-6];
     model.workspace.rotation = [0.6e-3; 3];
+    let reference = SpecSource::read(&repository().join("specs/reference.toml")).unwrap();
+    let task = spec::load(&reference).0.unwrap().task_space.unwrap();
     model.task_space = Some(TaskSpace {
-        mode: ControlMode::PF,
         probes,
-        calibration: None,
-        modal_damping: 0.02,
-        notch_damping: Some(1.0),
-        active_damping: false,
-        hand_over: false,
-        correction: None,
-        gains: None,
-        position_gains: None,
-        adaptation: None,
         velocity_cutoff: 2000.0,
-        interaction: Interaction::None,
-        environment: Environment { stiffness: [0.0; 6], rest: [0.0; 6] },
-        dynamics: DynamicsChoice::Cheapest,
-        dynamics_tolerance: None,
         lead: Some(0.0),
         transfer_time: 0.1,
         setpoint: SetpointRules {
@@ -46,14 +33,11 @@ pub fn model(probes: [Probe; 6]) -> Model {
             speed: [1e-3; 6],
             acceleration: [1.0; 6],
             jerk: [1e3; 6],
-            stop_acceleration: None,
-            stop_jerk: None,
             stream_speed: [1.0; 6],
-            stale_ticks: 10,
+            ..task.setpoint
         },
-        frames: Frames { work: [0.0; 6], tool: [0.0; 3] },
         trajectories: Vec::new(),
-        triggers: Vec::new(),
+        ..task
     });
     model
 }

@@ -79,6 +79,11 @@ impl Folder {
         Run::of(self.command().args(arguments))
     }
 
+    /// `specgen LINE` in this folder, the line split as by a shell.
+    pub fn line(&self, line: &str) -> Run {
+        Run::of(self.command().args(shlex::split(line).unwrap()))
+    }
+
     pub fn command(&self) -> Command {
         let mut command = Command::new(BINARY);
         command.current_dir(self.0.path());

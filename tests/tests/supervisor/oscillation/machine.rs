@@ -3,11 +3,9 @@
 use host_sim::controller::{MachineWord, Supervised, TickController};
 use host_sim::plant::LegParameters;
 use host_sim::platform::PlatformRig;
-use host_sim::platform::rig::Noise;
 use host_sim::word::Scalar;
 use specgen::compile::Compilation;
-use specgen::machine;
-use specgen_tests::Emitted;
+use specgen_tests::{Emitted, Row, scenario};
 
 use super::super::bench::{ARM, FAULTED, HOLDING, NOTHING, RUN, RUNNING};
 
@@ -53,9 +51,6 @@ impl Modes {
     }
 }
 
-/// Input, output, digest.
-pub type Row = (Vec<u64>, Vec<u64>, u64);
-
 pub struct Machine {
     pub supervised: Supervised,
     pub rig: PlatformRig,
@@ -97,9 +92,6 @@ impl Machine {
 
     pub fn with(supervised: Supervised, compiled: &Compilation, leg: &LegParameters, seed: u64) -> Self {
         let model = &compiled.model;
-        let task = model.task_space.as_ref().expect("a platform");
-        let specimen = machine::specimen(model, task, leg, Some(seed));
-        let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), seed);
         let (inputs, outputs) = (supervised.input_names(), supervised.output_names());
         let at = |names: &[String], name: &str| names.iter().position(|one| one == name).expect("a word");
         let places = Places {
@@ -118,7 +110,7 @@ impl Machine {
             rows.map(|row| std::array::from_fn(|axis| (0..6).map(|leg| row[leg] * jacobian[leg][axis]).sum()));
         let mut machine = Self {
             scalar: supervised.controller().description().scalar,
-            rig: scenario.rig().clone(),
+            rig: scenario(compiled, leg, seed).rig().clone(),
             rows: None,
             structure: None,
             vibration: None,

@@ -1,12 +1,11 @@
 //! Nothing that a sound machine does is taken for an oscillation.
 
 use host_sim::controller::{Supervised, TickController};
-use host_sim::plant::LegParameters;
 use host_sim::platform::Wrench;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::machine as simulated;
-use specgen_tests::{Emitted, repository};
+use specgen_tests::{Emitted, leg_class, repository};
 use std::fs;
 
 use super::super::bench::{ACKNOWLEDGE, ARM, HOLD, HOLDING, NOTHING, RAMP_DOWN, RUN, RUNNING};
@@ -23,22 +22,6 @@ impl RandomSource {
 
     fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
-/// Three classes of legs: plays with creep, Bouc-Wen, plays whose width grows with the rate.
-pub fn class(number: u64) -> LegParameters {
-    let [plays, bouc_wen] = [LegParameters::reference(), LegParameters::bouc_wen()];
-    match number % 3 {
-        0 => plays,
-        1 => bouc_wen,
-        _ => LegParameters {
-            kappa: 0.02,
-            creep_rates_per_s: bouc_wen.creep_rates_per_s.clone(),
-            creep_weights: bouc_wen.creep_weights.clone(),
-            creep_thresholds_v: bouc_wen.creep_thresholds_v.clone(),
-            ..plays
-        },
     }
 }
 
@@ -284,7 +267,7 @@ fn platform(emitted: &Emitted, spec: &str, ticks: u64, number: u64) -> QuietResu
     let supervised = Supervised::new(emitted.at_run_time());
     let (mut made, mut alarms) = (0, Vec::new());
     for class in 0..3 {
-        let mut machine = Machine::with(supervised.fork(), &emitted.compiled, &self::class(class), 5 + class);
+        let mut machine = Machine::with(supervised.fork(), &emitted.compiled, &leg_class(class), 5 + class);
         machine.start();
         // Gauges and frame drift by 2 nm a second; a reading is in V where there is a calibration.
         if emitted.compiled.model.task_space.as_ref().unwrap().calibration.is_none() {
@@ -319,7 +302,7 @@ fn legs(emitted: &Emitted, spec: &str, ticks: u64, number: u64) -> QuietResult {
     for class in 0..3 {
         supervised.reset();
         let mut draw = RandomSource(ChaCha8Rng::seed_from_u64(1000 * number + class));
-        let parameters = simulated::leg(model, &self::class(class));
+        let parameters = simulated::leg(model, &leg_class(class));
         let mut scenario =
             simulated::legs(model, &std::array::from_fn(|_| parameters.clone()), &parameters.noise, class, 60);
         let rig = scenario.rig_mut();
