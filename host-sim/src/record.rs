@@ -275,8 +275,7 @@ fn parse(words: &[u64], inputs: usize) -> Result<Block, String> {
     }
     let reason_word = reason & 0xffff_ffff;
     let decimation = (reason >> 32) as u32;
-    let reason =
-        Reason::from_word(reason_word).ok_or_else(|| format!("its reason {reason_word} is unknown"))?;
+    let reason = Reason::from_word(reason_word).ok_or_else(|| format!("its reason {reason_word} is unknown"))?;
     if decimation == 0 {
         return Err("its decimation is 0".to_owned());
     }
@@ -289,7 +288,8 @@ fn parse(words: &[u64], inputs: usize) -> Result<Block, String> {
     let mut decoded = Vec::new();
     for row in 0..*rows {
         let tick = first.saturating_add(row.saturating_mul(u64::from(decimation)));
-        let row = take_row(&mut rest, &mut last, tick).ok_or_else(|| format!("its row of tick {tick} is incomplete"))?;
+        let row =
+            take_row(&mut rest, &mut last, tick).ok_or_else(|| format!("its row of tick {tick} is incomplete"))?;
         decoded.push(row);
     }
     if !rest.is_empty() {

@@ -4,7 +4,9 @@
 use crate::identify_support::{self, Drive, expect, generator, normal, random_table, uniform};
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
-use specgen::identify::{DeadTime, Identification, Options, Record, Source, Staircase, choose_grid, identify, validate};
+use specgen::identify::{
+    DeadTime, Identification, Options, Record, Source, Staircase, choose_grid, identify, validate,
+};
 use specgen::report::identification;
 use specgen_tests::worse;
 

@@ -4,8 +4,9 @@
 use std::fs;
 use std::path::Path;
 
-use specgen::compile::{Refused, compile};
-use specgen::diagnostic::{Diagnostic, Place, Severity, codes, render};
+use specgen::compile::compile;
+use specgen::diagnostic::{Diagnostic, Place, Severity, render};
+use specgen::outcome::Refusal;
 use specgen_tests::cases::{self, Case, replaced};
 use specgen_tests::{length, repository};
 
@@ -22,7 +23,7 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-fn verdict(folder: &Path, text: &str, table: Option<&str>) -> Result<Vec<Diagnostic>, Refused> {
+fn verdict(folder: &Path, text: &str, table: Option<&str>) -> Result<Vec<Diagnostic>, Refusal> {
     let path = folder.join("platform.toml");
     fs::write(&path, text).expect("written");
     if let Some(table) = table {
@@ -128,7 +129,7 @@ fn refused(case: &Case, folder: &Path) -> String {
     let shown = render(&refused.findings, &source, false);
     let found = refused.findings.iter().find(|found| found.code == &what[..5]);
     let found = found.unwrap_or_else(|| panic!("{what}: not found:\n{shown}"));
-    assert!(found.severity == Severity::Error && codes::find(found.code).is_some(), "{what}");
+    assert!(found.severity == Severity::Error && specgen::findings::find(found.code).is_some(), "{what}");
     let place = match (&found.place, case.one('@')) {
         (Place::Spec(span), Some(at)) => {
             assert!(bad[span.start..].starts_with(at), "{what}: not at `{at}`:\n{shown}");

@@ -1,4 +1,4 @@
-//! Places in a text as editors count them, and what stands there. The text may be half written, so lines are looked at, not TOML.
+//! Places in a text as editors count them, and the key or value there. The text may be half written, so this reads lines, not TOML.
 
 pub mod complete;
 
@@ -36,7 +36,7 @@ impl<'a> Lines<'a> {
         Self { text, starts: std::iter::once(0).chain(breaks).collect() }
     }
 
-    /// Where byte `offset` stands; a byte within a character counts as its beginning.
+    /// Position of byte `offset`; a byte within a character counts as its beginning.
     fn position(&self, offset: usize) -> Position {
         let mut offset = offset.min(self.text.len());
         while !self.text.is_char_boundary(offset) {
@@ -48,7 +48,7 @@ impl<'a> Lines<'a> {
         Position { line: line as u32, character: column as u32 }
     }
 
-    /// Where bytes stand.
+    /// Positions of a range of bytes.
     pub fn part(&self, span: &Range<usize>) -> Part {
         Part { start: self.position(span.start), end: self.position(span.end) }
     }
@@ -73,7 +73,7 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// What stands at a place.
+/// The key or value at a place.
 pub struct Spot {
     /// The byte.
     offset: usize,
@@ -85,7 +85,7 @@ pub struct Spot {
     pub key: Option<&'static Key>,
     /// Whether the line is the header of a section.
     pub is_header: bool,
-    /// What stands of the line before the place.
+    /// The line up to the place.
     pub before: String,
     /// Whether the place is behind the equals sign of a key.
     pub in_value: bool,
@@ -167,7 +167,7 @@ impl Spot {
     }
 }
 
-/// A path with `%20` and the like as what they stand for.
+/// A path with `%20` and the like decoded.
 pub fn decoded(path: &str) -> String {
     let mut bytes = Vec::with_capacity(path.len());
     let mut rest = path.as_bytes();

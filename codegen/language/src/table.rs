@@ -2,7 +2,7 @@
 
 use std::fmt::{Display, Write as _};
 
-/// A column. What is wider than it stands out.
+/// A column. A longer text is not cut.
 #[derive(Clone, Copy)]
 pub struct Column {
     gap: &'static str,

@@ -231,9 +231,7 @@ impl Run<'_> {
             |signal: String, recorded, replayed| Some(Divergence { tick: block.first, signal, recorded, replayed });
         if !follows && let Err(error) = self.machine.load(&block.state) {
             return match error {
-                SnapshotError::Word { index, word } => {
-                    differs(format!("state word {index} (invalid)"), word, 0)
-                }
+                SnapshotError::Word { index, word } => differs(format!("state word {index} (invalid)"), word, 0),
                 SnapshotError::Length { given, expected } => {
                     differs("number of state words".to_owned(), given as u64, expected as u64)
                 }

@@ -203,7 +203,7 @@ impl Rig {
             return Some(byte);
         }
         // Lost, or with a bit flipped.
-        if what.is_multiple_of(2) { None } else { Some(byte ^ (1 << ((what >> 8) % 8))) }
+        if what % 2 == 0 { None } else { Some(byte ^ (1 << ((what >> 8) % 8))) }
     }
 }
 

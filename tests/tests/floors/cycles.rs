@@ -115,12 +115,12 @@ fn no_files_of_a_controller_of_legs_use_each_other_in_a_cycle() {
 /// and behind a re-export.
 #[test]
 fn a_cycle_in_a_crate_of_the_repository_is_found() {
-    let (cli, report) = ("codegen/cli/src/lib.rs", "codegen/report/src/lib.rs");
+    let (operate, report) = ("codegen/operate/src/lib.rs", "codegen/report/src/lib.rs");
     let studies = "codegen/studies/src/lib.rs";
     let cases: [(&str, &str, &str, &[&str]); 7] = [
         (studies, "src/firmware.rs", "use crate::build::Options as Build;", &["build.rs"]),
         (report, "identify/cause.rs", "use super::everett;\nfn f() { everett::run() }", &["everett.rs"]),
-        (cli, "operate/pose.rs", "use crate::cli::operate::Operator;", &["operator.rs"]),
+        (operate, "commands/pose.rs", "use super::operator::Operator;", &["operator.rs"]),
         (report, "pages/words.rs", "fn f() { super::recorded::read() }", &["recorded.rs"]),
         (studies, "learning/response.rs", "use super::Convergence;", &["convergence.rs"]),
         (

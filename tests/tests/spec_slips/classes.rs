@@ -9,7 +9,7 @@ use specgen::spec::{SpecSource, load_as_far};
 
 use super::edit::Edit::{Add, Value, With};
 use super::set::Of::{self, Joints, Own, Reference};
-use super::set::{Slip, slips};
+use super::set::{Change, Slip, slips};
 use crate::physical_lint::list;
 use crate::physical_lint::support::spec;
 
@@ -85,7 +85,7 @@ fn each(change: impl Fn(Vector) -> Vector) -> impl Fn(Vec<Vector>) -> Vec<Vector
 }
 
 /// Changes of a spec as a whole.
-const CHANGES: &[(&str, fn(&str) -> String)] = &[
+const CHANGES: &[Change] = &[
     ("joints: -y", |t| both(t, &each(negated(1)))),
     ("joints: -x", |t| both(t, &each(negated(0)))),
     ("joints: x and y swapped", |t| both(t, &each(|[x, y, z]| [y, x, z]))),

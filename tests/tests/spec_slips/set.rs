@@ -6,6 +6,9 @@ use crate::physical_lint::support::spec;
 use super::edit::Edit;
 use specgen_tests::cases::{self, Case};
 
+/// A change by its name: the text of the spec before and after.
+pub type Change = (&'static str, fn(&str) -> String);
+
 /// The spec that a slip is made in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Of {
@@ -74,7 +77,7 @@ pub struct Slip {
 }
 
 impl Slip {
-    fn new(case: Case, functions: &[(&str, fn(&str) -> String)]) -> Self {
+    fn new(case: Case, functions: &[Change]) -> Self {
         let case: &'static Case = Box::leak(Box::new(case));
         let pair = |text: &'static str| text.split_once([' ', '\n']).expect("a key and what is new");
         let mut texts = case.all('+');
@@ -101,13 +104,13 @@ impl Slip {
 }
 
 /// Slips of a file in `tests/cases`, with what functions in it do.
-pub fn slips(file: &str, functions: &[(&str, fn(&str) -> String)]) -> Vec<Slip> {
+pub fn slips(file: &str, functions: &[Change]) -> Vec<Slip> {
     let cases = cases::read(&specgen_tests::repository().join("tests/cases").join(file));
     cases.into_iter().map(|(case, _)| Slip::new(case, functions)).collect()
 }
 
 /// Changes of a record.
-pub const RECORDS: &[(&str, fn(&str) -> String)] = &[
+pub const RECORDS: &[Change] = &[
     ("time times 1000", |text| scaled(text, 0, 1e3)),
     ("displacement times 1000", |text| scaled(text, 2, 1e3)),
     ("displacement by 1000", |text| scaled(text, 2, 1e-3)),

@@ -330,7 +330,8 @@ fn samples_that_are_stale_missing_or_leap_are_counted_and_a_fault_if_it_goes_on(
             print(what, &found);
             assert_eq!(found, (None, shown), "{what}");
         }
-        let again: [(&str, fn(usize) -> bool, Spoil, usize); 3] = [
+        type When = fn(usize) -> bool;
+        let again: [(&str, When, Spoil, usize); 3] = [
             ("no new sample", |tick| tick > 0, stale, 5),
             ("a stale value in every second sample", |tick| tick % 2 == 1, stale, 15),
             ("one of two buffers dead", |tick| tick > 2 && tick % 2 == 1, |words, came| *words = came[1], 15),

@@ -1,7 +1,7 @@
-//! The findings of every crate but those of the lints, which stand with their rules in `codegen/compiler/src/lint/`. A code
+//! The findings of every crate but those of the lints, which are beside their rules in `codegen/compiler/src/lint/`. A code
 //! never changes its meaning; a retired one is not used again.
 //!
-//! What a code means stands in its page, `codegen/language/findings/E0441.md` and so on: what is checked, why it matters, a
+//! The meaning of a code is on its page, `codegen/language/findings/E0441.md` and so on: what is checked, why it matters, a
 //! spec that shows it, the fix. The examples are run by `codegen/cli/tests/findings.rs`.
 
 use super::Severity;

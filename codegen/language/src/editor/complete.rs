@@ -63,7 +63,7 @@ fn values(key: &Key, before: &str, folder: &Path) -> Vec<Value> {
     let first = match key.shape {
         Shape::One(item) => item,
         Shape::List(items) | Shape::Leading(_, items) | Shape::Rows(_, items) => match items {
-            // In the last items of a list of six stand angles.
+            // The last items of a list of six are angles.
             [.., last] if before.matches(',').count() >= 3 => *last,
             [first, ..] => *first,
             [] => return Vec::new(),

@@ -227,7 +227,7 @@ fn every_error_says_what_it_is() {
     let waited = Duration::from_millis(1500);
     let silent = |damaged| ClientError::Silent { waited, attempts: 3, damaged };
     assert_eq!(silent(0).to_string(), "no answer within 1.5 s (3 attempts)");
-    assert!(silent(1).to_string().starts_with("no answer within 1.5 s (3 attempts); 1 frames came damaged"));
+    assert!(silent(1).to_string().starts_with("no answer within 1.5 s (3 attempts); 1 frames were damaged"));
     assert!(silent(0).source().is_none());
     let said = |refusal| ClientError::Refused(refusal).to_string();
     let all = [
