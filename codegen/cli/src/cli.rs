@@ -80,7 +80,7 @@ struct Common {
     /// Print the result as JSON on standard output.
     #[arg(long, global = true)]
     json: bool,
-    /// Build anew: take no build that was kept, and keep none.
+    /// Ignore the build cache: neither read nor write it.
     #[arg(long, global = true)]
     no_cache: bool,
 }
@@ -95,23 +95,23 @@ struct Strictness {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Begin: a folder with a commented spec of your platform and a simulated record of its legs, from some fifteen answers.
+    /// Start a project: a folder with a commented spec of your platform and a simulated record of its legs, from about fifteen answers.
     New(new::Arguments),
     /// Report every finding about a spec; write nothing.
     Check(check::Arguments),
     /// Explain a finding by its code: what is checked, why it matters, a spec that shows it, the fix.
     Explain(explain::Arguments),
-    /// Build for one target, check the image, hold it against the budget.
+    /// Build for one target, check the image, compare it with the budget.
     Build(firmware::Arguments),
-    /// Say who takes the memory of an image, and what its tick reaches.
+    /// Show what uses the memory of an image, and what its tick reaches.
     Size(firmware::SizeArguments),
     /// Build, check, and write the image to a board by probe-rs.
     Flash(firmware::FlashArguments),
-    /// Run the emitted controller against the simulated machine of a spec; with --paper the paper's experiments.
+    /// Simulate the controller of a spec on its simulated machine; with --paper the paper's experiments.
     Sim(sim::Arguments),
-    /// Tune gains and weights on the simulated loop with the emitted controller.
+    /// Tune gains and weights on the simulated loop.
     Tune(tune::Arguments),
-    /// Learn a motion that repeats on the simulated machine: passes, and the correction that takes out what they show.
+    /// Learn a repeated motion, simulated or on a machine: measure passes, and compute the correction that cancels their error.
     Learn(learn::Arguments),
     /// Try the closed loop on corners and random draws of declared uncertainties; a gate for builds.
     Robust(robust::Arguments),
@@ -131,7 +131,7 @@ enum Command {
     Replay(replay::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
     Dynamics(dynamics::Arguments),
-    /// Write the controller for programs that are not ours: a C header with the library.
+    /// Export the controller as a C library, a Python module or an FMU.
     Export(export::Arguments),
     /// Identify from measured records: the Everett table, or linear, response, gauge, stiffness.
     Identify(identify::Arguments),
@@ -141,7 +141,7 @@ enum Command {
     Plant(plant::Arguments),
     /// Measure how well this computer keeps time, and say what to change for real time.
     Doctor(doctor::Arguments),
-    /// Serve an editor by the Language Server Protocol: findings while one types, meanings of keys, completion, fixes.
+    /// Serve an editor by the Language Server Protocol: findings as you type, meanings of keys, completion, fixes.
     Lsp(lsp::Arguments),
     /// Print the intermediate representation of a spec: every constant of its controller.
     #[command(after_help = examples::DUMP_IR)]
@@ -149,7 +149,7 @@ enum Command {
         /// The spec file.
         spec: named::InputFile,
     },
-    /// Show how much of what was built is kept, or remove it.
+    /// Show the size of the build cache, or clear it.
     Cache(cache::Arguments),
     /// Print a script that completes commands, options and files in a shell.
     Completions(completions::Arguments),

@@ -45,7 +45,7 @@ pub struct Compilation {
     pub pose_noise: Option<PoseNoise>,
     /// Noise of the pose at rest, as the gauges show it.
     pub rest_noise: RestNoise,
-    /// What all of it rests on that nobody measured.
+    /// Values that nobody measured.
     pub assumptions: Assumptions,
     /// Every constant of the controller.
     pub ir: Ir,
@@ -56,8 +56,8 @@ pub struct Compilation {
 }
 
 impl Compilation {
-    /// What of the requirements the spec misses although it compiles: errors that whoever judges the spec shows. A simulation runs all the
-    /// same.
+    /// Requirements that the spec does not meet although it compiles. A command that judges a spec reports them as errors; a
+    /// simulation still runs.
     #[must_use]
     pub fn missed(&self) -> Vec<Diagnostic> {
         rest::check(&self.model, &self.rest_noise)
@@ -150,7 +150,7 @@ fn check_spec(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Mod
     if findings.iter().all(|finding| finding.severity < Severity::Error) {
         return Some(model);
     }
-    // What the paths are is in the file whatever the platform: say it in the same run.
+    // Paths can be checked without a valid platform, so they are reported in the same run.
     findings.extend(setpoint::declared(&model, &source.dir).map_or_else(|found| found, |paths| paths.warnings));
     None
 }

@@ -1,6 +1,6 @@
 //! Command lines in messages: a pasted line works whatever the name of the file.
 //!
-//! Every printed command line with a name in it is built here; `tests/tests/shell_lines.rs` checks the sources.
+//! Every printed command line with a name in it is built here; `codegen/cli/tests/shell_lines.rs` checks the sources.
 
 use std::fmt;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The controller for programs that are not ours.
+//! The controller for other programs: a C library, a Python module or an FMU.
 
 pub mod fmu;
 

@@ -400,10 +400,10 @@ impl Outcome for Found {
         // Writing to a String cannot fail, here and below.
         let _ = writeln!(
             text,
-            "  learned {low:.1} to {high:.0} Hz; error times {:.2} a pass or less {}, worst at {:.0} Hz",
+            "  learned {low:.1} to {high:.0} Hz; each pass multiplies the error by {:.2} or less {}, worst at {:.0} Hz",
             convergence.radius,
             if convergence.measured {
-                "by the response\n  as it was measured"
+                "by the\n  measured response"
             } else {
                 "on every machine within\n  the intervals"
             },

@@ -226,8 +226,8 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         restart
     }
 
-    /// A tick while the host steps the machine: amplifiers off, codes unchanged, which is at rest. If the host falls
-    /// silent, the machine returns to the ticks.
+    /// A tick while the host steps the machine: amplifiers off, codes unchanged. If the host goes silent, the ticks of the
+    /// board resume.
     fn stand_by(&mut self, exchange: &mut Exchange, noticed: TargetStatus) {
         let report = &mut exchange.report;
         self.done(report, |amplifiers| amplifiers.enable(false));

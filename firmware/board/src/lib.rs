@@ -2,8 +2,9 @@
 //!
 //! ```text
 //! timer ─► Schedule ─missed─► Board::tick: Gauges ─codes─► supervise ─codes─► Amplifiers
-//!                                  ▲ commands,wave│ report, record ▼
-//! link  ◄─► Endpoint ◄─► LinkHandler ◄── Exchange ────────────────────────┘
+//!                               ▲ commands, wave │ report, record
+//!                               │                ▼
+//! link  ◄─► Endpoint ◄─► LinkHandler ◄────► Exchange
 //! ```
 //! The timer's interrupt owns [`Board`], the background owns the link. [`Exchange`] connects them; its lock is held
 //! only for copies. The supervisor makes every decision about control: a board collects faults and reports them as

@@ -52,7 +52,7 @@ fn arm(supervised: &mut Supervised, machine: &mut dyn Machine, compiled: &Compil
     arm_until(supervised, machine, compiled, u32::MAX, ARM)
 }
 
-/// ArmedMachine, and asked for something else from a tick on.
+/// Arms the machine, then sends request `then` from tick `until` on.
 fn arm_until(
     supervised: &mut Supervised,
     machine: &mut dyn Machine,

@@ -19,17 +19,17 @@ pub struct Arguments {
     /// Write the source only.
     #[arg(long)]
     no_build: bool,
-    /// Also write the crates that a board of one's own is made of: `hal`, `board`, `link`. See docs/porting.md.
+    /// Also write the crates for your own board: `hal`, `board`, `link`. See docs/porting.md.
     #[arg(long)]
     board: bool,
-    /// First bring what is missing for the microcontroller (cross compiler, emulator): by rustup or apt, else into the user's
-    /// cache. Where that fails, the job goes on without.
+    /// First install what is missing for the microcontroller (cross compiler, emulator): by rustup or apt, or into the user's
+    /// cache. If that fails, the job continues without it.
     #[arg(long, conflicts_with = "no_build")]
     setup: bool,
-    /// Everything that was found and measured, below the verdict.
+    /// Print all findings and measurements below the verdict.
     #[arg(long)]
     details: bool,
-    /// Exit with code 3 where what needs a missing cross compiler or emulator is left out.
+    /// Exit with code 3 if the cross compiler or the emulator is missing.
     #[arg(long, conflicts_with = "no_build")]
     require_target: bool,
     #[command(flatten)]

@@ -18,8 +18,8 @@ Examples:
   specgen flash platform.toml         # (board) build, check, write to the board
 
 docs/guide.md leads from the bench to running firmware. Every command has
-examples of its own: `specgen check --help`. (minutes) takes some; (board) wants
-a board, a second program, or a computer at rest.
+examples of its own: `specgen check --help`. (minutes) takes several minutes;
+(board) needs a board, a second program, or an idle computer.
 
 Exit codes: 0 good; 1 spec, record or budget refused, or an input that cannot be
 read; 2 usage, or an output that is an input; 3 environment; 4 a simulated run
@@ -102,15 +102,15 @@ Examples:
   specgen learn learning.toml -o case-1.json
       its [control] has correction = \"2 um\"; case 1 at 10 Hz, 5 passes
   specgen learn learning.toml --from case-1.json --passes 1
-      goes on where that ended
+      continues from that correction
   specgen learn learning.toml --prepare --passes 0 -o prepared.json
-      what lag and modes would leave, by the model alone
+      the correction that the model predicts, without a pass
   specgen learn learning.toml --excite response.json
-      measures the response of the running loop, for
+      measures the response of the running loop
   specgen learn learning.toml --response response.json
-      which learns with it, whatever the machine has of the spec's stiffness
+      learns with that response, so the stiffness of the spec does not matter
   specgen learn learning.toml --trajectory case-1 --socket link --machine stage-7  # (board)
-      on a machine, which is armed for it and ramped down after it";
+      on a machine: armed first, ramped down afterwards";
 
 pub const ROBUST: &str = "\
 Examples:
@@ -186,10 +186,10 @@ Examples:
   specgen panel platform.toml --socket rt.sock --listen 0.0.0.0:8020  # (board)
       for others on the network who know the token
 
-The address that it prints has the token in it: whoever has it may look, and take
-control. One page is in control at a time; hold and ramp down work from every page.
-A page that has them and is closed is a host that is lost: the machine holds, then
-ramps down. Ctrl-C ramps down first. docs/panel.md has the rest.";
+The printed address contains the token: whoever has it can watch and take control.
+One page is in control at a time; hold and ramp down work from every page. If the
+page in control closes, the machine treats the host as lost: it holds, then ramps
+down. Ctrl-C ramps down first. See docs/panel.md.";
 
 pub const GCS: &str = "\
 Examples:

@@ -1,4 +1,4 @@
-//! `specgen export`: the controller for programs that are not ours.
+//! `specgen export`: the controller as a C library, a Python module or an FMU.
 
 use clap::{Args, Subcommand};
 use specgen_language::outcome::Failure;

@@ -22,13 +22,13 @@ struct Common {
     /// build less.
     #[arg(long, value_name = "DIR")]
     target_dir: Option<OutputFolder>,
-    /// With lock-step for `specgen pil --port`: the host may step the machine of a board that stands at rest. For boards.
+    /// Include lock-step for `specgen pil --port`: the host may step a board that is at rest. For boards.
     #[arg(long)]
     lockstep: bool,
     /// Do not run the emulator: no instruction counts, no comparison of bits.
     #[arg(long)]
     no_measure: bool,
-    /// A real board may rest on what nobody measured: the values that the spec names as `assumed`, and simulated records.
+    /// Allow an image for a real board although values of the spec are assumed or records simulated.
     #[arg(long)]
     assumed_ok: bool,
     #[command(flatten)]

@@ -28,7 +28,7 @@ pub struct Arguments {
     /// Its operating frequency, Hz; 10, or that of the spec, if not given.
     #[arg(long, value_name = "HZ", value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<f64>,
-    /// Passes that are learned from at most; one more shows what came of them. The first that gains no more than its noise ends learning.
+    /// Largest number of learning passes; one more pass measures the result. Learning ends early once a pass gains no more than its noise.
     #[arg(long, value_name = "N", default_value_t = 5, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=1000))]
     passes: u32,
     /// Highest frequency to be learned, Hz; lowered to where every machine within [robust] converges.
@@ -37,7 +37,7 @@ pub struct Arguments {
     /// Range of an uncertainty, in place of that of [robust] or the default: `stiffness=2%`, `gain=0.9:1.1`, `delay_ticks=0`.
     #[arg(long, value_name = "NAME=RANGE", value_parser = UserRange::parse)]
     vary: Vec<UserRange>,
-    /// Begin with what the model says lag and modes would leave.
+    /// Begin with the correction that the model predicts for lag and modes.
     #[arg(long, conflicts_with = "from")]
     prepare: bool,
     /// Begin with this correction, of the same spec, machine and motion.
@@ -49,15 +49,15 @@ pub struct Arguments {
     /// Learn with the response that --excite measured on this machine, not with the model's and the intervals of [robust].
     #[arg(long, value_name = "FILE", conflicts_with = "vary")]
     response: Option<InputFile>,
-    /// Let the machine's own device make each correction, in its background, in room for so many knots a pass: 4096 on an STM32H743, which is
-    /// taken if no number is given, 768 on an STM32F446, 65536 on a PC.
+    /// Let the device compute each correction in its background, with storage for N knots per pass: 4096 (default) on an STM32H743,
+    /// 768 on an STM32F446, 65536 on a PC.
     #[arg(long, value_name = "KNOTS", num_args = 0..=1, default_missing_value = "4096", conflicts_with_all = ["excite", "response"],
           value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     on_device: Option<u32>,
-    /// Write the correction that is kept here (JSON): that of the last pass that gained more than its noise.
+    /// Write the resulting correction to this file (JSON): that of the last pass that gained more than its noise.
     #[arg(short, long, value_name = "FILE")]
     output: Option<OutputFile>,
-    /// Learn on this machine, which is armed for it and ramped down after it.
+    /// Learn on this machine: it is armed first and ramped down afterwards.
     #[command(flatten)]
     line: Line,
     /// What the machine at the end of the link is called; a correction is played on no other.

@@ -62,7 +62,7 @@ struct StudyArguments {
     /// Of mass, stiffness, damping, gain, hysteresis, creep, lag, noise (factors) and delay_ticks.
     #[arg(long, value_name = "NAME=RANGE", value_parser = UserRange::parse)]
     vary: Vec<UserRange>,
-    /// What is followed: case-1, case-2, machining or multisine, or a trajectory of the spec by its name; without
+    /// The trajectory: case-1, case-2, machining or multisine, or a trajectory of the spec by its name; without
     /// [control] leg or multisine. The first of them if not given.
     #[arg(long, value_name = "NAME")]
     trajectory: Option<String>,
@@ -82,7 +82,7 @@ struct StudyArguments {
     /// Learn the motion on each machine, from so many passes, and show what is left; for a spec with control.correction.
     #[arg(long, value_name = "PASSES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1000))]
     learn: Option<u32>,
-    /// Gate: largest rms error of the translation once learned, such as "6 nm", that of [robust] if not given; learning must grow on no machine, either.
+    /// Gate: largest rms error of the translation once learned, such as "6 nm", that of [robust] if not given. It also fails if the error grows from pass to pass on any machine.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true, requires = "learn")]
     max_learned: Option<f64>,
     /// Quantile of the draws that the gate compares, %; the largest of draws and corners if not given.

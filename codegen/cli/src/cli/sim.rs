@@ -31,8 +31,8 @@ pub struct Arguments {
     paper: bool,
     #[command(flatten)]
     plant: PlantArguments,
-    /// Without [control]: control ticks per period of the motion. The spec's period if not given, with --paper 500. The law is
-    /// held against the stability check at the interval that this gives.
+    /// Without [control]: control ticks per period of the motion. The spec's period if not given, with --paper 500. The
+    /// stability check runs at the resulting interval.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     samples: Option<u32>,
     /// Frequencies of the motions, with --paper of cases 1 and 2, Hz; 1 and 10 if not given. 0.1 takes ten times as long as 1.
@@ -41,10 +41,10 @@ pub struct Arguments {
     /// With [control]: play this trajectory of the spec on board, and nothing else.
     #[arg(long, value_name = "NAME", conflicts_with = "paper")]
     trajectory: Option<String>,
-    /// With [control]: control intervals by which voltages reach the amplifiers late.
+    /// With [control]: delay of the voltages to the amplifiers, in control intervals.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=100))]
     latency: u32,
-    /// With [control]: the machine in steps of 20 µs, which the usual ones, as long as the control interval, are held against.
+    /// With [control]: simulate the machine in steps of 20 µs instead of one step per control interval, as a check of the result.
     /// Several times slower.
     #[arg(long, conflicts_with = "record")]
     small_steps: bool,
@@ -69,8 +69,8 @@ pub(super) fn frequency(text: &str) -> Result<f64, String> {
 /// Which leg is simulated.
 #[derive(Args, Debug)]
 pub struct PlantArguments {
-    /// Leg whose shape of hysteresis is taken and scaled to the legs of the spec: `plays`, as if not given, `bouc-wen`, or a file
-    /// of leg parameters (JSON). The paper's experiments with six legs take them as they are.
+    /// Hysteresis model of the simulated legs, scaled to the legs of the spec: `plays` (default), `bouc-wen`, or a file of leg
+    /// parameters (JSON). The paper's experiments with six legs use it unscaled.
     #[arg(long, value_name = "LEG")]
     pub(super) plant: Option<InputFile>,
     /// Without noise and quantisation of gauge and amplifier.

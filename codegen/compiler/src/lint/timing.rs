@@ -309,7 +309,7 @@ fn transfer(facts: &Facts, found: &mut Found) {
     let how = if time < tick {
         "shorter than a tick: modes change with a bump"
     } else {
-        "so long that a mode takes a minute to be what it says"
+        "so long that the offset of the previous mode remains for many seconds"
     };
     found.add(
         TRANSFER_ODD,

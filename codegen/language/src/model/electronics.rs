@@ -82,13 +82,13 @@ section! {
 section! {
     /// Displacement gauge of a leg; with [control], of the six that measure the platform.
     ///
-    /// Displacements in m; voltages in V, ±10 V without the key.
+    /// Displacements in m; voltages in V, ±10 V without `input_range`.
     "sensor" ["gauges", "lvdt", "encoder"], Plain => Sensor {
         /// Smallest and largest displacement that it can measure.
         range: [f64; 2] = list(&[READING; 2]), Required, "" ["travel", "measuring_range"], ["-2 um", "48 um"];
         /// Noise, rms.
         noise: f64 = one(Dimension::LENGTH, Range::closed(0.0, 1e-3), "nm"), Default("0 nm"), "" ["sigma", "rms", "noise_rms"], "2.2 nm";
-        /// Time constant of its first-order lag: bandwidth of the gauge, and the filter before its converter.
+        /// Time constant of its first-order lag, 1/(2π·bandwidth): of the gauge and of the filter before its converter together.
         lag: f64 = one(Dimension::TIME, Range::closed(0.0, 0.01), "us"), Default("0 us"), "" ["tau", "time_constant", "bandwidth", "filter", "cutoff", "latency", "delay"], "15 us";
         /// Resolution of its converter over the range.
         bits: u32 = integer(8, 32), Required, "" ["resolution", "n_bits"], 16;

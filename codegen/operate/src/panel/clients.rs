@@ -140,7 +140,7 @@ impl Clients {
         }
     }
 
-    /// Handles the events of pages, after at most this wait for the first one; then finds pages that have gone.
+    /// Handles the events of pages, after at most this wait for the first one; then takes control from a page that has gone silent.
     pub fn listen(&mut self, limit: Duration) {
         match self.events.recv_timeout(limit) {
             Ok(first) => self.handle(first),

@@ -288,7 +288,7 @@ fn would_wind_up<P: Platform>(p: P, legs: &[LegState<P>; LEGS], growth: &[P::Rea
     winds_up(&excess, &transform(p.wrench_to_legs(), growth))
 }
 
-/// Takes the measured wrench if it is valid. If the mode does not use it, it is not checked.
+/// Takes the measured wrench if it is valid. If `config.interaction` is not `Measured`, it is not checked.
 #[inline]
 fn take_wrench<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, wrench: &[P::Real; 6]) -> bool {
     if config.interaction != Interaction::Measured {

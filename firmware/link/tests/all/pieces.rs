@@ -248,7 +248,7 @@ fn every_error_says_what_it_is() {
     }
     assert!(ClientError::Version { found: 9 }.to_string().contains("version 9"));
     assert!(ClientError::TooLong.to_string().contains("longer"));
-    assert!(ClientError::Unexpected.to_string().contains("something else"));
+    assert!(ClientError::Unexpected.to_string().contains("unexpected answer"));
 }
 
 /// Two settings, one input, two outputs.

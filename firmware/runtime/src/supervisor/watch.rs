@@ -44,7 +44,7 @@ crate::state! { |words|
 }
 
 crate::state! { |words|
-    /// All channels, and the order in which they are checked.
+    /// All channels, and the position in `ORDER`.
     pub struct Watch<T>[T: Real] {
         /// Channels 0 to 5.
         pub channels: [Channel<T>; 6] = [Channel::new(); 6], parts;
@@ -60,7 +60,7 @@ crate::state! { |words|
 }
 
 impl<T: Real> Watch<T> {
-    /// Clears the suspicions, but keeps the order.
+    /// Clears the suspicions, but keeps the position.
     #[inline(never)]
     pub fn forgive(&mut self) {
         for channel in &mut self.channels {
