@@ -24,14 +24,22 @@ pub struct Mode {
 }
 
 /// Modules whose tests mostly wait: for time that passes, or for another process.
-const WAITING: [&str; 1] = ["cli all::rt_pc"];
+const WAITING: [&str; 4] = ["cli all::rt_pc", "cli all::operate", "cli all::kills", "cli all::interrupt"];
 
 /// Packages without a test, whose libraries would be compiled a second time for none.
 const WITHOUT_TESTS: [&str; 3] = ["controller", "controller-with-passes", "specgen-law"];
 /// Packages whose own tests take seconds, and their libraries 7 to 54 CPU-seconds each to compile for them: in the full run only. What they
 /// compute is tested through the command and across crates in the short run, too; the golden constants of the compiler stay there.
-const LONG_TO_COMPILE: [&str; 6] =
-    ["specgen-numerics", "specgen-run-time", "specgen-identify", "host-sim", "specgen-studies", "specgen-report"];
+const LONG_TO_COMPILE: [&str; 8] = [
+    "specgen-numerics",
+    "specgen-run-time",
+    "specgen-identify",
+    "specgen-language",
+    "specgen-toolchain",
+    "host-sim",
+    "specgen-studies",
+    "specgen-report",
+];
 
 /// The variable of the environment that asks tests for their long form.
 const FULL: &str = "SPECGEN_FULL";
