@@ -303,8 +303,12 @@ fn ctrl_c_keeps_what_was_run_and_says_so() {
     let folder = Folder::new();
     let mut command = folder.command();
     command.args(["robust", "legs.toml", "--draws", "2000", "--frequency", "10", "--threads", "1"]);
-    let runs = |stderr: &str| stderr.lines().last().is_some_and(|line| line.starts_with("robust: "));
-    let run = Run::meanwhile(&mut command, runs, |process| crate::support::send(rustix::process::Signal::INT, process));
+    let begins = |stderr: &str| stderr.lines().last().is_some_and(|line| line.starts_with("controller: "));
+    let run = Run::meanwhile(&mut command, begins, |process| {
+        // A machine takes some 0.05 s.
+        std::thread::sleep(std::time::Duration::from_secs(1));
+        crate::support::send(rustix::process::Signal::INT, process);
+    });
     run.says(130, &["interrupted: the figures are of ", "no gate is passed"]);
     let shown = run.stdout;
     assert!(shown.contains("worst error") && !shown.contains("gate: passed"), "{shown}");
