@@ -103,7 +103,7 @@ fn follows(bench: &Bench) -> String {
 fn comes_to_run(command: &mut std::process::Command, link: &Path) -> (Running, Host) {
     for _ in 0..50 {
         // One that a program before this left is there, and nobody answers it.
-        let _ = std::fs::remove_file(link);
+        let _ = fs::remove_file(link);
         let running = Running::new(command);
         wait_for("the link", || link.exists());
         let mut host = Host::open(link, 1).unwrap();
