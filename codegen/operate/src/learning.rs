@@ -9,7 +9,7 @@ use specgen_language::interrupt;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_studies::learning::{LearnError, RepeatableMachine};
-use specgen_studies::lessons::{self, Bed, Done, Options, failure};
+use specgen_studies::lessons::{self, MachineSource, Options, SessionResult, failure};
 use specgen_studies::trajectory::Followed;
 
 use crate::commands::{Operator, SessionError, lost_link, motion_name};
@@ -33,7 +33,7 @@ struct OnLine<'a> {
     own: OwnTrajectory,
 }
 
-impl Bed for OnLine<'_> {
+impl MachineSource for OnLine<'_> {
     fn motion_name(&self, followed: &Followed) -> String {
         motion_name(&followed.name)
     }
@@ -48,7 +48,7 @@ impl Bed for OnLine<'_> {
         ui: &mut Ui,
         work: impl FnOnce(&mut dyn RepeatableMachine, &Ui) -> Result<T, LearnError>,
         keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
-    ) -> Result<Done<F>, Failure> {
+    ) -> Result<SessionResult<F>, Failure> {
         interrupt::heed();
         let ir = &compiled.ir;
         let (session, name) = self.line.open(Some(&ir.digest))?;
@@ -87,6 +87,6 @@ impl Bed for OnLine<'_> {
             Some(SessionError::Stopped) => Some(format!("{name}: the program that serves the link has ended")),
             Some(SessionError::Link(_) | SessionError::Interrupted) | None => None,
         };
-        Ok(Done { found, why, down })
+        Ok(SessionResult { found, why, down })
     }
 }

@@ -78,7 +78,7 @@ pub fn run(
     match output {
         Some(path) => {
             write_file(path, document.text().as_bytes())?;
-            ui.result(&Written { states: states.len(), file: path.display().to_string() });
+            ui.result(&ResultFile { states: states.len(), file: path.display().to_string() });
         }
         None => ui.result(&document),
     }
@@ -86,12 +86,12 @@ pub fn run(
 }
 
 #[derive(Serialize)]
-struct Written {
+struct ResultFile {
     states: usize,
     file: String,
 }
 
-impl Outcome for Written {
+impl Outcome for ResultFile {
     fn text(&self) -> String {
         format!("wrote {} states to {}\n", self.states, self.file)
     }

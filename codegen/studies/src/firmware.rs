@@ -50,7 +50,7 @@ pub struct Options {
 
 /// What was built for a target.
 #[derive(Debug, Serialize)]
-struct Made {
+struct BuildResult {
     name: String,
     digest: String,
     target: &'static str,
@@ -104,7 +104,7 @@ fn read_image(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
 }
 
 /// Why an image must not be used, if so.
-fn refusal(made: &Made) -> Option<String> {
+fn refusal(made: &BuildResult) -> Option<String> {
     let list: String = made.failures.iter().map(|failure| format!("\n  {failure}")).collect();
     (!list.is_empty()).then(|| format!("{} for {} is refused:{list}", made.target, made.board))
 }
@@ -139,7 +139,7 @@ fn accept_assumptions(target: Target, compiled: &Compilation, options: &Options)
 }
 
 /// Compiles, writes, builds, checks, measures. What does not do for the purpose is refused before anything is written.
-fn make(spec: &Path, options: &Options, purpose: Purpose, ui: &mut Ui) -> Result<Made, Failure> {
+fn make(spec: &Path, options: &Options, purpose: Purpose, ui: &mut Ui) -> Result<BuildResult, Failure> {
     let compiled = spec_file::quietly(spec, ui)?;
     spec_file::accept(&compiled, &compiled.findings, options.deny_warnings)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
@@ -209,11 +209,11 @@ fn build(
     folders: &Folders<'_>,
     options: &Options,
     ui: &mut Ui,
-) -> Result<Made, Failure> {
+) -> Result<BuildResult, Failure> {
     let Folders { output, target: target_dir } = *folders;
     let measure = !options.no_measure;
     let declared = compiled.model.target.mcu;
-    let mut made = Made {
+    let mut made = BuildResult {
         name: compiled.ir.name.clone(),
         digest: compiled.ir.digest.clone(),
         target: target.name,
@@ -310,7 +310,7 @@ fn unknown_filter(model: &model::Model) -> Option<&'static str> {
 }
 
 /// Size and checks of an image, and the image under a name that stays.
-fn examine(made: &mut Made, image: &Image, whole_image: bool, output: &Path) -> Result<(), Failure> {
+fn examine(made: &mut BuildResult, image: &Image, whole_image: bool, output: &Path) -> Result<(), Failure> {
     let folder = output.join("target");
     std::fs::create_dir_all(&folder).map_err(|error| TargetError::io("creating", &folder, error))?;
     let kept = folder.join(format!("{}.elf", made.target));
@@ -363,7 +363,7 @@ fn emulate(
 }
 
 /// Fills in what fails: budget, checks, bits.
-fn hold_against_budget(made: &mut Made, compiled: &Compilation, target: Target) {
+fn hold_against_budget(made: &mut BuildResult, compiled: &Compilation, target: Target) {
     let measured = made.measurement.as_ref();
     let used = match (target.kind, &made.size, &made.checks) {
         // The image is the one that was measured.

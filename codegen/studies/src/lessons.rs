@@ -109,13 +109,13 @@ pub fn simulated(options: &Options, compiled: Compilation, ui: &mut Ui) -> Resul
 ///
 /// # Errors
 /// As [`simulated`], or the machine ends before it is asked to.
-pub fn run(options: &Options, compiled: Compilation, bed: &mut impl Bed, ui: &mut Ui) -> Result<(), Failure> {
+pub fn run(options: &Options, compiled: Compilation, bed: &mut impl MachineSource, ui: &mut Ui) -> Result<(), Failure> {
     if let Some(path) = &options.excite {
         return excite::run(options, path, &compiled, bed, ui);
     }
     let study = study(options, bed, compiled)?;
     let start = bed.start().unwrap_or(study.motion.targets[0].pose);
-    let Done { found, why, down } = bed.work(
+    let SessionResult { found, why, down } = bed.work(
         &study.compiled,
         ui,
         |machine, ui| passes(options, &study, machine, ui),
@@ -136,19 +136,19 @@ pub fn run(options: &Options, compiled: Compilation, bed: &mut impl Bed, ui: &mu
     }
 }
 
-/// What came of work on a machine.
-pub struct Done<F> {
-    /// What was found, if the machine made its passes.
+/// The result of a session on a machine.
+pub struct SessionResult<F> {
+    /// The figures, if the machine made its passes.
     pub found: Option<F>,
-    /// Why it ended before it was asked to.
+    /// Why the session ended early.
     pub why: Option<String>,
-    /// How a machine at the end of a link was left, behind "; ".
+    /// The state in which a machine at the end of a link was left, after "; ".
     pub down: String,
 }
 
-/// What makes the passes: a simulated machine, or one at the end of a link.
-pub trait Bed {
-    /// What it calls a motion.
+/// The machine that makes the passes: simulated, or at the end of a link.
+pub trait MachineSource {
+    /// Name of a motion on this machine.
     fn motion_name(&self, followed: &Followed) -> String;
 
     /// Where it begins a motion that it has, in the user's coordinates, m and rad.
@@ -164,13 +164,13 @@ pub trait Bed {
         ui: &mut Ui,
         work: impl FnOnce(&mut dyn RepeatableMachine, &Ui) -> Result<T, LearnError>,
         keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
-    ) -> Result<Done<F>, Failure>;
+    ) -> Result<SessionResult<F>, Failure>;
 }
 
 /// The simulated machine of the spec.
 struct Simulated<'a>(&'a PlantOptions);
 
-impl Bed for Simulated<'_> {
+impl MachineSource for Simulated<'_> {
     fn motion_name(&self, followed: &Followed) -> String {
         format!("{} at {} Hz", followed.name, followed.frequency)
     }
@@ -185,7 +185,7 @@ impl Bed for Simulated<'_> {
         ui: &mut Ui,
         work: impl FnOnce(&mut dyn RepeatableMachine, &Ui) -> Result<T, LearnError>,
         keep: impl FnOnce(T, &Ui) -> Result<F, Failure>,
-    ) -> Result<Done<F>, Failure> {
+    ) -> Result<SessionResult<F>, Failure> {
         let (model, task) = (&compiled.model, takes_correction(compiled)?);
         let mut controller = at_run_time(compiled, ui)?;
         let mut rig = self.0.platform(model, task)?.1.rig().clone();
@@ -196,12 +196,12 @@ impl Bed for Simulated<'_> {
             Err(LearnError::Ended) => None,
             Err(error) => return Err(gate(error)),
         };
-        Ok(Done { found, why: None, down: String::new() })
+        Ok(SessionResult { found, why: None, down: String::new() })
     }
 }
 
 /// The motion, and what it is called.
-fn motion_of(options: &Options, bed: &impl Bed, compiled: &Compilation) -> Result<(Motion, String), Failure> {
+fn motion_of(options: &Options, bed: &impl MachineSource, compiled: &Compilation) -> Result<(Motion, String), Failure> {
     let model = &compiled.model;
     let task = takes_correction(compiled)?;
     let followed = trajectory::chosen(options.trajectory.as_deref(), options.frequency, options.plant.seed, compiled)?;
@@ -225,7 +225,7 @@ fn learnable_of(compiled: &Compilation) -> Result<Learnable, Failure> {
         .ok_or_else(|| Failure::Environment("the platform has no modes, which the spec was checked for".to_owned()))
 }
 
-fn study(options: &Options, bed: &impl Bed, compiled: Compilation) -> Result<Study, Failure> {
+fn study(options: &Options, bed: &impl MachineSource, compiled: Compilation) -> Result<Study, Failure> {
     let (motion, motion_name) = motion_of(options, bed, &compiled)?;
     let machine_name = machine_name(options);
     let mut learnable = learnable_of(&compiled)?;
@@ -278,7 +278,13 @@ fn passes(
 }
 
 /// Writes the table of the best pass, if a file is named.
-fn keep(options: &Options, study: &Study, learned: LearningResult, start: [f64; 6], ui: &Ui) -> Result<Found, Failure> {
+fn keep(
+    options: &Options,
+    study: &Study,
+    learned: LearningResult,
+    start: [f64; 6],
+    ui: &Ui,
+) -> Result<Lesson, Failure> {
     let Study { compiled, convergence, motion, motion_name, machine_name, spacing, .. } = study;
     if let Some(path) = &options.output {
         let names = [compiled.ir.digest.as_str(), machine_name, motion_name];
@@ -290,7 +296,7 @@ fn keep(options: &Options, study: &Study, learned: LearningResult, start: [f64; 
         write_file(path, table.to_json().as_bytes())?;
         ui.progress(&format!("wrote {} knots{zeros} to {}", table.knots.len(), path.display()));
     }
-    Ok(Found {
+    Ok(Lesson {
         name: compiled.ir.name.clone(),
         motion: motion_name.clone(),
         machine: machine_name.clone(),
@@ -373,7 +379,7 @@ fn kept(learned: &LearningResult) -> Vec<String> {
 
 /// What came of it.
 #[derive(Serialize)]
-struct Found {
+struct Lesson {
     name: String,
     motion: String,
     machine: String,
@@ -385,7 +391,7 @@ struct Found {
     help: Option<String>,
 }
 
-impl Outcome for Found {
+impl Outcome for Lesson {
     fn text(&self) -> String {
         let Self { name, motion, machine, convergence, learned, help } = self;
         let [low, high] = convergence.band;

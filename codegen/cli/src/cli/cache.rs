@@ -19,7 +19,7 @@ pub struct Arguments {
 }
 
 #[derive(Serialize)]
-struct Kept {
+struct CacheSize {
     /// None if nothing is kept for this user.
     folder: Option<String>,
     builds: usize,
@@ -31,7 +31,7 @@ struct Kept {
     cleared: Option<u64>,
 }
 
-impl Outcome for Kept {
+impl Outcome for CacheSize {
     fn text(&self) -> String {
         let builds = |count: usize| format!("{count} build{}", if count == 1 { "" } else { "s" });
         match (&self.folder, self.cleared) {
@@ -50,11 +50,11 @@ impl Outcome for Kept {
 }
 
 pub fn run(arguments: &Arguments, ui: &Ui) -> Result<(), Failure> {
-    let mut kept = Kept { folder: None, builds: 0, bytes: 0, limit: LIMIT, removed: 0, cleared: None };
+    let mut kept = CacheSize { folder: None, builds: 0, bytes: 0, limit: LIMIT, removed: 0, cleared: None };
     if let Some(cache) = Cache::of_user() {
         let removed = if arguments.clear { Some(cache.clear()?) } else { None };
         let extent = cache.extent()?;
-        kept = Kept {
+        kept = CacheSize {
             folder: Some(cache.folder().display().to_string()),
             builds: extent.builds,
             bytes: extent.bytes,

@@ -18,7 +18,7 @@ pub struct Arguments {
 
 /// What is known of a code.
 #[derive(Serialize)]
-struct Explained {
+struct Explanation {
     code: &'static str,
     title: &'static str,
     /// Markdown.
@@ -36,11 +36,11 @@ pub fn run(arguments: &Arguments, ui: &Ui) -> Result<(), Failure> {
         );
         return Err(Failure::Usage(format!("there is no finding `{}`; {help}", arguments.code)));
     };
-    ui.result(&Explained { code: code.id, title: code.title(), page: code.page() });
+    ui.result(&Explanation { code: code.id, title: code.title(), page: code.page() });
     Ok(())
 }
 
-impl Outcome for Explained {
+impl Outcome for Explanation {
     /// The page without its marks, code indented.
     fn text(&self) -> String {
         let mut text = String::new();
@@ -97,7 +97,7 @@ mod tests {
     #[test]
     fn no_line_of_a_page_is_longer_than_a_terminal_is_wide() {
         for code in findings::all() {
-            let page = Explained { code: code.id, title: code.title(), page: code.page() }.text();
+            let page = Explanation { code: code.id, title: code.title(), page: code.page() }.text();
             let long = page.lines().find(|line| line.chars().count() > WIDTH);
             assert_eq!(long, None, "{}", code.id);
         }

@@ -152,7 +152,7 @@ struct PredictArguments {
     /// Resonance behind the model, frequency in Hz and damping ratio, such as 735:0.015, or `none`; if not given that of the
     /// spec, or with a table that of a ring in the record.
     #[arg(long, value_name = "HZ:ZETA", value_parser = mode)]
-    mode: Option<Given>,
+    mode: Option<ModeArgument>,
     /// Write time_s, drive_V, displacement_um (predicted) and, where it was measured, measured_um and error_um here.
     #[arg(short, long, value_name = "FILE")]
     output: Option<OutputFile>,
@@ -240,16 +240,16 @@ fn grid(text: &str) -> Result<usize, String> {
 
 /// A mode, or that there is none.
 #[derive(Debug, Clone, Copy)]
-struct Given(Option<Mode>);
+struct ModeArgument(Option<Mode>);
 
-fn mode(text: &str) -> Result<Given, String> {
+fn mode(text: &str) -> Result<ModeArgument, String> {
     if text == "none" {
-        return Ok(Given(None));
+        return Ok(ModeArgument(None));
     }
     let found = text.split_once(':').and_then(|(hz, zeta)| Some((hz.parse::<f64>().ok()?, zeta.parse::<f64>().ok()?)));
     match found {
         Some((frequency, damping)) if (0.1..=1e7).contains(&frequency) && damping > 0.0 && damping < 1.0 => {
-            Ok(Given(Some(Mode { frequency, damping })))
+            Ok(ModeArgument(Some(Mode { frequency, damping })))
         }
         _ => Err(format!(
             "expected FREQUENCY:DAMPING, a frequency in Hz and a damping ratio below 1, or none; found `{text}`"
@@ -278,7 +278,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
                 drive: one.drive.to_path_buf(),
                 leg: one.leg,
                 dead_time: one.dead_time.map(|ms| ms * 1e-3),
-                mode: one.mode.map(|Given(mode)| mode),
+                mode: one.mode.map(|ModeArgument(mode)| mode),
                 output: one.output.as_deref().map(Into::into),
             };
             predict::run(&options, &one.bench.bench()?, ui)

@@ -19,7 +19,7 @@ pub struct Arguments {
     #[arg(long, value_enum)]
     like: Option<Like>,
     #[command(flatten)]
-    answers: Given,
+    answers: AnswerArguments,
 }
 
 /// What a new spec begins as.
@@ -33,9 +33,9 @@ enum Like {
 
 /// What was given on the command line, by option.
 #[derive(Debug, Clone, Default)]
-struct Given(Answers);
+struct AnswerArguments(Answers);
 
-impl FromArgMatches for Given {
+impl FromArgMatches for AnswerArguments {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let given =
             QUESTIONS.iter().filter_map(|one| Some((one.option, matches.get_one::<String>(one.option)?.clone())));
@@ -48,7 +48,7 @@ impl FromArgMatches for Given {
     }
 }
 
-impl Args for Given {
+impl Args for AnswerArguments {
     fn augment_args(command: Command) -> Command {
         QUESTIONS.iter().fold(command, |command, one| {
             let help = format!("{}, such as {}", one.text, one.example());
@@ -70,6 +70,6 @@ impl Args for Given {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let Arguments { name, like, answers: Given(answers) } = arguments;
+    let Arguments { name, like, answers: AnswerArguments(answers) } = arguments;
     begin::run(name, *like == Some(Like::Legs), like.is_none(), answers, ui)
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 use specgen_language::shell;
 
 use super::work::{Lessons, Work};
-use specgen_language::outcome::Outcome as Shown;
+use specgen_language::outcome::Outcome as CommandOutcome;
 use specgen_language::table::{left, right, row};
 use specgen_studies::robust::quantiles::quantile;
 use specgen_studies::robust::{Deviation, Factor, Factors, Figures, Gate, LearningFigures, Member, Outcome};
@@ -329,7 +329,7 @@ impl<'a> Found<'a> {
     }
 }
 
-impl Shown for Report<'_> {
+impl CommandOutcome for Report<'_> {
     fn text(&self) -> String {
         let (found, mut out) = (&self.found, String::new());
         let drawn = self.runs.iter().filter(|run| run.member.drawn).count();

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::Options;
 use specgen_compiler::compile::Compilation;
-use specgen_language::outcome::{Failure, Outcome as Shown};
+use specgen_language::outcome::{Failure, Outcome as CommandOutcome};
 use specgen_language::output::write_file;
 use specgen_language::shell;
 use specgen_language::ui::Ui;
@@ -188,7 +188,7 @@ impl Part {
         let mut document = json!(self);
         document["format"] = json!(FORMAT);
         write_file(file, format!("{document:#}\n").as_bytes())?;
-        ui.result(&Written {
+        ui.result(&PartFile {
             file: file.display().to_string(),
             shard: self.shard,
             planned: self.planned,
@@ -234,7 +234,7 @@ impl Part {
 
 /// A part that was written.
 #[derive(Serialize)]
-struct Written {
+struct PartFile {
     file: String,
     shard: Shard,
     planned: usize,
@@ -242,7 +242,7 @@ struct Written {
     diverged: usize,
 }
 
-impl Shown for Written {
+impl CommandOutcome for PartFile {
     fn text(&self) -> String {
         let Self { file, shard: Shard { index, of }, planned, machines, diverged } = self;
         format!("wrote part {index} of {of} to {file}: {machines} of {planned} machines, {diverged} diverged\n")

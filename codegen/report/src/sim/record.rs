@@ -38,7 +38,7 @@ const ARMING: f64 = 60.0;
 
 /// A recording that was written.
 #[derive(Serialize)]
-struct Written {
+struct RecordFile {
     ticks: u64,
     bytes: u64,
     file: String,
@@ -47,7 +47,7 @@ struct Written {
     seconds: f64,
 }
 
-impl Outcome for Written {
+impl Outcome for RecordFile {
     fn text(&self) -> String {
         let (bytes, ticks) = (self.bytes as f64, self.ticks as f64);
         format!(
@@ -115,7 +115,7 @@ pub(super) fn run(
     file.keep()?;
     let bytes = std::fs::metadata(path).map(|found| found.len()).unwrap_or_default();
     let ticks = recorder.tick();
-    ui.result(&Written { ticks, bytes, file: path.display().to_string(), seconds: ticks as f64 * period });
+    ui.result(&RecordFile { ticks, bytes, file: path.display().to_string(), seconds: ticks as f64 * period });
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use object::{Architecture, Object};
 use serde::Serialize;
 
-use super::{Made, Options, Purpose, make, read_image, refusal, text};
+use super::{BuildResult, Options, Purpose, make, read_image, refusal, text};
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::ui::Ui;
 use specgen_toolchain::TargetError;
@@ -14,7 +14,7 @@ use specgen_toolchain::size::{Size, has_tick, size};
 
 /// What was made of a spec, by owner and function.
 #[derive(Serialize)]
-struct Built(Made);
+struct Built(BuildResult);
 
 impl Outcome for Built {
     fn text(&self) -> String {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Made, time};
+use super::{BuildResult, time};
 use specgen_language::outcome::Outcome;
 use specgen_language::table::{left, right, row};
 use specgen_toolchain::budget::{ImageUsage, group};
@@ -12,7 +12,7 @@ use specgen_toolchain::size::Size;
 /// As many owners and variables as are listed.
 const LISTED: usize = 12;
 
-impl Outcome for Made {
+impl Outcome for BuildResult {
     fn text(&self) -> String {
         let mut out = format!(
             "{} → {} for {} (f{}, digest {})\n",
@@ -55,7 +55,7 @@ impl Outcome for Made {
     }
 }
 
-impl Made {
+impl BuildResult {
     /// Memory and instructions against their budgets.
     fn usage(&self, used: &ImageUsage, out: &mut String) {
         let of = |budget: Option<u64>| budget.map_or(String::new(), |budget| format!(" of {}", group(budget)));

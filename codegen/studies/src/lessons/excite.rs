@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 
 use serde::Serialize;
 
-use super::{Bed, Done, Options, learnable_of, machine_name, motion_of};
+use super::{MachineSource, Options, SessionResult, learnable_of, machine_name, motion_of};
 use crate::factors::Factors;
 use crate::learning::{Convergence, Excitation, ModeMeasurement, PASSES, takes_correction};
 use specgen_compiler::compile::Compilation;
@@ -22,7 +22,7 @@ pub(super) fn run(
     options: &Options,
     path: &Path,
     compiled: &Compilation,
-    bed: &mut impl Bed,
+    bed: &mut impl MachineSource,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
     let limit = takes_correction(compiled)?.correction.unwrap_or_default();
@@ -47,7 +47,7 @@ pub(super) fn run(
             write_file(path, response.to_json().as_bytes())?;
             let modes = learnable.heard(&response);
             ui.progress(&format!("wrote the response at {} frequencies to {}", response.bins.len(), path.display()));
-            Ok(Found {
+            Ok(MeasuredResponse {
                 name: compiled.ir.name.clone(),
                 machine: machine.clone(),
                 band: excitation.band,
@@ -58,7 +58,7 @@ pub(super) fn run(
             })
         },
     )?;
-    let Done { found, why, down } = done;
+    let SessionResult { found, why, down } = done;
     match found {
         Some(found) => ui.judged(&found, why),
         None => Err(Failure::Gate(why.unwrap_or_else(|| format!("interrupted before the last sweep was over{down}")))),
@@ -67,7 +67,7 @@ pub(super) fn run(
 
 /// What was measured.
 #[derive(Serialize)]
-struct Found {
+struct MeasuredResponse {
     name: String,
     machine: String,
     /// Of the sweeps, Hz.
@@ -80,7 +80,7 @@ struct Found {
     file: String,
 }
 
-impl Outcome for Found {
+impl Outcome for MeasuredResponse {
     fn text(&self) -> String {
         let Self { name, machine, band: [low, high], amplitude_nm, modes, convergence, file } = self;
         let mut text = format!(
