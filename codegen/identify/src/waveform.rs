@@ -199,7 +199,7 @@ mod tests {
         assert!(refused("x_um,theta_x_deg\n")[0].contains("`theta_x_rad`"));
         assert!(refused("x_um,z_V\n")[0].contains("`z_um`"));
         assert!(refused("theta_x\n")[0].contains("`theta_x_urad`"));
-        assert!(refused("pitch\n")[0].contains("no column of a table"));
+        assert!(refused("pitch\n")[0].contains("not a column of a table"));
         assert!(refused("1.0,2.0\n1,2\n")[0].contains("first line"));
         assert!(refused("time_s\n1\n2\n")[0].contains("no coordinate"));
     }
