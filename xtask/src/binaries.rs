@@ -125,7 +125,9 @@ pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut TestResults)
 
 /// The examples in the documentation, of which one is shown where it fails: most crates have none.
 pub fn examples(root: &Path) -> Outcome {
-    match cargo(root, &["test", "--release", "--workspace", "--doc", "--quiet"]).output() {
+    // Its examples name the crate `controller`; with `--doc`, cargo does not read `doctest = false`.
+    let without = "--exclude=controller-with-passes";
+    match cargo(root, &["test", "--release", "--workspace", without, "--doc", "--quiet"]).output() {
         Ok(output) if output.status.success() => Outcome::Passed,
         Ok(output) => {
             let text = [output.stdout, output.stderr].concat();

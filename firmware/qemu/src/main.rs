@@ -114,7 +114,7 @@ fn read_config() -> Result<Config, Exit> {
 /// Ticks that the stages and the stack are measured on, for that takes longer than the tick: every eighth of the first
 /// 20,000, every 64th of later ones.
 const fn is_due(tick: u64) -> bool {
-    tick % (if tick < 20_000 { 8 } else { 64 }) == 0
+    tick.is_multiple_of(if tick < 20_000 { 8 } else { 64 })
 }
 
 /// What the instruction count, the painted stack and the static stack bound all refer to.

@@ -1,5 +1,5 @@
 //! The folders that are copied into a workspace, each with what it needs beside it. The build script lists their files: a new
-//! file is in by being there, and so is a new board; another new folder is one more entry of [`PARTS`] and one more line of the script.
+//! file is in by being there, and so is a new board; another new folder is one more entry of `PARTS` and one more line of the script.
 
 use std::collections::BTreeSet;
 
