@@ -1,15 +1,15 @@
 //! The physical lint: values that are legal one by one and make no sense together.
 //!
-//! Almost every slip in a spec is a unit (a factor of a thousand), a sign, or two axes in each other's place. None of them is
-//! out of range by itself; each is far from what the rest of the platform says. So every rule compares one value with what
-//! others imply, says both numbers, and names the key that it suspects. Thresholds are wide: a factor of a thousand lies far
-//! outside, an unusual platform well inside.
+//! Almost every mistake in a spec is a unit (a factor of a thousand), a sign, or two swapped axes. Such a value is in range,
+//! but inconsistent with the rest of the platform. So every rule compares one value with what others imply, reports both
+//! numbers, and names the key that it suspects. Thresholds are wide: a factor of a thousand is far outside, an unusual
+//! platform well inside.
 //!
-//! A value that is seven times and more beyond what its rule lets pass is refused, unless `[lint] allow` names its key with
-//! a reason: see [`allow()`]. That concerns what is measured or bought (sizes, masses, stacks, electronics, gauges); what is chosen
-//! (workspace, limits of moves, budgets) is never more than pointed out.
+//! A value seven or more times beyond its threshold is an error, unless `[lint] allow` names its key with a reason: see
+//! [`allow()`]. That applies to measured or purchased properties (sizes, masses, stacks, electronics, gauges). Design
+//! choices (workspace, limits of moves, budgets) cause at most a warning.
 //!
-//! What needs no such judgement is checked elsewhere: ranges and consistency in [`specgen_language::spec`], reach in [`crate::reach`],
+//! Hard limits are checked elsewhere: ranges and consistency in [`specgen_language::spec`], reach in [`crate::reach`],
 //! stability in [`crate::stability`], paths in [`crate::lower::setpoint`], gauges in [`crate::lower`].
 
 /// The lints of a file: the rules in the order in which they run, then each finding with its page as the comment above it.
@@ -60,7 +60,7 @@ use specgen_language::diagnostic::{Code, Diagnostic};
 use specgen_language::model::Model;
 
 /// A rule looks at the platform and reports what it finds.
-type Rule = fn(&Facts, &mut Found);
+type Rule = fn(&Facts, &mut Findings);
 
 /// The lints of a file.
 struct Lints {
@@ -71,26 +71,26 @@ struct Lints {
 macro_rules! families {
     ($($family:ident)+) => { static FAMILIES: &[&Lints] = &[$(&$family::LINTS),+]; };
 }
-// In the order in which they run: a rule may look at what earlier ones found. The last three have findings and no rule.
+// In the order in which they run: a rule may read the findings of earlier ones. The last three have no rule.
 families! {
     layout order frames pairs bodies actuator electronics gauges gauge_places gauge_pattern gauge_layout alike contact
     weights timing tick motion triggers requirements factors budget allow culprit paths
 }
 
-/// A value that is so many times beyond what its rule lets pass is refused. A slip of a thousand is 32 times where its root
-/// counts, as that of a stiffness in a resonance, and no such rule is wider than four and a half.
+/// A value this many times beyond its threshold is an error. Where a value enters as its square root, as a stiffness does in a
+/// resonance, a factor of a thousand counts as 32; no such rule has a threshold wider than 4.5.
 const FAR_OFF: f64 = 7.0;
 
-/// How many times `value` lies beyond the nearer end of `sound`; 1 and less: inside.
+/// How many times `value` lies beyond the nearer end of `sound`; 1 or less: inside.
 fn times_beyond(value: f64, sound: &core::ops::RangeInclusive<f64>) -> f64 {
     let (below, above) = (sound.start() / value, value / sound.end());
     if below > above { below } else { above }
 }
 
-/// What every rule may look at.
+/// Input of every rule.
 pub(crate) struct Facts<'a> {
     model: &'a Model,
-    /// The legs at rest; none if they do not hold the platform.
+    /// The legs at rest; none if the geometry is singular.
     legs: Option<Legs>,
 }
 
@@ -100,7 +100,7 @@ struct Legs {
     jacobian: [[f64; 6]; 6],
     /// m.
     lengths: [f64; 6],
-    /// Modes of the platform on its legs, Hz, rising.
+    /// Modes of the platform on its legs, Hz, ascending.
     modes: Option<[f64; 6]>,
 }
 
@@ -124,7 +124,7 @@ impl Legs {
         self.lengths.into_iter().fold(f64::INFINITY, |a, b| if b < a { b } else { a })
     }
 
-    /// Largest leg motion for one of an axis.
+    /// Largest leg motion per unit motion of an axis.
     fn steepest(&self, axis: usize) -> f64 {
         self.jacobian.iter().map(|row| row[axis].abs()).fold(0.0, |a: f64, b| if b > a { b } else { a })
     }
@@ -135,13 +135,13 @@ pub(crate) fn codes() -> impl Iterator<Item = Code> {
     FAMILIES.iter().flat_map(|family| family.codes.iter().copied())
 }
 
-/// Every finding about values that do not fit together; in the order of the rules.
+/// Findings about inconsistent values, in the order of the rules.
 #[must_use]
 pub fn check(model: &Model) -> Vec<Diagnostic> {
-    // Without a platform there is an error already, and the rules that need one are left out.
+    // A singular geometry is reported elsewhere; rules that need the legs are skipped.
     let legs = crate::lower::platform(model).ok().map(|platform| Legs::of(model, &platform));
     let facts = Facts { model, legs };
-    let mut found = Found { model, list: Vec::new() };
+    let mut found = Findings { model, list: Vec::new() };
     for rule in FAMILIES.iter().flat_map(|family| family.rules) {
         rule(&facts, &mut found);
     }
@@ -149,12 +149,12 @@ pub fn check(model: &Model) -> Vec<Diagnostic> {
 }
 
 /// Collects findings at their places.
-pub(crate) struct Found<'a> {
+pub(crate) struct Findings<'a> {
     model: &'a Model,
     list: Vec<Diagnostic>,
 }
 
-impl<'a> Found<'a> {
+impl<'a> Findings<'a> {
     pub(crate) const fn new(model: &'a Model) -> Self {
         Self { model, list: Vec::new() }
     }
@@ -163,32 +163,32 @@ impl<'a> Found<'a> {
         self.list
     }
 
-    /// Whether a point of this gauge is found to be in the other frame: that explains whatever else is odd about it.
+    /// Whether this gauge has a finding [`OTHER_FRAME`]: that explains other oddities of the gauge.
     fn is_in_other_frame(&self, gauge: usize) -> bool {
         let of_gauge = format!("gauge[{gauge}].");
         self.list.iter().any(|one| one.code == OTHER_FRAME && one.key.starts_with(&of_gauge))
     }
 
-    /// The same of a value that lies so many `times` beyond what the rule lets pass.
+    /// Adds a finding about a value `times` beyond its threshold: an error from [`FAR_OFF`] on.
     fn add_off(&mut self, times: f64, code: Code, key: &str, message: String, help: &str) {
         if times < FAR_OFF || times.is_nan() {
             return self.add(code, key, message, help);
         }
         let message = match times.is_finite() {
-            true => format!("{message}: {} times beyond what passes", figure(times)),
-            false => format!("{message}: further beyond what passes than any factor says"),
+            true => format!("{message}; that is {} times beyond the limit of the check", figure(times)),
+            false => format!("{message}; that is infinitely far beyond the limit of the check"),
         };
-        let help = format!("{help}; if it is meant, say why in [lint]: allow = [\"{key}: <reason>\"]");
+        let help = format!("{help}; if it is intended, give the reason in [lint]: allow = [\"{key}: <reason>\"]");
         self.add(allow::FAR_OFF, key, message, &help);
     }
 
-    /// At `key`; where only its list or its section stands in the spec, there.
+    /// Adds a finding at `key`, or at its list or section if only that is in the spec.
     fn add(&mut self, code: Code, key: &str, message: String, help: &str) {
         let list = key.rsplit_once('[').filter(|_| key.ends_with(']')).map_or(key, |(list, _)| list);
         let section = key.rsplit_once('.').map_or(key, |(section, _)| section);
         let keys = [key, list, section];
         let mut finding = Diagnostic::at(&self.model.spans, &keys, code, message, help);
-        // The key that is suspected, even where only its section has a place.
+        // The suspected key, even if only its section has a place.
         key.clone_into(&mut finding.key);
         self.list.push(finding);
     }

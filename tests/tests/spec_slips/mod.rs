@@ -175,11 +175,11 @@ fn two_readings_of_a_value_are_both_offered() {
     for (edits, reading) in [
         (
             &[Edit::Value("actuator.voltage", "[\"0 V\", \"10 V\"]")][..],
-            ["\"150 V\" (`dac.range` and what", "\"100 V\""],
+            ["\"150 V\" (`dac.range` and the voltage", "\"100 V\""],
         ),
         (
             &[Edit::Value("actuator.voltage", "[\"0 V\", \"10 V\"]"), Edit::Value("dac.range", "[\"0 V\", \"10 V\"]")],
-            ["with `dac.range`, both 15 times as large", "ten times larger"],
+            ["it and `dac.range` are 15 times as large", "ten times larger"],
         ),
     ] {
         let text = edits.iter().fold(base.text.clone(), |text, edit| edit.of(&text));

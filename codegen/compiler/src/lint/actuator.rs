@@ -2,13 +2,13 @@
 
 use core::f64::consts::TAU;
 
-use super::{Facts, Found, figure, times_beyond};
+use super::{Facts, Findings, figure, times_beyond};
 
 lints! {
     rules: strain, stiffness_fits_resonance, slew_spares_the_stacks, slew_moves_the_legs, resonance_is_damped,
         grid_shows_the_loop;
 
-    /// # W0802: a stroke that does not fit the length of a leg
+    /// # W0802: stroke inconsistent with the leg length
     ///
     /// The stroke should be between a millionth and 0.015 of the length of a leg.
     ///
@@ -36,15 +36,15 @@ lints! {
     /// ```
     STRAIN_ODD = "W0802";
 
-    /// # W0803: resonance, stiffness and mass do not fit
-    ///
-    /// `actuator.resonance` is compared with sqrt(k_a / m) / 2π of the extensible
-    /// part alone and with a sixth of the platform.
-    ///
-    /// ## Why it matters
-    ///
-    /// The three are not independent; a value far from both is most often a stiffness
-    /// in N/um or a mass in the wrong unit.
+        /// # W0803: resonance, stiffness and mass are inconsistent
+        ///
+        /// `actuator.resonance` is compared with sqrt(k_a / m) / 2π, once with the
+        /// extensible part alone as m, once with a sixth of the platform added.
+        ///
+        /// ## Why it matters
+        ///
+        /// The three are not independent. A resonance far from both values usually comes
+        /// from a stiffness in N/um or a mass in the wrong unit.
     ///
     /// ## Example
     ///
@@ -66,15 +66,14 @@ lints! {
     /// ```
     RESONANCE_ODD = "W0803";
 
-    /// # W0804: a slew rate that does not spare the stacks
+    /// # W0804: slew rate too high for the stacks
     ///
-    /// The voltage should not be able to cross its range within a third of a period
-    /// of the resonance.
-    ///
-    /// ## Why it matters
-    ///
-    /// A stack that is driven so fast overshoots into tension, which ceramics do not
-    /// tolerate.
+        /// At the slew rate, the voltage should take at least a third of a period of the
+        /// resonance to cross its range.
+        ///
+        /// ## Why it matters
+        ///
+        /// A stack driven faster overshoots into tension, which ceramics do not tolerate.
     ///
     /// ## Example
     ///
@@ -88,21 +87,21 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Check V/ms against V/s; otherwise lower the slew rate to what the help names.
+        /// Check V/ms against V/s; otherwise lower the slew rate to the value in the help.
     ///
     /// ```toml
     /// slew_rate       = "40 V/ms"
     /// ```
     SLEW_TOO_FAST = "W0804";
 
-    /// # W0809: a slew rate that leaves the legs standing
+    /// # W0809: slew rate too low to move the legs
     ///
-    /// The voltage should take less than a second over its range.
-    ///
-    /// ## Why it matters
-    ///
-    /// A stack can be driven over its range in milliseconds; a slower limit is most
-    /// often V/s where V/ms is meant.
+        /// At the slew rate, the voltage should cross its range in less than a second.
+        ///
+        /// ## Why it matters
+        ///
+        /// A stack can cross its range in milliseconds. A much lower limit is usually in
+        /// V/s where V/ms was intended.
     ///
     /// ## Example
     ///
@@ -123,16 +122,16 @@ lints! {
     /// ```
     SLEW_TOO_SLOW = "W0809";
 
-    /// # W0858: a damping ratio that cannot be
+    /// # W0858: implausible damping ratio
     ///
     /// `actuator.damping_ratio` should be at least 0.0002 and at most 0.6,
     /// `control.modal_damping` between 0.0005 and 0.3.
     ///
     /// ## Why it matters
     ///
-    /// Bare ceramic has a damping ratio of 0.0002; glued and loaded stacks have a
-    /// hundred times more. With more than 0.6 a leg hardly rings. A value that is too
-    /// large is often a percentage, or a quality factor Q in place of 1/(2 Q).
+        /// Bare ceramic has a damping ratio of 0.0002; glued and loaded stacks have a
+        /// hundred times more. Above 0.6 a leg hardly rings. A value that is too large is
+        /// often a percentage, or a quality factor Q instead of 1/(2 Q).
     ///
     /// ## Example
     ///
@@ -153,14 +152,14 @@ lints! {
     /// ```
     DAMPING_ODD = "W0858";
 
-    /// # W0859: a grid too coarse for a hysteresis loop
+    /// # W0859: grid too coarse for a hysteresis loop
     ///
     /// `hysteresis.grid` should be at least 8.
     ///
     /// ## Why it matters
     ///
-    /// The branches of a loop are interpolated between nodes: with fewer each is a
-    /// few straight pieces, and the error of the inverse is that of the pieces.
+        /// The branches of a loop are interpolated linearly between nodes. With fewer
+        /// nodes the straight segments dominate the error of the inverse.
     ///
     /// ## Example
     ///
@@ -174,7 +173,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Take 16 or more; the table grows with the square.
+        /// Use 16 or more; the table grows with the square of the grid.
     ///
     /// ```toml
     /// grid    = 32
@@ -182,34 +181,34 @@ lints! {
     GRID_COARSE = "W0859";
 }
 
-/// Stroke of a leg, in leg lengths. Stacks give 0.0015 of their own length; levers in a leg make ten times that.
+/// Stroke of a leg, in leg lengths. Stacks give 0.0015 of their own length; levers in a leg amplify that tenfold.
 const LARGEST_STRAIN: f64 = 0.015;
-/// A leg of this strain or less moves by less than its own thermal expansion over a tenth of a kelvin.
+/// Below this strain a leg moves less than its thermal expansion over a tenth of a kelvin.
 const SMALLEST_STRAIN: f64 = 1e-6;
-/// What compliance of the mounting takes off a resonance: a factor of four in stiffness.
+/// Factor by which the compliance of the mounting lowers a resonance: a factor of four in stiffness.
 const MOUNTING: f64 = 2.0;
-/// A rod fixed at one end resonates at π/2 of what stiffness and mass make; a fifth more for tolerances.
+/// A rod fixed at one end resonates at π/2 times sqrt(k/m); a fifth more for tolerances.
 const FREE_ROD: f64 = 1.9;
-/// What legs of stacks have, N/m, and Hz as mounted.
+/// Usual stiffness of piezo legs, N/m, and their resonance as mounted, Hz.
 const STIFFNESSES: core::ops::RangeInclusive<f64> = 2e5..=2e9;
 const RESONANCES: core::ops::RangeInclusive<f64> = 20.0..=5e4;
-/// Share of the resonance's period in which a stack may be driven over its range: makers of stacks give a third as the least.
+/// Shortest time to drive a stack over its range, in periods of its resonance: makers of stacks specify a third.
 const FASTEST: f64 = 1.0 / 3.0;
-/// A stack that takes longer over its range, s, follows nothing.
+/// Longest plausible time over the range, s.
 const SLOWEST: f64 = 1.0;
 
-/// Damping ratio of a bare ceramic of a mechanical quality of 2,500. Whatever it is mounted in has more.
+/// Damping ratio of a bare ceramic with a mechanical quality of 2,500. Any mounted stack has more.
 const LEAST_DAMPED: f64 = 2e-4;
-/// More than this a leg does not ring at all.
+/// Above this a leg does not ring.
 const MOST_DAMPED: f64 = 0.6;
-/// The same of the platform on its legs, whose joints and flexures damp little; and the least that they have.
+/// The same for the platform on its legs, whose joints and flexures damp little; and their least damping.
 const MOST_DAMPED_MODE: f64 = 0.3;
 const LEAST_DAMPED_MODE: f64 = 5e-4;
-/// Fewer cells to an axis do not show the bend of a branch.
+/// Fewest cells per axis that resolve the curvature of a branch.
 const COARSEST_GRID: usize = 8;
 
-/// No piezo leg moves by more than a hundredth of its length.
-fn strain(facts: &Facts, found: &mut Found) {
+/// Checks the stroke against the leg length.
+fn strain(facts: &Facts, found: &mut Findings) {
     let Some(legs) = &facts.legs else { return };
     let (stroke, length) = (facts.model.actuator.stroke, legs.shortest());
     let off = times_beyond(stroke / length, &(SMALLEST_STRAIN..=LARGEST_STRAIN));
@@ -230,8 +229,8 @@ fn strain(facts: &Facts, found: &mut Found) {
     );
 }
 
-/// Stiffness and masses bound the resonance of a leg: as bare as its extensible part, or with its share of the platform.
-fn stiffness_fits_resonance(facts: &Facts, found: &mut Found) {
+/// Checks the resonance against stiffness and mass: between the bare extensible part and that with its share of the platform.
+fn stiffness_fits_resonance(facts: &Facts, found: &mut Findings) {
     let model = facts.model;
     let own = model.leg.extensible_mass;
     let of = |mass: f64| libm::sqrt(model.actuator.axial_stiffness / mass) / TAU;
@@ -241,11 +240,11 @@ fn stiffness_fits_resonance(facts: &Facts, found: &mut Found) {
     if off <= 1.0 {
         return;
     }
-    // Where only one of the two is what legs have, the other is suspected.
+    // If only one of the two is in the usual range, the other is suspected.
     let leg_like = (STIFFNESSES.contains(&model.actuator.axial_stiffness), RESONANCES.contains(&resonance));
     let key = if leg_like == (false, true) { "actuator.axial_stiffness" } else { "actuator.resonance" };
     let sizes = format!(
-        "a leg of {} N/m resonates at {} Hz with its extensible part of {} g alone and at {} Hz with a sixth of the platform",
+        "a leg of {} N/m resonates at {} Hz with only its extensible part of {} g, and at {} Hz with a sixth of the platform added",
         figure(model.actuator.axial_stiffness),
         figure(bare),
         figure(own * 1e3),
@@ -260,8 +259,8 @@ fn stiffness_fits_resonance(facts: &Facts, found: &mut Found) {
     );
 }
 
-/// A slew limit protects the stacks if they are not driven over their range within a fraction of their own period.
-fn slew_spares_the_stacks(facts: &Facts, found: &mut Found) {
+/// Checks that the slew limit protects the stacks from being driven over their range in a fraction of a period.
+fn slew_spares_the_stacks(facts: &Facts, found: &mut Findings) {
     let actuator = &facts.model.actuator;
     let [low, high] = actuator.voltage;
     let time = (high - low) / actuator.slew_rate;
@@ -273,21 +272,21 @@ fn slew_spares_the_stacks(facts: &Facts, found: &mut Found) {
         SLEW_TOO_FAST,
         "actuator.slew_rate",
         format!(
-            "at {} V/ms a stack goes over its range of {} V in {} us; one period of its resonance is {} us",
+            "at {} V/ms a stack crosses its range of {} V in {} us; one period of its resonance is {} us",
             figure(actuator.slew_rate * 1e-3),
             figure(high - low),
             figure(time * 1e6),
             figure(1e6 / actuator.resonance)
         ),
         &format!(
-            "a stack that is driven faster than a third of its period overshoots into tension: at most \"{} V/ms\" is usual; check the unit (V/ms or V/s)",
+            "a stack that crosses its range in less than a third of a period overshoots into tension: at most \"{} V/ms\" is usual; check the unit (V/ms or V/s)",
             figure((high - low) * 3.0 * actuator.resonance * 1e-3)
         ),
     );
 }
 
-/// A limit so low that nothing moves.
-fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
+/// Checks for a limit so low that nothing moves.
+fn slew_moves_the_legs(facts: &Facts, found: &mut Findings) {
     let actuator = &facts.model.actuator;
     let [low, high] = actuator.voltage;
     let time = (high - low) / actuator.slew_rate;
@@ -299,7 +298,7 @@ fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
         SLEW_TOO_SLOW,
         "actuator.slew_rate",
         format!(
-            "at {} V/ms a leg takes {} s over its stroke: it moves at {} um/s at most",
+            "at {} V/ms a leg takes {} s for its stroke: it moves at {} um/s at most",
             figure(actuator.slew_rate * 1e-3),
             figure(time),
             figure(actuator.slew_rate * actuator.leg_gain() * 1e6)
@@ -308,8 +307,8 @@ fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
     );
 }
 
-/// Everything that is built is damped.
-fn resonance_is_damped(facts: &Facts, found: &mut Found) {
+/// Checks both damping ratios against those of real structures.
+fn resonance_is_damped(facts: &Facts, found: &mut Findings) {
     let actuator = &facts.model.actuator;
     let structure = facts.model.task_space.as_ref().map_or(0.02, |task| task.modal_damping);
     for (key, damping) in [("actuator.damping_ratio", actuator.damping_ratio), ("control.modal_damping", structure)] {
@@ -325,12 +324,12 @@ fn resonance_is_damped(facts: &Facts, found: &mut Found) {
                 "a damping ratio of {} is {}",
                 figure(damping),
                 if damping > most {
-                    "too large for a resonance, which would hardly ring"
+                    "so large that the resonance would hardly ring"
                 } else {
-                    "that of a tuning fork; flexures and joints have more"
+                    "as low as that of a tuning fork; flexures and joints have more"
                 }
             ),
-            "0.005 to 0.05 is usual of a platform on its legs, 0.01 to 0.2 of a leg: check that it is a ratio, with critical damping as 1, and neither percent nor a quality factor (1/(2 Q))",
+            "usual are 0.005 to 0.05 for a platform on its legs, 0.01 to 0.2 for a leg: check that the value is a ratio (critical damping is 1), not a percentage or a quality factor Q; the ratio is 1/(2 Q)",
         );
     }
     if actuator.damping_ratio >= LEAST_DAMPED {
@@ -341,17 +340,17 @@ fn resonance_is_damped(facts: &Facts, found: &mut Found) {
         DAMPING_ODD,
         "actuator.damping_ratio",
         format!(
-            "with a damping ratio of {} a leg that is pushed rings for {} s (to a hundredth); a bare ceramic has {} and more",
+            "with a damping ratio of {} a leg rings for {} s (to a hundredth); a bare ceramic has at least {}",
             figure(actuator.damping_ratio),
             figure(libm::log(100.0) / (actuator.damping_ratio * TAU * actuator.resonance)),
             figure(LEAST_DAMPED)
         ),
-        "0.01 to 0.2 is usual: measure it with `specgen identify response`; check that it is a ratio, with critical damping as 1",
+        "0.01 to 0.2 is usual: measure it with `specgen identify response`; check that the value is a ratio (critical damping is 1)",
     );
 }
 
-/// A table of a few cells is no model of a hysteresis loop.
-fn grid_shows_the_loop(facts: &Facts, found: &mut Found) {
+/// Checks that the table has enough cells for a hysteresis loop.
+fn grid_shows_the_loop(facts: &Facts, found: &mut Findings) {
     let grid = facts.model.hysteresis.grid;
     if grid >= COARSEST_GRID {
         return;
@@ -361,9 +360,9 @@ fn grid_shows_the_loop(facts: &Facts, found: &mut Found) {
         GRID_COARSE,
         "hysteresis.grid",
         format!(
-            "{grid} intervals of {} V each: within one the model of a leg is a straight line",
+            "{grid} intervals of {} V each: within an interval the model of a leg is a straight line",
             figure((high - low) / grid as f64)
         ),
-        "the error of the inverse falls with the square of `hysteresis.grid`: 16 to 32 is usual, and `specgen identify` chooses it by the record",
+        "the error of the inverse falls with the square of `hysteresis.grid`: 16 to 32 is usual, and `specgen identify` chooses it from the record",
     );
 }

@@ -1,6 +1,6 @@
-//! Values that come six at a time and are much alike: calibrations of gauges, gains by stiffness.
+//! Values that come in sixes and should be similar: calibrations of gauges, gains relative to stiffness.
 
-use super::{AXES, Facts, Found, figure, times_beyond};
+use super::{AXES, Facts, Findings, figure, times_beyond};
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Gains, TaskSpace};
 
@@ -14,8 +14,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// Six gauges of one kind have alike calibrations; a factor of three or another
-    /// sign is a coefficient in another unit.
+        /// Six gauges of one kind have similar calibrations. A factor of three or a
+        /// different sign usually means a coefficient in the wrong unit.
     ///
     /// ## Example
     ///
@@ -36,15 +36,15 @@ lints! {
     /// ```
     CALIBRATION_ODD = "W0827";
 
-    /// # W0847: a calibration that is far from straight
+    /// # W0847: a strongly nonlinear calibration
     ///
-    /// A power of the voltage above the first should add less than a tenth of the
-    /// range.
-    ///
-    /// ## Why it matters
-    ///
-    /// Gauges are straight within a hundredth or two; a large coefficient is in
-    /// another unit (um/V^2 for nm/V^2).
+        /// Each term above the linear one should contribute less than a tenth of the
+        /// range.
+        ///
+        /// ## Why it matters
+        ///
+        /// Gauges are linear within 1 or 2 %. A large coefficient is usually in the wrong
+        /// unit (um/V^2 for nm/V^2).
     ///
     /// ## Example
     ///
@@ -72,8 +72,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// (8) gives each axis the bandwidth gain / stiffness; one axis ten times slower
-    /// or faster than the rest is a digit too few or too many.
+        /// By (8) the bandwidth of an axis is gain / stiffness. An axis ten times slower
+        /// or faster than the rest usually has a digit too few or too many.
     ///
     /// ## Example
     ///
@@ -94,15 +94,15 @@ lints! {
     /// ```
     GAIN_UNEVEN = "W0828";
 
-    /// # W0845: gains of two axes in each other's place?
+    /// # W0845: gains of two axes swapped?
     ///
-    /// Gains go with the stiffness of their axes. Two that are five times apart for
-    /// it, and would fit exchanged, are named.
-    ///
-    /// ## Why it matters
-    ///
-    /// z of a hexapod is some times stiffer than x and y, with other gains.
-    /// Exchanged, one axis is sluggish and the other near its limit.
+        /// Gains should be proportional to the stiffness of their axes. Two that differ
+        /// from that by a factor of five, and would match if swapped, are reported.
+        ///
+        /// ## Why it matters
+        ///
+        /// z of a hexapod is several times stiffer than x and y, and has higher gains.
+        /// When swapped, one axis is sluggish and the other near its stability limit.
     ///
     /// ## Example
     ///
@@ -123,15 +123,15 @@ lints! {
     /// ```
     GAINS_EXCHANGED = "W0845";
 
-    /// # W0878: an integral that takes seconds
+    /// # W0878: an integral action that takes seconds
     ///
     /// `integral` over the stiffness of the axes, K = J^T k_a J, should be at least
     /// 2 1/s.
     ///
     /// ## Why it matters
     ///
-    /// Its inverse is about the time in which the integral takes out what feed-forward
-    /// leaves. The error of a hysteresis model changes with every turn of the motion.
+        /// Its inverse is about the time in which integral action removes the error that
+        /// feed-forward leaves. The error of a hysteresis model changes at every reversal.
     ///
     /// ## Example
     ///
@@ -153,32 +153,32 @@ lints! {
     INTEGRAL_SLOW = "W0878";
 }
 
-/// A coefficient of a calibration against the middle one of the six.
+/// Largest ratio of a calibration coefficient to the median of the six.
 const CALIBRATION_SPREAD: f64 = 3.0;
-/// What a power above the first adds at an end of the range, in spans. Gauges on the market are straight within 0.02.
+/// Largest contribution of a term above the linear one at an end of the range, in spans. Commercial gauges stay within 0.02.
 const MOST_BENT: f64 = 0.1;
-/// Slowest integral, its gain over the stiffness of its axis, 1/s.
+/// Least integral gain over the stiffness of its axis, 1/s.
 const SLOWEST: f64 = 2.0;
-/// A gain over the stiffness of its axis, against the middle one of the six.
+/// Largest ratio of a gain over the stiffness of its axis to the median of the six.
 const GAIN_SPREAD: f64 = 10.0;
-/// Two gains over their stiffness are so many times apart as they stand, and less than that in each other's place.
+/// Ratio of two gains over their stiffness: at least this as written, and at most this when swapped.
 const EXCHANGED_NOW: f64 = 5.0;
 const EXCHANGED_THEN: f64 = 1.5;
 
-/// The middle of six magnitudes.
+/// The median of six magnitudes.
 fn middle(values: [f64; 6]) -> f64 {
     let mut sorted = values.map(f64::abs);
     sorted.sort_by(f64::total_cmp);
     0.5 * (sorted[2] + sorted[3])
 }
 
-/// Input of a gauge's converter without `sensor.input_range`, V.
+/// Input range of a gauge's converter without `sensor.input_range`, V.
 const INPUT: [f64; 2] = [-10.0, 10.0];
-/// What a gauge reads over the whole input of its converter, in ranges of the gauge.
+/// Reading over the whole input range of the converter, in ranges of the gauge.
 const SOUND_SPAN: core::ops::RangeInclusive<f64> = 0.05..=20.0;
 
-/// The volts of a calibration are those of the converter.
-fn calibrations_fit_converter(facts: &Facts, found: &mut Found) {
+/// Checks each slope against the ranges of gauge and converter.
+fn calibrations_fit_converter(facts: &Facts, found: &mut Findings) {
     let Some(calibration) = facts.model.task_space.as_ref().and_then(|task| task.calibration.as_ref()) else { return };
     let sensor = &facts.model.sensor;
     let [[low, high], [from, to]] = [sensor.range, sensor.input_range.unwrap_or(INPUT)];
@@ -196,7 +196,7 @@ fn calibrations_fit_converter(facts: &Facts, found: &mut Found) {
             CALIBRATION_ODD,
             &format!("{key}[1]"),
             format!(
-                "at {} um/V the gauge reads {} um over the {} V of its converter, and `sensor.range` is {} um",
+                "at {} um/V the gauge reads {} um over the {} V of its converter, but `sensor.range` is {} um",
                 figure(powers[1] * 1e6),
                 figure(read * 1e6),
                 figure(to - from),
@@ -208,12 +208,12 @@ fn calibrations_fit_converter(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// Gauges of one make have calibrations alike.
-fn calibrations(facts: &Facts, found: &mut Found) {
+/// Checks that the calibrations are similar.
+fn calibrations(facts: &Facts, found: &mut Findings) {
     let Some(calibration) = facts.model.task_space.as_ref().and_then(|task| task.calibration.as_ref()) else { return };
-    // Where slopes do not fit the converter, that says which.
-    let said = |one: &Diagnostic| one.key.ends_with("calibration[1]");
-    if found.list.iter().any(said) {
+    // A slope that does not fit the converter is reported already.
+    let is_slope = |one: &Diagnostic| one.key.ends_with("calibration[1]");
+    if found.list.iter().any(is_slope) {
         return;
     }
     // Offset and slope; higher powers differ from gauge to gauge.
@@ -232,24 +232,24 @@ fn calibrations(facts: &Facts, found: &mut Found) {
                 CALIBRATION_ODD,
                 &format!("gauge[{gauge}].calibration[{power}]"),
                 format!(
-                    "{} of the calibration of gauge {gauge} is {}, while the six have about {}",
+                    "{} of the calibration of gauge {gauge} is {}, but the median of all six is {}",
                     ["the offset", "the slope"][power],
                     ["um", "um/V"].map(|unit| format!("{} {unit}", figure(value * 1e6)))[power],
                     figure(usual * 1e6)
                 ),
-                "check its unit and its sign against the other gauges; where those have theirs from `sensor.calibration`, that may be the wrong one; a wrong sign makes the loop run away",
+                                "compare its unit and sign with the other gauges; if those use `sensor.calibration`, that may be the wrong one; a wrong sign makes the loop unstable",
             );
         }
     }
 }
 
-/// A gauge is nearly straight: what it adds in higher powers of the voltage is small over its range.
-fn calibrations_straight(facts: &Facts, found: &mut Found) {
+/// Checks that the terms above the linear one are small over the range.
+fn calibrations_straight(facts: &Facts, found: &mut Findings) {
     let Some(calibration) = facts.model.task_space.as_ref().and_then(|task| task.calibration.as_ref()) else { return };
     let [low, high] = facts.model.sensor.range;
     for (gauge, powers) in calibration.iter().enumerate() {
         let [offset, slope, ..] = powers[..] else { continue };
-        // Volts at the ends, by the slope alone.
+        // Volts at the ends of the range, by the slope alone.
         let volts = [low, high].map(|end| libm::fabs((end - offset) / slope));
         let farthest = if volts[0] > volts[1] { volts[0] } else { volts[1] };
         for (power, coefficient) in powers.iter().enumerate().skip(2) {
@@ -268,13 +268,13 @@ fn calibrations_straight(facts: &Facts, found: &mut Found) {
                     figure(farthest),
                     figure((high - low) * 1e6)
                 ),
-                "gauges are straight within a hundredth or two of their range: check the unit of this coefficient (nm/V^2 or um/V^2) and of the slope before it",
+                                "gauges are linear within 1 or 2 % of their range: check the unit of this coefficient (nm/V^2 or um/V^2) and of the slope before it",
             );
         }
     }
 }
 
-/// The gains that the spec gives, by key.
+/// The gains in the spec, by key.
 fn gains_of(task: &TaskSpace) -> Vec<(String, [f64; 6])> {
     let sections = [("gains", &task.gains), ("position_gains", &task.position_gains)];
     let given = sections.into_iter().filter_map(|(section, gains)| Some((section, gains.as_ref()?)));
@@ -285,15 +285,15 @@ fn gains_of(task: &TaskSpace) -> Vec<(String, [f64; 6])> {
     given.flat_map(keys).collect()
 }
 
-/// Gains go with the stiffness of the axes.
-fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
+/// Checks that gains are proportional to the stiffness of their axes.
+fn gains_by_stiffness(facts: &Facts, found: &mut Findings) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
     for (key, values) in gains_of(task) {
         let ratios: [f64; 6] = core::array::from_fn(|axis| values[axis] / stiffness[axis]);
         let usual = middle(ratios);
         for (axis, ratio) in ratios.into_iter().enumerate() {
-            // Zero switches an axis off.
+            // A gain of zero disables the axis.
             if ratio == 0.0 || usual == 0.0 || (1.0 / GAIN_SPREAD..=GAIN_SPREAD).contains(&(ratio / usual)) {
                 continue;
             }
@@ -302,20 +302,20 @@ fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
                 GAIN_UNEVEN,
                 &format!("{key}[{axis}]"),
                 format!(
-                    "the gain of {} is {}: {} times what the other axes have for their stiffness (its own is {})",
+                    "the gain of {} is {}: relative to the stiffness of its axis, that is {} times the gains of the other axes (stiffness {})",
                     AXES[axis],
                     figure(values[axis]),
                     figure(ratio / usual),
                     figure(stiffness[axis])
                 ),
-                &format!("about {:.3e} goes with the others: check the unit", usual * stiffness[axis]),
+                &format!("about {:.3e} would match the others: check the unit", usual * stiffness[axis]),
             );
         }
     }
 }
 
-/// An integral that takes seconds takes out nothing that lasts less.
-fn integral_in_time(facts: &Facts, found: &mut Found) {
+/// Checks that integral action is faster than seconds.
+fn integral_in_time(facts: &Facts, found: &mut Findings) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
     for (key, values) in gains_of(task).into_iter().filter(|(key, _)| key.ends_with("integral")) {
@@ -327,7 +327,7 @@ fn integral_in_time(facts: &Facts, found: &mut Found) {
             INTEGRAL_SLOW,
             &key,
             format!(
-                "gains over the stiffness of their axes are about {} 1/s: the integral has a time constant of {} s",
+                "the integral gains over the stiffness of their axes are about {} 1/s: a time constant of {} s",
                 figure(rate),
                 figure(1.0 / rate)
             ),
@@ -336,12 +336,12 @@ fn integral_in_time(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// Two axes with each other's gains: each is off for its stiffness, and both fit when exchanged.
-fn gains_in_order(facts: &Facts, found: &mut Found) {
+/// Checks for swapped gains: neither fits the stiffness of its axis, and both do when swapped.
+fn gains_in_order(facts: &Facts, found: &mut Findings) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
     for (key, values) in gains_of(task) {
-        // Translations among themselves, and rotations: across them the units would not fit.
+        // Within translations and within rotations: across them the units differ.
         for (a, b) in [(0, 1), (0, 2), (1, 2), (3, 4), (3, 5), (4, 5)] {
             if values[a] == 0.0 || values[b] == 0.0 {
                 continue;
@@ -355,14 +355,14 @@ fn gains_in_order(facts: &Facts, found: &mut Found) {
                 GAINS_EXCHANGED,
                 &format!("{key}[{a}]"),
                 format!(
-                    "the gains of {} and {} are {} and {}, while the platform is {} times as stiff along the first as along the second",
+                    "the gains of {} and {} are {} and {}, but the platform is {} times as stiff along the first as along the second",
                     AXES[a],
                     AXES[b],
                     figure(values[a]),
                     figure(values[b]),
                     figure(stiffness[a] / stiffness[b])
                 ),
-                &format!("in each other's place they would go with the stiffness: check the order of `{key}`"),
+                &format!("if they were swapped they would match the stiffness: check the order of `{key}`"),
             );
         }
     }

@@ -1,4 +1,4 @@
-//! What `[lint] allow` lets pass.
+//! Exceptions from the lint: `[lint] allow`.
 
 use specgen_language::diagnostic::{Diagnostic, Place, Severity};
 use specgen_language::model::Model;
@@ -6,16 +6,16 @@ use specgen_language::model::Model;
 lints! {
     rules:;
 
-    /// # E0890: a value that is far off
+    /// # E0890: a value far beyond the limit of a check
     ///
-    /// A finding of the physical lint whose value lies seven times, or more, beyond
-    /// what its rule lets pass is an error. The message says how many times.
-    ///
-    /// ## Why it matters
-    ///
-    /// Slips of a unit are of a thousand or more; where the root of a value counts,
-    /// such as the stiffness in a resonance, a thousand is 32. No good platform is
-    /// seven times beyond a rule, and no rule is wider than four and a half.
+        /// A value seven or more times beyond the limit of a check of the physical lint is
+        /// an error. The message states the factor.
+        ///
+        /// ## Why it matters
+        ///
+        /// A wrong unit is usually wrong by a factor of a thousand or more. Where a value
+        /// enters as its square root, as the stiffness does in a resonance, a thousand
+        /// counts as 32. No sound platform is seven times beyond a limit.
     ///
     /// ## Example
     ///
@@ -29,22 +29,22 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Correct the value; one that is meant is named in `allow` of `[lint]`, with the
-    /// reason.
+        /// Correct the value. If it is intended, list its key with the reason in `allow`
+        /// of `[lint]`.
     ///
     /// ```toml
     /// noise = "2 mV"
     /// ```
     FAR_OFF = "E0890";
 
-    /// # N0891: something odd that the spec lets pass
+    /// # N0891: an allowed exception
     ///
-    /// A key that `allow` of `[lint]` names, with the reason in the message.
-    ///
-    /// ## Why it matters
-    ///
-    /// What is found about it is a note, whatever it was. It is shown so that nobody
-    /// forgets that a value is odd.
+        /// `allow` of `[lint]` lists the key of a finding. The message contains the reason.
+        ///
+        /// ## Why it matters
+        ///
+        /// The finding is reduced to a note. It is still shown, so that nobody forgets that
+        /// the value is unusual.
     ///
     /// ## Example
     ///
@@ -60,16 +60,16 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Nothing has to be done. Take the entry out once the value is an ordinary one.
+        /// None needed. Remove the entry once the value is no longer unusual.
     ALLOWED = "N0891";
 
-    /// # W0892: an exception that lets nothing pass
+    /// # W0892: an unused exception
     ///
-    /// An entry of `allow` in `[lint]` should be about a finding that there is.
-    ///
-    /// ## Why it matters
-    ///
-    /// An exception that is not needed would hide the next slip of that key.
+        /// Every entry of `allow` in `[lint]` should match a finding.
+        ///
+        /// ## Why it matters
+        ///
+        /// An exception that is not needed would hide the next mistake in that key.
     ///
     /// ## Example
     ///
@@ -82,7 +82,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Take the entry out.
+        /// Remove the entry.
     ///
     /// ```toml
     /// [lint]
@@ -91,7 +91,7 @@ lints! {
     ALLOWED_NOTHING = "W0892";
 }
 
-/// Makes notes of warnings, and of values that are far off, whose keys the spec lets pass.
+/// Turns warnings and [`FAR_OFF`] errors into notes if the spec allows their keys.
 pub fn allow(model: &Model, findings: &mut [Diagnostic]) {
     for finding in findings {
         if finding.severity != Severity::Warning && finding.code != FAR_OFF {
@@ -99,14 +99,14 @@ pub fn allow(model: &Model, findings: &mut [Diagnostic]) {
         }
         let Some(reason) = model.lint.reason(&finding.key) else { continue };
         finding.message = format!("{} (allowed: {reason})", finding.message);
-        finding.help = "nothing is to be done while the reason holds".to_owned();
+        finding.help = "no action needed while the reason holds".to_owned();
         finding.replacement = None;
         finding.code = ALLOWED.id;
         finding.severity = ALLOWED.severity();
     }
 }
 
-/// Exceptions that let nothing pass: they would hide the next slip.
+/// Findings about exceptions that match no finding.
 #[must_use]
 pub fn unused(model: &Model, findings: &[Diagnostic]) -> Vec<Diagnostic> {
     let used = |allowed: &str| {
@@ -118,8 +118,8 @@ pub fn unused(model: &Model, findings: &[Diagnostic]) -> Vec<Diagnostic> {
     idle.map(|(index, (key, _))| {
         let path = format!("lint.allow[{index}]");
         let place = model.spans.get(&path).map_or(Place::Whole, |span| Place::Spec(span.clone()));
-        let message = format!("nothing is found about `{key}`, so that this lets nothing pass");
-        Diagnostic::new(ALLOWED_NOTHING, &path, place, message, "take it out: it would hide the next slip")
+        let message = format!("this exception has no effect: there is no finding about `{key}`");
+        Diagnostic::new(ALLOWED_NOTHING, &path, place, message, "remove it: it would hide the next mistake in that key")
     })
     .collect()
 }

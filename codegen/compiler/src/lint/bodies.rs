@@ -1,21 +1,21 @@
 //! Masses and inertias against sizes.
 
-use super::{Facts, Found, figure, times_beyond};
+use super::{Facts, Findings, figure, times_beyond};
 use specgen_language::diagnostic::Diagnostic;
 
 lints! {
     rules: leg_parts_have_size, mass_centres_off_the_joints, parts_are_bodies, centre_over_joints, moments_of_each_axis,
         moments_fit_symmetry, leg_parts_against_platform, moments_about_the_centre;
 
-    /// # W0810: mass and inertia of a leg part do not fit the leg
+    /// # W0810: inertia of a leg part too small for the leg
     ///
-    /// The radius of gyration of a part, sqrt(I/m), should be at least a fiftieth of
-    /// the leg.
-    ///
-    /// ## Why it matters
-    ///
-    /// A part of a leg reaches over a good part of it; an inertia so small is in
-    /// another unit.
+        /// The radius of gyration of a part, sqrt(I/m), should be at least a fiftieth of
+        /// the leg length.
+        ///
+        /// ## Why it matters
+        ///
+        /// A part extends over much of the leg. A smaller inertia is usually in the wrong
+        /// unit.
     ///
     /// ## Example
     ///
@@ -36,15 +36,15 @@ lints! {
     /// ```
     LEG_PART_SMALL = "W0810";
 
-    /// # W0811: mass centre in the joint
+    /// # W0811: mass centre almost in the joint
     ///
-    /// A mass centre should not lie far nearer to its joint than the part's radius of
-    /// gyration.
-    ///
-    /// ## Why it matters
-    ///
-    /// A value next to zero is a slip of mm for um. A part that is balanced about its
-    /// joint has exactly 0.
+        /// The distance from the joint to the mass centre should be at least a fiftieth of
+        /// the part's radius of gyration, or exactly 0.
+        ///
+        /// ## Why it matters
+        ///
+        /// A value close to zero is usually in um instead of mm. A part that is balanced
+        /// about its joint has exactly 0.
     ///
     /// ## Example
     ///
@@ -65,15 +65,15 @@ lints! {
     /// ```
     CENTRE_AT_JOINT = "W0811";
 
-    /// # W0856: mass, inertia and mass centre of no one body
+    /// # W0856: mass, inertia and mass centre are inconsistent
     ///
-    /// A part of a leg reaches from its joint on: its radius of gyration should be a
-    /// quarter to a little more than the whole of the way to its mass centre.
-    ///
-    /// ## Why it matters
-    ///
-    /// A uniform rod has 0.58, and 1.15 about its joint. Outside, one of mass, inertia
-    /// (about the mass centre) and centre is wrong, and with it the leg's part in (4).
+        /// A part of a leg starts at its joint: its radius of gyration should be 0.25 to
+        /// 1.05 times the distance from the joint to its mass centre.
+        ///
+        /// ## Why it matters
+        ///
+        /// A uniform rod has 0.58, and 1.15 about its joint. Otherwise mass, inertia (about
+        /// the mass centre) or centre is wrong, and so is the leg's contribution to (4).
     ///
     /// ## Example
     ///
@@ -87,7 +87,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Check the three.
+        /// Check all three values.
     ///
     /// ```toml
     /// fixed_inertia      = "1.07e5 g mm^2"
@@ -96,13 +96,13 @@ lints! {
 
     /// # W0857: a centre of mass outside the legs
     ///
-    /// `platform.center_of_mass` should lie within the joint circle, and not three
-    /// times as far above or below it.
-    ///
-    /// ## Why it matters
-    ///
-    /// A load that hangs so far out loads the legs one-sidedly; more often the centre
-    /// was measured from another point than P_C.
+        /// `platform.center_of_mass` should lie within the joint circle, and at most three
+        /// of its radii above or below it.
+        ///
+        /// ## Why it matters
+        ///
+        /// A centre of mass further out loads the legs unevenly. More often it was measured
+        /// from a point other than P_C.
     ///
     /// ## Example
     ///
@@ -123,16 +123,15 @@ lints! {
     /// ```
     CENTRE_FAR = "W0857";
 
-    /// # W0812: a moment of inertia that does not fit the size
+    /// # W0812: moment of inertia inconsistent with the size
     ///
     /// About x and y the radius of gyration should be a tenth to three times the
     /// joint circle; about z 0.3 to 1.5 times.
     ///
     /// ## Why it matters
     ///
-    /// I_zz of a plate that carries its joints on its rim is bounded by the rim; a
-    /// moment outside is in another unit, or about another point than the mass
-    /// centre.
+        /// The rim bounds the I_zz of a plate that carries its joints on the rim. A moment
+        /// outside the range is usually in the wrong unit, or not about the mass centre.
     ///
     /// ## Example
     ///
@@ -153,15 +152,15 @@ lints! {
     /// ```
     MOMENT_ODD = "W0812";
 
-    /// # W0813: moments of inertia in another order?
+    /// # W0813: moments of inertia in the wrong order?
     ///
-    /// I_xx and I_yy should be within a factor of two on a platform whose joints lie
-    /// alike along x and y; and where one of them is as I_zz, closer.
-    ///
-    /// ## Why it matters
-    ///
-    /// `platform.inertia` is I_xx, I_yy, I_zz in {P}, z along the axis of the
-    /// hexapod; CAD programs often have y there.
+        /// On a platform whose joints are spread equally along x and y, I_xx and I_yy should
+        /// be within a factor of two, and within 1.3 if one of them is close to I_zz.
+        ///
+        /// ## Why it matters
+        ///
+        /// `platform.inertia` is I_xx, I_yy, I_zz in {P}, with z along the axis of the
+        /// hexapod. CAD programs often use y for that axis.
     ///
     /// ## Example
     ///
@@ -175,7 +174,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Put the moments into this order.
+        /// Put the moments in this order.
     ///
     /// ```toml
     /// inertia        = ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e6 g mm^2"]
@@ -184,13 +183,13 @@ lints! {
 
     /// # W0814: leg and platform of very different mass
     ///
-    /// A part of a leg should weigh between a five-thousandth of the platform and
-    /// five times as much.
-    ///
-    /// ## Why it matters
-    ///
-    /// In (4) the legs add a few per cent to the platform. Other proportions are
-    /// grams for kilograms.
+        /// The mass of a leg part should be between 1/5000 of the platform's mass and five
+        /// times the platform's mass.
+        ///
+        /// ## Why it matters
+        ///
+        /// In (4) the legs add a few per cent to the platform. A very different proportion
+        /// usually means grams for kilograms.
     ///
     /// ## Example
     ///
@@ -213,14 +212,14 @@ lints! {
 
     /// # W0865: moments of inertia about another point?
     ///
-    /// I_xx + I_yy − I_zz is twice the integral of z² dm about the centre of mass. It
-    /// should not lie as far above and below as the base is away.
-    ///
-    /// ## Why it matters
-    ///
-    /// Moments about another point, such as the base or a corner in a CAD program, are
-    /// larger by mass times distance squared (Steiner). The leg forces of the motion
-    /// are then too large, and so is the feed-forward.
+        /// I_xx + I_yy − I_zz is twice the integral of z² dm about the centre of mass. The
+        /// rms z from it should be less than the height of the platform above the base.
+        ///
+        /// ## Why it matters
+        ///
+        /// Moments about another point, such as the base or the origin of a CAD model, are
+        /// larger by mass times distance squared (parallel axis theorem). The computed leg
+        /// forces are then too large, and so is the feed-forward.
     ///
     /// ## Example
     ///
@@ -242,26 +241,26 @@ lints! {
     MOMENTS_ELSEWHERE = "W0865";
 }
 
-/// Least radius of gyration of a leg part, in leg lengths: that of a disc a fifteenth of the leg long.
+/// Least radius of gyration of a leg part, in leg lengths: that of a rod a fifteenth of the leg long.
 const THINNEST: f64 = 0.02;
-/// Nearest that a mass centre lies to its own joint, in radii of gyration of the part.
+/// Least distance from joint to mass centre, in radii of gyration of the part.
 const NEAREST_CENTRE: f64 = 0.02;
-/// Radius of gyration of a part over the way from its joint to its mass centre. A rod from the joint on has 0.58, half its
-/// mass at either end 1, a lump half as long as that 0.29. About its joint instead of its mass centre a rod has 1.15.
+/// Radius of gyration of a part over the distance from its joint to its mass centre. A rod that starts at the joint has 0.58,
+/// half its mass at either end 1, a lump half as long as the distance 0.29. About its joint a rod has 1.15.
 const SOUND_PART: core::ops::RangeInclusive<f64> = 0.25..=1.05;
 /// Radius of gyration about one axis, in radii of the joint circle.
 const SOUND_AXIS: core::ops::RangeInclusive<f64> = 0.1..=3.0;
-/// The same about z: a platform reaches out to its joints. An even disc of their radius has 0.71, one of less than half of it
-/// 0.3, one of twice it 1.41. About x and y a tall load adds its height.
+/// The same about z. A uniform disc out to the joints has 0.71, one with less than half their radius 0.3, one with twice their
+/// radius 1.41. About x and y a tall load adds its height.
 const SOUND_TURN: core::ops::RangeInclusive<f64> = 0.3..=1.5;
-/// Farthest centre of mass from P_C, in radii of the joint circle: beside the axis, and along it.
+/// Largest offset of the centre of mass from P_C along x, y and z, in radii of the joint circle.
 const FARTHEST_CENTRE: [f64; 3] = [1.0, 1.0, 3.0];
-/// How much the moments about x and y differ on a platform that its joints cannot tell x from y on.
+/// Largest ratio of the moments about x and y on a platform whose joints are spread equally along both.
 const UNEVEN: f64 = 2.0;
-/// The same, where the moment about z is as one of the two within so much: then that about z is expected to be the odd one.
+/// The same if the moment about z is within [`AS_THAT_ABOUT_Z`] of one of the two: I_zz should be the one that differs.
 const ODD_ONE: f64 = 1.3;
 const AS_THAT_ABOUT_Z: f64 = 1.15;
-/// A leg part against the platform, by mass.
+/// Mass of a leg part over that of the platform.
 const SOUND_SHARE: core::ops::RangeInclusive<f64> = 2e-4..=5.0;
 
 fn parts<'a>(facts: &Facts<'a>) -> [(&'static str, &'a f64, &'a f64, &'a f64); 2] {
@@ -272,8 +271,8 @@ fn parts<'a>(facts: &Facts<'a>) -> [(&'static str, &'a f64, &'a f64, &'a f64); 2
     ]
 }
 
-/// A part of a leg is as long as a part of a leg. (That it is not longer is checked with the spec.)
-fn leg_parts_have_size(facts: &Facts, found: &mut Found) {
+/// Checks that leg parts are not too small. (The spec checks that they are not too large.)
+fn leg_parts_have_size(facts: &Facts, found: &mut Findings) {
     let Some(legs) = &facts.legs else { return };
     for (part, mass, inertia, _) in parts(facts) {
         let (radius, length) = (libm::sqrt(inertia / mass), legs.shortest());
@@ -296,11 +295,11 @@ fn leg_parts_have_size(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// A part reaches from its joint, so that its mass centre does not lie in it.
-fn mass_centres_off_the_joints(facts: &Facts, found: &mut Found) {
+/// Checks that mass centres are not almost in the joints.
+fn mass_centres_off_the_joints(facts: &Facts, found: &mut Findings) {
     for (part, mass, inertia, center) in parts(facts) {
         let radius = libm::sqrt(inertia / mass);
-        // Zero is a choice: a part that is balanced about its joint.
+        // Zero is intended: the part is balanced about its joint.
         if *center == 0.0 || *center >= NEAREST_CENTRE * radius {
             continue;
         }
@@ -309,7 +308,7 @@ fn mass_centres_off_the_joints(facts: &Facts, found: &mut Found) {
             CENTRE_AT_JOINT,
             &format!("leg.{part}_center"),
             format!(
-                "the mass centre of the {part} part lies {} mm from its joint, but the part's radius of gyration is {} mm",
+                                "the mass centre of the {part} part is {} mm from its joint, but the part's radius of gyration is {} mm",
                 figure(center * 1e3),
                 figure(radius * 1e3)
             ),
@@ -318,14 +317,14 @@ fn mass_centres_off_the_joints(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// Mass, inertia and mass centre of a part are those of one body, which begins at its joint.
-fn parts_are_bodies(facts: &Facts, found: &mut Found) {
+/// Checks that mass, inertia and mass centre are consistent for a body that starts at its joint.
+fn parts_are_bodies(facts: &Facts, found: &mut Findings) {
     for (part, mass, inertia, center) in parts(facts) {
         let radius = libm::sqrt(inertia / mass);
         let key = format!("leg.{part}_inertia");
-        // Zero is a choice: a part that is balanced about its joint. What is far off is said already.
-        let said = |one: &Diagnostic| [key.as_str(), &format!("leg.{part}_center")].contains(&one.key.as_str());
-        if *center == 0.0 || SOUND_PART.contains(&(radius / center)) || found.list.iter().any(said) {
+        // Zero is intended: the part is balanced about its joint. One finding about these keys is enough.
+        let is_known = |one: &Diagnostic| [key.as_str(), &format!("leg.{part}_center")].contains(&one.key.as_str());
+        if *center == 0.0 || SOUND_PART.contains(&(radius / center)) || found.list.iter().any(is_known) {
             continue;
         }
         found.add_off(
@@ -340,15 +339,15 @@ fn parts_are_bodies(facts: &Facts, found: &mut Found) {
                 figure(center * 1e3)
             ),
             &format!(
-                "a rod from the joint on has {} mm there: check `leg.{part}_inertia` (about the mass centre), `leg.{part}_mass` and `leg.{part}_center`",
+                "a rod that starts at the joint would have {} mm: check `leg.{part}_inertia` (about the mass centre), `leg.{part}_mass` and `leg.{part}_center`",
                 figure(center * 1e3 / libm::sqrt(3.0))
             ),
         );
     }
 }
 
-/// The centre of mass lies above the joints, or near them.
-fn centre_over_joints(facts: &Facts, found: &mut Found) {
+/// Checks that the centre of mass is near the joints.
+fn centre_over_joints(facts: &Facts, found: &mut Findings) {
     let (body, size) = (&facts.model.platform, facts.model.geometry.joint_radius());
     for (axis, value) in body.center_of_mass.into_iter().enumerate() {
         if libm::fabs(value) <= FARTHEST_CENTRE[axis] * size {
@@ -359,18 +358,18 @@ fn centre_over_joints(facts: &Facts, found: &mut Found) {
             CENTRE_FAR,
             &format!("platform.center_of_mass[{axis}]"),
             format!(
-                "the centre of mass lies {} mm from P_C along {}, on a platform whose joints are {} mm from the middle",
+                "the centre of mass is {} mm from P_C along {}, but the platform's joints are only {} mm from its axis",
                 figure(value * 1e3),
                 ["x", "y", "z"][axis],
                 figure(size * 1e3)
             ),
-            "the load would lie outside the legs: check the unit of `platform.center_of_mass` and the order of its axes",
+            "the load would be outside the legs: check the unit of `platform.center_of_mass` and the order of its axes",
         );
     }
 }
 
-/// Each moment by itself. (The largest is checked with the spec.)
-fn moments_of_each_axis(facts: &Facts, found: &mut Found) {
+/// Checks each moment against the joint circle. (The spec checks the largest against the other two.)
+fn moments_of_each_axis(facts: &Facts, found: &mut Findings) {
     let (body, size) = (&facts.model.platform, facts.model.geometry.joint_radius());
     for (axis, moment) in body.inertia.into_iter().enumerate() {
         let radius = libm::sqrt(moment / body.mass);
@@ -383,7 +382,7 @@ fn moments_of_each_axis(facts: &Facts, found: &mut Found) {
             MOMENT_ODD,
             &format!("platform.inertia[{axis}]"),
             format!(
-                "about {} the platform has a radius of gyration of {} mm (from {} g mm^2 and {} kg), but its joints are {} mm from the middle",
+                "about {} the platform has a radius of gyration of {} mm (from {} g mm^2 and {} kg), but its joints are {} mm from its axis",
                 ["x", "y", "z"][axis],
                 figure(radius * 1e3),
                 figure(moment * 1e9),
@@ -395,8 +394,8 @@ fn moments_of_each_axis(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// Joints that look alike along x and y carry a body that does.
-fn moments_fit_symmetry(facts: &Facts, found: &mut Found) {
+/// Checks that a platform with equally spread joints has similar moments about x and y.
+fn moments_fit_symmetry(facts: &Facts, found: &mut Findings) {
     let [xx, yy, zz] = facts.model.platform.inertia;
     let joints = &facts.model.geometry.platform_joints;
     let spread = |axis: usize| joints.iter().fold(0.0, |sum, joint| sum + joint[axis] * joint[axis]);
@@ -409,23 +408,23 @@ fn moments_fit_symmetry(facts: &Facts, found: &mut Found) {
     if !alike || (ratio <= UNEVEN && !exchanged) {
         return;
     }
-    // The odd one of the three is suspected: the one whose fellow is on the third axis.
+    // The one further from I_zz is suspected.
     let odd = usize::from(from_yy > from_xx);
     found.add(
         MOMENTS_UNEVEN,
         &format!("platform.inertia[{odd}]"),
         format!(
-            "I_xx is {} g mm^2 and I_yy {} g mm^2, {} times apart, on a platform whose joints lie alike along x and y",
+            "I_xx is {} g mm^2 and I_yy {} g mm^2, a ratio of {}, but the platform's joints are spread equally along x and y",
             figure(xx * 1e9),
             figure(yy * 1e9),
             figure(ratio)
         ),
-        "`platform.inertia` is I_xx, I_yy, I_zz in {P}, z along the axis of the hexapod: check their order",
+        "`platform.inertia` is I_xx, I_yy, I_zz in {P}, with z along the axis of the hexapod: check their order",
     );
 }
 
-/// A leg part outweighs the platform by a few times at most.
-fn leg_parts_against_platform(facts: &Facts, found: &mut Found) {
+/// Checks the masses of leg parts against that of the platform.
+fn leg_parts_against_platform(facts: &Facts, found: &mut Findings) {
     let platform = facts.model.platform.mass;
     for (part, mass, _, _) in parts(facts) {
         if SOUND_SHARE.contains(&(mass / platform)) {
@@ -435,15 +434,18 @@ fn leg_parts_against_platform(facts: &Facts, found: &mut Found) {
             times_beyond(mass / platform, &SOUND_SHARE),
             LEG_MASS_ODD,
             &format!("leg.{part}_mass"),
-            format!("the {part} part of a leg weighs {} kg, the platform {} kg", figure(*mass), figure(platform)),
+            format!(
+                "the {part} part of a leg has a mass of {} kg, the platform {} kg",
+                figure(*mass),
+                figure(platform)
+            ),
             &format!("check the units of `leg.{part}_mass` and `platform.mass`: kg or g"),
         );
     }
 }
 
-/// Moments are about the centre of mass. About the base's origin they would be larger by m h², as if mass lay as far above and
-/// below the platform as its base is.
-fn moments_about_the_centre(facts: &Facts, found: &mut Found) {
+/// Checks that moments are about the centre of mass. About the base's origin they would be larger by m h².
+fn moments_about_the_centre(facts: &Facts, found: &mut Findings) {
     let (body, height) = (&facts.model.platform, facts.model.geometry.height);
     let [xx, yy, zz] = body.inertia;
     // I_xx + I_yy − I_zz = 2 ∫ z² dm.
@@ -455,13 +457,13 @@ fn moments_about_the_centre(facts: &Facts, found: &mut Found) {
         MOMENTS_ELSEWHERE,
         "platform.inertia[0]",
         format!(
-            "with these moments and {} kg the mass of the platform lies {} mm (rms) above and below its centre, and the base is {} mm away",
+            "with these moments and {} kg the mass of the platform is spread {} mm (rms) along z about its centre, but the base is only {} mm away",
             figure(body.mass),
             figure(spread * 1e3),
             figure(height * 1e3)
         ),
         &format!(
-            "`platform.inertia` is about the centre of mass: from moments about the base's origin, take mass x height^2 = {} g mm^2 off I_xx and I_yy; check their unit, too",
+            "`platform.inertia` is about the centre of mass: if they are about the base's origin, subtract mass x height^2 = {} g mm^2 from I_xx and I_yy; also check their unit",
             figure(body.mass * height * height * 1e9)
         ),
     );

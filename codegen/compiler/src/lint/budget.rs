@@ -1,22 +1,21 @@
-//! Memory that the constants take whatever the code does.
+//! Checks of `[target.budget]` that need no build.
 
-use super::{Facts, Found, figure};
+use super::{Facts, Findings, figure};
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, Scalar};
 
 lints! {
     rules: tables_fit;
 
-    /// # E0870: a budget below what the tables take
+    /// # E0870: a budget below the size of the tables
     ///
-    /// The constants of the tables and the reversal memories are counted before
-    /// anything is built, and compared with `[target.budget]`; so are the least times
-    /// and instructions of a tick.
-    ///
-    /// ## Why it matters
-    ///
-    /// The image cannot become smaller than its tables: n(n+1)/2 nodes for each
-    /// different leg.
+        /// Before the build, `[target.budget]` is compared with the size of tables and
+        /// reversal memories, and with the least time and instructions of a tick.
+        ///
+        /// ## Why it matters
+        ///
+        /// The image cannot be smaller than its tables: n(n+1)/2 nodes for each different
+        /// leg.
     ///
     /// ## Example
     ///
@@ -30,21 +29,21 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Check the unit; otherwise a coarser grid or less memory.
+        /// Check the unit; otherwise use a coarser grid or a shorter reversal memory.
     ///
     /// ```toml
     /// flash        = "128 KiB"
     /// ```
     BUDGET_IMPOSSIBLE = "E0870";
 
-    /// # W0871: a budget that checks nothing
+    /// # W0871: a budget that has no effect
     ///
-    /// A budget should not be hundreds of times what the tables take, nor the time of
-    /// a tick longer than the period.
-    ///
-    /// ## Why it matters
-    ///
-    /// It would let an image pass that has grown tenfold.
+        /// A budget should not be hundreds of times the size of the tables, and the time of
+        /// a tick not longer than the period.
+        ///
+        /// ## Why it matters
+        ///
+        /// An image that has grown tenfold would still be within the budget.
     ///
     /// ## Example
     ///
@@ -58,7 +57,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Check KiB against MiB; the measured size and a tenth is a good budget.
+        /// Check KiB against MiB. A good budget is the measured size plus a tenth.
     ///
     /// ```toml
     /// flash        = "128 KiB"
@@ -67,12 +66,12 @@ lints! {
 
     /// # W0873: more RAM than flash
     ///
-    /// The budget of RAM should not exceed that of flash.
+    /// The RAM budget should not exceed the flash budget.
     ///
     /// ## Why it matters
     ///
-    /// Parts have more flash than RAM, and controllers need more of it: tables are
-    /// constants.
+        /// Microcontrollers have more flash than RAM, and controllers need more flash:
+        /// tables are constants.
     ///
     /// ## Example
     ///
@@ -86,7 +85,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Are the two in each other's place?
+        /// Check whether the two are swapped.
     ///
     /// ```toml
     /// ram          = "32 KiB"
@@ -95,12 +94,12 @@ lints! {
 
     /// # N0872: memory and time are measured by a build
     ///
-    /// `specgen check` knows what tables and memories take.
-    ///
-    /// ## Why it matters
-    ///
-    /// Code, stack and instructions per tick are known once the image is built and
-    /// run; until then a part of the budget is not checked.
+        /// `specgen check` knows only the size of tables and reversal memories.
+        ///
+        /// ## Why it matters
+        ///
+        /// Code size, stack and instructions per tick are known once the image is built
+        /// and run. Until then these parts of the budget are not checked.
     ///
     /// ## Example
     ///
@@ -113,21 +112,20 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Nothing: build with `specgen SPEC -o DIR`.
+    /// None needed: build with `specgen SPEC -o DIR`.
     ESTIMATED = "N0872";
 }
 
-/// Least stack of a tick, bytes: six legs and a pose in flight.
+/// Least stack of a tick, bytes: the values of six legs and a pose.
 const LEAST_STACK: u64 = 256;
-/// Least instructions of a tick: two sums and a product for every leg and axis of the kinematics and the law.
+/// Least instructions of a tick: two sums and a product for every leg and axis of kinematics and control law.
 const LEAST_INSTRUCTIONS: u64 = 300;
-/// Least time of a tick, s: converters are asked, and wait.
+/// Least time of a tick, s: the conversion time of the gauges.
 const LEAST_TIME: f64 = 5e-6;
-/// Declared more than this many times over what is needed, a budget checks nothing.
+/// A budget more than this many times the need has no effect.
 const LOOSE: u64 = 512;
 
-/// Bytes that tables and reversal memories take, and with them everything that can be said before a build: the rest is
-/// measured by `specgen build`.
+/// Size of tables and of reversal memories, bytes: all that is known before a build. `specgen build` measures the rest.
 pub fn least(model: &Model) -> [u64; 2] {
     let scalar = match model.controller.scalar {
         Scalar::F32 => 4,
@@ -140,7 +138,7 @@ pub fn least(model: &Model) -> [u64; 2] {
     [table as u64, memory as u64]
 }
 
-/// Says what of a declared budget only a build can tell.
+/// Notes which part of a declared budget needs a build to be checked.
 pub fn estimated(model: &Model) -> Option<Diagnostic> {
     let budget = &model.target.budget;
     if [budget.flash, budget.ram, budget.stack, budget.instructions] == [None; 4] {
@@ -152,20 +150,20 @@ pub fn estimated(model: &Model) -> Option<Diagnostic> {
         &["target.budget"],
         ESTIMATED,
         format!(
-            "tables take {tables} B of flash, reversal memories {memory} B of RAM; the rest of the budget is not checked here"
+            "tables take {tables} B of flash, reversal memories {memory} B of RAM; the rest of the budget is checked by a build"
         ),
         "`specgen SPEC -o DIR` builds the controller and measures flash, RAM, stack and instructions".to_owned(),
     ))
 }
 
-/// A budget below what the tables take, or so far above it that it checks nothing.
-fn tables_fit(facts: &Facts, found: &mut Found) {
+/// Checks for budgets below the need, and for budgets so large that they have no effect.
+fn tables_fit(facts: &Facts, found: &mut Findings) {
     let budget = &facts.model.target.budget;
     let [table, memory] = least(facts.model);
     let lines = [
         ("flash", budget.flash, table, "the hysteresis tables alone take"),
         ("ram", budget.ram, memory, "the reversal memories alone take"),
-        ("stack", budget.stack, LEAST_STACK, "no tick gets by with less than about"),
+        ("stack", budget.stack, LEAST_STACK, "a tick needs at least about"),
     ];
     for (name, declared, least, what) in lines {
         let Some(declared) = declared else { continue };
@@ -175,7 +173,7 @@ fn tables_fit(facts: &Facts, found: &mut Found) {
                 BUDGET_IMPOSSIBLE,
                 &key,
                 format!("`{key}` is {declared} B, but {what} {least} B"),
-                "check the unit (B or KiB); `specgen build` measures what it really takes",
+                "check the unit (B or KiB); `specgen build` measures the actual need",
             );
         } else if declared > LOOSE * least.max(if name == "stack" { 1024 } else { 4096 }) {
             found.add(
@@ -186,7 +184,7 @@ fn tables_fit(facts: &Facts, found: &mut Found) {
                     figure(declared as f64 / 1_048_576.0),
                     figure(least as f64 / 1024.0)
                 ),
-                "a budget that no controller can exceed checks nothing: check the unit (KiB or MiB)",
+                "a budget that no controller can exceed has no effect: check the unit (KiB or MiB)",
             );
         }
     }
@@ -197,7 +195,7 @@ fn tables_fit(facts: &Facts, found: &mut Found) {
             BUDGET_SWAPPED,
             "target.budget.ram",
             format!("a budget of {ram} B of RAM and {flash} B of flash"),
-            "code and tables are in flash, which is the larger on every part: are `target.budget.flash` and `target.budget.ram` in each other's place?",
+            "code and tables are in flash, which is larger than RAM on every microcontroller: check whether `target.budget.flash` and `target.budget.ram` are swapped",
         );
     }
     if let Some(declared) = budget.instructions
@@ -206,8 +204,8 @@ fn tables_fit(facts: &Facts, found: &mut Found) {
         found.add(
             BUDGET_LOOSE,
             "target.budget.instructions",
-            format!("`target.budget.instructions` is {declared}, and no tick of six legs comes near that"),
-            "some thousands are usual: a budget that no controller can exceed checks nothing",
+            format!("`target.budget.instructions` is {declared}, far more than any tick of six legs needs"),
+            "a few thousand are usual: a budget that no controller can exceed has no effect",
         );
     }
     let period = facts.model.timing.period;
@@ -218,14 +216,14 @@ fn tables_fit(facts: &Facts, found: &mut Found) {
                 BUDGET_LOOSE,
                 "target.budget.time",
                 format!("`target.budget.time` is {} us, more than the period of {} us", shown(time), shown(period)),
-                "the period is a limit without it: check the unit (us or ms)",
+                "the period limits the time anyway: check the unit (us or ms)",
             );
         } else if time < LEAST_TIME {
             found.add(
                 BUDGET_IMPOSSIBLE,
                 "target.budget.time",
-                format!("`target.budget.time` is {} us, and reading six gauges alone takes longer", shown(time)),
-                "check the unit (us or ms); `specgen build` estimates what a tick takes on a board",
+                format!("`target.budget.time` is {} us, but reading six gauges alone takes longer", shown(time)),
+                "check the unit (us or ms); `specgen build` estimates the time of a tick on a board",
             );
         }
     }
@@ -236,7 +234,7 @@ fn tables_fit(facts: &Facts, found: &mut Found) {
             BUDGET_IMPOSSIBLE,
             "target.budget.instructions",
             format!("`target.budget.instructions` is {declared}, but the kinematics of six legs alone takes more than {LEAST_INSTRUCTIONS}"),
-            "some thousands are usual; `specgen build` measures what a tick really takes",
+            "a few thousand are usual; `specgen build` measures the actual number per tick",
         );
     }
 }

@@ -1,19 +1,19 @@
 //! The work piece that the platform touches.
 
-use super::{AXES, Facts, Found, amount, figure, times_beyond};
+use super::{AXES, Facts, Findings, amount, figure, times_beyond};
 
 lints! {
     rules: work_piece, lever_of_contact, contact_near_bias;
 
-    /// # W0829: a work piece too soft or too stiff
+    /// # W0829: work piece too soft or too stiff
     ///
-    /// The stiffness of the work piece along an axis should lie between a thousandth
-    /// and twenty times that of the platform on its legs.
-    ///
-    /// ## Why it matters
-    ///
-    /// Softer it does not matter in (5); stiffer the legs bend and the platform
-    /// cannot move against it.
+        /// Along each axis, the stiffness of the work piece should be between a thousandth
+        /// and twenty times that of the platform on its legs.
+        ///
+        /// ## Why it matters
+        ///
+        /// A softer work piece does not matter in (5). Against a stiffer one the legs
+        /// deflect instead of moving the platform.
     ///
     /// ## Example
     ///
@@ -34,15 +34,15 @@ lints! {
     /// ```
     WORK_PIECE_ODD = "W0829";
 
-    /// # W0838: a work piece that turns on too long a lever
+    /// # W0838: lever arm of the contact too long
     ///
-    /// The stiffness of turning over that along an axis is a lever squared; it should
-    /// be less than three radii of the platform.
-    ///
-    /// ## Why it matters
-    ///
-    /// A contact lies on the platform, so that its lever is at most about a radius. N
-    /// m/rad and N m/deg differ by 57.
+        /// Rotational over translational stiffness is a lever arm squared. The lever arm
+        /// should be less than three radii of the platform.
+        ///
+        /// ## Why it matters
+        ///
+        /// The contact is on the platform, so its lever arm is at most about a radius.
+        /// N m/rad and N m/deg differ by a factor of 57.
     ///
     /// ## Example
     ///
@@ -56,22 +56,22 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Check the unit of the turning stiffness.
+        /// Check the unit of the rotational stiffness.
     ///
     /// ```toml
     /// stiffness = ["2.4e6 N/m", "2.4e6 N/m", "3e6 N/m", "3.8e3 N m/rad", "3.8e3 N m/rad", "0 N m/rad"]
     /// ```
     CONTACT_LEVER = "W0838";
 
-    /// # W0839: a work piece that presses the legs together
+    /// # W0839: contact force beyond the travel of the legs
     ///
-    /// At the bias, the force of the work piece, stiffness × (bias − rest) as in (5),
-    /// should not bend the legs by more than they reach.
-    ///
-    /// ## Why it matters
-    ///
-    /// Such a contact cannot be moved against. `control.environment.rest` is the pose
-    /// at which the work piece is unloaded, counted from rest.
+        /// At the bias, the force of the work piece, stiffness × (bias − rest) as in (5),
+        /// should not deflect the legs by more than their travel.
+        ///
+        /// ## Why it matters
+        ///
+        /// The platform cannot move against such a contact. `control.environment.rest` is
+        /// the pose at which the work piece is unloaded, relative to the rest pose.
     ///
     /// ## Example
     ///
@@ -95,11 +95,11 @@ lints! {
 
 /// Stiffness of a work piece over that of the platform on its legs.
 const SOUND_WORK_PIECE: core::ops::RangeInclusive<f64> = 1e-3..=20.0;
-/// Lever over which a contact makes its stiffness of turning, in radii of the platform's joints.
+/// Longest lever arm of a contact, in radii of the platform's joints.
 const LONGEST_LEVER: f64 = 3.0;
 
-/// A work piece that the platform feels, and that does not hold it fast.
-fn work_piece(facts: &Facts, found: &mut Found) {
+/// Checks the stiffness of the work piece against that of the platform.
+fn work_piece(facts: &Facts, found: &mut Findings) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
     for (axis, value) in task.environment.stiffness.into_iter().enumerate() {
@@ -123,8 +123,8 @@ fn work_piece(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// A contact resists turning by its stiffness over a lever, and the lever is one of the platform's size.
-fn lever_of_contact(facts: &Facts, found: &mut Found) {
+/// Checks rotational against translational stiffness of the contact.
+fn lever_of_contact(facts: &Facts, found: &mut Findings) {
     let Some(task) = &facts.model.task_space else { return };
     let stiffness = task.environment.stiffness;
     let radius = facts.model.geometry.joint_radius();
@@ -141,20 +141,20 @@ fn lever_of_contact(facts: &Facts, found: &mut Found) {
             CONTACT_LEVER,
             &format!("control.environment.stiffness[{axis}]"),
             format!(
-                "{} N m/rad about {} beside {} N/m is a lever of {} mm, on a platform whose joints are {} mm from the middle",
+                "{} N m/rad about {} with {} N/m means a lever arm of {} mm, but the platform's joints are only {} mm from its axis",
                 figure(stiffness[axis]),
                 AXES[axis],
                 figure(along),
                 figure(lever * 1e3),
                 figure(radius * 1e3)
             ),
-            "a contact turns with its stiffness times a lever squared: check the units of `control.environment.stiffness`, N/m and N m/rad",
+            "the rotational stiffness of a contact is its translational stiffness times the lever arm squared: check the units of `control.environment.stiffness`, N/m and N m/rad",
         );
     }
 }
 
-/// At the bias the work piece does not press the platform further than its legs reach.
-fn contact_near_bias(facts: &Facts, found: &mut Found) {
+/// Checks the contact force at the bias against the travel of the legs.
+fn contact_near_bias(facts: &Facts, found: &mut Findings) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
     let environment = &task.environment;
@@ -169,14 +169,14 @@ fn contact_near_bias(facts: &Facts, found: &mut Found) {
             CONTACT_FAR,
             &format!("control.environment.rest[{axis}]"),
             format!(
-                "at the bias the work piece presses along {} with {} {}: that bends the legs by {}, and they reach {}",
-                AXES[axis],
-                figure(force),
-                if axis < 3 { "N" } else { "N m" },
-                amount(axis, gives),
+                "at the bias the work piece pushes with {} {} along {}: that deflects the platform by {}, but it can only move by {}",
+                                figure(force),
+                                if axis < 3 { "N" } else { "N m" },
+                                AXES[axis],
+                                amount(axis, gives),
                 amount(axis, reach)
             ),
-            "`control.environment.rest` is the pose at which the work piece is unloaded, from rest: check its unit, and `control.environment.stiffness`",
+            "`control.environment.rest` is the pose at which the work piece is unloaded, relative to the rest pose: check its unit, and `control.environment.stiffness`",
         );
     }
 }

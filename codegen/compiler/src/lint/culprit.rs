@@ -1,7 +1,7 @@
-//! Which one value would explain the most findings: that is named first.
+//! Finds the one value that would explain most findings, and reports it first.
 //!
-//! A wrong unit shows wherever the value is compared with others, and often first at a key that is right. So each value that a
-//! finding names is tried with other powers of ten and the other sign; the one that takes most findings away is suspected.
+//! A wrong unit causes a finding wherever the value is compared with others, often first at a key that is right. So the check
+//! is repeated with each suspected value multiplied by powers of ten or negated. The change that removes most findings wins.
 
 mod readings;
 
@@ -18,14 +18,14 @@ lints! {
 
     /// # W0893: one value that would explain several findings
     ///
-    /// Where several findings come together, the spec is checked again with one value
-    /// changed by a power of ten, its sign or its order; a change after which most of
-    /// the findings are gone is named first.
-    ///
-    /// ## Why it matters
-    ///
-    /// One slip in the voltage shows as ten findings about other keys. What explains
-    /// most of them is the place to look.
+        /// If there are several findings, the spec is checked again with one value
+        /// changed by a power of ten, its sign or its order. The change that removes most
+        /// findings is reported first.
+        ///
+        /// ## Why it matters
+        ///
+        /// One mistake in the voltage can cause ten findings about other keys. The value
+        /// that explains most of them is the first to check.
     ///
     /// ## Example
     ///
@@ -39,7 +39,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Look at that value first; the rest of the findings may go with it.
+        /// Check that value first; correcting it may remove the other findings.
     ///
     /// ```toml
     /// voltage         = ["0 V", "100 V"]
@@ -47,7 +47,7 @@ lints! {
     ONE_VALUE = "W0893";
 }
 
-/// What is tried, the likeliest slips first; of a number without unit only what does not come from a unit.
+/// Changes to try, the likeliest mistakes first. The first [`OF_UNITS`] apply only to numbers with a unit.
 const SLIPS: [(f64, &str); 11] = [
     (1e3, "1000 times larger"),
     (1e-3, "1000 times smaller"),
@@ -59,32 +59,32 @@ const SLIPS: [(f64, &str); 11] = [
     (0.01, "a hundred times smaller"),
     (2.0, "twice as large"),
     (0.5, "half as large"),
-    (-1.0, "with the other sign"),
+    (-1.0, "negated"),
 ];
 const OF_UNITS: usize = 4;
-/// A spec with so many values under suspicion has more than one slip.
+/// With more suspects than this, there is probably more than one mistake.
 const MOST_SUSPECTS: usize = 40;
 
-/// What is found before records and paths are looked at.
-type Found = BTreeSet<(&'static str, String)>;
+/// Codes and keys of the findings of the first phases, without records and paths.
+type Names = BTreeSet<(&'static str, String)>;
 
 struct Culprit {
     key: String,
     how: String,
     explained: usize,
     of: usize,
-    /// What the value is often taken for.
+    /// A usual misunderstanding of the value.
     hint: Option<&'static str>,
 }
 
-/// A slip that would explain findings.
+/// A mistake that would explain findings.
 struct Slip {
-    /// Findings that would be gone, less twice those that would be new.
+    /// Findings that would disappear, less twice those that would be new.
     score: usize,
     culprit: Culprit,
 }
 
-/// How soon a finding is shown. What may be wrong with a value comes before what follows from it.
+/// Order in which findings are shown: causes before consequences.
 fn rank(one: &Diagnostic) -> u8 {
     let of_values = ["01", "02", "03", "08"].iter().any(|part| one.code[1..].starts_with(part));
     match (one.severity, of_values) {
@@ -96,18 +96,18 @@ fn rank(one: &Diagnostic) -> u8 {
     }
 }
 
-/// Puts first what is found about the one value that would explain most of the findings; then errors and doubts about values,
-/// then what later phases found with them.
+/// Sorts findings: first the one about the value that would explain most of them, then errors and warnings about values, then
+/// those of later phases.
 pub fn in_order(source: &SpecSource, findings: &mut Vec<Diagnostic>) {
     super::say_once(findings);
     findings.sort_by_key(rank);
     let Some(culprit) = culprit(source, findings) else { return };
     let own = |one: &Diagnostic| one.severity > Severity::Note && list_of(&one.key) == list_of(&culprit.key);
-    // That of the same item, if there is one.
+    // Prefer the finding about the same item of the list.
     let own =
         findings.iter().position(|one| own(one) && one.key == culprit.key).or_else(|| findings.iter().position(own));
     let explains = format!(
-        "{} {} of {} findings would be gone{}",
+        "if {}, {} of {} findings would disappear{}",
         culprit.how,
         culprit.explained,
         culprit.of,
@@ -122,7 +122,7 @@ pub fn in_order(source: &SpecSource, findings: &mut Vec<Diagnostic>) {
         None => {
             let spans = spec::load_as_far(source).0.map(|model| model.spans).unwrap_or_default();
             let Some(span) = spans.get(&culprit.key) else { return };
-            let message = format!("`{}` would explain most of what follows", culprit.key);
+            let message = format!("a mistake in `{}` would explain most of the following findings", culprit.key);
             let help = format!("check its unit, sign and order; {explains}");
             Diagnostic::new(ONE_VALUE, &culprit.key, Place::Spec(span.clone()), message, help)
         }
@@ -134,8 +134,8 @@ fn list_of(key: &str) -> &str {
     key.rsplit_once('[').filter(|_| key.ends_with(']')).map_or(key, |(list, _)| list)
 }
 
-/// What is found in a text, and where its values stand; none where it is not read as a whole.
-fn found(source: &SpecSource) -> Option<(Found, BTreeMap<String, Range<usize>>)> {
+/// Findings of a text, and the places of its values; none if it cannot be read completely.
+fn found(source: &SpecSource) -> Option<(Names, BTreeMap<String, Range<usize>>)> {
     let (model, mut findings) = spec::load_as_far(source);
     let model = model?;
     findings.extend(reach::check_bounds(&model));
@@ -158,7 +158,7 @@ fn culprit(source: &SpecSource, findings: &[Diagnostic]) -> Option<Culprit> {
         return None;
     }
     let model = spec::load_as_far(source).0?;
-    // Both at the amplifier's input agree with each other, and with nothing else.
+    // If both are given at the amplifier's input, they match each other but nothing else.
     if model.dac.range == model.actuator.voltage {
         let items =
             ["actuator.voltage", "dac.range"].map(|list| [0, 1].map(|item| spans.get(&format!("{list}[{item}]"))));
@@ -169,30 +169,30 @@ fn culprit(source: &SpecSource, findings: &[Diagnostic]) -> Option<Culprit> {
     let explained = |key: &str, text: String, how: String| -> Option<Slip> {
         let (now, _) = found(&SpecSource { text, ..source.clone() })?;
         let (gone, new) = (base.difference(&now).count(), now.difference(&base).count());
-        // Findings about one list name it already.
+        // If all findings are about one list, they name it already.
         let lists: BTreeSet<&str> = base.difference(&now).map(|(_, key)| list_of(key)).collect();
         let score = gone.saturating_sub(2 * new);
         let hint = readings::hint(&model, list_of(key));
         let culprit = Culprit { key: key.to_owned(), how, explained: gone, of: base.len(), hint };
         (lists.len() >= 2 && score >= 2 && 2 * gone > base.len()).then_some(Slip { score, culprit })
     };
-    // Of equal ones the first: the likeliest.
+    // Of equal scores the first: the likeliest.
     let better = |best: Option<Slip>, one: Slip| match best {
         Some(best) if best.score >= one.score => Some(best),
         _ => Some(one),
     };
     let mut best: Option<Slip> = None;
     for (key, places) in &suspects {
-        // One that explains everything is enough.
+        // This one explains everything.
         if best.as_ref().is_some_and(|best| best.score == base.len()) {
             break;
         }
         let tried = |factor: f64, of_unit: bool, how: &str, why: Option<&str>| {
             let text = changed(&source.text, places, factor, of_unit)?;
-            // One value is shown as it would be written.
+            // A single value is shown as it would be written.
             let written = match places.as_slice() {
-                [place] => format!("as {}", &text[place.start..place.end + text.len() - source.text.len()]),
-                [_, _, _, _] if key == "actuator.voltage" => format!("with `dac.range`, both {how},"),
+                [place] => format!("written as {}", &text[place.start..place.end + text.len() - source.text.len()]),
+                [_, _, _, _] if key == "actuator.voltage" => format!("it and `dac.range` are {how}"),
                 _ => how.to_owned(),
             };
             explained(key, text, why.map_or_else(|| written.clone(), |why| format!("{written} ({why})")))
@@ -215,14 +215,12 @@ fn culprit(source: &SpecSource, findings: &[Diagnostic]) -> Option<Culprit> {
         let mut text = source.text.clone();
         text.replace_range(second.clone(), &source.text[first.clone()]);
         text.replace_range(first.clone(), &source.text[second.clone()]);
-        best = explained(a, text, format!("with `{b}` in its place and the other way round,"))
-            .into_iter()
-            .fold(best, better);
+        best = explained(a, text, format!("swapped with `{b}`")).into_iter().fold(best, better);
     }
     best.map(|best| best.culprit)
 }
 
-/// Two readings of one value: that which explains more, or both where they explain as much and are not the same.
+/// The better of two explanations for one value; both if they score the same and differ.
 fn both(first: Option<Slip>, second: Option<Slip>) -> Option<Slip> {
     let (mut first, second) = match (first, second) {
         (Some(first), Some(second)) => (first, second),
@@ -232,23 +230,24 @@ fn both(first: Option<Slip>, second: Option<Slip>) -> Option<Slip> {
         return Some(if first.score > second.score { first } else { second });
     }
     if !first.culprit.how.starts_with(&second.culprit.how) {
-        first.culprit.how = format!("{}, or {},", first.culprit.how, second.culprit.how);
+        first.culprit.how = format!("{}, or {}", first.culprit.how, second.culprit.how);
     }
     Some(first)
 }
 
-/// Pairs of keys of which a finding says that they may be in each other's place.
+/// Pairs of keys that a finding suspects to be swapped.
 fn exchanged<'a>(findings: &'a [Diagnostic], spans: &BTreeMap<String, Range<usize>>) -> Vec<[&'a str; 2]> {
-    let said = findings.iter().filter(|one| one.help.contains("each other's place"));
-    said.filter_map(|one| {
-        let mut keys = one.help.split('`').skip(1).step_by(2).filter(|key| spans.contains_key(*key));
-        Some([keys.next()?, keys.next()?])
-    })
-    .collect()
+    findings
+        .iter()
+        .filter(|one| one.help.contains("swapped"))
+        .filter_map(|one| {
+            let mut keys = one.help.split('`').skip(1).step_by(2).filter(|key| spans.contains_key(*key));
+            Some([keys.next()?, keys.next()?])
+        })
+        .collect()
 }
 
-/// Values that findings are about or name, in their order: each item, and each list as a whole; with the places of their
-/// literals.
+/// Values that findings name, in the order of the findings: each item, then the whole list; with the places of their literals.
 fn suspects(findings: &[Diagnostic], spans: &BTreeMap<String, Range<usize>>) -> Vec<(String, Vec<Range<usize>>)> {
     let mut named: Vec<&str> = Vec::new();
     for finding in findings.iter().filter(|one| one.severity > Severity::Note) {
@@ -256,7 +255,7 @@ fn suspects(findings: &[Diagnostic], spans: &BTreeMap<String, Range<usize>>) -> 
         for text in [&finding.message, &finding.help] {
             named.extend(text.split('`').skip(1).step_by(2));
         }
-        // "[geometry]" stands for every value in it.
+        // "[geometry]" means every value in that section.
         for (section, _) in finding.help.split('[').skip(1).filter_map(|rest| rest.split_once(']')) {
             let within = |key: &&String| key.rsplit_once('.').is_some_and(|(outer, _)| outer == section);
             named.extend(spans.keys().filter(within).map(String::as_str));
@@ -284,7 +283,8 @@ fn suspects(findings: &[Diagnostic], spans: &BTreeMap<String, Range<usize>>) -> 
     suspects
 }
 
-/// The text with every literal times `factor`; none where one is no number, or has no unit and ought to, or nothing would change.
+/// The text with every literal times `factor`; none if one is not a number, or lacks the unit that `of_unit` requires, or if
+/// nothing would change.
 fn changed(text: &str, places: &[Range<usize>], factor: f64, of_unit: bool) -> Option<String> {
     let mut changed = text.to_owned();
     let mut any = false;
@@ -293,7 +293,7 @@ fn changed(text: &str, places: &[Range<usize>], factor: f64, of_unit: bool) -> O
         let inner = literal.trim_matches('"').trim_start();
         let end = inner.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(inner.len());
         let number: f64 = inner[..end].parse().ok()?;
-        // As decimal arithmetic has it.
+        // Rounded to the result of decimal arithmetic.
         let decimals = if SLIPS.iter().any(|(slip, _)| *slip == factor) { 12 } else { 3 };
         let scaled: f64 = format!("{:.decimals$e}", number * factor).parse().ok()?;
         any |= scaled != number;

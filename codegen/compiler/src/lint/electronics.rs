@@ -1,21 +1,21 @@
-//! Amplifier and converter.
+//! Amplifiers and digital-to-analogue converters.
 
-use super::{Facts, Found, figure, times_beyond};
+use super::{Facts, Findings, figure, times_beyond};
 use specgen_language::model::Model;
 
 lints! {
     rules: lag_fits_slew, current_fits_slew, amplifier_noise, capacitance_of_the_stacks, converter_step,
         converter_range, rest_without_power;
 
-    /// # W0805: an amplifier too slow for the slew rate
+    /// # W0805: amplifier too slow for the slew rate
     ///
-    /// A first-order lag makes at most range / lag of slew; `actuator.slew_rate`
-    /// should not exceed it.
-    ///
-    /// ## Why it matters
-    ///
-    /// The controller counts on a slew that the amplifier does not make, and its
-    /// model of the voltage runs ahead.
+        /// A first-order lag slews at most at range / lag. `actuator.slew_rate` should not
+        /// exceed that.
+        ///
+        /// ## Why it matters
+        ///
+        /// The controller assumes a slew rate that the amplifier does not reach, so its
+        /// model of the voltage runs ahead.
     ///
     /// ## Example
     ///
@@ -36,14 +36,14 @@ lints! {
     /// ```
     LAG_AGAINST_SLEW = "W0805";
 
-    /// # W0806: an amplifier without the current for the slew rate
+    /// # W0806: amplifier current too low for the slew rate
     ///
-    /// capacitance × slew_rate should not exceed `amplifier.current`, of one leg.
-    ///
-    /// ## Why it matters
-    ///
-    /// I = C dU/dt: beyond its current the amplifier limits the slew itself, unknown
-    /// to the controller. C is that of all stacks of a leg.
+        /// For one leg, capacitance × slew_rate should not exceed `amplifier.current`.
+        ///
+        /// ## Why it matters
+        ///
+        /// I = C dU/dt: at its current limit the amplifier limits the slew rate itself, and
+        /// the controller does not know. C is that of all stacks of a leg.
     ///
     /// ## Example
     ///
@@ -67,7 +67,7 @@ lints! {
     /// ```
     CURRENT_AGAINST_SLEW = "W0806";
 
-    /// # W0807: amplifier noise that cannot be
+    /// # W0807: implausible amplifier noise
     ///
     /// `amplifier.noise` (rms) should be between 2e-7 and 3e-4 of the voltage range.
     /// Above 1e-4 it should also move a leg by less than 25 times the noise of its
@@ -75,8 +75,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// Amplifiers for piezo stacks have 0.1 to 10 mV rms. Far more or far less is
-    /// usually a slip of the unit.
+        /// Amplifiers for piezo stacks have 0.1 to 10 mV rms. Far more or far less usually
+        /// means a wrong unit.
     ///
     /// ## Example
     ///
@@ -97,17 +97,17 @@ lints! {
     /// ```
     AMPLIFIER_NOISE = "W0807";
 
-    /// # W0864: a capacitance that does not fit stiffness and stroke
+    /// # W0864: capacitance inconsistent with stiffness and stroke
     ///
-    /// The energy of the charge at full voltage, C V²/2, is compared with that of the
-    /// blocked leg over its stroke, k d²/2: the second should be between a thousandth
-    /// of the first and five times the first.
-    ///
-    /// ## Why it matters
-    ///
-    /// Ceramics turn at most half of the electrical energy into mechanical. A
-    /// capacitance in nF that is meant in uF, or of one stack instead of all, makes the
-    /// current, and with it the slew rate, wrong by as much.
+        /// The electrical energy at full voltage, C V²/2, is compared with the elastic
+        /// energy of the blocked leg over its stroke, k d²/2. The elastic energy should be
+        /// between 0.001 and 5 times the electrical energy.
+        ///
+        /// ## Why it matters
+        ///
+        /// Ceramics convert at most half of the electrical energy into mechanical energy. A
+        /// capacitance in nF instead of uF, or of one stack instead of all, makes the
+        /// current and the possible slew rate wrong by the same factor.
     ///
     /// ## Example
     ///
@@ -127,15 +127,14 @@ lints! {
     /// ```
     CAPACITANCE_ODD = "W0864";
 
-    /// # W0808: converter step large against the stroke
+    /// # W0808: converter step too coarse for the stroke
     ///
     /// One code of `dac.bits` over `dac.range` should move a leg by less than a
     /// thousandth of its stroke.
     ///
     /// ## Why it matters
     ///
-    /// The platform goes to and fro between two codes by that much. 16 bits are
-    /// usual.
+        /// The platform dithers between two codes by that much. 16 bits are usual.
     ///
     /// ## Example
     ///
@@ -156,14 +155,14 @@ lints! {
     /// ```
     CONVERTER_COARSE = "W0808";
 
-    /// # W0849: a converter that the stacks hardly use
+    /// # W0849: converter range mostly unused
     ///
     /// `dac.range` should span less than four times `actuator.voltage`.
     ///
     /// ## Why it matters
     ///
-    /// Two bits and more are never used, and one code moves the leg four times as
-    /// far.
+        /// Two or more bits are never used, and one code moves the leg at least four times
+        /// as far as necessary.
     ///
     /// ## Example
     ///
@@ -184,15 +183,15 @@ lints! {
     /// ```
     CONVERTER_WIDE = "W0849";
 
-    /// # W0819: a rest that amplifiers do not keep when they are off
+    /// # W0819: rest voltage differs from amplifiers that are off
     ///
-    /// `supervisor.rest_voltage` should be 0 V where `actuator.voltage` allows it.
-    ///
-    /// ## Why it matters
-    ///
-    /// A stack whose amplifier is off discharges to 0 V. At another rest the legs
-    /// jump when the amplifiers are switched on, and again when they are switched
-    /// off.
+        /// `supervisor.rest_voltage` should be 0 V if `actuator.voltage` includes it.
+        ///
+        /// ## Why it matters
+        ///
+        /// A stack whose amplifier is off discharges to 0 V. With another rest voltage the
+        /// legs jump when the amplifiers are switched on, and again when they are switched
+        /// off.
     ///
     /// ## Example
     ///
@@ -205,31 +204,29 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Leave the key out, unless the amplifiers switch on and off slowly by
-    /// themselves.
+        /// Leave the key out, unless the amplifiers themselves ramp slowly when they switch.
     REST_NOT_ZERO = "W0819";
 }
 
-/// Largest slew rate of a first-order lag is range over time constant: a limit above that never binds.
+/// The largest slew rate of a first-order lag is range over time constant; a higher limit has no effect.
 const LAG_SLACK: f64 = 1.0;
-/// Noise of an amplifier, of its range: those for stacks have 0.1 to 10 mV on a hundred volts.
+/// Noise of an amplifier over its range: those for stacks have 0.1 to 10 mV on a hundred volts.
 const SOUND_NOISE: core::ops::RangeInclusive<f64> = 2e-7..=3e-4;
-/// Above this share, 10 mV on a hundred volts, the motion of a leg counts, too: no amplifier that is bought with care has so
-/// much …
+/// Above this share, 10 mV on a hundred volts, the noise is also compared with the gauges …
 const LOUD: f64 = 1e-4;
-/// … and this motion of a leg, in noises or steps of its gauge, is then reported.
+/// … and the motion of a leg must stay below this multiple of the noise or step of its gauge.
 const LOUDEST: f64 = 25.0;
-/// Energy of the blocked leg, k s²/2, over that of its charge, C U²/2: ceramics turn at most half of the one into the other,
-/// and levers leave a hundredth of that. Wide, for both figures come from data sheets.
+/// Energy of the blocked leg, k s²/2, over that of its charge, C U²/2: ceramics convert at most half, and a leg with levers a
+/// hundredth of that. The range is wide because both figures come from data sheets.
 const SOUND_COUPLING: core::ops::RangeInclusive<f64> = 1e-3..=5.0;
-/// A converter step of more than this share of the stroke is too coarse for any nanopositioning.
+/// Largest converter step, as a share of the stroke, that allows nanopositioning.
 const COARSEST_STEP: f64 = 1e-3;
 
-/// Range of a converter over that of the stacks: amplifiers are bought for their stacks.
+/// Largest range of a converter over that of the stacks: amplifiers are matched to their stacks.
 const WIDEST_RANGE: f64 = 4.0;
 
-/// An amplifier that is so slow never makes the declared slew rate.
-fn lag_fits_slew(facts: &Facts, found: &mut Found) {
+/// Checks that the lag of the amplifier allows the slew rate.
+fn lag_fits_slew(facts: &Facts, found: &mut Findings) {
     let (amplifier, actuator) = (&facts.model.amplifier, &facts.model.actuator);
     let [low, high] = actuator.voltage;
     let off = amplifier.lag * actuator.slew_rate / (LAG_SLACK * (high - low));
@@ -241,7 +238,7 @@ fn lag_fits_slew(facts: &Facts, found: &mut Found) {
         LAG_AGAINST_SLEW,
         "amplifier.lag",
         format!(
-            "with a lag of {} ms a step over {} V begins at {} V/ms, but `actuator.slew_rate` is {} V/ms",
+            "with a lag of {} ms a step of {} V starts at {} V/ms, but `actuator.slew_rate` is {} V/ms",
             figure(amplifier.lag * 1e3),
             figure(high - low),
             figure((high - low) / amplifier.lag * 1e-3),
@@ -251,8 +248,8 @@ fn lag_fits_slew(facts: &Facts, found: &mut Found) {
     );
 }
 
-/// What charges a stack: I = C dU/dt.
-fn current_fits_slew(facts: &Facts, found: &mut Found) {
+/// Checks the charging current of a leg: I = C dU/dt.
+fn current_fits_slew(facts: &Facts, found: &mut Findings) {
     let model = facts.model;
     let (Some(capacitance), Some(current)) = (model.actuator.capacitance, model.amplifier.current) else { return };
     let needed = capacitance * model.actuator.slew_rate;
@@ -264,26 +261,26 @@ fn current_fits_slew(facts: &Facts, found: &mut Found) {
         CURRENT_AGAINST_SLEW,
         "amplifier.current",
         format!(
-            "{} uF at {} V/ms take {} A, but the amplifier gives {} A",
+            "{} uF at {} V/ms need {} A, but the amplifier supplies {} A",
             figure(capacitance * 1e6),
             figure(model.actuator.slew_rate * 1e-3),
             figure(needed),
             figure(current)
         ),
         &format!(
-            "the amplifier's own limit is {} V/ms: write that as `actuator.slew_rate`, or check `actuator.capacitance` (of a whole leg) and `amplifier.current` (mA or A)",
+            "the amplifier can slew at {} V/ms: write that as `actuator.slew_rate`, or check `actuator.capacitance` (of a whole leg) and `amplifier.current` (mA or A)",
             figure(current / capacitance * 1e-3)
         ),
     );
 }
 
-/// Noise that would move a leg by much of its stroke, or that no amplifier is free of.
-fn amplifier_noise(facts: &Facts, found: &mut Found) {
+/// Checks the amplifier noise against the voltage range and the gauges.
+fn amplifier_noise(facts: &Facts, found: &mut Findings) {
     let (noise, actuator) = (facts.model.amplifier.noise, &facts.model.actuator);
     let [low, high] = actuator.voltage;
     let sensor = &facts.model.sensor;
     let step = sensor.step();
-    // Nothing below its step is seen.
+    // The gauge does not resolve less than its step.
     let seen = if sensor.noise > step { sensor.noise } else { step };
     let (share, beside) = (noise / (high - low), noise * actuator.leg_gain() / seen);
     let of_range = times_beyond(share, &SOUND_NOISE);
@@ -292,7 +289,7 @@ fn amplifier_noise(facts: &Facts, found: &mut Found) {
     }
     let moves = format!("moves a leg by {} nm rms", figure(noise * actuator.leg_gain() * 1e9));
     let how = if share < *SOUND_NOISE.start() {
-        format!("is quieter than any amplifier; it {moves}")
+        format!("is less than any real amplifier has; it {moves}")
     } else if share > *SOUND_NOISE.end() {
         format!("is {} of its range; it {moves}", figure(share))
     } else {
@@ -303,12 +300,12 @@ fn amplifier_noise(facts: &Facts, found: &mut Found) {
         AMPLIFIER_NOISE,
         "amplifier.noise",
         format!("an amplifier noise of {} mV rms on {} V {how}", figure(noise * 1e3), figure(high - low)),
-        "amplifiers for stacks have 0.1 to 10 mV rms: check the unit (V, mV or uV), and that it is rms, not peak to peak",
+        "amplifiers for stacks have 0.1 to 10 mV rms: check the unit (V, mV or uV), and that the value is rms, not peak to peak",
     );
 }
 
-/// What a stack makes of its charge.
-fn capacitance_of_the_stacks(facts: &Facts, found: &mut Found) {
+/// Checks electrical against elastic energy.
+fn capacitance_of_the_stacks(facts: &Facts, found: &mut Findings) {
     let actuator = &facts.model.actuator;
     let Some(capacitance) = actuator.capacitance else { return };
     let [low, high] = actuator.voltage;
@@ -324,18 +321,18 @@ fn capacitance_of_the_stacks(facts: &Facts, found: &mut Found) {
         CAPACITANCE_ODD,
         "actuator.capacitance",
         format!(
-            "charging {} uF to {} V takes {} J, and the blocked leg holds {} J (stiffness x stroke^2 / 2)",
+            "charging {} uF to {} V takes {} J, but the blocked leg stores {} J (stiffness x stroke^2 / 2)",
             figure(capacitance * 1e6),
             figure(volts),
             figure(charged / 2.0),
             figure(blocked / 2.0)
         ),
-        "ceramics turn at most half of the one into the other: check the unit of `actuator.capacitance` (uF or nF; of a whole leg), and `actuator.axial_stiffness`",
+        "ceramics convert at most half of the electrical energy: check the unit of `actuator.capacitance` (uF or nF; of a whole leg), and `actuator.axial_stiffness`",
     );
 }
 
-/// One code of the converter in nanometres.
-fn converter_step(facts: &Facts, found: &mut Found) {
+/// Checks one code of the converter against the stroke.
+fn converter_step(facts: &Facts, found: &mut Findings) {
     let (dac, actuator) = (&facts.model.dac, &facts.model.actuator);
     let [low, high] = dac.range;
     let volts = (high - low) / (libm::exp2(f64::from(dac.bits)) - 1.0);
@@ -354,12 +351,12 @@ fn converter_step(facts: &Facts, found: &mut Found) {
             figure(step / actuator.stroke),
             figure(actuator.stroke * 1e6)
         ),
-        "a converter of 16 bits or more is usual; check `dac.range` and `dac.bits` too: the range is in volts at the stack",
+        "16 bits or more are usual; check `dac.bits` and `dac.range`, which is in volts at the stack",
     );
 }
 
-/// A converter is not spread over many times what the stacks take.
-fn converter_range(facts: &Facts, found: &mut Found) {
+/// Checks the range of the converter against that of the stacks.
+fn converter_range(facts: &Facts, found: &mut Findings) {
     let ([low, high], [from, to]) = (facts.model.dac.range, facts.model.actuator.voltage);
     if high - low <= WIDEST_RANGE * (to - from) {
         return;
@@ -369,16 +366,16 @@ fn converter_range(facts: &Facts, found: &mut Found) {
         CONVERTER_WIDE,
         &format!("dac.range[{item}]"),
         format!(
-            "the converter spans {} V, the stacks take {} V of it",
+            "the converter spans {} V, but the stacks use only {} V of it",
             figure(high - low),
             figure(to - from)
         ),
-        "two bits and more of the converter are never used: check `dac.range`, in volts at the stack, and `actuator.voltage`",
+        "two or more bits of the converter are never used: check `dac.range`, in volts at the stack, and `actuator.voltage`",
     );
 }
 
-/// Amplifiers that are off leave the stacks at 0 V.
-fn rest_without_power(facts: &Facts, found: &mut Found) {
+/// Checks that the rest voltage is that of amplifiers that are off.
+fn rest_without_power(facts: &Facts, found: &mut Findings) {
     let model = facts.model;
     let [low, high] = model.actuator.voltage;
     let rest = model.rest_voltage();
@@ -390,10 +387,10 @@ fn rest_without_power(facts: &Facts, found: &mut Found) {
         REST_NOT_ZERO,
         "supervisor.rest_voltage",
         format!(
-            "the legs rest at {} V, but stacks whose amplifiers are off stand at 0 V: {} um that a leg jumps when they are switched on",
+            "the legs rest at {} V, but stacks discharge to 0 V when their amplifiers are off: a leg jumps by {} um when they are switched on",
             figure(rest),
             figure((rest - off).abs() * model.actuator.leg_gain() * 1e6)
         ),
-        "leave `supervisor.rest_voltage` out, unless the amplifiers switch on and off slowly by themselves",
+        "leave `supervisor.rest_voltage` out, unless the amplifiers themselves ramp slowly when they switch",
     );
 }

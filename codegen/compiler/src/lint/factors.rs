@@ -1,8 +1,8 @@
-//! Values that are usually left out, against what stands in their place, and factors against 1.
+//! Optional values compared with their defaults, and factors compared with 1.
 
 use core::ops::RangeInclusive;
 
-use super::{Facts, Found, figure, times_beyond};
+use super::{Facts, Findings, figure, times_beyond};
 use crate::lower::supervision::{defaults, samples, steadiness};
 use specgen_language::diagnostic::{Diagnostic, Severity};
 
@@ -11,15 +11,15 @@ lints! {
 
     /// # W0888: a value far from its default
     ///
-    /// Times, counts and bounds of `[supervisor]`, and `control.dynamics_tolerance`,
-    /// should be within a factor of 50 of their defaults. `disagreement` and
-    /// `tracking_error`, which are shares of a whole, should not exceed that whole.
-    /// `disturbance` should be at most 50 times its default, a thirtieth of the stroke.
-    ///
-    /// ## Why it matters
-    ///
-    /// A fault that is seen after ten seconds instead of ten milliseconds is seen too
-    /// late. Such a time is most often in another unit.
+        /// Times, counts and bounds of `[supervisor]`, and `control.dynamics_tolerance`,
+        /// should be within a factor of 50 of their defaults. `disagreement` and
+        /// `tracking_error`, which are fractions of a range, should not exceed that range.
+        /// `disturbance` should be at most 50 times its default, a thirtieth of the stroke.
+        ///
+        /// ## Why it matters
+        ///
+        /// A fault detected after ten seconds instead of ten milliseconds is detected too
+        /// late. Such a time is usually in the wrong unit.
     ///
     /// ## Example
     ///
@@ -43,12 +43,13 @@ lints! {
 
     /// # W0889: a factor far from 1
     ///
-    /// Factors of `[robust]` should be between a quarter and four, and 1 be among them.
-    ///
-    /// ## Why it matters
-    ///
-    /// They multiply what the spec says: 0.05 is not a tolerance of 5 % but a twentieth
-    /// of the mass, and 5 is five times the mass.
+        /// Factors of `[robust]` should be between 0.25 and 4, and their range should
+        /// include 1.
+        ///
+        /// ## Why it matters
+        ///
+        /// They multiply the nominal value: 0.05 is not a tolerance of 5 % but a twentieth
+        /// of the mass, and 5 is five times the mass.
     ///
     /// ## Example
     ///
@@ -62,7 +63,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Write smallest and largest factor.
+        /// Write the smallest and the largest factor.
     ///
     /// ```toml
     /// [robust]
@@ -71,19 +72,19 @@ lints! {
     FACTOR_ODD = "W0889";
 }
 
-/// A value over its default: a slip of a thousand lies far outside, whatever has its reason well inside.
+/// A value over its default: a factor of a thousand is far outside, any reasonable choice well inside.
 const NEAR_DEFAULT: RangeInclusive<f64> = 1.0 / 50.0..=50.0;
-/// The same of a bound whose default is a fifth of the whole: beyond the whole it is none.
+/// The same for a bound whose default is a fifth of the full range: beyond the full range it has no effect.
 const PART_OF_WHOLE: RangeInclusive<f64> = 1.0 / 50.0..=5.0;
-/// A factor that `specgen robust` puts on a figure of the spec.
+/// A factor by which `specgen robust` multiplies a value of the spec.
 const SOUND_FACTOR: RangeInclusive<f64> = 0.25..=4.0;
 
-/// A value that stands in the spec beside what would stand there without it.
+/// A value of the spec and its default.
 struct Pair {
     key: String,
     value: Option<f64>,
     default: f64,
-    /// How it is shown: unit, and how many of it are one in SI.
+    /// Displayed unit, and how many of it are one SI unit.
     unit: (&'static str, f64),
     sound: RangeInclusive<f64>,
 }
@@ -133,8 +134,8 @@ fn pairs(facts: &Facts) -> Vec<Pair> {
     pairs
 }
 
-/// Times and bounds of the supervisor, beside what holds without their keys.
-fn near_defaults(facts: &Facts, found: &mut Found) {
+/// Compares times and bounds of the supervisor with their defaults.
+fn near_defaults(facts: &Facts, found: &mut Findings) {
     for Pair { key, value, default, unit: (unit, scale), sound } in pairs(facts) {
         let Some(value) = value.filter(|value| times_beyond(value / default, &sound) > 1.0) else { continue };
         let shown = |value: f64| format!("{} {unit}", figure(value * scale)).trim_end().to_owned();
@@ -142,12 +143,12 @@ fn near_defaults(facts: &Facts, found: &mut Found) {
             FAR_FROM_DEFAULT,
             &key,
             format!("`{key}` is {}, {} times its default of {}", shown(value), figure(value / default), shown(default)),
-            "check its unit and its digits, or leave the key out",
+            "check its unit and digits, or leave the key out",
         );
     }
 }
 
-/// A value that is refused is not also far from its default.
+/// Drops [`FAR_FROM_DEFAULT`] for values that have an error.
 pub fn say_once(findings: &mut Vec<Diagnostic>) {
     let list = |key: &str| key.split('[').next().unwrap_or_default().to_owned();
     let errors = findings.iter().filter(|one| one.severity == Severity::Error);
@@ -155,8 +156,8 @@ pub fn say_once(findings: &mut Vec<Diagnostic>) {
     findings.retain(|one| one.code != FAR_FROM_DEFAULT || !refused.contains(&list(&one.key)));
 }
 
-/// What `specgen robust` varies are factors about 1, neither percent nor tolerances.
-fn near_one(facts: &Facts, found: &mut Found) {
+/// Checks that the factors of `specgen robust` are around 1, and not percentages or tolerances.
+fn near_one(facts: &Facts, found: &mut Findings) {
     let robust = &facts.model.robust;
     let ranges = [
         ("mass", robust.mass),
@@ -176,15 +177,15 @@ fn near_one(facts: &Facts, found: &mut Found) {
             found.add(
                 FACTOR_ODD,
                 &format!("{key}[{end}]"),
-                format!("`{key}` would be tried at {} times what the spec says", figure([low, high][end])),
-                "give the smallest and the largest factor on the value of the spec: a tolerance of 5 % is [0.95, 1.05]",
+                format!("`{key}` would multiply the nominal value by {}", figure([low, high][end])),
+                "give the smallest and the largest factor on the nominal value: a tolerance of 5 % is [0.95, 1.05]",
             );
         } else if low > 1.0 || high < 1.0 {
             found.add(
                 FACTOR_ODD,
                 &key,
-                format!("`{key}` goes from {} to {}: what the spec says, 1, is not in it", figure(low), figure(high)),
-                "give a smallest factor of at most 1 and a largest of at least 1; correct the value itself if it is off",
+                format!("`{key}` is from {} to {}, which does not include the nominal value, 1", figure(low), figure(high)),
+                "give a smallest factor of at most 1 and a largest of at least 1; if the nominal value is wrong, correct it instead",
             );
         }
     }

@@ -1,4 +1,4 @@
-//! Whether one slip in the layout of the gauges would explain that it sees a motion badly; in which order they are listed.
+//! Mistakes that explain why the gauges measure some motion badly; the order in which gauges are listed.
 
 use nalgebra::Matrix6;
 
@@ -6,7 +6,7 @@ use super::gauge_pattern::{Change, GAUGE_PATTERN, changes};
 use super::gauge_places::GAUGE_FAR;
 use super::gauges::GAUGES_ALIKE;
 use super::order::{JOINTS_CLOCKWISE, turn};
-use super::{Facts, Found, figure};
+use super::{Facts, Findings, figure};
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::Probe;
 use specgen_numerics::{cross, dot};
@@ -14,14 +14,14 @@ use specgen_numerics::{cross, dot};
 lints! {
     rules: slip_of_one, gauges_run_round;
 
-    /// # W0826: a layout of gauges that one slip would explain
+    /// # W0826: a poor gauge layout that one mistake would explain
     ///
-    /// Where the gauges see some motion badly, each sign and each order of two
-    /// coordinates is tried; one that makes the layout sound is named.
-    ///
-    /// ## Why it matters
-    ///
-    /// A badly seen motion amplifies the noise of the gauges by the condition number.
+        /// If the gauges measure some motion badly, each sign and each order of two
+        /// coordinates is tried. One that makes the layout good is reported.
+        ///
+        /// ## Why it matters
+        ///
+        /// For a badly measured motion, the condition number amplifies the gauge noise.
     ///
     /// ## Example
     ///
@@ -35,7 +35,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Correct the gauge that the message names.
+        /// Correct the gauge named in the message.
     ///
     /// ```toml
     /// point     = ["-80 mm", "0 mm", "180 mm"]
@@ -44,14 +44,14 @@ lints! {
 
     /// # N0883: gauges and joints numbered in opposite directions
     ///
-    /// The three gauges along the axis run round it in the opposite direction to the
-    /// joints, seen from above.
-    ///
-    /// ## Why it matters
-    ///
-    /// Any order may be meant. But if x or y of the gauges was measured to the other
-    /// side, the layout is mirrored: everything else about it looks right, and
-    /// rotations are measured with the wrong sign.
+        /// Seen from above, the three gauges along the axis are numbered in the opposite
+        /// direction to the joints.
+        ///
+        /// ## Why it matters
+        ///
+        /// Any order is possible. But if x or y of the gauges has the wrong sign, the
+        /// layout is mirrored: everything else looks right, but rotations are measured with
+        /// the wrong sign.
     ///
     /// ## Example
     ///
@@ -75,7 +75,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Nothing, if the gauges are wired in this order. Otherwise correct the signs.
+    /// None needed if the gauges are wired in this order. Otherwise correct the signs.
     ///
     /// ```toml
     /// point     = ["-40 mm", "69.282 mm", "180 mm"]
@@ -88,15 +88,15 @@ lints! {
     GAUGES_MIRRORED = "N0883";
 }
 
-/// A layout is suspected if undoing one slip makes its condition this many times better.
+/// A layout is reported if undoing one mistake improves its condition number by this factor.
 const MUCH_BETTER: f64 = 1.5;
-/// Below this condition a layout is good whatever could be better.
+/// Below this condition number a layout is good.
 const GOOD: f64 = 2.0;
 
-/// Within this cosine of the axis a gauge looks along it.
+/// Least cosine to the axis of a gauge that measures along it.
 const AXIAL: f64 = 0.99;
 
-/// Best seen over worst seen motion, turns counted at the joint radius; infinite if one is not seen at all.
+/// Condition number: best over worst measured motion, rotations as motion at the joint radius; infinite if one is not measured.
 fn condition(probes: &[Probe; 6], height: f64, radius: f64) -> f64 {
     let mut rows = Matrix6::zeros();
     for (k, probe) in probes.iter().enumerate() {
@@ -119,10 +119,10 @@ fn condition(probes: &[Probe; 6], height: f64, radius: f64) -> f64 {
     if values.min() > 1e-9 { values.max() / values.min() } else { f64::INFINITY }
 }
 
-/// Names the one gauge whose sign or order of coordinates would explain a layout that sees badly.
-fn slip_of_one(facts: &Facts, found: &mut Found) {
+/// Finds the gauge whose sign or order of coordinates would explain a poor layout.
+fn slip_of_one(facts: &Facts, found: &mut Findings) {
     let Some(task) = &facts.model.task_space else { return };
-    // A slip that puts a gauge out of the pattern of the others is known better from that, and a copy as a copy.
+    // These findings are more specific.
     let known = |finding: &Diagnostic| finding.code == GAUGE_PATTERN || finding.code == GAUGES_ALIKE;
     if found.list.iter().any(known) || (0..6).any(|gauge| found.is_in_other_frame(gauge)) {
         return;
@@ -145,7 +145,7 @@ fn slip_of_one(facts: &Facts, found: &mut Found) {
     if !best.is_finite() || now < MUCH_BETTER * best {
         return;
     }
-    // Others do as well, or nearly: the slip may be in any of them.
+    // Changes that are as good or nearly as good: the mistake may be in any of them.
     let mut keys: Vec<&str> = Vec::new();
     for (_, change) in tried.iter().filter(|(other, _)| *other <= 1.2 * best) {
         if !keys.contains(&change.key.as_str()) {
@@ -153,30 +153,30 @@ fn slip_of_one(facts: &Facts, found: &mut Found) {
         }
     }
     let seen = if now.is_finite() {
-        format!("see one motion {} times better than another", figure(now))
+        format!("measure one motion {} times better than another", figure(now))
     } else {
-        "do not see every motion".to_owned()
+        "do not measure every motion".to_owned()
     };
     found.add(
         GAUGE_SLIP,
         &first.key,
         format!(
-            "the gauges {seen}; with {} in `{}` changed it would be {} times",
+            "the gauges {seen}; with {} in `{}` changed, the ratio would be {}",
             first.what,
             first.key,
             figure(*best)
         ),
         &format!(
-            "check signs and order of the coordinates in {}",
+            "check the signs and the order of the coordinates in {}",
             keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")
         ),
     );
 }
 
-/// Gauges along the axis that are numbered the other way round than the joints: a mirrored layout looks so.
-fn gauges_run_round(facts: &Facts, found: &mut Found) {
+/// Checks whether gauges along the axis are numbered in the opposite direction to the joints, as in a mirrored layout.
+fn gauges_run_round(facts: &Facts, found: &mut Findings) {
     let Some(task) = &facts.model.task_space else { return };
-    // These findings explain it.
+    // These findings would explain it.
     let known = [JOINTS_CLOCKWISE, GAUGE_PATTERN, GAUGE_FAR];
     if found.list.iter().any(|one| known.iter().any(|code| one.code == *code)) {
         return;
@@ -192,9 +192,9 @@ fn gauges_run_round(facts: &Facts, found: &mut Found) {
         GAUGES_MIRRORED,
         &format!("gauge[{}].point", numbers[1]),
         format!(
-            "gauges {}, {} and {} run {} seen from above, the joints {}",
+            "seen from above, gauges {}, {} and {} are numbered {}, the joints {}",
             numbers[0], numbers[1], numbers[2], way[0], way[1]
         ),
-        "gauges may be numbered in any order; but if x or y was measured to the other side, the layout is mirrored, and rotations come out with the wrong sign",
+        "gauges may be numbered in any order; but if x or y has the wrong sign, the layout is mirrored, and rotations are measured with the wrong sign",
     );
 }

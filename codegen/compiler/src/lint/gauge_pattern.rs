@@ -1,23 +1,24 @@
-//! Gauges stand in a pattern. One that stands out of it, and would not with one slip undone, has that slip: a chance layout
-//! comes within a thousandth of a pattern once in hundreds.
+//! Gauges are usually arranged in a pattern. A gauge that breaks the pattern, and would fit after correcting one mistake,
+//! probably has that mistake: a random layout fits a pattern to a thousandth only once in hundreds.
 
 use super::gauges::GAUGES_ALIKE;
-use super::{Facts, Found};
+use super::{Facts, Findings};
 use specgen_language::model::Probe;
 
 lints! {
     rules: out_of_pattern;
 
-    /// # W0848: a gauge out of the pattern of the others
+    /// # W0848: a gauge that breaks the pattern of the others
     ///
-    /// Gauges are at one height or one radius, measure along the axis, along their
-    /// radius or across it, or form an equilateral triangle. One that does not, and
-    /// would with another sign, digit or order of its coordinates, is named.
-    ///
-    /// ## Why it matters
-    ///
-    /// A gauge that is not where the spec says gives a pose that is wrong by
-    /// its lever: tilts are read where there are none.
+        /// Gauges usually share one height or one radius, measure along the axis, along
+        /// their radius or tangentially, or form an equilateral triangle. A gauge that does
+        /// not, but would with a different sign, digit or order of its coordinates, is
+        /// reported.
+        ///
+        /// ## Why it matters
+        ///
+        /// If a gauge is not where the spec says, its lever arm is wrong: the pose has
+        /// tilts that do not exist.
     ///
     /// ## Example
     ///
@@ -31,7 +32,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Compare with the drawing.
+    /// Compare the coordinates with the drawing.
     ///
     /// ```toml
     /// point     = ["-40 mm", "69.282 mm", "180 mm"]
@@ -39,10 +40,10 @@ lints! {
     GAUGE_PATTERN = "W0848";
 }
 
-/// How near to a pattern counts as in it: points are written with four digits.
+/// Relative tolerance of a pattern: points are written with four digits.
 const NEAR: f64 = 2e-3;
 
-/// One change of one gauge: what was mistaken, if it was.
+/// One possible mistake in one gauge, corrected.
 pub(super) struct Change {
     pub(super) key: String,
     pub(super) what: String,
@@ -51,7 +52,7 @@ pub(super) struct Change {
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Signs and coordinates of `vector` in each other's place; what they would be called.
+/// Variants of `vector` with a changed sign or swapped coordinates, each with its description.
 fn changed(vector: [f64; 3]) -> Vec<([f64; 3], String)> {
     let mut list = Vec::new();
     for k in 0..3 {
@@ -76,7 +77,7 @@ pub(super) fn changes(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
     let point = changed(probe.point).into_iter().map(|(point, what)| Change {
         key: format!("gauge[{gauge}].point"),
         what,
-        // The target faces the gauge, wherever that is.
+        // The target moves with the gauge.
         probe: Probe { point, plane_point: [point[0], point[1], point[2] - height], ..probe.clone() },
     });
     let direction = changed(probe.direction).into_iter().map(|(direction, what)| Change {
@@ -87,14 +88,14 @@ pub(super) fn changes(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
     point.chain(direction).collect()
 }
 
-/// Whether a gauge keeps to what the others do; none if those have no such pattern.
+/// Whether a gauge fits the pattern of the others; none if the others have no such pattern.
 type Pattern = fn(&[Probe; 6], usize) -> Option<bool>;
 
 const PATTERNS: [(Pattern, &str); 4] = [
-    (height, "stands at the height of the other five"),
-    (radius, "stands as far from the axis as the other five"),
-    (line, "looks along the axis, along its radius or across it, as the other five do"),
-    (triangle, "makes an equilateral triangle with the other two that look along the axis"),
+    (height, "is at the height of the other five"),
+    (radius, "is as far from the axis as the other five"),
+    (line, "measures along the axis, along its radius or tangentially, as the other five do"),
+    (triangle, "forms an equilateral triangle with the other two that measure along the axis"),
 ];
 
 fn across(probe: &Probe) -> f64 {
@@ -140,17 +141,17 @@ fn triangle(probes: &[Probe; 6], gauge: usize) -> Option<bool> {
     axial(&probes[gauge]).then_some(ab > 0.0 && alike)
 }
 
-/// A point in the platform's frame, for one in the base's.
+/// The gauge with its point taken as relative to the platform.
 fn frame(gauge: usize, probe: &Probe, height: f64) -> Change {
     let [x, y, z] = probe.point;
     Change {
         key: format!("gauge[{gauge}].point"),
-        what: "z counted from the base, in {B},".to_owned(),
+        what: "z measured from the base, in {B},".to_owned(),
         probe: Probe { point: [x, y, z + height], plane_point: [x, y, z], ..probe.clone() },
     }
 }
 
-/// A digit too many or too few in a coordinate, or cm for mm.
+/// A coordinate with a digit too many or too few, or cm for mm.
 fn digits(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
     let each = (0..3).flat_map(|axis| [(axis, 10.0), (axis, 0.1)]);
     each.map(|(axis, factor)| {
@@ -165,14 +166,14 @@ fn digits(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
     .collect()
 }
 
-/// Names the gauge whose sign, digits or order of coordinates would put it in line with the others.
-fn out_of_pattern(facts: &Facts, found: &mut Found) {
+/// Finds the gauge whose sign, digits or order of coordinates, if corrected, would fit the pattern.
+fn out_of_pattern(facts: &Facts, found: &mut Findings) {
     let Some(task) = &facts.model.task_space else { return };
-    // A copy is known as a copy.
+    // A copied gauge has its own finding.
     if found.list.iter().any(|finding| finding.code == GAUGES_ALIKE) {
         return;
     }
-    // How many patterns each change restores, and one of them; changes that break none.
+    // For each change that breaks no pattern: how many patterns it restores, and one of them.
     let mut restoring: Vec<(usize, &str, Change)> = Vec::new();
     for gauge in 0..6 {
         let now = PATTERNS.map(|(pattern, _)| pattern(&task.probes, gauge));
@@ -204,9 +205,9 @@ fn out_of_pattern(facts: &Facts, found: &mut Found) {
     found.add(
         GAUGE_PATTERN,
         &first.key,
-        format!("with {} in `{}` changed, the gauge {pattern}; as it is written it does not", first.what, first.key),
+        format!("with {} in `{}` changed, the gauge {pattern}; as written it does not fit", first.what, first.key),
         &format!(
-            "check signs, digits and order of the coordinates, in {{B}}, in {}",
+            "check the signs, the digits and the order of the coordinates, which are in {{B}}, in {}",
             keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")
         ),
     );

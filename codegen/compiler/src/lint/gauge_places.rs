@@ -1,21 +1,21 @@
-//! Where gauges look at the platform.
+//! Where the lines of the gauges meet the platform.
 
-use super::{Facts, Found, figure};
+use super::{Facts, Findings, figure};
 use specgen_language::model::Probe;
 
 lints! {
     rules: turned_layout, size_of_pattern, size_of_layout;
 
-    /// # W0884: gauge points and directions turned against each other
+    /// # W0884: gauge points and directions rotated
     ///
-    /// Gauges that look across the axis look along a radius or along its tangent.
-    /// Three or more that are all turned from it by the same angle are reported; 45
-    /// degrees is not, for gauges at the corners of a square look so.
-    ///
-    /// ## Why it matters
-    ///
-    /// Points and directions are then in frames that are turned against each other.
-    /// Translations come out turned, too.
+        /// Gauges that measure across the axis usually measure along a radius or a tangent.
+        /// Three or more that are all rotated from it by the same angle are reported. 45
+        /// degrees is not: gauges at the corners of a square have it.
+        ///
+        /// ## Why it matters
+        ///
+        /// Points and directions are then in frames that are rotated against each other,
+        /// and measured translations are rotated, too.
     ///
     /// ## Example
     ///
@@ -65,13 +65,13 @@ lints! {
 
     /// # W0885: gauges close together
     ///
-    /// The farthest gauge should be at least a fifth of the joint radius from the
+    /// The outermost gauge should be at least a fifth of the joint radius from the
     /// axis.
     ///
     /// ## Why it matters
     ///
-    /// Close together, gauges see a rotation through a short lever, and noise hides it.
-    /// Points in cm that were written as mm look like this.
+        /// With a short lever arm, a rotation changes the readings little and is lost in
+        /// noise. The usual cause is points in cm that were written as mm.
     ///
     /// ## Example
     ///
@@ -155,14 +155,14 @@ lints! {
     /// ```
     LAYOUT_SMALL = "W0885";
 
-    /// # W0825: a gauge that looks past the platform
+    /// # W0825: a gauge that misses the platform
     ///
     /// The line of a gauge should meet its target plane within about one and a half
     /// radii of the platform.
     ///
     /// ## Why it matters
     ///
-    /// There is no target there: coordinates are in another order or unit.
+        /// There is no target there. Coordinates are usually in the wrong order or unit.
     ///
     /// ## Example
     ///
@@ -185,18 +185,18 @@ lints! {
     GAUGE_FAR = "W0825";
 }
 
-/// A line within this cosine of the axis: where along the axis it begins does not matter.
+/// Least cosine to the axis of a gauge whose position along the axis does not matter.
 pub(super) const ALONG_AXIS: f64 = 0.5;
-/// Lines that all look beside radius and tangent by an angle, deg, and how far these angles may differ.
+/// Least reported angle of the lines to radius and tangent, deg, and the most that these angles may differ.
 const TURNED: f64 = 3.0;
 const ALIKE: f64 = 0.5;
-/// Fewest such lines: two are alike by chance.
+/// Fewest such lines: two may agree by chance.
 const FEWEST: usize = 3;
-/// Nearer to the axis than this share of its radius no line is beside it.
+/// Least distance from the axis, in joint radii, at which the angle means something.
 const OFF_AXIS: f64 = 0.1;
-/// The farthest gauge stands so many joint radii from the axis, at least.
+/// Least distance of the outermost gauge from the axis, in joint radii.
 const NARROWEST: f64 = 0.2;
-/// Farthest target from P_C, in joint radii.
+/// Largest distance of a target from P_C, in joint radii.
 const DETACHED: f64 = 3.0;
 
 /// Where the line of a gauge meets its target at rest, in {P}, m.
@@ -208,7 +208,7 @@ pub(super) fn pierced(probe: &Probe, height: f64) -> [f64; 3] {
     core::array::from_fn(|k| start[k] + way * n[k])
 }
 
-/// Angle from radius or tangent to the line of a gauge that looks across the axis, deg, from -45 to 45.
+/// Angle from radius or tangent to the line of a gauge that measures across the axis, deg, from -45 to 45.
 fn beside(probe: &Probe, height: f64, radius: f64) -> Option<f64> {
     let ([x, y, _], [a, b, c]) = (pierced(probe, height), probe.direction);
     if libm::fabs(c) >= ALONG_AXIS || libm::hypot(x, y) < OFF_AXIS * radius {
@@ -218,8 +218,8 @@ fn beside(probe: &Probe, height: f64, radius: f64) -> Option<f64> {
     Some(angle - 90.0 * libm::rint(angle / 90.0))
 }
 
-/// Gauges look along a radius or across it. All beside it by one angle: points and directions are turned against each other.
-fn turned_layout(facts: &Facts, found: &mut Found) {
+/// Checks whether all lines are rotated from radius or tangent by the same angle.
+fn turned_layout(facts: &Facts, found: &mut Findings) {
     let Some(task) = &facts.model.task_space else { return };
     let (height, radius) = (facts.model.geometry.height, facts.model.geometry.joint_radius());
     let angles: Vec<(usize, f64)> = task
@@ -233,7 +233,7 @@ fn turned_layout(facts: &Facts, found: &mut Found) {
         let apart = angle - first;
         libm::fabs(apart - 90.0 * libm::rint(apart / 90.0))
     };
-    // At the corners of a square, along its sides: 45 deg from both.
+    // Gauges at the corners of a square, along its sides, have 45 deg.
     let is_meant = libm::fabs(first) < TURNED || libm::fabs(first) > 45.0 - TURNED;
     if angles.len() < FEWEST || is_meant || angles.iter().any(|(_, angle)| apart(*angle) > ALIKE) {
         return;
@@ -242,16 +242,16 @@ fn turned_layout(facts: &Facts, found: &mut Found) {
         LAYOUT_TURNED,
         &format!("gauge[{gauge}].direction"),
         format!(
-            "the {} gauges that look across the axis are all turned by {} deg from their radius or its tangent",
+            "the {} gauges that measure across the axis are all rotated by {} deg from their radius or tangent",
             angles.len(),
             figure(libm::fabs(first))
         ),
-        "points and directions are both in {B}: check that both are given along its axes",
+        "points and directions are both in {B}: check that both use its axes",
     );
 }
 
-/// Gauges stand apart by much of the platform: on a spot in its middle they do not see it turn.
-fn size_of_pattern(facts: &Facts, found: &mut Found) {
+/// Checks that the gauges are far enough apart to measure rotations.
+fn size_of_pattern(facts: &Facts, found: &mut Findings) {
     let Some(task) = &facts.model.task_space else { return };
     let (height, radius) = (facts.model.geometry.height, facts.model.geometry.joint_radius());
     let far = task.probes.iter().fold(0.0, |far: f64, probe| {
@@ -267,16 +267,16 @@ fn size_of_pattern(facts: &Facts, found: &mut Found) {
         LAYOUT_SMALL,
         "gauge[0].point",
         format!(
-            "all gauges stand within {} mm of the axis, on a platform whose joints are {} mm from the middle",
+            "all gauges are within {} mm of the axis, but the platform's joints are {} mm from it",
             figure(far * 1e3),
             figure(radius * 1e3)
         ),
-        "check the unit of the points (mm or cm), or set the gauges further apart: so near to each other they hardly see a rotation",
+        "check the unit of the points (mm or cm), or place the gauges further apart: this close together they hardly measure a rotation",
     );
 }
 
-/// Targets are on the platform.
-fn size_of_layout(facts: &Facts, found: &mut Found) {
+/// Checks that targets are on the platform.
+fn size_of_layout(facts: &Facts, found: &mut Findings) {
     let Some(task) = &facts.model.task_space else { return };
     let radius = facts.model.geometry.joint_radius();
     for (gauge, probe) in task.probes.iter().enumerate() {
@@ -291,12 +291,12 @@ fn size_of_layout(facts: &Facts, found: &mut Found) {
                     GAUGE_FAR,
                     &format!("gauge[{gauge}].point[{axis}]"),
                     format!(
-                        "the line of gauge {gauge} meets its target {} mm along {} from P_C, on a platform whose joints are {} mm from it",
+                        "the line of gauge {gauge} meets its target {} mm along {} from P_C, but the platform's joints are {} mm from it",
                         figure(pierced[axis] * 1e3),
                         ["x", "y", "z"][axis],
                         figure(radius * 1e3)
                     ),
-                    "check the order and the units of `point`: x, y, z in {B}, whose origin lies in the base",
+                    "check the order and the units of `point`: x, y, z in {B}, whose origin is in the base",
                 );
             }
             continue;
@@ -306,16 +306,16 @@ fn size_of_layout(facts: &Facts, found: &mut Found) {
             GAUGE_FAR,
             &format!("gauge[{gauge}].point"),
             format!(
-                "the line of gauge {gauge} meets its target {} mm from P_C, on a platform whose joints are {} mm from it",
+                "the line of gauge {gauge} meets its target {} mm from P_C, but the platform's joints are {} mm from it",
                 figure(far * 1e3),
                 figure(radius * 1e3)
             ),
-            "check `point`, `direction` ({B}) and `target_point`, `target_normal` ({P}, from P_C) of the gauge",
+            "check `point` and `direction` (in {B}), `target_point` and `target_normal` (in {P}, from P_C) of the gauge",
         );
     }
 }
 
-/// The axis, across the gauge's line, on which the target stands out from a platform of `radius`.
+/// The axis across the gauge's line on which the target is outside a platform of `radius`.
 fn aside(pierced: &[f64; 3], direction: &[f64; 3], radius: f64) -> Option<usize> {
     (0..3).find(|axis| direction[*axis].abs() < 0.5 && pierced[*axis].abs() > 1.5 * radius)
 }

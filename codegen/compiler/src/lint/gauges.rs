@@ -1,19 +1,19 @@
 //! Gauges: resolution, range, layout.
 
-use super::{FAR_OFF, Facts, Found, amount, figure};
+use super::{FAR_OFF, Facts, Findings, amount, figure};
 
 lints! {
     rules: differ, noise_of_a_step, range_centred, range_beyond_zero, step_against_stroke, odd_coordinates,
         opposite_directions, noise_of_many_steps;
 
-    /// # E0328: two gauges that are one
+    /// # E0328: two identical gauges
     ///
-    /// No two of the gauges may have the same `point` and the same `direction`.
-    ///
-    /// ## Why it matters
-    ///
-    /// Six readings are then five, and a motion of the platform is unseen. Most often
-    /// a section was copied and not changed.
+        /// No two gauges may have the same `point` and the same `direction`.
+        ///
+        /// ## Why it matters
+        ///
+        /// There are then only five independent readings, and one motion of the platform
+        /// is not measured. Usually a section was copied and not changed.
     ///
     /// ## Example
     ///
@@ -26,7 +26,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Give the second gauge its own place, or its own direction.
+    /// Give the second gauge its own point or direction.
     ///
     /// ```toml
     /// point     = ["-80 mm", "0 mm", "180 mm"]
@@ -40,8 +40,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// A noise below what the converter shows cannot be measured; it is a slip of the
-    /// unit, or the resolution of a data sheet at 1 Hz bandwidth.
+        /// Noise far below the resolution of the converter cannot be measured. The unit is
+        /// wrong, or the value is a data-sheet resolution at 1 Hz bandwidth.
     ///
     /// ## Example
     ///
@@ -62,16 +62,17 @@ lints! {
     /// ```
     GAUGE_QUIET = "W0820";
 
-    /// # W0821: a range with ends in different units?
+    /// # W0821: ends of the range in different units?
     ///
-    /// Neither end of `sensor.range` should lie a hundred times further from rest
-    /// than the other, nor five times further and five times beyond what there is to
-    /// see; a leg's gauge should not end five strokes away.
-    ///
-    /// ## Why it matters
-    ///
-    /// The step of the converter, and with it the noise of the loop, is counted from
-    /// the whole range.
+        /// Neither end of `sensor.range` should be a hundred times further from rest than
+        /// the other. Nor should it be both five times further and five times beyond the
+        /// motion of the platform. The range of a leg's gauge should end within five
+        /// strokes.
+        ///
+        /// ## Why it matters
+        ///
+        /// The whole range determines the step of the converter, and so the noise of the
+        /// loop.
     ///
     /// ## Example
     ///
@@ -94,13 +95,13 @@ lints! {
 
     /// # W0846: an end of the range that is nearly zero
     ///
-    /// An end of `sensor.range`, if it is not zero, should be at least a thousandth
-    /// of the range from rest.
-    ///
-    /// ## Why it matters
-    ///
-    /// It is a slip of nm for um: creep and drift alone would take the reading out of
-    /// the range.
+        /// An end of `sensor.range`, if it is not zero, should be at least a thousandth
+        /// of the range from rest.
+        ///
+        /// ## Why it matters
+        ///
+        /// It is usually nm written for um. Creep and drift alone would move the reading out
+        /// of the range.
     ///
     /// ## Example
     ///
@@ -123,13 +124,13 @@ lints! {
 
     /// # W0823: a coordinate that is nearly zero
     ///
-    /// A coordinate of a gauge, if it is not zero, should not be next to nothing
-    /// beside the size of the platform.
+        /// A coordinate of a gauge, if it is not zero, should not be tiny compared with the
+        /// size of the platform.
     ///
     /// ## Why it matters
     ///
-    /// It is a slip of mm for um or for m. The lever of the gauge about that axis
-    /// would vanish.
+        /// It is usually um or m written for mm. The lever arm of the gauge about that axis
+        /// would vanish.
     ///
     /// ## Example
     ///
@@ -151,14 +152,14 @@ lints! {
     /// ```
     COORDINATE_ODD = "W0823";
 
-    /// # W0824: gauges that count against each other
+    /// # W0824: gauges of opposite sign
     ///
-    /// Gauges along the same line should count in the same sense.
-    ///
-    /// ## Why it matters
-    ///
-    /// A wrong sign turns feedback into positive feedback: the loop runs away at
-    /// once. Check it by moving the platform by hand before the amplifiers are on.
+        /// Parallel gauges should have the same direction.
+        ///
+        /// ## Why it matters
+        ///
+        /// A wrong sign makes the feedback positive, and the loop is unstable. Check it by
+        /// moving the platform by hand before the amplifiers are switched on.
     ///
     /// ## Example
     ///
@@ -173,7 +174,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Turn the direction round, if the gauge really counts that way.
+    /// Reverse the direction, unless the gauge really counts that way.
     ///
     /// ```toml
     /// direction = [0, 0, 1]
@@ -182,14 +183,14 @@ lints! {
 
     /// # W0886: gauge noise of many steps
     ///
-    /// `sensor.noise` should be less than 40 steps of a converter of 18 bits or fewer.
-    /// A noise beyond that of all gauges is W0303.
-    ///
-    /// ## Why it matters
-    ///
-    /// A converter is chosen for its gauge. One that shows nothing but noise in its
-    /// last five bits belongs to a better gauge: the noise is in another unit, or peak
-    /// to peak.
+        /// `sensor.noise` should be less than 40 steps of a converter of 18 bits or fewer.
+        /// Noise beyond that of any gauge is reported as W0303.
+        ///
+        /// ## Why it matters
+        ///
+        /// A converter is matched to its gauge. If its last five bits were only noise, the
+        /// converter would be wasted. Usually the noise is in the wrong unit, or peak to
+        /// peak.
     ///
     /// ## Example
     ///
@@ -203,21 +204,22 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Check the unit; rms is meant.
+    /// Check the unit, and that the value is rms.
     ///
     /// ```toml
     /// noise = "2.2 nm"
     /// ```
     GAUGE_NOISY = "W0886";
 
-    /// # W0822: gauge step large against the stroke
+    /// # W0822: gauge step too coarse
     ///
-    /// One code of a gauge should be less than a thousandth of the stroke, and finer
-    /// than the noise where the range is more than five times what there is to see.
-    ///
-    /// ## Why it matters
-    ///
-    /// Feedback cannot do better than the step; it goes to and fro within it.
+        /// One code of a gauge should be less than a thousandth of the stroke. It should
+        /// also be finer than the noise if the range is more than five times the motion to
+        /// measure.
+        ///
+        /// ## Why it matters
+        ///
+        /// Feedback cannot do better than one step; the platform dithers within it.
     ///
     /// ## Example
     ///
@@ -239,34 +241,33 @@ lints! {
     GAUGE_COARSE = "W0822";
 }
 
-/// Noise below this share of a converter step cannot be known.
+/// Noise below this share of a converter step cannot be measured.
 const QUIETEST: f64 = 0.06;
-/// Range of a gauge over what there is to see.
+/// Largest range of a gauge over the motion to measure.
 const WIDEST: f64 = 5.0;
-/// Steps of noise beside which a converter is too fine to be meant, and bits from which on converters are so for any gauge.
+/// Largest noise of a gauge, in steps of a converter with at most [`FINE_BITS`].
 const NOISIEST: f64 = 40.0;
-/// Noise of what there is to see that no gauge has, and the narrowest range of the stroke, as the checks of the spec have them.
+/// Largest noise over the motion to measure, and the narrowest range over the stroke: as in the checks of the spec.
 const BEYOND_ALL: f64 = 2e-3;
 const NARROWEST: f64 = 0.05;
 const FINE_BITS: u32 = 18;
-/// A step coarser than this share of the stroke.
+/// Coarsest step, as a share of the stroke.
 const COARSEST_STEP: f64 = 1e-3;
-/// How far a gauge may reach to one side, in what there is to see there. Gauges come in steps of 2 to 2.5: that is two steps
-/// too wide.
+/// Largest range to one side, in motions to that side. Gauges are sold in steps of 2 to 2.5, so this is two steps too wide.
 const FARTHEST: f64 = 5.0;
-/// The two sides of a range that is declared about rest, where one reaches too far; and wherever it reaches.
+/// Largest ratio of the two sides of a range about rest: if one side is also beyond [`FARTHEST`], and in any case.
 const UNEVEN: f64 = 5.0;
 const LOPSIDED: f64 = 100.0;
-/// An end of the range that is not zero but below this share of the whole: nobody sets the zero of a gauge so near.
+/// Least distance of an end of the range from zero, as a share of the whole range, unless it is exactly zero.
 const END_AT_ZERO: f64 = 1e-3;
-/// A coordinate that is not zero but below this share of the platform, and above the rounding of a drawing.
+/// Coordinates between the two are suspicious: below this share of the platform, but above the rounding of a drawing, m.
 const NEARLY_ZERO: f64 = 2e-3;
 const ROUNDING: f64 = 1e-6;
-/// Lines within this angle of each other are parallel, as a cosine.
+/// Least cosine between parallel lines.
 const PARALLEL: f64 = 0.99;
 
-/// A noise far below the converter's step is a slip of the unit.
-fn noise_of_a_step(facts: &Facts, found: &mut Found) {
+/// Checks that the noise is not far below the converter's step.
+fn noise_of_a_step(facts: &Facts, found: &mut Findings) {
     let (noise, step) = (facts.model.sensor.noise, facts.model.sensor.step());
     if noise == 0.0 || noise >= QUIETEST * step {
         return;
@@ -275,25 +276,24 @@ fn noise_of_a_step(facts: &Facts, found: &mut Found) {
         GAUGE_QUIET,
         "sensor.noise",
         format!(
-            "a noise of {} nm rms is {} of the converter's step of {} nm",
+            "a noise of {} nm rms is only {} of the converter's step of {} nm",
             figure(noise * 1e9),
             figure(noise / step),
             figure(step * 1e9)
         ),
-        "a noise so far below the step cannot be measured: check `sensor.bits`, `sensor.range` and the unit of `sensor.noise` (nm or pm), or leave the noise out",
+        "noise this far below the step cannot be measured: check `sensor.bits`, `sensor.range` and the unit of `sensor.noise` (nm or pm), or leave the noise out",
     );
 }
 
-/// A converter of few bits that shows nothing but noise is a slip of the noise's unit, or of the range.
-fn noise_of_many_steps(facts: &Facts, found: &mut Found) {
+/// Checks that the noise does not fill the lower bits of the converter.
+fn noise_of_many_steps(facts: &Facts, found: &mut Findings) {
     let (noise, step, stroke) = (facts.model.sensor.noise, facts.model.sensor.step(), facts.model.actuator.stroke);
     let [low, high] = facts.model.sensor.range;
     let seen = if stroke < high - low { stroke } else { high - low };
-    // What is beyond all gauges is said with the spec (W0303). What is far beyond them is refused, unless it is the range that is
-    // odd (W0304).
+    // Noise beyond any gauge has a finding of its own (W0303). Far beyond, it is an error, unless the range is the odd one (W0304).
     let beyond = noise / (BEYOND_ALL * seen);
-    let is_said = beyond > 1.0 && (beyond < FAR_OFF || high - low < NARROWEST * stroke);
-    if facts.model.sensor.bits > FINE_BITS || noise <= NOISIEST * step || is_said {
+    let is_known = beyond > 1.0 && (beyond < FAR_OFF || high - low < NARROWEST * stroke);
+    if facts.model.sensor.bits > FINE_BITS || noise <= NOISIEST * step || is_known {
         return;
     }
     found.add_off(
@@ -307,17 +307,17 @@ fn noise_of_many_steps(facts: &Facts, found: &mut Found) {
             facts.model.sensor.bits,
             figure(step * 1e9)
         ),
-        "a converter is chosen for its gauge: check the unit of `sensor.noise` (nm or um; rms) and of `sensor.range`",
+        "a converter is matched to its gauge: check the unit of `sensor.noise` (nm or um; rms) and of `sensor.range`",
     );
 }
 
-/// Both ends of the range in the same unit.
-fn range_centred(facts: &Facts, found: &mut Found) {
+/// Checks that both ends of the range have the same unit.
+fn range_centred(facts: &Facts, found: &mut Findings) {
     let [low, high] = facts.model.sensor.range;
     let stroke = facts.model.actuator.stroke;
     let below = -low;
     let (asymmetric, item) = if facts.model.task_space.is_some() {
-        // Seen from rest, a platform moves both ways.
+        // From rest, a platform moves both ways.
         let seen = FARTHEST * farthest_seen(facts);
         let beyond = |far: f64, near: f64| far > LOPSIDED * near || (far > UNEVEN * near && far > seen);
         (below > 0.0 && high > 0.0 && (beyond(below, high) || beyond(high, below)), usize::from(high < below))
@@ -331,17 +331,17 @@ fn range_centred(facts: &Facts, found: &mut Found) {
         GAUGE_LOPSIDED,
         &format!("sensor.range[{item}]"),
         format!(
-            "the gauge reaches from {} um to {} um, the stroke is {} um",
+            "the gauge measures from {} um to {} um, but the stroke is {} um",
             figure(low * 1e6),
             figure(high * 1e6),
             figure(stroke * 1e6)
         ),
-        "check both ends of `sensor.range`, their unit and their digits",
+        "check the unit and digits of both ends of `sensor.range`",
     );
 }
 
-/// An end of a range in the wrong unit is a tiny one beside the other.
-fn range_beyond_zero(facts: &Facts, found: &mut Found) {
+/// Checks for an end of a range that is tiny compared with the other.
+fn range_beyond_zero(facts: &Facts, found: &mut Findings) {
     let model = facts.model;
     for (name, range, scale, unit) in
         [("sensor.range", model.sensor.range, 1e6, "um"), ("dac.range", model.dac.range, 1.0, "V")]
@@ -354,11 +354,11 @@ fn range_beyond_zero(facts: &Facts, found: &mut Found) {
                 RANGE_AT_ZERO,
                 &format!("{name}[{item}]"),
                 format!(
-                    "a range from {} {unit} to {} {unit} ends next to 0, but not there",
+                    "a range from {} {unit} to {} {unit} has an end that is almost 0",
                     figure(range[0] * scale),
                     figure(range[1] * scale)
                 ),
-                &format!("check the unit of this end of `{name}`; write 0 if it is meant to be there"),
+                &format!("check the unit of this end of `{name}`; write 0 if that is intended"),
             );
         }
     }
@@ -377,8 +377,8 @@ fn farthest_seen(facts: &Facts) -> f64 {
     })
 }
 
-/// A range of many times what there is to see wastes the converter, where its step is coarser than the gauge's noise.
-fn range_too_wide(facts: &Facts, found: &mut Found) {
+/// Checks for a range far beyond the motion, if that makes the step coarser than the noise.
+fn range_too_wide(facts: &Facts, found: &mut Findings) {
     let (model, step) = (facts.model, facts.model.sensor.step());
     let [low, high] = model.sensor.range;
     let seen = if model.task_space.is_some() { 2.0 * farthest_seen(facts) } else { model.actuator.stroke };
@@ -391,17 +391,17 @@ fn range_too_wide(facts: &Facts, found: &mut Found) {
         GAUGE_COARSE,
         "sensor.range",
         format!(
-            "the gauge spans {} um, {} times what there is to see; one code of it is {} nm{beside}",
+            "the gauge spans {} um, {} times the motion to measure; one code is {} nm{beside}",
             figure((high - low) * 1e6),
             figure((high - low) / seen),
             figure(step * 1e9)
         ),
-        "check the unit and the digits of `sensor.range`; a wide range asks for more `sensor.bits`",
+        "check the unit and digits of `sensor.range`; a wide range needs more `sensor.bits`",
     );
 }
 
-/// One code of the gauge against the stroke.
-fn step_against_stroke(facts: &Facts, found: &mut Found) {
+/// Checks one code of the gauge against the motion and the stroke.
+fn step_against_stroke(facts: &Facts, found: &mut Findings) {
     range_too_wide(facts, found);
     let (step, stroke) = (facts.model.sensor.step(), facts.model.actuator.stroke);
     if step <= COARSEST_STEP * stroke {
@@ -417,12 +417,12 @@ fn step_against_stroke(facts: &Facts, found: &mut Found) {
             figure(step / stroke),
             figure(stroke * 1e6)
         ),
-        "a converter of 16 bits or more is usual; check `sensor.range` and `sensor.bits`",
+        "16 bits or more are usual; check `sensor.range` and `sensor.bits`",
     );
 }
 
-/// Two gauges that see the same are one, whatever they are called: most often a section that was copied and not changed.
-fn differ(facts: &Facts, found: &mut Found) {
+/// Checks for identical gauges: usually a section that was copied and not changed.
+fn differ(facts: &Facts, found: &mut Findings) {
     let Some(task) = &facts.model.task_space else { return };
     let seen = |gauge: usize| {
         let probe = &task.probes[gauge];
@@ -434,15 +434,15 @@ fn differ(facts: &Facts, found: &mut Found) {
             GAUGES_ALIKE,
             &format!("gauge[{later}].point"),
             format!(
-                "gauge {later} stands and looks as gauge {earlier}: six readings are needed, and these two are one"
+                "gauge {later} has the same point and direction as gauge {earlier}; six independent readings are needed"
             ),
-            &format!("change `point` or `direction` of `gauge[{later}]`, if it was copied from `gauge[{earlier}]`"),
+            &format!("change `point` or `direction` of `gauge[{later}]`, which may be a copy of `gauge[{earlier}]`"),
         );
     }
 }
 
-/// A coordinate in the wrong unit is a tiny one beside large ones.
-fn odd_coordinates(facts: &Facts, found: &mut Found) {
+/// Checks for coordinates that are tiny compared with the platform.
+fn odd_coordinates(facts: &Facts, found: &mut Findings) {
     let Some(task) = &facts.model.task_space else { return };
     let radius = facts.model.geometry.joint_radius();
     for (gauge, probe) in task.probes.iter().enumerate() {
@@ -458,19 +458,19 @@ fn odd_coordinates(facts: &Facts, found: &mut Found) {
                 COORDINATE_ODD,
                 &format!("{key}[{axis}]"),
                 format!(
-                    "{} of `{key}` is {}, on a platform of {} mm",
+                    "{} of `{key}` is {}, but the platform has a radius of {} mm",
                     ["x", "y", "z"][axis],
                     amount(0, value),
                     figure(radius * 1e3)
                 ),
-                "check the unit (mm or um); write \"0 mm\" if it is meant to be in the middle",
+                "check the unit (mm or um); write \"0 mm\" if the centre is intended",
             );
         }
     }
 }
 
-/// Parallel gauges that count the same way are the rule; one that counts the other way has a wrong sign, or means to.
-fn opposite_directions(facts: &Facts, found: &mut Found) {
+/// Checks for a gauge that counts opposite to parallel ones.
+fn opposite_directions(facts: &Facts, found: &mut Findings) {
     let Some(task) = &facts.model.task_space else { return };
     let along = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     for (gauge, probe) in task.probes.iter().enumerate() {
@@ -484,16 +484,16 @@ fn opposite_directions(facts: &Facts, found: &mut Found) {
             }
         }
         let Some((other, count)) = against else { continue };
-        // Of two, the later one is named; of more, the one that stands alone.
+        // Of two, the later one is reported; of more, the one that differs.
         if count < with + 1 || (count == with + 1 && gauge < other) {
             continue;
         }
         found.add(
             GAUGE_REVERSED,
             &format!("gauge[{gauge}].direction"),
-            format!("gauge {gauge} counts against gauge {other}, which looks along the same line the other way"),
+            format!("gauge {gauge} counts opposite to gauge {other}, which is parallel to it"),
             &format!(
-                "a wrong sign makes the loop run away: with the amplifiers off, move the platform by hand and see that the readings go as `gauge[{other}].direction` and `gauge[{gauge}].direction` say; if so, nothing is wrong"
+                                "a wrong sign makes the loop unstable: with the amplifiers off, move the platform by hand; if the readings change as `gauge[{other}].direction` and `gauge[{gauge}].direction` say, both are correct"
             ),
         );
     }

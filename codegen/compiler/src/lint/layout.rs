@@ -1,6 +1,6 @@
-//! Where the joints are.
+//! Positions of the joints.
 
-use super::{Facts, Found, figure};
+use super::{Facts, Findings, figure};
 use crate::reach::joints;
 
 lints! {
@@ -8,12 +8,12 @@ lints! {
 
     /// # W0815: joints that would touch
     ///
-    /// Two joints of one body should be apart by more than a hundredth of a leg.
-    ///
-    /// ## Why it matters
-    ///
-    /// The legs would have to be thinner than that. Most often the half angle between
-    /// two joints is in another unit, or was halved twice.
+        /// Two joints of one body should be more than a hundredth of a leg length apart.
+        ///
+        /// ## Why it matters
+        ///
+        /// The legs would have to be thinner than that. Usually the angle between two
+        /// joints is in the wrong unit, or the half angle was given.
     ///
     /// ## Example
     ///
@@ -27,21 +27,21 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Check `base_angle` and `platform_angle`: each is the whole angle of a pair.
+    /// Check `base_angle` and `platform_angle`: each is the full angle between a pair.
     ///
     /// ```toml
     /// base_angle      = "0.012 pi rad"
     /// ```
     JOINTS_TOUCH = "W0815";
 
-    /// # E0860: joints beyond their angle
+    /// # E0860: joints beyond their angle limit
     ///
     /// Over the workspace, no joint at base or platform may turn further from rest
     /// than `leg.joint_angle`.
     ///
     /// ## Why it matters
     ///
-    /// A flexure bent beyond its angle yields or breaks.
+    /// A flexure bent beyond its limit yields or breaks.
     ///
     /// ## Example
     ///
@@ -68,7 +68,7 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// It is possible, but the base of most hexapods is the wider side.
+    /// It is possible, but most hexapods have a base wider than the platform.
     ///
     /// ## Example
     ///
@@ -82,7 +82,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Are the two radii in each other's place?
+    /// Check whether the two radii are swapped.
     ///
     /// ```toml
     /// base_radius     = "150 mm"
@@ -91,14 +91,14 @@ lints! {
 
     /// # W0817: radii and height out of proportion
     ///
-    /// Radii of base and platform and the height: one should not be five times larger
-    /// or smaller than what lies between the other two, nor a base more than 2.5 times
-    /// as wide as its platform.
-    ///
-    /// ## Why it matters
-    ///
-    /// A hexapod so flat or so high holds some motions badly; more often it is a slip
-    /// of the unit.
+        /// Base radius, platform radius and height should each be within a factor of five
+        /// of the geometric mean of the other two. The base should be at most 2.5 times as
+        /// wide as the platform.
+        ///
+        /// ## Why it matters
+        ///
+        /// A very flat or very tall hexapod is soft in some directions. More often a unit is
+        /// wrong.
     ///
     /// ## Example
     ///
@@ -112,7 +112,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Check the units of the three.
+    /// Check the units of all three.
     ///
     /// ```toml
     /// height          = "180 mm"
@@ -120,16 +120,15 @@ lints! {
     SIZES_APART = "W0817";
 }
 
-/// Two joints of one body nearer than this share of a leg cannot be built: a leg that is a hundred times as long as thick is no
-/// strut, and two stand beside each other.
+/// Least distance of two joints of one body, in leg lengths: two legs side by side cannot be thinner than this.
 const NEAREST: f64 = 1e-2;
-/// Base, platform and height are of one size: none is so many times larger or smaller than what lies between the others.
+/// Largest ratio of base, platform or height to the geometric mean of the other two.
 const OUT_OF_PROPORTION: f64 = 5.0;
-/// A base is so many times as wide as the platform, at most.
+/// Largest ratio of base radius to platform radius.
 const WIDEST_BASE: f64 = 2.5;
 
-/// The joints of a pair are two parts that stand beside each other.
-fn joints_apart(facts: &Facts, found: &mut Found) {
+/// Checks that joints are far enough apart to be built.
+fn joints_apart(facts: &Facts, found: &mut Findings) {
     let geometry = &facts.model.geometry;
     let Some(legs) = &facts.legs else { return };
     for (body, joints) in [("base", &geometry.base_joints), ("platform", &geometry.platform_joints)] {
@@ -141,7 +140,7 @@ fn joints_apart(facts: &Facts, found: &mut Found) {
         else {
             continue;
         };
-        // Legs that meet in one joint are a layout of their own; a gap that is nearly none is a slip.
+        // Legs that meet in one joint are a valid layout; only a tiny gap is reported.
         if gap == 0.0 || gap >= NEAREST * legs.shortest() {
             continue;
         }
@@ -160,14 +159,14 @@ fn joints_apart(facts: &Facts, found: &mut Found) {
                 figure(legs.shortest() * 1e3)
             ),
             &format!(
-                "check the unit of `{key}`: an angle of a few degrees sets the joints of a pair some millimetres apart"
+                "check the unit of `{key}`: with an angle of a few degrees, the joints of a pair are some millimetres apart"
             ),
         );
     }
 }
 
-/// The joints of a leg stand what the workspace asks of them.
-fn joints_turn(facts: &Facts, found: &mut Found) {
+/// Checks the angles of the joints over the workspace.
+fn joints_turn(facts: &Facts, found: &mut Findings) {
     let Some(most) = facts.model.leg.joint_angle else { return };
     let [base, platform] = joints::angles(&facts.model.geometry, &facts.model.workspace.bounds());
     let (end, angle) = if base > platform { ("base", base) } else { ("platform", platform) };
@@ -178,7 +177,7 @@ fn joints_turn(facts: &Facts, found: &mut Found) {
         JOINT_ANGLE,
         "leg.joint_angle",
         format!(
-            "in the declared workspace a joint at the {end} turns by {} mrad, but it may turn by {} mrad",
+            "in the declared workspace a joint at the {end} turns by {} mrad, but its limit is {} mrad",
             figure(angle * 1e3),
             figure(most * 1e3)
         ),
@@ -186,8 +185,8 @@ fn joints_turn(facts: &Facts, found: &mut Found) {
     );
 }
 
-/// Hexapods stand on a base that is wider than their platform.
-fn base_is_wider(facts: &Facts, found: &mut Found) {
+/// Checks that the base is wider than the platform.
+fn base_is_wider(facts: &Facts, found: &mut Findings) {
     let geometry = &facts.model.geometry;
     let radius = |joints: &[[f64; 3]; 6]| {
         joints.iter().map(|joint| libm::hypot(joint[0], joint[1])).fold(0.0, |a: f64, b| if b > a { b } else { a })
@@ -206,18 +205,18 @@ fn base_is_wider(facts: &Facts, found: &mut Found) {
         PLATFORM_WIDER,
         key,
         format!(
-            "the platform's joints are {} mm from its axis, those of the base {} mm",
+            "the platform's joints are {} mm from the axis, those of the base {} mm",
             figure(platform * 1e3),
             figure(base * 1e3)
         ),
         &format!(
-            "check that `{key}` and `{other}` are not in each other's place; a platform wider than its base is possible"
+            "check that `{key}` and `{other}` are not swapped; a platform wider than its base is possible but unusual"
         ),
     );
 }
 
-/// Radii and height of a hexapod are of one size.
-fn proportions(facts: &Facts, found: &mut Found) {
+/// Checks the proportions of radii and height.
+fn proportions(facts: &Facts, found: &mut Findings) {
     let geometry = &facts.model.geometry;
     let radius = |joints: &[[f64; 3]; 6]| {
         joints.iter().map(|joint| libm::hypot(joint[0], joint[1])).fold(0.0, |a: f64, b| if b > a { b } else { a })
@@ -228,14 +227,14 @@ fn proportions(facts: &Facts, found: &mut Found) {
         ["geometry.base_joints", "geometry.platform_joints", "geometry.height"]
     };
     let sizes = [radius(&geometry.base_joints), radius(&geometry.platform_joints), geometry.height];
-    // Against the geometric mean of the two others.
+    // Relative to the geometric mean of the other two.
     let apart: [f64; 3] = core::array::from_fn(|k| {
         let (a, b) = (sizes[(k + 1) % 3], sizes[(k + 2) % 3]);
         libm::fabs(libm::log(sizes[k] / libm::sqrt(a * b)))
     });
     let odd = (1..3).fold(0, |odd, k| if apart[k] > apart[odd] { k } else { odd });
     let wide = sizes[0] > WIDEST_BASE * sizes[1];
-    // A platform in the plane of its base is found where the legs are.
+    // A platform in the plane of its base has a finding of its own.
     if !apart[odd].is_finite() || (apart[odd] <= libm::log(OUT_OF_PROPORTION) && !wide) {
         return;
     }
@@ -251,13 +250,13 @@ fn proportions(facts: &Facts, found: &mut Found) {
         SIZES_APART,
         keys[odd],
         format!(
-            "joints are {} mm from the axis on the base and {} mm on the platform, at a height of {} mm",
+            "base joints are {} mm from the axis and platform joints {} mm, at a height of {} mm",
             figure(sizes[0] * 1e3),
             figure(sizes[1] * 1e3),
             figure(sizes[2] * 1e3)
         ),
         &format!(
-            "check the unit of `{}`{radius}: base, platform and height are of one size on most hexapods{width}",
+            "check the unit of `{}`{radius}: base, platform and height are of similar size on most hexapods{width}",
             keys[odd]
         ),
     );

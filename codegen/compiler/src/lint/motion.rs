@@ -1,22 +1,22 @@
-//! Limits of moves and streams against the workspace, the tick and the legs.
+//! Limits of moves and streams compared with workspace, tick and legs.
 
-use super::{AXES, Facts, Found, amount, figure};
+use super::{AXES, Facts, Findings, amount, figure};
 use specgen_language::model::SetpointRules;
 
 lints! {
     rules: rotations_beside_translations, stops_take_ticks, correction_moves_codes, moves_within_slew, moves_end,
         limits_bind, stream_limit_binds, streams_keep_up, streams_within_slew, workspace_is_used;
 
-    /// # W0887: rotations limited unlike translations
+    /// # W0887: limits of rotations and translations far apart
     ///
-    /// Limits of speed, acceleration and jerk of rotations should be within ten times
-    /// those of translations, at the joints or as parts of the workspace.
-    ///
-    /// ## Why it matters
-    ///
-    /// A rate in degrees where milliradians were meant is 17 times too fast, one in
-    /// radians where degrees were meant 57 times: too little to break another limit,
-    /// and enough to shake the platform.
+        /// Limits of speed, acceleration and jerk of rotations should be within a factor of
+        /// ten of those of translations, as motion at the joints or as fractions of the
+        /// workspace.
+        ///
+        /// ## Why it matters
+        ///
+        /// Degrees instead of milliradians are 17 times too fast, radians instead of
+        /// degrees 57 times. That may violate no other limit, but it shakes the platform.
     ///
     /// ## Example
     ///
@@ -30,20 +30,20 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Check the unit of the last three.
+    /// Check the units of the last three.
     ///
     /// ```toml
     /// speed        = ["100 um/s", "100 um/s", "100 um/s", "1 mrad/s", "1 mrad/s", "1 mrad/s"]
     /// ```
     LIMITS_APART = "W0887";
 
-    /// # W0840: moves faster than the slew rate
+    /// # W0840: moves beyond the slew rate
     ///
-    /// At `control.setpoint.speed` no leg should need more than `actuator.slew_rate`.
-    ///
-    /// ## Why it matters
-    ///
-    /// A move at that speed meets the slew limit and lags its profile.
+        /// At `control.setpoint.speed` no leg should need more than `actuator.slew_rate`.
+        ///
+        /// ## Why it matters
+        ///
+        /// A move at that speed runs into the slew limit and lags its profile.
     ///
     /// ## Example
     ///
@@ -71,7 +71,7 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// It is a slip of the unit: um/s for mm/s.
+    /// It is usually um/s written for mm/s.
     ///
     /// ## Example
     ///
@@ -92,16 +92,16 @@ lints! {
     /// ```
     MOVE_SLOW = "W0841";
 
-    /// # W0842: a limit of moves that has no effect
+    /// # W0842: a limit of moves without effect
     ///
-    /// Speed, acceleration and jerk belong together: each should take more than a
-    /// tick to be reached, and be reached at all. A stop should take more than a tick,
-    /// and a correction be worth ten codes of the converter.
-    ///
-    /// ## Why it matters
-    ///
-    /// A limit that is reached within a tick limits nothing; one that is never
-    /// reached is dead text. Either is most often off by 1000.
+        /// Within the workspace, moves should reach the limits of speed, acceleration and
+        /// jerk, and reaching them should take more than a tick. A stop should take more
+        /// than a tick. A correction should be at least ten codes of the converter.
+        ///
+        /// ## Why it matters
+        ///
+        /// A limit that is reached within a tick, or never, has no effect. It is usually
+        /// wrong by a factor of 1000.
     ///
     /// ## Example
     ///
@@ -115,22 +115,22 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Choose times: speed / acceleration and acceleration / jerk of some ten ticks.
+        /// Choose speed / acceleration and acceleration / jerk of some ten ticks.
     ///
     /// ```toml
     /// acceleration = ["10 mm/s^2", "10 mm/s^2", "10 mm/s^2", "100 mrad/s^2", "100 mrad/s^2", "100 mrad/s^2"]
     /// ```
     LIMIT_WITHOUT_EFFECT = "W0842";
 
-    /// # W0843: streamed set-points that are not checked
+    /// # W0843: stream speed limit without effect
     ///
     /// At `control.setpoint.stream_speed` a stream should not be able to cross the
     /// workspace in one tick.
     ///
     /// ## Why it matters
     ///
-    /// The bound is what protects the machine from a jump of the host. So high, it
-    /// lets every jump pass.
+        /// The limit protects the machine from jumps in the host's set-points. A limit this
+        /// high lets every jump pass.
     ///
     /// ## Example
     ///
@@ -144,7 +144,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Write the speed that your paths have, with some reserve.
+    /// Write the speed of your paths plus some reserve.
     ///
     /// ```toml
     /// stream_speed = ["5 mm/s", "5 mm/s", "5 mm/s", "50 mrad/s", "50 mrad/s", "50 mrad/s"]
@@ -158,8 +158,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// Streams are the way of fast set-points; a limit below that of moves is probably
-    /// a slip of the unit, and every stream that is faster is refused.
+        /// Streams are meant for fast set-points. A limit far below that of moves probably
+        /// has the wrong unit, and every faster stream is refused.
     ///
     /// ## Example
     ///
@@ -180,15 +180,14 @@ lints! {
     /// ```
     STREAM_SLOW = "W0867";
 
-    /// # W0844: a workspace bound of next to nothing
+    /// # W0844: a tiny workspace bound
     ///
-    /// A bound should be more than half a hundredth of what the legs reach on this
-    /// axis.
-    ///
-    /// ## Why it matters
-    ///
-    /// It is a slip of the unit: nm for um, urad for mrad. Nearly every set-point on
-    /// that axis would be refused.
+        /// A bound should be more than 0.5 % of the travel that the legs give this axis.
+        ///
+        /// ## Why it matters
+        ///
+        /// It is usually nm written for um, or urad for mrad. Nearly every set-point on
+        /// that axis would be refused.
     ///
     /// ## Example
     ///
@@ -210,33 +209,33 @@ lints! {
     WORKSPACE_TINY = "W0844";
 }
 
-/// A move across the workspace that takes longer than this is not meant, s.
+/// Longest plausible move across the workspace, s.
 const LONGEST_MOVE: f64 = 120.0;
-/// How many times over the whole way a limit would have to be kept before it is reached.
+/// A limit that is reached only after this many workspace widths is never reached.
 const NEVER: f64 = 4.0;
-/// A limit of jerk that is so much larger than what the acceleration needs ends within a tick.
+/// Ticks within which a limit is reached at once.
 const WITHIN_TICK: f64 = 1.0;
-/// A stream that may go slower than this share of the speed of moves.
+/// Least stream speed, as a share of the speed of moves.
 const SLOWEST_STREAM: f64 = 0.1;
-/// Smallest bound against what its legs reach.
+/// Least bound, as a share of the travel.
 const SMALLEST_USE: f64 = 5e-3;
-/// How many times faster or slower rotations are than translations, at the joints and against the workspace. Degrees for
-/// milliradians are 17 times, for radians 57.
+/// Largest ratio of rotations to translations, both at the joints and relative to the workspace. Degrees for milliradians are a
+/// factor of 17, radians for degrees 57.
 const APART: f64 = 10.0;
-/// Codes of the converter that a correction is worth, at least.
+/// Least correction, in codes of the converter.
 const FEWEST_CODES: f64 = 10.0;
 
 fn rules<'a>(facts: &Facts<'a>) -> Option<&'a SetpointRules> {
     facts.model.task_space.as_ref().map(|task| &task.setpoint)
 }
 
-/// Both ways from the middle, m or rad.
+/// Width of the workspace, m or rad.
 fn way(facts: &Facts, axis: usize) -> f64 {
     2.0 * facts.model.workspace.bounds()[axis]
 }
 
-/// The voltage follows a move at its largest speed.
-fn moves_within_slew(facts: &Facts, found: &mut Found) {
+/// Checks the largest speed of moves against the slew rate.
+fn moves_within_slew(facts: &Facts, found: &mut Findings) {
     let (Some(rules), Some(legs)) = (rules(facts), &facts.legs) else { return };
     let actuator = &facts.model.actuator;
     for (axis, speed) in rules.speed.into_iter().enumerate() {
@@ -248,22 +247,22 @@ fn moves_within_slew(facts: &Facts, found: &mut Found) {
             MOVE_BEYOND_SLEW,
             &format!("control.setpoint.speed[{axis}]"),
             format!(
-                "{}/s along {} needs {} V/ms, but `actuator.slew_rate` is {} V/ms",
+                "a speed of {}/s along {} needs {} V/ms, but `actuator.slew_rate` is {} V/ms",
                 amount(axis, speed),
                 AXES[axis],
                 figure(slew * 1e-3),
                 figure(actuator.slew_rate * 1e-3)
             ),
             &format!(
-                "at most {}/s keeps within the slew rate; check the units of both",
+                "at most {}/s is within the slew rate; check the units of both",
                 amount(axis, speed * actuator.slew_rate / slew)
             ),
         );
     }
 }
 
-/// A move across the workspace ends within the time that an operator waits.
-fn moves_end(facts: &Facts, found: &mut Found) {
+/// Checks how long a move across the workspace takes.
+fn moves_end(facts: &Facts, found: &mut Findings) {
     let Some(rules) = rules(facts) else { return };
     for (axis, speed) in rules.speed.into_iter().enumerate() {
         let time = way(facts, axis) / speed;
@@ -284,9 +283,9 @@ fn moves_end(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// Speed, acceleration and jerk belong together: each is reached, and none at once.
+/// Checks that speed, acceleration and jerk are each reached, but not within a tick.
 #[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
-fn limits_bind(facts: &Facts, found: &mut Found) {
+fn limits_bind(facts: &Facts, found: &mut Findings) {
     let Some(rules) = rules(facts) else { return };
     let tick = facts.model.timing.period;
     for axis in 0..6 {
@@ -304,7 +303,7 @@ fn limits_bind(facts: &Facts, found: &mut Found) {
             say(
                 "acceleration",
                 shown(acceleration, "s^2"),
-                format!("does nothing: a speed of {} is there within a tick", shown(speed, "s")),
+                format!("has no effect: a speed of {} is reached within a tick", shown(speed, "s")),
             );
         } else if speed * speed / acceleration > NEVER * way(facts, axis) {
             say(
@@ -317,7 +316,7 @@ fn limits_bind(facts: &Facts, found: &mut Found) {
             say(
                 "jerk",
                 shown(jerk, "s^3"),
-                format!("does nothing: an acceleration of {} is there within a tick", shown(acceleration, "s^2")),
+                format!("has no effect: an acceleration of {} is reached within a tick", shown(acceleration, "s^2")),
             );
         } else if acceleration * acceleration / jerk > 50.0 * NEVER * speed {
             say(
@@ -333,14 +332,14 @@ fn limits_bind(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// The middle of three.
+/// The median of three.
 fn middle(mut values: [f64; 3]) -> f64 {
     values.sort_by(f64::total_cmp);
     values[1]
 }
 
-/// Rotations and translations are limited alike: at the joints, or as parts of the workspace.
-fn rotations_beside_translations(facts: &Facts, found: &mut Found) {
+/// Compares the limits of rotations and translations.
+fn rotations_beside_translations(facts: &Facts, found: &mut Findings) {
     let Some(rules) = rules(facts) else { return };
     let radius = facts.model.geometry.joint_radius();
     let bounds = facts.model.workspace.bounds();
@@ -354,7 +353,7 @@ fn rotations_beside_translations(facts: &Facts, found: &mut Found) {
         let of = |first: usize, each: &dyn Fn(usize) -> f64| middle(core::array::from_fn(|k| each(first + k)));
         let along = of(0, &|axis| limits[axis]);
         let about = of(3, &|axis| limits[axis]);
-        // A locked axis has no way.
+        // A locked axis has no travel.
         let part = |axis: usize| if bounds[axis] > 0.0 { limits[axis] / bounds[axis] } else { f64::INFINITY };
         let ratios = [radius * about / along, of(3, &part) / of(0, &part)];
         let faster = ratios.iter().all(|ratio| *ratio > APART);
@@ -366,7 +365,7 @@ fn rotations_beside_translations(facts: &Facts, found: &mut Found) {
             LIMITS_APART,
             &format!("{key}[3]"),
             format!(
-                "rotations are limited to {} {}, which is {} {} at the joints, translations to {} {}: {} times {}",
+                "rotations are limited to {} {}, which is {} {} at the joints; translations are limited to {} {}, {} times {}",
                 figure(about),
                 unit[1],
                 figure(radius * about * 1e3),
@@ -381,8 +380,8 @@ fn rotations_beside_translations(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// A stop that is over within a tick is no stop, but a jump.
-fn stops_take_ticks(facts: &Facts, found: &mut Found) {
+/// Checks that a stop takes more than a tick.
+fn stops_take_ticks(facts: &Facts, found: &mut Findings) {
     let Some(rules) = rules(facts) else { return };
     let Some(limits) = rules.stop_acceleration else { return };
     let tick = facts.model.timing.period;
@@ -396,7 +395,7 @@ fn stops_take_ticks(facts: &Facts, found: &mut Found) {
             LIMIT_WITHOUT_EFFECT,
             &format!("control.setpoint.stop_acceleration[{axis}]"),
             format!(
-                "a limit of {}/s^2 on {} does nothing: a speed of {}/s is gone within a tick",
+                "a limit of {}/s^2 on {} has no effect: it stops a speed of {}/s within a tick",
                 amount(axis, limit),
                 AXES[axis],
                 amount(axis, fastest)
@@ -407,8 +406,8 @@ fn stops_take_ticks(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// A correction of a few codes corrects nothing.
-fn correction_moves_codes(facts: &Facts, found: &mut Found) {
+/// Checks that a correction is more than a few codes.
+fn correction_moves_codes(facts: &Facts, found: &mut Findings) {
     let model = facts.model;
     let Some(correction) = model.task_space.as_ref().and_then(|task| task.correction) else { return };
     let [low, high] = model.dac.range;
@@ -420,7 +419,7 @@ fn correction_moves_codes(facts: &Facts, found: &mut Found) {
         LIMIT_WITHOUT_EFFECT,
         "control.correction",
         format!(
-            "a correction of {} nm at most does nothing: one code of the converter moves a leg by {} nm",
+            "a correction of at most {} nm has no effect: one code of the converter moves a leg by {} nm",
             figure(correction * 1e9),
             figure(code * 1e9)
         ),
@@ -428,8 +427,8 @@ fn correction_moves_codes(facts: &Facts, found: &mut Found) {
     );
 }
 
-/// A streamed set-point that may jump across the workspace is not checked at all.
-fn stream_limit_binds(facts: &Facts, found: &mut Found) {
+/// Checks that the stream speed limit prevents jumps.
+fn stream_limit_binds(facts: &Facts, found: &mut Findings) {
     let Some(rules) = rules(facts) else { return };
     for (axis, speed) in rules.stream_speed.into_iter().enumerate() {
         let step = speed * facts.model.timing.period;
@@ -440,19 +439,19 @@ fn stream_limit_binds(facts: &Facts, found: &mut Found) {
             STREAM_UNCHECKED,
             &format!("control.setpoint.stream_speed[{axis}]"),
             format!(
-                "{}/s lets a stream jump by {} along {} in a tick, more than the whole workspace of {}",
+                "at {}/s a stream may jump by {} along {} in a tick, more than the whole workspace of {}",
                 amount(axis, speed),
                 amount(axis, step),
                 AXES[axis],
                 amount(axis, way(facts, axis))
             ),
-            "a jump across the workspace would pass: check the unit",
+            "a jump across the workspace would be accepted: check the unit",
         );
     }
 }
 
-/// A stream that may not go a tenth as fast as moves go is in another unit.
-fn streams_keep_up(facts: &Facts, found: &mut Found) {
+/// Checks that streams may be about as fast as moves.
+fn streams_keep_up(facts: &Facts, found: &mut Findings) {
     let Some(rules) = rules(facts) else { return };
     for (axis, stream) in rules.stream_speed.into_iter().enumerate() {
         if stream >= SLOWEST_STREAM * rules.speed[axis] {
@@ -462,7 +461,7 @@ fn streams_keep_up(facts: &Facts, found: &mut Found) {
             STREAM_SLOW,
             &format!("control.setpoint.stream_speed[{axis}]"),
             format!(
-                "streamed set-points may move at {}/s along {}, while moves go at {}/s",
+                "streamed set-points may move at {}/s along {}, but moves at {}/s",
                 amount(axis, stream),
                 AXES[axis],
                 amount(axis, rules.speed[axis])
@@ -472,8 +471,8 @@ fn streams_keep_up(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// The voltage follows a stream at its largest speed. Where it does not on most axes, the slew rate is suspected.
-fn streams_within_slew(facts: &Facts, found: &mut Found) {
+/// Checks the largest speed of streams against the slew rate. If most axes are beyond it, the slew rate is suspected.
+fn streams_within_slew(facts: &Facts, found: &mut Findings) {
     let (Some(rules), Some(legs)) = (rules(facts), &facts.legs) else { return };
     let actuator = &facts.model.actuator;
     let slews: [f64; 6] =
@@ -499,9 +498,9 @@ fn streams_within_slew(facts: &Facts, found: &mut Found) {
     );
 }
 
-/// A bound that uses next to nothing of what the legs reach.
+/// Checks for a bound that uses almost none of the travel.
 #[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
-fn workspace_is_used(facts: &Facts, found: &mut Found) {
+fn workspace_is_used(facts: &Facts, found: &mut Findings) {
     let Some(legs) = &facts.legs else { return };
     let stroke = facts.model.actuator.stroke;
     for axis in 0..6 {
@@ -520,12 +519,12 @@ fn workspace_is_used(facts: &Facts, found: &mut Found) {
             WORKSPACE_TINY,
             &key,
             format!(
-                "{} is bound to ±{}, while the legs reach ±{}",
+                "{} is bounded to ±{}, but the legs reach ±{}",
                 AXES[axis],
                 amount(axis, bound),
                 amount(axis, reached)
             ),
-            "check the unit; write 0 to keep an axis still",
+            "check the unit; write 0 to lock an axis",
         );
     }
 }

@@ -1,6 +1,6 @@
-//! In which order joints are listed.
+//! The order in which joints are listed.
 
-use super::{Facts, Found, figure};
+use super::{Facts, Findings, figure};
 use specgen_language::model::Geometry;
 
 lints! {
@@ -8,16 +8,15 @@ lints! {
 
     /// # W0882: joints numbered clockwise
     ///
-    /// `base_joints` and `platform_joints` should be listed counter-clockwise, seen
-    /// from above, as equations (1) and (2) number them.
-    ///
-    /// ## Why it matters
-    ///
-    /// In right-handed coordinates with z up the paper's legs run counter-clockwise.
-    /// If they do not, y was measured to the other side or x and y are exchanged: the
-    /// geometry is a mirror image, and rotations have the wrong sign. Lists that were
-    /// written backwards look the same; legs that are numbered clockwise on purpose
-    /// are no fault.
+        /// `base_joints` and `platform_joints` should be listed counter-clockwise, seen
+        /// from above, as equations (1) and (2) number them.
+        ///
+        /// ## Why it matters
+        ///
+        /// In right-handed coordinates with z up, the paper numbers legs counter-clockwise.
+        /// If yours are clockwise, y may have the wrong sign or x and y may be swapped: then
+        /// the geometry is a mirror image, and rotations have the wrong sign. The lists may
+        /// also be in reverse order. Numbering legs clockwise on purpose is allowed.
     ///
     /// ## Example
     ///
@@ -57,7 +56,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Measure y to the left of x, seen from above.
+    /// Seen from above, y is to the left of x.
     ///
     /// ```toml
     ///     ["81 mm", "125 mm", "2 mm"],
@@ -79,14 +78,13 @@ lints! {
 
     /// # W0818: legs that cross
     ///
-    /// No two legs should be shorter with each other's joints, nor all of them if one
-    /// list began elsewhere or ran in the other direction.
-    ///
-    /// ## Why it matters
-    ///
-    /// Both lists of joints go in the order of the legs. With two of them exchanged
-    /// each voltage goes to the wrong leg. A layout with crossed legs is possible,
-    /// and rare.
+        /// Swapping two platform joints should not make the legs shorter. Nor should
+        /// starting one list at another joint, or reversing it.
+        ///
+        /// ## Why it matters
+        ///
+        /// Both lists of joints are in the order of the legs. If two are swapped, each
+        /// voltage goes to the wrong leg. A layout with crossed legs is possible, but rare.
     ///
     /// ## Example
     ///
@@ -102,7 +100,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Put both lists into the same order.
+    /// Put both lists in the same order.
     ///
     /// ```toml
     ///     ["-46 mm", "-84 mm", "-9 mm"],
@@ -111,11 +109,11 @@ lints! {
     LEGS_CROSS = "W0818";
 }
 
-/// Legs that would be shorter by more than this share with each other's joints cross.
+/// Legs that swapping joints would shorten by more than this share cross.
 const CROSSED: f64 = 1e-3;
 
-/// Which way points run round their middle in the order of the list, seen from above: positive counter-clockwise. Twice the
-/// area of their polygon, m².
+/// Direction of the points about their middle, seen from above: positive is counter-clockwise. Twice the area of their polygon,
+/// m².
 pub(super) fn turn(points: &[[f64; 3]]) -> f64 {
     let count = points.len();
     let following = |k: usize| points[(k + 1) % count];
@@ -126,8 +124,8 @@ fn is_listed(facts: &Facts, body: &str) -> bool {
     facts.model.spans.contains_key(&format!("geometry.{body}_joints"))
 }
 
-/// Joints are numbered as in (1) and (2), counter-clockwise seen from above.
-fn joints_run_round(facts: &Facts, found: &mut Found) {
+/// Checks that joints are numbered as in (1) and (2): counter-clockwise, seen from above.
+fn joints_run_round(facts: &Facts, found: &mut Findings) {
     let geometry = &facts.model.geometry;
     let bodies = [("base", turn(&geometry.base_joints)), ("platform", turn(&geometry.platform_joints))];
     let clockwise: Vec<&str> =
@@ -136,10 +134,10 @@ fn joints_run_round(facts: &Facts, found: &mut Found) {
         [one] => (
             one,
             format!(
-                "the joints of the {one} run clockwise, seen from above, those of the other body counter-clockwise"
+                "seen from above, the joints of the {one} are listed clockwise, those of the other body counter-clockwise"
             ),
         ),
-        [_, _] => ("base", "the joints of base and platform run clockwise, seen from above".to_owned()),
+        [_, _] => ("base", "seen from above, the joints of base and platform are listed clockwise".to_owned()),
         _ => return,
     };
     found.add(
@@ -147,12 +145,12 @@ fn joints_run_round(facts: &Facts, found: &mut Found) {
         &format!("geometry.{key}_joints"),
         message,
         &format!(
-            "the paper's equations (1) and (2) number legs counter-clockwise, x to the right, y up, seen from above: check the sign of y, that x and y are not exchanged, and the order of the lists; if the legs are numbered clockwise, say so in [lint]: allow = [\"geometry.{key}_joints: <reason>\"]"
+            "equations (1) and (2) of the paper number legs counter-clockwise: check the sign of y, the order of x and y, and the order of the lists; if the legs are numbered clockwise on purpose, allow it in [lint]: allow = [\"geometry.{key}_joints: <reason>\"]"
         ),
     );
 }
 
-/// Length of all legs together if leg k goes from base joint k to platform joint `to(k)`, m.
+/// Total length of the legs if leg k goes from base joint k to platform joint `to(k)`, m.
 fn length(geometry: &Geometry, to: impl Fn(usize) -> usize) -> f64 {
     (0..6).fold(0.0, |sum, k| sum + leg(geometry, k, to(k)))
 }
@@ -162,13 +160,14 @@ fn leg(geometry: &Geometry, base: usize, platform: usize) -> f64 {
     libm::hypot(libm::hypot(p[0] - b[0], p[1] - b[1]), geometry.height + p[2] - b[2])
 }
 
-/// Legs do not cross. Joints on circles are paired by rule; those of a list may be in another order on one body.
-fn legs_cross(facts: &Facts, found: &mut Found) {
+/// Checks whether legs cross. Only listed joints can be in the wrong order; joints on circles cannot.
+fn legs_cross(facts: &Facts, found: &mut Findings) {
     let geometry = &facts.model.geometry;
     if !["base", "platform"].iter().any(|body| is_listed(facts, body)) {
         return;
     }
-    let help = "`geometry.base_joints` and `geometry.platform_joints` list the legs in the same order: check it on both bodies";
+    let help =
+        "`geometry.base_joints` and `geometry.platform_joints` must list the legs in the same order: check both lists";
     let now = length(geometry, |k| k);
     let limit = now * (1.0 - CROSSED);
     let pairs: Vec<(usize, usize)> = (0..6).flat_map(|i| (i + 1..6).map(move |j| (i, j))).collect();
@@ -184,18 +183,18 @@ fn legs_cross(facts: &Facts, found: &mut Found) {
         let both = leg(geometry, i, i) + leg(geometry, j, j);
         leg(geometry, i, j) + leg(geometry, j, i) < both * (1.0 - CROSSED)
     };
-    // The whole list begun elsewhere, or read backwards.
+    // The whole list started at another joint, or reversed.
     let turned = (0..12_usize).map(|k| (k, length(geometry, |leg| if k < 6 { (leg + k) % 6 } else { (k - leg) % 6 })));
     let best = turned.reduce(|best, one| if one.1 < best.1 { one } else { best });
     let best_pair =
         pairs.iter().map(|pair| exchanged(*pair)).fold(now, |best, one| if one < best { one } else { best });
     if let Some((k, shorter)) = best.filter(|(_, shorter)| *shorter < limit && *shorter < best_pair) {
-        let how = if k < 6 { format!("{k} places further on") } else { "in the other direction".to_owned() };
+        let how = if k < 6 { format!("starting {k} joints later") } else { "in reverse order".to_owned() };
         found.add(
             LEGS_CROSS,
             "geometry.platform_joints[0]",
             format!(
-                "the legs cross: together they are {} mm long, and {} mm if the platform's joints were listed {how}",
+                "the legs cross: their total length is {} mm, but {} mm with the platform's joints listed {how}",
                 figure(now * 1e3),
                 figure(shorter * 1e3)
             ),
@@ -209,7 +208,7 @@ fn legs_cross(facts: &Facts, found: &mut Found) {
         LEGS_CROSS,
         &format!("geometry.platform_joints[{i}]"),
         format!(
-            "legs {i} and {j} cross: together they are {} mm long, and {} mm if each went to the other's joint",
+            "legs {i} and {j} cross: their total length is {} mm, but {} mm with their platform joints exchanged",
             figure(now * 1e3),
             figure(then * 1e3)
         ),

@@ -1,21 +1,21 @@
-//! Joints in pairs.
+//! Angles of the pairs of joints.
 
 use core::f64::consts::PI;
 
-use super::{Facts, Found, figure};
+use super::{Facts, Findings, figure};
 
 lints! {
     rules: angles_of_pairs;
 
-    /// # W0868: joints of a pair further apart than pairs are
+    /// # W0868: joints of a pair too far apart
     ///
     /// `base_angle` and `platform_angle` should be at most 60 degrees.
     ///
     /// ## Why it matters
     ///
-    /// They are the angle between the two joints of a pair, the smaller one. Beyond 60
-    /// degrees the joints of a pair are nearer to those of the next pair: the larger
-    /// angle was given, and the legs are numbered differently than in (1) and (2).
+        /// The key is the smaller of the two angles between neighbouring joints. Beyond 60
+        /// degrees a joint is closer to the next pair than to its partner: the larger angle
+        /// was given, and the legs are not numbered as in (1) and (2).
     ///
     /// ## Example
     ///
@@ -37,11 +37,11 @@ lints! {
     PAIR_WIDE = "W0868";
 }
 
-/// Six joints evenly on their circle are so many degrees apart: no pair is wider.
+/// Widest pair, deg: the angle of six evenly spaced joints.
 const WIDEST_PAIR: f64 = 60.0;
 
-/// Joints of a pair are nearer to each other than to the next pair.
-fn angles_of_pairs(facts: &Facts, found: &mut Found) {
+/// Checks that the joints of a pair are closer to each other than to the next pair.
+fn angles_of_pairs(facts: &Facts, found: &mut Findings) {
     let geometry = &facts.model.geometry;
     for (body, joints, other) in [("base", &geometry.base_joints, 1), ("platform", &geometry.platform_joints, 5)] {
         let key = format!("geometry.{body}_angle");
@@ -59,7 +59,7 @@ fn angles_of_pairs(facts: &Facts, found: &mut Found) {
                 figure(120.0 - angle)
             ),
             &format!(
-                "`{key}` is the angle within a pair, the smaller of the two: if \"{} deg\" is meant, write that",
+                "`{key}` is the angle within a pair, the smaller of the two: write \"{} deg\" if the other angle was given",
                 figure(120.0 - angle)
             ),
         );

@@ -1,12 +1,12 @@
-//! What the declared trajectories ask of stacks and amplifiers.
+//! What the declared trajectories demand of stacks and amplifiers.
 //!
-//! Jumps, corners, speed and place of a path are checked where it is lowered, its reach in [`crate::reach`].
+//! Jumps, corners, speed and position of a path are checked where it is lowered, its reach in [`crate::reach`].
 
 use serde::Serialize;
 use specgen_numerics::{displacements, mass_matrix};
 use specgen_runtime::Platform;
 
-use super::{Found, Legs, figure};
+use super::{Findings, Legs, figure};
 use crate::lower::setpoint::Stretch;
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, TaskSpace};
@@ -14,15 +14,15 @@ use specgen_language::model::{Model, TaskSpace};
 lints! {
     rules:;
 
-    /// # E0850: trajectory faster than the slew rate
+    /// # E0850: trajectory beyond the slew rate
     ///
-    /// Along a trajectory no leg may need a faster change of voltage than
-    /// `actuator.slew_rate`, even with a quarter more gain than the mean.
-    ///
-    /// ## Why it matters
-    ///
-    /// The leg would lag from the first fast piece on, and the platform leave its
-    /// path on all axes.
+        /// Along a trajectory no leg may need a faster change of voltage than
+        /// `actuator.slew_rate`, even if its gain is a quarter above the mean.
+        ///
+        /// ## Why it matters
+        ///
+        /// The leg would lag from the first fast segment on, and the platform would leave
+        /// its path on all axes.
     ///
     /// ## Example
     ///
@@ -45,12 +45,13 @@ lints! {
 
     /// # W0851: trajectory near the slew rate
     ///
-    /// Where a stack's gain is lowest, a leg should still have slew to spare.
-    ///
-    /// ## Why it matters
-    ///
-    /// The gain over a hysteresis loop varies by some ten per cent; at its lowest the
-    /// same motion needs more voltage.
+        /// Along a trajectory a leg should stay within `actuator.slew_rate` even where the
+        /// gain of its stacks is lowest.
+        ///
+        /// ## Why it matters
+        ///
+        /// The gain varies by some ten per cent over a hysteresis loop. Where it is lowest,
+        /// the same motion needs more voltage.
     ///
     /// ## Example
     ///
@@ -71,15 +72,15 @@ lints! {
     /// ```
     PATH_NEAR_SLEW = "W0851";
 
-    /// # E0852: trajectory that takes more current than the amplifier gives
+    /// # E0852: trajectory beyond the current of the amplifier
     ///
     /// I = C dU/dt along the trajectory, with `actuator.capacitance` and the gain of
     /// the stacks, must not exceed `amplifier.current`.
     ///
     /// ## Why it matters
     ///
-    /// The amplifier would limit the current, and with it the slew, unknown to the
-    /// controller.
+        /// The amplifier would limit the current and so the slew rate, and the controller
+        /// would not know.
     ///
     /// ## Example
     ///
@@ -105,15 +106,15 @@ lints! {
     /// ```
     PATH_BEYOND_CURRENT = "E0852";
 
-    /// # W0853: trajectory whose inertia bends the legs
+    /// # W0853: trajectory whose inertia deflects the legs
     ///
-    /// The force of inertia along the trajectory, by (3), over the stiffness of a leg
-    /// should be less than a tenth of the stroke.
-    ///
-    /// ## Why it matters
-    ///
-    /// The feed-forward takes the bend out, but reach does not count it: near the
-    /// ends of the strokes it is missing.
+        /// Along a trajectory, the inertia force by (3) over the stiffness of a leg should be
+        /// less than a tenth of the stroke.
+        ///
+        /// ## Why it matters
+        ///
+        /// Feed-forward compensates the deflection, but the reach check ignores it: near the
+        /// ends of the strokes the compensation runs out of travel.
     ///
     /// ## Example
     ///
@@ -139,11 +140,11 @@ lints! {
 
     /// # W0854: trajectory near the lowest mode
     ///
-    /// A sinusoid should be below a fifth of the lowest mode's frequency.
-    ///
-    /// ## Why it matters
-    ///
-    /// Nearer, it excites the mode: the platform moves further than its legs.
+        /// The frequency of a sinusoid should be below a fifth of the lowest mode.
+        ///
+        /// ## Why it matters
+        ///
+        /// A higher frequency excites the mode: the platform moves further than its legs.
     ///
     /// ## Example
     ///
@@ -165,14 +166,14 @@ lints! {
     PATH_EXCITES = "W0854";
 }
 
-/// The local gain of a stack differs from its mean by about a quarter, so that a path needs this much less slew at best.
+/// Ratio of mean to local gain of a stack, at most.
 const GAIN_SLACK: f64 = 1.3;
-/// Inertia that bends the legs by more than this share of the stroke.
+/// Largest deflection by inertia, as a share of the stroke.
 const LARGEST_DEFLECTION: f64 = 0.1;
-/// A sinusoid faster than this share of the lowest mode excites it.
+/// Highest frequency of a sinusoid, as a share of the lowest mode.
 const FASTEST: f64 = 0.2;
 
-/// What a trajectory asks of the legs.
+/// What a trajectory demands of the legs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PathDemand {
     /// Its name.
@@ -183,13 +184,13 @@ pub struct PathDemand {
     pub slew: f64,
     /// Largest acceleration of a leg between the corners, m/s².
     pub leg_acceleration: f64,
-    /// By how much the inertia bends a leg there, m.
+    /// Deflection of a leg by inertia there, m.
     pub deflection: f64,
     /// Largest current, A, with `actuator.capacitance`.
     pub current: Option<f64>,
 }
 
-/// Looks at every trajectory of `task`, whose poses are `paths`, in the order of the spec.
+/// Checks every trajectory of `task`; `paths` are their poses, in the order of the spec.
 #[must_use]
 pub fn check(
     model: &Model,
@@ -197,7 +198,7 @@ pub fn check(
     platform: &Platform<f64>,
     paths: &[Vec<Stretch>],
 ) -> (Vec<PathDemand>, Vec<Diagnostic>) {
-    let mut found = Found::new(model);
+    let mut found = Findings::new(model);
     let legs = Legs::of(model, platform);
     let mass = mass_matrix(platform, &[0.0; 6]);
     let inverse = crate::lower::inverse_jacobian(&model.geometry).unwrap_or([[0.0; 6]; 6]);
@@ -237,7 +238,7 @@ fn larger(slot: &mut f64, value: f64) {
 
 type Matrix = [[f64; 6]; 6];
 
-/// Speeds and accelerations by differences: of leg displacements, whose curvature the poses do not have.
+/// Adds a stretch to `demand`. Speeds and accelerations are differences of leg displacements, which are nonlinear in the pose.
 #[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
 fn look(
     demand: &mut PathDemand,
@@ -258,7 +259,7 @@ fn look(
         for leg in 0..6 {
             larger(&mut demand.leg_acceleration, second(three[0][leg], three[1][leg], three[2][leg]).abs());
         }
-        // f = J⁻ᵀ M ḧ: over the travel of a piezo M and J are those at rest.
+        // f = J⁻ᵀ M ḧ, with M and J at rest: they are constant over the travel of a piezo.
         let acceleration: [f64; 6] =
             core::array::from_fn(|axis| second(poses[0][axis], poses[1][axis], poses[2][axis]));
         let wrench: [f64; 6] =
@@ -270,23 +271,23 @@ fn look(
     }
 }
 
-fn slew(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
+fn slew(model: &Model, key: &str, demand: &PathDemand, found: &mut Findings) {
     let limit = model.actuator.slew_rate;
     if demand.slew <= limit / GAIN_SLACK {
         return;
     }
     let message = format!(
-        "`{}` moves a leg at {} um/s, which takes about {} V/ms; `actuator.slew_rate` is {} V/ms",
+        "`{}` moves a leg at {} um/s, which needs about {} V/ms, but `actuator.slew_rate` is {} V/ms",
         demand.name,
         figure(demand.leg_speed * 1e6),
         figure(demand.slew * 1e-3),
         figure(limit * 1e-3)
     );
     let help = format!(
-        "play it {} times slower, or raise `actuator.slew_rate` if amplifier and stack stand it; check its unit (V/ms or V/s)",
+        "run it {} times slower, or raise `actuator.slew_rate` if amplifier and stack allow it; check its unit (V/ms or V/s)",
         figure(demand.slew * GAIN_SLACK / limit)
     );
-    // Beyond doubt only where the mean gain and a quarter more do not do.
+    // Certain only if even a gain above the mean is not enough.
     if demand.slew > limit * GAIN_SLACK {
         found.add(PATH_BEYOND_SLEW, key, message, &help);
     } else {
@@ -294,7 +295,7 @@ fn slew(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
     }
 }
 
-fn current(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
+fn current(model: &Model, key: &str, demand: &PathDemand, found: &mut Findings) {
     let (Some(needed), Some(limit)) = (demand.current, model.amplifier.current) else { return };
     if needed <= limit / GAIN_SLACK {
         return;
@@ -303,20 +304,20 @@ fn current(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
         PATH_BEYOND_CURRENT,
         key,
         format!(
-            "`{}` charges a leg with about {} A (at {} V/ms); `amplifier.current` is {} A",
+            "`{}` charges a leg with about {} A (at {} V/ms), but `amplifier.current` is {} A",
             demand.name,
             figure(needed),
             figure(demand.slew * 1e-3),
             figure(limit)
         ),
         &format!(
-            "play it {} times slower; or check `actuator.capacitance` and `amplifier.current`",
+            "run it {} times slower; or check `actuator.capacitance` and `amplifier.current`",
             figure(needed * GAIN_SLACK / limit)
         ),
     );
 }
 
-fn deflection(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
+fn deflection(model: &Model, key: &str, demand: &PathDemand, found: &mut Findings) {
     let stroke = model.actuator.stroke;
     if demand.deflection <= LARGEST_DEFLECTION * stroke {
         return;
@@ -325,17 +326,17 @@ fn deflection(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) 
         PATH_INERTIA,
         key,
         format!(
-            "the inertia along `{}` bends a leg by {} um of its stroke of {} um (leg acceleration {} m/s^2)",
+            "the inertia along `{}` deflects a leg by {} um of its stroke of {} um (leg acceleration {} m/s^2)",
             demand.name,
             figure(demand.deflection * 1e6),
             figure(stroke * 1e6),
             figure(demand.leg_acceleration)
         ),
-        "play it slower; or check `platform.mass`, `platform.inertia` and `actuator.axial_stiffness`",
+        "run it slower; or check `platform.mass`, `platform.inertia` and `actuator.axial_stiffness`",
     );
 }
 
-fn excitation(key: &str, name: &str, frequency: f64, mode: f64, found: &mut Found) {
+fn excitation(key: &str, name: &str, frequency: f64, mode: f64, found: &mut Findings) {
     if frequency <= FASTEST * mode {
         return;
     }
@@ -343,6 +344,6 @@ fn excitation(key: &str, name: &str, frequency: f64, mode: f64, found: &mut Foun
         PATH_EXCITES,
         key,
         format!("`{name}` at {} Hz excites the lowest mode of {} Hz", figure(frequency), figure(mode)),
-        "a tenth of the lowest mode is usual: check the unit of the frequency, and `actuator.axial_stiffness`, which makes the mode",
+        "a tenth of the lowest mode is usual: check the unit of the frequency, and `actuator.axial_stiffness`, which determines the mode",
     );
 }

@@ -1,20 +1,20 @@
-//! Requirements that would be met whatever is built, and such as no motion has.
+//! Requirements that any platform meets, and limits at frequencies that it cannot reach.
 
 use super::paths::PATH_EXCITES;
-use super::{Facts, Found, figure};
+use super::{Facts, Findings, figure};
 
 lints! {
     rules: ask_something, frequencies;
 
-    /// # W0866: a requirement that asks nothing
+    /// # W0866: a requirement that is always met
     ///
-    /// A precision, a noise or a largest error of more than a twentieth of the stroke
-    /// is reported, and one of a rotation of more than a twentieth of the workspace.
-    ///
-    /// ## Why it matters
-    ///
-    /// It is met whatever is built, so that it checks nothing: probably a slip of the
-    /// unit.
+        /// A precision, noise or error limit should be at most a twentieth of the stroke,
+        /// for a rotation at most a twentieth of the workspace.
+        ///
+        /// ## Why it matters
+        ///
+        /// Any platform meets a looser limit, so it checks nothing. The unit is probably
+        /// wrong.
     ///
     /// ## Example
     ///
@@ -36,11 +36,11 @@ lints! {
     ASKS_NOTHING = "W0866";
 }
 
-/// A precision or an error of more than this share of the stroke, or of the workspace, asks nothing of a nanopositioner.
+/// Loosest meaningful limit, as a share of the stroke or the workspace.
 const LOOSEST: f64 = 0.05;
 
-/// What the platform is for is finer than a twentieth of its stroke.
-fn ask_something(facts: &Facts, found: &mut Found) {
+/// Checks for limits that any platform meets.
+fn ask_something(facts: &Facts, found: &mut Findings) {
     let model = facts.model;
     let rotation = model.workspace.rotation.into_iter().fold(0.0, |most: f64, one| if one > most { one } else { most });
     let wholes = [(model.actuator.stroke, "a stroke", "um", 1e6), (rotation, "a workspace", "mrad", 1e3)];
@@ -69,18 +69,18 @@ fn ask_something(facts: &Facts, found: &mut Found) {
         found.add(
             ASKS_NOTHING,
             &key,
-            format!("`{key}` is {} {unit}, of {of} of {} {unit}", figure(limit * scale), figure(whole * scale)),
+            format!("`{key}` is {} {unit}, for {of} of {} {unit}", figure(limit * scale), figure(whole * scale)),
             if about == 0 {
-                "whatever is built meets that: check the unit, nm or um"
+                "any platform meets that: check the unit (nm or um)"
             } else {
-                "whatever is built meets that: check the unit, nrad, urad or mrad"
+                "any platform meets that: check the unit (nrad, urad or mrad)"
             },
         );
     }
 }
 
-/// A limit at a frequency is about a motion that the platform can make.
-fn frequencies(facts: &Facts, found: &mut Found) {
+/// Checks that limits are at frequencies below the lowest mode.
+fn frequencies(facts: &Facts, found: &mut Findings) {
     let Some(modes) = facts.legs.as_ref().and_then(|legs| legs.modes) else { return };
     for (index, limit) in facts.model.requirements.tracking.iter().enumerate() {
         let Some(frequency) = limit.frequency.filter(|frequency| *frequency > modes[0]) else { continue };

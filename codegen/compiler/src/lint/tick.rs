@@ -1,16 +1,16 @@
-//! Whether the board that a spec names can keep its period, by what boards and laws take, as the manifests of the boards have it. `specgen build` estimates
-//! the tick from the image itself, a minute later, and refuses a period that is shorter.
+//! Whether the board in the spec can keep the period, by the typical tick times in the manifests of the boards. `specgen build`
+//! estimates the tick from the image and refuses a shorter period.
 
-use super::{Facts, Found, Lints, figure};
+use super::{Facts, Findings, Lints, figure};
 use specgen_language::diagnostic::codes;
 use specgen_language::model::{DynamicsChoice, Interaction, Mcu, Model, Scalar};
 
 pub(super) static LINTS: Lints = Lints { rules: &[fits_period], codes: &[] };
 
-/// Another law, scalar or compiler takes this share of the table at least: below it the period is refused.
+/// Share of the typical time below which the period is refused: no law, scalar or compiler is faster than that.
 const CERTAIN: f64 = 0.8;
 
-/// About what the longest tick of the named board takes, s; none for an emulated one.
+/// Typical time of the longest tick on the named board, s; none for an emulated one.
 #[must_use]
 pub fn about(model: &Model) -> Option<f64> {
     let Mcu::Board(board) = model.target.mcu else { return None };
@@ -27,8 +27,8 @@ pub fn about(model: &Model) -> Option<f64> {
     Some(f64::from(time) * 1e-6)
 }
 
-/// The period is longer than what the tick of the named board takes.
-fn fits_period(facts: &Facts, found: &mut Found) {
+/// Checks the period against the typical tick time of the named board.
+fn fits_period(facts: &Facts, found: &mut Findings) {
     let (model, period) = (facts.model, facts.model.timing.period);
     let Some(tick) = about(model).filter(|tick| period < *tick) else { return };
     let part = model.target.mcu.part();

@@ -1,6 +1,6 @@
-//! Times against the tick, and the tick against the modes.
+//! Times compared with the tick, and the tick compared with the modes.
 
-use super::{Facts, Found, figure};
+use super::{Facts, Findings, figure};
 
 lints! {
     rules: times_that_do_nothing, lead_of_the_lag, transfer, velocity_filter, ticks_against_modes, gauges_in_time,
@@ -8,12 +8,12 @@ lints! {
 
     /// # W0830: a time too short to have an effect
     ///
-    /// Lag, lead, dead time and the width of a trigger's pulse should be at least a
-    /// hundredth of a tick, or 0.
-    ///
-    /// ## Why it matters
-    ///
-    /// A time so short changes no number: it is us written for ms.
+        /// Lag, lead, dead time and the width of a trigger's pulse should be at least a
+        /// hundredth of a tick, or 0.
+        ///
+        /// ## Why it matters
+        ///
+        /// A shorter time has no effect. It is usually us written for ms.
     ///
     /// ## Example
     ///
@@ -27,23 +27,23 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Check the unit, or take the key out.
+    /// Check the unit, or leave the key out.
     ///
     /// ```toml
     /// lag   = "0.35 ms"
     /// ```
     TIME_WITHOUT_EFFECT = "W0830";
 
-    /// # W0831: a lead longer than what it takes out
+    /// # W0831: lead longer than the delay
     ///
-    /// `control.lead`, and `lead` of a trajectory, should not exceed amplifier lag and
-    /// tick together by more than a quarter; `hysteresis.dead_time` of six legs not be
-    /// more than three times these and a period of the legs' resonance.
-    ///
-    /// ## Why it matters
-    ///
-    /// The lead lets the feed-forward run ahead of the set-point by what amplifier
-    /// and sampling are late. More, and the legs are early.
+        /// `control.lead`, and `lead` of a trajectory, should be at most 1.25 times the sum
+        /// of amplifier lag and tick. `hysteresis.dead_time` of six legs should be at most
+        /// three times the sum of these and a period of the legs' resonance.
+        ///
+        /// ## Why it matters
+        ///
+        /// The lead makes the feed-forward run ahead of the set-point by the delay of
+        /// amplifier and sampling. With a longer lead the legs are early.
     ///
     /// ## Example
     ///
@@ -56,23 +56,23 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Leave the key out: the compiler takes the delay from command to pose, which
-    /// `specgen check --details` states. Or write at most amplifier lag and tick
-    /// together; `specgen sim` shows which lead is best on a path with corners.
+        /// Leave the key out: the compiler then uses the delay from command to pose, which
+        /// `specgen check --details` states. Or write at most the sum of amplifier lag and
+        /// tick; `specgen sim` shows which lead is best on a path with corners.
     ///
     /// ```toml
     /// lead            = "0.1 ms"
     /// ```
     LEAD_TOO_LONG = "W0831";
 
-    /// # W0832: a transfer time that is no transfer
+    /// # W0832: implausible transfer time
     ///
     /// `control.transfer_time` should be from a tick to five seconds.
     ///
     /// ## Why it matters
     ///
-    /// It is the time constant with which the offset of a change of mode fades.
-    /// Shorter it is a step of the voltage; longer, the offset stays.
+        /// It is the time constant with which the offset after a change of mode decays. A
+        /// shorter time makes a step in the voltage; with a longer time the offset remains.
     ///
     /// ## Example
     ///
@@ -99,7 +99,7 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// The derivative term of (7) would act on a velocity that is late by the filter.
+        /// The filter would delay the velocity in the derivative term of (7).
     ///
     /// ## Example
     ///
@@ -120,16 +120,16 @@ lints! {
     /// ```
     VELOCITY_FILTER_SLOW = "W0833";
 
-    /// # W0834: tick and modes do not fit
+    /// # W0834: period and modes are inconsistent
     ///
-    /// A period of the platform's lowest mode should have between four and three
-    /// thousand ticks.
-    ///
-    /// ## Why it matters
-    ///
-    /// With fewer the loop hardly sees the mode; with more the tick is far faster
-    /// than anything there is to control. Period, stiffness or masses are in another
-    /// unit.
+        /// One period of the platform's lowest mode should have between four and three
+        /// thousand ticks.
+        ///
+        /// ## Why it matters
+        ///
+        /// With fewer ticks the loop hardly samples the mode. With more, the tick is far
+        /// faster than anything to control. Period, stiffness or masses are usually in the
+        /// wrong unit.
     ///
     /// ## Example
     ///
@@ -156,9 +156,9 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// What the controller does is seen only after the lag of the gauges. A tick
-    /// that is much faster than that costs computation and gains nothing, and the
-    /// stability check allows small gains. Mostly the unit is another one.
+        /// The gauges show the effect of a tick only after their lag. A much faster tick
+        /// costs computation and gains nothing, and the stability check allows only small
+        /// gains. Usually the unit is wrong.
     ///
     /// ## Example
     ///
@@ -171,8 +171,8 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Check `sensor.lag` (us or ms): for a gauge or filter of first order it is
-    /// 1/(2 pi bandwidth), and several in a row add.
+        /// Check `sensor.lag` (us or ms): for a gauge or filter of first order it is
+        /// 1/(2 pi bandwidth), and the lags of several in series add up.
     ///
     /// ```toml
     /// lag = "0.2 ms"
@@ -181,15 +181,14 @@ lints! {
 
     /// # W0869: a mode above half the tick rate
     ///
-    /// The tick samples a mode of the platform that lies above half the tick rate,
-    /// and the gauges pass more than a third of it.
-    ///
-    /// ## Why it matters
-    ///
-    /// Such a mode appears as another, lower frequency, and the loop answers to that.
-    /// The stability check contains it as it is; what it cannot contain are the
-    /// changes of a mode by a few hertz, which move its alias by as much in the
-    /// other direction.
+        /// No mode of the platform should be above half the tick rate, unless the gauges
+        /// attenuate it to less than a third.
+        ///
+        /// ## Why it matters
+        ///
+        /// Such a mode is aliased to a lower frequency, and the loop responds to the alias.
+        /// The stability check includes it at its nominal frequency only. If the mode
+        /// shifts by a few hertz, its alias shifts by as much in the other direction.
     ///
     /// ## Example
     ///
@@ -203,8 +202,8 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Sample faster than twice the highest mode, or filter the gauges and say so in
-    /// `sensor.lag`.
+        /// Sample faster than twice the highest mode, or filter the gauges and include the
+        /// filter in `sensor.lag`.
     ///
     /// ```toml
     /// period = "200 us"
@@ -212,26 +211,26 @@ lints! {
     MODE_ALIASED = "W0869";
 }
 
-/// Below this share of a tick a time does nothing.
+/// Below this share of a tick a time has no effect.
 const NOTHING: f64 = 0.01;
-/// Largest lead, in amplifier lags and ticks together: what there is to take out, and a quarter for the modes.
+/// Largest lead over the sum of amplifier lag and tick: a quarter more for the modes.
 const LARGEST_LEAD: f64 = 1.25;
-/// The same of six legs, their resonance included: a record's dead time has it all.
+/// The same for the dead time of six legs over that sum and a period of their resonance.
 const LONGEST_DEAD_TIME: f64 = 3.0;
-/// A change of mode that takes longer than this is not meant, s.
+/// Longest plausible transfer time, s.
 const LONGEST_TRANSFER: f64 = 5.0;
-/// A velocity filter slower than this share of the lowest mode.
+/// Lowest cut-off of the velocity filter, as a share of the lowest mode.
 const SLOWEST_FILTER: f64 = 0.1;
-/// Ticks that gauges may lag: beyond that the tick is faster than anything that it sees.
+/// Longest lag of the gauges, in ticks.
 const SLOWEST_GAUGE: f64 = 5.0;
-/// Part of a mode above half the tick rate that gauges may show.
+/// Largest transmission of the gauges for a mode above half the tick rate.
 const LARGEST_ALIAS: f64 = 1.0 / 3.0;
-/// Ticks in a period of the lowest mode, at least; and at most, by far.
+/// Fewest and most ticks in a period of the lowest mode.
 const FEWEST_TICKS: f64 = 4.0;
 const MOST_TICKS: f64 = 3000.0;
 
-/// Lag and lead are entered to have an effect.
-fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
+/// Checks for times that are too short to have an effect.
+fn times_that_do_nothing(facts: &Facts, found: &mut Findings) {
     let model = facts.model;
     let tick = model.timing.period;
     let lead = model.task_space.as_ref().and_then(|task| task.lead).unwrap_or(0.0);
@@ -261,8 +260,8 @@ fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// A lead takes out the lag, no more.
-fn lead_of_the_lag(facts: &Facts, found: &mut Found) {
+/// Checks that leads do not exceed the delays that they compensate.
+fn lead_of_the_lag(facts: &Facts, found: &mut Findings) {
     let model = facts.model;
     let lag = model.amplifier.lag + model.timing.period;
     // The legs' own resonance delays them by a part of its period.
@@ -272,7 +271,7 @@ fn lead_of_the_lag(facts: &Facts, found: &mut Found) {
             LEAD_TOO_LONG,
             "hysteresis.dead_time",
             format!(
-                "legs are asked for {} ms early, but amplifier, tick and a period of their resonance together are {} ms",
+                "the feed-forward runs {} ms ahead, but amplifier, tick and a period of the legs' resonance together delay by {} ms",
                 figure(dead_time * 1e3),
                 figure((lag + 1.0 / model.actuator.resonance) * 1e3)
             ),
@@ -288,19 +287,19 @@ fn lead_of_the_lag(facts: &Facts, found: &mut Found) {
             LEAD_TOO_LONG,
             &key,
             format!(
-                "legs are asked for {} ms early, but amplifier and tick together lag {} ms",
+                "the feed-forward runs {} ms ahead, but amplifier and tick together delay by {} ms",
                 figure(lead * 1e3),
                 figure(lag * 1e3)
             ),
             &format!(
-                "leave `{key}` out, and the compiler takes the lag out; or check its unit and that of `amplifier.lag`"
+                "leave `{key}` out, and the compiler compensates the delay; or check its unit and that of `amplifier.lag`"
             ),
         );
     }
 }
 
-/// The offset of a change of mode fades over some ticks and not for ever.
-fn transfer(facts: &Facts, found: &mut Found) {
+/// Checks the time in which the offset after a change of mode decays.
+fn transfer(facts: &Facts, found: &mut Findings) {
     let Some(task) = &facts.model.task_space else { return };
     let (time, tick) = (task.transfer_time, facts.model.timing.period);
     if time >= tick && time <= LONGEST_TRANSFER {
@@ -319,8 +318,8 @@ fn transfer(facts: &Facts, found: &mut Found) {
     );
 }
 
-/// A velocity that is filtered below the modes says nothing about them.
-fn velocity_filter(facts: &Facts, found: &mut Found) {
+/// Checks that the velocity filter passes the lowest mode.
+fn velocity_filter(facts: &Facts, found: &mut Findings) {
     let (Some(task), Some(modes)) = (&facts.model.task_space, facts.legs.as_ref().and_then(|legs| legs.modes)) else {
         return;
     };
@@ -336,12 +335,12 @@ fn velocity_filter(facts: &Facts, found: &mut Found) {
             figure(cutoff),
             figure(modes[0])
         ),
-        "at least the frequency of the lowest mode: check the unit (rad/s, not Hz)",
+        "usual is at least the frequency of the lowest mode: check the unit (rad/s, not Hz)",
     );
 }
 
-/// The tick must see the platform move.
-fn ticks_against_modes(facts: &Facts, found: &mut Found) {
+/// Checks the number of ticks in a period of the lowest mode.
+fn ticks_against_modes(facts: &Facts, found: &mut Findings) {
     let tick = facts.model.timing.period;
     let Some(modes) = facts.legs.as_ref().and_then(|legs| legs.modes) else { return };
     let ticks = 1.0 / (modes[0] * tick);
@@ -352,17 +351,17 @@ fn ticks_against_modes(facts: &Facts, found: &mut Found) {
         TICKS_AGAINST_MODES,
         "timing.period",
         format!(
-            "a period of the platform's lowest mode, {} Hz, has {} ticks of {} us",
+            "one period of the platform's lowest mode, {} Hz, has {} ticks of {} us",
             figure(modes[0]),
             figure(ticks),
             figure(tick * 1e6)
         ),
-        "ten to a hundred ticks are usual: check `timing.period`, and `actuator.axial_stiffness` and the masses, which make the mode",
+        "ten to a hundred ticks are usual: check `timing.period`, and `actuator.axial_stiffness` and the masses, which determine the mode",
     );
 }
 
-/// Gauges see what a tick does within some ticks.
-fn gauges_in_time(facts: &Facts, found: &mut Found) {
+/// Checks the lag of the gauges against the tick.
+fn gauges_in_time(facts: &Facts, found: &mut Findings) {
     let (lag, tick) = (facts.model.sensor.lag, facts.model.timing.period);
     let off = lag / (SLOWEST_GAUGE * tick);
     if off <= 1.0 {
@@ -373,17 +372,17 @@ fn gauges_in_time(facts: &Facts, found: &mut Found) {
         GAUGE_LATE,
         "sensor.lag",
         format!(
-            "the gauges lag {} us, {} ticks of {} us: what a tick does is seen long after",
+            "the gauges lag by {} us, {} ticks of {} us: the effect of a tick is measured long after it",
             figure(lag * 1e6),
             figure(lag / tick),
             figure(tick * 1e6)
         ),
-        "check the unit (us or ms); a tick this much faster than its gauges gains nothing: lengthen `timing.period` or let the gauges pass more",
+        "check the unit (us or ms); a tick this much faster than its gauges gains nothing: lengthen `timing.period` or increase the bandwidth of the gauges",
     );
 }
 
-/// A mode above half the tick rate is sampled as another frequency, unless the gauges keep it out.
-fn modes_seen_as_others(facts: &Facts, found: &mut Found) {
+/// Checks for aliased modes that the gauges do not filter out.
+fn modes_seen_as_others(facts: &Facts, found: &mut Findings) {
     let (lag, tick) = (facts.model.sensor.lag, facts.model.timing.period);
     let Some(modes) = facts.legs.as_ref().and_then(|legs| legs.modes) else { return };
     let share = |mode: f64| 1.0 / libm::hypot(1.0, core::f64::consts::TAU * mode * lag);
@@ -394,14 +393,14 @@ fn modes_seen_as_others(facts: &Facts, found: &mut Found) {
         MODE_ALIASED,
         "timing.period",
         format!(
-            "a mode of the platform of {} Hz lies above half the tick rate, {} Hz: the gauges show it as {} Hz, with {} of its amplitude",
+            "the platform's mode at {} Hz is above half the tick rate, {} Hz: it is aliased to {} Hz with {} of its amplitude",
             figure(*mode),
             figure(0.5 / tick),
             figure(alias),
             figure(share(*mode))
         ),
         &format!(
-            "a period below {} us samples all modes as what they are; or filter the gauges before they are sampled, with a lag above {} us, and write that as `sensor.lag`",
+            "a period below {} us samples all modes without aliasing; or filter the gauges before sampling with a lag above {} us, and write that as `sensor.lag`",
             figure(0.5e6 / modes[5]),
             figure(libm::sqrt(1.0 / (LARGEST_ALIAS * LARGEST_ALIAS) - 1.0) / (core::f64::consts::TAU * mode) * 1e6)
         ),

@@ -1,6 +1,6 @@
-//! Output lines against noise, speed and themselves.
+//! Triggers compared with noise, speed and their own keys.
 
-use super::{Facts, Found, amount, figure};
+use super::{Facts, Findings, amount, figure};
 use crate::lower::{pose_noise, triggers};
 use specgen_language::model::{Trigger, TriggerKind};
 use specgen_runtime::trigger::MOST_STEPS;
@@ -8,15 +8,15 @@ use specgen_runtime::trigger::MOST_STEPS;
 lints! {
     rules: more_than_one, some_at_all, steps_apart, above_noise, pulses_apart;
 
-    /// # W0877: a trigger that passes one position
+    /// # W0877: a trigger with at most one pulse
     ///
-    /// `step` of a trigger of kind "position" should not be longer than the way from
-    /// `start` to `stop`, and `last` of any trigger not lie before its `first`.
-    ///
-    /// ## Why it matters
-    ///
-    /// There is then a pulse at `start` and at no other position: one of the three is
-    /// in another unit.
+        /// `step` of a trigger of kind "position" should not be longer than the distance
+        /// from `start` to `stop`. `last` of any trigger should not be before its `first`.
+        ///
+        /// ## Why it matters
+        ///
+        /// There is then a pulse only at `start`, or none at all. Usually one of the values
+        /// is in the wrong unit.
     ///
     /// ## Example
     ///
@@ -37,17 +37,17 @@ lints! {
     /// ```
     TRIGGER_SINGLE = "W0877";
 
-    /// # E0874: positions of a trigger within its hysteresis
+    /// # E0874: step of a trigger too small
     ///
-    /// `step` of a trigger must be above its `hysteresis`, which is ten times the
-    /// noise of the measured pose where the spec does not say it, and there are at most
-    /// a million steps from `start` to `stop`.
-    ///
-    /// ## Why it matters
-    ///
-    /// A position that was passed counts again only after the pose was away from it by
-    /// the hysteresis. With positions closer than that, noise would decide which of
-    /// them give a pulse.
+        /// `step` of a trigger must be larger than its `hysteresis`, whose default is ten
+        /// times the noise of the measured pose. From `start` to `stop` there may be at
+        /// most a million steps.
+        ///
+        /// ## Why it matters
+        ///
+        /// A trigger position is armed again only when the pose has moved away from it by
+        /// the hysteresis. With closer positions, noise would decide which of them give a
+        /// pulse.
     ///
     /// ## Example
     ///
@@ -78,15 +78,14 @@ lints! {
 
     /// # W0875: hysteresis of a trigger within the noise
     ///
-    /// A `hysteresis` below ten times the noise of the measured pose (rms) along the
-    /// axis is reported.
-    ///
-    /// ## Why it matters
-    ///
-    /// The pose is measured with noise: at rest near a position it passes to and fro.
-    /// A hysteresis of ten times its rms is passed by chance once in 10⁶ ticks or
-    /// less; below that the line shows the noise, and one position gives several
-    /// pulses.
+        /// `hysteresis` should be at least ten times the noise of the measured pose (rms)
+        /// along the axis.
+        ///
+        /// ## Why it matters
+        ///
+        /// At rest near a trigger position, noise crosses it back and forth. A hysteresis of
+        /// ten times the rms is exceeded by chance at most once in 10⁶ ticks. With less,
+        /// noise gives several pulses at one position.
     ///
     /// ## Example
     ///
@@ -103,7 +102,7 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Leave the key out: then it is ten times the noise.
+    /// Leave the key out: the default is ten times the noise.
     ///
     /// ```toml
     /// [[trigger]]
@@ -114,15 +113,15 @@ lints! {
     /// ```
     TRIGGER_IN_NOISE = "W0875";
 
-    /// # W0876: pulses of a trigger run into one another
+    /// # W0876: pulses of a trigger overlap
     ///
-    /// At the largest speed of moves, `control.setpoint.speed`, a position is passed
-    /// while the pulse of the one before lasts.
-    ///
-    /// ## Why it matters
-    ///
-    /// Each pulse has an edge of its own: the line is low for a tick before the next.
-    /// A position that is passed before that gives no pulse, and is counted as missed.
+        /// At the largest speed of moves, `control.setpoint.speed`, the pulse at one
+        /// position should end before the next position is passed.
+        ///
+        /// ## Why it matters
+        ///
+        /// Each pulse has its own edge: the line is low for at least a tick before it. A
+        /// position that is passed earlier gives no pulse and is counted as missed.
     ///
     /// ## Example
     ///
@@ -152,29 +151,29 @@ lints! {
     TRIGGERS_MERGE = "W0876";
 }
 
-/// The triggers of a kind, by their number.
+/// The triggers of these kinds, with their numbers.
 fn of_kind<'a>(facts: &Facts<'a>, kinds: &[TriggerKind]) -> Vec<(usize, &'a Trigger)> {
     let task = facts.model.task_space.as_ref();
     let triggers = task.into_iter().flat_map(|task| task.triggers.iter().enumerate());
     triggers.filter(|(_, trigger)| kinds.contains(&trigger.kind)).collect()
 }
 
-/// rms of the pose by axis; none where gauges do not fix it, for which there is an error.
+/// rms noise of the pose by axis; none if the gauges do not determine the pose, which is an error of its own.
 fn noise(facts: &Facts) -> Option<[f64; 6]> {
     pose_noise(facts.model).ok().flatten().map(|noise| noise.pose)
 }
 
-/// Its key of a length or an angle.
+/// Key of a length, or of the angle on a rotation axis.
 fn key(index: usize, trigger: &Trigger, name: &str) -> String {
     format!("trigger[{index}].{name}{}", if trigger.axis < 3 { "" } else { "_angle" })
 }
 
-/// Positions that are passed one after the other are more than one.
-fn more_than_one(facts: &Facts, found: &mut Found) {
+/// Checks that a trigger has more than one position.
+fn more_than_one(facts: &Facts, found: &mut Findings) {
     for (index, trigger) in of_kind(facts, &[TriggerKind::Position]) {
         let (Some(start), Some(step)) = (trigger.start, trigger.step) else { continue };
         let stop = trigger.stop.unwrap_or(facts.model.workspace.bounds()[trigger.axis]);
-        // One position is meant where start and stop are one.
+        // If start and stop are equal, one position is intended.
         if stop <= start || step <= stop - start {
             continue;
         }
@@ -182,17 +181,17 @@ fn more_than_one(facts: &Facts, found: &mut Found) {
             TRIGGER_SINGLE,
             &key(index, trigger, "step"),
             format!(
-                "`step` of trigger[{index}] is {}, but from start to stop there are {}: only the first position gives a pulse",
+                "`step` of trigger[{index}] is {}, but from start to stop it is only {}: only the first position gives a pulse",
                 amount(trigger.axis, step),
                 amount(trigger.axis, stop - start)
             ),
-            "check the units of start, stop and step; write `stop` equal to `start` if one position is meant",
+            "check the units of start, stop and step; set `stop` equal to `start` if one position is intended",
         );
     }
 }
 
-/// What may have a pulse does not end before it begins.
-fn some_at_all(facts: &Facts, found: &mut Found) {
+/// Checks that `last` is not before `first`.
+fn some_at_all(facts: &Facts, found: &mut Findings) {
     let triggers = facts.model.task_space.iter().flat_map(|task| task.triggers.iter().enumerate());
     for (index, trigger) in triggers {
         let Some(last) = trigger.last.filter(|last| *last < trigger.first) else { continue };
@@ -205,8 +204,8 @@ fn some_at_all(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// Positions are apart by more than the hysteresis, and not so many that a single precision cannot tell them apart.
-fn steps_apart(facts: &Facts, found: &mut Found) {
+/// Checks that positions are further apart than the hysteresis, and few enough for single precision.
+fn steps_apart(facts: &Facts, found: &mut Findings) {
     for (index, trigger) in of_kind(facts, &[TriggerKind::Position]) {
         let (Some(noise), Some(step)) = (noise(facts), trigger.step) else { continue };
         let (hysteresis, shown) = (triggers::hysteresis(trigger, &noise), |value| amount(trigger.axis, value));
@@ -214,12 +213,12 @@ fn steps_apart(facts: &Facts, found: &mut Found) {
         let least = triggers::extent(&facts.model.workspace.bounds())[1];
         let problem = if step <= hysteresis {
             let fix = if 2.0 * hysteresis > least { 2.0 * hysteresis } else { least };
-            (format!("not above its hysteresis of {}", shown(hysteresis)), fix)
+            (format!("not larger than its hysteresis of {}", shown(hysteresis)), fix)
         } else if step < least {
             let steps = (stop - trigger.start.unwrap_or(0.0)) / step;
             (
                 format!(
-                    "too fine: {} steps to stop, expected {MOST_STEPS} at most across the workspace",
+                    "too small: {} steps to stop, but at most {MOST_STEPS} are possible across the workspace",
                     figure(steps)
                 ),
                 least * 1.001,
@@ -236,8 +235,8 @@ fn steps_apart(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// The hysteresis is above the noise.
-fn above_noise(facts: &Facts, found: &mut Found) {
+/// Checks that the hysteresis is above the noise.
+fn above_noise(facts: &Facts, found: &mut Findings) {
     for (index, trigger) in of_kind(facts, &[TriggerKind::Position, TriggerKind::Level]) {
         let (Some(noise), Some(hysteresis)) = (noise(facts), trigger.hysteresis) else { continue };
         let quiet = triggers::QUIET * noise[trigger.axis];
@@ -246,18 +245,18 @@ fn above_noise(facts: &Facts, found: &mut Found) {
                 TRIGGER_IN_NOISE,
                 &key(index, trigger, "hysteresis"),
                 format!(
-                    "`hysteresis` of trigger[{index}] is {}, but the pose has {} of noise, rms",
+                    "`hysteresis` of trigger[{index}] is {}, but the measured pose has a noise of {} rms",
                     amount(trigger.axis, hysteresis),
                     amount(trigger.axis, noise[trigger.axis])
                 ),
-                &format!("take it out, or write \"{}\" or more", amount(trigger.axis, 1.01 * quiet)),
+                &format!("leave it out, or write \"{}\" or more", amount(trigger.axis, 1.01 * quiet)),
             );
         }
     }
 }
 
-/// A pulse is over, and the line low for a tick, before the next position is passed.
-fn pulses_apart(facts: &Facts, found: &mut Found) {
+/// Checks that a pulse has ended, and the line was low for a tick, before the next position is passed.
+fn pulses_apart(facts: &Facts, found: &mut Findings) {
     let Some(task) = &facts.model.task_space else { return };
     let period = facts.model.timing.period;
     for (index, trigger) in of_kind(facts, &[TriggerKind::Position]) {
@@ -269,13 +268,13 @@ fn pulses_apart(facts: &Facts, found: &mut Found) {
                 TRIGGERS_MERGE,
                 &format!("trigger[{index}].width"),
                 format!(
-                    "a pulse of trigger[{index}] takes {ticks} tick{} and one between, but at {}/s a position is passed every {} ticks",
+                    "a pulse of trigger[{index}] takes {ticks} tick{} plus one before the next, but at {}/s a position is passed every {} ticks",
                     if ticks == 1 { "" } else { "s" },
                     amount(trigger.axis, speed),
                     figure(between)
                 ),
                 &format!(
-                    "a step of \"{}\" leaves time for it; or write a shorter width",
+                    "a step of \"{}\" leaves enough time; or write a shorter width",
                     amount(trigger.axis, 1.01 * f64::from(ticks + 1) * speed * period)
                 ),
             );

@@ -1,20 +1,20 @@
-//! How fast the run-to-run adaptation works, and for which gains.
+//! Speed of the run-to-run adaptation, and the range of gains.
 
-use super::{Facts, Found, figure};
+use super::{Facts, Findings, figure};
 use specgen_language::model::AdaptationMode;
 
 lints! {
     rules: ratio_of_gains, adapts_in_time, drift_behind_level;
 
-    /// # W0835: a gain ratio that no stack has
+    /// # W0835: implausible gain ratio
     ///
     /// `adaptation.gain_ratio` should lie between 0.2 and 4.
     ///
     /// ## Why it matters
     ///
-    /// λ is the gain of the stack over the identified one. At small signals it is
-    /// about half of that over the range, in the cold a quarter; no temperature and
-    /// no amplitude does more.
+        /// λ is the gain of the stack over the identified gain. It is about 0.5 at small
+        /// signals and 0.25 at cryogenic temperature. No temperature or amplitude changes
+        /// it more.
     ///
     /// ## Example
     ///
@@ -28,21 +28,21 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// 0.5 to 1.5 is a wide interval.
+    /// 0.5 to 1.5 is a wide range.
     ///
     /// ```toml
     /// gain_ratio = [0.9, 1.1]
     /// ```
     GAIN_RATIO_ODD = "W0835";
 
-    /// # W0836: an adaptation that comes too late
+    /// # W0836: adaptation too slow
     ///
-    /// The level estimate should follow within half a second.
-    ///
-    /// ## Why it matters
-    ///
-    /// The error of a hysteresis model changes with every turn of the motion; an
-    /// estimate that is slower than the motion corrects the error of the turn before.
+        /// The level estimate should follow within half a second.
+        ///
+        /// ## Why it matters
+        ///
+        /// The error of a hysteresis model changes at every reversal of the motion. An
+        /// estimate that is slower than the motion corrects the error of an earlier branch.
     ///
     /// ## Example
     ///
@@ -56,23 +56,22 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// Check rad/s; some hundred are usual.
+    /// Check the unit; some hundred rad/s are usual.
     ///
     /// ```toml
     /// level_bandwidth = "1260 rad/s"
     /// ```
     ADAPTATION_SLOW = "W0836";
 
-    /// # W0837: a drift estimate that does not go with the level
+    /// # W0837: drift and level estimates do not match
     ///
-    /// The drift estimate of PCC (AII.6) should be slower than that of the level, and
-    /// not two thousand times slower.
-    ///
-    /// ## Why it matters
-    ///
-    /// Faster than the level it takes noise for drift and extrapolates it; two
-    /// thousand times slower it does nothing. The two are often in each other's
-    /// place.
+        /// The drift estimate of PCC (AII.6) should be slower than the level estimate, but
+        /// less than two thousand times slower.
+        ///
+        /// ## Why it matters
+        ///
+        /// If it is faster, it extrapolates noise as drift. If it is two thousand times
+        /// slower, it has no effect. Often the two values are swapped.
     ///
     /// ## Example
     ///
@@ -89,20 +88,20 @@ lints! {
     ///
     /// ## Fix
     ///
-    /// A twentieth of the level's bandwidth is usual.
+    /// A twentieth of the level bandwidth is usual.
     DRIFT_ODD = "W0837";
 }
 
-/// λ = ρ/ρ̂ that a stack may have. At small signals ceramics move half as far per volt as over their range, in the cold of
-/// liquid nitrogen a quarter.
+/// Plausible λ = ρ/ρ̂. Per volt, ceramics move half as far at small signals as over their range, and a quarter as far in liquid
+/// nitrogen.
 const SOUND_RATIO: core::ops::RangeInclusive<f64> = 0.2..=4.0;
-/// Slowest adaptation, rad/s: half a second to take out what a hysteresis model leaves, which changes with every turn.
+/// Slowest adaptation, rad/s: half a second to correct the error of a hysteresis model, which changes at every reversal.
 const SLOWEST: f64 = 2.0;
-/// Drift estimate over level estimate: slower, but not so slow that the level has long followed.
+/// Bandwidth of the drift estimate over that of the level estimate.
 const SOUND_DRIFT: core::ops::RangeInclusive<f64> = 5e-4..=1.0;
 
-/// Gains of stacks stay within a few times of what was identified.
-fn ratio_of_gains(facts: &Facts, found: &mut Found) {
+/// Checks that the range of gains is plausible.
+fn ratio_of_gains(facts: &Facts, found: &mut Findings) {
     for (end, ratio) in facts.model.adaptation.gain_ratio.into_iter().enumerate() {
         if SOUND_RATIO.contains(&ratio) {
             continue;
@@ -110,8 +109,8 @@ fn ratio_of_gains(facts: &Facts, found: &mut Found) {
         found.add(
             GAIN_RATIO_ODD,
             &format!("adaptation.gain_ratio[{end}]"),
-            format!("the loop is to be stable for stacks whose gain is {} times what was identified", figure(ratio)),
-            "a stack's gain at small signals is about half of that over its range, in the cold a quarter: 0.5 to 1.5 is a wide interval",
+            format!("the loop would have to be stable for stacks with {} times the identified gain", figure(ratio)),
+            "a stack's gain at small signals is about half of that over its range, at cryogenic temperature a quarter: 0.5 to 1.5 is a wide range",
         );
     }
 }
@@ -133,8 +132,8 @@ fn bandwidths(facts: &Facts) -> Option<[(String, f64); 2]> {
     }))
 }
 
-/// An adaptation that is still at it when the error is another one.
-fn adapts_in_time(facts: &Facts, found: &mut Found) {
+/// Checks that the adaptation follows the error of the hysteresis model.
+fn adapts_in_time(facts: &Facts, found: &mut Findings) {
     let Some([(key, level), _]) = bandwidths(facts) else { return };
     if level == 0.0 || level >= SLOWEST {
         return;
@@ -142,13 +141,13 @@ fn adapts_in_time(facts: &Facts, found: &mut Found) {
     found.add(
         ADAPTATION_SLOW,
         &key,
-        format!("the level estimate follows at {} rad/s: it takes {} s", figure(level), figure(1.0 / level)),
-        "the error of a hysteresis model changes with every turn of the motion: tens to hundreds of rad/s are usual; check the unit (rad/s; per run)",
+        format!("the level estimate has a bandwidth of {} rad/s: it takes {} s to follow", figure(level), figure(1.0 / level)),
+        "the error of a hysteresis model changes at every reversal of the motion: tens to hundreds of rad/s are usual; check the unit (rad/s; per run)",
     );
 }
 
-/// The drift estimate is the slower of the two.
-fn drift_behind_level(facts: &Facts, found: &mut Found) {
+/// Checks that the drift estimate is the slower one, but not too slow.
+fn drift_behind_level(facts: &Facts, found: &mut Findings) {
     let Some([(level_key, level), (key, drift)]) = bandwidths(facts) else { return };
     if facts.model.adaptation.mode != AdaptationMode::Pcc
         || level == 0.0
@@ -157,11 +156,13 @@ fn drift_behind_level(facts: &Facts, found: &mut Found) {
     {
         return;
     }
-    let how = if drift > level { "is to follow faster than" } else { "is next to nothing beside" };
+    let how = if drift > level { "would be faster than" } else { "has no effect compared with" };
     found.add(
         DRIFT_ODD,
         &key,
         format!("the drift estimate, at {} rad/s, {how} the level estimate, at {} rad/s", figure(drift), figure(level)),
-        &format!("the paper has a twentieth: check the units of `{key}` and `{level_key}`, and that the two are not in each other's place"),
+        &format!(
+            "the paper uses a twentieth: check the units of `{key}` and `{level_key}`, and that the two are not swapped"
+        ),
     );
 }
