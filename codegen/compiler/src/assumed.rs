@@ -1,11 +1,11 @@
-//! What a controller rests on that nobody measured: what the spec names as assumed, and records that a simulation made.
+//! Assumptions of a controller: values that the spec lists as assumed, and simulated records.
 
 use serde::Serialize;
 
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
 
-/// Values and records that nobody measured.
+/// Values and records that were not measured.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Assumptions {
     /// Paths of keys and repeated sections, as the spec's `assumed` names them.
@@ -15,57 +15,57 @@ pub struct Assumptions {
 }
 
 impl Assumptions {
-    /// Those of `model`, whose files `simulated` are marked so.
+    /// Those of `model`, whose files `simulated` are marked as simulated.
     #[must_use]
     pub fn of(model: &Model, simulated: Vec<String>) -> Self {
         Self { values: model.assumed.clone(), simulated }
     }
 
-    /// Whether everything is measured or known.
+    /// Whether every value is measured or known.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.values.is_empty() && self.simulated.is_empty()
     }
 
-    /// How many values, such as `13 assumed values`; none if there is none.
+    /// The number of values, such as `13 assumed values`; none if there are none.
     #[must_use]
     pub fn count(&self) -> Option<String> {
         counted(&self.values, |count| format!("{count} assumed values"), "1 assumed value")
     }
 
-    /// The records, such as `simulated leg record`; none if there is none.
+    /// The records, such as `simulated leg record`; none if there are none.
     #[must_use]
     pub fn records(&self) -> Option<String> {
         counted(&self.simulated, |count| format!("{count} simulated leg records"), "simulated leg record")
     }
 
-    /// All of them in a few words: `13 assumed values, simulated leg record`; empty if there is none.
+    /// A summary such as `13 assumed values, simulated leg record`; empty if there are none.
     #[must_use]
     pub fn summary(&self) -> String {
         self.count().into_iter().chain(self.records()).collect::<Vec<_>>().join(", ")
     }
 
-    /// Each by what a user finds it under: a path of the spec, or a file.
+    /// Each as the path of a key in the spec, or as a file.
     #[must_use]
     pub fn list(&self) -> Vec<String> {
         let files = self.simulated.iter().map(|file| format!("hysteresis: {file} (simulated)"));
         self.values.iter().cloned().chain(files).collect()
     }
 
-    /// Why no real machine takes the controller of `model` without being asked to, at the list in the spec.
+    /// The finding that refuses the controller of `model` for a real machine, at the list in the spec.
     #[must_use]
     pub fn refusal(&self, model: &Model) -> Diagnostic {
         let clear = [
             (!self.values.is_empty())
-                .then_some("measure or look up these values, write them, and take their entries out of `assumed`"),
-            (!self.simulated.is_empty()).then_some("name a record of the machine's own legs in `hysteresis.records`"),
+                .then_some("measure or look up these values, write them, and remove their entries from `assumed`"),
+            (!self.simulated.is_empty()).then_some("name a record of the real legs in `hysteresis.records`"),
         ];
         let clear: Vec<&str> = clear.into_iter().flatten().collect();
         Diagnostic::at(
             &model.spans,
             if self.values.is_empty() { &["hysteresis.records"] } else { &["assumed", "sensor"] },
             codes::ASSUMED_ON_BOARD,
-            format!("the controller of a real machine would rest on {}: {}", self.summary(), self.list().join(", ")),
+            format!("the controller of a real machine would be based on {}: {}", self.summary(), self.list().join(", ")),
             format!("{}; or accept them with --assumed-ok", clear.join(", and ")),
         )
     }

@@ -27,7 +27,7 @@ use specgen_toolchain::targets::Target;
 pub struct Compilation {
     /// The file as read.
     pub source: SpecSource,
-    /// What it says.
+    /// The checked model.
     pub model: Model,
     /// How each record was identified, in the order of `hysteresis.records`; none for one that is a table already.
     pub records: Vec<Option<identify::Report>>,
@@ -37,15 +37,15 @@ pub struct Compilation {
     pub design: Option<Design>,
     /// Travel of the platform, and how well its legs hold it, for a controller in task space.
     pub reach: Option<Reach>,
-    /// What each trajectory asks of the legs, in the order of the spec.
+    /// What each trajectory demands of the legs, in the order of the spec.
     pub demands: Vec<PathDemand>,
-    /// How far stops go, from every declared speed.
+    /// Stopping distances from every declared speed.
     pub stops: Vec<Stopping>,
-    /// Noise of the measured pose, with gauges that see the platform.
+    /// Noise of the measured pose, if the gauges measure the platform.
     pub pose_noise: Option<PoseNoise>,
-    /// Noise of the pose at rest, as the gauges show it.
+    /// Noise of the pose at rest, as the gauges measure it.
     pub rest_noise: RestNoise,
-    /// Values that nobody measured.
+    /// Values that were not measured.
     pub assumptions: Assumptions,
     /// Every constant of the controller.
     pub ir: Ir,
@@ -56,23 +56,23 @@ pub struct Compilation {
 }
 
 impl Compilation {
-    /// Requirements that the spec does not meet although it compiles. A command that judges a spec reports them as errors; a
-    /// simulation still runs.
+        /// Requirements that the spec does not meet although it compiles. `check` and `build` report them as errors; a simulation
+        /// still runs.
     #[must_use]
     pub fn missed(&self) -> Vec<Diagnostic> {
         rest::check(&self.model, &self.rest_noise)
     }
 }
 
-/// Everything short of writing: reads, checks, identifies, lowers, emits.
+/// All phases except writing: read, check, identify, lower, emit.
 ///
 /// # Errors
-/// The spec or a record is refused. Later phases run only on what earlier ones accepted, so a second run may find more.
+/// The spec or a record is refused. Later phases run only if earlier ones accept, so a second run may find more.
 pub fn compile(path: &Path) -> Result<Compilation, Refusal> {
     compile_source(SpecSource::read(path).map_err(|finding| Refusal { source: None, findings: vec![finding] })?)
 }
 
-/// The same for a text at hand.
+/// The same for a text in memory.
 ///
 /// # Errors
 /// As [`compile`].
@@ -90,7 +90,7 @@ pub fn compile_source(source: SpecSource) -> Result<Compilation, Refusal> {
 fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compilation> {
     let model = check_spec(source, findings)?;
 
-    // These do not depend on each other: one run reports what any of them refuses.
+        // These are independent: one run reports the findings of all of them.
     let stability = accepted(check_stability(&model), findings);
     let records = accepted(declared::records(&model, &source.dir), findings);
     let setpoints = accepted(setpoint::declared(&model, &source.dir), findings);
@@ -110,7 +110,7 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compila
     let ir = accepted(lower::lower(&model, task, &records.tables, &records.rate_tables, origin), findings)?;
     let pose_noise = accepted(lower::pose_noise(&model), findings)?;
     let rest_noise = accepted(rest::noise(&model, design.as_ref()), findings)?;
-    // With the program of the spec's board, if it has one.
+    // Includes the program of the spec's board, if it has one.
     let target = Target::of(model.target.mcu);
     let files = workspace::files_with(&ir, &emit::emit(&ir), &[target.name]);
     lint::allow(&model, findings);
@@ -134,12 +134,12 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compila
     })
 }
 
-/// What a phase made; or none, and `findings` says why.
+/// The result of a phase; or none, with the errors added to `findings`.
 fn accepted<T>(made: Result<T, Vec<Diagnostic>>, findings: &mut Vec<Diagnostic>) -> Option<T> {
     made.map_err(|found| findings.extend(found)).ok()
 }
 
-/// The language, and values that make no sense together.
+/// Reads the spec and checks its values, each and together.
 fn check_spec(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Model> {
     let (model, found) = spec::load_as_far(source);
     findings.extend(found);
@@ -155,7 +155,8 @@ fn check_spec(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Mod
     None
 }
 
-/// Legs with their own gauges adapt each on its own; a controller in task space closes its loops over the platform's modes.
+/// Checks stability. Legs with their own gauges adapt independently; a controller in task space closes its loops over the
+/// platform's modes.
 ///
 /// # Errors
 /// As [`stability::check`] or [`stability::platform::design`].

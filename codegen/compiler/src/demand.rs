@@ -1,4 +1,4 @@
-//! What workspace, trajectories and stops ask of the legs, against what stacks, tables and amplifiers can do.
+//! What workspace, trajectories and stops demand of the legs, compared with what stacks, tables and amplifiers can do.
 
 use specgen_runtime::Platform;
 
@@ -11,21 +11,21 @@ use specgen_identify::everett::EverettTable;
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::model::{Model, TaskSpace};
 
-/// What a spec asks of its legs, all of it within what they can do.
+/// What a spec demands of its legs, all within their capability.
 #[derive(Debug, Default)]
 pub struct Demand {
-    /// Travel of the platform; none for legs that do not hold one.
+    /// Travel of the platform; none if the legs do not determine its pose.
     pub reach: Option<Reach>,
-    /// What each trajectory asks of the legs, in the order of the spec.
+    /// What each trajectory demands of the legs, in the order of the spec.
     pub paths: Vec<PathDemand>,
-    /// How far stops go, from every declared speed.
+    /// Stopping distances from every declared speed.
     pub stops: Vec<Stopping>,
-    /// Warnings and notes, none of which refuses anything.
+    /// Warnings and notes.
     pub warnings: Vec<Diagnostic>,
 }
 
-/// Checks where the legs reach, and that trajectories and stops stay there: as far as both the data sheet's stroke and every
-/// leg's table allow. And that stacks and amplifiers make them.
+/// Checks that trajectories and stops stay within reach of the legs, as limited by the data sheet's stroke and every leg's table,
+/// and that stacks and amplifiers are fast enough.
 ///
 /// # Errors
 /// All findings about what is out of reach or too fast.
@@ -37,7 +37,7 @@ pub fn check(model: &Model, setpoints: Option<&Setpoints>, tables: &[EverettTabl
     }
 }
 
-/// Legs may be driven one by one where they do not hold a platform: then there is no pose to look at.
+/// Legs with their own gauges. If they do not determine a pose, there is nothing to check.
 fn of_legs(model: &Model, stroke: f64) -> Result<Demand, Vec<Diagnostic>> {
     let Ok(platform) = platform(model) else { return Ok(Demand::default()) };
     let (reach, warnings) = reach::check_legs(model, &platform, stroke)?;

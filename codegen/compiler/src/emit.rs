@@ -1,9 +1,9 @@
 //! IR to the text of the `controller` crate.
 //!
-//! One emitter per emitted file. Emitters are infallible and do no arithmetic: whatever can fail failed in lowering.
+//! One emitter per emitted file. Emitters cannot fail and do no arithmetic: errors are found in lowering.
 //!
-//! The law itself is the crate `specgen-law`, which the workspace contains; emitted are constants, tables and types. What differs
-//! between six legs with their own gauges and a platform in task space lies in `legs` and `platform`.
+//! The law itself is the crate `specgen-law`, which the workspace contains. Constants, tables and types are emitted. `legs` and
+//! `platform` are the parts that differ between six legs with their own gauges and a platform in task space.
 
 mod body;
 mod checked;

@@ -18,7 +18,7 @@ pub(crate) fn figure(value: f64) -> String {
     }
 }
 
-/// `value` with so many decimals; nothing has no sign.
+/// `value` with so many decimals; zero has no sign.
 pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let is_zero = text.bytes().all(|letter| b"-0.".contains(&letter));
@@ -30,7 +30,7 @@ mod tests {
     use super::{figure, fixed};
 
     #[test]
-    fn nothing_has_no_sign() {
+    fn zero_has_no_sign() {
         let found = [-0.0, -0.004, -0.006, 0.0, 73.7].map(|value| fixed(value, 2));
         assert_eq!(found, ["0.00", "0.00", "-0.01", "0.00", "73.70"]);
     }

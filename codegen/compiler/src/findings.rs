@@ -1,4 +1,4 @@
-//! Every finding there is: `specgen explain`, and the page *Findings* of the book.
+//! The list of all findings: `specgen explain`, and the page *Findings* of the book.
 
 use crate::lint;
 use specgen_language::diagnostic::{Code, codes};
@@ -22,11 +22,11 @@ const MARKDOWN_HEAD: &str = "\
 
 # Findings
 
-Every finding has a code that keeps its meaning. E: refused, nothing is written. W: pointed out, nothing is refused. N: worth
-knowing. Numbers: 01 file and syntax, 02 keys and values, 03 ranges and consistency, 04 stability, reach, set-points, gauges and
-supervisor, 05 records, 06 identification, 07 tuning, 08 values that do not fit together. `specgen explain CODE` prints one of
-these pages. An example is a change of a spec of the repository, or commands; a test runs it, with and without its fix, unless it
-is marked (minutes) or stands in a block `text`.
+Every finding has a code whose meaning never changes. E is an error: the spec is refused and nothing is written. W is a warning,
+N a note. Numbers: 01 file and syntax, 02 keys and values, 03 ranges and consistency, 04 stability, reach, set-points, gauges and
+supervisor, 05 records, 06 identification, 07 tuning, 08 inconsistent values. `specgen explain CODE` prints one of these pages. An
+example is a change of a spec of the repository, or commands. A test runs it with and without its fix, unless it is marked
+(minutes) or is in a block `text`.
 ";
 
 /// The pages of all codes as one Markdown text: the page *Findings* of the book.
@@ -81,7 +81,7 @@ mod tests {
             }
             parts.push(rest);
             assert!(parts.iter().all(|part| !part.trim().is_empty()), "{}", code.id);
-            // Text, and not the blocks of code between.
+            // Only the text between the blocks of code.
             let text = page.split("```").step_by(2).flat_map(str::lines);
             text.for_each(|line| assert!(line.chars().count() <= 80, "{}: {line}", code.id));
         }

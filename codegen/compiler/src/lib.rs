@@ -1,4 +1,4 @@
-//! The checked model to an emitted controller.
+//! Compiles the checked model to an emitted controller.
 //!
 //! ```text
 //! model → lint, stability, requirements, demand (findings) → lower → ir (every constant) → emit (text) → workspace (folder)
@@ -8,9 +8,9 @@
 //! |---|---|
 //! | [`compile`] | the phases in their order: start reading here |
 //! | [`stability`] | legs: Jury tests and the sampled leg; platform: modes, notch, start values, closed loop, margins, refusals |
-//! | [`reach`], [`demand`] | travel, workspace, bias and paths against the strokes; what motion requires of the legs against what they can do |
-//! | [`lint`] | values that are legal one by one and implausible together: each file has pages, messages and rules |
-//! | [`findings`] | every code with its page |
+//! | [`reach`], [`demand`] | travel, workspace, bias and paths compared with the strokes; demands of motion compared with the legs |
+//! | [`lint`] | values that are each in range but implausible together; each file has pages, messages and rules |
+//! | [`findings`] | all codes with their pages |
 //! | [`precision`] | rounding errors of the scalar: the runtime's kernels on numbers that record every operation |
 //! | [`lower`], [`ir`] | every constant of the controller, computed and rounded; `specgen dump-ir` prints it |
 //! | [`constants`] | constants of the IR as structs of the runtime; the emitted text is their `{:?}` |

@@ -1,6 +1,6 @@
-//! Model and tables to IR: all arithmetic on constants happens here.
+//! Lowers model and tables to IR: all arithmetic on constants is here.
 //!
-//! Trigonometry goes through `libm`, so that the same spec gives the same bytes on every computer.
+//! Trigonometry uses `libm`, so that the same spec gives the same bytes on every computer.
 
 mod actuation;
 mod dynamics;
@@ -43,7 +43,7 @@ const LEG_SETPOINT_STROKES: f64 = 2.0;
 pub struct Origin<'a> {
     /// Hex digest of spec and records.
     pub digest: &'a str,
-    /// What nobody measured, see [`Assumptions::list`](crate::assumed::Assumptions::list).
+    /// Values that were not measured, see [`Assumptions::list`](crate::assumed::Assumptions::list).
     pub assumed: Vec<String>,
 }
 
@@ -51,7 +51,7 @@ pub struct Origin<'a> {
 ///
 /// `task` is the tuning of a controller in task space and its set-points ([`setpoint::lower`]), none for six legs with their own
 /// gauges; `tables` holds one Everett table for all legs or one for each, `rate_tables` those of the second weight of (6), if the
-/// spec names any. Nothing of `origin` changes the law.
+/// spec names any. `origin` does not change the law.
 ///
 /// # Errors
 /// Findings about values that cannot be turned into a controller (a converter too coarse
@@ -86,7 +86,7 @@ pub fn lower(
         leg_gain: model.actuator.leg_gain(),
     };
     let rings = match &task {
-        // In every control mode: without a notch the feedback leaves the platform's modes a part of their damping only.
+        // The longest over all control modes: without a notch, feedback reduces the damping of the platform's modes.
         Some((design, _)) => {
             design.margins.iter().flat_map(|margins| &margins.modes).fold(0.0, |longest: f64, mode| {
                 let rings = 1.0 / (core::f64::consts::TAU * mode.frequency * mode.damping_ratio);
@@ -159,7 +159,7 @@ pub fn lower(
     })
 }
 
-/// What every leg can do, m: as far as both the data sheet's stroke and every leg's table allow.
+/// Travel of every leg, m: the smaller of the data sheet's stroke and every leg's table.
 #[must_use]
 pub fn stroke(model: &Model, tables: &[EverettTable]) -> f64 {
     let largest = tables.iter().map(|table| table.node(table.grid, 0));
@@ -183,7 +183,7 @@ pub fn gauges(model: &Model, task: &model::TaskSpace, scalar: Scalar) -> Result<
     sensing::lower(model, task, scalar)
 }
 
-/// What a controller in task space has of its own.
+/// The part that only a controller in task space has.
 fn task_space(
     model: &Model,
     task: &model::TaskSpace,
@@ -208,7 +208,7 @@ fn task_space(
     })
 }
 
-/// Tables in the layout of the controller, each distinct one once, and what goes with them.
+/// Tables in the layout of the controller, each distinct one once, with their indices and rates.
 fn hysteresis(model: &Model, tables: &[EverettTable], rate_tables: &[EverettTable], scalar: Scalar) -> Hysteresis {
     let (distinct, table_of_leg) = rate::distinct(tables, 1.0, scalar);
     Hysteresis {

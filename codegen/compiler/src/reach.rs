@@ -1,10 +1,10 @@
-//! What the legs reach: travel of each axis, the declared workspace, the bias, trajectories; and how well the legs hold the
-//! platform there.
+//! Reach of the legs: travel of each axis, the declared workspace, the bias, trajectories; and the conditioning of the geometry
+//! there.
 //!
-//! A leg moves between 0 (no voltage, where the gauges are zeroed) and its stroke. Weight and pre-load are left out: what
-//! they do to the rest pose is inside the zero of the gauges. Poses are x, y, z (m), θx, θy, θz (rad) from rest; those of
-//! set-points include the bias. The poses that a hexapod reaches are no box, so corners of the declared workspace beyond
-//! reach are reported and not refused; a bound that its axis alone cannot reach is.
+//! A leg moves between 0 (no voltage, where the gauges are zeroed) and its stroke. Weight and pre-load are not included: the
+//! zero of the gauges contains their effect on the rest pose. Poses are x, y, z (m), θx, θy, θz (rad) from rest; those of
+//! set-points include the bias. The reachable poses of a hexapod are not a box. So corners of the declared workspace beyond reach
+//! cause only a warning, but a bound that its axis alone cannot reach is an error.
 
 mod boxes;
 mod conditioning;
@@ -22,15 +22,15 @@ pub use boxes::Boxes;
 pub use conditioning::Conditioning;
 pub use findings::describe;
 
-/// Interior poses that are looked at beside the corners.
+/// Interior poses that are checked in addition to the corners.
 const INTERIOR_POSES: u32 = 128;
-/// A leg closer to either end than this part of its stroke has no room for corrections.
+/// Least distance of a leg from its ends, as a share of the stroke, that leaves room for corrections.
 const ROOM: f64 = 0.01;
 
 /// Pose from rest, m and rad.
 pub type Pose = [f64; 6];
 
-/// What is reached.
+/// Reach of the platform.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reach {
     /// Largest leg displacement, m; the smallest is 0.
@@ -39,47 +39,47 @@ pub struct Reach {
     pub axes: [AxisReach; 6],
     /// Smallest and largest leg displacement at the bias, m.
     pub at_bias: [f64; 2],
-    /// Part of the declared workspace, shrunk towards the bias, of which every corner is within reach; 0 to 1.
+    /// Scale of the declared workspace, shrunk towards the bias, at which every corner is within reach; 0 to 1.
     pub share: f64,
     /// Smallest and largest leg displacement that corners and interior of the declared workspace would need, m.
     pub demanded: [f64; 2],
     /// No pose in the declared workspace needs more than this in magnitude, m.
     pub demanded_bound: f64,
-    /// How well the legs hold the platform.
+    /// Conditioning of the geometry.
     pub conditioning: Conditioning,
-    /// Largest turn of a joint over the declared workspace, rad: at the base, at the platform.
+    /// Largest angle of a joint over the declared workspace, rad: at the base, at the platform.
     pub joint_angles: [f64; 2],
     /// Largest boxes about the middle of the strokes.
     pub boxes: Boxes,
 }
 
-/// One axis, all others standing still.
+/// Reach of one axis with all others fixed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AxisReach {
     /// Declared bound on its magnitude, m or rad.
     pub declared: f64,
     /// Lowest and highest value from the middle of all strokes, m or rad from rest.
     pub from_middle: [f64; 2],
-    /// The same from the bias; from rest where there is none.
+    /// The same from the bias; from rest if there is no bias.
     pub from_bias: [f64; 2],
 }
 
 /// What a path needs of the legs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PathReach {
-    /// Poses looked at.
+    /// Number of poses.
     pub poses: usize,
     /// Smallest and largest displacement of any leg, m.
     pub displacement: [f64; 2],
-    /// What could be added to z of every pose with all legs still in their strokes, lowest and highest, m; none: nothing.
+    /// Range of shifts in z that keeps all legs within their strokes at every pose, m; none if no shift does.
     pub shift: Option<[f64; 2]>,
 }
 
-/// Checks bias and workspace of `model`, whose `[control]` is `task`. `stroke`: what every leg can do, m.
+/// Checks bias and workspace of `model`, whose `[control]` is `task`. `stroke`: travel of every leg, m.
 ///
 /// # Errors
-/// A bias out of reach, a bound that its axis cannot reach. (A workspace in which the legs hardly hold the platform has
-/// no `platform`: [`crate::lower::platform`] refuses it.)
+/// A bias out of reach, a bound that its axis cannot reach. (For a nearly singular workspace there is no `platform`:
+/// [`crate::lower::platform`] refuses it.)
 pub fn check(
     model: &Model,
     task: &TaskSpace,
@@ -96,11 +96,11 @@ pub fn check(
     Ok((reach, found))
 }
 
-/// Looks at the workspace of `model`, whose legs have gauges of their own and no bias: set-points count from rest, where the
-/// legs stand at the lower end of their strokes. `stroke`: what every leg can do, m.
+/// Checks the workspace of `model`, whose legs have their own gauges and no bias: set-points are relative to rest, where the
+/// legs are at the lower end of their strokes. `stroke`: travel of every leg, m.
 ///
 /// # Errors
-/// A bound that its axis cannot reach, where set-points are poses.
+/// A bound that its axis cannot reach, if set-points are poses.
 pub fn check_legs(
     model: &Model,
     platform: &Platform<f64>,
@@ -114,7 +114,7 @@ pub fn check_legs(
     Ok((reach, found))
 }
 
-/// Bounds of the workspace that no pose reaches, with the stroke that the spec declares: nothing else is needed to know it.
+/// Findings about workspace bounds that no pose reaches with the declared stroke.
 #[must_use]
 pub fn check_bounds(model: &Model) -> Vec<Diagnostic> {
     let Ok(platform) = crate::lower::platform(model) else { return Vec::new() };
@@ -123,13 +123,13 @@ pub fn check_bounds(model: &Model) -> Vec<Diagnostic> {
     findings::of_bounds(model, legs.stroke, |axis| [-1.0, 1.0].map(|sign| legs.travel(&middle, axis, sign)))
 }
 
-/// Where legs with gauges of their own end after their gauges: for `check`, not for every build.
+/// Notes for `check` about legs that reach beyond their own gauges.
 #[must_use]
 pub fn notes(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
     if model.task_space.is_some() { Vec::new() } else { findings::notes_of_legs(model, reach) }
 }
 
-/// What is reached, with set-points about `bias` (m and rad, from rest). `stroke`: what every leg can do, m.
+/// The reach with set-points about `bias` (m and rad, from rest). `stroke`: travel of every leg, m.
 #[must_use]
 pub fn measure(model: &Model, platform: &Platform<f64>, stroke: f64, bias: &Pose) -> Reach {
     let bounds = model.workspace.bounds();
@@ -160,7 +160,7 @@ pub fn measure(model: &Model, platform: &Platform<f64>, stroke: f64, bias: &Pose
     }
 }
 
-/// Checks the poses of a declared path, bias included. `key`: where the path stands in the spec; `name`: what users call it.
+/// Checks the poses of a declared path, bias included. `key`: place of the path in the spec; `name`: its name for users.
 ///
 /// # Errors
 /// [`specgen_language::diagnostic::codes::TRAJECTORY_UNREACHABLE`] at `key`, with the shift in z that would make it fit, if one does.

@@ -1,23 +1,23 @@
-//! What the platform is for, against what its converters can do.
+//! The required precision compared with the converters.
 
 use crate::lower::inverse_jacobian;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
 
-/// Most bits that `dac.bits` takes.
+/// Largest accepted `dac.bits`.
 const MOST_BITS: u32 = 24;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The finest steps of the converters, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Steps {
-    /// A leg for one code.
+    /// Motion of a leg for one code.
     pub leg: f64,
-    /// The platform along x, y, z for half a code on every leg, each with the sign that adds.
+    /// Motion of the platform along x, y, z for half a code on every leg, with the worst signs.
     pub platform: [f64; 3],
 }
 
-/// The steps of the spec's converter; the geometry holds, so there is an inverse.
+/// The steps of the spec's converter. The geometry must not be singular.
 #[must_use]
 pub fn steps(model: &Model) -> Steps {
     let [low, high] = model.dac.range;
@@ -31,7 +31,7 @@ pub fn steps(model: &Model) -> Steps {
 /// Refuses a converter too coarse for `requirements.precision`.
 ///
 /// # Errors
-/// One finding at that key, with the number of bits that would do.
+/// One finding at that key, with the number of bits that would be enough.
 pub fn check(model: &Model) -> Result<(), Vec<Diagnostic>> {
     let Some(precision) = model.requirements.precision else { return Ok(()) };
     let steps = steps(model);
@@ -64,17 +64,17 @@ pub fn check(model: &Model) -> Result<(), Vec<Diagnostic>> {
         ),
         match enough {
             Some(bits) => {
-                format!("dac.bits = {bits} would do; or a `dac.range` of {range:.3} V, or allow {}", up(largest))
+                format!("dac.bits = {bits} would be enough; or use a `dac.range` of {range:.3} V, or allow {}", up(largest))
             }
             None => format!(
-                "no converter that specgen drives has so many bits: allow {}, or narrow `dac.range` to {range:.3} V",
+                "no supported converter has enough bits: allow {}, or narrow `dac.range` to {range:.3} V",
                 up(largest)
             ),
         },
     )])
 }
 
-/// As a value for the spec, rounded up to what is printed.
+/// A value for the spec, rounded up to the printed digits.
 fn up(metres: f64) -> String {
     format!("\"{:.3} nm\"", (metres * 1e12).ceil() / 1e3)
 }

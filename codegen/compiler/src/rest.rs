@@ -1,4 +1,4 @@
-//! Noise of the pose at rest, against what the spec asks for.
+//! Noise of the pose at rest, compared with the requirements of the spec.
 
 use serde::Serialize;
 
@@ -11,27 +11,27 @@ use specgen_numerics::Matrix6;
 
 const AXES: [&str; 6] = ["x", "y", "z", "theta_x", "theta_y", "theta_z"];
 
-/// Noise of the pose at rest, rms, as the gauges show it while the controller holds it: x, y, z in m, θx, θy, θz in rad.
+/// Noise of the pose at rest, rms, as the gauges measure it while the controller holds it: x, y, z in m, θx, θy, θz in rad.
 ///
-/// Of six legs with their own gauges, which do not see the platform, it is what their readings give the pose. The steps of the drive's
-/// converter are left out: `requirements.precision` has a check of its own for them.
+/// For six legs with their own gauges, it is the noise of the pose computed from their readings. The steps of the drive's converter
+/// are not included: `requirements.precision` has its own check.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RestNoise {
-    /// Gauges and amplifiers together, which are independent: the root of the sum of the squares.
+        /// Gauges and amplifiers together. They are independent: the root of the sum of the squares.
     pub pose: [f64; 6],
-    /// By the noise of the gauges and the steps of their converters.
+        /// Due to the noise of the gauges and the steps of their converters.
     pub gauges: [f64; 6],
-    /// By the noise of the amplifiers, with the gain of a leg over its whole range: a bound, for a voltage of some millivolts switches little
-    /// of the hysteresis and moves a leg by less. 0.58 of it was found on the simulated machine.
+        /// Due to the noise of the amplifiers, with the gain of a leg over its whole range. This is an upper bound: the gain for some
+        /// millivolts is lower. The simulated machine has 0.58 of it.
     pub amplifiers: [f64; 6],
-    /// Of one reading, steps of the converter included, m.
+    /// Noise of one reading, steps of the converter included, m.
     pub reading: f64,
 }
 
 /// Computes it: with `design`, the closed loop of the platform in the spec's mode; without, each leg on its own.
 ///
 /// # Errors
-/// Gauges that do not fix the pose, or legs that do not hold the platform.
+/// Gauges or legs that do not determine the pose.
 pub fn noise(model: &Model, design: Option<&Design>) -> Result<RestNoise, Vec<Diagnostic>> {
     let [reading, _] = lower::reading_noise(model);
     let asked = model.actuator.leg_gain() * model.amplifier.noise;
@@ -58,7 +58,7 @@ pub fn noise(model: &Model, design: Option<&Design>) -> Result<RestNoise, Vec<Di
     Ok(RestNoise { pose, gauges: root(gauges), amplifiers: root(amplifiers), reading })
 }
 
-/// Weights of level and drift that are in use on a leg of its own.
+/// Weights of level and drift that a leg with its own gauge uses.
 fn weights(model: &Model) -> Option<(f64, Option<f64>)> {
     let adaptation = &model.adaptation;
     match adaptation.mode {
@@ -72,8 +72,8 @@ fn scaled(matrix: &Matrix6, factor: f64) -> Matrix6 {
     matrix.map(|row| row.map(|x| x * factor))
 }
 
-/// What is beyond the spec's limits: the worst of x, y, z, and of the rotations. The errors refuse no simulation; what judges a spec shows
-/// them, and a board takes no such controller.
+/// Findings beyond the spec's limits: the worst of x, y, z, and the worst rotation. They are errors for `check`, `build` and
+/// boards; a simulation still runs.
 #[must_use]
 pub fn check(model: &Model, noise: &RestNoise) -> Vec<Diagnostic> {
     let beyond = |axis: usize| model.requirements.noise_of(axis).map_or(0.0, |(limit, _)| noise.pose[axis] / limit);
@@ -88,8 +88,8 @@ fn finding(model: &Model, noise: &RestNoise, axis: usize) -> Option<Diagnostic> 
     let shown = |value: f64| format!("{:.3} {unit}", value * 1e9);
     let (gauges, amplifiers) = (noise.gauges[axis], noise.amplifiers[axis]);
     let message = format!(
-        "the pose at rest has a noise of {} rms in {}, more than the {} of {key}: {} by the gauges ({:.3} nm a reading, with the steps of \
-         their converter), {} by the amplifiers",
+        "the pose at rest has a noise of {} rms in {}, more than the {} of {key}: {} from the gauges ({:.3} nm per reading, with the steps of \
+         their converter), {} from the amplifiers",
         shown(noise.pose[axis]),
         AXES[axis],
         shown(limit),
@@ -103,10 +103,10 @@ fn finding(model: &Model, noise: &RestNoise, axis: usize) -> Option<Diagnostic> 
         ("the amplifiers", "`amplifier.noise`")
     };
     let allowing = if axis < 3 { "noise" } else { "rotation_noise" };
-    // Rounded up to what is printed; of axes with the same limit this one is the noisiest.
+    // Rounded up to the printed digits; among axes with the same limit this one is the noisiest.
     let largest = libm::ceil(noise.pose[axis] * 1e12) / 1e3;
     let help = format!(
-        "it is made by {what} above all: correct {source} or take better ones; or allow it, in [requirements]: {allowing} = \"{largest:.3} {unit}\""
+        "most of it comes from {what}: correct {source} or use better ones; or allow it, in [requirements]: {allowing} = \"{largest:.3} {unit}\""
     );
     Some(Diagnostic::at(&model.spans, &[key], codes::NOISE_AT_REST, message, help))
 }

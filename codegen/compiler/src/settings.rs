@@ -1,4 +1,4 @@
-//! The page *Settings* of the book: what a `Config` may hold, printed from the table that the controller checks it by.
+//! The page *Settings* of the book: the permitted values of a `Config`, from the controller's own table.
 
 use std::fmt::Write as _;
 
@@ -9,13 +9,13 @@ use crate::ir::{Ir, Range, Setting};
 pub fn markdown(platform: &Ir, legs: &Ir) -> String {
     let mut text = String::from(
         "# Settings\n\n\
-         What may change while a controller runs, its `Config`: by code (`with_…` of the emitted `config.rs`), as words (records, \
-         `--config` of a real-time PC, `specgen tune`) or over the link (`config write SPEC` of `specgen operate`). Each word has a \
-         range; both ends are included. The compiler takes the ranges from the spec, the emitted `permitted.rs` holds them, and a \
-         `Config` with any word beyond is refused by the word's name: no setting makes a machine leave the limits of its spec. That \
-         a setting is stable on the platform is for `specgen check` to say.\n\n\
-         A snapshot of a state (the beginning of a record) is checked by the same table: it holds every state that these settings \
-         and any inputs can lead to.\n",
+                  The `Config` of a controller is what may change while it runs: in code (`with_…` of the emitted `config.rs`), as words \
+                  (records, `--config` of a real-time PC, `specgen tune`) or over the link (`config write SPEC` of `specgen operate`). Each \
+                  word has a range that includes both ends. The ranges come from the spec and are in the emitted `permitted.rs`. A `Config` \
+                  with a word out of range is refused with the name of the word: no setting makes a machine leave the limits of its spec. \
+                  `specgen check` tells whether a setting is stable.\n\n\
+                  The same table checks a snapshot of a state (the start of a record): it permits every state that these settings and any \
+                  inputs can lead to.\n",
     );
     for (title, spec, ir) in
         [("Of a platform", "specs/reference.toml", platform), ("Of six legs", "specs/legs.toml", legs)]
@@ -35,7 +35,7 @@ pub fn markdown(platform: &Ir, legs: &Ir) -> String {
     text
 }
 
-/// Of the first three and of the others, where they differ.
+/// The text for translations and that for rotations, or one if they are equal.
 fn both([first, last]: &[String; 2]) -> String {
     if first == last { first.clone() } else { format!("{first}; {last}") }
 }

@@ -1,4 +1,4 @@
-//! Specs that commands read: compiled, with what was found shown.
+//! Compiles the spec of a command and shows its findings.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use specgen_language::outcome::{Failure, Refusal};
 use specgen_language::spec::{self, SpecSource};
 use specgen_language::ui::Ui;
 
-/// Compiles the spec at `path`; its findings are shown.
+/// Compiles the spec at `path` and shows its findings.
 ///
 /// # Errors
 /// The spec is refused.
@@ -19,7 +19,7 @@ pub fn compiled(path: &Path, ui: &mut Ui) -> Result<Compilation, Failure> {
     Ok(compiled)
 }
 
-/// The same for a command that only looks things up in it: the findings in one line.
+/// The same for a command that only reads values of the spec: the findings in one line.
 ///
 /// # Errors
 /// The spec is refused.
@@ -29,7 +29,7 @@ pub fn looked_up(path: &Path, ui: &mut Ui) -> Result<Compilation, Failure> {
     Ok(compiled)
 }
 
-/// The same with no finding shown. Tables on a fine grid take seconds.
+/// The same without showing findings. Tables on a fine grid take seconds.
 ///
 /// # Errors
 /// The spec is refused.
@@ -37,7 +37,7 @@ pub fn quietly(path: &Path, ui: &Ui) -> Result<Compilation, Failure> {
     Ok(ui.during("compiling the spec", || compile::compile(path))?)
 }
 
-/// What a spec says, whose records need not be there.
+/// The model of a spec whose records need not exist.
 ///
 /// # Errors
 /// The spec is refused.
@@ -50,7 +50,7 @@ pub fn model(path: &Path) -> Result<Model, Failure> {
 /// Refuses a spec with a warning among `findings`, if warnings are denied.
 ///
 /// # Errors
-/// There is one, and they are.
+/// There is a warning, and warnings are denied.
 pub fn accept(compiled: &Compilation, findings: &[Diagnostic], deny_warnings: bool) -> Result<(), Failure> {
     if !deny_warnings || findings.iter().all(|one| one.severity < Severity::Warning) {
         return Ok(());

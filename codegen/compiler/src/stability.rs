@@ -1,12 +1,12 @@
-//! Stability of the adaptation, decided when compiling.
+//! Stability of the adaptation, checked at compile time.
 //!
 //! Two checks over the declared interval of λ = ρ/ρ̂:
 //!
-//! 1. **Jury**, for a leg that follows its voltage at once (Appendix B): EWMA 0 < λω < 2, the corrected (AII.18); PCC (AII.19),
-//!    of which λ < 4/(2ω_Σ − ω_Π) binds.
+//! 1. **Jury**, for a leg that follows its voltage immediately (Appendix B): EWMA 0 < λω < 2, the corrected (AII.18); PCC (AII.19),
+//!    whose binding bound is λ < 4/(2ω_Σ − ω_Π).
 //! 2. **Spectral radius** of the sampled loop with the leg's own dynamics: amplifier lag, axial resonance and lag of the
-//!    gauge, exactly discretised over one run (the drive is held), closed by the filter form of the run-to-run law. This limit is lower:
-//!    the integrator meets the resonance.
+//!    gauge, exactly discretised over one run (the drive is held), closed by the filter form of the run-to-run law. This limit is lower
+//!    because of the resonance.
 
 mod phase;
 pub mod platform;
@@ -19,16 +19,16 @@ pub use phase::phase_margin;
 pub use sampled::{LegDynamics, shown_at_rest, spectral_radius, transition};
 pub use specgen_numerics::{ewma_limit, pcc_limit};
 
-/// A radius above this is refused. The limit is 1; a small weight rightly has a radius just below it, so what is kept
-/// off here is rounding, not slowness.
+/// Largest accepted radius. The limit is 1. A small weight has a radius just below 1 and is valid, so the margin covers only
+/// rounding.
 pub const LARGEST_RADIUS: f64 = 1.0 - 1e-6;
-/// Values of λ looked at, evenly spaced over the interval, ends included.
+/// Number of λ values checked, evenly spaced over the interval, ends included.
 const RATIOS: u32 = 9;
 
-/// What was found for a stable spec.
+/// Margins of a stable spec.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Margins {
-    /// Largest λ that the static test allows for these weights; none where the law does not adapt.
+    /// Largest λ that the static test allows for these weights; none if the law does not adapt.
     pub static_gain_limit: Option<f64>,
     /// Largest spectral radius of the sampled leg over the λ interval.
     pub spectral_radius: f64,
@@ -44,7 +44,7 @@ enum Estimator {
 }
 
 impl Estimator {
-    /// The laws whose weights are given: which of them is used is a setting, not a build, so each must be stable.
+    /// The laws whose weights are given. Each must be stable, because a setting can select any of them.
     fn of(adaptation: &Adaptation) -> Vec<Self> {
         let level = adaptation.level_weight > 0.0;
         let drift = adaptation.drift_weight > 0.0;
@@ -62,7 +62,7 @@ impl Estimator {
         }
     }
 
-    /// What of the spec is there for a later change to this law alone, if `mode` is not it.
+    /// The values of the spec that only this law uses, if `mode` is another law.
     fn unused(self, mode: AdaptationMode) -> Option<&'static str> {
         match (mode, self) {
             (AdaptationMode::Invhys, _) => Some("the weights of level and drift"),
@@ -80,15 +80,15 @@ impl Estimator {
     }
 }
 
-/// Checks the weights of `model`, under every law that they are given for.
+/// Checks the weights of `model` for every law that uses them.
 ///
 /// # Errors
-/// One finding at the weight's place in the spec, naming the largest weight that would do.
+/// One finding at the weight's place in the spec, with the largest stable weight.
 pub fn check(model: &Model) -> Result<Margins, Vec<Diagnostic>> {
     let adaptation = &model.adaptation;
     let dynamics = LegDynamics::of(model);
     let laws = Estimator::of(adaptation);
-    // What every law allows; none of them, and there is nothing to allow.
+    // The largest weight that all laws allow; none if there are no laws.
     let largest = laws.iter().map(|law| largest_level_weight(&dynamics, adaptation, *law)).reduce(f64::min);
     let mut margins = Margins { static_gain_limit: None, spectral_radius: 0.0, largest_level_weight: largest };
     for law in laws {
@@ -99,7 +99,7 @@ pub fn check(model: &Model) -> Result<Margins, Vec<Diagnostic>> {
     Ok(margins)
 }
 
-/// Static limit of λ and spectral radius of one law; or why it is refused, `largest` being the level weight that would do.
+/// Static limit of λ and spectral radius of one law; or its refusal, with `largest` as the largest stable level weight.
 fn check_law(
     model: &Model,
     dynamics: &LegDynamics,
@@ -139,7 +139,7 @@ fn check_law(
     Ok((static_limit, radius))
 }
 
-/// What a message about a loop adds for gauges that lag.
+/// Addition to a message about a loop if the gauges lag.
 fn gauge_lag_text(lag: f64) -> String {
     if lag > 0.0 { format!(", gauges that lag {lag} s") } else { String::new() }
 }
@@ -159,8 +159,8 @@ fn worst_radius(dynamics: &LegDynamics, adaptation: &Adaptation, law: Estimator,
         .fold(0.0, f64::max)
 }
 
-/// Largest level weight, drift weight in proportion, below which every weight is stable. Found by scanning upwards and
-/// bisecting the first crossing: beyond a first unstable stretch a loop may be stable again, but nobody should rely on it.
+/// Largest level weight, drift weight in proportion, below which every weight is stable. It scans upwards and
+/// bisects the first crossing: beyond a first unstable range a loop may be stable again, but nobody should rely on it.
 fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation, law: Estimator) -> f64 {
     let largest_scale = match law {
         Estimator::Ewma => 1.0 / adaptation.level_weight,
@@ -170,7 +170,7 @@ fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation, law: Es
         adaptation.gain_ratio[1] < law.static_limit(adaptation, scale)
             && worst_radius(dynamics, adaptation, law, scale) <= LARGEST_RADIUS
     };
-    // Four decades up to the largest weight there is.
+    // Four decades up to the largest possible weight.
     let steps = 400;
     let scale_at = |k: i32| largest_scale * libm::exp10(-4.0 * (1.0 - f64::from(k) / f64::from(steps)));
     let Some(first_stable) = (0..=steps).find(|&k| stable(scale_at(k))) else {
@@ -187,7 +187,7 @@ fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation, law: Es
     low * adaptation.level_weight
 }
 
-/// `largest` is rounded down to what the message shows, so that the number shown is itself accepted.
+/// The refusal of a law. The message shows `largest` rounded down, so that the number shown is itself accepted.
 fn refusal(model: &Model, code: Code, law: Estimator, mut message: String, largest: f64) -> Diagnostic {
     let bandwidth = model.spans.contains_key("adaptation.level_bandwidth");
     let key = if bandwidth { "adaptation.level_bandwidth" } else { "adaptation.level_weight" };
@@ -210,14 +210,14 @@ fn refusal(model: &Model, code: Code, law: Estimator, mut message: String, large
             String::new()
         };
         format!(
-            "the largest stable {name} is {level}{unit}{drift}; or lengthen the run, or narrow `adaptation.gain_ratio`, or check `amplifier.lag`, `actuator.resonance` and `timing.period`, which make the loop"
+            "the largest stable {name} is {level}{unit}{drift}; or lengthen the run, or narrow `adaptation.gain_ratio`, or check `amplifier.lag`, `actuator.resonance` and `timing.period`, which determine the loop"
         )
     };
     let unused = law.unused(model.adaptation.mode);
     if unused.is_some() {
-        message += "; the mode in force does not use it, but a running controller can be switched to it";
+        message += "; the selected mode does not use it, but a running controller can be switched to it";
     }
     let help = unused
-        .map_or_else(|| help.clone(), |weights| format!("take {weights} out, and it cannot be switched to; or {help}"));
+        .map_or_else(|| help.clone(), |weights| format!("leave out {weights}, and it cannot be selected; or {help}"));
     Diagnostic::at(&model.spans, &[key], code, message, help)
 }

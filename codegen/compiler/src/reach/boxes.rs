@@ -1,4 +1,4 @@
-//! The largest boxes of poses that the legs reach, about the middle of their strokes.
+//! The largest boxes of reachable poses about the middle of the strokes.
 
 use serde::Serialize;
 use specgen_numerics::jacobian;
@@ -9,28 +9,28 @@ use super::travel::Legs;
 /// Steps towards the box of largest volume; a hundredth of them leaves less than a thousandth to gain.
 const STEPS: u32 = 2000;
 
-/// Half widths, m and rad, of boxes all of whose corners are reached.
+/// Half widths, m and rad, of boxes whose corners are all reachable.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Boxes {
-    /// The middle of the strokes, from rest: where they are centred.
+    /// Centre of the boxes: the middle of the strokes, from rest.
     pub centre: Pose,
-    /// Of the shape of the declared workspace.
+    /// The box with the shape of the declared workspace.
     pub as_declared: Pose,
-    /// Of largest volume, in all six coordinates.
+    /// The box of largest volume in all six coordinates.
     pub largest: Pose,
-    /// Of largest volume without rotation.
+    /// The box of largest volume without rotation.
     pub without_rotation: Pose,
 }
 
 impl Boxes {
     pub(super) fn of(legs: &Legs<'_>, centre: Pose, declared: &Pose) -> Self {
         let slopes = jacobian(legs.platform, &centre).map(|row| row.map(f64::abs));
-        // Where the linear legs would end; the corners say what is left of that.
+        // Linear legs would reach `half`; the exact corners reach a share of it.
         let fitted = |half: Pose| {
             let share = legs.corners_within(&centre, &half);
             half.map(|width| width * share)
         };
-        // Ten times the travel is beyond every leg: the share brings the declared shape back to what is reached.
+        // Scales the declared shape to where the linear legs end.
         let furthest = slopes.iter().map(|row| row.iter().zip(declared).fold(0.0, |sum, (a, b)| sum + a * b));
         let furthest = furthest.fold(0.0, |a: f64, b| if b > a { b } else { a });
         let scale = if furthest > 0.0 { 0.5 * legs.stroke / furthest } else { 0.0 };
@@ -45,7 +45,7 @@ impl Boxes {
 
 /// Half widths w of the first `axes` coordinates that make Π w largest under Σ |J_ij| w_j ≤ stroke/2 for every leg i.
 ///
-/// The best w is 1/Σ λ_i |J_ij| for the right shares λ of the legs; a leg that is beyond its stroke gets a larger share.
+/// The optimum is w_j = 1/Σ λ_i |J_ij| with shares λ of the legs; each step increases the share of legs beyond their stroke.
 fn largest(slopes: &[[f64; 6]; 6], stroke: f64, axes: usize) -> Pose {
     let mut shares = [1.0; 6];
     let mut widths = [0.0; 6];
@@ -58,7 +58,7 @@ fn largest(slopes: &[[f64; 6]; 6], stroke: f64, axes: usize) -> Pose {
             let motion = row.iter().zip(&widths).fold(0.0, |sum, (slope, width)| sum + slope * width);
             *share *= motion;
         }
-        // Σ λ_i is the number of axes where every leg that counts moves by 1.
+        // At the optimum every active leg moves by 1, and Σ λ_i is the number of axes.
         let sum = shares.iter().fold(0.0, |sum, share| sum + share);
         shares = shares.map(|share| share * axes as f64 / sum);
     }

@@ -1,4 +1,4 @@
-//! How well six legs hold the platform: singular values of J, angles taken as motion at the joint radius.
+//! Conditioning of the geometry: singular values of J, with angles as motion at the joint radius.
 
 use nalgebra::Matrix6;
 use serde::Serialize;
@@ -7,7 +7,7 @@ use specgen_runtime::Platform;
 
 use super::Pose;
 
-/// Of J with the columns of angles divided by the joint radius, so that it has no unit.
+/// Singular values of J with the columns of angles divided by the joint radius, so that they have no unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Conditioning {
     /// σ_max/σ_min at rest.
@@ -18,19 +18,19 @@ pub struct Conditioning {
     pub worst_pose: Pose,
     /// Smallest σ over the same poses: 0 is a singular pose.
     pub smallest_singular_value: f64,
-    /// Within this motion of the joints beyond the workspace there is no singular pose, m: an estimate from below, of
+    /// Within this motion of the joints beyond the workspace there is no singular pose, m: a lower estimate, of
     /// first order in the motion.
     pub free_of_singularities: f64,
-    /// No pose of the declared workspace has a condition above this, to second order in the motion; `f64::MAX` where that
-    /// cannot be said.
+        /// Upper bound of the condition number over the declared workspace, to second order in the motion; `f64::MAX` if there is
+        /// none.
     pub worst_bound: f64,
     /// Smallest and largest σ at rest.
     pub at_rest_values: [f64; 2],
 }
 
 impl Conditioning {
-    /// With the bound over the whole box, corner to corner: no joint moves further than translation, turn and its square take
-    /// it, and the singular values change with that no faster than `free_of_singularities` says.
+        /// Adds the bound over the whole box: from the largest motion of any joint, and the rate of change of the singular values as
+        /// in `free_of_singularities`.
     pub(super) fn bounded(mut self, bounds: &Pose, shortest_leg: f64, joint_radius: f64) -> Self {
         let turn = bounds[3] + bounds[4] + bounds[5];
         let motion = libm::sqrt(bounds[0] * bounds[0] + bounds[1] * bounds[1] + bounds[2] * bounds[2])

@@ -1,4 +1,4 @@
-//! Findings about reach, and its figures for people.
+//! Findings about reach, and the text of `specgen check`.
 
 use std::fmt::Write as _;
 
@@ -14,7 +14,7 @@ const fn unit(axis: usize) -> (&'static str, f64) {
     if axis < 3 { ("um", 1e6) } else { ("urad", 1e6) }
 }
 
-/// Findings about bias and workspace; `bias` is the path that stands still at the bias.
+/// Findings about bias and workspace; `bias` is the path that stays at the bias.
 pub(super) fn of(model: &Model, reach: &Reach, bias: &PathReach) -> Vec<Diagnostic> {
     let mut findings = Vec::new();
     findings.extend(of_bias(model, reach, bias));
@@ -38,10 +38,10 @@ fn is_warning(finding: &Diagnostic) -> bool {
     finding.severity > Severity::Note
 }
 
-/// A gauge that sees less than this share of its leg's stroke is hardly meant.
+/// Least plausible range of a gauge, as a share of its leg's stroke.
 const LEAST_SEEN: f64 = 0.5;
 
-/// A leg that goes where its gauge does not see it.
+/// Checks whether a leg moves beyond the range of its gauge.
 fn of_gauge_ends(model: &Model, reach: &Reach) -> Option<Diagnostic> {
     let [low, high] = model.sensor.range;
     if low <= 0.0 && high >= reach.stroke {
@@ -49,7 +49,7 @@ fn of_gauge_ends(model: &Model, reach: &Reach) -> Option<Diagnostic> {
     }
     let item = usize::from(low <= 0.0);
     let seen = if high < reach.stroke { high } else { reach.stroke } - if low > 0.0 { low } else { 0.0 };
-    // The paper's gauge sees four fifths; one that sees little is in another unit.
+    // The paper's gauge covers four fifths; a much smaller range is in the wrong unit.
     let code = if seen < LEAST_SEEN * reach.stroke { codes::SENSOR_RANGE } else { codes::GAUGE_SHORT_OF_STROKE };
     Some(Diagnostic::at(&model.spans, &[&format!("sensor.range[{item}]"), "sensor.range", "sensor"], code,
         format!(
@@ -58,11 +58,11 @@ fn of_gauge_ends(model: &Model, reach: &Reach) -> Option<Diagnostic> {
             fixed(high * 1e6, 3),
             reach.stroke * 1e6
         ),
-        "a leg beyond the end of its gauge is a gauge fault: keep set-points within the gauge, or take one that sees the whole stroke; check the unit of `sensor.range`".to_owned(),
+        "a leg beyond the range of its gauge is a gauge fault: keep set-points within the range, or use a gauge that covers the whole stroke; check the unit of `sensor.range`".to_owned(),
     ))
 }
 
-/// Above this condition number one motion is held thirty times worse than another.
+/// Largest condition number without a warning.
 const POOREST: f64 = 30.0;
 
 fn of_condition(model: &Model, reach: &Reach) -> Option<Diagnostic> {
@@ -75,7 +75,7 @@ fn of_condition(model: &Model, reach: &Reach) -> Option<Diagnostic> {
             "the condition number of the legs is {} at rest {}",
             of_number(conditioning.at_rest, 1),
             if conditioning.worst_bound < f64::MAX {
-                format!("and may come to {} in the workspace", of_number(conditioning.worst_bound, 1))
+                format!("and may reach {} in the workspace", of_number(conditioning.worst_bound, 1))
             } else {
                 "and has no bound: a pose of the workspace may be singular".to_owned()
             }
@@ -84,7 +84,7 @@ fn of_condition(model: &Model, reach: &Reach) -> Option<Diagnostic> {
     ))
 }
 
-/// A condition number; one that is beyond all use in powers of ten.
+/// A condition number; in powers of ten if it is very large.
 fn of_number(value: f64, decimals: usize) -> String {
     if value < 1e6 { format!("{value:.decimals$}") } else { format!("{value:.1e}") }
 }
@@ -112,7 +112,7 @@ fn of_bias(model: &Model, reach: &Reach, bias: &PathReach) -> Option<Diagnostic>
         return None;
     }
     let message = format!(
-        "at the bias a leg stands at {:.3} um of {:.3} um: there is no room for corrections beyond",
+        "at the bias a leg is at {:.3} um of {:.3} um: there is no room for corrections",
         if low < room { low * 1e6 } else { high * 1e6 },
         reach.stroke * 1e6
     );
@@ -121,8 +121,8 @@ fn of_bias(model: &Model, reach: &Reach, bias: &PathReach) -> Option<Diagnostic>
     Some(Diagnostic::at(&model.spans, &KEYS, codes::NO_ROOM, message, help))
 }
 
-/// Bounds that no pose reaches, `stroke` (m) being what every leg can do, and `from_middle` how far an axis alone goes from the
-/// middle of the strokes (m or rad). Legs that are driven one by one have no workspace.
+/// Bounds that no pose reaches. `stroke`: travel of every leg, m; `from_middle`: travel of an axis alone from the middle of the
+/// strokes, m or rad. Legs with displacement set-points have no workspace.
 pub(super) fn of_bounds(model: &Model, stroke: f64, from_middle: impl Fn(usize) -> [f64; 2]) -> Vec<Diagnostic> {
     if model.task_space.is_none() && model.controller.setpoint == SetpointKind::Leg {
         return Vec::new();
@@ -144,13 +144,13 @@ fn of_axis(model: &Model, stroke: f64, axis: usize, declared: f64, [low, high]: 
     let shown = |value: f64| libm::floor(value * scale * 100.0) / 100.0;
     let seen = lower::seen(model).map_or(f64::INFINITY, |seen| seen[axis]);
     let most = if seen < furthest {
-        format!("at most {} {unit}, where the gauges end (the legs reach {} {unit})", shown(seen), shown(furthest))
+        format!("at most {} {unit}, the range of the gauges (the legs reach {} {unit})", shown(seen), shown(furthest))
     } else {
         format!("at most {} {unit}", shown(furthest))
     };
-    // The table of a leg may end before its data sheet does.
+    // The table of a leg may cover less than the stroke of the data sheet.
     let (code, binds, way_out) = if stroke < model.actuator.stroke {
-        (codes::AXIS_UNREACHABLE, of_table(model, stroke), "use a record that reaches the whole stroke")
+        (codes::AXIS_UNREACHABLE, of_table(model, stroke), "use a record that covers the whole stroke")
     } else {
         let binds = format!("the stroke is {} um", figure(stroke * 1e6));
         (codes::WORKSPACE_UNREACHABLE, binds, "use legs with more stroke")
@@ -160,7 +160,7 @@ fn of_axis(model: &Model, stroke: f64, axis: usize, declared: f64, [low, high]: 
         &[&key, table, "workspace"],
         code,
         format!(
-            "no pose reaches |{}| = {:.2} {unit}: {binds}, and from the middle of it this axis alone goes from {} to {} {unit}",
+            "no pose reaches |{}| = {:.2} {unit}: {binds}, and from its middle this axis alone moves from {} to {} {unit}",
             AXES[axis],
             declared * scale,
             fixed(low * scale, 2),
@@ -170,7 +170,7 @@ fn of_axis(model: &Model, stroke: f64, axis: usize, declared: f64, [low, high]: 
     ))
 }
 
-/// Says that not the declared stroke binds, but what was identified.
+/// Explains that the identified table limits the travel, not the declared stroke.
 fn of_table(model: &Model, stroke: f64) -> String {
     format!(
         "the identified hysteresis ends at {} um, before the stroke of {} um (`actuator.stroke`)",
@@ -179,7 +179,7 @@ fn of_table(model: &Model, stroke: f64) -> String {
     )
 }
 
-/// What is wrong with a path, if anything.
+/// The finding about a path that is out of reach.
 pub(super) fn of_path(model: &Model, stroke: f64, [key, name]: [&str; 2], path: &PathReach) -> Option<Diagnostic> {
     if path.poses == 0 || !beyond(stroke, path.displacement) {
         return None;
@@ -201,7 +201,7 @@ pub(super) fn of_path(model: &Model, stroke: f64, [key, name]: [&str; 2], path: 
     ))
 }
 
-/// Beyond the ends of the strokes by more than rounding; NaN is.
+/// Whether a range is beyond the ends of the strokes by more than rounding; true for NaN.
 fn beyond(stroke: f64, [low, high]: [f64; 2]) -> bool {
     let inside = low >= -1e-9 * stroke && high <= (1.0 + 1e-9) * stroke;
     !inside
@@ -211,15 +211,15 @@ fn advice(path: &PathReach, what: &str) -> String {
     match path.shift {
         // Rounded inwards.
         Some([low, high]) => format!(
-            "add {} um to {} um to z of {what}, and it fits",
+            "add {} um to {} um to z of {what} to bring it within reach",
             libm::ceil(low * 1e8) / 100.0,
             libm::floor(high * 1e8) / 100.0
         ),
-        None => format!("no z of {what} makes it fit: it is too large for this stroke; check its units, or reduce it"),
+        None => format!("no z of {what} brings it within reach: the motion is too large for this stroke; check its units, or reduce it"),
     }
 }
 
-/// The reach as text for `specgen check`. `biased`: set-points count from a bias, else from rest.
+/// The reach as text for `specgen check`. `biased`: set-points are relative to a bias, else to rest.
 #[must_use]
 pub fn describe(reach: &Reach, biased: bool) -> String {
     // Rounding errors of a bound at zero are not shown as -0.0.
@@ -248,7 +248,7 @@ pub fn describe(reach: &Reach, biased: bool) -> String {
     if biased {
         let _ = writeln!(
             text,
-            "  at the bias the legs stand at {:.1} to {:.1} um; {:.1} % of the declared workspace around it is reached corner by corner",
+            "  at the bias the legs are at {:.1} to {:.1} um; all corners of {:.1} % of the declared workspace around it are within reach",
             reach.at_bias[0] * 1e6,
             reach.at_bias[1] * 1e6,
             reach.share * 100.0
@@ -272,7 +272,7 @@ pub fn describe(reach: &Reach, biased: bool) -> String {
     let half = |half: &[f64]| half.iter().map(|width| format!("{:.1}", width * 1e6)).collect::<Vec<_>>().join("/");
     let _ = writeln!(
         text,
-        "  largest box that is reached about z = {:.1} um, all at once, ± um and urad: {} and {} of the declared shape; {} and {} by volume; {} without rotation",
+        "  largest box within reach about z = {:.1} um, all axes together, ± um and urad: {} and {} with the declared shape; {} and {} by volume; {} without rotation",
         reach.boxes.centre[2] * 1e6,
         half(&reach.boxes.as_declared[..3]),
         half(&reach.boxes.as_declared[3..]),

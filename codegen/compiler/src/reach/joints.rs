@@ -1,4 +1,4 @@
-//! How far the joints of the legs turn.
+//! Angles of the joints of the legs.
 
 use super::{Pose, travel};
 use specgen_language::model::Geometry;
@@ -29,7 +29,7 @@ pub fn angles(geometry: &Geometry, bounds: &Pose) -> [f64; 2] {
     largest
 }
 
-/// By sine and cosine, so that a small one keeps its digits.
+/// From sine and cosine, so that a small angle keeps its digits.
 fn angle(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     libm::atan2(norm(cross(*a, *b)), dot(*a, *b))
 }

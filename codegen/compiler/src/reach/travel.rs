@@ -6,9 +6,9 @@ use specgen_runtime::Platform;
 
 use super::{INTERIOR_POSES, PathReach, Pose, wider};
 
-/// The kinematics holds up to here, rad.
+/// Largest angle for which the kinematics is valid, rad.
 const LARGEST_ANGLE: f64 = core::f64::consts::FRAC_PI_4;
-/// A leg counts as within its stroke up to this part of it beyond: rounding must not refuse a path that starts at rest.
+/// Tolerance of the stroke, as a share of it: rounding must not refuse a path that starts at rest.
 const SLACK: f64 = 1e-9;
 
 pub(super) struct Legs<'a> {
@@ -44,7 +44,7 @@ impl Legs<'_> {
         pose
     }
 
-    /// Value of `axis` at which the first leg ends, moving it alone from `pose` in the direction of `sign`; its value at
+    /// Value of `axis` at which the first leg reaches its end, moving it alone from `pose` in the direction of `sign`; its value at
     /// `pose` if a leg is beyond its ends there.
     pub(super) fn travel(&self, pose: &Pose, axis: usize, sign: f64) -> f64 {
         let moved = |by: f64| {
@@ -52,7 +52,7 @@ impl Legs<'_> {
             moved[axis] += sign * by;
             moved
         };
-        // No pose within reach is further than the strokes allow the steepest leg, twice over for the curvature.
+        // An upper bound of the travel: the stroke over the steepest slope, doubled for the curvature.
         let slopes = jacobian(self.platform, pose);
         let steepest = slopes.iter().map(|row| row[axis].abs()).fold(0.0, |a: f64, b| if b > a { b } else { a });
         let far = 2.0 * self.stroke / steepest;
@@ -60,7 +60,7 @@ impl Legs<'_> {
         pose[axis] + sign * largest(far, |by| self.holds(&moved(by)))
     }
 
-    /// Part of the box, shrunk towards `bias`, of which all corners are in reach.
+    /// Scale of the box, shrunk towards `bias`, at which all corners are in reach.
     pub(super) fn share(&self, bias: &Pose, bounds: &Pose) -> f64 {
         largest(1.0, |share| {
             corners().all(|signs| {
@@ -70,7 +70,7 @@ impl Legs<'_> {
         })
     }
 
-    /// Largest part, up to 1, of a box of half widths `half` about `centre` of which all corners are in reach.
+    /// Largest scale, up to 1, of a box of half widths `half` about `centre` at which all corners are in reach.
     pub(super) fn corners_within(&self, centre: &Pose, half: &Pose) -> f64 {
         largest(1.0, |share| {
             corners().all(|signs| self.holds(&core::array::from_fn(|i| centre[i] + share * signs[i] * half[i])))
@@ -99,7 +99,7 @@ impl Legs<'_> {
         largest
     }
 
-    /// Displacements along a path, and by how much all of it may be moved along z. The legs' slopes in z are those at rest:
+    /// Displacements along a path, and the range of possible shifts along z. The legs' slopes in z are those at rest:
     /// over the strokes of a piezo they do not change.
     pub(super) fn shift(&self, poses: impl Iterator<Item = Pose>) -> PathReach {
         let mut path = PathReach { poses: 0, displacement: [f64::INFINITY, f64::NEG_INFINITY], shift: None };
@@ -108,7 +108,7 @@ impl Legs<'_> {
         for pose in poses {
             path.poses += 1;
             for (x, slope) in displacements(self.platform, &pose).iter().zip(slopes) {
-                // What is no number is beyond every stroke, and stays so.
+                // NaN counts as beyond every stroke.
                 path.displacement =
                     if x.is_nan() { [f64::NEG_INFINITY, f64::INFINITY] } else { wider(path.displacement, [*x, *x]) };
                 let (mut from, mut to) = (-x / slope, (self.stroke - x) / slope);
@@ -141,7 +141,7 @@ pub(super) fn samples(bounds: &Pose) -> impl Iterator<Item = Pose> {
     corners().chain(interior).map(move |part| core::array::from_fn(|axis| part[axis] * bounds[axis]))
 }
 
-/// Digits of `k` in `base`, mirrored at the point.
+/// Digits of `k` in `base`, mirrored at the radix point.
 fn radical_inverse(mut k: u32, base: u32) -> f64 {
     let (mut value, mut weight) = (0.0, 1.0);
     while k > 0 {

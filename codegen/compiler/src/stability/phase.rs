@@ -1,15 +1,15 @@
-//! Phase margin of a loop that is known by its transition from tick to tick.
+//! Phase margin of a loop given by its transition from tick to tick.
 
 use core::f64::consts::PI;
 
 use specgen_numerics::{Matrix, eigenvalues};
 
-/// Steps of the scan over half a turn, and bisections of the interval that holds the margin.
+/// Steps of the scan over half a turn, and bisections of the interval that contains the margin.
 const STEPS: u32 = 90;
 const BISECTIONS: u32 = 12;
 
-/// Phase lag, rad, put into all inputs of the plant at once, at which a stable loop stops being stable; none up to half a
-/// turn, or if the loop is not stable without it.
+/// Phase lag, rad, added to all inputs of the plant at once, at which a stable loop becomes unstable; none if there is none up to
+/// half a turn, or if the loop is unstable without it.
 ///
 /// `transition` gives the matrix of one tick with the plant's inputs times a factor, in which it is affine. With the factor
 /// e^(−jφ) it is complex, A − jB; its eigenvalues and their conjugates are those of [A B; −B A].

@@ -1,12 +1,12 @@
-//! Stability and design of a platform controller, decided when compiling.
+//! Stability and design of a platform controller, at compile time.
 //!
-//! The platform rests on six legs of axial stiffness k_a; its modes, together with the lags of amplifiers and gauges, bound
-//! how fast anything may be fed back. Here the modes are found, the notch on them is designed, gains and bandwidths that the spec
-//! leaves out get start values, and every control mode that a running controller can be switched to is checked: the
-//! spectral radius of one tick of the closed loop, with the platform sampled exactly, over the declared interval of λ.
+//! The platform rests on six legs of axial stiffness k_a. Its modes and the lags of amplifiers and gauges limit the bandwidth of
+//! feedback. This module computes the modes, designs the notch for them, chooses gains and bandwidths that the spec leaves out, and
+//! checks every control mode that a running controller can be switched to: the spectral radius of one tick of the closed loop,
+//! with the platform sampled exactly, over the declared interval of λ.
 //!
-//! Pose coordinates are x, y, z (m) and θx, θy, θz (rad) from rest. Not in the model: flexure stiffness, bending of legs,
-//! axial modes inside a leg, hysteresis (λ stands for it), dynamics of the gauges beyond a first-order lag.
+//! Pose coordinates are x, y, z (m) and θx, θy, θz (rad) from rest. Not modelled: flexure stiffness, bending of legs, axial modes
+//! inside a leg, hysteresis (represented by λ), dynamics of the gauges beyond a first-order lag.
 
 mod closed_loop;
 mod damping;
@@ -39,7 +39,7 @@ pub use notch::{Biquad, Notch};
 pub use report::describe;
 pub use rule::bandwidth_limit;
 
-/// Values of λ looked at, evenly spaced over the interval, ends included.
+/// Number of λ values checked, evenly spaced over the interval, ends included.
 const RATIOS: u32 = 5;
 
 /// The platform at rest, in pose coordinates from rest.
@@ -57,39 +57,39 @@ impl RestDynamics {
     pub fn of(platform: &Platform<f64>) -> Self {
         let mass = mass_matrix(platform, &[0.0; 6]);
         Self {
-            // Symmetric but for rounding, which the modes must not see.
+            // Made exactly symmetric for the modes.
             mass: core::array::from_fn(|i| core::array::from_fn(|j| 0.5 * (mass[i][j] + mass[j][i]))),
             jacobian: jacobian(platform, &[0.0; 6]),
         }
     }
 }
 
-/// What the analysis decided: numbers for lowering, figures for the user.
+/// Result of the analysis: numbers for lowering, figures for the user.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Design {
-    /// Of the free platform, by frequency.
+    /// Modes of the free platform, by frequency.
     pub modes: [Mode; 6],
-    /// c_a of a leg, N s/m.
+    /// Damping c_a of a leg, N s/m.
     pub leg_damping: f64,
-    /// τ by which legs are asked for early, s: given, or [`lead`].
+    /// Lead τ of the feed-forward, s: from the spec, or [`lead`].
     pub lead: f64,
-    /// Whether it is the spec's own.
+    /// Whether the lead is from the spec.
     pub lead_given: bool,
-    /// On feedback, if the spec has one.
+    /// Notch on feedback, if the spec has one.
     pub notch: Option<Notch>,
-    /// Of each mode in P/F, if the spec asks for it.
+    /// Active damping of each mode in P/F, if the spec enables it.
     pub damping: Option<ActiveDamping>,
     /// Ω, rad/s: level bandwidth at which EWMA alone becomes unstable.
     pub bandwidth_limit: f64,
-    /// Gains and bandwidths of F and P/F, given or by the rule.
+    /// Gains and bandwidths of F and P/F, from the spec or from the rule.
     pub combined: Tuning,
     /// Gains of P alone; its bandwidths are zero.
     pub position: Tuning,
     /// Whether the check includes contact with the declared work piece.
     pub touching: bool,
-    /// Every control mode.
+    /// Margins of every control mode.
     pub margins: Vec<ModeMargins>,
-    /// Warnings and notes about what is stable but thin.
+    /// Warnings and notes about small margins.
     #[serde(skip)]
     pub findings: Vec<Diagnostic>,
 }
@@ -108,7 +108,7 @@ pub struct Mode {
 /// Finds modes, notch, gains and margins of the platform of `model`, whose `[control]` is `task`.
 ///
 /// # Errors
-/// What has no modes, or is unstable in some control mode, at the key that is to blame, with a number that would do.
+/// A platform without six modes, or an unstable control mode: at the responsible key, with a stable value.
 pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<Design, Vec<Diagnostic>> {
     let Some(mut closed_loop) = closed_loop_of(model, task, plant) else {
         return Err(vec![refusal::no_modes(model)]);
@@ -153,10 +153,11 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
     })
 }
 
-/// τ of the spec, or else the delay of the pose behind a slow command, s, not below zero.
+/// Lead τ of the spec, or else the delay of the pose behind a slow command, s, not below zero.
 ///
-/// The amplifier is late by its lag, and every mode by 2 ζ/ω, the slope of its phase, which is the same for all with c_a = β k_a. A voltage
-/// is held over a period, on average half of it late, but asks for the pose at the end of it: half a period early.
+/// The amplifier delays by its lag, and every mode by 2 ζ/ω, the slope of its phase, which is the same for all with c_a = β k_a. A
+/// voltage is held over a period, half a period late on average, but it commands the pose at the end of the period. So half a
+/// period is subtracted.
 #[must_use]
 pub fn lead(model: &Model, task: &TaskSpace, basis: &ModalBasis) -> f64 {
     task.lead.unwrap_or_else(|| {
@@ -166,7 +167,7 @@ pub fn lead(model: &Model, task: &TaskSpace, basis: &ModalBasis) -> f64 {
 }
 
 impl Design {
-    /// The law that the spec starts with, and its numbers.
+    /// The law at start-up, and its tuning.
     #[must_use]
     pub fn law(&self, model: &Model, task: &TaskSpace) -> (Law, &Tuning) {
         match task.mode {
@@ -176,7 +177,7 @@ impl Design {
         }
     }
 
-    /// The loop of the spec that this was designed for, up to its tuning; `task` is its `[control]`.
+    /// The closed loop of the spec without tuning; `task` is its `[control]`.
     #[must_use]
     pub fn closed_loop(&self, model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Option<ClosedLoop> {
         let active_damping = self.damping.as_ref().map(|damping| damping.sections);
@@ -184,7 +185,7 @@ impl Design {
     }
 }
 
-/// The loop of a spec up to tuning and active damping; none if the platform has no six modes.
+/// The closed loop of a spec without tuning and active damping; none if the platform does not have six modes.
 #[must_use]
 pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Option<ClosedLoop> {
     let basis = ModalBasis::of(plant, model.actuator.axial_stiffness)?;
@@ -206,7 +207,7 @@ pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> 
     })
 }
 
-/// The run-to-run law that the spec starts with.
+/// The run-to-run law at start-up.
 fn adapting(model: &Model) -> Estimator {
     match model.adaptation.mode {
         AdaptationMode::Invhys => Estimator::Invhys,
@@ -225,7 +226,7 @@ fn gains(gains: &Gains) -> Tuning {
     }
 }
 
-/// What every control mode must hold under: λ over its interval, free and touching the declared work piece.
+/// Conditions under which every control mode must be stable: λ over its interval, free and touching the declared work piece.
 fn nominal_conditions(closed_loop: &ClosedLoop, [low, high]: [f64; 2]) -> Vec<Conditions> {
     let contacts: &[bool] = if closed_loop.environment == [0.0; 6] { &[false] } else { &[false, true] };
     let mut all = Vec::new();

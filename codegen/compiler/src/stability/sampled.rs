@@ -1,7 +1,7 @@
 //! Spectral radius of one leg under run-to-run adaptation, with amplifier lag, axial resonance and lag of its gauge.
 //!
-//! State at the end of a run: [p, y, v, g, δ̂, φ̂] with amplifier output p, displacement y, velocity v and what the gauge shows
-//! g (all as displacement); g is y, and no state, where the gauge does not lag.
+//! State at the end of a run: [p, y, v, g, δ̂, φ̂] with amplifier output p, displacement y, velocity v and reading of the gauge
+//! g (all as displacement). If the gauge does not lag, g is y and not a state.
 //! Over a run the request q̂ = −δ̂ − φ̂ is held:
 //!
 //! ```text
@@ -15,14 +15,14 @@ use core::f64::consts::TAU;
 use specgen_language::model::Model;
 use specgen_numerics::{Matrix, exponential, spectral_radius as largest_magnitude, steady_covariances};
 
-/// Linear dynamics of a leg as the adaptation sees it.
+/// Linear dynamics of a leg in the adaptation loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LegDynamics {
     /// Duration of a run, s.
     pub run: f64,
     /// Amplifier lag τ, s, ≥ 0.
     pub lag: f64,
-    /// Lag of the gauge with the filter behind it, s, ≥ 0.
+    /// Lag of the gauge and its filter, s, ≥ 0.
     pub gauge_lag: f64,
     /// ω of the axial resonance, rad/s.
     pub resonance: f64,
@@ -46,7 +46,7 @@ impl LegDynamics {
     /// State transition of [p, y, v, g] over one run, and in the last column its response to a held input. Without a lag of
     /// the gauge there is no g.
     fn discretise(&self) -> Matrix {
-        // A lag far below the run is as good as none; the bound keeps the matrix exponential well scaled.
+        // A lag far below the run is negligible; the bound keeps the matrix exponential well scaled.
         let shortest = self.shortest();
         let lag = if self.lag > shortest { self.lag } else { shortest };
         let stiffness = self.resonance * self.resonance;
@@ -71,7 +71,7 @@ impl LegDynamics {
         1e-4 * self.run
     }
 
-    /// Of the leg: three, and a fourth where the gauge lags.
+    /// Number of states of the leg: three, and a fourth if the gauge lags.
     fn states(&self) -> usize {
         if self.gauge_lag > self.shortest() { 4 } else { 3 }
     }
@@ -111,9 +111,9 @@ pub fn transition(dynamics: &LegDynamics, level_weight: f64, drift_weight: Optio
     one_run
 }
 
-/// Variance of what the gauge of a leg shows at rest (m²), by unit variance of its noise and of the amplifier's (of the displacement
-/// asked for): the first over runs, with the weights of level and drift that are in use, none without adaptation; the second over ticks of
-/// `period` (s), on the leg alone.
+/// Variance of a leg's reading at rest (m²) for unit variance of the gauge noise, and of the amplifier noise (as requested
+/// displacement). The first is over runs with the weights of level and drift in use (none without adaptation), the second over ticks
+/// of `period` (s) on the leg alone.
 #[must_use]
 pub fn shown_at_rest(dynamics: &LegDynamics, weights: Option<(f64, Option<f64>)>, period: f64) -> [f64; 2] {
     let alone = LegDynamics { run: period, ..*dynamics };
@@ -133,22 +133,22 @@ pub fn shown_at_rest(dynamics: &LegDynamics, weights: Option<(f64, Option<f64>)>
     let Some((level, drift)) = weights else { return [1.0, by_amplifier] };
     let (leg, closed) = (dynamics.states(), self::transition(dynamics, level, drift, 1.0));
     let discrete = dynamics.discretise();
-    // An error of the reading does what the state that is shown does by way of the estimates.
+    // An error of the reading acts like the measured state, through the estimates.
     let column = shown(leg);
     let own = |row: usize| if row < leg { discrete[(row, column)] } else { 0.0 };
     let input: Vec<Vec<f64>> = (0..closed.size()).map(|row| vec![closed[(row, column)] - own(row)]).collect();
     [1.0 + of(&closed, &input, column), by_amplifier]
 }
 
-/// The state that the gauge shows, of a leg of so many.
+/// Index of the measured state of a leg with so many states.
 fn shown(leg: usize) -> usize {
     if leg > 3 { 3 } else { 1 }
 }
 
-/// Row of an estimate over the states, of which the first `leg` are the leg's: its factors of the reading, δ̂ and φ̂.
+/// Row of an estimate over the states, the first `leg` of which are the leg's, from its factors of reading, δ̂ and φ̂.
 fn estimate_row(leg: usize, states: usize, [measured, level, drift]: [f64; 3]) -> Vec<f64> {
     let mut row = vec![0.0; leg];
-    // What the gauge shows is its own state, or the displacement.
+    // The reading is its own state, or the displacement.
     row[shown(leg)] = measured;
     row.extend([level, drift]);
     row.truncate(states);
@@ -162,7 +162,7 @@ mod tests {
     const REFERENCE: LegDynamics =
         LegDynamics { run: 1e-4, lag: 0.35e-3, gauge_lag: 0.0, resonance: TAU * 870.0, damping_ratio: 0.1 };
 
-    /// Fine-step simulation of the same loop, independent of the matrix exponential: does a disturbance die out?
+    /// Whether a disturbance decays, in a fine-step simulation of the same loop without the matrix exponential.
     fn settles(dynamics: &LegDynamics, level_weight: f64, drift_weight: Option<f64>, gain_ratio: f64) -> bool {
         let (mut p, mut y, mut v, mut g, mut level, mut drift) = (0.0, 1e-3, 0.0, 0.0, 0.0, 0.0);
         let fine = 200;
@@ -194,7 +194,7 @@ mod tests {
             if let Some(weight) = drift_weight {
                 drift = weight * (model_error - old) + (1.0 - weight) * drift;
             }
-            // A NaN does not settle, either.
+            // NaN does not settle.
             if y.is_nan() || y.abs() > 1.0 {
                 return false;
             }

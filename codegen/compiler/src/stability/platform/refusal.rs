@@ -1,4 +1,4 @@
-//! Findings about a platform that is unstable, or nearly so.
+//! Findings about a platform that is unstable, or has small margins.
 
 use core::f64::consts::{PI, TAU};
 
@@ -14,14 +14,14 @@ use specgen_language::model::{AdaptationMode, ControlMode, Model, TaskSpace};
 const ADAPTED: [Law; 2] = [Law::Feedforward(Estimator::Ewma), Law::Feedforward(Estimator::Pcc)];
 const COMBINED: [Law; 3] =
     [Law::Combined(Estimator::Invhys), Law::Combined(Estimator::Ewma), Law::Combined(Estimator::Pcc)];
-/// Lowest factor looked at.
+/// Lowest factor checked.
 const LOWEST: f64 = 1e-4;
-/// What is offered is this part of the limit: at the limit itself nothing could be stable beside it.
+/// Suggested value over the limit: right at the limit no other value would be stable.
 const SLACK: f64 = 0.95;
-/// Below these a margin is thin.
+/// Margins below these cause a warning.
 const THIN_GAIN: f64 = 1.5;
 const THIN_DELAY: f64 = 0.5;
-/// Above these active damping does little, or too much.
+/// Above these, active damping is ineffective or too strong.
 const MOST_COMPLIANT: f64 = 0.67;
 const MOST_SENSITIVE: f64 = 2.2;
 
@@ -31,14 +31,14 @@ pub(super) fn no_modes(model: &Model) -> Diagnostic {
         &model.spans,
         &["geometry"],
         codes::NO_MODES,
-        "the platform has no six modes on its legs: its mass matrix or K = Jᵀ k_a J at rest is not positive definite"
+        "the platform does not have six modes on its legs: its mass matrix or K = Jᵀ k_a J at rest is not positive definite"
             .to_owned(),
-        "check [geometry] (six legs that hold every direction), the masses and inertias, and actuator.axial_stiffness"
+        "check [geometry] (six legs that constrain every direction), the masses and inertias, and actuator.axial_stiffness"
             .to_owned(),
     )
 }
 
-/// Refuses what is unstable. Each finding offers a number; taking every offer gives a spec that is accepted.
+/// Refuses unstable control modes. Each finding suggests a value; a spec with all suggested values is accepted.
 pub(super) fn check(
     model: &Model,
     task: &TaskSpace,
@@ -58,7 +58,7 @@ pub(super) fn check(
         bandwidths = largest.unwrap_or(LOWEST);
         findings.push(case.bandwidths(task, unstable, combined, largest));
     }
-    // Gains are judged beside bandwidths that are, or will be, accepted; the rule's are chosen beside accepted ones only.
+    // Gains are checked together with accepted bandwidths, or with the suggested ones.
     let beside = combined.scaled(1.0, bandwidths);
     let judged = task.gains.is_some() || findings.is_empty();
     if let Some(unstable) = case.unstable(&COMBINED, &beside).filter(|_| judged) {
@@ -117,7 +117,7 @@ impl Case<'_> {
         )
     }
 
-    /// The measured interaction force closes a loop of its own, whatever the gains.
+    /// Checks the loop that the measured interaction force closes, whatever the gains.
     fn interaction(&self) -> Option<Diagnostic> {
         const BARE: [Law; 1] = [Law::Feedforward(Estimator::Invhys)];
         let unstable = self.unstable(&BARE, &Tuning::NONE)?;
@@ -133,7 +133,7 @@ impl Case<'_> {
             .filter(|factor| stable_with(*factor));
         let help = match largest {
             Some(factor) => format!(
-                "the measured force of the work piece, fed forward, closes a loop: it is stable up to {factor} times the \
+                "feeding the measured force of the work piece forward closes a loop, which is stable up to {factor} times the \
                  declared stiffness; or set interaction = \"none\" or \"modelled\""
             ),
             None => "more damping (control.modal_damping) or a longer period would be needed: check both, \
@@ -158,8 +158,8 @@ impl Case<'_> {
                     String::new()
                 };
                 format!(
-                    "level_bandwidth = \"{} rad/s\"{drift} is stable, {factor} times what is given; a third of that is a \
-                     good start; or leave both out and the compiler chooses",
+                    "level_bandwidth = \"{} rad/s\"{drift} is stable, {factor} times the given value; a third of that is a \
+                     good start; or leave both out, and the compiler chooses them",
                     shown(tuning.level_bandwidth * factor)
                 )
             },
@@ -184,7 +184,7 @@ impl Case<'_> {
                 };
                 format!(
                     "all of [{table}] × {factor} is stable: in SI units proportional [{}], integral [{}]{}; a third of \
-                     that is a good start; or leave the table out and the compiler chooses",
+                     that is a good start; or leave the table out, and the compiler chooses it",
                     list(&tuning.proportional),
                     list(&tuning.integral),
                     if tuning.derivative == [0.0; 6] {
@@ -199,7 +199,7 @@ impl Case<'_> {
     }
 
     fn no_tuning(&self, unstable: Unstable) -> Diagnostic {
-        let message = format!("the start rule found no values that hold: {}", self.what(unstable));
+        let message = format!("the tuning rule found no stable values: {}", self.what(unstable));
         Diagnostic::at(
             &self.model.spans,
             &["control", "timing.period"],
@@ -218,7 +218,7 @@ impl Case<'_> {
     }
 }
 
-/// Warnings about margins that are thin, one for each group of numbers, and about modes that the notch cannot reach.
+/// Warnings about small margins, one for each group of values, and about modes that the notch cannot cover.
 pub(super) fn thin(
     model: &Model,
     task: &TaskSpace,
@@ -244,7 +244,7 @@ pub(super) fn thin(
                 or(one.gain_margin, "enough"),
                 or(one.delay_margin_ticks, "enough")
             );
-            let help = "reduce these values, or leave them out: the compiler's own hold at twice the gain".to_owned();
+            let help = "reduce these values, or leave them out: the compiler's own are stable at twice the gain".to_owned();
             findings.push(Diagnostic::at(&model.spans, keys, codes::THIN_MARGIN, message, help));
         }
     }
@@ -261,17 +261,17 @@ pub(super) fn thin(
             &["control.notch_damping", "control.notch", "timing.period"],
             codes::MODE_NOT_NOTCHED,
             format!(
-                "the notch leaves out the modes at {}: they lie near or above half the tick rate, {:.0} Hz",
+                "the notch does not cover the modes at {}: they are near or above half the tick rate, {:.0} Hz",
                 missed.join(", "),
                 PI / closed_loop.period / TAU
             ),
-            "shorten timing.period to reach them; the stability check includes them as they are".to_owned(),
+            "shorten timing.period to cover them; the stability check includes them without the notch".to_owned(),
         ));
     }
     findings
 }
 
-/// Modes that active damping leaves as they are, or thin.
+/// Warns about modes that active damping does not improve, or leaves with a small margin.
 pub(super) fn hardly_damped(model: &Model, closed_loop: &ClosedLoop, damping: &ActiveDamping) -> Option<Diagnostic> {
     let left: Vec<String> = closed_loop
         .basis
@@ -284,7 +284,7 @@ pub(super) fn hardly_damped(model: &Model, closed_loop: &ClosedLoop, damping: &A
                 None => Some(format!("{hertz:.0} Hz (too fast for the period)")),
                 Some(mode) if mode.compliance > MOST_COMPLIANT || mode.sensitivity[1] > MOST_SENSITIVE => {
                     Some(format!(
-                        "{hertz:.0} Hz (peak of the compliance {:.2} of that without, largest sensitivity {:.2})",
+                        "{hertz:.0} Hz (compliance peak {:.2} times that without, largest sensitivity {:.2})",
                         mode.compliance, mode.sensitivity[1]
                     ))
                 }
@@ -297,15 +297,15 @@ pub(super) fn hardly_damped(model: &Model, closed_loop: &ClosedLoop, damping: &A
             &model.spans,
             &["control.active_damping", "control"],
             codes::HARDLY_DAMPED,
-            format!("active damping does little for the modes at {}", left.join(", ")),
-            "shorten timing.period, or take an amplifier of less lag; or leave active damping out: active_damping = false"
+            format!("active damping has little effect on the modes at {}", left.join(", ")),
+            "shorten timing.period, or use an amplifier with less lag; or disable active damping: active_damping = false"
                 .to_owned(),
         )
     })
 }
 
-/// P/F without estimates has its integral alone against what disturbs it, as P has; where that of P is faster, P may be the
-/// more accurate of the two.
+/// Notes if P may be more accurate than P/F without estimates: both then reject disturbances only by their integral action, and
+/// that of P may be faster.
 pub(super) fn slower_than_position(
     model: &Model,
     task: &TaskSpace,
@@ -320,10 +320,10 @@ pub(super) fn slower_than_position(
         if ratio > most { ratio } else { most }
     });
     let message = if ratio.is_infinite() {
-        "P/F with Invhys has an axis without integral, which P has: in contact P may be the more accurate".to_owned()
+        "P/F with Invhys has no integral action on an axis where P has it: in contact P may be more accurate".to_owned()
     } else {
         format!(
-            "P/F with Invhys corrects disturbances {ratio:.1} times slower than P: in contact P may be the more accurate"
+            "P/F with Invhys corrects disturbances {ratio:.1} times slower than P: in contact P may be more accurate"
         )
     };
     (ratio > 1.0).then(|| {
@@ -332,7 +332,7 @@ pub(super) fn slower_than_position(
             &["adaptation.mode", "adaptation"],
             codes::SLOWER_THAN_P,
             message,
-            "write adaptation.mode = \"ewma\" or \"pcc\": their estimates correct what the integral of P/F leaves"
+            "write adaptation.mode = \"ewma\" or \"pcc\": their estimates correct what the integral action of P/F leaves"
                 .to_owned(),
         )
     })
