@@ -1,11 +1,11 @@
-//! Lists the files that are copied into outputs, each source behind a line with its licence: all in these folders and in those of
-//! boards, but for tests and for packages of their own.
+//! Lists the files that are copied into outputs, each source behind a line with its licence: all files in these folders and in those
+//! of boards, except tests and nested packages.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
-/// Folders in the repository. In an output each stands beside the others, under its own name.
+/// Folders in the repository. In an output they are side by side under their own names.
 const FOLDERS: [&str; 13] = [
     "firmware/board",
     "firmware/hal",
@@ -22,10 +22,10 @@ const FOLDERS: [&str; 13] = [
     "host-sim/unit",
 ];
 
-/// Where boards are: packages whose manifest says what specgen knows of them.
+/// Folder of the boards: packages with a table `package.metadata.board`.
 const FIRMWARE: &str = "../../firmware";
 
-/// What files there are: not those that an editor leaves.
+/// Extensions of copied files; others may be left by an editor.
 const KINDS: [&str; 6] = ["json", "lock", "md", "rs", "toml", "x"];
 
 /// First line of a copied source file.
@@ -50,10 +50,10 @@ fn main() -> io::Result<()> {
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut files = Vec::new();
         collect(&folder, &mut files)?;
-        // A lock file that cargo leaves in a member of some workspace is nobody's.
-        let stands_alone = fs::read_to_string(folder.join("Cargo.toml"))?.contains("[workspace]");
-        files.retain(|file| stands_alone || !file.ends_with("Cargo.lock"));
-        // The tests of the simulator need more than what it is made of.
+        // Cargo may leave a lock file in a member of some other workspace.
+        let is_workspace = fs::read_to_string(folder.join("Cargo.toml"))?.contains("[workspace]");
+        files.retain(|file| is_workspace || !file.ends_with("Cargo.lock"));
+        // The tests of the simulator have further dependencies.
         files.retain(|file| place.starts_with("firmware") || !file.ends_with("tests.rs"));
         files.sort();
         let constant = name.to_uppercase().replace('-', "_");
@@ -79,7 +79,7 @@ fn main() -> io::Result<()> {
     fs::write(out.join("files.rs"), text)
 }
 
-/// Files below a folder. Where one comes or goes, this runs again.
+/// Files below a folder. A change of its contents reruns the script.
 fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();

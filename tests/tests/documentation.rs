@@ -38,7 +38,8 @@ const BANNED: [&str; 16] = [
 ];
 
 /// Folders whose Rust sources are free of [`BANNED`] words in comments and in texts.
-const PLAIN: [&str; 10] = [
+const PLAIN: [&str; 11] = [
+    "codegen/compiler/src",
     "codegen/identify/src",
     "codegen/language/src",
     "codegen/numerics/src",
@@ -58,8 +59,8 @@ const BANNED_TYPES: [&str; 40] = [
     "Said", "Seen", "Shown", "Told", "Tried", "Wanted",
 ];
 /// Folders that [`BANNED_TYPES`] does not cover yet: their parts are moving to other crates.
-const MOVING: [&str; 5] =
-    ["codegen/cli", "codegen/compiler/src/lint", "codegen/operate", "codegen/report", "codegen/studies"];
+const MOVING: [&str; 4] =
+    ["codegen/cli", "codegen/operate", "codegen/report", "codegen/studies"];
 
 /// Texts of the Markdown files below a folder, by path from the repository.
 fn markdown(folder: &Path, found: &mut Vec<(String, String)>) {

@@ -42,7 +42,7 @@ fn a_converter_too_coarse_is_refused_with_the_bits_that_would_do() {
             let one = finding(&findings, codes::TOO_FEW_BITS);
             let Place::Spec(span) = &one.place else { panic!("{one:?}") };
             assert!(text[span.clone()].contains("nm") && one.key == "requirements.precision", "{one:?}");
-            assert!(one.help.contains(&format!("dac.bits = {bits} would do")), "{factor}: {}", one.help);
+            assert!(one.help.contains(&format!("dac.bits = {bits} would be enough")), "{factor}: {}", one.help);
             // The bits that are named do, one fewer does not; so does the precision that is named.
             for (bits, good) in [(bits, true), (bits - 1, false)] {
                 let dac = format!("[dac]\nbits  = {bits}");
@@ -57,7 +57,7 @@ fn a_converter_too_coarse_is_refused_with_the_bits_that_would_do() {
     }
     let (_, hopeless) = verdict("legs.toml", &[("[timing]", "[requirements]\nprecision = \"0.001 nm\"\n\n[timing]")]);
     let findings = hopeless.unwrap_err();
-    assert!(finding(&findings, codes::TOO_FEW_BITS).help.contains("no converter"), "{findings:?}");
+    assert!(finding(&findings, codes::TOO_FEW_BITS).help.contains("no supported converter"), "{findings:?}");
 }
 
 /// The platform's step by brute force: every combination of half codes up or down, through the solved linear equations.

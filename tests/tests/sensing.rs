@@ -287,7 +287,7 @@ fn gauges_that_cannot_see_a_motion_are_refused_and_the_motion_is_named() {
     layout[5] = probe([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]);
     let (code, _, message) = refusal(&model(layout));
     assert_eq!(code, "E0432", "{message}");
-    assert!(message.contains("times less") && message.contains("θz"), "{message}");
+    assert!(message.contains("times worse") && message.contains("θz"), "{message}");
 }
 
 #[test]

@@ -403,14 +403,14 @@ fn sine(cycles: f64) -> impl Iterator<Item = f64> {
 #[test]
 fn the_wrap_of_a_table_is_judged_as_any_corner() {
     for (cycles, expected) in [
-        (1.3, "where it begins again: to the first row x goes by -2.8"),
+        (1.3, "where it starts again: x steps by -2.8"),
         (1.5, "its speed changes by 56.5"),
         (2.5, "its speed changes by 94.2"),
     ] {
         let found = repeated(sine(cycles));
         assert_eq!(codes(&found), ["W0458"], "{cycles}: {found:#?}");
         assert!(found[0].message.contains(expected), "{cycles}: {}", found[0].message);
-        assert!(found[0].message.contains("where it begins again") && found[0].help.contains("whole cycles"));
+        assert!(found[0].message.contains("where it starts again") && found[0].help.contains("whole cycles"));
     }
     // Half a cycle turns by 18.8 um/s, at which the lowest mode rings by less than a gauge sees.
     for cycles in [0.5, 1.0, 2.0, 7.0] {

@@ -89,6 +89,6 @@ fn a_weight_that_is_not_in_force_may_be_taken_out() {
     let mode = || ("mode         = \"pcc\"", "mode         = \"invhys\"".to_owned());
     let no_lag = || (LAG, "lag   = \"0 ms\"".to_owned());
     let (code, help) = verdict(&[no_lag(), mode()]).unwrap_err();
-    assert!(code == "E0402" && help.starts_with("take the weights of level and drift out"), "{help}");
+    assert!(code == "E0402" && help.starts_with("leave out the weights of level and drift,"), "{help}");
     verdict(&[no_lag(), mode(), (LEVEL, String::new()), (DRIFT, String::new())]).unwrap();
 }

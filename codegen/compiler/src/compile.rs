@@ -56,8 +56,8 @@ pub struct Compilation {
 }
 
 impl Compilation {
-        /// Requirements that the spec does not meet although it compiles. `check` and `build` report them as errors; a simulation
-        /// still runs.
+    /// Requirements that the spec does not meet although it compiles. `check` and `build` report them as errors; a simulation
+    /// still runs.
     #[must_use]
     pub fn missed(&self) -> Vec<Diagnostic> {
         rest::check(&self.model, &self.rest_noise)
@@ -90,7 +90,7 @@ pub fn compile_source(source: SpecSource) -> Result<Compilation, Refusal> {
 fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compilation> {
     let model = check_spec(source, findings)?;
 
-        // These are independent: one run reports the findings of all of them.
+    // These are independent: one run reports the findings of all of them.
     let stability = accepted(check_stability(&model), findings);
     let records = accepted(declared::records(&model, &source.dir), findings);
     let setpoints = accepted(setpoint::declared(&model, &source.dir), findings);

@@ -1,11 +1,11 @@
-//! What the scalar of the controller costs: rounding errors of leg displacements and of the measured pose, in nanometres per
-//! axis, by analysis and by trial.
+//! Rounding errors of the controller's scalar: of leg displacements and of the measured pose, in nanometres per axis, by analysis and
+//! by sampling.
 //!
-//! The analysis runs the controller's own kernels on numbers that remember what was rounded where ([`specgen_numerics::TracedNumber`]), over the whole
-//! workspace in 64 parts. The trial runs them in the controller's scalar at corners and random poses of the workspace, against the same kernels on 106 bits
-//! ([`specgen_numerics::Double`]) with constants, series and passes that are exact there. Both count the rounding of constants and the terms and
-//! steps that are left out. Not counted: the set-point generator, calibration of gauges, and the inverse of the
-//! hysteresis, whose voltage leaves the controller in steps of the converter.
+//! The analysis runs the controller's own kernels on numbers that record every rounding ([`specgen_numerics::TracedNumber`]), over
+//! the whole workspace in 64 parts. The sampling runs them in the controller's scalar at corners and random poses of the workspace
+//! and compares with the same kernels on 106 bits ([`specgen_numerics::Double`]) with constants, series and passes that are exact
+//! there. Both include the rounding of constants and truncated terms and steps. Not included: the set-point generator, calibration
+//! of gauges, and the inverse of the hysteresis, whose voltage leaves the controller in steps of the converter.
 
 mod kinematics;
 mod sensing;
@@ -22,38 +22,38 @@ use specgen_language::model::Model;
 
 pub use table::{Row, describe, rows};
 
-/// Random poses beside the corners of the workspace.
+/// Random poses in addition to the corners of the workspace.
 const SAMPLES: usize = 3000;
 
 /// Errors of the chosen scalar, m and rad, in the order x, y, z, θx, θy, θz.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Precision {
-    /// Of each leg displacement.
+    /// Errors of each leg displacement.
     pub legs: Figures,
-    /// Of the pose that the legs are sent to.
+    /// Errors of the commanded pose.
     pub commanded: Figures,
-    /// Of the pose computed from the readings of gauges that see the platform.
+    /// Errors of the pose computed from the readings of gauges on the platform.
     pub measured: Option<Figures>,
 }
 
 /// Largest error of six numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Figures {
-    /// None in the declared workspace is larger.
+    /// Proven bound over the declared workspace.
     pub bound: [f64; 6],
-    /// Largest found against 106 bits.
+    /// Largest sampled difference from 106 bits.
     pub sampled: [f64; 6],
-    /// Largest found against doubles; none where the controller computes in doubles.
+    /// Largest sampled difference from doubles; none if the controller computes in doubles.
     pub against_f64: Option<[f64; 6]>,
 }
 
 impl Figures {
-    /// Before any sample. `single`: doubles are another measure.
+    /// Figures before any sample. `single`: also compare with doubles.
     fn none(bound: [f64; 6], single: bool) -> Self {
         Self { bound, sampled: [0.0; 6], against_f64: single.then_some([0.0; 6]) }
     }
 
-    /// Bound over largest found of each number; none where nothing was found.
+    /// Bound over largest sample of each number; none if all samples are exact.
     #[must_use]
     pub fn ratio(&self) -> [Option<f64>; 6] {
         core::array::from_fn(|k| (self.sampled[k] > 0.0).then(|| self.bound[k] / self.sampled[k]))
@@ -77,7 +77,7 @@ pub fn of(model: &Model, ir: &Ir) -> Result<Precision, Vec<Diagnostic>> {
     tried(model, ir, 0, SAMPLES)
 }
 
-/// The same without random poses: its bounds, and what the corners of the workspace show.
+/// The same without random poses: bounds, and samples at the corners of the workspace.
 ///
 /// # Errors
 /// As [`of`].
@@ -85,7 +85,7 @@ pub fn bounds(model: &Model, ir: &Ir) -> Result<Precision, Vec<Diagnostic>> {
     tried(model, ir, 0, 0)
 }
 
-/// The same with `samples` random poses from `seed` beside the corners.
+/// The same with `samples` random poses from `seed` in addition to the corners.
 ///
 /// # Errors
 /// As [`of`].
@@ -120,7 +120,7 @@ fn boxes(bounds: &[f64; 6]) -> impl Iterator<Item = [[f64; 2]; 6]> {
     })
 }
 
-/// Rounding errors beyond the noise of the gauges are worth a warning: another scalar would control better.
+/// Warns about rounding errors beyond the noise of the gauges: another scalar would control better.
 #[must_use]
 pub fn findings(model: &Model, precision: &Precision, noise: Option<&PoseNoise>) -> Vec<Diagnostic> {
     let (Some(noise), Some(measured)) = (noise, &precision.measured) else { return Vec::new() };

@@ -17,12 +17,12 @@ const AXES: [&str; 6] = ["x", "y", "z", "theta_x", "theta_y", "theta_z"];
 /// are not included: `requirements.precision` has its own check.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RestNoise {
-        /// Gauges and amplifiers together. They are independent: the root of the sum of the squares.
+    /// Gauges and amplifiers together. They are independent: the root of the sum of the squares.
     pub pose: [f64; 6],
-        /// Due to the noise of the gauges and the steps of their converters.
+    /// Due to the noise of the gauges and the steps of their converters.
     pub gauges: [f64; 6],
-        /// Due to the noise of the amplifiers, with the gain of a leg over its whole range. This is an upper bound: the gain for some
-        /// millivolts is lower. The simulated machine has 0.58 of it.
+    /// Due to the noise of the amplifiers, with the gain of a leg over its whole range. This is an upper bound: the gain for some
+    /// millivolts is lower. The simulated machine has 0.58 of it.
     pub amplifiers: [f64; 6],
     /// Noise of one reading, steps of the converter included, m.
     pub reading: f64,

@@ -185,7 +185,7 @@ fn two_readings_of_a_value_are_both_offered() {
         let text = edits.iter().fold(base.text.clone(), |text, edit| edit.of(&text));
         let (_, found) = verdict(&text, base.folder.path());
         let first = found.first().unwrap();
-        assert!(list(&first.key) == "actuator.voltage" && first.help.contains("at its input"), "{first:?}");
+        assert!(list(&first.key) == "actuator.voltage" && first.help.contains("at the input"), "{first:?}");
         assert!(reading.iter().all(|reading| first.help.contains(reading)), "{first:?}");
     }
 }
@@ -212,7 +212,7 @@ fn a_value_that_the_supervisor_refuses_is_found_once() {
             continue;
         }
         let shown = default.replace('"', if default.starts_with('[') { "\"" } else { "" });
-        assert!(here[0].help.contains(&format!("leave {key} out: it is then {shown}")), "{:?}", here[0]);
+        assert!(here[0].help.contains(&format!("leave {key} out: the default is {shown}")), "{:?}", here[0]);
         let (accepted, found) = verdict(&with(&format!("{key} = {default}")), base.folder.path());
         assert!(accepted && found.iter().all(|one| !one.key.contains(key)), "{line}: {found:#?}");
     }

@@ -33,7 +33,7 @@ fn refused(spec: &str, line: &str) -> String {
         // "leave key out: …"
         if let Some(fix) = help.strip_prefix("leave ") {
             let key = line.split(" = ").next().expect("a key");
-            assert!(fix.starts_with(&format!("{key} out: it is then ")), "{line}: {help}");
+            assert!(fix.starts_with(&format!("{key} out: the default is ")), "{line}: {help}");
             assert_eq!(verdict(spec, "# left out"), Ok(()), "{line}: fixed by leaving it out");
             continue;
         }

@@ -451,22 +451,22 @@ fn what_looks_alike_and_what_is_not_seen_is_printed_for_each_spec() {
         specgen::lower::describe_wiring(&compiled.model, &compiled.ir.supervision)
     };
     let text = described("reference.toml", "");
-    assert!(text.contains("0.950 V, 0.599 um, for 50.0 ms; 0.30 s in all"), "{text}");
-    assert!(text.contains("no single fault of a gauge or leg looks like another"), "{text}");
+    assert!(text.contains("0.950 V, 0.599 um, 50.0 ms on each leg; 0.30 s in total"), "{text}");
+    assert!(text.contains("this geometry distinguishes all single faults"), "{text}");
     assert!(
         text.ends_with("all gauges or all legs that leaves 0.35 to 2.145 of the spec's gain\n")
-            && !text.contains("turned"),
+            && !text.contains("rotated"),
         "{text}"
     );
     let text = described("legs.toml", "");
     assert!(text.contains("\n      gauge 1 inverted, leg 1 inverted\n"), "{text}");
     assert!(text.contains("\n      gauge 0 swapped with gauge 5, leg 0 swapped with leg 5\n"), "{text}");
-    assert!(text.contains("gauges turned by 2 places, those of all legs by 2"), "{text}");
+    assert!(text.contains("gauges rotated by 2 positions and those of all legs by 2"), "{text}");
     let text = described("reference.toml", "legs = \"different\"");
-    assert!(text.contains("gains of legs are not tested until each leg has a record of its own"), "{text}");
-    assert!(text.contains("not seen: leg 0 gain × 0.50, leg 0 gain × 2.00, leg 1 gain × 0.50"), "{text}");
+    assert!(text.contains("gains of legs are not checked until each leg has its own record"), "{text}");
+    assert!(text.contains("not detected: leg 0 gain × 0.50, leg 0 gain × 2.00, leg 1 gain × 0.50"), "{text}");
     let text = described("features/six-records.toml", "legs = \"different\"");
-    assert!(!text.contains("not tested"), "legs with records of their own are compared with these: {text}");
+    assert!(!text.contains("not checked"), "legs with records of their own are compared with these: {text}");
     let text = described("reference.toml", "off = \"a plant without gauges\"");
     assert!(text.contains("wiring check: off (a plant without gauges)"), "{text}");
 }

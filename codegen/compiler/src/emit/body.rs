@@ -1,5 +1,5 @@
-//! `src/body.rs`: constants of the inverse dynamics. Reads [`ir::Dynamics`](crate::ir::Dynamics); exports `PLATFORM`, which the
-//! law's `dynamics.rs` works with.
+//! `src/body.rs`: constants of the inverse dynamics. Reads [`ir::Dynamics`](crate::ir::Dynamics); exports `PLATFORM` for the
+//! law's `dynamics.rs`.
 
 use proc_macro2::TokenStream;
 use quote::quote;

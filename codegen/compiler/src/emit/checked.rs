@@ -1,5 +1,5 @@
-//! `src/checked.rs`: what the controller checks itself by: the settings at start-up as words, where it comes from, and the checksum of
-//! both and of all tables. Reads [`ir::Integrity`](crate::ir::Integrity); the law's `integrity.rs` computes it again.
+//! `src/checked.rs`: data for the controller's self-check: the settings at start-up as words, its origin, and the checksum of
+//! both and of all tables. Reads [`ir::Integrity`](crate::ir::Integrity); the law's `integrity.rs` recomputes the checksum.
 
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};

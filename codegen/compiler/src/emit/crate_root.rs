@@ -1,17 +1,17 @@
-//! `src/lib.rs`: documentation of the crate, its modules, and what the law adds for targets.
+//! `src/lib.rs`: documentation of the crate, its modules, and the call of the law's `controller!`.
 
 use crate::ir::Ir;
 
-/// Modules that a user of the crate sees. The law's `controller!` adds those that are no constants.
+/// Public modules of the crate. The law's `controller!` adds those that are not constants.
 const PUBLIC: [&str; 7] = ["body", "hysteresis", "limits", "permitted", "setpoint", "supervision", "task_space"];
 
-/// Its documentation: what it is, of a platform and of six legs, and how it is called.
+/// Documentation of the crate: for a platform, for six legs, and how to call it.
 const PLATFORM_PAGE: &str = include_str!("pages/platform.md");
 const LEGS_PAGE: &str = include_str!("pages/legs.md");
 const CALLING: &str = include_str!("pages/use.md");
 const LICENCE: &str = "Generated code is under the licence 0BSD: use it as you like.";
 
-/// How the controller is called, in which units and frames: of its documentation and of the README.
+/// How to call the controller, with units and frames: for its documentation and the README.
 pub fn calling(ir: &Ir) -> String {
     let (command, frames) = if ir.task_space.is_some() {
         (

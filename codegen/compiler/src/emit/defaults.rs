@@ -1,5 +1,5 @@
-//! `src/defaults.rs`: the spec's settings, which `Config::new` of the law begins with. Reads [`ir::Defaults`](crate::ir::Defaults)
-//! and, of a platform, [`ir::PlatformDefaults`](crate::ir::PlatformDefaults).
+//! `src/defaults.rs`: the spec's settings, from which the law's `Config::new` starts. Reads [`ir::Defaults`](crate::ir::Defaults)
+//! and, for a platform, [`ir::PlatformDefaults`](crate::ir::PlatformDefaults).
 
 use std::fmt::Debug;
 
@@ -28,7 +28,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     }
 }
 
-/// What the converter and the amplifiers let through.
+/// Code limits of converter and amplifiers.
 fn code_limits(ir: &Ir) -> TokenStream {
     let max_step = literal::integer(ir.defaults.max_step);
     quote! { CodeLimits { min: limits::CODES[0], max: limits::CODES[1], max_step: #max_step } }

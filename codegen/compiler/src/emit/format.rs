@@ -1,4 +1,4 @@
-//! Tokens to committed text: prettyplease, then a pass for blank lines and for long rows of numbers.
+//! Formats tokens: prettyplease, then a pass for blank lines and for long rows of numbers.
 
 use proc_macro2::TokenStream;
 
@@ -20,14 +20,14 @@ pub fn header(ir: &Ir) -> String {
 pub fn source(header: &str, tokens: TokenStream) -> String {
     let file: syn::File = match syn::parse2(tokens) {
         Ok(file) => file,
-        // Emitters quote whole items; that each parses is tested for every example spec.
+        // Emitters quote whole items. A test parses those of every example spec.
         Err(error) => unreachable!("emitted tokens are not items: {error}"),
     };
     let printed = prettyplease::unparse(&file);
     format!("{header}{}", space_items(&pack_numbers(&printed)))
 }
 
-/// Joins the one-number-a-line arrays that the printer makes into rows.
+/// Joins the arrays that the printer writes with one number per line into rows.
 fn pack_numbers(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut row = String::new();
@@ -55,7 +55,7 @@ fn pack_numbers(text: &str) -> String {
     out
 }
 
-/// Puts a blank line between items (and between the functions of an `impl`), which the printer does not.
+/// Puts a blank line between items and between the functions of an `impl`, which the printer leaves out.
 fn space_items(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut previous = "";

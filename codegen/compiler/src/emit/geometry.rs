@@ -1,5 +1,5 @@
-//! `src/geometry.rs`: constants of the leg kinematics. Reads [`ir::Kinematics`](crate::ir::Kinematics) and the pose bounds; the law's
-//! `kinematics.rs` works with them.
+//! `src/geometry.rs`: constants of the leg kinematics. Reads [`ir::Kinematics`](crate::ir::Kinematics) and the pose bounds; used by
+//! the law's `kinematics.rs`.
 
 use proc_macro2::TokenStream;
 use quote::quote;

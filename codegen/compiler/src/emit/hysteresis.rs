@@ -1,5 +1,5 @@
 //! `src/hysteresis.rs`: the Everett tables. Reads [`ir::Hysteresis`](crate::ir::Hysteresis); exports `TABLES` and the types
-//! of table and memory: of the static model, or of one that knows the rate. All three are used alike.
+//! of table and memory: of the static model, or of one with rate dependence or creep. All three have the same interface.
 
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
@@ -14,7 +14,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let (tables, of_leg) = statics(ir.scalar, &h.tables, &h.table_of_leg, "EVERETT", doc);
     let Rate { imports, types: [table, memory_type], entries, constants } = rate(ir, &of_leg);
     let rate_doc = rate_doc(ir);
-    // A platform leads its load, see `task_space.rs`.
+    // A platform applies its lead to the load, see `task_space.rs`.
     let lead = ir.task_space.is_none().then(|| {
         let (ticks, limit) = h.lead.as_ref().map_or((0.0, 0.0), |lead| (lead.ticks, lead.limit));
         let (ticks, limit, led) = (literal::real(ir.scalar, ticks), literal::real(ir.scalar, limit), h.lead.is_some());
@@ -55,10 +55,10 @@ pub fn emit(ir: &Ir) -> TokenStream {
     }
 }
 
-/// What depends on the rate model.
+/// Parts that depend on the rate model.
 struct Rate {
     imports: TokenStream,
-    /// Of a table and of a memory.
+    /// Types of a table and of a memory.
     types: [TokenStream; 2],
     /// The table of each leg.
     entries: Vec<TokenStream>,
@@ -123,7 +123,7 @@ fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
     }
 }
 
-/// A `static` for each distinct table, and the name of that of each leg.
+/// A `static` for each distinct table, and the name of each leg's.
 fn statics(
     scalar: Scalar,
     tables: &[Vec<f64>],
@@ -148,7 +148,7 @@ fn statics(
     (statics.collect(), table_of_leg.iter().map(|k| names[*k].clone()).collect())
 }
 
-/// What the model has beyond the static one, in lines for the documentation of the module.
+/// Lines for the documentation of the module about what the model adds to the static one.
 fn rate_doc(ir: &Ir) -> Vec<&'static str> {
     let mut lines = Vec::new();
     match &ir.hysteresis.rate {

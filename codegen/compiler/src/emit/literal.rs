@@ -1,4 +1,4 @@
-//! Numbers as source text: shortest decimal that reads back to the same bits.
+//! Numbers as source text: the shortest decimal that reads back to the same bits.
 
 use std::fmt::{self, Debug};
 
@@ -17,7 +17,7 @@ pub fn real(scalar: Scalar, value: f64) -> TokenStream {
     let literal: Literal = match text.parse() {
         Ok(literal) => literal,
         // Lowering keeps every constant finite; `{:?}` of a finite number is a literal.
-        Err(_) => unreachable!("{text} is no literal"),
+        Err(_) => unreachable!("{text} is not a literal"),
     };
     if value.is_sign_negative() {
         quote! { -#literal }
@@ -41,7 +41,7 @@ macro_rules! constant {
 }
 pub(crate) use constant;
 
-/// What `{:?}` prints, and the Rust that is meant: paths of variants, references to slices, a name.
+/// Text of `{:?}` and its valid Rust: paths of variants, references to slices, a name.
 const MEANT: [(&str, &str); 11] = [
     ("amplifier_fault: ", "amplifier_fault: specgen_runtime::supervisor::Reaction::"),
     (" kind: ", " kind: specgen_runtime::trigger::Kind::"),
@@ -62,7 +62,7 @@ pub fn printed(constant: &impl Debug) -> TokenStream {
     parsed(&text)
 }
 
-/// Rust within a constant, in place of a value.
+/// Rust code inside a constant instead of a value.
 pub struct RustExpression<'a>(pub &'a TokenStream);
 
 impl Debug for RustExpression<'_> {
@@ -71,11 +71,11 @@ impl Debug for RustExpression<'_> {
     }
 }
 
-/// Rust that is known to be Rust.
+/// Parses text that is known to be valid Rust.
 pub fn parsed(text: &str) -> TokenStream {
     match text.parse() {
         Ok(tokens) => tokens,
-        Err(error) => unreachable!("{text} is no Rust: {error}"),
+        Err(error) => unreachable!("{text} is not valid Rust: {error}"),
     }
 }
 

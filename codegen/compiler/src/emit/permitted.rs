@@ -1,4 +1,4 @@
-//! `src/permitted.rs`: the table of what settings may be. Reads [`ir::PermittedRanges`](crate::ir::PermittedRanges).
+//! `src/permitted.rs`: the table of permitted settings. Reads [`ir::PermittedRanges`](crate::ir::PermittedRanges).
 
 use std::marker::PhantomData;
 

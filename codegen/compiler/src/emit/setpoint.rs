@@ -1,5 +1,5 @@
 //! `src/setpoint.rs`: limits, user frames and trajectories. Reads [`ir::Setpoints`](crate::ir::Setpoints) and the pose bounds;
-//! exports `SETPOINTS` and `TRAJECTORY_NAMES`. Only for controllers that see the platform.
+//! exports `SETPOINTS` and `TRAJECTORY_NAMES`. Only for controllers of a platform.
 
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};

@@ -70,8 +70,8 @@ fn counts_in(words: &[u32]) -> TokenStream {
     quote! { #(#words),* }
 }
 
-/// How legs stand at reset, which is at rest. One for all where they rest at the lowest voltage, at which every history is
-/// forgotten.
+/// State of the legs at reset, which is at rest. One for all if they rest at the lowest voltage, where every history is
+/// erased.
 fn at_rest(ir: &Ir) -> TokenStream {
     let real = |value| literal::real(ir.scalar, value);
     let (doc, memory, displacement, code) = match &ir.supervision.risen {

@@ -11,7 +11,7 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<(Actuation, i32), V
     let full_scale = (1_i32 << model.dac.bits) - 1;
     let volts_per_code = (volts_full - volts_at_zero) / f64::from(full_scale);
     let cell = (volts_max - volts_min) / model.hysteresis.grid as f64;
-    // The limits hold for the voltage as the controller computes it, in its own arithmetic.
+    // The limits apply to the voltage as the controller computes it, in its own arithmetic.
     let voltage = |code: i32| {
         scalar.round(scalar.round(volts_at_zero) + scalar.round(f64::from(code) * scalar.round(volts_per_code)))
     };
@@ -34,7 +34,7 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<(Actuation, i32), V
             "use a converter with more bits or a narrower range".to_owned(),
         ));
     }
-    // The spec was checked to allow one code per tick; rounding must not take it away.
+    // The spec is checked to allow one code per tick; rounding must not reduce that to zero.
     let step = (model.actuator.slew_rate * model.timing.period / volts_per_code).max(1.0);
     if !findings.is_empty() {
         return Err(findings);
@@ -63,7 +63,7 @@ mod tests {
     use super::*;
     use specgen_language::spec::{self, SpecSource};
 
-    /// Codes whose voltage is within `volts` as the controller computes it; every code is asked.
+    /// Codes whose voltage, as the controller computes it, is within `volts`; checks every code.
     fn within<T: Real + Into<f64>>(actuation: &Actuation, volts: [f64; 2]) -> [i32; 2] {
         let [volts_at_zero, volts_per_code, cells_at_zero, cells_per_code, codes_per_cell] = [
             actuation.volts_at_zero,
@@ -77,12 +77,12 @@ mod tests {
         let inside = |code: &i32| (volts[0]..=volts[1]).contains(&dac.voltage(*code).into());
         let all: Vec<i32> = (0..1 << actuation.bits).filter(inside).collect();
         let (first, last) = (all[0], all[all.len() - 1]);
-        assert_eq!(all.len() as i32, last - first + 1, "no code between two that are inside is outside");
+        assert_eq!(all.len() as i32, last - first + 1, "codes inside the range are consecutive");
         [first, last]
     }
 
-    /// Together with `firmware/runtime/tests/all/dac_exact.rs` (no code leaves the limits or moves by more than the step, whatever
-    /// comes in): no voltage leaves `actuator.voltage`, and none moves faster than `actuator.slew_rate`.
+    /// Together with `firmware/runtime/tests/all/dac_exact.rs` (no code exceeds the limits or changes by more than the step for any
+    /// input): no voltage exceeds `actuator.voltage` or changes faster than `actuator.slew_rate`.
     #[test]
     fn the_codes_within_the_limits_are_those_of_voltages_within_the_limits_and_the_step_is_no_faster_than_the_slew_rate()
      {

@@ -1,7 +1,7 @@
 //! Constants of the inverse dynamics, and the order in which its six equilibrium equations are solved.
 //!
-//! The order is chosen at rest by complete pivoting, once for each leg as the first one (moments are taken about that leg's
-//! joint), and the choice that stays farthest from a vanishing pivot over the declared workspace is kept.
+//! Complete pivoting at rest gives one candidate order for each leg as the first one (moments are taken about that leg's joint).
+//! The candidate whose smallest pivot over the declared workspace is largest is used.
 
 use specgen_runtime::Platform;
 
@@ -13,22 +13,22 @@ use specgen_numerics::{cross, dot, pivot_ratio};
 
 /// Standard gravity of the project's reference data, m/s², along −z of {B}.
 pub const GRAVITY: f64 = 9.81;
-/// Smallest ratio of pivots that is accepted anywhere in the workspace. Elimination may lose as many digits as this has:
+/// Smallest accepted ratio of pivots anywhere in the workspace. Elimination may lose this many digits:
 /// three leave 1e-12 of the 1e-16 of `f64`, and 1e-4 of the 1e-7 of `f32`.
 const SMALLEST_PIVOT_RATIO: f64 = 1e-3;
-/// Interior poses that are looked at beside rest and the 64 corners.
+/// Interior poses checked in addition to rest and the 64 corners.
 const INTERIOR_POSES: u32 = 128;
 
-/// Relative size of what rounding leaves of a sum that is zero.
+/// Relative rounding error of a sum that is zero.
 const ROUNDING: f64 = 1e-14;
 
 type Vector = [f64; 3];
 type Matrix = [[f64; 3]; 3];
 
-/// The dynamics of a model at full precision: the one that the emitted controller holds rounded to its scalar.
+/// The dynamics of a model at full precision. The emitted controller contains it rounded to its scalar.
 ///
 /// # Errors
-/// [`codes::ILL_CONDITIONED`] if the legs hardly hold the platform somewhere in the declared workspace.
+/// [`codes::ILL_CONDITIONED`] if the geometry is nearly singular somewhere in the declared workspace.
 pub fn platform(model: &Model) -> Result<Platform<f64>, Vec<Diagnostic>> {
     constants(model).map(|constants| constants.platform())
 }
@@ -56,7 +56,7 @@ fn constants(model: &Model) -> Result<Dynamics, Vec<Diagnostic>> {
     }
 }
 
-/// Over `poses`, or as soon as it is no more than `beaten`: a choice that is no better is not looked at any further.
+/// The smallest ratio over `poses`. Stops early once it is not above `beaten`.
 fn smallest_pivot_ratio(platform: &Platform<f64>, poses: &[[f64; 6]], reach: f64, beaten: f64) -> f64 {
     let mut smallest = f64::INFINITY;
     for pose in poses {
@@ -75,7 +75,7 @@ fn smallest_pivot_ratio(platform: &Platform<f64>, poses: &[[f64; 6]], reach: f64
 fn assemble(model: &Model, order: [usize; LEGS], rows: [usize; LEGS]) -> Dynamics {
     let (base, joint) = joint_positions(&model.geometry);
     let pole = joint[order[0]];
-    // A base in one plane is measured from there, and its third components are zero.
+    // A planar base is measured from its plane, so that its third components are zero.
     let level = base[0][2];
     let flat_base = base.iter().all(|b| b[2] == level);
     let base_height = if flat_base { level } else { 0.0 };
@@ -106,7 +106,7 @@ fn assemble(model: &Model, order: [usize; LEGS], rows: [usize; LEGS]) -> Dynamic
     let trace = xx + yy + zz;
     let mut mass = body.mass;
     let mut first_moment = body.center_of_mass.map(|c| body.mass * c);
-    // ∫ x xᵀ dm = (tr I) / 2 − I about the mass centre; then Steiner, and the point masses at the joints.
+    // ∫ x xᵀ dm = (tr I) / 2 − I about the mass centre; then the parallel axis theorem, and the point masses at the joints.
     let mut second: Matrix = inertia.map(|row| row.map(|entry| -entry));
     for (k, row) in second.iter_mut().enumerate() {
         row[k] += trace / 2.0;
@@ -126,7 +126,7 @@ fn assemble(model: &Model, order: [usize; LEGS], rows: [usize; LEGS]) -> Dynamic
         }
     }
 
-    // What is zero by symmetry is zero, so that the controller leaves it out.
+    // Entries that are zero by symmetry are set to zero, so that the controller omits them.
     let reach = model.geometry.joint_radius();
     let clean = |value: f64, size: f64| if value.abs() <= ROUNDING * size { 0.0 } else { value };
     let first_moment = first_moment.map(|moment| clean(moment, mass * reach));
@@ -188,7 +188,7 @@ fn elimination(model: &Model, first: usize, reach: f64) -> ([usize; LEGS], [usiz
         for j in columns {
             for i in step..6 {
                 let size = m[rows[i]][order[j]].abs();
-                // Equal by symmetry is equal, whatever rounding says: the first one counts.
+                // Among entries equal by symmetry, the first one is used despite rounding.
                 if size > largest * (1.0 + 1e-9) {
                     (row, column, largest) = (i, j, size);
                 }
@@ -224,7 +224,7 @@ fn poses(model: &Model) -> Vec<[f64; 6]> {
     poses
 }
 
-/// The digits of `index` behind the point, in reverse.
+/// The digits of `index`, mirrored at the radix point.
 fn radical_inverse(mut index: u32, base: u32) -> f64 {
     let (mut value, mut unit) = (0.0, 1.0);
     while index > 0 {

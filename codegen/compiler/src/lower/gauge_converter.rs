@@ -5,12 +5,12 @@ use crate::ir::{GaugeConverter, Scalar, Sensing};
 use specgen_language::diagnostic::{Diagnostic, Place, codes};
 use specgen_language::model::Model;
 
-/// What converters of gauges with a calibration take in without `sensor.input_range`, V.
+/// Default of `sensor.input_range` for gauges with a calibration, V.
 const VOLTS: [f64; 2] = [-10.0, 10.0];
-/// A code is an `i32`: of a converter with more bits the targets drop the lowest.
+/// Most bits of a code, which is an `i32`. The targets drop the lowest bits of a converter with more.
 const MOST_BITS: u32 = 31;
 
-/// The converter's range is that of the gauge, or that of its voltage if there is a calibration.
+/// Constants of the converter. Its range is that of the gauge, or that of the voltage if there is a calibration.
 pub(super) fn lower(model: &Model, sensing: Option<&Sensing>, scalar: Scalar) -> GaugeConverter {
     let calibrated = sensing.filter(|sensing| sensing.calibration.is_some());
     let [low, high] = if calibrated.is_some() { model.sensor.input_range.unwrap_or(VOLTS) } else { model.sensor.range };
@@ -27,7 +27,7 @@ pub(super) fn lower(model: &Model, sensing: Option<&Sensing>, scalar: Scalar) ->
     }
 }
 
-/// A gauge whose voltage at rest the converter does not take in: nothing it says would be believed.
+/// Findings about gauges whose voltage at rest is outside the range of the converter.
 pub(super) fn unseen(model: &Model, sensing: Option<&Sensing>) -> Vec<Diagnostic> {
     let Some(Sensing { calibration: Some(of_gauge), raw_limits, .. }) = sensing else { return Vec::new() };
     let [low, high] = model.sensor.input_range.unwrap_or(VOLTS);
@@ -36,7 +36,7 @@ pub(super) fn unseen(model: &Model, sensing: Option<&Sensing>) -> Vec<Diagnostic
     let unseen = of_gauge.iter().zip(raw_limits).enumerate().filter(|(_, (coefficients, [first, last]))| {
         let reading = |volts: f64| coefficients.iter().rev().fold(0.0, |sum, c| c + volts * sum);
         let (from, to) = (if *first > low { *first } else { low }, if *last < high { *last } else { high });
-        // Within the limits the polynomial rises, or falls, all the way.
+        // Within the limits the polynomial is monotonic.
         from >= to || reading(from) * reading(to) > 0.0
     });
     let place = place.cloned().map_or(Place::Whole, Place::Spec);

@@ -1,4 +1,4 @@
-//! Checksum of tables and settings, as the controller computes it again when it starts.
+//! Checksum of tables and settings, which the controller recomputes at start.
 
 use super::Origin;
 use specgen_runtime::{ControlMode, Crc32};
@@ -9,8 +9,8 @@ use crate::ir::{
     TaskSpace,
 };
 
-/// Digest of what the controller depends on: the text of the spec (line ends as `\n`) and the files that it names, by name and
-/// text. Not the folder it lies in.
+/// Digest of the inputs of the controller: the text of the spec (line ends as `\n`), and name and text of the files that it
+/// references. It does not depend on their folder.
 pub(crate) fn digest<'a>(spec: &str, files: impl Iterator<Item = &'a (String, String)>) -> String {
     let mut all = spec.replace("\r\n", "\n").into_bytes();
     for (name, text) in files {
@@ -22,7 +22,7 @@ pub(crate) fn digest<'a>(spec: &str, files: impl Iterator<Item = &'a (String, St
     sha256(&all)
 }
 
-/// A line about where a controller comes from, and one about what of that nobody measured, if there is such.
+/// A line with the origin of a controller, and one with its assumed values, if there are any.
 pub(super) fn identity(name: &str, origin: &Origin<'_>, scalar: Scalar) -> String {
     let assumed = if origin.assumed.is_empty() {
         String::new()
@@ -37,7 +37,7 @@ pub(super) fn identity(name: &str, origin: &Origin<'_>, scalar: Scalar) -> Strin
     )
 }
 
-/// The settings as words and the checksum of everything. The order is that of the emitted `integrity.rs`: identity, tables by their
+/// The settings as words, and the checksum of all constants. The order is that of the emitted `integrity.rs`: identity, tables by their
 /// number, tables of the rate, creep, trajectories, settings.
 pub(super) fn lower(
     identity: String,
@@ -95,7 +95,7 @@ fn of_segment(crc: &mut Crc32, word: impl Fn(&f64) -> u64, segment: &Segment) {
     }
 }
 
-/// A code as the emitted `Config::to_words` has it.
+/// A code in the encoding of the emitted `Config::to_words`.
 fn of_code(code: i32) -> u64 {
     u64::from(code.cast_unsigned())
 }

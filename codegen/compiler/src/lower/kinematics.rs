@@ -1,4 +1,4 @@
-//! Joints, rest legs, and how many terms and steps the kinematics needs over the declared workspace.
+//! Joints, legs at rest, and the number of terms and steps that the kinematics needs over the declared workspace.
 
 use specgen_runtime::{Legs, Series};
 
@@ -7,13 +7,13 @@ use crate::ir::{Kinematics, LEGS, Scalar};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Geometry, Model};
 
-/// Largest |Δl| / l₀ for which the Newton steps are known to converge as counted.
+/// Largest |Δl| / l₀ for which the counted number of Newton steps is proven to converge.
 const LARGEST_RATIO: f64 = 0.25;
-/// More corrections than this mean that the forward kinematics does not converge.
+/// Largest number of corrections. More mean that the forward kinematics does not converge.
 const MOST_CORRECTIONS: u32 = 40;
-/// Relative difference of coordinates that are one but for rounding.
+/// Relative difference of coordinates that are equal except for rounding.
 const SAME_JOINT: f64 = 4e-15;
-/// More terms of a root than this take longer than a Newton step.
+/// Most terms of a root. More take longer than a Newton step.
 const MOST_TERMS: usize = 8;
 
 /// B_i in the base frame and P_i in the platform frame, m.
@@ -91,7 +91,7 @@ fn jacobian_at_rest(rest_leg: &[[f64; 3]; LEGS], rest_length: &[f64; LEGS], plat
 
 /// J⁻¹ of the legs at rest in f64: pose coordinates (rows) per leg displacement (columns).
 ///
-/// None if the legs do not hold the platform.
+/// None if the geometry is singular.
 #[must_use]
 pub fn inverse_jacobian(geometry: &Geometry) -> Option<[[f64; 6]; LEGS]> {
     leg_jacobian(geometry).and_then(|jacobian| linear::inverse(&jacobian))
@@ -106,7 +106,7 @@ pub fn leg_jacobian(geometry: &Geometry) -> Option<[[f64; 6]; LEGS]> {
     whole.then(|| jacobian_at_rest(&rest_leg, &rest_length, &geometry.platform_joints))
 }
 
-/// Corrections of the forward kinematics, counted at 3⁶ poses on the faces of the workspace. None if they do not end.
+/// Number of corrections of the forward kinematics, counted at 3⁶ poses on the faces of the workspace; none without convergence.
 fn corrections(legs: &Legs<f64>, inverse: &Matrix, bounds: [f64; 6], scalar: Scalar) -> Option<u32> {
     let tolerance = tolerance(bounds, scalar);
     let good = |count: &u32| {
@@ -124,8 +124,8 @@ fn degenerate(model: &Model) -> Diagnostic {
         &model.spans,
         &[key],
         codes::DEGENERATE_GEOMETRY,
-        "the six legs leave a motion of the platform free at rest",
-        "move the joints of base and platform apart: pairs of legs must meet in different places",
+        "the six legs leave one motion of the platform unconstrained at rest",
+        "move the joints of base and platform apart: pairs of legs must meet at different points",
     )
 }
 
@@ -136,7 +136,7 @@ fn too_large(model: &Model, displacement: f64, length: f64) -> Diagnostic {
         &[key],
         codes::WORKSPACE_TOO_LARGE,
         format!(
-            "the declared workspace may change a leg by {:.3} mm, more than a quarter of its length of {:.3} mm",
+            "the declared workspace may change the length of a leg by {:.3} mm, more than a quarter of its {:.3} mm",
             displacement * 1e3,
             length * 1e3
         ),
@@ -169,8 +169,8 @@ fn series(largest: f64, scalar: Scalar, leading: f64, first: u32) -> Vec<f64> {
     }
 }
 
-/// Coefficients of the root Δl of Δl² + 2 l₀ Δl = s over u = s/(2 l₀) after the leading 1, in τ = u/l₀, and Newton steps from there,
-/// which take a division each: so many that what is left is below a quarter ulp.
+/// Coefficients of the root Δl of Δl² + 2 l₀ Δl = s over u = s/(2 l₀) after the leading 1, in τ = u/l₀, and the number of Newton steps
+/// after them, each with a division, for a remainder below a quarter ulp.
 ///
 /// With r = |Δl| / l₀, |τ| ≤ r + r²/2. A step turns a relative error ε into ε² r / (2 (1 − r)).
 fn root_of(ratio: f64, scalar: Scalar) -> (Vec<f64>, u32) {

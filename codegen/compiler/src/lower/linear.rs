@@ -49,7 +49,7 @@ pub(super) fn inverse(matrix: &Matrix) -> Option<Matrix> {
     Some(inverse)
 }
 
-/// The matrix with what rounding left of a zero made one: entries below 10⁻¹³ of the size that their row may have.
+/// The matrix with rounding errors set to zero: entries below 10⁻¹³ of the size of their row.
 pub(super) fn without_dust(matrix: Matrix, size_of_row: [f64; 6]) -> Matrix {
     let mut clean = matrix;
     for (row, size) in clean.iter_mut().zip(size_of_row) {
@@ -65,8 +65,8 @@ pub(super) fn dusted(value: f64, size: f64) -> f64 {
     if value.abs() < 1e-13 * size { 0.0 } else { value }
 }
 
-/// Numbers that agree but for their sign and a share of `tolerance` are given one magnitude: what rounding left of the symmetry of a
-/// platform. A core then keeps one constant for all of them.
+/// Gives one magnitude to numbers that agree within a share of `tolerance`, except for their sign: it restores the symmetry of a
+/// platform, so that the controller holds one constant for all of them.
 pub(super) fn alike(values: &mut [f64], tolerance: f64) {
     for k in 1..values.len() {
         let (before, rest) = values.split_at_mut(k);
@@ -80,7 +80,7 @@ pub(super) fn alike(values: &mut [f64], tolerance: f64) {
     }
 }
 
-/// The same of a matrix that is made of others.
+/// The same for a matrix.
 pub(super) fn with_alike(mut matrix: Matrix) -> Matrix {
     alike(matrix.as_flattened_mut(), 1e-13);
     matrix

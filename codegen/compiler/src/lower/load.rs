@@ -1,12 +1,12 @@
-//! The load of the legs under motion and gravity: by the whole kernel, or to first order where that is proven to do.
+//! The load of the legs under motion and gravity: by the whole kernel, or to first order if that is proven to be accurate enough.
 //!
 //! ```text
 //! p(h, ḣ, ḧ) = (J⁻ᵀ (M ḧ + C ḣ + G) − f_rest)/k_a = P h + Q ḧ + e      (7) without the interaction force
 //! ```
-//! P and Q are the derivatives of the controller's own kernel at rest. What they leave, e, is bounded over the whole workspace and all
-//! motions within the declared limits by running that kernel on polynomials with a rest ([`specgen_numerics::Taylor`]); nothing is
-//! sampled. Terms of P that the tolerance has room for are left out, the smallest first. Q is kept whole: its error would grow with
-//! the acceleration of stops and streams.
+//! P and Q are the derivatives of the controller's own kernel at rest. The error e is bounded over the whole workspace and all
+//! motions within the declared limits by running that kernel on polynomials with a remainder ([`specgen_numerics::Taylor`]), without
+//! sampling. Terms of P are left out, the smallest first, as far as the tolerance allows. Q is kept complete: its error would grow
+//! with the acceleration of stops and streams.
 
 use super::linear::with_alike;
 use super::setpoint::motions::{self, Motions};
@@ -16,12 +16,12 @@ use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{DynamicsChoice, Model, TaskSpace};
 use specgen_numerics::{Expansion, expand_leg_forces};
 
-/// Share of the converter's step that the error may be, if the spec does not say.
+/// Default of the largest error, as a share of the converter's step.
 const SHARE_OF_STEP: f64 = 0.1;
-/// Parts of the largest in its matrix below which a derivative is what rounding left of a zero.
+/// Derivatives below this share of the largest in their matrix are rounding errors of zero.
 const DUST: f64 = 1e-12;
 
-/// How the controller computes the load.
+/// The way the controller computes the load.
 ///
 /// # Errors
 /// Frames that the set-points refuse.
@@ -44,7 +44,7 @@ pub(super) fn lower(
     Ok(Load { affine: taken.then_some(affine), tolerance, bounds, operations })
 }
 
-/// How the load is computed, and what is proven of it, for `specgen check`.
+/// Text for `specgen check`: how the load is computed, and the proven error.
 #[must_use]
 pub fn describe(load: &Load) -> String {
     let nm = |value: f64| figure(value * 1e9);
@@ -56,7 +56,7 @@ pub fn describe(load: &Load) -> String {
     };
     format!(
         "  load of the legs under motion and gravity: {chosen}, {instead}\n    first order off by {} nm at most, tolerance {} nm, in moves and \
-         trajectories (load up to {} nm); {} of {} nm in stops, {} of {} nm in whatever a stream may state\n",
+         trajectories (load up to {} nm); {} of {} nm in stops, {} of {} nm in any permitted stream\n",
         nm(tracked.error),
         nm(load.tolerance),
         nm(tracked.load),
@@ -117,7 +117,7 @@ impl Space {
         Affine { pose: with_alike(affine.pose), acceleration: with_alike(affine.acceleration) }
     }
 
-    /// What `affine` leaves of the load of a leg, m.
+    /// Error of `affine` for the load of a leg, m.
     fn left(&self, affine: &Affine, leg: usize) -> f64 {
         let (pose, acceleration) = (&affine.pose[leg], &affine.acceleration[leg]);
         let slope = core::array::from_fn(|k| match k {
@@ -139,7 +139,7 @@ impl Space {
     }
 }
 
-/// The larger one; not a number, where that is none, is larger than all.
+/// The larger one; NaN counts as the largest.
 fn larger(a: f64, b: f64) -> f64 {
     if b <= a { a } else { b }
 }

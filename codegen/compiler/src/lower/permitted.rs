@@ -1,4 +1,4 @@
-//! The table of what settings may be: nothing beyond what the spec itself says or could say.
+//! The table of permitted settings: the ranges of values that a spec could have.
 
 use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE};
 use specgen_runtime::trigger::LONGEST;
@@ -11,11 +11,11 @@ use crate::ir::{
 use specgen_language::model::{LARGEST_GAIN, LARGEST_RUN_INTERVAL, LARGEST_TRAVEL, LARGEST_TURN};
 use specgen_numerics::Matrix6;
 
-/// Between what the bounds below say and what is loaded: they neglect what is quadratic, and rounding.
+/// Margin on the bounds below, which neglect quadratic terms and rounding.
 const MARGIN: f64 = 16.0;
-/// What the scalar rounds of a pose in the user's coordinates, as a part of it.
+/// Relative rounding error of a pose in the user's coordinates.
 const ROUNDING: f64 = 1e-5;
-/// No number of a state is larger: products with constants stay finite in both scalars.
+/// Largest number in a state: products with constants stay finite in both scalars.
 const FINITE: f64 = 1e30;
 
 pub(super) fn lower(
@@ -102,11 +102,11 @@ pub(super) fn lower(
     PermittedRanges { settings, state }
 }
 
-/// Largest displacement of a leg, m, and what a cell a tick adds to it: by the tables and what accounts for the rate, and as demanded.
+/// Largest displacement of a leg, m, and its addition by one cell per tick: from the tables and their rate terms, and as demanded.
 fn legs(hysteresis: &Hysteresis, bounds: &Bounds, kinematics: &Kinematics) -> [f64; 2] {
     let full = |tables: &[Vec<f64>]| largest(tables.iter().flatten().copied());
     let still = full(&hysteresis.tables);
-    // Legs do not creep, or move, by more than twice what the model has them do from one end to the other.
+    // An upper bound: twice the model's creep, or motion, from one end to the other.
     let (displacement, rate) = match &hysteresis.rate {
         None => (still, 0.0),
         Some(RateModel::DynamicPreisach { tables, .. }) => {
@@ -120,10 +120,10 @@ fn legs(hysteresis: &Hysteresis, bounds: &Bounds, kinematics: &Kinematics) -> [f
     [2.0 * if displacement > demanded { displacement } else { demanded }, 2.0 * rate]
 }
 
-/// Six legs, each with a gauge of its own: set-points are poses or displacements.
+/// Six legs with their own gauges: set-points are poses or displacements.
 fn of_legs(bounds: &Bounds, kinematics: &Kinematics, [leg, leg_rate]: [f64; 2]) -> State {
     let reading = largest(bounds.sensor);
-    // A leg begins where its gauge shows it; the pose that this makes is of first order, which the margin makes up for.
+    // A leg starts at its reading; its pose is to first order, which the margin covers.
     let leg = largest([leg, reading]);
     let place = core::array::from_fn(|axis| {
         let seen: f64 = kinematics.inverse_jacobian[axis].iter().map(|value| value.abs() * leg).sum();
@@ -135,9 +135,9 @@ fn of_legs(bounds: &Bounds, kinematics: &Kinematics, [leg, leg_rate]: [f64; 2]) 
         leg,
         leg_rate,
         reading,
-        // Estimates are means of readings less displacements, and differences of these.
+        // Estimates are averages of readings less displacements, and differences of these.
         request: 4.0 * (reading + leg),
-        // These have none.
+        // Not used for six legs.
         rate: [LARGEST; 6],
         acceleration: [LARGEST; 6],
         pose: [LARGEST_PLACE; 6],
@@ -156,7 +156,7 @@ fn of_platform(task: &TaskSpace, bounds: &Bounds, [leg, leg_rate]: [f64; 2], per
     let user = user(&task.setpoints, &place);
     let reading = largest(task.sensing.raw_limits.into_iter().flatten());
     let pose = measured(&task.sensing);
-    // No motion is faster than from one end to the other in a tick, and back in the next.
+    // An upper bound: from one end to the other in a tick, and back in the next.
     let far: [f64; 6] =
         core::array::from_fn(|axis| largest([user[axis], place[axis], task.setpoints.stream_rate[axis] * period]));
     let rate = far.map(|far| MARGIN * far / period);
@@ -200,13 +200,13 @@ fn user(setpoints: &Setpoints, place: &[f64; 6]) -> [f64; 6] {
     core::array::from_fn(|axis| (1.0 + ROUNDING) * largest([user[axis], place[axis], setpoints.home[axis].abs()]))
 }
 
-/// The largest pose that gauges show within their limits, m and rad: to first order, which [`MARGIN`] makes up for.
+/// The largest pose that gauges measure within their limits, m and rad: to first order, which [`MARGIN`] covers.
 fn measured(sensing: &Sensing) -> [f64; 6] {
     let reading = |gauge: usize| {
         let ends = sensing.raw_limits[gauge];
         match &sensing.calibration {
             None => largest(ends),
-            // Each power at its largest.
+            // Each power at its maximum.
             Some(calibration) => {
                 let end = largest(ends);
                 calibration[gauge].iter().rev().fold(0.0, |sum: f64, coefficient| sum * end + coefficient.abs())
@@ -252,7 +252,7 @@ fn of_gains(scalar: Scalar) -> [Setting; 8] {
     ]
 }
 
-/// An output line. Positions of any axis have one range, for the axis is a setting, too.
+/// An output line. Positions of all axes have one range, because the axis is a setting, too.
 fn of_line(line: usize, bounds: &[f64; 6], scalar: Scalar) -> [Setting; 11] {
     let [most, least] = triggers::extent(bounds).map(|value| scalar.round(value));
     let places = Range::Number(-most, most);
@@ -286,7 +286,7 @@ fn of_line(line: usize, bounds: &[f64; 6], scalar: Scalar) -> [Setting; 11] {
     .map(|setting| Setting { line: Some(line), ..setting })
 }
 
-/// What the notch makes of set-point and pose that lie `apart`, m and rad.
+/// Largest output of the notch if set-point and pose are `apart`, m and rad.
 fn error(law: &ControlLaw, apart: f64) -> f64 {
     match &law.notch {
         None => apart,
@@ -294,9 +294,8 @@ fn error(law: &ControlLaw, apart: f64) -> f64 {
     }
 }
 
-/// The largest that a leg is asked for under any settings, and what the estimates and the notch make of it, where set-point and pose
-/// lie `apart` and the notch makes `error` of that, m and rad. The force of the integral is as it is bounded; the largest gain is on
-/// every axis.
+/// Largest request to a leg under any settings, with estimates and notch, if set-point and pose are `apart` and the notch turns that
+/// into `error`, m and rad. The integral has its largest permitted force, and every axis the largest gain.
 fn largest_request(law: &ControlLaw, apart: f64, error: f64) -> f64 {
     let (to_modes, ring) = match &law.notch {
         None => (1.0, 1.0),
@@ -305,9 +304,9 @@ fn largest_request(law: &ControlLaw, apart: f64, error: f64) -> f64 {
     let modal = to_modes * apart;
     let lead = law.own_leads.iter().fold(law.lead, |most, lead| if *lead > most { *lead } else { most });
     let deflection = norm(&law.force_to_modes) * (LARGEST_GAIN * error + LARGEST);
-    // Environment, damping, and all that is measured or computed of the motion.
+    // Environment, damping, and all measured or computed terms of the motion.
     let load = norm(&law.wrench_to_legs) * (LARGEST_GAIN * (apart + 2.0 * LARGEST) + LARGEST) + lead * apart;
-    // A change of mode is bumpless by an offset as large as the request.
+    // The offset of a bumpless change of mode is as large as the request.
     let damping = law.damping.as_ref().map_or(0.0, |sections| modal * resounds(sections));
     let correction = law.correction.as_ref().map_or(0.0, |limits| to_modes * (limits[0].most + limits[3].most));
     let request = 2.0 * (apart + load + norm(&law.modes_to_legs) * (deflection + damping + correction + 2.0));
@@ -325,7 +324,7 @@ fn norm(matrix: &Matrix6) -> f64 {
         .fold(1.0, |most: f64, sum: f64| if sum > most { sum } else { most })
 }
 
-/// By how much the notch, or what it remembers, may exceed its input: two poles of radius √a₂ ring for 1/(1 − √a₂)² ticks at most.
+/// Largest ratio of output or state of the notch to its input: two poles of radius √a₂ sum up to at most 1/(1 − √a₂)².
 fn ring(notch: &Notch) -> f64 {
     notch.sections.iter().fold(1.0, |most: f64, section| {
         let fades = 1.0 - libm::sqrt(section.a[1].abs());

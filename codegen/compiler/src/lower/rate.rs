@@ -4,7 +4,7 @@ use crate::ir::{LEGS, Lead, RateModel, Scalar};
 use specgen_identify::everett::EverettTable;
 use specgen_language::model::{Model, RateDependence};
 
-/// The inverse is found when it misses the demand by less than this share of a converter code.
+/// Tolerance of the inverse, as a share of a converter code.
 const SHARE_OF_CODE: f64 = 0.125;
 
 /// Distinct lists of nodes, E(i, j) for i = 0..=N, j = 0..=i, and that of each leg; values times `factor`.
@@ -60,8 +60,8 @@ pub(super) fn lower(
     }
 }
 
-/// The dead time less half a period: a voltage that is held stands for the middle of its tick. Bounded by what the legs move
-/// within it at the amplifier's slew rate: a jump of the demand is not led any further.
+/// The dead time less half a period, because a held voltage corresponds to the middle of its tick. Bounded by the motion of the legs
+/// within it at the amplifier's slew rate, so that jumps of the demand are not extrapolated further.
 pub(super) fn lead(model: &Model, scalar: Scalar) -> Option<Lead> {
     let lead = model.hysteresis.dead_time - 0.5 * model.timing.period;
     (lead > 0.0).then(|| Lead {

@@ -1,4 +1,4 @@
-//! Gauges of the platform to the constants of `specgen_runtime::sensing`, with what could make them useless found first.
+//! Lowers the gauges of the platform to the constants of `specgen_runtime::sensing`, after checking that they are usable.
 
 mod calibration;
 mod layout;
@@ -17,17 +17,17 @@ use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen_language::model::{Model, TaskSpace};
 use specgen_numerics::Kernels as _;
 
-/// More passes than this mean that the pose does not converge.
+/// Most passes. More mean that the pose does not converge.
 const MOST_PASSES: u32 = 12;
-/// What the pose of a reading at the end of the gauges' range may miss that reading by, over the range: beyond the declared
-/// workspace the pose need not be exact, but it must make sense.
+/// Largest error of the pose for readings at the ends of the gauges' range, as a share of the range: beyond the declared workspace
+/// the pose need not be exact, but it must be plausible.
 const SOUND_AT_RANGE: f64 = 1e-3;
 
 /// The constants of the gauges.
 ///
 /// # Errors
-/// A gauge that misses the platform, gauges that leave a motion unseen, a range that does not hold the workspace, a calibration that
-/// cannot be inverted, a workspace too large.
+/// A gauge that misses the platform, gauges that do not measure every motion, a range smaller than the workspace, a calibration
+/// that cannot be inverted, a workspace too large.
 pub(super) fn lower(model: &Model, task: &TaskSpace, scalar: Scalar) -> Result<Sensing, Vec<Diagnostic>> {
     let layout = layout::check(model, &task.probes)?;
     let mut findings = range_holds_workspace(model, &layout);
@@ -59,7 +59,7 @@ pub(super) fn lower(model: &Model, task: &TaskSpace, scalar: Scalar) -> Result<S
     })
 }
 
-/// How many passes and terms the workspace takes.
+/// Number of passes and terms for the workspace.
 struct Solution {
     passes: u32,
     remainder: [f64; 2],
@@ -68,7 +68,7 @@ struct Solution {
 }
 
 impl Solution {
-    /// Counted in f64 at 3⁶ poses on the faces of the workspace, and tried at the ends of the gauges' range.
+    /// Counts them in f64 at 3⁶ poses on the faces of the workspace, and checks the ends of the gauges' range.
     fn of(model: &Model, layout: &Layout, scalar: Scalar) -> Result<Self, Vec<Diagnostic>> {
         let bounds = model.workspace.bounds();
         let tolerance = tolerance(bounds, scalar);
@@ -94,7 +94,7 @@ impl Solution {
             model,
             codes::GAUGES_DIVERGE,
             "workspace.rotation",
-            format!("the pose cannot be found from the gauges in {MOST_PASSES} passes over the declared workspace and sensor.range"),
+            format!("over the declared workspace and sensor.range, the pose does not converge from the readings within {MOST_PASSES} passes"),
             "the equations of the gauges are solved for small motions: reduce workspace.rotation and workspace.translation, or sensor.range"
                 .to_owned(),
         )])
@@ -108,7 +108,7 @@ fn largest_error(gauges: &Gauges<f64>, series: &Series<f64>, bounds: [f64; 6]) -
         let found = f64::pose(gauges, &f64::readings(gauges, series, &pose));
         for ((largest, found), exact) in largest.iter_mut().zip(&found).zip(&pose) {
             let error = (found - exact).abs();
-            // A NaN is infinitely wrong.
+            // NaN counts as an infinite error.
             let error = if error.is_nan() { f64::INFINITY } else { error };
             if error > *largest {
                 *largest = error;
@@ -118,7 +118,7 @@ fn largest_error(gauges: &Gauges<f64>, series: &Series<f64>, bounds: [f64; 6]) -
     largest
 }
 
-/// Whether the pose of every combination of readings at the ends of `range` gives these readings back.
+/// Whether the pose for every combination of readings at the ends of `range` reproduces these readings.
 fn sound_at_range(gauges: &Gauges<f64>, range: [f64; 2]) -> bool {
     let span = range[1] - range[0];
     (0..64_u32).all(|corner| {
@@ -137,12 +137,12 @@ fn sound_at_range(gauges: &Gauges<f64>, range: [f64; 2]) -> bool {
     })
 }
 
-/// Coefficients in x² of asin x / x and atan x / x after the leading 1, for angles up to `largest`: what is left out is below a
+/// Coefficients in x² of asin x / x and atan x / x after the leading 1, for angles up to `largest`: the remainder is below a
 /// quarter of the last bit.
 fn arcs(largest: f64, scalar: Scalar) -> (Vec<f64>, Vec<f64>) {
     let limit = scalar.epsilon() / 4.0;
     let (mut arc_sine, mut arc_tangent) = (Vec::new(), Vec::new());
-    // The terms of the arc sine fall by less than x² each, so those left out sum to less than the first over 1 − x².
+    // Each term of the arc sine is less than x² times the one before, so the remainder is less than its first term over 1 − x².
     let square = libm::pow(libm::sin(largest), 2.0);
     let (mut binomial, mut power) = (1.0, 1.0);
     for k in 1..200_u32 {
@@ -169,7 +169,7 @@ fn arcs(largest: f64, scalar: Scalar) -> (Vec<f64>, Vec<f64>) {
     (arc_sine, arc_tangent)
 }
 
-/// Largest magnitude of each axis alone that the gauges read, m and rad; none without gauges that see the platform.
+/// Largest magnitude of each axis alone that the gauges can read, m and rad; none without gauges on the platform.
 pub(crate) fn seen(model: &Model) -> Option<[f64; 6]> {
     let layout = layout::check(model, &model.task_space.as_ref()?.probes).ok()?;
     Some(core::array::from_fn(|axis| seen_along(model, &layout, axis)))
@@ -185,8 +185,8 @@ fn seen_along(model: &Model, layout: &Layout, axis: usize) -> f64 {
     ends.fold(f64::INFINITY, |least, end| if end < least { end } else { least })
 }
 
-/// A pose that is accepted must be one that the gauges can read: each axis by itself, up to its bound. Where that way lies
-/// below the reach of every leg, as all poses below rest do, it need not be read.
+/// Checks that the gauges can read each axis alone up to its bound. Directions out of reach of every leg, as all poses below rest,
+/// are skipped.
 fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
     const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
     let [low, high] = model.sensor.range;
@@ -209,7 +209,7 @@ fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
     let Some((_, axis, k, reading)) = worst else { return Vec::new() };
     let (name, unit, scale) = if axis < 3 { ("translation", "µm", 1e6) } else { ("rotation", "mrad", 1e3) };
     let most = libm::floor(seen_along(model, layout, axis) * scale * 1e4) / 1e4;
-    // An axis that no gauge sees on one side of rest has no bound to propose.
+    // If the range ends at rest on one side, there is no bound to suggest.
     let less = if most > 0.0 {
         format!("at most {most} {unit} on this axis (workspace.{name}[{}]), or ", axis % 3)
     } else {
@@ -220,19 +220,19 @@ fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
         codes::GAUGE_RANGE,
         "sensor.range",
         format!(
-            "within the declared workspace, {} of ±{:.4} {unit} alone takes gauge {k} to {} µm, beyond its range of {} µm to {} µm",
+            "within the declared workspace, {} of ±{:.4} {unit} alone moves gauge {k} to {} µm, beyond its range of {} µm to {} µm",
             AXES[axis],
             model.workspace.bounds()[axis] * scale,
             fixed(reading * 1e6, 3),
             fixed(low * 1e6, 3),
             fixed(high * 1e6, 3)
         ),
-        format!("{less}gauges whose range takes in {} µm; check the unit of sensor.range", fixed(reading * 1e6, 3)),
+        format!("{less}gauges whose range includes {} µm; check the unit of sensor.range", fixed(reading * 1e6, 3)),
     )]
 }
 
 fn finding(model: &Model, code: Code, key: &str, message: String, help: String) -> Diagnostic {
-    // A key of a gauge that takes its default has no place of its own; its table may have one.
+    // A key with its default value has no place in the spec; its table may have one.
     let table = key.split('.').next().unwrap_or(key);
     let span = model.spans.get(key).or_else(|| model.spans.get(table));
     let place = span.cloned().map_or(Place::Whole, Place::Spec);

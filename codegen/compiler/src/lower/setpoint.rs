@@ -1,4 +1,4 @@
-//! Set-points: limits, user frames and trajectories to the constants of `specgen_runtime::setpoint`, each checked against the
+//! Lowers limits, user frames and trajectories to the constants of `specgen_runtime::setpoint`, each checked against the
 //! workspace and the limits that the spec declares.
 
 mod check;
@@ -32,7 +32,7 @@ const LONGEST: f64 = 4_194_304.0;
 /// Largest sum of the workspace's angles for which the angles of a turned frame are computed: every one of them is then within
 /// π/4 of zero.
 const TURNED: f64 = core::f64::consts::PI / 14.0;
-/// What a user's angle may exceed that sum by.
+/// Factor by which a user's angle may exceed that sum.
 const TURNED_MARGIN: f64 = 1.1;
 
 /// The constants of the set-point generator, and warnings. `waveforms` holds the table of each trajectory that is one.
@@ -67,7 +67,7 @@ pub fn lower(
             }
             (kind, _) => match paper::formula(kind) {
                 Some((pieces, frequency)) => segments::lower(model, task, &user, index, pieces, frequency),
-                // Whoever reads the file reports that it cannot be read.
+                // Reading the file has reported the error.
                 None => continue,
             },
         };
@@ -111,7 +111,7 @@ pub fn lower(
     ))
 }
 
-/// The user's frames, and the workspace that is seen through them.
+/// The user's frames and the workspace in them.
 pub(super) struct User {
     frames: Frames,
     /// Pose that user set-points are added to: the spec's bias and the offset of the work frame, m and rad.
@@ -147,20 +147,20 @@ impl User {
         let mut home = [0.0; 6];
         for (axis, offset) in [ox, oy, oz].into_iter().enumerate() {
             bias[axis] += offset;
-            // Wᵀ (−offset); 0 without one, not −0.
+            // Wᵀ (−offset); 0 instead of −0 without an offset.
             home[axis] = 0.0 - (axes[0][axis] * ox + axes[1][axis] * oy + axes[2][axis] * oz);
         }
         Ok(Self { frames, bias, home, bound: model.workspace.bounds() })
     }
 
-    /// Rate of the platform's pose at rest when the user's axis moves at a rate of 1.
+    /// Rate of the platform's pose at rest for unit rate of the user's axis.
     fn column(&self, axis: usize) -> [f64; 6] {
         let mut user = Target::new();
         user.rate[axis] = 1.0;
         self.platform(&user).map_or([0.0; 6], |platform| platform.rate)
     }
 
-    /// The platform's set-point of a user's, without the bias; none if an angle is beyond what is meant.
+    /// The platform's set-point for a user's, without the bias; none if an angle is out of range.
     fn platform(&self, user: &Target<f64>) -> Option<Target<f64>> {
         match self.frames {
             Frames::Parallel => Some(*user),
@@ -190,7 +190,7 @@ impl User {
         (excess(worst) > 1.0).then(|| (worst, pose[worst]))
     }
 
-    /// Bias and work zero must be places where the platform can be.
+    /// Checks that bias and work zero are within the workspace.
     fn check_zero(&self, model: &Model, task: &TaskSpace) -> Vec<Diagnostic> {
         let places = [
             ("control.setpoint.bias", "the bias pose", self.home, "reduce the bias, or widen the workspace"),
@@ -198,7 +198,7 @@ impl User {
                 "control.frames.work",
                 "the zero of the work frame",
                 [0.0; 6],
-                "the offset moves the zero of set-points away from the bias pose: keep it within the travel, or leave it at 0",
+                "the offset moves the zero of set-points away from the bias pose: keep it within the travel, or set it to 0",
             ),
         ];
         let offset = task.frames.work[..3] != [0.0; 3];
@@ -209,7 +209,7 @@ impl User {
             }
             if let Some((axis, value)) = self.outside(user) {
                 let message = format!(
-                    "{what} puts {} at {}, outside the workspace of ±{}",
+                    "{what} has {} = {}, outside the workspace of ±{}",
                     AXES[axis],
                     amount(axis, value),
                     amount(axis, self.bound[axis])
@@ -226,12 +226,16 @@ fn too_wide(model: &Model, found: f64, largest: f64) -> Diagnostic {
         &model.spans,
         &["control.frames"],
         codes::FRAMES_TOO_WIDE,
-        format!("the workspace turns by up to {:.1} mrad; user frames are for {:.1} mrad", found * 1e3, largest * 1e3),
+        format!(
+            "the rotations of the workspace add up to {:.1} mrad, but user frames allow at most {:.1} mrad",
+            found * 1e3,
+            largest * 1e3
+        ),
         "reduce workspace.rotation, or leave control.frames out".to_owned(),
     )
 }
 
-/// A move from end to end of the workspace must come to its end.
+/// Checks that a move from end to end of the workspace does not take too many ticks.
 fn too_slow(model: &Model, user: &User, limits: &MoveLimits<f64>) -> Option<Diagnostic> {
     let [tx, ty, tz, rx, ry, rz] = user.bound;
     let point = match user.frames {
@@ -242,7 +246,7 @@ fn too_slow(model: &Model, user: &User, limits: &MoveLimits<f64>) -> Option<Diag
     let way = match user.frames {
         Frames::Parallel => user.bound.map(|bound| 2.0 * bound),
         _ => {
-            // A user's axis may point anywhere, and a turn moves P_C about the tool point.
+            // A user's axis may have any direction, and a rotation moves P_C about the tool point.
             let reach = tx + ty + tz + angle * (point[0].abs() + point[1].abs() + point[2].abs());
             [2.0 * reach, 2.0 * reach, 2.0 * reach, 2.0 * angle, 2.0 * angle, 2.0 * angle]
         }

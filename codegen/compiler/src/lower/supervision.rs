@@ -1,4 +1,4 @@
-//! The supervisor: times to ticks and samples, bounds to SI, and what cannot work.
+//! Lowers the supervisor: times to ticks and samples, bounds to SI; refuses values that cannot work.
 
 pub(crate) mod defaults;
 mod rest;
@@ -18,17 +18,17 @@ use specgen_language::model::{FaultAction, Model};
 use specgen_numerics::multiply6;
 use specgen_runtime::supervisor::{self, Reaction, WRONG};
 
-/// Gauges are looked at in turn.
+/// Gauges are checked in turn, one per tick.
 const CHANNELS: f64 = 6.0;
-/// Samples that a fault of a gauge takes at least.
+/// Fewest samples for a fault of a gauge.
 const FEWEST_SAMPLES: f64 = 2.0;
-/// Times the noise (rms) that a bound must keep off: what noise alone does once in 10^15 samples.
+/// Least bound over the rms noise: noise alone exceeds it once in 10^15 samples.
 const NOISE_MARGIN: f64 = 8.0;
 /// Largest `supervisor.tracking_error` that a spec may declare.
 const LARGEST_SHARE: f64 = 10.0;
-/// Fewest steps of the converter by which a sound gauge must have moved.
+/// Fewest steps of the converter by which a working gauge must move.
 const FEWEST_STEPS: f64 = 2.0;
-/// Reading of each gauge per leg displacement where each leg has its own.
+/// Reading of each gauge per leg displacement if each leg has its own gauge.
 const OWN_GAUGES: [[f64; 6]; 6] = {
     let mut rows = [[0.0; 6]; 6];
     let mut leg = 0;
@@ -41,10 +41,10 @@ const OWN_GAUGES: [[f64; 6]; 6] = {
 /// Missed ticks are counted over this time, s.
 const MISSED_WINDOW: f64 = 1.0;
 
-/// Every constant of the supervisor, for a platform or legs whose modes ring for `rings` (s) at most, as a time constant.
+/// Every constant of the supervisor. `rings`: longest decay time constant of the modes of platform or legs, s.
 ///
 /// # Errors
-/// A time that is shorter than it can be seen, a bound below the noise, a ramp faster than the slew rate.
+/// A time too short to detect anything, a bound below the noise, a ramp faster than the slew rate.
 pub(super) fn lower(
     model: &Model,
     hysteresis: &Hysteresis,
@@ -135,7 +135,7 @@ impl Times<'_> {
         self.counted(key, given, otherwise, CHANNELS, FEWEST_SAMPLES)
     }
 
-    /// Ticks after which a host is lost, and those with the event of it after which it is gone.
+    /// Ticks of silence after which the machine holds, and further ones after which it ramps down.
     fn host_lost(&mut self) -> [u32; 2] {
         let given = self.model.supervisor.host_lost;
         let [hold, down] = given.unwrap_or(defaults::HOST_LOST);
@@ -153,11 +153,11 @@ impl Times<'_> {
                     codes::SUPERVISOR_TIME,
                     "host_lost",
                     format!(
-                        "a host is to be lost after {hold:.6} ms, at least a period, and the machine to ramp down after {down:.6} ms; \
-                         before that it holds"
+                        "the machine would hold after {hold:.6} ms without a host and ramp down after {down:.6} ms: the first must be at least a \
+                         period, the second longer"
                     ),
                     format!(
-                        "leave host_lost out: it is then [\"{} ms\", \"{} ms\"]; it must be at least [\"{least_hold:.6} ms\", \"{least_down:.6} ms\"]",
+                        "leave host_lost out: the default is [\"{} ms\", \"{} ms\"]; it must be at least [\"{least_hold:.6} ms\", \"{least_down:.6} ms\"]",
                         figure(defaults::HOST_LOST[0] * 1e3),
                         figure(defaults::HOST_LOST[1] * 1e3)
                     ),
@@ -167,8 +167,8 @@ impl Times<'_> {
         [hold_ticks, (down_ticks - hold_ticks).saturating_add(1)]
     }
 
-    /// How often something that is looked at every `every` ticks is seen in that time; a time that is given must let it be
-    /// seen `fewest` times.
+    /// Number of checks within a time, with one check every `every` ticks. A time from the spec must allow at least
+    /// `fewest` checks.
     fn counted(&mut self, key: &str, given: Option<f64>, otherwise: f64, every: f64, fewest: f64) -> u32 {
         let between = every * self.model.timing.period;
         let least = fewest * between;
@@ -180,13 +180,13 @@ impl Times<'_> {
                 codes::SUPERVISOR_TIME,
                 key,
                 format!(
-                    "`supervisor.{key}` is {:.6} ms, but it takes {:.6} ms at a period of {:.6} ms to be seen",
+                    "`supervisor.{key}` is {:.6} ms, but detection takes {:.6} ms at a period of {:.6} ms",
                     time * 1e3,
                     least * 1e3,
                     self.model.timing.period * 1e3
                 ),
                 format!(
-                    "leave {key} out: it is then {} ms; it must be at least {:.6} ms, or shorten timing.period",
+                    "leave {key} out: the default is {} ms; it must be at least {:.6} ms, or shorten timing.period",
                     figure(otherwise.max(least) * 1e3),
                     least * 1e3
                 ),
@@ -212,7 +212,7 @@ fn gauge_bounds(model: &Model, findings: &mut Vec<Diagnostic>) -> (f64, f64) {
             codes::SUPERVISOR_BOUND,
             "stuck_motion",
             format!(
-                "`supervisor.stuck_motion` is {:.4} nm, but a step of the gauge's converter is {:.4} nm: a sound gauge may not show it",
+                "`supervisor.stuck_motion` is {:.4} nm, but a step of the gauge's converter is {:.4} nm: a working gauge may not resolve it",
                 stuck_motion * 1e9,
                 step * 1e9
             ),
@@ -227,7 +227,7 @@ fn gauge_bounds(model: &Model, findings: &mut Vec<Diagnostic>) -> (f64, f64) {
             codes::SUPERVISOR_BOUND,
             "disagreement",
             format!(
-                "a disagreement of {:.4} nm is below what the gauge's noise and converter make, {:.4} nm",
+                "a disagreement of {:.4} nm is less than the effect of the gauge's noise and converter, {:.4} nm",
                 disagreement * 1e9,
                 least * 1e9
             ),
@@ -259,7 +259,7 @@ fn tracking(model: &Model, noise: Option<&PoseNoise>, findings: &mut Vec<Diagnos
             codes::SUPERVISOR_BOUND,
             "tracking_error",
             format!(
-                "a tracking error of {share} of the range is below what the gauges' noise makes of one axis, {least:.6}"
+                "a tracking error of {share} of the range is less than the effect of the gauges' noise on one axis, {least:.6}"
             ),
             format!("write tracking_error = {:.6} or more; the default is 0.2", above(least)),
         ));
@@ -267,7 +267,7 @@ fn tracking(model: &Model, noise: Option<&PoseNoise>, findings: &mut Vec<Diagnos
     full.map(|full| share * full)
 }
 
-/// An axis, or a leg, of which noise alone makes more than any share of its range that may be declared.
+/// The finding about an axis, or a leg, whose noise alone exceeds the largest share of its range that may be declared.
 fn no_range(model: &Model, axis: usize, full: f64, noise: f64) -> Diagnostic {
     let share = model.supervisor.tracking_error;
     if model.task_space.is_none() {
@@ -275,14 +275,14 @@ fn no_range(model: &Model, axis: usize, full: f64, noise: f64) -> Diagnostic {
             &model.spans,
             &["sensor.noise", "sensor"],
             codes::SUPERVISOR_BOUND,
-            format!("the gauges' noise makes {:.4} um of a leg whose stroke is {:.4} um", noise * 1e6, full * 1e6),
+            format!("the gauges' noise amounts to {:.4} um at a leg whose stroke is {:.4} um", noise * 1e6, full * 1e6),
             format!("write noise = \"{:.4} nm\" or less", share * full / NOISE_MARGIN * 1e9 * 0.999),
         );
     }
     let (table, item, unit) =
         if axis < 3 { ("workspace.translation", axis, "um") } else { ("workspace.rotation", axis - 3, "urad") };
     let message = format!(
-        "the gauges' noise makes {:.4} {unit} of {}, whose range is {:.4} {unit}: no share of that is above it",
+        "the gauges' noise amounts to {:.4} {unit} of {}, whose range is only {:.4} {unit}",
         noise * 1e6,
         AXES[axis],
         full * 1e6
@@ -300,7 +300,7 @@ fn no_range(model: &Model, axis: usize, full: f64, noise: f64) -> Diagnostic {
     )
 }
 
-/// Codes of a step, and ticks from one to the next: no faster than asked.
+/// Codes of a step, and ticks between steps: not faster than requested.
 fn ramp(model: &Model, actuation: &Actuation, max_step: i32, findings: &mut Vec<Diagnostic>) -> (i32, u32) {
     let slew_rate = model.actuator.slew_rate;
     let rate = model.supervisor.ramp_rate.unwrap_or_else(|| defaults::ramp_rate(model));
@@ -311,7 +311,7 @@ fn ramp(model: &Model, actuation: &Actuation, max_step: i32, findings: &mut Vec<
             "ramp_rate",
             format!("voltages would ramp down at {} V/s, faster than actuator.slew_rate, {} V/s", rate, slew_rate),
             format!(
-                "leave ramp_rate out: it is then {} V/s; it must be at most {slew_rate} V/s",
+                "leave ramp_rate out: the default is {} V/s; it must be at most {slew_rate} V/s",
                 figure(defaults::ramp_rate(model))
             ),
         ));
@@ -326,14 +326,14 @@ fn ramp(model: &Model, actuation: &Actuation, max_step: i32, findings: &mut Vec<
     }
 }
 
-/// A little above, for a fix that is itself accepted when printed.
+/// A slightly larger value, so that the printed fix is itself accepted.
 fn above(value: f64) -> f64 {
     value * 1.001 + 1e-4
 }
 
-/// A count; what does not fit is as good as never.
+/// A count; the largest if it does not fit.
 fn whole(value: f64) -> u32 {
-    // Saturates, and a NaN gives 0.
+    // Saturates; NaN gives 0.
     value as u32
 }
 

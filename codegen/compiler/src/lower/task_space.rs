@@ -18,9 +18,9 @@ const IDENTITY: Matrix6 = {
     }
     matrix
 };
-/// Offset of a change of mode that is over, m: a hundredth of a converter step, far below what a gauge sees.
+/// Offset below which a change of mode is complete, m: a hundredth of a converter step, far below the resolution of a gauge.
 const TRANSFER_NEGLIGIBLE: f64 = 1e-11;
-/// Time in which a correction may go from nothing to its limit, s.
+/// Time in which a correction may go from zero to its limit, s.
 const CORRECTION_TIME: f64 = 1e-3;
 
 /// Constants of (7) and of the composition of P and F. `rest_force` are the leg forces at rest, N.
@@ -35,10 +35,10 @@ pub(super) fn law(
     let round = |value: f64| scalar.round(value);
     let round_all = |matrix: Matrix6| linear::with_alike(without_dust(matrix)).map(|row| row.map(round));
     let compliance = 1.0 / model.actuator.axial_stiffness;
-    // Lowering of the dynamics has refused a singular geometry.
+    // A singular geometry was refused when lowering the dynamics.
     let legs_to_pose = linear::inverse(&rest.jacobian).unwrap_or([[0.0; 6]; 6]);
     let wrench_to_legs = transpose6(&legs_to_pose).map(|row| row.map(|value| value * compliance));
-    // Without a notch the axes of the pose do as well as the modes: the run-to-run law is the same in all coordinates.
+    // Without a notch pose axes serve as modes: the run-to-run law is the same in all coordinates.
     let (to_modal, from_modal) =
         design.notch.as_ref().map_or((IDENTITY, IDENTITY), |notch| (notch.to_modal, notch.from_modal));
     let legs_to_modes = multiply6(&to_modal, &legs_to_pose);
@@ -84,14 +84,14 @@ pub(super) fn law(
     }
 }
 
-/// The lead (s) of each trajectory, that of the control, `usual`, where it has none of its own; nothing where none has.
+/// The lead (s) of each trajectory, by default that of the control, `usual`; empty if no trajectory has its own.
 fn own_leads(task: &model::TaskSpace, usual: f64) -> impl Iterator<Item = f64> {
     let any = task.trajectories.iter().any(|trajectory| trajectory.lead.is_some());
     let all = task.trajectories.iter().map(move |trajectory| trajectory.lead.unwrap_or(usual));
     all.take(if any { task.trajectories.len() } else { 0 })
 }
 
-/// The matrix with what rounding left of a zero made one: entries below 10⁻¹² of the largest in their column. A symmetric
+/// The matrix with rounding errors set to zero: entries below 10⁻¹² of the largest in their column. A symmetric
 /// platform has many, and a zero costs no instruction.
 fn without_dust(matrix: Matrix6) -> Matrix6 {
     let mut largest = [0.0; 6];
@@ -111,7 +111,7 @@ fn without_dust(matrix: Matrix6) -> Matrix6 {
     })
 }
 
-/// What six blocked legs can exert: a sensor that reads more is wrong. N and N m about P_C.
+/// Largest wrench of six blocked legs, N and N m about P_C: a sensor that reads more is faulty.
 fn largest_wrench(model: &Model) -> [f64; 6] {
     let force = LEGS as f64 * model.actuator.axial_stiffness * model.actuator.stroke;
     let radius = model.geometry.platform_joints.iter().fold(0.0, |most: f64, joint| {
@@ -121,7 +121,7 @@ fn largest_wrench(model: &Model) -> [f64; 6] {
     [force, force, force, force * radius, force * radius, force * radius]
 }
 
-/// Config at start-up.
+/// The `Config` at start-up.
 pub(super) fn defaults(model: &Model, task: &model::TaskSpace, scalar: Scalar, design: &Design) -> PlatformDefaults {
     let round = |value: f64| scalar.round(value);
     let gains = |tuning: &design::Tuning| Gains {

@@ -1,10 +1,10 @@
-//! Digital lines: what the spec leaves out, and times in ticks.
+//! Lowers triggers: default values, and times in ticks.
 
 use crate::ir::{Line, Scalar};
 use specgen_language::model::{Model, TaskSpace, Trigger, TriggerDirection, TriggerKind};
 use specgen_runtime::trigger::{Direction, Kind, LONGEST, MOST_STEPS};
 
-/// A hysteresis that the noise of the pose does not pass, in rms of that.
+/// Default hysteresis, in rms noise of the pose.
 pub const QUIET: f64 = 10.0;
 
 /// Largest position and smallest step that any line may have: m and rad.
@@ -14,7 +14,7 @@ pub fn extent(bounds: &[f64; 6]) -> [f64; 2] {
     [most, 2.0 * most / f64::from(MOST_STEPS)]
 }
 
-/// How far the pose has to go from a position before that counts again, m or rad: as the spec says, or by `noise` of each axis.
+/// Distance from a position at which it is armed again, m or rad: from the spec, or by the `noise` of each axis.
 #[must_use]
 pub fn hysteresis(trigger: &Trigger, noise: &[f64; 6]) -> f64 {
     trigger.hysteresis.unwrap_or(QUIET * noise[trigger.axis])
@@ -56,7 +56,7 @@ pub(super) fn lower(model: &Model, task: &TaskSpace, noise: &[f64; 6], scalar: S
     task.triggers.iter().filter_map(line).collect()
 }
 
-/// What an output line shows; none of the input.
+/// Kind of an output line; none for an input.
 fn kind(kind: TriggerKind) -> Option<Kind> {
     Some(match kind {
         TriggerKind::Position => Kind::Position,

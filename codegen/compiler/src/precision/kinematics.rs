@@ -1,4 +1,4 @@
-//! Leg displacements of a pose.
+//! Rounding errors of leg displacements.
 
 use specgen_numerics::{Double, Kernels, TracedNumber, trace};
 use specgen_runtime::{Legs, Real, Series};
@@ -9,10 +9,10 @@ use specgen_language::model::{Geometry, Model};
 
 /// Terms of sine and versine: below 2⁻¹⁰⁶ of the first up to 0.5 rad.
 const TERMS: u32 = 14;
-/// Newton steps to 106 bits from anywhere.
+/// Newton steps for 106 bits from any start.
 const STEPS: usize = 8;
 
-/// The legs without any rounding that matters.
+/// The legs without relevant rounding.
 pub(super) struct Exact {
     rest_leg: [[Double; 3]; 6],
     platform_joint: [[Double; 3]; 6],
@@ -105,19 +105,19 @@ impl FromReal<Self> for f64 {
     }
 }
 
-/// A constant of the controller, with what it leaves out of what it stands for.
+/// A constant of the controller with its rounding error.
 pub(super) fn kept<const SINGLE: bool>(kept: f64, exact: Double) -> TracedNumber<SINGLE> {
     TracedNumber::constant(kept, [(Double::from(kept) - exact).value(); 2])
 }
 
-/// A series cut after the terms that are kept. What is left out, at arguments of which the square is at most `square`, counts
-/// as an error of its last coefficient: terms get smaller, so it lies between nothing and their first over 1 − `square`.
+/// A truncated series. The remainder, for arguments whose square is at most `square`, counts as an error of the last coefficient:
+/// terms decrease, so it is between zero and the first omitted term over 1 − `square`.
 pub(super) fn cut<const SINGLE: bool>(
     coefficients: &[f64],
     exact: &[Double],
     square: f64,
 ) -> Vec<TracedNumber<SINGLE>> {
-    // Without any term that of the first is zero.
+    // Without any terms, that of the first is zero.
     let last = if coefficients.is_empty() { 0 } else { coefficients.len() - 1 };
     (0..=last)
         .map(|k| {
@@ -130,7 +130,7 @@ pub(super) fn cut<const SINGLE: bool>(
         .collect()
 }
 
-/// The legs in numbers that remember their rounding.
+/// The legs in numbers that record their rounding.
 pub(super) struct TracedLegs<const SINGLE: bool> {
     sine: Vec<TracedNumber<SINGLE>>,
     versine: Vec<TracedNumber<SINGLE>>,
@@ -144,7 +144,7 @@ impl<const SINGLE: bool> TracedLegs<SINGLE> {
         Self {
             sine: cut(&constants.sine, &exact.sine, square),
             versine: cut(&constants.versine, &exact.versine, square),
-            // Over powers of two: exact.
+            // Divided by powers of two, so exact.
             root: constants.root.iter().map(|c| TracedNumber::constant(*c, [0.0; 2])).collect(),
         }
     }
@@ -154,7 +154,7 @@ impl<const SINGLE: bool> TracedLegs<SINGLE> {
     }
 }
 
-/// Errors of the legs, and of the pose that they make.
+/// Errors of the legs, and of the resulting pose.
 pub(super) fn figures(model: &Model, constants: &Kinematics, scalar: Scalar, poses: &[[f64; 6]]) -> (Figures, Figures) {
     let exact = Exact::of(&model.geometry);
     let single = scalar == Scalar::F32;
@@ -183,7 +183,7 @@ pub(super) fn figures(model: &Model, constants: &Kinematics, scalar: Scalar, pos
     (legs, whole)
 }
 
-/// No leg displacement in the workspace is off by more, and no pose that the legs make.
+/// Proven bounds over the workspace of the errors of leg displacements, and of the resulting pose.
 fn bound<const SINGLE: bool>(
     model: &Model,
     constants: &Kinematics,
@@ -226,8 +226,8 @@ where
     (of_legs, of_pose)
 }
 
-/// What the series of the root and Newton's steps leave of a displacement, m. Of u = s/(2 l) = Δ + Δ²/(2 l) the series leaves less than
-/// twice its last term times τ and the geometric sum of what follows; a step leaves its square over 2 (l + Δ).
+/// Remainder of a displacement after the series of the root and Newton steps, m. For u = s/(2 l) = Δ + Δ²/(2 l) that of the series is less than
+/// twice its last term times τ and the geometric sum of the omitted terms; a step leaves its square over 2 (l + Δ).
 fn left_by_root(constants: &Kinematics, displacement: f64, length: f64) -> f64 {
     let twice = 2.0 * (length - displacement);
     let way = displacement + displacement * displacement / (2.0 * length);

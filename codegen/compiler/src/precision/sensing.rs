@@ -1,4 +1,4 @@
-//! The pose from the gauges.
+//! Rounding errors of the pose computed from the readings.
 
 use specgen_numerics::{Double, Kernels, Trace, TracedNumber, cross, magnitude, trace};
 use specgen_runtime::{Gauges, Real};
@@ -10,17 +10,17 @@ use crate::lower;
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, TaskSpace};
 
-/// Passes to 106 bits: each leaves a part of the error as small as the angle.
+/// Passes for 106 bits: each multiplies the error by about the angle.
 const PASSES: usize = 40;
 /// Terms of arc sine and arc tangent: enough for 0.5 rad.
 const TERMS: u32 = 70;
-/// Doublings of the digits of an inverse.
+/// Newton steps for an inverse; each doubles the number of digits.
 const REFINEMENTS: u32 = 3;
 
 type Vectors = [[Double; 3]; 6];
 type Matrix = [[Double; 6]; 6];
 
-/// The gauges without any rounding that matters. What the layout says, in doubles, counts as exact.
+/// The gauges without relevant rounding. The layout in doubles counts as exact.
 struct Exact {
     direction: Vectors,
     normal: Vectors,
@@ -125,7 +125,7 @@ where
     T::pose(&gauges, &readings.map(of)).map(f64::from_real)
 }
 
-/// Errors of the pose that is computed from the readings that `poses` make.
+/// Errors of the pose computed from the readings at `poses`.
 pub(super) fn figures(
     model: &Model,
     task: &TaskSpace,
@@ -158,7 +158,7 @@ pub(super) fn figures(
     Ok(figures)
 }
 
-/// No pose in the workspace is off by more.
+/// Proven bound of the errors over the workspace.
 fn bound<const SINGLE: bool>(
     model: &Model,
     kinematics: &Kinematics,
@@ -178,7 +178,7 @@ where
             let gauges = gauges.gauges();
             let series = TracedLegs::of(kinematics, legs, largest);
             let pose = core::array::from_fn(|axis| TracedNumber::coordinate(axis, corner[axis][0], corner[axis][1]));
-            // Readings are given numbers, of which it only counts where they lie.
+            // Readings are inputs without error; only their ranges matter.
             let readings = TracedNumber::readings(&gauges, &series.series(), &pose).map(TracedNumber::given);
             let guess = gauges.guess(&readings);
             let start = start(&gauges, &readings, &guess);
@@ -189,11 +189,10 @@ where
     bound
 }
 
-/// The first guess of the turn, which the fixed point of the passes is known to lie near.
+/// The first guess of the rotation, with a bound of its distance from the fixed point of the passes.
 ///
-/// All passes from the fixed point would leave it where it is: what finitely many leave is what they carry of the distance
-/// between the two. With ψ₁ one pass from ψ₀, and passes that contract by κ about there, ψ∞ − ψ₀ is off ψ₁ − ψ₀ by
-/// κ/(1 − κ) of that at most.
+/// The error after finitely many passes is the remainder of that distance. With ψ₁ one pass from ψ₀, and passes that contract by
+/// κ around there, ψ∞ − ψ₀ differs from ψ₁ − ψ₀ by at most κ/(1 − κ) of it.
 fn start<const SINGLE: bool>(
     gauges: &Gauges<'_, TracedNumber<SINGLE>>,
     readings: &[TracedNumber<SINGLE>; 6],
@@ -204,13 +203,13 @@ where
 {
     let psi = [guess[3], guess[4], guess[5]];
     let next = TracedNumber::next_turn(gauges, readings, guess, &psi);
-    // As it would be without rounding.
+    // The step without rounding.
     let step: [TracedNumber<SINGLE>; 3] = core::array::from_fn(|k| (next[k] - psi[k]).given());
     let longest = step.iter().fold(0.0, |a: f64, step| if step.magnitude() > a { step.magnitude() } else { a });
-    // Where all passes lie if κ is below a half.
+    // The range of all passes if κ is below a half.
     let around = psi.map(|psi| psi.widened(2.0 * longest).given());
     let after = TracedNumber::next_turn(gauges, readings, guess, &around);
-    // The constants of the controller contract as those without rounding do, but for their last bits.
+    // The controller's constants contract like the exact ones, except for their last bits.
     let contraction = 1.001
         * Trace::peek(|record| {
             after.iter().fold(0.0, |largest: f64, row| {
@@ -221,12 +220,12 @@ where
     let more = if contraction < 0.5 { longest * contraction / (1.0 - contraction) } else { f64::INFINITY };
     core::array::from_fn(|k| {
         let [low, high] = step[k].range();
-        // The fixed point is the guess plus the step: the guess is off by the opposite.
+        // The fixed point is the guess plus the step, so the error of the guess is its negative.
         psi[k].off_by([-high - more, more - low])
     })
 }
 
-/// Constants of the controller that remember what they leave out.
+/// Constants of the controller with their rounding and truncation errors.
 struct Constants<const SINGLE: bool> {
     direction: [[TracedNumber<SINGLE>; 3]; 6],
     normal: [[TracedNumber<SINGLE>; 3]; 6],

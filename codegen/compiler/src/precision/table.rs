@@ -1,4 +1,4 @@
-//! Rounding errors as rows: what `check` prints and the report shows.
+//! Rounding errors as rows, for `check` and the report.
 
 use std::fmt::Write as _;
 
@@ -8,19 +8,19 @@ use crate::ir::Scalar;
 /// One axis, nm or nrad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Which pose: that of the legs, or that of the gauges.
+    /// The commanded or the measured pose.
     pub what: &'static str,
     /// x to θz.
     pub axis: &'static str,
     /// nm or nrad.
     pub unit: &'static str,
-    /// None in the workspace is larger.
+    /// Proven bound over the workspace.
     pub bound: f64,
-    /// Largest found against 106 bits.
+    /// Largest sampled difference from 106 bits.
     pub sampled: f64,
-    /// Bound over largest found; none where nothing was found.
+    /// Bound over largest sample; none if all samples are exact.
     pub ratio: Option<f64>,
-    /// Largest found against doubles; none where the controller computes in doubles.
+    /// Largest sampled difference from doubles; none if the controller computes in doubles.
     pub against_f64: Option<f64>,
 }
 
@@ -43,8 +43,8 @@ pub fn rows(precision: &Precision) -> Vec<Row> {
             })
             .collect::<Vec<_>>()
     };
-    let mut rows = of("pose asked for", &precision.commanded);
-    rows.extend(precision.measured.iter().flat_map(|figures| of("pose measured", figures)));
+    let mut rows = of("commanded pose", &precision.commanded);
+    rows.extend(precision.measured.iter().flat_map(|figures| of("measured pose", figures)));
     rows
 }
 
@@ -56,10 +56,10 @@ pub fn describe(precision: &Precision, scalar: Scalar) -> String {
     let single = precision.commanded.against_f64.is_some();
     let _ = writeln!(
         text,
-        "  rounding of f{} over the workspace: no error is above the bound by analysis; largest found at {} poses against 106 bits{}",
+        "  rounding of f{} over the workspace: proven bound, and largest of {} poses compared with 106 bits{}",
         scalar.bits(),
         SAMPLES + 64,
-        if single { ", and against f64" } else { "" }
+        if single { " and with f64" } else { "" }
     );
     let _ = writeln!(
         text,

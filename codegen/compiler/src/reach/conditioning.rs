@@ -21,16 +21,16 @@ pub struct Conditioning {
     /// Within this motion of the joints beyond the workspace there is no singular pose, m: a lower estimate, of
     /// first order in the motion.
     pub free_of_singularities: f64,
-        /// Upper bound of the condition number over the declared workspace, to second order in the motion; `f64::MAX` if there is
-        /// none.
+    /// Upper bound of the condition number over the declared workspace, to second order in the motion; `f64::MAX` if there is
+    /// none.
     pub worst_bound: f64,
     /// Smallest and largest σ at rest.
     pub at_rest_values: [f64; 2],
 }
 
 impl Conditioning {
-        /// Adds the bound over the whole box: from the largest motion of any joint, and the rate of change of the singular values as
-        /// in `free_of_singularities`.
+    /// Adds the bound over the whole box: from the largest motion of any joint, and the rate of change of the singular values as
+    /// in `free_of_singularities`.
     pub(super) fn bounded(mut self, bounds: &Pose, shortest_leg: f64, joint_radius: f64) -> Self {
         let turn = bounds[3] + bounds[4] + bounds[5];
         let motion = libm::sqrt(bounds[0] * bounds[0] + bounds[1] * bounds[1] + bounds[2] * bounds[2])

@@ -1,46 +1,46 @@
-//! Why an output folder could not be written.
+//! Errors of writing an output folder.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use specgen_language::outcome::Failure;
 
-/// Why an output folder could not be written.
+/// Error of writing an output folder.
 #[derive(Debug)]
 pub enum WriteError {
     /// The folder holds files that specgen did not write, or that were changed since. Nothing was changed.
     Occupied {
         /// The folder.
         dir: PathBuf,
-        /// Up to a few of the files, relative to it; a folder that is foreign as a whole ends in `/`.
+        /// A few of the files, relative to it; a path of a folder that specgen never wrote to ends in `/`.
         files: Vec<String>,
     },
     /// Something other than a folder has that name. Nothing was changed.
     NotAFolder {
-        /// What was named as the output folder.
+        /// The output path.
         dir: PathBuf,
     },
-    /// Another run writes to it or builds in it. Nothing was changed.
+    /// Another run is writing to the folder or building in it. Nothing was changed.
     Busy {
         /// The folder.
         dir: PathBuf,
-        /// That run: its process and command.
+        /// Process and command of that run.
         owner: String,
     },
-    /// The file system said no. Nothing was changed.
+    /// An I/O error. Nothing was changed.
     Io {
-        /// What was attempted.
+        /// The attempted action.
         action: String,
-        /// Its answer.
+        /// Its error.
         source: io::Error,
     },
-    /// The file system said no, and again when what had been done was to be undone.
+    /// An I/O error, and another one while undoing the changes.
     HalfWritten {
         /// The folder.
         dir: PathBuf,
-        /// What was attempted.
+        /// The attempted action.
         action: String,
-        /// Its answer.
+        /// Its error.
         source: io::Error,
     },
 }
@@ -56,7 +56,7 @@ impl std::fmt::Display for WriteError {
         match self {
             Self::Occupied { dir, files } => write!(
                 f,
-                "output folder `{}` holds files that specgen did not write or that were changed since: {}; \
+                "output folder `{}` contains files that specgen did not write or that were changed since: {}; \
                  nothing was written. Name another folder with -o, or move them away",
                 dir.display(),
                 files.join(", ")
@@ -69,7 +69,7 @@ impl std::fmt::Display for WriteError {
             Self::Busy { dir, owner } => write!(
                 f,
                 "output folder `{}` is in use by {owner}; nothing was written. \
-                 Run again when that has ended, or name another folder with -o",
+                 Run again when it has finished, or name another folder with -o",
                 dir.display()
             ),
             Self::Io { action, source } => write!(
@@ -78,7 +78,7 @@ impl std::fmt::Display for WriteError {
             ),
             Self::HalfWritten { dir, action, source } => write!(
                 f,
-                "could not {action}: {source}, nor put back what was there before: `{}` holds files of two versions. \
+                "could not {action}: {source}; restoring the previous files failed, too: `{}` contains files of two versions. \
                  Run again when that is fixed, or name another folder with -o",
                 dir.display()
             ),

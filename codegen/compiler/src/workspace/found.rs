@@ -1,7 +1,7 @@
-//! What lies in an output folder, and whose it is.
+//! Contents of an output folder: files of specgen, of cargo, and of the user.
 //!
 //! The manifest (`.specgen`) lists every file with its SHA-256, so that a later run can distinguish its own output from the user's
-//! work. While files are replaced one by one it has a line for the old and one for the new state of each.
+//! work. While files are replaced one by one, it has a line for the old and one for the new version of each.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -13,12 +13,12 @@ use specgen_toolchain::sha256;
 
 /// Name of the manifest in the output folder.
 pub(super) const MANIFEST: &str = ".specgen";
-/// The work folder where it cannot stand beside the output.
+/// The work folder if it has to be inside the output.
 pub(super) const WORK: &str = ".specgen-work";
-/// As many files that specgen did not write as a message names.
+/// Most foreign files that a message names.
 const NAMED: usize = 5;
 
-/// Files and their digests, of which a file may have two.
+/// Files and their digests; a file may have two.
 #[derive(Debug, Default)]
 pub(super) struct Manifest(BTreeMap<String, BTreeSet<String>>);
 
@@ -28,11 +28,11 @@ impl Manifest {
         Self(digests.collect())
     }
 
-    /// The one in `dir`; empty if there is none.
+    /// The manifest in `dir`; empty if there is none.
     pub fn read(dir: &Path) -> Self {
         let mut manifest = Self::default();
         for line in fs::read_to_string(dir.join(MANIFEST)).unwrap_or_default().lines() {
-            // A path that leads out of the folder is not ours.
+            // Ignore paths that lead out of the folder.
             if let Some((digest, path)) = line.split_once("  ")
                 && Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
             {
@@ -46,7 +46,7 @@ impl Manifest {
         self.0.is_empty()
     }
 
-    /// Adds the digests of another one.
+    /// Adds the digests of another manifest.
     pub fn add(&mut self, other: &Self) {
         for (path, digests) in &other.0 {
             self.0.entry(path.clone()).or_default().extend(digests.iter().cloned());
@@ -64,14 +64,14 @@ impl Manifest {
         self.0.keys().any(|recorded| recorded.starts_with(&prefix))
     }
 
-    /// Whether cargo made this in a workspace of ours: what it builds, and a lock file beside a manifest of ours.
+    /// Whether cargo made this in one of our workspaces: its target folder, or a lock file next to one of our manifests.
     pub fn is_cargos(&self, path: &str) -> bool {
         let (folder, name) = path.rsplit_once('/').map_or(("", path), |(folder, name)| (folder, name));
         let package = if folder.is_empty() { "Cargo.toml".to_owned() } else { format!("{folder}/Cargo.toml") };
         name == "target" || (name == "Cargo.lock" && self.0.contains_key(&package))
     }
 
-    /// Whether `root/path` is as it was written. Lock files that specgen wrote are its own even where cargo changed them since.
+    /// Whether `root/path` is unchanged since specgen wrote it. Lock files may have been changed by cargo.
     pub fn is_ours(&self, root: &Path, path: &str, kind: fs::FileType) -> bool {
         if !kind.is_file() {
             return false;
@@ -85,7 +85,7 @@ impl Manifest {
     }
 }
 
-/// What lies in the folder `below` of `root`, as path relative to `root` and kind, sorted.
+/// Entries of the folder `below` of `root`, as path relative to `root` and kind, sorted.
 pub(super) fn entries(root: &Path, below: &str) -> io::Result<Vec<(String, fs::FileType)>> {
     let mut out = Vec::new();
     for entry in fs::read_dir(root.join(below))? {
@@ -135,13 +135,13 @@ impl FolderContents<'_> {
             if self.manifest.is_ours(root, &path, kind) {
                 self.ours.insert(path);
             } else if self.manifest.is_cargos(&path) || path == WORK {
-                // Never ours, never in the way.
+                // Neither ours nor foreign.
             } else if !kind.is_dir() {
                 self.foreign.push(path);
             } else if self.manifest.enters(&path) {
                 self.walk(root, &path)?;
             } else if self.holds_anything(root, &path)? {
-                // Into a folder that no earlier run wrote to there is no need to look: it may be a whole disk.
+                // Do not descend into a folder that no earlier run wrote to: it may be a whole disk.
                 self.foreign.push(format!("{path}/"));
             }
         }

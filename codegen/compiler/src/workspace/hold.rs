@@ -1,4 +1,4 @@
-//! One run at a time in an output folder: its work folder, with a lock that ends with the process, however that ends.
+//! Exclusive use of an output folder: its work folder with a lock that is released when the process ends, for any reason.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -9,9 +9,9 @@ use super::error::WriteError;
 use specgen_language::interrupt::{self, Guard, ResultFolders};
 use specgen_language::lock;
 
-/// The lock in the work folder; its text names the owner.
+/// The lock file in the work folder. It contains the name of the owner.
 const LOCK: &str = "lock";
-/// A run that only writes is over by then; one that builds is not waited for.
+/// Time to wait for another run: a run that only writes has finished by then.
 const TIMEOUT: Duration = Duration::from_secs(5);
 const ROUND: Duration = Duration::from_millis(20);
 
@@ -20,13 +20,13 @@ const ROUND: Duration = Duration::from_millis(20);
 pub struct Hold {
     work: PathBuf,
     _file: File,
-    // An interrupt removes it with the process.
+    // An interrupt also removes it.
     _lock: Guard,
     _made: ResultFolders,
 }
 
 impl Hold {
-    /// Makes `work`, the work folder of `dir`, or takes the one of a run that was killed.
+    /// Creates `work`, the work folder of `dir`, or takes over that of a killed run.
     pub(super) fn take(work: &Path, dir: &Path) -> Result<Self, WriteError> {
         let start = Instant::now();
         loop {
@@ -49,7 +49,7 @@ impl Hold {
         let path = work.join(LOCK);
         let (mut file, lock) = Guard::file(|| lock::make(&path), |_| path.clone())?;
         let owner = format!("process {} (`{}`)\n", std::process::id(), command());
-        // A lock without a name locks all the same.
+        // The lock works without a name, too.
         let _ = file.set_len(0).and_then(|()| file.write_all(owner.as_bytes()));
         Ok(Self { work: work.to_owned(), _file: file, _lock: lock, _made: made })
     }
@@ -58,21 +58,21 @@ impl Hold {
 impl Drop for Hold {
     fn drop(&mut self) {
         let _whole = interrupt::whole();
-        // Before the lock ends: whoever waits for it sees that it is no more the one in the folder.
+        // Before the lock is released, so that a waiting run sees that the file is no longer the one in the folder.
         let _ = fs::remove_file(self.work.join(LOCK));
-        // One that still holds something is taken up by the next run.
+        // The next run takes over a folder that is not empty.
         let _ = fs::remove_dir(&self.work);
     }
 }
 
-/// What lies in a work folder comes into the output: it has to be this user's.
+/// Checks that the work folder belongs to this user: its contents are moved into the output.
 fn check_own(work: &Path) -> io::Result<()> {
     let found = fs::symlink_metadata(work)?;
     let refused = |kind, what: &str| Err(io::Error::new(kind, format!("`{}` is {what}", work.display())));
     match (found.is_dir(), lock::is_own(&found)) {
         (true, true) => Ok(()),
-        (false, _) => refused(io::ErrorKind::NotADirectory, "no folder, but specgen works there"),
-        (true, false) => refused(io::ErrorKind::PermissionDenied, "another user's"),
+        (false, _) => refused(io::ErrorKind::NotADirectory, "not a folder, but specgen needs it as its work folder"),
+        (true, false) => refused(io::ErrorKind::PermissionDenied, "owned by another user"),
     }
 }
 

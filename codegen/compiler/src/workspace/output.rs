@@ -1,9 +1,8 @@
-//! The output folder: written whole or not at all, whatever ends the process.
+//! Writes the output folder completely or not at all, even if the process is killed.
 //!
-//! Every file is first written into a work folder beside the output, then the two folders change places in one step. What the
-//! old one holds beside our files (cargo's `target`) is carried over. Where folders cannot be swapped, such as a mount point,
-//! files are replaced one by one, with a manifest that knows both versions: what a killed run leaves there, the next one
-//! recognises as its own.
+//! Every file is first written into a work folder beside the output, then the two folders are swapped atomically. Other contents of
+//! the old folder (cargo's `target`) are carried over. If the folders cannot be swapped, for example at a mount point, files are
+//! replaced one by one with a manifest that lists both versions, so that the next run recognises the files of a killed one.
 
 mod replace;
 
@@ -18,16 +17,16 @@ use super::hold::Hold;
 use specgen_language::files::sync;
 use specgen_language::interrupt;
 
-/// In the work folder: what is to be the output; after the swap, what was.
+/// In the work folder: the new output; after the swap, the old one.
 const NEW: &str = "new";
 /// In the work folder: files that were replaced one by one.
 const OLD: &str = "old";
-/// In the work folder: a manifest on its way.
+/// In the work folder: the next manifest.
 const NEXT_MANIFEST: &str = "manifest";
 
-/// Writes the workspace into `dir`, which must not exist, be empty, or hold nothing but an unchanged earlier output
-/// (its `target` folders stay). A failure leaves everything as it was. No other run writes or builds there until what is
-/// returned is dropped.
+/// Writes the workspace into `dir`, which must not exist, be empty, or contain only an unchanged earlier output (its `target`
+/// folders are kept). A failure leaves everything unchanged. No other run writes or builds there until the returned value is
+/// dropped.
 ///
 /// # Errors
 /// See [`WriteError`].
@@ -35,22 +34,22 @@ pub fn write(dir: &Path, files: &BTreeMap<String, String>) -> Result<Hold, Write
     let place = Place::of(dir)?;
     let hold = Hold::take(&place.work, dir)?;
     let _whole = interrupt::whole();
-    take_up(&place).map_err(|e| WriteError::io("take up what a killed run left in", &place.work, e))?;
+    take_up(&place).map_err(|e| WriteError::io("recover the files of a killed run in", &place.work, e))?;
     let earlier = Manifest::read(dir);
     let known = check_free(dir, &earlier)?;
     check_writable(dir, &known)?;
     let change = Change { dir, work: &place.work, files, earlier: &earlier, known: &known };
     let done = stage(&place.work, files).and_then(|()| put(&place, &change));
     if done.is_err() {
-        // Nothing but new files: a swap does not fail half-way.
+        // Only new files: a swap is atomic.
         let _ = fs::remove_dir_all(place.work.join(NEW));
     }
-    // Not by `map`: that would drop `hold`, which waits for `_whole`, before it.
+    // Not with `map`: that would drop `hold`, which waits for `_whole`, first.
     done?;
     Ok(hold)
 }
 
-/// Writes the files into a folder of the process's own, which goes with it: nothing is looked for there, nothing kept.
+/// Writes the files into a temporary folder of this process without checking or keeping its contents.
 ///
 /// # Errors
 /// See [`WriteError`].
@@ -58,11 +57,11 @@ pub fn write_scratch(dir: &Path, files: &BTreeMap<String, String>) -> Result<(),
     files.iter().try_for_each(|(path, text)| write_file(&dir.join(path), text))
 }
 
-/// Where the output is and where the work is done.
+/// Paths of the output and of the work folder.
 struct Place {
     dir: PathBuf,
     work: PathBuf,
-    /// The folder may be another one afterwards: it is no mount point, and nobody in it would lose the ground.
+    /// Whether the folder may be replaced: it is not a mount point, and not the current directory of this process.
     may_swap: bool,
 }
 
@@ -81,26 +80,26 @@ impl Place {
             _ => None,
         };
         let here = std::env::current_dir().and_then(fs::canonicalize);
-        let stands_in = here.is_ok_and(|here| here.starts_with(&dir));
+        let is_inside = here.is_ok_and(|here| here.starts_with(&dir));
         Ok(match beside {
-            // A run with other rights was killed there: it is to be taken up.
-            Some(work) if !inside.exists() => Self { may_swap: !stands_in && system::is_mine(&dir), dir, work },
+            // If the other exists, a run with other rights was killed there, and it must be recovered.
+            Some(work) if !inside.exists() => Self { may_swap: !is_inside && system::is_mine(&dir), dir, work },
             _ => Self { dir, work: inside, may_swap: false },
         })
     }
 }
 
-/// What is to be done to an output.
+/// A change of an output.
 struct Change<'a> {
     dir: &'a Path,
     work: &'a Path,
     files: &'a BTreeMap<String, String>,
-    /// What the earlier output consists of, and what of that is there.
+    /// The manifest of the earlier output, and which of its files exist.
     earlier: &'a Manifest,
     known: &'a BTreeSet<String>,
 }
 
-/// All new files, safe on the disk; the manifest last, as the sign that they are whole.
+/// Writes and syncs all new files; the manifest last, as a sign that they are complete.
 fn stage(work: &Path, files: &BTreeMap<String, String>) -> Result<(), WriteError> {
     let new = work.join(NEW);
     write_scratch(&new, files)?;
@@ -109,13 +108,13 @@ fn stage(work: &Path, files: &BTreeMap<String, String>) -> Result<(), WriteError
         .map_err(|error| WriteError::io("write", &new, error))
 }
 
-/// Puts a manifest into `folder`, in one step and safe on the disk.
+/// Writes a manifest into `folder`, atomically and synced.
 fn put_manifest(work: &Path, manifest: &Manifest, folder: &Path) -> io::Result<()> {
     let beside = work.join(NEXT_MANIFEST);
     fs::write(&beside, manifest.text())?;
     let moved = sync(&beside).and_then(|()| fs::rename(&beside, folder.join(MANIFEST)));
     if moved.is_err() {
-        // Nothing stays of what could not be done.
+        // Clean up after the failure.
         let _ = fs::remove_file(&beside);
     }
     moved?;
@@ -129,25 +128,25 @@ fn put(place: &Place, change: &Change<'_>) -> Result<(), WriteError> {
         let _ = place.dir.parent().map(sync);
         return Ok(());
     }
-    // Without a manifest the earlier one could not be distinguished, after a kill, from files that are not yet all there.
+    // Without a manifest, the earlier output could not be distinguished from incomplete files after a kill.
     if place.may_swap && !change.earlier.is_empty() && swap(&new, &place.dir).is_ok() {
-        // The output is whole; what cannot be carried over now, the next run takes up.
+        // The output is complete; the next run carries over what could not be moved now.
         let _ = carry_over(&new, &place.dir);
         return Ok(());
     }
     replace::one_by_one(change)
 }
 
-/// Both folders change places, in one step.
+/// Swaps both folders atomically.
 fn swap(new: &Path, dir: &Path) -> io::Result<()> {
     fs::set_permissions(new, fs::metadata(dir)?.permissions())?;
     system::exchange(new, dir)?;
-    // A power failure before this finds one of the two, as one after it does.
+    // A power failure before or after this leaves one of the two.
     let _ = dir.parent().map(sync);
     Ok(())
 }
 
-/// What a run that was killed left in the work folder.
+/// Recovers what a killed run left in the work folder.
 fn take_up(place: &Place) -> io::Result<()> {
     let is_left = |left: &Path| fs::symlink_metadata(left).is_ok();
     let [new, old, manifest] = [NEW, OLD, NEXT_MANIFEST].map(|name| place.work.join(name));
@@ -161,11 +160,10 @@ fn take_up(place: &Place) -> io::Result<()> {
     if is_left(&manifest) { fs::remove_file(manifest) } else { Ok(()) }
 }
 
-/// Removes an output that another one has taken the place of, or that was never whole. What is not of specgen's making is moved
-/// into `dir`.
+/// Removes an output that was replaced or never complete. Files that specgen did not make are moved into `dir`.
 fn carry_over(left: &Path, dir: &Path) -> io::Result<()> {
     let manifest = Manifest::read(left);
-    // Without a manifest it was never whole: nobody else has put anything there.
+    // Without a manifest it was never complete, so that nobody else has put anything there.
     if !manifest.is_empty() {
         carry_folder(left, "", dir, &manifest)?;
     }
@@ -186,14 +184,14 @@ fn carry_folder(left: &Path, below: &str, dir: &Path, manifest: &Manifest) -> io
             }
             fs::rename(left.join(&path), &to)?;
         } else if !manifest.is_cargos(&path) {
-            let text = format!("`{}` and `{}` are both there; keep one", left.join(&path).display(), to.display());
+            let text = format!("`{}` and `{}` both exist; keep one", left.join(&path).display(), to.display());
             return Err(io::Error::new(io::ErrorKind::AlreadyExists, text));
         }
     }
     Ok(())
 }
 
-/// A folder that its owner has closed stays as it is.
+/// Refuses folders without write permission.
 fn check_writable(dir: &Path, known: &BTreeSet<String>) -> Result<(), WriteError> {
     let folders: BTreeSet<PathBuf> =
         known.iter().filter_map(|path| dir.join(path).parent().map(Path::to_owned)).collect();
@@ -217,7 +215,7 @@ fn sync_tree(root: &Path) -> io::Result<()> {
     sync(root)
 }
 
-/// What only the system knows.
+/// System calls.
 #[cfg(target_os = "linux")]
 mod system {
     use std::io;

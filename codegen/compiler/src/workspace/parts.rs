@@ -1,5 +1,5 @@
-//! The folders that are copied into a workspace, each with what it needs beside it. The build script lists their files: a new
-//! file is in by being there, and so is a new board; another new folder is one more entry of `PARTS` and one more line of the script.
+//! The folders that are copied into a workspace, with their dependencies. The build script finds their files and all boards. Another
+//! new folder needs an entry in `PARTS` and a line in the script.
 
 use std::collections::BTreeSet;
 
@@ -10,13 +10,13 @@ use specgen_language::model;
 pub struct Part {
     /// Its name, in `firmware/` and in the workspace.
     pub folder: &'static str,
-    /// A member of the workspace; else it is built for itself, because of its target or of its dependencies.
+    /// Whether it is a member of the workspace; others are built separately because of their target or dependencies.
     pub member: bool,
-    /// What it is, for the README.
+    /// Description for the README.
     pub what: &'static str,
-    /// What building it takes, for the README.
+    /// Requirements of a build, for the README.
     pub needs: &'static str,
-    /// Folders that it depends on, beside `controller`, `law` and `runtime`.
+    /// Folders that it depends on, except `controller`, `law` and `runtime`.
     pub with: &'static [&'static str],
 }
 
@@ -34,7 +34,7 @@ mod files {
 }
 pub use files::{HOST_SIM, UNIT};
 
-/// Every folder there is, but for boards.
+/// All folders except boards.
 const PARTS: [Part; 11] = [
     Part {
         folder: "law",
@@ -75,28 +75,28 @@ const PARTS: [Part; 11] = [
     Part {
         folder: "board",
         member: false,
-        what: "what all boards have in common: one tick on real converters, the messages of the link",
+        what: "code shared by all boards: one tick on real converters, the messages of the link",
         needs: "packages of `hal` and `link`",
         with: &["hal", "link"],
     },
     Part {
         folder: "stm32",
         member: false,
-        what: "what the STM32 boards have in common",
+        what: "code shared by the STM32 boards",
         needs: "packages of `hal` and `link`, `cortex-m`, `cortex-m-rt`, `stm32-metapac`",
         with: &["board", "hal", "link"],
     },
     Part {
         folder: "tick",
         member: false,
-        what: "a board's tick between stand-ins for its converters, on an emulated Cortex-M: what its time is estimated from",
+        what: "a board's tick with simulated converters on an emulated Cortex-M, to estimate its time",
         needs: "target `thumbv7em-none-eabihf`, QEMU, Rust 1.88, packages of `hal` and `link`",
         with: &["board", "hal", "link", "qemu", "stm32"],
     },
     Part {
         folder: "rt",
         member: false,
-        what: "what a control loop needs of Linux: clock, rights, book of late ticks, shared memory",
+        what: "what a control loop needs from Linux: clock, privileges, log of late ticks, shared memory",
         needs: "Linux, package `libc`",
         with: &[],
     },
@@ -120,7 +120,7 @@ const fn of_board(board: &model::Part) -> Part {
     }
 }
 
-/// Every folder there is: boards behind what they have in common.
+/// All folders: boards after the folders that they share.
 #[must_use]
 pub fn all() -> Vec<Part> {
     let (before, behind) = PARTS.split_at(PARTS.iter().take_while(|part| part.folder != "tick").count());
@@ -135,7 +135,7 @@ pub const ALWAYS: &[&str] = &["law", "runtime", "host", "qemu"];
 pub fn select(targets: &[&str]) -> Vec<Part> {
     let mut parts = all();
     let mut wanted: BTreeSet<&str> = ALWAYS.iter().chain(targets).copied().collect();
-    // What is added may depend on more; a folder is added once, so this ends.
+    // Added folders may have dependencies; each folder is added once, so this ends.
     loop {
         let needed =
             parts.iter().filter(|part| wanted.contains(part.folder)).flat_map(|part| part.with.iter().copied());

@@ -1,4 +1,4 @@
-//! `src/gauges.rs` of six legs: what the codes of the gauges' converters mean, and what is believed.
+//! `src/gauges.rs` of six legs: the codes of the gauges' converters, and the ranges of valid readings.
 
 use proc_macro2::TokenStream;
 use quote::quote;

@@ -1,5 +1,5 @@
-//! `src/gauges.rs` of a platform: constants of the gauges that see it. Reads [`ir::Sensing`](crate::ir::Sensing); the law's
-//! `sensing.rs` works with them.
+//! `src/gauges.rs` of a platform: constants of its gauges. Reads [`ir::Sensing`](crate::ir::Sensing); used by the law's
+//! `sensing.rs`.
 
 use proc_macro2::TokenStream;
 use quote::quote;

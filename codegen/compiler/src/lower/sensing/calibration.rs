@@ -1,19 +1,18 @@
-//! Calibration polynomials: which raw words they may be given.
+//! Calibration polynomials: the range of raw words for which they are valid.
 
 use super::finding;
 use crate::ir::Scalar;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
 
-/// The search for the ends of the range steps by this part of the first guess.
+/// Steps of the search for an end of the range, per first guess.
 const STEPS: u32 = 4096;
-/// How far beyond where the slope at rest would put the ends they are looked for.
+/// Extent of the search, in first guesses by the slope at rest.
 const REACH: f64 = 4.0;
 
-/// Raw words that mean a reading within `sensor.range`, per gauge: metres, or volts if there is a calibration.
+/// Raw words for readings within `sensor.range`, per gauge: metres, or volts if there is a calibration.
 ///
-/// A polynomial is used only on the interval about rest where it rises (or falls) all the way across the range: beyond, two raw
-/// words would mean the same reading.
+/// A polynomial must be monotonic across the range. It is used only there: beyond, two raw words may have the same reading.
 pub(super) fn raw_limits(model: &Model, calibration: Option<&[Vec<f64>; 6]>) -> Result<[[f64; 2]; 6], Vec<Diagnostic>> {
     let range = model.sensor.range;
     let Some(of_gauge) = calibration else {
@@ -29,11 +28,11 @@ pub(super) fn raw_limits(model: &Model, calibration: Option<&[Vec<f64>; 6]>) -> 
                 codes::CALIBRATION_AMBIGUOUS,
                 &format!("gauge[{k}].calibration"),
                 format!(
-                    "the calibration of gauge {k} does not rise or fall all the way across sensor.range, {:.3} µm to {:.3} µm",
+                    "the calibration of gauge {k} is not monotonic across sensor.range, {:.3} µm to {:.3} µm",
                     range[0] * 1e6,
                     range[1] * 1e6
                 ),
-                "check the units and signs of the coefficients, lowest power first, or narrow sensor.range to where the calibration holds"
+                "check the units and signs of the coefficients, lowest power first, or narrow sensor.range to where the calibration is monotonic"
                     .to_owned(),
             )),
         }
@@ -41,7 +40,7 @@ pub(super) fn raw_limits(model: &Model, calibration: Option<&[Vec<f64>; 6]>) -> 
     if findings.is_empty() { Ok(limits) } else { Err(findings) }
 }
 
-/// Coefficients of one length, rounded; what is missing is zero.
+/// Rounded coefficients, padded with zeros to one length.
 pub(super) fn padded(of_gauge: &[Vec<f64>; 6], scalar: Scalar) -> [Vec<f64>; 6] {
     let longest = of_gauge.iter().fold(1, |longest, c| if c.len() > longest { c.len() } else { longest });
     of_gauge.clone().map(|mut coefficients| {
@@ -59,15 +58,15 @@ fn slope(coefficients: &[f64], raw: f64) -> f64 {
     powers.fold(0.0, |sum, (power, c)| power as f64 * c + raw * sum)
 }
 
-/// Raw words at the two ends of `range`, in rising order; none unless the polynomial is monotone between them.
+/// Raw words at the two ends of `range`, in ascending order; none unless the polynomial is monotonic between them.
 fn invert(coefficients: &[f64], [low, high]: [f64; 2]) -> Option<[f64; 2]> {
     let linear = *coefficients.get(1)?;
     let span = high - low;
-    // A gauge that needs a raw word that no converter yields is as good as one without a slope.
+    // So small a slope would need raw words beyond those of any converter.
     if linear.abs() * 1e9 <= span {
         return None;
     }
-    // Rest reads zero: start from the raw word of the reading zero, found from the origin by Newton's method.
+    // The reading at rest is zero: find its raw word from the origin by Newton's method, and start there.
     let mut rest = 0.0;
     for _ in 0..50 {
         rest -= value(coefficients, rest) / slope(coefficients, rest);
@@ -98,7 +97,7 @@ fn invert(coefficients: &[f64], [low, high]: [f64; 2]) -> Option<[f64; 2]> {
     Some([end(-1.0)?, end(1.0)?])
 }
 
-/// Where the polynomial, monotone between `a` and `b`, takes the value `target`.
+/// Argument at which the polynomial, monotonic between `a` and `b`, has the value `target`.
 fn bisect(coefficients: &[f64], target: f64, mut a: f64, mut b: f64) -> f64 {
     let rising = value(coefficients, b) > value(coefficients, a);
     for _ in 0..100 {

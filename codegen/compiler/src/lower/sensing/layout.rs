@@ -1,4 +1,4 @@
-//! Where the gauges look, and whether six of them fix the pose.
+//! Layout of the gauges, and whether the six determine the pose.
 
 use nalgebra::Matrix6;
 use specgen_runtime::Gauges;
@@ -9,12 +9,12 @@ use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Model, Probe};
 use specgen_numerics::multiply6;
 
-/// A line that meets its plane this many joint radii away from P_C cannot meet the platform.
+/// Largest distance from P_C at which a line may meet its plane, in joint radii.
 const FARTHEST: f64 = 10.0;
-/// Largest ratio of the best seen motion to the worst seen one, turns counted by the way they move the targets.
+/// Largest ratio of the best to the worst measured motion, with rotations as motion of the targets.
 const WORST_CONDITION: f64 = 100.0;
 
-/// Gauges as the runtime's equations see them, in f64, and J.
+/// Gauges as in the runtime's equations, in f64, and J.
 pub(super) struct Layout {
     pub(super) direction: [[f64; 3]; 6],
     pub(super) normal: [[f64; 3]; 6],
@@ -27,7 +27,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// The runtime's view of it, one pass.
+    /// The gauges for the runtime, with one pass.
     pub(super) fn gauges<'a>(&self, (arc_sine, arc_tangent): &'a (Vec<f64>, Vec<f64>)) -> Gauges<'a, f64> {
         Gauges {
             direction: self.direction,
@@ -43,7 +43,7 @@ impl Layout {
     }
 }
 
-/// The layout, if every line meets its plane and no motion goes unseen.
+/// The layout, if every line meets its plane and the gauges measure every motion.
 pub(super) fn check(model: &Model, probes: &[Probe; 6]) -> Result<Layout, Vec<Diagnostic>> {
     let mut findings = Vec::new();
     let mut direction = [[0.0; 3]; 6];
@@ -105,7 +105,7 @@ fn target(model: &Model, k: usize, probe: &Probe) -> Result<Target, Vec<Diagnost
     let way = dot(m, [0, 1, 2].map(|j| probe.plane_point[j] - start[j])) / across;
     let c = [0, 1, 2].map(|j| start[j] + way * n[j]);
     let radius = model.geometry.joint_radius();
-    // A line along its plane was refused in the spec; here it would pierce at infinity.
+    // The checks of the spec refuse a line parallel to its plane, which would meet it at infinity.
     let far = norm(c);
     if far.is_nan() || far > FARTHEST * radius {
         return Err(vec![finding(
@@ -113,11 +113,11 @@ fn target(model: &Model, k: usize, probe: &Probe) -> Result<Target, Vec<Diagnost
             codes::PROBE_MISSES,
             &format!("gauge[{k}].point"),
             format!(
-                "the line of gauge {k} meets its target plane {:.1} mm from the middle of a platform whose joints are {:.1} mm from it",
+                "the line of gauge {k} meets its target plane {:.1} mm from P_C, but the platform's joints are {:.1} mm from it",
                 far * 1e3,
                 radius * 1e3
             ),
-            "check `point`, `direction` ({B}) and `target_point`, `target_normal` ({P}, from P_C) of the gauge"
+            "check `point` and `direction` (in {B}), `target_point` and `target_normal` (in {P}, from P_C) of the gauge"
                 .to_owned(),
         )]);
     }
@@ -126,17 +126,17 @@ fn target(model: &Model, k: usize, probe: &Probe) -> Result<Target, Vec<Diagnost
     Ok((clean(n, 1.0), scaled, clean(cross(scaled, n), 1.0), clean(c, radius)))
 }
 
-/// Typical distance of the targets from P_C, m: what makes a turn comparable with a shift.
+/// Typical distance of the targets from P_C, m: the lever arm that makes rotations comparable with translations.
 fn lever(model: &Model, pierced: &[[f64; 3]; 6]) -> f64 {
     let mean = pierced.iter().fold(0.0, |sum, c| sum + dot(*c, *c)) / 6.0;
     let radius = model.geometry.joint_radius();
     if mean > 1e-6 * radius * radius { libm::sqrt(mean) } else { radius }
 }
 
-/// The motion that the gauges see worst, if they see it too badly: condition, and pose coordinates with the largest shift or turn
-/// by `lever` as 1.
+/// The worst measured motion, if the condition number is too large: condition number, and pose coordinates whose largest translation
+/// or rotation times `lever` is 1.
 fn blind_motion(jacobian: &Matrix, lever: f64) -> Option<(f64, [f64; 6])> {
-    // Decides, names a direction, and reaches no emitted number.
+    // Used only for this check: no emitted number depends on it.
     let scaled = Matrix6::from_fn(|i, j| if j < 3 { jacobian[i][j] } else { jacobian[i][j] / lever });
     let svd = scaled.svd(false, true);
     let (smallest, value) = svd.singular_values.argmin();
@@ -154,7 +154,7 @@ fn blind_motion(jacobian: &Matrix, lever: f64) -> Option<(f64, [f64; 6])> {
 }
 
 fn blind(model: &Model, (condition, motion): (f64, [f64; 6])) -> Diagnostic {
-    // A motion of 1 µm, parts below a thousandth left out.
+    // A motion of 1 µm without parts below a thousandth.
     let lever = motion[3..].iter().fold(1.0_f64, |a, b| if b.abs() > a { b.abs() } else { a });
     let parts: Vec<String> = motion
         .iter()
@@ -164,16 +164,16 @@ fn blind(model: &Model, (condition, motion): (f64, [f64; 6])) -> Diagnostic {
         .map(|(_, (part, (axis, unit)))| format!("{axis} {part:+.3} {unit}"))
         .collect();
     let how = if condition > 1e9 {
-        "cannot see the motion".to_owned()
+        "do not measure the motion".to_owned()
     } else {
-        format!("see {condition:.0} times less of one motion than of another:")
+        format!("measure one motion {condition:.0} times worse than another:")
     };
     finding(
         model,
         codes::GAUGES_BLIND,
         "gauge[0]",
         format!("the six gauges {how} {}", parts.join(", ")),
-        "six gauges fix a pose if, for instance, three look along one axis at the corners of a triangle, two along another side by side, and one along the third: move or turn one that should see this motion"
+        "six gauges determine a pose if, for instance, three measure along one axis at the corners of a triangle, two along another axis side by side, and one along the third: move or turn one that should measure this motion"
             .to_owned(),
     )
 }

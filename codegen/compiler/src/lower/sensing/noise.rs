@@ -1,4 +1,4 @@
-//! What the noise of the gauges does to the pose.
+//! Noise of the pose due to the gauges.
 
 use super::layout;
 use crate::lower::kinematics::leg_jacobian;
@@ -6,24 +6,24 @@ use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::Model;
 use specgen_numerics::{Matrix6, multiply6};
 
-/// Noise of one gauge reading and what it becomes, rms. Gauges are independent of each other, and the converter's error is spread
-/// evenly over its step.
+/// Noise of one gauge reading, of the pose and of the legs, rms. Gauges are independent of each other, and the converter's error is
+/// uniform over its step.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct PoseNoise {
-    /// Of a reading, quantisation included, m.
+    /// Noise of a reading, quantisation included, m.
     pub reading: f64,
-    /// Of that, the converter's: a step over √12, m.
+    /// The converter's share: a step over √12, m.
     pub quantisation: f64,
-    /// Of x, y, z (m) and θx, θy, θz (rad), by J⁻¹ of the gauges at rest.
+    /// Noise of x, y, z (m) and θx, θy, θz (rad), by J⁻¹ of the gauges at rest.
     pub pose: [f64; 6],
-    /// Of each leg displacement computed from the pose, m.
+    /// Noise of each leg displacement computed from the pose, m.
     pub leg: [f64; 6],
 }
 
-/// Reading of each gauge (rows) per pose coordinate (columns) at rest, m/m and m/rad; none without gauges that see the platform.
+/// Reading of each gauge (rows) per pose coordinate (columns) at rest, m/m and m/rad; none without gauges on the platform.
 ///
 /// # Errors
-/// Gauges that do not fix the pose.
+/// Gauges that do not determine the pose.
 pub fn readings_per_pose(model: &Model) -> Result<Option<[[f64; 6]; 6]>, Vec<Diagnostic>> {
     match &model.task_space {
         Some(task) => Ok(Some(layout::check(model, &task.probes)?.jacobian)),
@@ -31,10 +31,10 @@ pub fn readings_per_pose(model: &Model) -> Result<Option<[[f64; 6]; 6]>, Vec<Dia
     }
 }
 
-/// Pose coordinates (rows) per reading of each gauge (columns) at rest, m/m and rad/m; none without gauges that see the platform.
+/// Pose coordinates (rows) per reading of each gauge (columns) at rest, m/m and rad/m; none without gauges on the platform.
 ///
 /// # Errors
-/// Gauges that do not fix the pose.
+/// Gauges that do not determine the pose.
 pub fn poses_per_reading(model: &Model) -> Result<Option<Matrix6>, Vec<Diagnostic>> {
     match &model.task_space {
         Some(task) => Ok(Some(layout::check(model, &task.probes)?.inverse)),
@@ -52,7 +52,7 @@ pub fn reading_noise(model: &Model) -> [f64; 2] {
 /// Pose noise of a platform with gauges; none for one without.
 ///
 /// # Errors
-/// Gauges that do not fix the pose.
+/// Gauges that do not determine the pose.
 pub fn pose_noise(model: &Model) -> Result<Option<PoseNoise>, Vec<Diagnostic>> {
     let Some(task) = &model.task_space else {
         return Ok(None);

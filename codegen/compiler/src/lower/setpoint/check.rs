@@ -1,9 +1,9 @@
-//! What every trajectory must keep: the workspace, and the speed that a stream may have.
+//! Checks of every trajectory: the workspace, and the speed limit of streams.
 
 use super::{AXES, User, amount};
 use specgen_language::model::{Model, SetpointRules};
 
-/// Where and by how much a trajectory breaks a rule.
+/// Place and amount of a violation by a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Worst {
     /// s from the start.
@@ -15,7 +15,7 @@ pub(super) struct Worst {
     excess: f64,
 }
 
-/// Largest excesses over workspace and speed, as far as there are any.
+/// Largest violations of workspace and speed, if any.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Excesses {
     pub place: Option<Worst>,
@@ -23,7 +23,7 @@ pub(super) struct Excesses {
 }
 
 impl Excesses {
-    /// Looks at one tick: the user's pose (m, rad) and rate (per s).
+    /// Checks one tick: the user's pose (m, rad) and rate (per s).
     pub fn look(&mut self, user: &User, rules: &SetpointRules, time: f64, pose: [f64; 6], rate: [f64; 6]) {
         if let Some((axis, value)) = user.outside(pose) {
             let excess = value.abs() / user.bound[axis];
@@ -37,27 +37,27 @@ impl Excesses {
         }
     }
 
-    /// How the place can be fixed: numbers that are themselves accepted, as far as the workspace is concerned.
+    /// Fix of a violation of the workspace, with values that the workspace check accepts.
     pub fn fix_of_place(&self, user: &User) -> Option<String> {
         let Worst { axis, value, .. } = self.place?;
         let bound = user.bound[axis];
         let beyond = if value > 0.0 { value - bound } else { value + bound };
         let (table, item) = if axis < 3 { ("translation", axis) } else { ("rotation", axis - 3) };
         Some(format!(
-            "change control.setpoint.bias[{axis}] by {}, or widen workspace.{table}[{item}] to {}, as far as legs and gauges reach",
+            "change control.setpoint.bias[{axis}] by {}, or widen workspace.{table}[{item}] to {}, if legs and gauges reach that far",
             outwards(axis, -beyond),
             outwards(axis, value.abs())
         ))
     }
 
-    /// Speed that control.setpoint.stream_speed would have to permit on the worst axis, with its key.
+    /// Fix of a violation of speed: the control.setpoint.stream_speed that the worst axis needs.
     pub fn fix_of_speed(&self) -> Option<String> {
         let Worst { axis, value, .. } = self.speed?;
         Some(format!("raise control.setpoint.stream_speed[{axis}] to {}/s", outwards(axis, value.abs())))
     }
 
-    /// The frequency at which a path of the paper, whose speeds go with it, is within the speed; rounded down. Seen at
-    /// ticks of `period` (s), the largest speed may be missed by the cosine of half a tick's phase.
+    /// The frequency, rounded down, at which a path of the paper is within the speed limit: its speeds are proportional to it. Sampling
+    /// at ticks of `period` (s) may miss the largest speed by the cosine of half a tick's phase.
     pub fn fix_of_frequency(&self, frequency: f64, period: f64) -> Option<f64> {
         let missed = libm::cos(core::f64::consts::PI * frequency * period);
         let slower = frequency / self.speed?.excess * missed;
@@ -65,12 +65,12 @@ impl Excesses {
         Some(libm::floor(slower * scale) / scale)
     }
 
-    /// What is wrong with place and speed, in words.
+    /// Messages about place and speed.
     pub fn messages(&self, model: &Model, user: &User, rules: &SetpointRules) -> [Option<(Worst, String)>; 2] {
         let place = self.place.map(|worst| {
             let axis = worst.axis;
             let message = format!(
-                "it puts {} at {} after {:.6} s, outside the workspace of ±{}, the bias included",
+                "{} is {} after {:.6} s, outside the workspace of ±{}, which includes the bias",
                 AXES[axis],
                 amount(axis, worst.value),
                 worst.time,

@@ -1,8 +1,8 @@
-//! Where a table of poses turns at once: within it, at its start and end, and where one that repeats begins again.
+//! Corners of a table of poses: inside the table, at its start and end, and where a repeated one starts again.
 //!
-//! The bend of a row is its second difference, y₋ − 2 y + y₊; over the time of a row it is the change of speed there. A table that is
-//! played once rests before its first row and behind its last; the last row of one that repeats is followed by the first. A corner is a
-//! bend that stands out from those around it and lets the lowest mode ring by more than a gauge sees.
+//! The bend of a row is its second difference, y₋ − 2 y + y₊; over the time of a row it is the change of speed there. A table that
+//! runs once is at rest before its first row and after its last; the last row of a repeated table is followed by the first. A corner is
+//! a bend much larger than those around it that makes the lowest mode ring by more than the resolution of a gauge.
 
 use core::ops::Range;
 
@@ -13,29 +13,29 @@ use specgen_identify::waveform::Waveform;
 use specgen_language::diagnostic::{Diagnostic, Place, codes};
 use specgen_language::model::Model;
 
-/// A bend that is this many times those around it is a corner, a step so many times its neighbours' a jump.
+/// Least ratio of a corner's bend to those around it, and of a jump's step to those around it.
 const STANDS_OUT: f64 = 4.0;
-/// A step that is none, m and rad.
+/// Steps below these do not count, m and rad.
 const NO_STEP: [f64; 6] = [5e-9, 5e-9, 5e-9, 50e-9, 50e-9, 50e-9];
-/// Rows on either side that a bend is held against. Not the next one: a step from row to row bends both.
+/// Offsets of the rows that a bend is compared with. Not the adjacent ones: a step from row to row bends both.
 const AROUND: [isize; 4] = [-3, -2, 2, 3];
-/// Ringing that is none, m and rad.
+/// Ringing below these does not count, m and rad.
 const NO_RING: [f64; 6] = [10e-9, 10e-9, 10e-9, 100e-9, 100e-9, 100e-9];
-/// A radian weighs as much as the 0.1 m at which a leg feels it.
+/// A radian weighs as much as 0.1 m, its lever arm at a leg.
 const WEIGHTS: [f64; 6] = [1.0, 1.0, 1.0, 0.1, 0.1, 0.1];
 
-/// A bend of a row.
+/// The bend at a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Corner {
     row: usize,
     axis: usize,
     /// Change of the speed, m/s and rad/s.
     rate: f64,
-    /// How far the lowest mode rings at it, m and rad.
+    /// Ringing of the lowest mode due to it, m and rad.
     ring: f64,
 }
 
-/// A warning about the sharpest corner of a table, whose rows are `period` (s) apart; none where there is none.
+/// A warning about the sharpest corner of a table, whose rows are `period` (s) apart; none without corners.
 pub(super) fn warning(model: &Model, name: &str, waveform: &Waveform, period: f64, repeat: bool) -> Option<Diagnostic> {
     let platform = crate::lower::platform(model).ok()?;
     let basis = ModalBasis::of(&RestDynamics::of(&platform), model.actuator.axial_stiffness)?;
@@ -49,10 +49,10 @@ pub(super) fn warning(model: &Model, name: &str, waveform: &Waveform, period: f6
         let step = amount(axis, waveform.rows[0][axis] - waveform.rows[last][axis]);
         (
             format!(
-                "where it begins again: to the first row {} goes by {step}, and its speed changes by {speed}",
+                "where it starts again: {} steps by {step} to the first row, and its speed changes by {speed}",
                 AXES[axis]
             ),
-            "the platform rings at every repetition: give whole cycles, without the first row again at the end, or leave repeat out",
+            "the platform rings at every repetition: give whole cycles without repeating the first row at the end, or leave repeat out",
         )
     } else {
         let place = match row {
@@ -62,7 +62,7 @@ pub(super) fn warning(model: &Model, name: &str, waveform: &Waveform, period: f6
         };
         (
             format!("{place}, where the speed of {} changes by {speed}", AXES[axis]),
-            "the platform rings at each: expect errors there, or round the path over some rows",
+            "each corner makes the platform ring: expect errors there, or round the path over some rows",
         )
     };
     let message = format!("trajectory \"{name}\" has corners, the sharpest {place}");
@@ -70,23 +70,23 @@ pub(super) fn warning(model: &Model, name: &str, waveform: &Waveform, period: f6
     Some(Diagnostic::in_file(&waveform.shown_as, line, codes::TRAJECTORY_CORNERS, message, help))
 }
 
-/// A step of a table that stands out from those around it: a jump that no speed limit sees.
+/// A step of a table that is much larger than those around it: a jump below the speed limit.
 pub fn step(waveform: &Waveform) -> Option<Diagnostic> {
     let Step { row, axis, step, around } = stands_out(waveform)?;
     let place = Place::File { path: waveform.shown_as.clone(), line: waveform.lines.get(row).copied() };
     let message = format!(
-        "{} steps by {} {} here, by at most {} in the rows around",
+        "{} steps by {} {} here, but by at most {} in the rows around",
         AXES[axis],
         figure(step * 1e6),
         if axis < 3 { "um" } else { "urad" },
         figure(around * 1e6)
     );
     let help =
-        "a jump between two pieces? The platform rings behind it: join the pieces, or spread the step over some rows";
+        "the platform rings after a jump: if it is between two pieces, join them, or spread the step over some rows";
     Some(Diagnostic::new(codes::WAVEFORM_STEP, "trajectory", place, message, help))
 }
 
-/// A step to a row from the one before, and the largest of those around it; m or rad.
+/// A step from the row before, and the largest step around it; m or rad.
 struct Step {
     row: usize,
     axis: usize,
@@ -106,7 +106,7 @@ fn stands_out(waveform: &Waveform) -> Option<Step> {
     })
 }
 
-/// The sharpest corner, but for those of some rows.
+/// The sharpest corner outside some rows.
 fn sharpest(rows: &[[f64; 6]], repeat: bool, ringing: &Ringing, but: Range<usize>) -> Option<Corner> {
     let count = rows.len() as isize;
     let mut worst: Option<Corner> = None;
@@ -131,7 +131,7 @@ fn sharpest(rows: &[[f64; 6]], repeat: bool, ringing: &Ringing, but: Range<usize
     worst
 }
 
-/// How a mode rings at the corners of a table, whose rows a spline joins.
+/// Ringing of a mode at the corners of a table that is interpolated by a spline.
 struct Ringing {
     /// From row to row, s.
     period: f64,
@@ -140,7 +140,7 @@ struct Ringing {
 }
 
 impl Ringing {
-    /// Where the speed changes by `rate`: the longer the rows are beside the period of the mode, the less.
+    /// Ringing where the speed changes by `rate`: the longer the rows relative to the period of the mode, the less.
     fn at(&self, rate: f64) -> f64 {
         let half = 0.5 * self.mode * self.period;
         rate.abs() / self.mode / (1.0 + half * half / 3.0)
@@ -172,16 +172,16 @@ mod tests {
         // The last row is followed by the first 2.85 µm off: up and down again within two rows.
         let (row, rate) = found(sine(1.3, 0.0), true).unwrap();
         assert!((row == 0 || row == 999) && (rate.abs() - 2853.0).abs() < 40.0, "row {row}: {rate} µm/s");
-        // The places fit, the slope turns round.
+        // The positions match, but the slope reverses.
         let (row, rate) = found(sine(1.5, 0.0), true).unwrap();
         assert!(row == 0 && (rate - 2.0 * 3.0 * TAU * 1.5).abs() < 0.1, "row {row}: {rate} µm/s");
-        // The first row again at the end: it stands still for a row.
+        // The first row is repeated at the end: it is at rest for a row.
         let (row, rate) = found(sine(1.0, 0.0).chain([1e-3]), true).unwrap();
         assert!((row == 0 || row == 1000) && rate.abs() > 17.0, "row {row}: {rate} µm/s");
         for (cycles, phase) in [(1.0, 0.0), (3.0, 0.0), (1.0, 0.3), (20.0, 0.1)] {
             assert_eq!(found(sine(cycles, phase), true), None, "{cycles} cycles from {phase}");
         }
-        // Played once, the ends are nobody's neighbours: what counts is the slope from and to rest.
+        // If the table runs once, its ends are not neighbours: only the slope from and to rest matters.
         assert_eq!(found(sine(1.3, 0.25).map(|x| x * 0.05), false), None);
     }
 
@@ -195,7 +195,7 @@ mod tests {
         assert!((row == 0 || row == 99) && (rate.abs() - 100.0).abs() < 1e-6, "row {row}: {rate} µm/s");
         // 13 µm/s let 200 Hz ring by 10 nm.
         assert_eq!((found(line(0.012), false).is_some(), found(line(0.015), false).is_some()), (false, true));
-        // Rows as long as two periods of the mode round a corner off.
+        // Rows as long as two periods of the mode smooth a corner.
         let slow: Vec<[f64; 6]> = (0..100).map(|k| [0.1e-6 * f64::from(k), 0.0, 0.0, 0.0, 0.0, 0.0]).collect();
         let of = |period: f64| sharpest(&slow, false, &Ringing { period, mode: MODE }, 0..0);
         assert!(of(10e-3).is_none() && of(1e-3).is_some());

@@ -1,4 +1,4 @@
-//! The set-points of a spec with the tables of poses that it names.
+//! Reads the tables of poses that a spec names, and lowers its set-points.
 
 use std::path::Path;
 
@@ -9,12 +9,12 @@ use specgen_identify::waveform;
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, TrajectoryKind};
 
-/// What the set-points of a spec yield.
+/// The lowered set-points of a spec.
 #[derive(Debug, Default)]
 pub struct SpecSetpoints {
     /// The constants of the generator; none for six legs with their own gauges.
     pub setpoints: Option<Setpoints>,
-    /// Warnings, none of which refuses anything.
+    /// Warnings.
     pub warnings: Vec<Diagnostic>,
     /// Name and text of each table of poses.
     pub texts: Vec<(String, String)>,

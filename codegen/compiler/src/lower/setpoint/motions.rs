@@ -1,4 +1,4 @@
-//! How fast set-points may move the platform, along its own axes.
+//! Largest rates and accelerations of set-points along the platform's own axes.
 
 use super::User;
 use super::stop::PEAK;
@@ -7,7 +7,7 @@ use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, TaskSpace};
 use specgen_numerics::norm;
 
-/// With angles up to [`super::TURNED`], no angle moves faster than this many times the platform turns.
+/// Largest ratio of the rate of an angle to the angular rate of the platform, for angles up to [`super::TURNED`].
 const TURNS: f64 = 1.1;
 
 /// Largest rates and accelerations of the six coordinates, m and rad, s.
@@ -17,7 +17,7 @@ pub(in crate::lower) struct Motions {
     pub acceleration: [f64; 6],
 }
 
-/// Of moves and trajectories; of stops from any declared speed; of whatever a stream may state, and a wall may stop.
+/// The motions of moves and trajectories; of stops from any declared speed; of any permitted stream, also when a bound stops it.
 ///
 /// # Errors
 /// Frames that [`super::lower`] refuses.
@@ -59,7 +59,7 @@ impl Motions {
         }
     }
 
-    /// From the user's axes to those of the platform: no motion of one is beyond the other.
+    /// From the user's axes to an upper bound along those of the platform.
     fn of_platform(self, frames: &Frames) -> Self {
         let (point, turned) = match frames {
             Frames::Parallel => return self,

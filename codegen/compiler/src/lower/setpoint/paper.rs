@@ -37,7 +37,7 @@ pub(super) struct Piece {
     pub coordinates: [Coordinate; 6],
 }
 
-/// Pieces of a trajectory that formulas give, with their frequency, Hz; none of a table.
+/// Pieces of a trajectory defined by formulas, with their frequency, Hz; none for a table.
 pub(super) fn formula(kind: &TrajectoryKind) -> Option<(Vec<Piece>, f64)> {
     match kind {
         TrajectoryKind::Paper { path, as_printed, frequency } => {
@@ -50,7 +50,7 @@ pub(super) fn formula(kind: &TrajectoryKind) -> Option<(Vec<Piece>, f64)> {
 
 /// The pieces of a path at f_c = `frequency` (Hz), from t = 0.
 fn pieces(path: PaperPath, as_printed: bool, frequency: f64) -> Vec<Piece> {
-    // tf is f_c/0.1 Hz; machining's spans and phases fit together only with tf = f_c/1 Hz.
+    // tf is f_c/0.1 Hz; the spans and phases of machining match only with tf = f_c/1 Hz.
     let factor = if path == PaperPath::Machining && !as_printed { frequency } else { 10.0 * frequency };
     let scaled = match path {
         PaperPath::Case1 => case_1(as_printed, factor, frequency),
@@ -120,7 +120,7 @@ fn tilt_y(as_printed: bool) -> Coordinate {
 }
 
 fn machining(as_printed: bool) -> Scaled {
-    // x is missing in print; an assumption takes its place where it is corrected.
+    // x is missing in print; the corrected version uses an assumption.
     let x = |of_x: Coordinate| if as_printed { REST } else { of_x };
     // 2.5 + (5 + 8s/5)(1 + cos)/2, and 2.5 + (5 + 8s/5) cos(… − π/2).
     let around_x = swing([5.0, 0.8], [2.5, 0.8], 0.25);

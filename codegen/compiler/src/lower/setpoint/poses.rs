@@ -1,13 +1,13 @@
-//! Poses of the platform along the declared trajectories, for checks that need them all.
+//! Poses of the platform along the declared trajectories, for checks.
 
 use super::{User, paper, table};
 use crate::ir::{Path, Setpoints};
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, TaskSpace, TrajectoryKind};
 
-/// Poses looked at on an analytic piece; its fastest motion makes a few turns.
+/// Poses per analytic piece; its fastest motion makes a few turns.
 const A_PIECE: u32 = 4000;
-/// Poses looked at between two rows of a table.
+/// Poses between two rows of a table.
 const A_ROW: u32 = 4;
 
 /// Poses at even intervals, without a joint between them.

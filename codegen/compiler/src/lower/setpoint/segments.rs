@@ -1,4 +1,4 @@
-//! Analytic pieces to segments in ticks, and what jumps between them.
+//! Lowers analytic pieces to segments in ticks, and checks for jumps between them.
 
 use core::f64::consts::TAU;
 
@@ -9,11 +9,11 @@ use crate::ir::{Path, Segment, SegmentAxis};
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen_language::model::{Model, TaskSpace};
 
-/// A step at a joint that is none: below what a gauge sees. m and rad.
+/// Steps at a joint below the resolution of a gauge do not count, m and rad.
 const NO_JUMP: [f64; 6] = [1e-9, 1e-9, 1e-9, 10e-9, 10e-9, 10e-9];
-/// A change of slope that is none, per s.
+/// Changes of slope below these do not count, per s.
 const NO_CORNER: [f64; 6] = [1e-9, 1e-9, 1e-9, 10e-9, 10e-9, 10e-9];
-/// Share of a tick by which a joint may lie before a tick and count as at it: its time is a rounded quotient.
+/// Tolerance, as a share of a tick, within which a joint is at a tick: its time is a rounded quotient.
 const AT_TICK: f64 = 1e-6;
 
 /// Segments of trajectory `index` and warnings about its corners.
@@ -39,7 +39,7 @@ pub(super) fn lower(
         let [message, help] = if steps {
             let time = 1e3 / frequency;
             [
-                format!("{time} ms are too short or too long for ticks of {:.3} us", period * 1e6),
+                format!("{time} ms is too short or too long for ticks of {:.3} us", period * 1e6),
                 "choose from three ticks to some minutes".to_owned(),
             ]
         } else {
@@ -52,7 +52,7 @@ pub(super) fn lower(
     let joints = joints(&pieces, frequency);
     for jump in joints.iter().filter(|joint| joint.pose.abs() > NO_JUMP[joint.axis]) {
         let message = format!("{} jumps by {} after {:.6} s", AXES[jump.axis], amount(jump.axis, jump.pose), jump.time);
-        let help = "the printed formulas jump: leave as_printed out to use the corrected ones";
+        let help = "the formulas as printed have a jump: leave as_printed out to use the corrected ones";
         let mut found = refuse(codes::TRAJECTORY_JUMPS, message, help);
         let printed = format!("trajectory[{index}].as_printed");
         if let Some(span) = model.spans.get(&printed) {
@@ -96,7 +96,7 @@ pub(super) fn lower(
                 AXES[worst.axis],
                 amount(worst.axis, worst.rate)
             );
-            let help = "the platform rings at each: expect errors there, or smooth the path as a waveform";
+            let help = "each corner makes the platform ring: expect errors there, or use a smoothed path as a waveform";
             Diagnostic::at(&model.spans, &[&key], codes::TRAJECTORY_CORNERS, message, help)
         })
         .into_iter()
@@ -128,7 +128,7 @@ impl Piece {
     }
 }
 
-/// What changes at once where one piece follows another, at the start from rest, or at the end to rest.
+/// The discontinuity between two pieces, at the start from rest, or at the end to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Joint {
     time: f64,
@@ -157,7 +157,7 @@ fn joints(pieces: &[Piece], frequency: f64) -> Vec<Joint> {
     joints
 }
 
-/// The sharpest corner, if there is one; a radian weighs as much as the 0.1 m at which a leg feels it.
+/// The sharpest corner, if there is one; a radian weighs as much as 0.1 m, its lever arm at a leg.
 fn corner(joints: &[Joint]) -> Option<Joint> {
     let weight = |joint: &Joint| joint.rate.abs() * if joint.axis < 3 { 1.0 } else { 0.1 };
     joints
@@ -177,7 +177,7 @@ fn excesses(
 ) -> Excesses {
     let mut excesses = Excesses::default();
     for (piece, span) in pieces.iter().zip(firsts.windows(2)) {
-        // The tick after the last one belongs to the next piece; looking at it too covers the joint.
+        // The tick after the last one belongs to the next piece; checking it, too, covers the joint.
         for tick in span[0] as u32..=span[1] as u32 {
             let time = f64::from(tick) * model.timing.period;
             let time = if time > piece.end { piece.end } else { time };
@@ -188,7 +188,7 @@ fn excesses(
     excesses
 }
 
-/// A piece of `duration` (s) whose own time w = 0..1 counts from the tick `first`.
+/// A piece of `duration` (s) whose own time w = 0..1 starts at the tick `first`.
 fn segment(piece: &Piece, duration: f64, first: f64, period: f64, frequency: f64) -> Segment {
     let start = first * period;
     let swings = piece.coordinates.iter().any(|coordinate| coordinate.radius != [0.0; 2]);

@@ -1,7 +1,7 @@
 //! Cubic splines through equidistant rows: twice continuously differentiable, so that rate and acceleration are analytic.
 //!
 //! With m = M h²/6 (M second derivative, h row time) the spline's equations are m₋ + 4 m + m₊ = y₋ − 2 y + y₊ at inner rows.
-//! A table played once starts and ends at rest: 2 m₀ + m₁ = y₁ − y₀ and likewise at the end. One that repeats closes.
+//! A table that runs once starts and ends at rest: 2 m₀ + m₁ = y₁ − y₀ and likewise at the end. A repeated one is periodic.
 
 /// m of every row of one axis; at least two rows.
 pub(super) fn at_rest(y: &[f64]) -> Vec<f64> {
@@ -28,7 +28,7 @@ pub(super) fn closed(y: &[f64]) -> Vec<f64> {
         let [a, b] = [right[0], right[1]];
         return vec![(4.0 * a - 2.0 * b) / 12.0, (4.0 * b - 2.0 * a) / 12.0];
     }
-    // The corners taken out as a product of one vector with itself (Sherman and Morrison), u = (1, 0, …, 0, 1).
+    // The corner entries are a rank-one update u uᵀ (Sherman and Morrison) with u = (1, 0, …, 0, 1).
     let mut diagonal = vec![4.0; n];
     diagonal[0] = 3.0;
     diagonal[n - 1] = 3.0;
@@ -40,7 +40,7 @@ pub(super) fn closed(y: &[f64]) -> Vec<f64> {
     plain.iter().zip(&corner).map(|(plain, corner)| plain - factor * corner).collect()
 }
 
-/// Solves a system with `diagonal` and ones beside it; diagonally dominant, so without pivoting.
+/// Solves a tridiagonal system with `diagonal` and ones beside it; diagonally dominant, so without pivoting.
 fn tridiagonal(diagonal: &[f64], mut right: Vec<f64>) -> Vec<f64> {
     let n = diagonal.len();
     let mut pivot = diagonal.to_vec();

@@ -1,12 +1,13 @@
-//! Limits of stops: given, or derived from what legs and amplifiers follow.
+//! Limits of stops: from the spec, or derived from the dynamics of legs and amplifiers.
 //!
-//! Derived limits let a stop from the largest declared speed take the time t, and just reach both: a = 1.5 v/t, j = 6 v/t²
-//! (see `specgen_runtime::setpoint::Stop`). Stops from lower speeds are shorter, but take two thirds of it at least. t is the least time in which
-//! * a share of a period of the platform's lowest mode goes by: shorter stops ring with what the feed-forward of the
-//!   inertia leaves, as large as the stiffness is uncertain;
+//! With derived limits a stop from the largest declared speed v takes the time t and just reaches both limits: a = 1.5 v/t,
+//! j = 6 v/t² (see `specgen_runtime::setpoint::Stop`). Stops from lower speeds are shorter, but take at least two thirds of t. t is the
+//! least time such that
+//! * it is at least a share of the period of the platform's lowest mode: the feed-forward of inertia is only as accurate as the
+//!   stiffness, and shorter stops would excite ringing;
 //! * the amplifiers follow;
-//! * what the stop adds to the rate of a leg's voltage keeps within `actuator.slew_rate`, all axes stopping at once;
-//! * inertia bends no leg by more than a share of its stroke.
+//! * the stop's contribution to the voltage rate of a leg stays within `actuator.slew_rate`, with all axes stopping at once;
+//! * inertia deflects no leg by more than a share of its stroke.
 
 use specgen_runtime::setpoint::StopLimits;
 
@@ -15,17 +16,17 @@ use crate::lower;
 use crate::stability::platform::{ModalBasis, RestDynamics, lead};
 use specgen_language::model::{Model, TaskSpace};
 
-/// Share of the period of the lowest mode that a stop takes at least.
+/// Least time of a stop, in periods of the lowest mode.
 const PERIODS: f64 = 0.35;
-/// Time constants of the amplifier that it takes at least.
+/// Least time of a stop, in lags of the amplifier.
 const LAGS: f64 = 3.4;
-/// Share of `actuator.slew_rate` that it takes at most: the local gain of a stack differs from its mean by a quarter.
+/// Largest share of `actuator.slew_rate` for a stop: the local gain of a stack differs from its mean by a quarter.
 const SLEW: f64 = 1.0 / 1.3;
-/// Share of the stroke by which inertia bends a leg at most, all axes stopping at once.
+/// Largest deflection of a leg by inertia, as a share of the stroke, with all axes stopping at once.
 const BENT: f64 = 0.05;
-/// Share of the time of a stop from the largest speed that the shortest one takes, over three.
+/// Time of the shortest stop, in thirds of that of a stop from the largest speed.
 const SHORTEST_THIRDS: i32 = 2;
-/// Peak deceleration and peak jerk of a stop from a rate of 1 that takes a time of 1.
+/// Peak deceleration and peak jerk of a stop from unit rate in unit time.
 pub(super) const PEAK: f64 = 1.5;
 const SLOPE: f64 = 6.0;
 
@@ -39,7 +40,7 @@ pub(super) struct Limits {
 }
 
 impl Limits {
-    /// What the spec gives, and for the rest what follows from the platform.
+    /// The limits of the spec; those left out are derived from the platform.
     pub fn of(model: &Model, task: &TaskSpace, user: &User) -> Self {
         let rules = &task.setpoint;
         let speed: [f64; 6] = core::array::from_fn(|axis| larger(rules.stream_speed[axis], rules.speed[axis]));
@@ -56,7 +57,7 @@ impl Limits {
         Self { acceleration, jerk, speed }
     }
 
-    /// These, raised as far as a stop from `speed` (per s) within `time` (s) takes.
+    /// These limits, raised as needed for a stop from `speed` (per s) within `time` (s).
     pub fn at_least(&self, speed: &[f64; 6], time: f64) -> Self {
         Self {
             acceleration: core::array::from_fn(|axis| larger(self.acceleration[axis], PEAK * speed[axis] / time)),
@@ -65,14 +66,14 @@ impl Limits {
         }
     }
 
-    /// As the controller has them.
+    /// The limits in the form of the controller.
     pub fn reciprocal(&self, period: f64) -> StopLimits<f64> {
         let mut limits = StopLimits {
             acceleration: self.acceleration.map(|a| 1.0 / (a * period * period)),
             jerk: self.jerk.map(|j| 1.0 / (j * period * period * period)),
             shortest: 1,
         };
-        // A slow motion has the room to be stopped as gently as the legs like it.
+        // Slow motions have room for a gentle stop.
         limits.shortest = (limits.ticks(&self.speed.map(|v| v * period)) * SHORTEST_THIRDS / 3).max(1);
         limits
     }
@@ -82,11 +83,11 @@ fn larger(a: f64, b: f64) -> f64 {
     if b > a { b } else { a }
 }
 
-/// t, s, for stops from `speed` (per s, m and rad, along the user's axes).
+/// The time t, s, for stops from `speed` (per s, m and rad, along the user's axes).
 #[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
 fn shortest_time(model: &Model, task: &TaskSpace, user: &User, speed: &[f64; 6]) -> f64 {
     let mut time = larger(2.0 * model.timing.period, LAGS * model.amplifier.lag);
-    // A platform that has no dynamics is refused elsewhere.
+    // A platform without dynamics is refused elsewhere.
     let Ok(platform) = lower::platform(model) else { return time };
     let rest = RestDynamics::of(&platform);
     let Some(basis) = ModalBasis::of(&rest, model.actuator.axial_stiffness) else { return time };
@@ -96,7 +97,7 @@ fn shortest_time(model: &Model, task: &TaskSpace, user: &User, speed: &[f64; 6])
     let slew = SLEW * model.actuator.slew_rate * model.actuator.leg_gain();
     let bent = BENT * model.actuator.stroke;
     for leg in 0..6 {
-        // Rate of the leg at these speeds, and what it is bent by at accelerations of the same numbers, all axes at once.
+        // Rate of the leg at these speeds, and its deflection at accelerations of the same numbers, all axes at once.
         let (mut rate, mut bend) = (0.0, 0.0);
         for (axis, v) in speed.iter().enumerate() {
             let column = user.column(axis);
@@ -106,7 +107,7 @@ fn shortest_time(model: &Model, task: &TaskSpace, user: &User, speed: &[f64; 6])
             rate += moved.abs() * v;
             bend += force.abs() * v / model.actuator.axial_stiffness;
         }
-        // slew = lead · acceleration + bending by the jerk.
+        // slew = lead · acceleration + deflection by the jerk.
         let (once, twice) = (PEAK * lead * rate, SLOPE * bend);
         time = larger(time, (once + libm::sqrt(once * once + 4.0 * slew * twice)) / (2.0 * slew));
         time = larger(time, PEAK * bend / bent);

@@ -1,5 +1,4 @@
-//! How far the platform goes on when a motion is stopped, from every speed that the spec declares; and that it stands within
-//! workspace and strokes then.
+//! Stopping distances of the platform from every declared speed, and the check that stops end within workspace and strokes.
 
 mod refusal;
 
@@ -15,9 +14,9 @@ use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, TaskSpace};
 use specgen_numerics::largest;
 
-/// A stop beside a wall is shortened while it runs; a trajectory up to the wall itself is not refused for that.
+/// Tolerance for trajectories up to the bound of the workspace: a stop close to a bound is shortened while it runs.
 const SLACK: f64 = 0.01;
-/// Room of an axis that is none, as a share of the workspace: a leg that stands at the end of its stroke has as much by rounding.
+/// Least room of an axis, as a share of the workspace. Rounding gives this much to a leg at the end of its stroke.
 const LEAST_ROOM: f64 = 1e-6;
 
 /// The longest stop of one kind of motion.
@@ -27,21 +26,21 @@ pub struct Stopping {
     pub what: String,
     /// Largest speed of each axis, m/s and rad/s.
     pub speed: [f64; 6],
-    /// What a stream goes on by until it counts as stale, m and rad.
+    /// Distance that a stream coasts until it counts as stale, m and rad.
     pub coasted: [f64; 6],
     /// Longest time from there to standstill, s.
     pub time: f64,
-    /// Longest way of the set-point from there to standstill, m and rad.
+    /// Longest distance of the set-point from there to standstill, m and rad.
     pub way: [f64; 6],
-    /// By how much the platform, which follows a lag behind and is corrected for that, may go beyond it, m and rad.
+    /// Possible overshoot of the platform beyond the set-point, due to its lag, m and rad.
     pub overshoot: [f64; 6],
 }
 
-/// What decides about the length of a stop.
+/// Parameters that determine the length of a stop.
 struct Conditions {
     limits: StopLimits<f64>,
     period: f64,
-    /// Of the amplifiers, s.
+    /// Lag of the amplifiers, s.
     lag: f64,
 }
 
@@ -55,7 +54,7 @@ impl Stopping {
         Self { what: what.to_owned(), speed, coasted, time, way, overshoot }
     }
 
-    /// Of the set-point's way, what no limit of stops shortens.
+    /// The part of the distance that no limit of stops shortens.
     fn fixed(&self, axis: usize) -> f64 {
         self.coasted[axis] + self.overshoot[axis]
     }
@@ -65,12 +64,11 @@ impl Stopping {
     }
 }
 
-/// The stops of `model`, whose `[control]` is `task`: of streams, of moves, of each trajectory. `stroke`: what every leg can
-/// do, m.
+/// The stops of `model`, whose `[control]` is `task`: of streams, of moves, of each trajectory. `stroke`: travel of every leg, m.
 ///
 /// # Errors
-/// A stop that ends outside workspace or strokes: of a stream or a move along an axis from the bias pose, whichever way there
-/// is more room; of a trajectory at some tick of it.
+/// A stop that ends outside workspace or strokes: of a stream or a move along an axis from the bias pose, in the direction with
+/// more room; of a trajectory at any of its ticks.
 pub fn check(
     model: &Model,
     task: &TaskSpace,
@@ -134,11 +132,11 @@ fn rates(stretch: &Stretch) -> impl Iterator<Item = ([f64; 6], [f64; 6])> + '_ {
     stretch.poses.windows(2).map(move |pair| (pair[1], rate(pair)))
 }
 
-/// Where a stop of a trajectory would leave.
+/// A stop of a trajectory that would end outside.
 struct Leaves {
-    /// Part of the stop's way that is within.
+    /// Share of the stop's distance that is inside.
     share: f64,
-    /// Where, in words.
+    /// The place in words.
     end: String,
 }
 
@@ -150,7 +148,7 @@ fn keep(slot: &mut Option<Leaves>, found: Option<Leaves>) {
     }
 }
 
-/// Where the platform can be.
+/// Workspace and strokes.
 struct Place<'a> {
     user: &'a User,
     platform: &'a Platform<f64>,
@@ -158,7 +156,7 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
-    /// Whether a user's pose lies in the workspace and every leg in its stroke, with `slack` as a share of either.
+    /// Whether a user's pose is in the workspace and every leg in its stroke, with `slack` as a share of either.
     fn holds(&self, pose: [f64; 6], slack: f64) -> bool {
         let Some(there) = self.user.pose(pose) else { return false };
         let inside = there.iter().zip(&self.user.bound).all(|(value, bound)| value.abs() <= (1.0 + slack) * bound);
@@ -166,7 +164,7 @@ impl Place<'_> {
         inside && displacements(self.platform, &there).iter().all(|leg| *leg >= low && *leg <= high)
     }
 
-    /// How far the user's axis alone can go from the bias pose in its better direction, m or rad; 0 where rounding alone lets it.
+    /// Room of the user's axis alone from the bias pose in its better direction, m or rad; 0 if it is only rounding.
     fn room(&self, axis: usize) -> f64 {
         let group = if axis < 3 { 0..3 } else { 3..6 };
         let far = 4.0 * self.user.bound[group].iter().sum::<f64>();
@@ -181,7 +179,7 @@ impl Place<'_> {
         if room > LEAST_ROOM * far { room } else { 0.0 }
     }
 
-    /// What a stop from a pose of a trajectory leaves, if anything.
+    /// The stop from a pose of a trajectory, if it ends outside.
     fn leaves(&self, pose: &[f64; 6], stop: &Stopping) -> Option<Leaves> {
         let after = |share: f64| core::array::from_fn(|axis| pose[axis] + share * stop.distance(axis));
         let end: [f64; 6] = after(1.0);

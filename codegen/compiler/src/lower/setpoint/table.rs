@@ -1,4 +1,4 @@
-//! A table of poses to a spline in ticks.
+//! Lowers a table of poses to a spline in ticks.
 
 use super::check::Excesses;
 use super::{AXES, LONGEST, User, amount, corners, spline};
@@ -7,11 +7,11 @@ use specgen_identify::waveform::Waveform;
 use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::{Model, TaskSpace};
 
-/// Share of a tick that the period may be off a whole number of ticks, for it is a rounded quotient.
+/// Tolerance of the period, in ticks, to be a whole number of ticks: it is a rounded quotient.
 const WHOLE: f64 = 1e-6;
 
-/// Rows are the same within this part of the largest step from row to row, and of the largest value: what is left of a rounded
-/// sine, and far less than a row that is meant is from the first one.
+/// Tolerance for equal rows, as a share of the largest step and of the largest value: the rounding of a sine, and far less than
+/// any intended difference from the first row.
 const SAME_STEP: f64 = 1e-6;
 const SAME_VALUE: f64 = 1e-9;
 
@@ -48,7 +48,7 @@ pub(super) fn lower(
             waveform,
             waveform.rows.len() - 1,
             codes::WAVEFORM_CLOSED_TWICE,
-            "the last row is the first again, which follows it anyway when the table repeats".to_owned(),
+            "the last row repeats the first, which follows it anyway when the table repeats".to_owned(),
             "leave the last row out",
         ));
     }
@@ -88,7 +88,7 @@ pub(super) fn lower(
     Ok((path, corners::warning(model, name, waveform, period, repeat).into_iter().collect()))
 }
 
-/// Whether the last row is the first again, within what the numbers of a table resolve.
+/// Whether the last row repeats the first, within the rounding of the table.
 fn closes(rows: &[[f64; 6]]) -> bool {
     let [first, .., last] = rows else { return false };
     let largest =
@@ -101,7 +101,7 @@ fn closes(rows: &[[f64; 6]]) -> bool {
         })
 }
 
-/// Steps from row to row that no motion at the permitted speed makes.
+/// Findings about steps from row to row beyond the permitted speed.
 fn steps(task: &TaskSpace, waveform: &Waveform, period: f64, repeat: bool) -> Vec<Diagnostic> {
     let rows = &waveform.rows;
     let following = |k: usize| if k + 1 < rows.len() { Some(k + 1) } else { repeat.then_some(0) };
@@ -129,10 +129,10 @@ fn steps(task: &TaskSpace, waveform: &Waveform, period: f64, repeat: bool) -> Ve
     findings
 }
 
-/// More jumps than these say nothing new.
+/// Most jumps that are reported.
 const MOST_FINDINGS: usize = 5;
 
-/// Workspace and speed at every tick of the spline.
+/// Checks workspace and speed at every tick of the spline.
 fn between(
     model: &Model,
     task: &TaskSpace,

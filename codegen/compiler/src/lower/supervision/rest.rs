@@ -1,4 +1,4 @@
-//! Where the legs rest.
+//! The rest voltage of the legs.
 
 use crate::ir::{Actuation, Hysteresis, LEGS, RateModel, Rest, Scalar};
 use specgen_language::diagnostic::{Diagnostic, codes};
@@ -13,7 +13,7 @@ pub(super) fn code(model: &Model, actuation: &Actuation) -> i32 {
     nearest.clamp(actuation.code_min, actuation.code_max)
 }
 
-/// A rest voltage that may not go out.
+/// The finding about a rest voltage that is not permitted.
 pub(super) fn beyond(model: &Model) -> Option<Diagnostic> {
     let [low, high] = model.actuator.voltage;
     let rest = model.rest_voltage();
@@ -29,7 +29,7 @@ pub(super) fn beyond(model: &Model) -> Option<Diagnostic> {
     ))
 }
 
-/// How the legs stand at a code above the lowest.
+/// State of the legs at a code above the lowest.
 pub(super) fn risen(code: i32, hysteresis: &Hysteresis, actuation: &Actuation, scalar: Scalar) -> Option<Rest> {
     if code == actuation.code_min {
         return None;

@@ -1,4 +1,4 @@
-//! What makes a sample of the gauges wrong: the leap that no leg and no noise can make, and how many repeated samples noise does not make.
+//! Faulty samples of the gauges: a jump beyond motion and noise, and more repeated samples than noise explains.
 
 use super::{NOISE_MARGIN, above, finding};
 use crate::ir::Sensing;
@@ -8,16 +8,16 @@ use specgen_runtime::supervisor::WRONG;
 
 /// A second difference of samples has the variance of six.
 const SECOND_DIFFERENCE: f64 = 2.449_489_742_783_178;
-/// Steps of the converter that rounding makes of it, at most.
+/// Largest effect of rounding on it, in steps of the converter.
 const ROUNDING: f64 = 2.0;
-/// Of a calibrated gauge, its steepest word per metre over that of its range.
+/// Steepest word per metre of a calibrated gauge over the mean of its range.
 const STEEPEST: f64 = 1.5;
-/// Probability a tick with which noise alone may make a fault of repeated samples.
+/// Probability per tick that noise alone causes a fault of repeated samples.
 const FALSE_FAULT: f64 = 1e-15;
-/// Fewest repeated samples that are a fault, and most.
+/// Fewest and most repeated samples that are a fault.
 const REPEATS: [u32; 2] = [3, 64];
 
-/// Largest leap of each gauge, in the unit of its words. `readings`: of each gauge (rows) per displacement of each leg.
+/// Largest leap of each gauge, in the unit of its words. `readings`: reading of each gauge (rows) per displacement of each leg.
 pub(super) fn leap(
     model: &Model,
     readings: &[[f64; 6]; 6],
@@ -35,12 +35,12 @@ pub(super) fn leap(
             codes::SUPERVISOR_BOUND,
             "leap",
             format!(
-                "a leap of {:.4} nm is below what the gauge's noise and converter make of three samples, {:.4} nm",
+                "a leap of {:.4} nm is less than the effect of the gauge's noise and converter on three samples, {:.4} nm",
                 given * 1e9,
                 noise * 1e9
             ),
             format!(
-                "write leap = \"{:.4} nm\" or more; without the key no leg can leap so far at actuator.slew_rate",
+                "write leap = \"{:.4} nm\" or more, or leave it out: the default is more than a leg can move at actuator.slew_rate",
                 above(noise * 1e9)
             ),
         ));
@@ -57,18 +57,18 @@ pub(super) fn leap(
     })
 }
 
-/// What noise and converter make of three samples, m.
+/// Effect of noise and converter on three samples, m.
 fn noise(model: &Model) -> f64 {
     NOISE_MARGIN * SECOND_DIFFERENCE * model.sensor.noise + ROUNDING * model.sensor.step()
 }
 
-/// Without `supervisor.leap`, m, of a gauge that shows the displacement of one leg.
+/// Default of `supervisor.leap`, m, for a gauge that measures the displacement of one leg.
 pub(crate) fn of_one_leg(model: &Model) -> f64 {
     acceleration(model) + noise(model)
 }
 
-/// By how much the displacement of a leg may change its motion from one period to the next, m: as much as voltages that turn round at the
-/// slew rate make of it behind the lags.
+/// Largest second difference of a leg's displacement from period to period, m: for a voltage that reverses at the slew rate, behind the
+/// lags.
 fn acceleration(model: &Model) -> f64 {
     let period = model.timing.period;
     let lag = model.amplifier.lag + model.sensor.lag;
@@ -76,7 +76,7 @@ fn acceleration(model: &Model) -> f64 {
     2.0 * model.actuator.slew_rate * model.actuator.leg_gain() * period * part
 }
 
-/// Count at which repeated samples are a fault; 0 where the noise is not above a step of the converter, so that they say nothing.
+/// Number of repeated samples that is a fault; 0 if the noise is below a step of the converter, so that repetition means nothing.
 pub(super) fn repeats(model: &Model) -> u32 {
     let noise = model.sensor.noise / model.sensor.step();
     if noise <= 1.0 {
@@ -84,7 +84,7 @@ pub(super) fn repeats(model: &Model) -> u32 {
     }
     let repeated = repeated(noise);
     let (mut count, mut probability) = (1, repeated);
-    // Each further one comes before the count has fallen to nothing.
+    // Each further repetition comes before the count has decayed.
     while count < REPEATS[1] && (probability > FALSE_FAULT || count < REPEATS[0]) {
         probability *= repeated * f64::from(WRONG * count - 1);
         count += 1;
@@ -92,7 +92,7 @@ pub(super) fn repeats(model: &Model) -> u32 {
     WRONG * count
 }
 
-/// Probability that six codes are those of one of the two samples before, by noise (rms) of so many steps.
+/// Probability that six codes equal those of one of the two samples before, for noise (rms) of so many steps.
 fn repeated(noise: f64) -> f64 {
     let spread = core::f64::consts::SQRT_2 * noise;
     let within = libm::erf(1.0 / (spread * core::f64::consts::SQRT_2));
@@ -104,7 +104,7 @@ fn repeated(noise: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Against codes that are counted, for noise of 1 and 2.6 steps.
+    /// Compared with counted codes, for noise of 1 and 2.6 steps.
     #[test]
     fn the_probability_of_a_repeated_code_is_that_of_the_sum_over_codes() {
         for noise in [1.0, 2.6] {

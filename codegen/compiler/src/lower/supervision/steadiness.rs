@@ -1,4 +1,4 @@
-//! A sustained oscillation: what noise, environment and motion explain of an error, and for how long it must last.
+//! Detection of sustained oscillation: the error that noise, environment and motion explain, and the least duration.
 
 use super::{CHANNELS, above, defaults, finding, whole};
 use crate::ir::Scalar;
@@ -7,26 +7,26 @@ use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
 use specgen_runtime::supervisor::Steadiness;
 
-/// Errors are looked at from here on, Hz: below it the feedback is at work.
+/// Lowest frequency of the detection, Hz: below it the feedback acts.
 pub(crate) const LOWEST: f64 = 60.0;
-/// Times the noise (rms) of an axis that an oscillation must exceed at least.
+/// Least oscillation, in rms noise of an axis.
 const NOISE_MARGIN: f64 = 6.0;
-/// Swing of the error that a swing of the set-point explains, as a part of it.
+/// Amplitude of the error that the set-point explains, as a share of its amplitude.
 const MOTION: f64 = 1.0;
-/// How long what was explained is held, as a time constant: times that of the slowest ring by the model, more where machines differ from it
-/// and close modes beat, less in a stage; and at least so long, s.
+/// Time constant with which the explained error decays, in decay times of the slowest mode: more for the whole error, because machines
+/// differ from the model and close modes beat, less in a stage. And the least time constant, s.
 const HELD: [f64; 2] = [8.0, 3.0];
 const SHORTEST_HELD: f64 = 0.06;
-/// Time that leads to the first stage, and from one to the next, s.
+/// Time to the first stage, and from one stage to the next, s.
 const FIRST: f64 = 0.03;
 const NEXT: f64 = 0.1;
-/// Longest time that an oscillation goes one way, s: half a period of 45 Hz.
+/// Longest half period of an oscillation, s: that of 45 Hz.
 const ONE_WAY: f64 = 0.011;
 const FEWEST_ONE_WAY: f64 = 3.0;
 /// Fewest samples.
 const FEWEST: f64 = 12.0;
 
-/// What an angle makes at the platform joints, m/rad, and the least amplitude (m) that is above the noise of every axis.
+/// Lever arms of angles at the platform joints, m/rad, and the least amplitude (m) above the noise of every axis.
 fn arms_and_least(model: &Model, noise: Option<&PoseNoise>) -> ([f64; 6], f64) {
     let (arms, noise) = match noise {
         Some(noise) => {
@@ -39,7 +39,7 @@ fn arms_and_least(model: &Model, noise: Option<&PoseNoise>) -> ([f64; 6], f64) {
     (arms, least)
 }
 
-/// Without `supervisor.disturbance`, m.
+/// Default of `supervisor.disturbance`, m.
 pub(crate) fn usual(model: &Model) -> f64 {
     let noise = pose_noise(model).ok().flatten();
     libm::fmax(defaults::disturbance(model), arms_and_least(model, noise.as_ref()).1)
@@ -61,7 +61,7 @@ pub(super) fn lower(
             codes::SUPERVISOR_BOUND,
             "disturbance",
             format!(
-                "a disturbance of {:.4} nm is below what the gauges' noise makes of one axis, {:.4} nm",
+                "a disturbance of {:.4} nm is less than the effect of the gauges' noise on one axis, {:.4} nm",
                 disturbance * 1e9,
                 least * 1e9
             ),

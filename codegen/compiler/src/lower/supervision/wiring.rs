@@ -1,4 +1,4 @@
-//! The wiring check: the pulse of a leg, the weights of its samples, and the faults that look alike on this geometry.
+//! The wiring check: the pulse of a leg, the weights of its samples, and the faults that this geometry cannot distinguish.
 
 use super::{defaults, finding, rest, whole};
 use crate::figure::figure;
@@ -8,28 +8,28 @@ use specgen_language::model::{LARGEST_PULSE, LONGEST_TIMEOUT, LegMakes, Model};
 use specgen_numerics::Factor;
 use specgen_runtime::supervisor::{self, Fault, Finding, Response, with};
 
-/// Fewest ticks of a leg.
+/// Fewest ticks of a pulse.
 const FEWEST: f64 = 40.0;
-/// Hz. A pulse of 50 ms holds three periods of 60 Hz, which leave nothing in it.
+/// Mains frequency, Hz. A pulse of 50 ms contains exactly three periods of 60 Hz, which cancel.
 const MAINS: f64 = 50.0;
-/// A period of the mains takes as many ticks at least, or it is not told from the pulse.
+/// Fewest ticks per mains period that distinguish mains from the pulse.
 const MAINS_TICKS: f64 = 4.0;
-/// Periods of the mains in a pulse, at least: one whole period is the pulse itself.
+/// Fewest mains periods in a pulse: one whole period looks like the pulse itself.
 const MAINS_PERIODS: f64 = 1.5;
-/// Least gain of small motions over that of large ones, stiff joints and legs of little gain included.
+/// Least gain of small motions over that of large ones, including stiff joints and legs with low gain.
 const LEAST_GAIN: f64 = 0.4;
-/// Part of what a gauge or leg shows that its noise may be, rms.
+/// Largest rms noise, as a share of the response of a gauge or leg.
 const NOISE: f64 = 0.03;
-/// Gains of a gauge or leg that is faulty, hundredths.
+/// Gains of a faulty gauge or leg, hundredths.
 const GAINS: [u32; 2] = [50, 200];
-/// Gains that alike legs show over the mean of the others: 15 % to either side.
+/// Range of gains of equal legs over the mean of the others: 15 % to either side.
 const ALIKE: [f64; 2] = [0.74, 1.35];
-/// Without `wiring_check.residual`.
+/// Default of `wiring_check.residual`.
 const RESIDUAL: f64 = 0.1;
-/// Steps towards a bound that is accepted as printed.
+/// Most steps towards a bound that is accepted as printed.
 const TRIES: u32 = 200;
 
-/// Constants of the check; none where the spec switches it off. `readings`: of each gauge (rows) per displacement of each leg.
+/// Constants of the check; none if the spec switches it off. `readings`: reading of each gauge (rows) per displacement of each leg.
 pub(super) fn lower(
     model: &Model,
     hysteresis: &Hysteresis,
@@ -57,12 +57,12 @@ pub(super) fn lower(
                 codes::SUPERVISOR_TIME,
                 "wiring_check.time",
                 format!(
-                    "a pulse of {:.6} ms is shorter than {FEWEST} periods and what `actuator.slew_rate` permits, {:.6} ms",
+                    "a pulse of {:.6} ms is too short: {FEWEST} periods and `actuator.slew_rate` require at least {:.6} ms",
                     time * 1e3,
                     least * 1e3
                 ),
                 format!(
-                    "leave wiring_check.time out: it is then {} ms; it must be at least {:.6} ms",
+                    "leave wiring_check.time out: the default is {} ms; it must be at least {:.6} ms",
                     figure(libm::fmax(least, defaults::WIRING_TIME) * 1e3),
                     least * 1e3
                 ),
@@ -76,7 +76,7 @@ pub(super) fn lower(
             &["supervisor.wiring_check.amplitude", "supervisor.wiring_check", "sensor.noise", "sensor"],
             codes::SUPERVISOR_BOUND,
             format!(
-                "the gauges' noise makes {} % of what a pulse of {} um shows of a leg or gauge, more than {:.0} %",
+                "the gauges' noise is {} % of the response of a leg or gauge to a pulse of {} um; at most {:.0} % is allowed",
                 figure(chosen.noise * 1e2),
                 figure(chosen.size * 1e6),
                 NOISE * 1e2
@@ -90,7 +90,7 @@ pub(super) fn lower(
     let compares = identified || spec.legs == LegMakes::Alike;
     let round = |value: f64| scalar.round(value);
     let signed = if up { height } else { -height };
-    // Where the pulse goes down the gauges do, too, and u is its depth.
+    // For a negative pulse the gauges move down, too, and u is its depth.
     let per_leg = legs(hysteresis, actuation, [rest, rest + signed]);
     let constants = supervisor::Wiring {
         ticks,
@@ -109,7 +109,7 @@ pub(super) fn lower(
     Some(Wiring { constants, alike, unseen, turned })
 }
 
-/// Bounds that a fault-free machine leaves, or that let a fault pass which the usual residual shows.
+/// Findings about bounds that a fault-free machine violates, or that miss a fault which the default residual detects.
 fn odd_bounds(
     model: &Model,
     identified: bool,
@@ -125,7 +125,7 @@ fn odd_bounds(
     if !identified && constants.leg_gain.is_some() && (low > ALIKE[0] || high < ALIKE[1]) {
         return odd(
             "leg_gain",
-            format!("legs of one make show gains of {} to {}, but only {low} to {high} pass", ALIKE[0], ALIKE[1]),
+            format!("equal legs have gains of {} to {}, but only {low} to {high} are accepted", ALIKE[0], ALIKE[1]),
             format!("write wiring_check.leg_gain = {ALIKE:?} or wider, in [supervisor]"),
         );
     }
@@ -134,12 +134,12 @@ fn odd_bounds(
     let missed = missed.next().filter(|_| spec.residual > RESIDUAL)?;
     odd(
         "residual",
-        format!("with a residual of {} the check lets pass: {missed}", spec.residual),
+        format!("with a residual of {} the check misses: {missed}", spec.residual),
         format!("write wiring_check.residual = {RESIDUAL} or less, in [supervisor]"),
     )
 }
 
-/// Whether a fault is seen where small motions have 0.7 of the spec's gain.
+/// Whether the check detects a fault if small motions have 0.7 of the spec's gain.
 fn sees(wiring: &supervisor::Wiring<f64>, readings: &Response<f64>, fault: Finding) -> bool {
     !supervisor::explains(wiring, readings, &small(with(readings, fault)))
 }
@@ -158,18 +158,18 @@ struct Pulse {
     /// Displacement of a leg by the spec's gain, m.
     size: f64,
     regression: Regression,
-    /// Part of what the least moved gauge or leg shows that noise makes, rms.
+    /// rms noise, as a share of the smallest response of a gauge or leg.
     noise: f64,
 }
 
-/// A pulse that cannot be made in the time (s) that it is given.
+/// A pulse that is not possible in the given time (s).
 struct TooShort {
     time: f64,
     least: f64,
 }
 
 impl Pulse {
-    /// Of a share of the stroke, in a time (s) or in the one that slew rate and noise ask for, with so many codes of room and in a tick.
+    /// A pulse of a share of the stroke, in a time (s) or in the time that slew rate and noise require, with limits in codes, in all and per tick.
     fn new(
         model: &Model,
         actuation: &Actuation,
@@ -183,7 +183,7 @@ impl Pulse {
         let volts = amplitude * model.actuator.stroke / gain;
         // Saturates.
         let height = (libm::round(volts / actuation.volts_per_code) as i32).clamp(1, if room > 1 { room } else { 1 });
-        // Ticks that the slew rate asks for where the pulse is steepest.
+        // Ticks that the slew rate requires where the pulse is steepest.
         let steepest = libm::ceil(f64::from(height) * core::f64::consts::PI / f64::from(max_step) - 1e-9);
         let least = period * if steepest > FEWEST { steepest } else { FEWEST };
         let time = given.unwrap_or(libm::fmax(least, defaults::WIRING_TIME));
@@ -201,13 +201,13 @@ impl Pulse {
         if given.is_some() || pulse.noise <= NOISE {
             return Ok(pulse);
         }
-        // Noise goes with the root of the time.
+        // Noise falls with the square root of the time.
         let longer = time * (pulse.noise / NOISE) * (pulse.noise / NOISE) * 1.1;
         Ok(in_time(libm::fmax(time, libm::fmin(longer, defaults::LONGEST_WIRING_TIME))))
     }
 }
 
-/// What makes the noise small enough: an amplitude and a time that are accepted as they are printed.
+/// Fixes for too much noise: an amplitude and a time that are accepted as printed.
 fn larger_or_longer(
     model: &Model,
     refused: &Pulse,
@@ -237,13 +237,13 @@ fn larger_or_longer(
         (Some(larger), Some(longer)) => format!("write {larger}, or {longer}, in [supervisor]"),
         (Some(fix), None) | (None, Some(fix)) => format!("write {fix}, in [supervisor]"),
         (None, None) => {
-            "write wiring_check = { off = \"the gauges are too noisy\" } in [supervisor]: nothing then proves the signs"
+            "write wiring_check = { off = \"the gauges are too noisy\" } in [supervisor]: the signs are then not checked"
                 .to_owned()
         }
     }
 }
 
-/// What a leg moves at the pulse by its own table, over the mean of all: legs that were measured one by one are held against their own.
+/// Motion of each leg at the pulse by its own table, over the mean of all: legs measured individually are compared with their own table.
 fn legs(hysteresis: &Hysteresis, actuation: &Actuation, codes: [i32; 2]) -> [f64; 6] {
     let drive = |code: i32| actuation.cells_at_zero + f64::from(code) * actuation.cells_per_code;
     let moves: Vec<f64> = hysteresis
@@ -256,11 +256,11 @@ fn legs(hysteresis: &Hysteresis, actuation: &Actuation, codes: [i32; 2]) -> [f64
         .collect();
     let moved = hysteresis.table_of_leg.map(|table| moves[table]);
     let mean = moved.iter().sum::<f64>() / 6.0;
-    // A table that is flat there says nothing of its leg.
+    // A table that is flat there gives no information.
     if moved.iter().all(|moved| *moved > 0.1 * mean) { moved.map(|moved| moved / mean) } else { [1.0; 6] }
 }
 
-/// What the samples of a leg are regressed on: the pulse as the gauges see it, its way, a constant, time, and the mains.
+/// Regressors of the samples of a leg: the pulse as the gauges read it, its path, a constant, time, and mains.
 struct Regression {
     ticks: u32,
     turn: [[f64; 2]; 2],
@@ -274,7 +274,7 @@ impl Regression {
             let angle = 2.0 * core::f64::consts::PI * turns;
             [libm::cos(angle), libm::sin(angle)]
         };
-        // A code counts from the tick on that gave it, and the amplifier follows a staircase: at once where it has no lag.
+        // A code acts from its tick on, and the amplifier follows the staircase: immediately if it has no lag.
         let steps = if amplifier_lag > 0.0 { 1.0 / (1.0 - libm::exp(-period / amplifier_lag)) } else { 1.0 };
         let delay = steps + sensor_lag / period;
         let share = 1.0 / f64::from(ticks);
@@ -314,13 +314,13 @@ impl Regression {
             .collect()
     }
 
-    /// Of every sample.
+    /// The weights of every sample.
     fn weights(&self) -> Vec<f64> {
         self.rows().iter().map(|row| row.iter().zip(&self.coefficients).map(|(a, b)| a * b).sum()).collect()
     }
 }
 
-/// What noise makes of what the least moved gauge or leg shows, rms.
+/// rms noise of the smallest response of a gauge or leg.
 fn noise(model: &Model, weights: &[f64], pulse: f64, readings: &Response<f64>) -> f64 {
     let step = model.sensor.step();
     let of_reading = libm::sqrt(model.sensor.noise * model.sensor.noise + step * step / 12.0);
@@ -351,7 +351,7 @@ fn is_dead(fault: Finding) -> bool {
     matches!(fault, Finding::Gauge(_, Fault::Dead) | Finding::Leg(_, Fault::Dead))
 }
 
-/// Places by which the connectors of gauges and legs may both be turned without the check seeing it.
+/// Positions by which the connectors of gauges and legs may both be rotated without detection.
 fn turned(wiring: &supervisor::Wiring<f64>, readings: &Response<f64>) -> Vec<[usize; 2]> {
     let ways = (1..36).map(|way| [way / 6, way % 6]);
     let shown = |[gauges, legs]: [usize; 2]| -> Response<f64> {
@@ -360,7 +360,7 @@ fn turned(wiring: &supervisor::Wiring<f64>, readings: &Response<f64>) -> Vec<[us
     ways.filter(|way| supervisor::explains(wiring, readings, &shown(*way))).collect()
 }
 
-/// Sets of faults that look alike to the check, and those that it does not see, as words.
+/// Sets of faults that the check cannot distinguish, and those that it does not detect, as words.
 fn alike(wiring: &supervisor::Wiring<f64>, readings: &Response<f64>) -> (Vec<Vec<u32>>, Vec<u32>) {
     let faults = single_faults();
     let (mut sets, mut unseen): (Vec<Vec<u32>>, Vec<u32>) = (Vec::new(), Vec::new());
@@ -369,7 +369,7 @@ fn alike(wiring: &supervisor::Wiring<f64>, readings: &Response<f64>) -> (Vec<Vec
         if !sees(wiring, readings, *fault) {
             unseen.push(fault.word());
         }
-        // The first that looks like it leads its set.
+        // A set starts with its first fault.
         if sets.iter().any(|set| set.contains(&fault.word())) {
             continue;
         }
@@ -393,47 +393,48 @@ fn alike(wiring: &supervisor::Wiring<f64>, readings: &Response<f64>) -> (Vec<Vec
     (sets, unseen)
 }
 
-/// What the wiring check does and does not tell, a line each.
+/// Text about what the wiring check detects and what not.
 #[must_use]
 pub fn describe(model: &Model, supervision: &Supervision) -> String {
     let Some(wiring) = &supervision.wiring else {
         let reason = model.supervisor.wiring_check.off.as_deref().unwrap_or_default();
-        return format!(
-            "  wiring check: off ({reason}); nothing tells that gauges and legs have the right sign and order\n"
-        );
+        return format!("  wiring check: off ({reason}); sign and order of gauges and legs are not checked\n");
     };
     let name = |word: &u32| Finding::of_word(*word).to_string();
     let volts =
         f64::from(wiring.height) * (model.dac.range[1] - model.dac.range[0]) / f64::from((1_i32 << model.dac.bits) - 1);
     let mut text = format!(
-        "  wiring check: each leg makes a pulse of {volts:.3} V, {:.3} um, for {:.1} ms; {:.2} s in all while arming\n",
+        "  wiring check: a pulse of {volts:.3} V, {:.3} um, {:.1} ms on each leg; {:.2} s in total while arming\n",
         libm::fabs(volts) * model.actuator.leg_gain() * 1e6,
         f64::from(wiring.ticks) * model.timing.period * 1e3,
         6.0 * f64::from(wiring.ticks) * model.timing.period
     );
     if wiring.leg_gain.is_none() {
-        text.push_str("    gains of legs are not tested until each leg has a record of its own (hysteresis.records)\n");
+        text.push_str("    gains of legs are not checked until each leg has its own record (hysteresis.records)\n");
     }
     let alike = match wiring.alike.len() {
-        0 => "    no single fault of a gauge or leg looks like another on this geometry\n".to_owned(),
-        1 => "    1 set of faults looks alike on this geometry:\n".to_owned(),
-        count => format!("    {count} sets of faults look alike on this geometry:\n"),
+        0 => "    this geometry distinguishes all single faults of gauges and legs\n".to_owned(),
+        1 => "    this geometry does not distinguish 1 set of faults:\n".to_owned(),
+        count => format!("    this geometry does not distinguish {count} sets of faults:\n"),
     };
     text.push_str(&alike);
     for set in &wiring.alike {
         text.push_str(&format!("      {}\n", set.iter().map(name).collect::<Vec<_>>().join(", ")));
     }
     if !wiring.unseen.is_empty() {
-        text.push_str(&format!("    not seen: {}\n", wiring.unseen.iter().map(name).collect::<Vec<_>>().join(", ")));
+        text.push_str(&format!(
+            "    not detected: {}\n",
+            wiring.unseen.iter().map(name).collect::<Vec<_>>().join(", ")
+        ));
     }
     for [gauges, legs] in &wiring.turned {
         text.push_str(&format!(
-            "    not seen: the connectors of all gauges turned by {gauges} places, those of all legs by {legs}\n"
+            "    not detected: the connectors of all gauges rotated by {gauges} positions and those of all legs by {legs}\n"
         ));
     }
-    text.push_str("    not seen: a common factor of all gauges or all legs");
+    text.push_str("    not detected: a common factor of all gauges or all legs");
     if let Some([low, high]) = wiring.leg_gain {
-        // As the controller has it, of small motions.
+        // As in the controller, for small motions.
         text.push_str(&format!(" that leaves {} to {} of the spec's gain", figure(low * 0.5), figure(high * 1.5)));
     }
     text.push('\n');

@@ -1,8 +1,8 @@
 //! One tick of the closed loop (8) as a matrix: the plant, sampled exactly, and the controller's tick, line by line.
 //!
 //! Everything is in modal coordinates z = V⁻¹ x, where leg motions are V⁻¹ J⁻¹ of leg coordinates and a wrench w is
-//! V⁻¹ K⁻¹ w, the leg motion that it asks for. Set-point and load are zero: only what is fed back matters. g is what the
-//! gauges show of z: z itself, or behind their lag.
+//! V⁻¹ K⁻¹ w, the leg motion that it requests. Set-point and load are zero: only feedback matters for stability. g is the
+//! reading of z: z itself, or z behind the lag of the gauges.
 //!
 //! ```text
 //! e  = N(−g) ;   s ← s + T k_I e ;   u = K⁻¹ (k_p e + s)
@@ -22,27 +22,27 @@ use specgen_numerics::{Matrix, Matrix6, spectral_radius};
 /// A linear combination of the states.
 type Signal = Vec<f64>;
 
-/// What the loop is tried under.
+/// Conditions under which the loop is checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conditions {
     /// λ = ρ/ρ̂ of the actuators.
     pub gain_ratio: f64,
-    /// Axial stiffness of the legs against the nominal one, which the controller assumes; damping ratios stay.
+    /// Axial stiffness of the legs relative to the nominal one, which the controller assumes; damping ratios are unchanged.
     pub stiffness: f64,
-    /// Damping ratios against the nominal ones.
+    /// Damping ratios relative to the nominal ones.
     pub damping: f64,
-    /// Ticks between reading the gauges and the voltage, beyond none.
+    /// Additional delay between reading the gauges and the voltage, ticks.
     pub delay: f64,
     /// Whether the platform touches the declared work piece.
     pub touching: bool,
 }
 
 impl Conditions {
-    /// As declared.
+    /// The declared platform.
     pub const NOMINAL: Self = Self { gain_ratio: 1.0, stiffness: 1.0, damping: 1.0, delay: 0.0, touching: false };
 }
 
-/// A platform and its controller, up to the tuning.
+/// A platform and its controller, without the tuning.
 #[derive(Debug, Clone)]
 pub struct ClosedLoop {
     /// Modes of the free platform.
@@ -53,9 +53,9 @@ pub struct ClosedLoop {
     pub period: f64,
     /// Amplifier lag τ, s.
     pub lag: f64,
-    /// Lag of the gauges with the filter behind them, s.
+    /// Lag of the gauges and their filter, s.
     pub gauge_lag: f64,
-    /// On feedback.
+    /// Notch on feedback.
     pub notch: Option<Notch>,
     /// D of each mode in P/F, if there is active damping.
     pub active_damping: Option<[Biquad; 6]>,
@@ -74,15 +74,15 @@ impl ClosedLoop {
         spectral_radius(&self.transition(law, tuning, conditions))
     }
 
-    /// The matrix of one tick. States that the law or the tuning does not use are left out: an idle integrator would read
-    /// as an eigenvalue of 1.
+    /// The matrix of one tick. States that the law or the tuning does not use are left out: an idle integrator would give an
+    /// eigenvalue of 1.
     #[must_use]
     pub fn transition(&self, law: Law, tuning: &Tuning, conditions: &Conditions) -> Matrix {
         Assembly::new(self, law, tuning, conditions).matrix()
     }
 
-    /// Lags of amplifier and gauges, s. One below a ten-thousandth of a tick is as good as none: the amplifier's is then that,
-    /// the gauges' nothing, which keeps the matrix exponential well scaled.
+    /// Lags of amplifier and gauges, s. A lag below a ten-thousandth of a tick is negligible: for the amplifier that bound is used,
+    /// for the gauges zero. This keeps the matrix exponential well scaled.
     pub(super) fn lags_used(&self) -> [f64; 2] {
         let shortest = 1e-4 * self.period;
         [
@@ -95,7 +95,7 @@ impl ClosedLoop {
         if touching { self.basis.couple(&self.environment) } else { [[0.0; 6]; 6] }
     }
 
-    /// diag(ω⁻²) A: from a modal force to the leg motion that it asks for.
+    /// diag(ω⁻²) A: from a modal force to the leg motion that it requests.
     fn asked(&self, modal_force: &Matrix6) -> Matrix6 {
         core::array::from_fn(|i| {
             let square = self.basis.frequencies[i] * self.basis.frequencies[i];
@@ -109,7 +109,7 @@ fn used(factors: &[f64; 6]) -> Vec<usize> {
     (0..6).filter(|&axis| factors[axis] != 0.0).collect()
 }
 
-/// Where each group of states begins.
+/// Index of the first state of each group.
 #[derive(Debug, Clone)]
 struct Layout {
     history: usize,
@@ -135,9 +135,9 @@ struct Assembly<'a> {
     drifts: bool,
     integrating: Vec<usize>,
     damped: Vec<usize>,
-    /// Where the states of a correction begin, if one is given.
+    /// First state of the correction, if there is one.
     correction: Option<usize>,
-    /// Whether these are an error on the gauges, not a correction of the request.
+    /// Whether the correction is an error of the readings instead of a correction of the request.
     on_gauges: bool,
     layout: Layout,
     next: Matrix,
@@ -197,10 +197,10 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// The matrix of a tick, and what a correction of each mode, which is added to the request, does to the states.
+    /// The matrix of a tick, and the effect of a correction of each mode, added to the request, on the states.
     fn driven(mut self) -> (Matrix, Vec<[f64; 6]>) {
         let total = self.layout.total;
-        // Six states of their own, which nothing changes.
+        // Six constant states.
         self.layout.total += 6;
         self.next = Matrix::zeros(total + 6);
         self.correction = Some(total);
@@ -301,7 +301,7 @@ impl<'a> Assembly<'a> {
             }
         }
         for (k, axis) in self.integrating.clone().into_iter().enumerate() {
-            // In units of the stiffness of its axis, so that the states are alike in size.
+            // In units of the stiffness of its axis, so that the states have similar magnitudes.
             let index = self.layout.integral + k;
             let stiffness = self.of.basis.axis_stiffness[axis];
             let gain = self.of.period * self.tuning.integral[axis] / stiffness;
@@ -317,7 +317,7 @@ impl<'a> Assembly<'a> {
         feedback
     }
 
-    /// D e, which the innovation does not see.
+    /// D e, which does not enter the innovation.
     fn active_damping(&mut self, seen: &[Signal; 6]) -> [Signal; 6] {
         let Some(sections) = self.of.active_damping.as_ref().filter(|_| self.damps_modes) else {
             return self.zeros();
@@ -360,7 +360,7 @@ impl<'a> Assembly<'a> {
         estimates
     }
 
-    /// p = K⁻¹ (K_w z − k_v v): known to the model, so the innovation does not see it. The force sensor does not lag.
+    /// p = K⁻¹ (K_w z − k_v v): known to the model, so it does not enter the innovation. The force sensor has no lag.
     fn load(&mut self, place: &[Signal; 6], seen: &[Signal; 6]) -> [Signal; 6] {
         let mut load = self.zeros();
         if self.of.measured && self.conditions.touching {
@@ -392,7 +392,7 @@ impl<'a> Assembly<'a> {
         load
     }
 
-    /// The plant under the requests that act during this tick, and the requests still on their way.
+    /// The plant under the requests that act during this tick, and the delayed requests.
     fn plant(&mut self, request: &[Signal; 6]) {
         let contact = self.of.contact(self.conditions.touching);
         let damping = self.of.damping.map(|ratio| ratio * self.conditions.damping);
@@ -432,7 +432,7 @@ impl<'a> Assembly<'a> {
 }
 
 fn add(sum: &mut Signal, factor: f64, signal: &Signal) {
-    // Zero times anything is left out, so that what does not couple stays exactly apart.
+    // Zero terms are skipped, so that decoupled states stay exactly decoupled.
     if factor == 0.0 {
         return;
     }

@@ -1,15 +1,15 @@
-//! Active damping: one second-order section a mode, designed together with gains and bandwidths. The sections are the platform's: gains that
-//! a spec gives, or a running machine is given, change nothing about them.
+//! Active damping: one second-order section per mode, designed together with gains and bandwidths. The sections depend only on the
+//! platform: gains from the spec or set on a running machine do not change them.
 //!
-//! In modal coordinates the loop of a mode is one of a single signal but for what the gains of the axes couple, which the check of the
-//! whole loop sees afterwards. With the sampled mode P, the notch N and e = 1 − z⁻¹,
+//! In modal coordinates each mode is treated as a single-input single-output loop. The coupling by the gains of the axes is left to
+//! the later check of the whole loop. With the sampled mode P, the notch N and e = 1 − z⁻¹,
 //!
 //! ```text
 //! C = N κ + A N (1 + z⁻¹ N κ) + D        κ = k_p/K + T k_I/(K e) ;   A = (ω1 (e + z⁻¹ ω2) + ω2 e)/e² ;   S = 1/(1 + P C)
 //! ```
-//! D, and for the lowest mode κ and A with it, are where a cost is least: the worst |S| over stiffness, λ, lag, delay and damping stays
-//! below 2, the peak of the compliance below half of that without feedback, |S| of slow motion and noise where the start rule has them.
-//! Bounds are penalties; where they cannot all be met the cost is what is least wrong, and the figures say so.
+//! D, and for the lowest mode κ and A with it, minimise a cost. Targets: the worst |S| over stiffness, λ, lag, delay and damping below
+//! 2, the peak of the compliance below half of that without feedback, |S| of slow motion and noise no worse than with the start rule.
+//! Bounds are penalties. If not all can be met, the result is the best compromise, and the figures show it.
 
 use core::f64::consts::PI;
 
@@ -22,36 +22,36 @@ use super::sampled::{PLACE, Plant, shown};
 use specgen_numerics::nyquist::{Complex, over, plus, sensitivity, square, times};
 use specgen_numerics::{Matrix6, simplex};
 
-/// Frequencies below, about and above the mode.
+/// Number of frequencies below, around and above the mode.
 const POINTS: [u32; 3] = [50, 100, 40];
-/// What D is designed for: stiffness, λ, delay in ticks, lag of the amplifier against its own; each with 0.7 of the damping.
+/// Design conditions of D: stiffness, λ, delay in ticks, relative lag of the amplifier; each with 0.7 of the damping.
 const STIFFNESS: [f64; 2] = [0.9, 1.1];
 const RATIO: [f64; 2] = [0.9, 1.1];
 const DELAY: [f64; 2] = [0.0, 1.0];
 const LAG: [f64; 2] = [0.7, 1.3];
-/// Stiffness under which it must be stable, nothing more.
+/// Stiffness under which the loop must only be stable.
 const WIDE: [f64; 2] = [0.6, 1.6];
-/// Largest |S| over the first, and what is aimed at over the others.
+/// Target of the largest |S|: nominal, and over the conditions.
 const SENSITIVITY: f64 = 1.95;
 const WIDE_SENSITIVITY: f64 = 4.0;
-/// Peak of the compliance aimed at, of that without feedback.
+/// Target of the compliance peak, relative to that without feedback.
 const COMPLIANCE: f64 = 0.5;
-/// |S| of slow motion is aimed at, of the start rule's, at 1/36, 1/7.2 and 1/3.6 of the lowest mode.
+/// Frequencies at which |S| of slow motion is compared with that of the start rule: the lowest mode over these.
 pub const SLOW: [f64; 3] = [36.0, 7.2, 3.6];
 const SLOWEST: f64 = 1.04;
 const MIDDLE: f64 = 0.74;
-/// Gain of D above all modes aimed at: what the gauges' noise asks of the legs.
+/// Target of the gain of D above all modes, which amplifies the gauge noise.
 const FAST: f64 = 1.0;
-/// Least Ω2 of the rule's.
+/// Least Ω2, relative to that of the rule.
 const LEAST_DRIFT: f64 = 0.3;
-/// Values of the cost from each start; and the parts of the steps with which it is tried again, as often, from the best.
+/// Evaluations of the cost from each start; and the relative steps of restarts from the best, with as many evaluations.
 const FIRST: usize = 500;
 const THEN: [f64; 5] = [0.5, -1.0, 0.7, -0.5, 0.3];
 
-/// What active damping does to a mode; ratios.
+/// Effect of active damping on a mode; ratios.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DampedMode {
-    /// Peak of the compliance, force to pose, of that without feedback.
+    /// Peak of the compliance (force to pose), relative to that without feedback.
     pub compliance: f64,
     /// Largest |S|: nominal, and over ±10 % of stiffness and λ, ±30 % of the amplifier's lag, one tick more, 0.7 of the damping.
     pub sensitivity: [f64; 2],
@@ -64,13 +64,13 @@ pub struct DampedMode {
 /// Active damping of a platform.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ActiveDamping {
-    /// D of each mode.
+    /// The section D of each mode.
     pub sections: [Biquad; 6],
-    /// What it does to each; none for a mode that is too fast to be sampled.
+    /// Effect on each mode; none for a mode that is too fast to be sampled.
     pub modes: [Option<DampedMode>; 6],
 }
 
-/// Gains and weights as a mode sees them.
+/// Gains and weights in the loop of one mode.
 #[derive(Debug, Clone, Copy)]
 struct Feedback {
     /// k_p/K and T k_I/K.
@@ -79,7 +79,7 @@ struct Feedback {
     weights: [f64; 2],
 }
 
-/// Sections, and gains and bandwidths for them in place of the rule's `start`.
+/// The sections, and gains and bandwidths that replace the rule's `start`.
 pub(super) fn design(of: &ClosedLoop, adapting: Estimator, start: &Tuning) -> (ActiveDamping, Tuning) {
     let share = shares(of, start);
     let feedback = |mode: usize, factors: [f64; 4]| Feedback {
@@ -89,7 +89,7 @@ pub(super) fn design(of: &ClosedLoop, adapting: Estimator, start: &Tuning) -> (A
             if adapting == Estimator::Pcc { start.drift_bandwidth * of.period * factors[3] } else { 0.0 },
         ],
     };
-    // Of k_p, k_I, Ω1 and Ω2.
+    // Factors of k_p, k_I, Ω1 and Ω2.
     let mut factors = [1.0; 4];
     let mut sections = [Biquad { b: [0.0; 3], a: [0.0; 2] }; 6];
     let mut modes = [None; 6];
@@ -104,13 +104,13 @@ pub(super) fn design(of: &ClosedLoop, adapting: Estimator, start: &Tuning) -> (A
         let before = modes.iter().position(|one: &Option<DampedMode>| one.is_some());
         let alike = before.is_some() && mode > 0 && frequency - of.basis.frequencies[mode - 1] < 1e-6 * frequency;
         if !alike {
-            // The lowest mode decides about the gains, too.
+            // The lowest mode also determines the gains.
             let tried = if before.is_none() { factors.len() } else { 0 };
             let cost = |x: &[f64]| {
                 let (tuned, section) = x.split_at(tried);
                 let factors = with(factors, tuned);
                 let controller = family.controller(&feedback(mode, factors), Some(section));
-                // Without a bound Ω2 would go to nothing: what it corrects is slower than all that the cost looks at.
+                // Without a bound Ω2 would vanish: it corrects errors slower than any frequency in the cost.
                 let lost = LEAST_DRIFT - factors[3];
                 family.figures(&controller).cost(&rule) + if lost > 0.0 { 10.0 * lost } else { 0.0 }
             };
@@ -148,7 +148,7 @@ fn with(mut factors: [f64; 4], tuned: &[f64]) -> [f64; 4] {
     factors
 }
 
-/// k_p/K and k_I/K of each mode: what the gains of the axes are along it.
+/// k_p/K and k_I/K of each mode: the gains of the axes, projected on it.
 fn shares(of: &ClosedLoop, tuning: &Tuning) -> [[f64; 2]; 6] {
     let along = |gains: &[f64; 6]| -> [f64; 6] {
         let coupled: Matrix6 = of.basis.couple(gains);
@@ -158,7 +158,7 @@ fn shares(of: &ClosedLoop, tuning: &Tuning) -> [[f64; 2]; 6] {
     core::array::from_fn(|i| [proportional[i], integral[i]])
 }
 
-/// Logarithms of `count` factors and a section, where the cost is least: from four weak sections, and from one that is `known`.
+/// Logarithms of `count` factors and a section with the least cost: starts from four weak sections and from `known`.
 fn search(count: usize, known: Option<&[f64]>, mut cost: impl FnMut(&[f64]) -> f64) -> Vec<f64> {
     const GAINS: [[f64; 4]; 3] = [[0.0; 4], [0.0, -0.5, 0.35, -0.8], [0.7, -0.3, 0.2, -1.0]];
     const WEAK: [[f64; 3]; 4] = [[0.02, 0.0, 0.06], [0.02, 0.06, 0.0], [0.02, -0.06, 0.0], [0.02, 0.0, -0.06]];
@@ -187,7 +187,7 @@ fn search(count: usize, known: Option<&[f64]>, mut cost: impl FnMut(&[f64]) -> f
     start
 }
 
-/// A mode under all that it is designed for.
+/// A mode under all its design conditions.
 struct Family<'a> {
     of: &'a ClosedLoop,
     adapting: Estimator,
@@ -197,14 +197,14 @@ struct Family<'a> {
     delay: Vec<Complex>,
     notch: Vec<Complex>,
     slope: Vec<Complex>,
-    /// |compliance|², without feedback, of the static one.
+    /// |compliance|² without feedback, relative to the static compliance.
     open: Vec<f64>,
     nominal: Vec<Complex>,
     narrow: Vec<Vec<Complex>>,
     wide: Vec<Vec<Complex>>,
-    /// Places of [`SLOW`] in the list of frequencies.
+    /// Indices of [`SLOW`] in the list of frequencies.
     slow: [usize; 3],
-    /// Share of the band up to half the tick rate that each frequency stands for.
+    /// Share of the band up to half the tick rate that each frequency represents.
     width: Vec<f64>,
 }
 
@@ -412,7 +412,7 @@ impl<'a> Family<'a> {
     }
 }
 
-/// ωT of every frequency that is looked at, rising to π: close about the mode, and with `wanted` among them.
+/// ωT of every checked frequency, ascending to π: dense around the mode, and including `wanted`.
 fn angles(mode: f64, wanted: [f64; 3]) -> Vec<f64> {
     let [below, about, above] = POINTS;
     let (low, high) = (0.6 * mode, if 1.6 * mode < PI { 1.6 * mode } else { 0.5 * (mode + PI) });
@@ -438,13 +438,13 @@ fn of_section(Biquad { b, a }: &Biquad, delay: Complex) -> Complex {
     over(sum(b[0], b[1], b[2]), sum(1.0, a[0], a[1]))
 }
 
-/// P of a mode: from a leg motion that is asked for to what the gauges show.
+/// P of a mode: from a requested leg motion to the readings of the gauges.
 fn response(of: &ClosedLoop, mode: usize, conditions: &Conditions, lag: f64, angles: &[f64]) -> Vec<Complex> {
     let [shortest, gauge_lag] = ClosedLoop { lag, ..of.clone() }.lags_used();
     let damping = of.damping.map(|ratio| ratio * conditions.damping);
     let plant = Plant::new(&of.basis, &damping, conditions.stiffness, &[[0.0; 6]; 6], [shortest, gauge_lag]);
     let sampled = plant.sample(of.period);
-    // Free of contact a mode is apart from the others: every sixth state.
+    // Without contact a mode is decoupled from the others: every sixth state.
     let states: Vec<usize> = (mode..sampled.transition.len()).step_by(6).collect();
     let seen = if shown(gauge_lag) == PLACE { 1 } else { 3 };
     angles

@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-/// The estimates of F that are in use.
+/// The estimates of F in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
     /// None: inverse Preisach model alone.
@@ -36,7 +36,7 @@ impl Law {
         Self::Combined(Estimator::Pcc),
     ];
 
-    /// As users write it.
+    /// Its name for users.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -55,7 +55,7 @@ impl Law {
         !matches!(self, Self::Feedforward(_))
     }
 
-    /// Whether active damping is at work.
+    /// Whether active damping acts.
     pub(super) fn damps_modes(self) -> bool {
         matches!(self, Self::Combined(_))
     }

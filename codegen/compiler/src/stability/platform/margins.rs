@@ -1,4 +1,4 @@
-//! How far a stable loop is from its limits.
+//! Margins of a stable loop.
 
 use core::f64::consts::{PI, TAU};
 
@@ -11,14 +11,14 @@ use super::search::largest_stable;
 use super::{nominal_conditions, worst_radius};
 use specgen_numerics::eigenvalues;
 
-/// No margin is looked for beyond these.
+/// Upper ends of the search for margins.
 const LARGEST_RATIO: f64 = 10.0;
 const LARGEST_GAIN: f64 = 30.0;
 const LARGEST_DELAY: f64 = 5.0;
 /// Closed-loop modes with more damping than this are not listed.
 const WELL_DAMPED: f64 = 0.5;
 
-/// What one control mode can stand.
+/// Margins of one control mode.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModeMargins {
     /// The control mode, such as `P/F pcc`.
@@ -56,7 +56,7 @@ impl ModeMargins {
         let everywhere = |tuning: &Tuning, conditions: Conditions| {
             contacts.iter().all(|&touching| stable(tuning, &Conditions { touching, ..conditions }))
         };
-        // What was met nowhere is beyond the range looked at.
+        // A limit that was not found is beyond the range.
         let inside = |found: Option<f64>, high: f64| found.filter(|x| *x < high);
         let gain_ratio_limit = inside(
             largest_stable(ratios[1], LARGEST_RATIO, 1.2, |gain_ratio| {
@@ -77,7 +77,7 @@ impl ModeMargins {
             largest_stable(1.0, largest_gain, 1.2, |gain| everywhere(&tuning.scaled(gain, gain), Conditions::NOMINAL)),
             largest_gain,
         );
-        // The search works by factors: 1 + delay from 1 on.
+        // The search is over factors: 1 + delay, from 1 on.
         let delay_margin_ticks = inside(
             largest_stable(1.0, 1.0 + LARGEST_DELAY, 1.2, |x| {
                 everywhere(tuning, Conditions { delay: x - 1.0, ..Conditions::NOMINAL })
@@ -114,7 +114,7 @@ fn closed_modes(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning) -> (Option<
             slowest = 1.0 / decay;
         }
         let frequency = libm::hypot(decay, turn);
-        // A real pole on the left is half the tick rate, not a mode.
+        // A negative real pole is half the tick rate, not a mode.
         if turn > 0.0 && turn < (1.0 - 1e-9) * PI / closed_loop.period && decay < WELL_DAMPED * frequency {
             modes.push(ClosedMode { frequency: frequency / TAU, damping_ratio: decay / frequency });
         }

@@ -3,14 +3,14 @@
 use super::RestDynamics;
 use specgen_numerics::{Matrix6, generalized_modes, inverse_of_modes, multiply6, transpose6};
 
-/// A coupling smaller than this against the largest is rounding: modes that do not couple are kept exactly apart, which
-/// lets the closed loop fall into small blocks.
+/// Relative coupling below which it is only rounding. Uncoupled modes are kept exactly decoupled, which splits the closed loop into
+/// small blocks.
 const UNCOUPLED: f64 = 1e-12;
 
 /// Modal coordinates z = V⁻¹ x of the pose from rest, Vᵀ M V = I.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModalBasis {
-    /// ω in rising order, rad/s.
+    /// ω in ascending order, rad/s.
     pub frequencies: [f64; 6],
     /// V: modal → pose coordinates; column i is mode i.
     pub from_modal: Matrix6,
@@ -26,7 +26,7 @@ impl ModalBasis {
         let gram = multiply6(&transpose6(&plant.jacobian), &plant.jacobian);
         let stiffness = gram.map(|row| row.map(|x| x * axial_stiffness));
         let (squares, from_modal) = generalized_modes(&stiffness, &plant.mass)?;
-        // Rounding leaves a free motion a stiffness of some 1e-16 of the largest.
+        // Rounding gives a free motion a stiffness of about 1e-16 of the largest.
         let held = squares.iter().all(|square| *square > 1e-12 * squares[5]);
         held.then(|| Self {
             frequencies: squares.map(libm::sqrt),
@@ -51,13 +51,13 @@ impl ModalBasis {
         coupled
     }
 
-    /// V⁻¹ K⁻¹ = diag(ω⁻²) Vᵀ, applied to one axis of a wrench: the leg motion that it asks for, in modal coordinates.
+    /// V⁻¹ K⁻¹ = diag(ω⁻²) Vᵀ, applied to one axis of a wrench: the leg motion that it requests, in modal coordinates.
     pub fn compliance(&self, axis: usize) -> [f64; 6] {
         core::array::from_fn(|i| self.from_modal[axis][i] / (self.frequencies[i] * self.frequencies[i]))
     }
 }
 
-/// A row of V without its rounding.
+/// A row of V with rounding errors set to zero.
 fn clean(row: [f64; 6]) -> [f64; 6] {
     let largest = row.iter().fold(0.0, |a: f64, x| if x.abs() > a { x.abs() } else { a });
     row.map(|x| if x.abs() <= UNCOUPLED * largest { 0.0 } else { x })

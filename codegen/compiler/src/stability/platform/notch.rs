@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::modes::ModalBasis;
 use specgen_numerics::Matrix6;
 
-/// A mode above this part of half the tick rate gets no section: sampled, it shows up elsewhere.
+/// A mode above this share of half the tick rate gets no section, because it is nearly aliased.
 const HIGHEST: f64 = 0.9;
 
 /// y = b0 x + s1 ; s1 ← b1 x − a1 y + s2 ; s2 ← b2 x − a2 y.
@@ -20,7 +20,7 @@ pub struct Biquad {
 }
 
 impl Biquad {
-    /// Lets everything pass.
+    /// The identity.
     pub const IDENTITY: Self = Self { b: [1.0, 0.0, 0.0], a: [0.0, 0.0] };
 
     /// (s² + 2 ζ ω s + ω²) / (s² + 2 ζ_d ω s + ω²), bilinear with the mode itself prewarped; `frequency` in rad/s below π/T.
@@ -41,7 +41,7 @@ impl Biquad {
     }
 }
 
-/// V · six sections · V⁻¹.
+/// The notch V · six sections · V⁻¹.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Notch {
     /// V⁻¹: pose coordinates (m, rad) → modal.

@@ -1,4 +1,4 @@
-//! The loop, opened at the legs: what comes back to their displacement for one that is added to it.
+//! The open loop, cut at the requested leg displacements.
 
 use core::f64::consts::TAU;
 
@@ -8,17 +8,17 @@ use super::sampled::Plant;
 use specgen_numerics::nyquist::Complex;
 
 impl ClosedLoop {
-    /// The open loop of each axis x to θz at `frequencies` (Hz, below half the tick rate), the other axes open as well: gain
-    /// (a ratio) and phase (degrees, falling without a jump from that of the lowest frequency). With λ = 1, free of contact.
+    /// The open loop of each axis x to θz at `frequencies` (Hz, below half the tick rate), with the other axes open as well: gain
+    /// (a ratio) and phase (degrees, unwrapped from that of the lowest frequency). With λ = 1, free of contact.
     #[must_use]
     pub fn open_loop(&self, law: Law, tuning: &Tuning, frequencies: &[f64]) -> [Vec<[f64; 2]>; 6] {
         let at = |gain_ratio| self.transition(law, tuning, &Conditions { gain_ratio, ..Conditions::NOMINAL });
-        // λ stands before what the request does to the plant and nowhere else: that part of the tick is the way back.
+        // λ multiplies only the effect of the request on the plant, so the difference is the loop's return path.
         let (open, closed) = (at(0.0), at(1.0));
         let size = open.size();
         let plant = Plant::new(&self.basis, &self.damping, 1.0, &[[0.0; 6]; 6], self.lags_used());
         let input = plant.sample(self.period).input;
-        // In modal coordinates a request moves the drive of its own mode, the first six states, and through that the rest.
+        // In modal coordinates a request acts on the drive of its own mode, one of the first six states.
         let request: [Vec<f64>; 6] = core::array::from_fn(|i| {
             (0..size).map(|state| (closed[(i, state)] - open[(i, state)]) / input[i][i]).collect()
         });
@@ -35,7 +35,7 @@ impl ClosedLoop {
                 })
                 .collect();
             solve(&mut rows);
-            // Modal, then along each axis: the trace of V L V⁻¹ in its place.
+            // Modal, then along each axis: the diagonal of V L V⁻¹.
             let modal: [[Complex; 6]; 6] = core::array::from_fn(|i| {
                 core::array::from_fn(|k| {
                     (0..size).fold([0.0; 2], |sum, state| {
@@ -62,7 +62,7 @@ impl ClosedLoop {
     }
 }
 
-/// Gaussian elimination with the largest pivot: the columns behind the square become its inverse times themselves.
+/// Gaussian elimination with partial pivoting: the columns after the square are multiplied by its inverse.
 pub(super) fn solve(rows: &mut [Vec<Complex>]) {
     let size = rows.len();
     let square = |v: Complex| v[0] * v[0] + v[1] * v[1];
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn columns_behind_the_square_become_what_solves_it() {
-        // (2 + i) x = 5 and, behind a swap, x + y = 1.
+        // (2 + i) x = 5 and, after a row swap, x + y = 1.
         let mut rows = vec![vec![[0.0, 0.0], [1.0, 0.0], [0.0, 2.0]], vec![[2.0, 1.0], [0.0, 0.0], [5.0, 0.0]]];
         solve(&mut rows);
         let close = |a: Complex, b: Complex| (a[0] - b[0]).abs() < 1e-12 && (a[1] - b[1]).abs() < 1e-12;

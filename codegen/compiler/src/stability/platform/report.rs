@@ -20,12 +20,12 @@ pub fn describe(design: &Design) -> String {
         design.modes[0].damping_ratio,
         design.modes[5].damping_ratio
     );
-    let whose = if design.lead_given { "as the spec says" } else { "the delay from command to pose" };
+    let whose = if design.lead_given { "from the spec" } else { "the delay from command to pose" };
     let _ = writeln!(text, "  lead: {:.4} ms, {whose}", design.lead * 1e3);
     let notch = if design.notch.is_some() { "with the modal notch" } else { "without a notch" };
     let _ = writeln!(
         text,
-        "  level estimate stable up to {:.1} rad/s {notch}; here {:.1}, drift {:.2} rad/s",
+        "  level estimate stable up to {:.1} rad/s {notch}; used {:.1}, drift {:.2} rad/s",
         design.bandwidth_limit, design.combined.level_bandwidth, design.combined.drift_bandwidth
     );
     let _ = write!(text, "{}", gains("gains", &design.combined));
@@ -33,7 +33,7 @@ pub fn describe(design: &Design) -> String {
     if let Some(damping) = &design.damping {
         text.push_str(&damped(design, damping));
     }
-    let touching = if design.touching { "free and touching the declared work piece" } else { "free of contact" };
+    let touching = if design.touching { "free and touching the declared work piece" } else { "without contact" };
     let _ = writeln!(text, "  every control mode, checked {touching}:");
     let _ = writeln!(
         text,
@@ -75,7 +75,7 @@ fn gains(name: &str, tuning: &Tuning) -> String {
     text
 }
 
-/// What active damping does, mode by mode.
+/// Effect of active damping, mode by mode.
 fn damped(design: &Design, damping: &ActiveDamping) -> String {
     let lowest = design.modes[0].frequency / TAU;
     let mut text = format!(

@@ -1,4 +1,4 @@
-//! The platform at rest, with the loop closed: what the noise of gauges and amplifiers makes of its pose.
+//! Noise of the pose at rest in closed loop, from the noise of gauges and amplifiers.
 
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::{Law, Tuning};
@@ -6,10 +6,10 @@ use super::sampled::shown;
 use specgen_numerics::{Matrix, Matrix6, multiply6, steady_covariances, transpose6};
 
 impl ClosedLoop {
-    /// Variance of the pose as the gauges show it (m², rad²), at rest under `law`: that made by the gauges, whose noise has the factor
-    /// `gauges` in pose coordinates (columns are independent, of unit variance), and that made by the amplifiers, `amplifiers` likewise,
-    /// in what the legs ask of the pose. Both are white from tick to tick, and a voltage is held over a tick. Hysteresis and the
-    /// steps of the converters are left out.
+    /// Variance of the measured pose (m², rad²) at rest under `law`: that due to the gauges, then that due to the amplifiers. `gauges`
+    /// maps independent noise of unit variance (columns) to noise of the readings in pose coordinates; `amplifiers` maps it to noise of
+    /// the pose that the legs request. Both are white from tick to tick, and a voltage is held over a tick. Hysteresis and the steps of
+    /// the converters are not included.
     #[must_use]
     pub fn at_rest(&self, law: Law, tuning: &Tuning, gauges: &Matrix6, amplifiers: &Matrix6) -> [[f64; 6]; 2] {
         let modal = |factor: &Matrix6| multiply6(&self.basis.to_modal, factor);
@@ -17,7 +17,7 @@ impl ClosedLoop {
         let (_, reading) = self.driven(law, tuning, &Conditions::NOMINAL, true);
         let inputs = [applied(&reading, &modal(gauges)), applied(&request, &modal(amplifiers))];
         let [by_gauges, by_amplifiers] = steady_covariances(&transition, [&inputs[0], &inputs[1]]);
-        // The noise of a reading moves nothing before the next tick: it adds to what it has moved.
+        // The noise of a reading moves the platform only from the next tick on, so the two are independent.
         let direct = multiply6(gauges, &transpose6(gauges));
         let of_states = |covariance: &Matrix| self.of_pose(covariance, shown(self.lags_used()[1]));
         let gauges = of_states(&by_gauges);
@@ -33,7 +33,7 @@ impl ClosedLoop {
     }
 }
 
-/// B G: what independent noise does to the states by way of six inputs.
+/// B G: effect of independent noise on the states through six inputs.
 fn applied(input: &[[f64; 6]], factor: &Matrix6) -> Vec<Vec<f64>> {
     let column = |row: &[f64; 6], k: usize| row.iter().zip(factor).fold(0.0, |sum, (x, row)| sum + x * row[k]);
     input.iter().map(|row| (0..6).map(|k| column(row, k)).collect()).collect()

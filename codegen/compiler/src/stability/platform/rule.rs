@@ -1,8 +1,8 @@
-//! Start values of gains and bandwidths where a spec gives none.
+//! Tuning rule for gains and bandwidths that the spec leaves out.
 //!
 //! From Ω, the bandwidth at which the level estimate alone becomes unstable: Ω1 = Ω/4.5, Ω2 = 0.044 Ω1, k_I = Ω/12 · K,
-//! k_p = 0.05 K (without notch 0.005), P alone k_I = Ω/2 · K, with K = diag(Jᵀ k_a J). Then all of them × 0.85 until the
-//! loop holds with λ = 2, with stiffness ± 15 % at λ = 1.4, and with one more tick of delay at λ = 1.3, each with 0.7 of the
+//! k_p = 0.05 K (without notch 0.005), P alone k_I = Ω/2 · K, with K = diag(Jᵀ k_a J). Then all of them are multiplied by 0.85 until
+//! the loop is stable with λ = 2, with stiffness ± 15 % at λ = 1.4, and with one more tick of delay at λ = 1.3, each with 0.7 of the
 //! damping, free and touching the declared work piece.
 
 use super::closed_loop::{ClosedLoop, Conditions};
@@ -21,11 +21,11 @@ const INTEGRAL_ALONE: f64 = 2.0;
 /// k_p/K with and without notch.
 const PROPORTIONAL: f64 = 0.05;
 const PROPORTIONAL_PLAIN: f64 = 0.005;
-/// One step of shrinking, and how many are tried: 0.85⁴⁰ is 0.0015.
+/// Factor of one step, and the number of steps: 0.85⁴⁰ is 0.0015.
 const SHRINK: f64 = 0.85;
 const SHRINKS: u32 = 40;
 
-/// What a rule's values must hold under.
+/// Conditions under which the rule's values must be stable.
 const ROBUST: [Conditions; 4] = [
     Conditions { gain_ratio: 2.0, damping: 0.7, ..Conditions::NOMINAL },
     Conditions { gain_ratio: 1.4, damping: 0.7, stiffness: 0.85, ..Conditions::NOMINAL },
@@ -33,8 +33,8 @@ const ROBUST: [Conditions; 4] = [
     Conditions { gain_ratio: 1.3, damping: 0.7, delay: 1.0, ..Conditions::NOMINAL },
 ];
 
-/// Ω, rad/s: first level bandwidth at which EWMA alone is unstable on the nominal platform; 1/T_s, a weight of 1, if none
-/// is; zero if even a ten-thousandth of that is.
+/// Ω, rad/s: lowest level bandwidth at which EWMA alone is unstable on the nominal platform; 1/T_s, a weight of 1, if none
+/// is unstable; zero if even a ten-thousandth of that is.
 #[must_use]
 pub fn bandwidth_limit(closed_loop: &ClosedLoop) -> f64 {
     let fastest = 1.0 / closed_loop.period;
@@ -45,9 +45,9 @@ pub fn bandwidth_limit(closed_loop: &ClosedLoop) -> f64 {
     .unwrap_or(0.0)
 }
 
-/// Gains and bandwidths of P/F: those given stay, the others follow the rule.
+/// Gains and bandwidths of P/F: those in the spec are kept, the others follow the rule.
 ///
-/// With active damping what it was designed beside, `damped`, stands in place of the rule's start.
+/// With active damping, the values of its design, `damped`, replace the rule's start values.
 pub(super) fn combined(
     closed_loop: &ClosedLoop,
     limit: f64,
@@ -69,7 +69,7 @@ pub(super) fn combined(
     shrink(closed_loop, &free, fixed, ratios, |factor| given.over(&start.scaled(factor, factor)))
 }
 
-/// Where the rule begins.
+/// Start values of the rule.
 fn start(closed_loop: &ClosedLoop, limit: f64) -> Tuning {
     let stiffness = &closed_loop.basis.axis_stiffness;
     let level_bandwidth = limit / LEVEL;
@@ -82,7 +82,7 @@ fn start(closed_loop: &ClosedLoop, limit: f64) -> Tuning {
     }
 }
 
-/// Puts active damping into the loop; what it is, and the gains and bandwidths that it was designed beside.
+/// Adds active damping to the loop. Returns it with the gains and bandwidths of its design.
 pub(super) fn damped(closed_loop: &mut ClosedLoop, limit: f64, adapting: Estimator) -> (ActiveDamping, Tuning) {
     let (damping, tuning) = damping::design(closed_loop, adapting, &start(closed_loop, limit));
     closed_loop.active_damping = Some(damping.sections);
@@ -100,7 +100,7 @@ pub(super) fn alone(closed_loop: &ClosedLoop, limit: f64, ratios: [f64; 2]) -> T
     shrink(closed_loop, &[Law::Position], &[], ratios, |factor| start.scaled(factor, factor))
 }
 
-/// What the spec gives of a tuning.
+/// The values of a tuning in the spec.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TuningKeys<'a> {
     pub(super) gains: Option<&'a Tuning>,
@@ -109,7 +109,7 @@ pub(super) struct TuningKeys<'a> {
 }
 
 impl TuningKeys<'_> {
-    /// What is given, in place of the rule's.
+    /// The rule's values, replaced by those of the spec.
     fn over(&self, rule: &Tuning) -> Tuning {
         let mut tuning = *rule;
         if let Some(gains) = self.gains {
@@ -133,10 +133,10 @@ pub(super) fn is_stable(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, con
     closed_loop.spectral_radius(law, tuning, conditions) <= LARGEST_RADIUS
 }
 
-/// The first tuning on the way down that holds; the last one tried if none does, which the check then refuses.
+/// The first stable tuning on the way down; the last one tried if none is, which the check then refuses.
 ///
-/// A condition that a `fixed` law does not hold under, whose numbers are the spec's, is not asked of the others: the rule
-/// cannot fix it.
+/// If a `fixed` law, with values from the spec, is unstable under a condition, the other laws do not have to be stable under it: the
+/// rule cannot fix that.
 fn shrink(
     closed_loop: &ClosedLoop,
     laws: &[Law],

@@ -3,32 +3,32 @@
 //! ```text
 //! τ ṗ = d − p ;   z̈ + √κ diag(2 ζ ω) ż + (κ diag(ω²) + Vᵀ K_e V) z = κ diag(ω²) p ;   τ_g ġ = z − g
 //! ```
-//! d is the leg motion asked for, z the pose, g what the gauges show of it, all in modal coordinates; κ scales the axial stiffness of the legs while
-//! their damping ratios stay, and K_e is the stiffness of a work piece that the platform touches.
+//! d is the requested leg motion, z the pose, g its reading, all in modal coordinates. κ scales the axial stiffness of the legs at
+//! constant damping ratios, and K_e is the stiffness of a work piece that the platform touches.
 
 use super::modes::ModalBasis;
 use specgen_numerics::{Matrix, Matrix6, exponential};
 
-/// Where the states of each group begin, six each: lagged drive, displacement, velocity over ω, and what the gauges show.
+/// First state of each group of six: lagged drive, displacement, velocity over ω, and reading.
 const DRIVE: usize = 0;
 pub(super) const PLACE: usize = 6;
 const SPEED: usize = 12;
 const SHOWN: usize = 18;
 
-/// The plant of one set of conditions.
+/// The plant under one set of conditions.
 #[derive(Debug, Clone)]
 pub(super) struct Plant {
-    /// [A B; 0 0] over [p, z, ż/ω, g, d], per s; g only behind gauges that lag.
+    /// [A B; 0 0] over [p, z, ż/ω, g, d], per s; g only if the gauges lag.
     continuous: Matrix,
     gauge_lag: f64,
 }
 
-/// States of a plant whose gauges have this lag (s): without one they show the displacement itself.
+/// Number of states of a plant whose gauges have this lag (s): without lag they read the displacement itself.
 pub(super) fn states(gauge_lag: f64) -> usize {
     if gauge_lag > 0.0 { SHOWN + 6 } else { SHOWN }
 }
 
-/// Where what the gauges show begins.
+/// First state of the readings.
 pub(super) fn shown(gauge_lag: f64) -> usize {
     if gauge_lag > 0.0 { SHOWN } else { PLACE }
 }

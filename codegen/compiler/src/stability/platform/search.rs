@@ -3,10 +3,10 @@
 /// Bisections of the interval that holds the limit.
 const BISECTIONS: u32 = 12;
 
-/// Largest `x` in [low, high] below which everything looked at is stable: scans upwards, each step `ratio` times the one
-/// before, and bisects the first crossing. Beyond a first unstable stretch a loop may be stable again, but nobody should
-/// rely on it. Values at the lower end that count as unstable only because they are too slow are passed over. None if
-/// nothing is stable; `high` if nothing unstable was met above something stable.
+/// Largest `x` in [low, high] below which every checked value is stable: scans upwards, each step `ratio` times the one
+/// before, and bisects the first crossing. Beyond a first unstable range a loop may be stable again, but nobody should
+/// rely on it. Values at the lower end that count as unstable only because they are too slow are skipped. None if
+/// nothing is stable; `high` if nothing above the first stable value is unstable.
 pub(super) fn largest_stable(low: f64, high: f64, ratio: f64, stable: impl Fn(f64) -> bool) -> Option<f64> {
     let mut good = low;
     while !stable(good) {

@@ -1,4 +1,4 @@
-//! Files replaced one by one, where folders cannot be swapped. A step that fails takes back those before it.
+//! Replaces files one by one if folders cannot be swapped. If a step fails, the steps before it are undone.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,7 +9,7 @@ use super::super::error::WriteError;
 use super::super::found::{MANIFEST, Manifest};
 use super::{Change, NEW, OLD, put_manifest, sync};
 
-/// Moves what is replaced or no longer made into the work folder, and the new files from there into the output.
+/// Moves replaced and obsolete files into the work folder, and the new files from there into the output.
 pub(super) fn one_by_one(change: &Change<'_>) -> Result<(), WriteError> {
     let mut undo = Undo::default();
     let done = replace(change, &mut undo);
@@ -21,7 +21,7 @@ pub(super) fn one_by_one(change: &Change<'_>) -> Result<(), WriteError> {
             Err(WriteError::HalfWritten { dir: change.dir.to_owned(), action, source })
         }
         done => {
-            // Files of ours that nothing needs any more; the next run tries again.
+            // Obsolete files; if this fails, the next run removes them.
             let _ = fs::remove_dir_all(change.work.join(OLD));
             let _ = fs::remove_dir_all(change.work.join(NEW));
             done
@@ -36,7 +36,7 @@ fn replace(change: &Change<'_>, undo: &mut Undo) -> Result<(), WriteError> {
     let stale = || known.iter().filter(|path| *path != MANIFEST && !files.contains_key(*path));
     for path in stale().chain(files.keys()) {
         let (here, aside) = (dir.join(path), work.join(OLD).join(path));
-        // Not only what is known: an empty folder, or a file that cargo made, may lie where one of ours goes.
+        // Also for unknown entries: an empty folder, or a file of cargo, may have the path of one of ours.
         if fs::symlink_metadata(&here).is_ok() {
             if let Some(folder) = aside.parent() {
                 fs::create_dir_all(folder).map_err(|e| WriteError::io("create", folder, e))?;
@@ -56,7 +56,7 @@ fn replace(change: &Change<'_>, undo: &mut Undo) -> Result<(), WriteError> {
         .try_for_each(|folder| sync(&dir.join(folder)))
         .and_then(|()| put_manifest(work, &Manifest::of(files), dir))
         .map_err(|e| WriteError::io("write", &manifest, e))?;
-    // Folders that only the earlier output had; one that still holds something stays.
+    // Folders that only the earlier output had, unless they are not empty.
     for path in stale() {
         for folder in Path::new(path).ancestors().skip(1).filter(|folder| !folder.as_os_str().is_empty()) {
             let _ = fs::remove_dir(dir.join(folder));
@@ -65,8 +65,7 @@ fn replace(change: &Change<'_>, undo: &mut Undo) -> Result<(), WriteError> {
     Ok(())
 }
 
-/// Puts a manifest in place that knows the old and the new version of each file: from now on a kill leaves nothing that the next
-/// run does not recognise.
+/// Writes a manifest with the old and the new version of each file, so that after a kill the next run recognises every file.
 fn know_both(change: &Change<'_>, undo: &mut Undo) -> io::Result<()> {
     let (place, before) = (change.dir.join(MANIFEST), change.work.join(OLD).join(MANIFEST));
     fs::create_dir_all(change.work.join(OLD))?;
@@ -74,7 +73,7 @@ fn know_both(change: &Change<'_>, undo: &mut Undo) -> io::Result<()> {
     both.add(change.earlier);
     if change.earlier.is_empty() {
         put_manifest(change.work, &both, change.dir)?;
-        // To be undone, it goes where nobody looks.
+        // Undoing moves it to the work folder.
         undo.moves.push((before, place));
     } else {
         fs::copy(&place, &before)?;
@@ -84,7 +83,7 @@ fn know_both(change: &Change<'_>, undo: &mut Undo) -> io::Result<()> {
     Ok(())
 }
 
-/// What was done so far, to be taken back in reverse order.
+/// Steps done so far, to be undone in reverse order.
 #[derive(Default)]
 struct Undo {
     folders: Vec<PathBuf>,

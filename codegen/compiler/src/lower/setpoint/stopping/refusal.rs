@@ -1,14 +1,14 @@
-//! What is said of a stop that leaves workspace or strokes, and what speed or limits would do.
+//! Findings about stops that leave workspace or strokes, with the speed or limits that would avoid it.
 
 use super::super::{AXES, amount, stop};
 use super::{Leaves, Stopping};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Model, TrajectoryKind};
 
-/// A stop of which less than this is within begins at the end, or beyond it.
+/// If less than this share of a stop is inside, the stop begins at the bound or beyond it.
 const LEAST_SHARE: f64 = 1e-6;
 
-/// A stop that its axis has no room for. An axis without any room at all is kept still, and needs none.
+/// A stop that is longer than the room of its axis. An axis without any room is locked and needs none.
 pub(super) fn too_long(
     model: &Model,
     stop: &Stopping,
@@ -28,7 +28,7 @@ pub(super) fn too_long(
         to_standstill
     };
     let message = format!(
-        "a {} along {} that is stopped at {}/s goes on by {coasted}, but workspace and strokes end {} from the bias pose at the furthest",
+        "a {} along {} that is stopped at {}/s continues for {coasted}, but workspace and strokes end at most {} from the bias pose",
         stop.what,
         AXES[worst],
         amount(worst, stop.speed[worst]),
@@ -36,7 +36,7 @@ pub(super) fn too_long(
     );
     let slower = down(stop.speed[worst] / excess(worst) * 1e6);
     let unit = if worst < 3 { "um" } else { "urad" };
-    let mut help = format!("at most {slower} {unit}/s fits");
+    let mut help = format!("at most {slower} {unit}/s stops in time");
     help += &harder(model, stop, room, limits);
     if stop.coasted[worst] > 0.0 {
         help += "; or lower control.setpoint.stale_ticks";
@@ -46,11 +46,11 @@ pub(super) fn too_long(
     Some(Diagnostic::at(&model.spans, &keys, codes::STOP_LEAVES, message, help))
 }
 
-/// The least limits with which the stop fits on every axis, as lines of a spec; nothing if what goes by before it is too long.
+/// The least limits with which the stop fits on every axis, as lines of a spec; empty if the distance before the stop is too long.
 fn harder(model: &Model, stop: &Stopping, room: &[f64; 6], limits: &stop::Limits) -> String {
     let period = model.timing.period;
     let moving = |axis: &usize| room[*axis] > 0.0;
-    // Of all axes, which stop together.
+    // All axes stop together.
     let time = (0..6).filter(moving).fold(stop.time, |time, axis| {
         let left = 2.0 * (room[axis] - stop.fixed(axis)) / stop.speed[axis];
         if left < time { left } else { time }
@@ -74,18 +74,18 @@ fn harder(model: &Model, stop: &Stopping, room: &[f64; 6], limits: &stop::Limits
     )
 }
 
-/// A stop on the way of trajectory `index`.
+/// A stop during trajectory `index` that ends outside.
 pub(super) fn leaves(model: &Model, index: usize, name: &str, kind: &TrajectoryKind, leaves: &Leaves) -> Diagnostic {
     let (key, rate) = kind.rate();
     let fix = match key {
-        "frequency" => format!("at most {} Hz stops within", down(rate * leaves.share)),
-        time => format!("a {time} of at least {} ms stops within", up(rate / leaves.share * 1e3)),
+        "frequency" => format!("at most {} Hz stops in time", down(rate * leaves.share)),
+        time => format!("a {time} of at least {} ms stops in time", up(rate / leaves.share * 1e3)),
     };
-    // On the way it is outside before it stops: no time helps.
+    // If the path itself is outside, more time does not help.
     let fix =
         if leaves.share > LEAST_SHARE { fix } else { "the path itself goes that far: make it smaller".to_owned() };
     let message =
-        format!("trajectory \"{name}\": another command on the way would bring it to rest with {}", leaves.end);
+        format!("trajectory \"{name}\": a command that interrupts it would bring it to rest with {}", leaves.end);
     let help = format!("{fix}; or raise control.setpoint.stop_acceleration and stop_jerk");
     Diagnostic::at(&model.spans, &[&format!("trajectory[{index}].{key}")], codes::STOP_LEAVES, message, help)
 }
@@ -104,7 +104,7 @@ fn three_digits(value: f64, whole: fn(f64) -> f64) -> f64 {
     if value <= 0.0 {
         return 0.0;
     }
-    // By whole powers of ten, so that the number shown is that number.
+    // Uses whole powers of ten, so that the printed number is exact.
     let places = 2.0 - libm::floor(libm::log10(value));
     let step = libm::pow(10.0, places.abs());
     if places < 0.0 { whole(value / step) * step } else { whole(value * step) / step }

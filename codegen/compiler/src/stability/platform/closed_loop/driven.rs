@@ -1,12 +1,12 @@
-//! What six inputs do to the loop: a correction of the request, or an error of the motion.
+//! Response of the loop to six inputs: a correction of the request, or an error of the motion.
 
 use super::{Assembly, ClosedLoop, Conditions, Estimator, Law, Tuning, shown};
 use specgen_numerics::nyquist::{Complex, times};
 use specgen_numerics::{Matrix, Resolvent};
 
 impl ClosedLoop {
-    /// The matrix of a tick, and what six inputs in modal coordinates do to the states: a correction of the request, or an error of what
-    /// the gauges show.
+    /// The matrix of a tick, and the effect of six inputs in modal coordinates on the states: a correction of the request, or an error
+    /// of the readings.
     pub(in super::super) fn driven(
         &self,
         law: Law,
@@ -19,8 +19,8 @@ impl ClosedLoop {
         assembly.driven()
     }
 
-    /// What the gauges show at the end of an interval by the correction that is given for it, both in modal coordinates, at each of the angles
-    /// ωT_s: T(z) = z C (z − A)⁻¹ B of the transition A, row by row, as (real, imaginary).
+    /// Response of the readings at the end of an interval to the correction for that interval, both in modal coordinates, at each of
+    /// the angles ωT_s: T(z) = z C (z − A)⁻¹ B of the transition A, row by row, as (real, imaginary).
     #[must_use]
     pub fn correction_response(
         &self,
@@ -41,7 +41,7 @@ impl ClosedLoop {
         found
     }
 
-    /// What the gauges show at the end of each interval of requests that nothing is fed back to, all in modal coordinates, from rest.
+    /// Readings at the end of each interval under open-loop requests, all in modal coordinates, from rest.
     #[must_use]
     pub fn without_feedback(&self, requests: &[[f64; 6]]) -> Vec<[f64; 6]> {
         let law = Law::Feedforward(Estimator::Invhys);
@@ -54,8 +54,8 @@ impl ClosedLoop {
         found
     }
 
-    /// What feedback leaves of an error that the gauges would show at the beginning of each interval without it, from rest, all in modal
-    /// coordinates.
+    /// Closed-loop error for an error that the readings would have at the start of each interval without feedback, from rest, all in
+    /// modal coordinates.
     #[must_use]
     pub fn left(&self, law: Law, tuning: &Tuning, errors: &[[f64; 6]]) -> Vec<[f64; 6]> {
         let (transition, input) = self.driven(law, tuning, &Conditions::NOMINAL, true);
@@ -64,7 +64,7 @@ impl ClosedLoop {
         let mut last = [0.0; 6];
         let mut found = Vec::with_capacity(errors.len());
         over_time(&transition, &input, errors, |states| {
-            // What the feedback did in the intervals before is shown beside the error.
+            // The reading is the error plus the effect of earlier feedback.
             if let Some(error) = given.next() {
                 found.push(core::array::from_fn(|mode| error[mode] - last[mode]));
             }
