@@ -1,5 +1,5 @@
-//! A shared library may leave symbols undefined unless told otherwise; then the proof that no panic path remains (see
-//! `src/lib.rs`) would never fail.
+//! Makes undefined symbols an error of the linker. By default a shared library may have them, and the proof that no panic path
+//! remains (see `src/lib.rs`) would never fail.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

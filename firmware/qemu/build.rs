@@ -1,9 +1,9 @@
-//! Tells the linker where the layout is.
+//! Gives the linker the memory layout.
 
 use std::path::PathBuf;
 
 fn main() {
-    // Cargo always sets it for a build script.
+    // Cargo always sets this for a build script.
     let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
     println!("cargo:rustc-link-search={}", root.display());
     println!("cargo:rustc-link-arg-bins=-Tlink.x");

@@ -1,5 +1,5 @@
-// The program of an STM32 board, included by the `main.rs` of each: what is its own are `clocks`, `pins`, `spi`, `BOARD`,
-// `RECORD`, `PASSES`, `prepare` and `memory_intact`.
+// The program of an STM32 board, included by the `main.rs` of each board, which defines `clocks`, `pins`, `spi`, `BOARD`, `RECORD`,
+// `PASSES`, `prepare` and `memory_intact`.
 
 use specgen_board::{Exchange, SampleMemory, TargetStatus};
 use specgen_stm32::{converters, timer};
@@ -8,20 +8,20 @@ use specgen_stm32::{converters, timer};
 type Board = converters::OnBoard<spi::Registers, { pins::OUTPUT }, { clocks::DELAY }>;
 
 const _: () =
-    assert!(timer::period(clocks::TIMER).is_some(), "timing.period is nothing that the timer of this board counts");
+    assert!(timer::period(clocks::TIMER).is_some(), "the timer of this board cannot count timing.period");
 
-/// For specgen's estimate of the tick.
+/// Figures for specgen's estimate of the tick.
 #[unsafe(no_mangle)]
 static SPECGEN_TIMES: specgen_stm32::times::Times = clocks::TIMES;
 
-/// A tick without its timer, under a name that the analyses of the image know.
+/// A tick without its timer, under a symbol that the analyses of the image look up.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn specgen_tick(board: &mut Board, exchange: &mut Exchange, noticed: TargetStatus) -> bool {
     board.timed_tick(exchange, noticed, timer::now)
 }
 
-/// Of the watchdog, µs: some hundred ticks, and starting the converters anew.
+/// Timeout of the watchdog, µs: some hundred ticks, and a restart of the converters.
 const WATCHDOG: u32 = 20_000;
 
 #[rtic::app(device = stm32_metapac, peripherals = false)]
@@ -61,7 +61,7 @@ mod app {
         line: Line<Link>,
     }
 
-    // What is large is made where it stays: a move of some kilobytes would go over the stack.
+    // Large values are created in place: moving some kilobytes would use the stack.
     #[init(local = [
         machine: MaybeUninit<Machine> = MaybeUninit::uninit(),
         exchange: Exchange = Exchange::new(),
@@ -80,14 +80,14 @@ mod app {
     fn init(mut context: init::Context) -> (Shared, Local) {
         let core = &mut context.core;
         prepare(core);
-        // Or the linker leaves it out.
+        // Keeps the symbols in the image.
         core::hint::black_box((&raw const crate::SPECGEN_TIMES, &raw const crate::BOARD));
         cycles::start(&mut core.DCB, &mut core.DWT);
         let hertz = clocks::start();
         let wiring = pins::take(hertz);
-        // From here on a start that does not come to its end is a reset.
+        // From here on, a start that hangs ends in a reset.
         let mut watchdog = Watchdog::start(pins::WATCHDOG, WATCHDOG);
-        // No handler of its own: what nobody handles stops with the amplifiers off.
+        // It has no handler of its own: the default handler stops with the amplifiers off.
         if !supply::watch(pins::SUPPLY) {
             safe::stop();
         }
@@ -105,7 +105,7 @@ mod app {
         exchange.prepare();
 
         let mut schedule = Schedule::new(period, 0);
-        // The bus of the USART has half the clock of its timers.
+        // The bus clock of the USART is half that of the timers.
         let line = Line::open(&mut core.NVIC, hertz / 2, context.local.ring, context.local.answer);
         timer::start(&mut schedule);
         watchdog.feed();
@@ -115,7 +115,7 @@ mod app {
         )
     }
 
-    // One below the highest, which is the voltage detector's.
+    // One below the highest priority, which the voltage detector has.
     #[task(binds = TIM2, priority = 15, shared = [exchange, board], local = [schedule, health, watchdog, stop, fault])]
     fn tick(context: tick::Context) {
         let local = context.local;
@@ -136,7 +136,7 @@ mod app {
         });
     }
 
-    /// Requests of the host. Its interrupt is nobody's but theirs that `serial` has.
+    /// Requests of the host. Only the interrupts of `serial` pend this task.
     #[task(
         binds = CEC,
         priority = 1,
@@ -167,7 +167,7 @@ mod app {
     }
 }
 
-/// What happens where nothing should: amplifiers off, then the watchdog resets the part.
+/// Handlers of unexpected events: amplifiers off, then the watchdog resets the part.
 mod safe {
     use core::panic::PanicInfo;
 
@@ -175,8 +175,8 @@ mod safe {
 
     use specgen_stm32::enable;
 
-    /// Amplifiers off and nothing more: the watchdog is fed by the tick alone, and resets the part within 20 ms. Reset leaves
-    /// the enable line to its pull-down.
+        /// Switches the amplifiers off and waits: only the tick feeds the watchdog, so it resets the part within 20 ms. After a reset the
+        /// pull-down holds the enable line low.
     pub fn stop() -> ! {
         cortex_m::interrupt::disable();
         loop {
@@ -184,20 +184,20 @@ mod safe {
         }
     }
 
-    /// Initialisation and the link have paths that end here; the tick has none, see docs/bring-up.md.
+    /// Only initialisation and the link can reach this; the tick cannot panic, see docs/bring-up.md.
     #[panic_handler]
     fn panic(_: &PanicInfo<'_>) -> ! {
         stop()
     }
 
     #[exception]
-    // SAFETY: called by the vector table alone; does not return.
+    // SAFETY: called only through the vector table; does not return.
     unsafe fn HardFault(_: &ExceptionFrame) -> ! {
         stop()
     }
 
     #[exception]
-    // SAFETY: called by the vector table alone; does not return.
+    // SAFETY: called only through the vector table; does not return.
     unsafe fn DefaultHandler(_: i16) -> ! {
         stop()
     }

@@ -1,9 +1,9 @@
-//! Tells the linker where the layout is, which is that of `../qemu`.
+//! Gives the linker the memory layout, that of `../qemu`.
 
 use std::path::PathBuf;
 
 fn main() {
-    // Cargo always sets it for a build script.
+    // Cargo always sets this for a build script.
     let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
     println!("cargo:rustc-link-search={}", root.join("../qemu").display());
     println!("cargo:rustc-link-arg-bins=-Tlink.x");

@@ -1,19 +1,18 @@
-//! Cases of a test as text, in `tests/cases/`: what is given, and below it what comes of it.
+//! Test cases as text in `tests/cases/`: the input, and below it the expected result.
 //!
 //! A case is a block of lines; an empty line ends it. Its first line names it. Every other line begins with a letter or
-//! sign and a space; what lines mean is up to the test, but for `- old` and `+ new`, which change a text, and `> …`,
-//! which is what came of the case. `SPECGEN_BLESS=1` writes the lines with `>` again. A block that begins with `#` is a
-//! comment.
+//! sign and a space. The test defines their meaning, except for `- old` and `+ new`, which change a text, and `> …`, the
+//! expected result. `SPECGEN_BLESS=1` updates the lines with `>`. A block that begins with `#` is a comment.
 
 use std::fs;
 use std::path::Path;
 
-/// One case, without what came of it.
+/// One case without its result.
 #[derive(Debug, Clone)]
 pub struct Case {
     /// The first line.
     pub title: String,
-    /// Sign and text of the other lines; lines with one sign that follow each other are one text.
+    /// Sign and text of the other lines; consecutive lines with the same sign are one text.
     pub parts: Vec<(char, String)>,
 }
 
@@ -64,7 +63,7 @@ pub fn replaced(text: &str, old: &str, new: &str) -> String {
     text.replacen(old, new, 1)
 }
 
-/// Cases of a file, each with the lines that say what came of it.
+/// Cases of a file, each with the lines of its expected result.
 ///
 /// # Panics
 /// If there is no such file, or no case in it.
@@ -81,10 +80,10 @@ pub fn read(file: &Path) -> Vec<(Case, String)> {
     cases
 }
 
-/// Compares what comes of every `step`th case of a file with what stands there, or writes it where `SPECGEN_BLESS` is set.
+/// Compares the result of every `step`th case of a file with the expected one, or updates it if `SPECGEN_BLESS` is set.
 ///
 /// # Panics
-/// With all that differs.
+/// With all differences.
 pub fn hold(file: &Path, step: usize, mut run: impl FnMut(&Case) -> String) {
     let is_new = std::env::var_os("SPECGEN_BLESS").is_some();
     let (mut stale, mut lines) = (Vec::new(), Vec::new());

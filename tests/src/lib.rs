@@ -1,7 +1,7 @@
 //! Helpers that the cross-crate tests share. The tests themselves are in `tests/tests/`.
 //!
-//! Controllers are emitted into `target/tests`, built there for the host and for the emulated microcontrollers, and run
-//! through their words: what is tested is what a user gets.
+//! Controllers are emitted into `target/tests`, built there for the host and for the emulated microcontrollers, and executed
+//! through their words: the tests use what a user gets.
 
 pub mod cases;
 
@@ -38,10 +38,10 @@ pub fn repository() -> PathBuf {
     here.parent().unwrap_or(here).to_owned()
 }
 
-/// A new folder of this process below `target/tests/scratch`, which the next whole test run empties. Nobody else writes there.
+/// A new folder of this process below `target/tests/scratch`, which the next complete test run empties. Used exclusively.
 ///
 /// # Panics
-/// If it cannot be made.
+/// If it cannot be created.
 #[must_use]
 pub fn scratch(name: &str) -> PathBuf {
     static MADE: AtomicU32 = AtomicU32::new(0);
@@ -52,21 +52,20 @@ pub fn scratch(name: &str) -> PathBuf {
     folder
 }
 
-/// Where the image of a board stays with its spec, for what runs after the tests.
+/// Folder of a board's image and spec, which are kept for later steps.
 #[must_use]
 pub fn kept(board: &str) -> PathBuf {
     builds().join("boards").join(board)
 }
 
-/// Where cargo builds images: shared, so that what they have in common is compiled once, but not by two tests at once, as cargo
-/// would let one wait for the other.
+/// Target folder for images. It is shared, so that common dependencies are compiled once, but not used by two tests at the same
+/// time, because cargo would make one wait for the other.
 #[must_use]
 pub fn image_target() -> PathBuf {
     builds().join(format!("build-{}", worker()))
 }
 
-/// How much of what only gains by length is run: the short length in the test run, the long one where `SPECGEN_FULL` is set, as
-/// `cargo xtask test --full` does.
+/// Length of a test that benefits from more data: `short` normally, `long` if `SPECGEN_FULL` is set, as by `cargo xtask test --full`.
 #[must_use]
 pub fn length<T>(short: T, long: T) -> T {
     if std::env::var_os("SPECGEN_FULL").is_some() { long } else { short }
@@ -84,21 +83,21 @@ fn builds() -> PathBuf {
 
 /// A compiled spec with its workspace on disk.
 pub struct Emitted {
-    /// What compiled.
+    /// The compiled spec.
     pub compiled: Arc<Compilation>,
     /// The workspace.
     pub dir: PathBuf,
 }
 
-/// Where workspaces are built, one after the other: cargo names crates by their place, so what a workspace shares with the one
-/// before, above all the runtime, is compiled once. A folder for each worker of the test run.
+/// Folder in which workspaces are built one after the other. Cargo identifies crates by their path, so parts shared with the last
+/// workspace, above all the runtime, are compiled once. Each worker of the test run has its own folder.
 struct Stage {
     folder: PathBuf,
     _lock: fs::File,
 }
 
 impl Stage {
-    /// Puts a workspace there. Files that are there with the same content keep their time, by which cargo goes.
+    /// Copies a workspace there. Unchanged files keep their modification time, which cargo uses.
     fn of(workspace: &Path) -> Self {
         let folder = builds().join(format!("stage-{}", worker()));
         fs::create_dir_all(&folder).expect("target is writable");
@@ -124,7 +123,7 @@ fn worker() -> String {
     std::env::var("SPECGEN_TEST_WORKER").unwrap_or_default()
 }
 
-/// Files below `dir` with their content, by path relative to it, but for what cargo built there.
+/// Files below `dir` with their content, by path relative to it, except those built by cargo.
 fn files(dir: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut files = BTreeMap::new();
     let mut open = vec![dir.to_owned()];
@@ -143,7 +142,7 @@ fn files(dir: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 impl Emitted {
-    /// Compiles a spec of `specs/` with `edits` (old text, new text) and writes its workspace to a folder of its own.
+    /// Compiles a spec of `specs/` with `edits` (old text, new text) and writes its workspace to a separate folder.
     ///
     /// # Panics
     /// If an edit finds nothing to replace, or the spec is refused.
@@ -169,7 +168,7 @@ impl Emitted {
         Self::of(name, one)
     }
 
-    /// The reference as it stands in `specs/`: the same digest as that of `firmware/controller`.
+    /// The unchanged reference of `specs/`: its digest is that of `firmware/controller`.
     ///
     /// # Panics
     /// As [`Emitted::new`].
@@ -180,7 +179,7 @@ impl Emitted {
         Self::of(name, compiled.into())
     }
 
-    /// A spec that was compiled, with its workspace on disk.
+    /// A compiled spec with its workspace on disk.
     ///
     /// # Panics
     /// If it cannot be written.
@@ -210,7 +209,7 @@ impl Emitted {
         Controller::load(&self.library()).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// The law on the constants of the compiled spec: the bits of [`Emitted::controller`], and nothing is built.
+    /// The law with the constants of the compiled spec: the bits of [`Emitted::controller`] without a build.
     ///
     /// # Panics
     /// If the compiled spec cannot be run.
@@ -219,7 +218,7 @@ impl Emitted {
         specgen::run_time::controller(&self.compiled.ir).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// The emitted crate for a microcontroller; none, with a line that says so, where tools are missing and not required.
+    /// The emitted crate for a microcontroller; none, with a printed line, if tools are missing and not required.
     ///
     /// # Panics
     /// If it does not build.
@@ -230,7 +229,7 @@ impl Emitted {
         Some(target::build_image(&stage.folder, mcu, &image_target()).unwrap_or_else(|error| panic!("{error}")))
     }
 
-    /// Input rows of every kind that a tick may meet, for leg or pose set-points.
+    /// Input rows of every kind that may occur in a tick, for leg or pose set-points.
     ///
     /// # Panics
     /// If the controller lacks a word.
@@ -248,7 +247,7 @@ impl Emitted {
         stimulus::record(description, &setpoints, rows, seed).expect("the controller has set-point and gauge words")
     }
 
-    /// Input rows of every kind that a tick of a platform may meet.
+    /// Input rows of every kind that may occur in a tick of a platform.
     ///
     /// # Panics
     /// If the controller is not one in task space.
@@ -267,7 +266,7 @@ impl Emitted {
     }
 }
 
-/// Compiles a spec of `specs/` after edits of its text, with further records beside those of `specs/records/`.
+/// Compiles a spec of `specs/` after edits of its text, with records in addition to those of `specs/records/`.
 ///
 /// # Panics
 /// If an edit finds nothing to replace, or the spec is refused.
@@ -279,7 +278,7 @@ pub fn compile_edited(name: &str, spec: &str, edits: &[(&str, &str)], more: &[(&
         assert!(text.contains(old), "{spec} has no `{old}`");
         text = text.replace(old, new);
     }
-    // Beside a copy of the records, as a user would have it: an unchanged spec is the same controller wherever it is compiled.
+    // Next to a copy of the records, as for a user: an unchanged spec gives the same controller in any folder.
     let scratch = scratch(name);
     let folder = scratch.join(Path::new(spec).parent().unwrap_or(Path::new("")));
     let records = scratch.join("records");
@@ -307,17 +306,17 @@ pub fn edited(spec: &str, edits: &[(&str, &str)]) -> String {
     edits.iter().fold(text, |text, (old, new)| cases::replaced(&text, old, new))
 }
 
-/// What the compiler says of a text that lies in `specs/`.
+/// Compiles a text as if it were in `specs/`.
 ///
 /// # Errors
-/// The findings, where it is refused.
+/// The findings, if it is refused.
 pub fn compile_text(text: &str) -> Result<Compilation, Vec<Diagnostic>> {
     let (name, dir) = ("platform.toml".to_owned(), repository().join("specs"));
     let source = SpecSource { display_name: name, text: text.to_owned(), dir };
     compile_source(source).map_err(|refused| refused.findings)
 }
 
-/// The host's trace of recorded inputs, with the spec's settings but for the named ones.
+/// The host's trace of recorded inputs, with the spec's settings except the named ones.
 ///
 /// # Panics
 /// If the controller has no such setting or refuses it.
@@ -345,7 +344,7 @@ pub fn assert_same_bits(what: &str, image: &Image, config: &[u64], host: &Trace)
 /// Input, output and digest of a supervised tick.
 pub type Row = (Vec<u64>, Vec<u64>, u64);
 
-/// The first tick of a recorded machine in which an image has another output or digest, and what else the image said.
+/// The first tick of a recorded machine in which output or digest of an image differ, and the other results of the image.
 ///
 /// # Panics
 /// If the image does not run.
@@ -360,7 +359,7 @@ pub fn machine_difference(image: &Image, config: &[u64], rows: &[Row]) -> (Optio
     (differs, result)
 }
 
-/// The same, where no tick differs.
+/// The same, asserting that no tick differs.
 ///
 /// # Panics
 /// With `what` and the first tick that differs.
@@ -370,7 +369,7 @@ pub fn assert_same_machine(what: &str, image: &Image, config: &[u64], rows: &[Ro
     result
 }
 
-/// The simulated platform of a compiled spec, with such legs.
+/// The simulated platform of a compiled spec, with these legs.
 ///
 /// # Panics
 /// If the spec is of six legs.
@@ -381,7 +380,7 @@ pub fn scenario(compiled: &Compilation, leg: &LegParameters, seed: u64) -> Platf
     machine::scenario(&compiled.model, task, &specimen, &Noise::of(&specimen), seed)
 }
 
-/// Three classes of legs: plays with creep, Bouc-Wen with creep over five decades, plays that depend on the rate with the same creep.
+/// Three classes of legs: plays with creep, Bouc-Wen with creep over five decades, rate-dependent plays with the same creep.
 #[must_use]
 pub fn leg_class(number: u64) -> LegParameters {
     let [plays, bouc_wen] = [LegParameters::reference(), LegParameters::bouc_wen()];
@@ -423,7 +422,7 @@ pub fn integers(trace: &Trace, name: &str) -> Vec<u64> {
 /// Text files below `dir`, by path relative to it.
 ///
 /// # Panics
-/// If there are none, or one is no text.
+/// If there are none, or one is not text.
 #[must_use]
 pub fn sources(dir: &Path) -> BTreeMap<String, String> {
     let files = files(dir);

@@ -59,8 +59,7 @@ const BANNED_TYPES: [&str; 40] = [
     "Said", "Seen", "Shown", "Told", "Tried", "Wanted",
 ];
 /// Folders that [`BANNED_TYPES`] does not cover yet: their parts are moving to other crates.
-const MOVING: [&str; 4] =
-    ["codegen/cli", "codegen/operate", "codegen/report", "codegen/studies"];
+const MOVING: [&str; 4] = ["codegen/cli", "codegen/operate", "codegen/report", "codegen/studies"];
 
 /// Texts of the Markdown files below a folder, by path from the repository.
 fn markdown(folder: &Path, found: &mut Vec<(String, String)>) {

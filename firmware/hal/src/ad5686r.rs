@@ -1,15 +1,15 @@
-//! Two AD5686R: eight DAC channels of 16 bits, of which six drive amplifiers.
+//! Two AD5686R: eight DAC channels of 16 bits, six of which drive amplifiers.
 //!
-//! From the data sheet (AD5686R/AD5685R/AD5684R Rev. B); stand-alone mode, both parts on one SPI, each with its SYNC.
+//! From the data sheet (AD5686R/AD5685R/AD5684R Rev. B); stand-alone mode, both parts on one SPI, each with its own SYNC.
 //!
 //! | what | as used here |
 //! | --- | --- |
 //! | frame | 24 bits, MSB first: command C3–C0, address D C B A (one bit a channel), 16 data bits |
-//! | SPI | mode 1: data are taken on falling SCLK; SYNC low for the frame, high for 30 ns between frames |
+//! | SPI | mode 1: data are sampled on falling SCLK; SYNC low for the frame, high for 30 ns between frames |
 //! | SCLK | at most 50 MHz where nothing comes back: 25 MHz or less is used |
 //! | SDO | valid up to 25 ns after rising SCLK, for VLOGIC of 2.7 V and more and 20 pF; taken on the falling edge, half a cycle later. Frames that only write go by `write` of the SPI, frames whose answer counts by `transfer_in_place`, which is to have a clock slow enough for SDO and its wire: docs/bring-up.md has the figures |
-//! | LDAC | held high; a low pulse of 15 ns or more moves all input registers to the outputs of both parts at once |
-//! | read-back | command 1001 with one channel: the next frame brings out its DAC register in the lower 16 bits |
+//! | LDAC | held high; a low pulse of 15 ns or more transfers all input registers to the outputs of both parts simultaneously |
+//! | read-back | command 1001 with one channel: the next frame returns its DAC register in the lower 16 bits |
 //! | power-up | all channels on, at zero scale with RSTSEL low, internal reference on; RESET high, GAIN low 2.5 V or high 5 V |
 //!
 //! | command | word |
@@ -24,10 +24,10 @@
 //! | no daisy chain | `0x800000` |
 //! | read back | `0x9a0000` |
 //!
-//! Legs 0 to 2 are channels A, B, C of the first part, legs 3 to 5 those of the second. In every tick one channel is read back, of the
-//! parts in turn, so each within six ticks: what it gives must be the code written in the tick before. One that gave another code is a
-//! fault in every tick until it gives the right one. Question and answer go while the gauges are converted. Codes of a tick
-//! alternate between the parts: SYNC of one is high for as long as a frame of the other lasts.
+//! Legs 0 to 2 are channels A, B, C of the first part, legs 3 to 5 those of the second. Every tick reads back one channel, alternating
+//! between the parts, so each channel once in six ticks. It must return the code written in the tick before. A channel that returned
+//! another code is a fault in every tick until it returns the right one. The read-back takes place during the conversion of the gauges.
+//! The codes of a tick alternate between the parts, so that SYNC of one is high during a frame of the other.
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::OutputPin;
@@ -39,11 +39,11 @@ use crate::{Amplifiers, CHANNELS, Edge, Fault};
 pub const LEGS_PER_PART: usize = 3;
 /// Largest code.
 pub const LARGEST: i32 = 0xffff;
-/// SYNC high between two frames of a part that follow each other, and from the last frame to LDAC, ns.
+/// SYNC high between two consecutive frames of a part, and from the last frame to LDAC, ns.
 pub const SYNC_HIGH: u32 = 30;
-/// LDAC low where the program gives it ([`Pulse`](crate::Pulse)), ns.
+/// Width of an LDAC pulse from the program ([`Pulse`](crate::Pulse)), ns.
 pub const LDAC_LOW: u32 = 30;
-/// Patterns that channel D, which drives nothing, must give back before a part is believed.
+/// Patterns that channel D, which drives nothing, must return at start.
 pub const PATTERNS: [u16; 2] = [0xa55a, 0x5aa5];
 
 /// A channel of a part: its address bit.
@@ -65,25 +65,25 @@ const ALL: u8 = 0xf;
 /// Commands to a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Command {
-    /// Nothing; brings out what was asked for.
+    /// No operation; returns the requested register.
     NoOperation,
-    /// To the input register: goes to the output with the next LDAC.
+    /// Writes the input register, which the next LDAC transfers to the output.
     WriteInput(Channel, u16),
-    /// To input and DAC register, at once.
+    /// Writes input and DAC register immediately.
     WriteThrough(Channel, u16),
-    /// To input and DAC registers of all channels, at once.
+    /// Writes input and DAC registers of all channels immediately.
     WriteThroughAll(u16),
     /// All channels on.
     PowerUp,
-    /// LDAC works on all channels.
+    /// LDAC acts on all channels.
     LdacUnmasked,
-    /// As after power-up.
+    /// Software reset to the power-up state.
     Reset,
     /// Internal reference on.
     ReferenceOn,
-    /// Stand-alone.
+    /// Stand-alone mode.
     NoDaisyChain,
-    /// The next frame brings out this DAC register.
+    /// The next frame returns this DAC register.
     ReadBack(Channel),
 }
 
@@ -115,13 +115,13 @@ struct Part<SPI> {
 }
 
 impl<SPI: SpiDevice> Part<SPI> {
-    /// Sends a frame; what comes back meanwhile does not count.
+    /// Sends a frame and ignores the answer.
     #[inline]
     fn send(&mut self, command: Command) -> Result<(), Fault> {
         self.spi.write(&command.frame()).map_err(|_| Fault::Bus)
     }
 
-    /// What stands in the register of a channel: the lower 16 bits of the frame after the question.
+    /// The register of a channel: the lower 16 bits of the frame after the read-back command.
     #[inline]
     fn read_back(&mut self, channel: Channel, delay: &mut impl DelayNs) -> Result<u16, Fault> {
         self.send(Command::ReadBack(channel))?;
@@ -132,7 +132,7 @@ impl<SPI: SpiDevice> Part<SPI> {
         Ok(u16::from_be_bytes([high, low]))
     }
 
-    /// Power-up state, outputs at zero, and proof that the part answers.
+    /// Resets the part to its power-up state with outputs at zero, and checks that it answers.
     fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), Fault> {
         const SETTINGS: [Command; 6] = [
             Command::Reset,
@@ -168,13 +168,13 @@ pub struct Ad5686rPair<FIRST, SECOND, LDAC, ENABLE, DELAY> {
     delay: DELAY,
     /// Whether the amplifiers are enabled.
     on: bool,
-    /// What stands in the DAC registers, as far as is known.
+    /// Contents of the DAC registers, if known.
     written: Option<[u16; CHANNELS]>,
-    /// Whether the codes that were written last are others than those before them, which are out.
+    /// Whether the last written codes differ from those before, which are at the outputs.
     changed: bool,
-    /// Channels whose last answer was another code: a bit for each `turn`.
+    /// Channels whose last answer was a wrong code: a bit for each `turn`.
     refuted: u8,
-    /// Which channel is read back next, 0 to 5: A of the first part, A of the second, B of the first.
+    /// The channel to read back next, 0 to 5: A of the first part, A of the second, B of the first, and so on.
     turn: u8,
 }
 
@@ -218,13 +218,13 @@ where
 {
     const BITS: u32 = 16;
 
-    /// Amplifiers disabled, both parts at power-up state with outputs at zero, and both proved to answer: channel D of each
-    /// gives [`PATTERNS`] back.
+        /// Disables the amplifiers, resets both parts with outputs at zero, and checks that both answer: channel D of each must return
+        /// [`PATTERNS`].
     fn start(&mut self) -> Result<(), Fault> {
         (self.written, self.refuted) = (None, 0);
         self.enable(false)?;
         self.ldac.hold();
-        // Both, so that one part that does not answer leaves the other at zero.
+        // Start both, so that the other is at zero even if one does not answer.
         let first = self.first.start(&mut self.delay);
         let second = self.second.start(&mut self.delay);
         first.and(second)?;
@@ -234,7 +234,7 @@ where
 
     /// Two frames to one part.
     fn ask(&mut self) -> Result<(), Fault> {
-        // The codes of the last tick are out by now, and these are not to go out by halves.
+        // The codes of the last tick are at the outputs, and the new ones must not be output partially.
         self.ldac.hold();
         let Some([a, b, c, d, e, f]) = self.written else { return Ok(()) };
         let (channel, [of_first, of_second]) = match self.turn / 2 {
@@ -252,12 +252,12 @@ where
         if self.refuted == 0 { Ok(()) } else { Err(Fault::ReadBack) }
     }
 
-    /// Six frames and LDAC. Codes go out even where one part does not take them: the other needs its own.
+    /// Six frames and LDAC. If one part fails, the other still gets its codes.
     fn write(&mut self, codes: &[i32; CHANNELS]) -> Result<(), Fault> {
         if codes.iter().any(|&code| !(0..=LARGEST).contains(&code)) {
             return Err(Fault::Code);
         }
-        // Checked: 16 bits.
+        // Checked to have 16 bits.
         let [a, b, c, d, e, f] = codes.map(|code| code as u16);
         self.changed = self.written.take() != Some([a, b, c, d, e, f]);
         let mut sent = Ok(());

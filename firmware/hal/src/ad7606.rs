@@ -1,11 +1,11 @@
-//! AD7606, AD7606B (16 bits), AD7608, AD7606C-18 (18 bits): eight channels sampled at once, read over SPI.
+//! AD7606, AD7606B (16 bits), AD7608, AD7606C-18 (18 bits): eight channels sampled simultaneously, read over SPI.
 //!
 //! From the data sheets (AD7606 Rev. F, AD7608 Rev. B); hardware mode, one serial data line.
 //!
 //! | what | as used here |
 //! | --- | --- |
 //! | interface | PAR/SER/BYTE SEL high, DB15/BYTE SEL low: serial; all channels on DOUTA, V1 first |
-//! | SPI | mode 2 (SCLK idles high): CS falling puts out the MSB, SCLK falling samples, rising brings the next bit |
+//! | SPI | mode 2 (SCLK idles high): the falling edge of CS outputs the MSB, that of SCLK samples it, the rising edge outputs the next bit |
 //! | SCLK | at most 23.5 MHz at VDRIVE above 4.75 V, 17 MHz at 3.3 V: 16.7 MHz or less is used |
 //! | start | CONVST A and B together: low for 25 ns or more, then the rising edge samples all channels |
 //! | BUSY | high within 45 ns of that edge, low when all are converted: 4.2 µs at most (AD7608: 4.2 µs) without oversampling |
@@ -15,8 +15,8 @@
 //! | OS0–2 | low: no oversampling |
 //! | RESET | high for 50 ns (AD7606B: 3 µs) after power-up, then 300 µs until the first start |
 //!
-//! V1 to V6 are the gauges. V8 sees the 2.5 V reference of the DACs: with it a part that answers, but not with what its
-//! inputs are, is found in the tick. V7 is left for the loop-back of bring-up.
+//! V1 to V6 are the gauges. V8 is connected to the 2.5 V reference of the DACs: it detects within a tick a part that answers with
+//! wrong values. V7 is reserved for the loop-back at bring-up.
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{InputPin, OutputPin};
@@ -26,22 +26,22 @@ use crate::{CHANNELS, Edge, Fault, Gauges};
 
 /// Inputs of the part.
 pub const INPUTS: usize = 8;
-/// CONVST low where the program gives the edge ([`Pulse`](crate::Pulse)), ns.
+/// CONVST low if the program generates the edge ([`Pulse`](crate::Pulse)), ns.
 pub const CONVST_LOW: u32 = 30;
-/// From the rising edge of CONVST until BUSY is looked at first, ns.
+/// Time from the rising edge of CONVST to the first poll of BUSY, ns.
 pub const BUSY_DELAY: u32 = 50;
-/// From that edge until all are converted at most, ns.
+/// Longest time from that edge to the end of all conversions, ns.
 pub const CONVERSION: u64 = 4_200;
-/// Between two looks at BUSY, ns.
+/// Time between two polls of BUSY, ns.
 pub const POLL: u32 = 50;
-/// Looks at BUSY until it is given up: 10 µs and more, twice the longest conversion.
+/// Polls of BUSY before the timeout: at least 10 µs, twice the longest conversion.
 pub const POLLS: u32 = 200;
-/// RESET high, ns.
+/// Width of the RESET pulse, ns.
 pub const RESET_HIGH: u32 = 4_000;
-/// From the end of RESET until the first start, ns.
+/// Time from the end of RESET to the first start, ns.
 pub const RESET_WAIT: u32 = 300_000;
 
-/// What V8 must show, as codes of the part: 0 at the lowest input.
+/// Permitted range of V8, as codes of the part: 0 at the lowest input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
     /// Lowest code.
@@ -60,7 +60,7 @@ impl Window {
 
 /// The code of an input of so many mV at a range of ±`range` mV.
 const fn code_of(millivolts: i32, range: i32, bits: u32) -> i32 {
-    // In 64 bits: 40 V in mV times 2^18. Cast back it is below 2^19, for an input within twice the range.
+    // In 64 bits: 40 V in mV times 2^18. The result is below 2^19 for an input within twice the range.
     ((((millivolts + range) as i64) << bits) / (2 * range as i64)) as i32
 }
 
@@ -72,10 +72,10 @@ pub trait BusyLine {
     /// [`Fault::Pin`] if it cannot be read.
     fn is_high(&mut self) -> Result<bool, Fault>;
 
-    /// Every fall from here on counts.
+    /// Latches falling edges from now on.
     fn watch(&mut self) {}
 
-    /// Whether a conversion has ended since [`BusyLine::watch`], or is under way. A pin that latches no edge tells only the latter.
+    /// Whether a conversion has ended since [`BusyLine::watch`], or is running. A pin without a latch detects only the latter.
     ///
     /// # Errors
     /// [`Fault::Pin`] if it cannot be read.
@@ -112,18 +112,18 @@ where
 {
     const WIDTH: () = assert!(BITS == 16 || BITS == 18, "AD7606 family: codes of 16 or 18 bits");
 
-    /// Takes the pins. `start` is CONVST A and B together; nothing is driven until [`Gauges::start`].
+    /// A driver on these pins. `start` is CONVST A and B together; nothing is driven until [`Gauges::start`].
     pub const fn new(spi: SPI, start: START, busy: BUSY, reset: RESET, delay: DELAY, window: Window) -> Self {
         let () = Self::WIDTH;
         Self { spi, start, busy, reset, delay, window }
     }
 
-    /// Reads all eight inputs as they were at the edge of CONVST that [`Gauges::begin`] gave: V1 to V8, 0 to 2^BITS − 1. Takes
-    /// what is left of 4 µs and the transfer; gives up after 10 µs without an end of the conversion.
+        /// Reads all eight inputs as sampled at the CONVST edge of [`Gauges::begin`]: V1 to V8, 0 to 2^BITS − 1. Takes the rest of the
+        /// 4 µs and the transfer; times out if the conversion does not end within 10 µs.
     ///
     /// # Errors
-    /// Every [`Fault`] but [`Fault::NotStarted`], [`Fault::ReadBack`] and [`Fault::Code`]; [`Fault::Reference`] only after the
-    /// rest was found good.
+    /// Every [`Fault`] except [`Fault::NotStarted`], [`Fault::ReadBack`] and [`Fault::Code`]; [`Fault::Reference`] only after the
+    /// rest was found valid.
     pub fn inputs(&mut self) -> Result<[i32; INPUTS], Fault> {
         self.converted()?;
         // Zeros are sent: SDI of the parts that have one ignores them in hardware mode.
@@ -171,7 +171,7 @@ where
 {
     const BITS: u32 = BITS as u32;
 
-    /// Resets the part, as it must be after power-up, and samples once. Takes 0.3 ms.
+    /// Resets the part, which is required after power-up, and samples once. Takes 0.3 ms.
     fn start(&mut self) -> Result<(), Fault> {
         self.start.hold();
         self.reset.set_high().map_err(|_| Fault::Pin)?;
@@ -179,7 +179,7 @@ where
         self.reset.set_low().map_err(|_| Fault::Pin)?;
         self.delay.delay_ns(RESET_WAIT);
         let read = self.begin().and_then(|()| self.read());
-        // Or what gives the edge might still be at it when a tick asks for the next one.
+        // Otherwise the timer might still be running when a tick requests the next edge.
         self.start.hold();
         read.map(|_| ())
     }
@@ -196,20 +196,20 @@ where
     }
 }
 
-/// Eight codes in two's complement, most significant bit first and without gaps, as codes from 0 on.
+/// Converts eight codes in two's complement, most significant bit first and without gaps, to codes from 0 on.
 fn unpack<const BITS: usize>(frame: &[u8; BITS]) -> [i32; INPUTS] {
     let mut codes = [0; INPUTS];
     let mut bytes = frame.iter();
     let (mut bits, mut held) = (0_u32, 0);
     for code in &mut codes {
         while held < BITS {
-            // Eight codes of BITS bits are BITS bytes: none is missing.
+            // Eight codes of BITS bits are exactly BITS bytes.
             bits = bits << 8 | u32::from(bytes.next().copied().unwrap_or_default());
             held += 8;
         }
         held -= BITS;
         let value = bits >> held & ((1 << BITS) - 1);
-        // The sign bit turned over: the lowest input, −2^(BITS−1), becomes 0. At most 18 bits.
+        // Inverting the sign bit maps the lowest input, −2^(BITS−1), to 0. At most 18 bits.
         *code = (value ^ 1 << (BITS - 1)) as i32;
     }
     codes

@@ -1,8 +1,8 @@
-//! What can be wrong with a converter.
+//! Faults of a converter.
 
 use core::fmt;
 
-/// Why a converter is not believed. The numbers go over the link.
+/// Fault of a converter. The numbers are sent over the link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Fault {
@@ -10,24 +10,24 @@ pub enum Fault {
     Bus = 1,
     /// A pin cannot be driven or read.
     Pin = 2,
-    /// The conversion did not begin: BUSY stayed low. No supply, no CONVST, or no part.
+    /// The conversion did not start: BUSY stayed low. No supply, no CONVST, or no part.
     NotStarted = 3,
     /// The conversion did not end in time: BUSY stayed high. BUSY is not connected, or the part is in reset.
     NotEnded = 4,
-    /// All bits of the frame are the same: the data line is stuck or open.
+    /// All bits of the frame are equal: the data line is stuck or open.
     Blank = 5,
-    /// The channel that sees the reference voltage does not show it: supply, reference or range are wrong.
+    /// The channel connected to the reference voltage does not read it: supply, reference or range are wrong.
     Reference = 6,
-    /// The part gave back another code than it was sent.
+    /// The part returned a code other than the one sent.
     ReadBack = 7,
     /// A code is outside of the converter's range.
     Code = 8,
-    /// A conversion that no tick asked for began or ended while the frame was read: its words are of two conversions.
+    /// An unexpected conversion started or ended while the frame was read: its words are from two conversions.
     Again = 9,
 }
 
 impl Fault {
-    /// All of them.
+    /// All faults.
     pub const ALL: [Self; 9] = [
         Self::Bus,
         Self::Pin,
@@ -46,7 +46,7 @@ impl Fault {
         self as u8
     }
 
-    /// Its bit in a word of all faults seen: bit `number`.
+    /// Its bit in a word of all detected faults: bit `number`.
     #[must_use]
     pub const fn bit(self) -> u32 {
         1 << self as u32
@@ -60,13 +60,13 @@ impl fmt::Display for Fault {
             Self::Pin => "a pin cannot be driven or read",
             Self::NotStarted => "BUSY stayed low: is the ADC supplied, and is CONVST connected?",
             Self::NotEnded => "BUSY stayed high: is it connected, and is the ADC out of reset?",
-            Self::Blank => "all bits of the ADC's frame are the same: is DOUTA connected?",
+            Self::Blank => "all bits of the ADC's frame are equal: is DOUTA connected?",
             Self::Reference => {
-                "channel V8 does not show the reference: are RANGE, supply and V8 as in the wiring table?"
+                "channel V8 does not read the reference: are RANGE, supply and V8 as in the wiring table?"
             }
-            Self::ReadBack => "a DAC gave back another code than it was sent: are SDO, SYNC and SCLK connected?",
-            Self::Code => "a code is outside of the converter's range",
-            Self::Again => "BUSY rose again while the ADC was read: is CONVST disturbed?",
+            Self::ReadBack => "a DAC returned a code other than the one sent: are SDO, SYNC and SCLK connected?",
+            Self::Code => "a code is outside the converter's range",
+            Self::Again => "BUSY rose again while the ADC was read: is there interference on CONVST?",
         })
     }
 }

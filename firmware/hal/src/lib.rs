@@ -1,7 +1,7 @@
-//! Gauges and amplifiers of a platform, as a control tick needs them, and drivers of real converters.
+//! Traits for gauges and amplifiers in a control tick, and drivers of real converters.
 //!
-//! A driver moves codes and finds out whether its part answers as its data sheet says. What a code means, and what
-//! becomes of a machine whose converter answers garbage, is the controller's business.
+//! A driver transfers codes and checks that its part answers as its data sheet says. The controller interprets the codes, and
+//! decides what happens if a converter fails.
 //!
 //! | trait | drivers |
 //! | --- | --- |
@@ -9,7 +9,7 @@
 //! | [`Amplifiers`] | [`ad5686r`]: two AD5686R (16 bits) |
 //! | [`Lines`] | pins of a microcontroller |
 //!
-//! Nothing here allocates, panics or waits without a bound: a wait for a part is counted out and ends in a [`Fault`].
+//! Nothing here allocates, panics or waits without a bound: a wait for a part times out with a [`Fault`].
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
@@ -27,12 +27,12 @@ pub use lines::Lines;
 /// Legs of a platform, and gauges.
 pub const CHANNELS: usize = 6;
 
-/// Six gauges that are sampled at the same instant.
+/// Six gauges that are sampled simultaneously.
 pub trait Gauges {
     /// Bits of a code.
     const BITS: u32;
 
-    /// Brings the parts into their working state and finds out whether they answer. Called once at power-up, and again after a
+    /// Initialises the parts and checks that they answer. Called once at power-up, and again after a
     /// fault while the amplifiers are disabled. May take a millisecond.
     ///
     /// # Errors
@@ -41,20 +41,19 @@ pub trait Gauges {
         Ok(())
     }
 
-    /// Samples all gauges at once, now or where a timer did in this tick, and returns while they are converted.
+    /// Samples all gauges simultaneously, now or by the timer in this tick, and returns during the conversion.
     ///
     /// # Errors
-    /// The [`Fault`] that leaves nothing to read.
+    /// The [`Fault`] after which there is nothing to read.
     fn begin(&mut self) -> Result<(), Fault> {
         Ok(())
     }
 
-    /// The codes of what [`Self::begin`] sampled, 0 to 2^[`Self::BITS`] − 1: 0 at the lowest input, not in two's
-    /// complement. Blocks until they are there, for a time that does not depend on what the part answers by more than
-    /// its driver says.
+        /// The codes that [`Self::begin`] sampled, 0 to 2^[`Self::BITS`] − 1: 0 at the lowest input, not in two's
+        /// complement. Blocks until they are available. The driver documents how much this time may vary.
     ///
     /// # Errors
-    /// The [`Fault`] that makes the codes unbelievable. The next call starts anew.
+    /// The [`Fault`] that makes the codes invalid. The next call starts afresh.
     fn read(&mut self) -> Result<[i32; CHANNELS], Fault>;
 }
 
@@ -63,16 +62,16 @@ pub trait Amplifiers {
     /// Bits of a code.
     const BITS: u32;
 
-    /// Disables the amplifiers, brings the parts into their working state with all outputs at code 0, and finds out whether
-    /// they answer. Called once at power-up, and again after a fault while the amplifiers are disabled. May take a millisecond.
+        /// Disables the amplifiers, initialises the parts with all outputs at code 0, and checks that they answer. Called once at
+        /// power-up, and again after a fault while the amplifiers are disabled. May take a millisecond.
     ///
     /// # Errors
-    /// The first [`Fault`] found. The amplifiers are disabled all the same.
+    /// The first [`Fault`] found. The amplifiers are disabled in any case.
     fn start(&mut self) -> Result<(), Fault> {
         self.enable(false)
     }
 
-    /// Looks, while the gauges are converted, whether the parts hold what was written. At most once between two writes.
+    /// Checks, during the conversion of the gauges, that the parts hold the written codes. At most once between two writes.
     ///
     /// # Errors
     /// [`Fault::ReadBack`] if one does not, [`Fault::Bus`] or [`Fault::Pin`].
@@ -80,14 +79,15 @@ pub trait Amplifiers {
         Ok(())
     }
 
-    /// Gives out six codes, 0 to 2^[`Self::BITS`] − 1; all outputs change at the same instant, after the last is written:
-    /// at once, or at the instant of the tick that a timer keeps.
+        /// Outputs six codes, 0 to 2^[`Self::BITS`] − 1. All outputs change simultaneously after the last is written: immediately, or at
+        /// the timer's instant in the tick.
     ///
     /// # Errors
-    /// A [`Fault`] says that an output may not be what was asked for. A code out of range is one, and then nothing is written.
+    /// A [`Fault`] means that an output may differ from its code. For a code out of range nothing is written.
     fn write(&mut self, codes: &[i32; CHANNELS]) -> Result<(), Fault>;
 
-    /// Enables (true) or disables the amplifiers; enables them only when the outputs have changed. Disabled is the state after power-up and reset, before any call.
+        /// Enables (true) or disables the amplifiers; enables them only after the outputs have changed. They are disabled after
+        /// power-up and reset.
     ///
     /// # Errors
     /// [`Fault::Pin`] if the line cannot be driven.

@@ -6,12 +6,12 @@ use crate::Fault;
 
 /// Digital outputs that a controller sets in every tick, and an input that it samples.
 pub trait Lines {
-    /// How many there are.
+    /// Number of outputs.
     const COUNT: usize;
     /// Whether there is an input.
     const INPUT: bool = false;
 
-    /// Sets line k high where bit k of `high` is set, else low; lines beyond [`Self::COUNT`] are left out.
+    /// Sets line k high if bit k of `high` is set, else low; ignores bits beyond [`Self::COUNT`].
     ///
     /// # Errors
     /// [`Fault::Pin`] if a line cannot be driven.
@@ -37,7 +37,7 @@ impl Lines for () {
     }
 }
 
-/// Pins, each of which may be left out.
+/// Optional pins.
 impl<PIN: OutputPin, const N: usize> Lines for [Option<PIN>; N] {
     const COUNT: usize = N;
 
@@ -55,7 +55,7 @@ impl<PIN: OutputPin, const N: usize> Lines for [Option<PIN>; N] {
     }
 }
 
-/// Outputs, and a pin of the input, which may be left out.
+/// Outputs, and an optional input pin.
 impl<L: Lines, PIN: InputPin> Lines for (L, Option<PIN>) {
     const COUNT: usize = L::COUNT;
     const INPUT: bool = true;

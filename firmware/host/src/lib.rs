@@ -1,11 +1,11 @@
 //! The controller as a shared library with a C ABI.
 //!
-//! A simulator loads it and steps the very code that the microcontroller runs. The library is `no_std` and its panic
-//! handler calls a function that does not exist: **it links only if no panic path is left** in the controller.
+//! A simulator loads it and steps the same code that the microcontroller runs. The library is `no_std` and its panic
+//! handler calls a function that does not exist: **it links only if no panic path remains** in the controller.
 //!
-//! Words are as in `controller::INPUT_NAMES`, `OUTPUT_NAMES`, `CONFIG_NAMES`. `Config` and `State` live in memory of the
-//! caller, of the size and alignment that [`specgen_describe`] states.
-//! Pointers are not verified here: a caller in a safe language wraps this once and checks [`specgen_abi_version`] first.
+//! The order of words is that of `controller::INPUT_NAMES`, `OUTPUT_NAMES`, `CONFIG_NAMES`. The caller provides memory for `Config`
+//! and `State`, with the size and alignment from [`specgen_describe`].
+//! Pointers are not checked: wrap the functions once in a safe language, and check [`specgen_abi_version`] first.
 #![no_std]
 #![deny(missing_docs)]
 
@@ -23,7 +23,7 @@ const ABI_VERSION: u32 = 2;
 
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo) -> ! {
-    // SAFETY: nobody defines it; what calls it does not link.
+    // SAFETY: it is not defined, so code that calls it does not link.
     unsafe extern "C" {
         fn specgen_panic_path_remains() -> !;
     }
@@ -31,21 +31,21 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
     unsafe { specgen_panic_path_remains() }
 }
 
-/// Version of this interface; callers refuse any other than the one they were written for.
+/// Version of this interface; callers must refuse any version other than their own.
 #[unsafe(no_mangle)]
 pub extern "C" fn specgen_abi_version() -> u32 {
     ABI_VERSION
 }
 
-/// What this controller is: `key=value` lines in UTF-8, those of `controller::DESCRIPTION` and `state_bytes`,
+/// Description of this controller: `key=value` lines in UTF-8, those of `controller::DESCRIPTION` and `state_bytes`,
 /// `state_align`, `config_bytes`, `config_align`, `machine_bytes`, `machine_align`, and
 /// `machine_words`, the words of its snapshot.
 ///
 /// # Safety
-/// `text` and `length` point to writable memory. The text lives as long as the library is loaded.
+/// `text` and `length` point to writable memory. The text is valid while the library is loaded.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_describe(text: *mut *const u8, length: *mut usize) {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         text.write(DESCRIPTION.as_ptr());
         length.write(DESCRIPTION.len());
@@ -75,7 +75,7 @@ const DESCRIPTION_LENGTH: usize = {
 };
 static DESCRIPTION: [u8; DESCRIPTION_LENGTH] = describe();
 
-/// The controller's own description, then the lines of [`MEMORY`]; evaluated by the compiler.
+/// The controller's own description, then the lines of [`MEMORY`]; evaluated at compile time.
 const fn describe() -> [u8; DESCRIPTION_LENGTH] {
     let mut text = [b'\n'; DESCRIPTION_LENGTH];
     let mut end = append(&mut text, 0, controller::DESCRIPTION);
@@ -110,35 +110,35 @@ const fn append(text: &mut [u8; DESCRIPTION_LENGTH], start: usize, piece: &str) 
 /// `words` points to `CONFIG_WORDS` writable words.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_config_default(words: *mut u64) {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     unsafe { words.cast::<[u64; CONFIG_WORDS]>().write(Config::new().to_words()) }
 }
 
-/// Whether words make a `Config`: 0, or one more than the index of the first word out of range.
+/// Whether words are a valid `Config`: 0, or one more than the index of the first word out of range.
 ///
 /// # Safety
 /// `words` points to `CONFIG_WORDS` words.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_config_check(words: *const u64) -> i32 {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     match Config::from_words(&unsafe { words.cast::<[u64; CONFIG_WORDS]>().read() }) {
         Ok(_) => 0,
         Err(error) => error.word as i32 + 1,
     }
 }
 
-/// Makes a `Config` of words: returns 0, or one more than the index of the first word out of range (then `config` is as
-/// it was).
+/// Makes a `Config` from words: returns 0, or one more than the index of the first word out of range (then `config` is
+/// unchanged).
 ///
 /// # Safety
 /// `words` points to `CONFIG_WORDS` words, `config` to memory for a `Config`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_config_load(config: *mut u8, words: *const u64) -> i32 {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     let words = unsafe { words.cast::<[u64; CONFIG_WORDS]>().read() };
     match Config::from_words(&words) {
         Ok(checked) => {
-            // SAFETY: the caller's duty.
+            // SAFETY: guaranteed by the caller.
             unsafe { config.cast::<Config>().write(checked) };
             0
         }
@@ -152,37 +152,37 @@ pub unsafe extern "C" fn specgen_config_load(config: *mut u8, words: *const u64)
 /// `state` points to memory for a `State`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_state_reset(state: *mut u8) {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     unsafe { state.cast::<State>().write(state_at_reset()) }
 }
 
 /// One control tick.
 ///
 /// # Safety
-/// `config` holds a loaded `Config`, `state` a `State` put at reset before; `input` points to `INPUT_WORDS` words,
+/// `config` contains a loaded `Config`, `state` a `State` put at reset before; `input` points to `INPUT_WORDS` words,
 /// `output` to `OUTPUT_WORDS` writable words. No two threads step the same state at once.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_step(config: *const u8, state: *mut u8, input: *const u64, output: *mut u64) {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     let (config, state, input) =
         unsafe { (&*config.cast::<Config>(), &mut *state.cast::<State>(), &*input.cast::<[u64; INPUT_WORDS]>()) };
     let result = controller::step(config, state, &TickInput::from_words(input));
     let words = controller::output_words(&result, state);
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     unsafe { output.cast::<[u64; OUTPUT_WORDS]>().write(words) }
 }
 
 /// Fingerprint of a `State`.
 ///
 /// # Safety
-/// `state` holds a `State` put at reset before.
+/// `state` contains a `State` put at reset before.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_state_digest(state: *const u8) -> u64 {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     unsafe { (*state.cast::<State>()).digest() }
 }
 
-/// Bytes of a `Machine`: what the controller remembers with its supervisor.
+/// Size of a `Machine`, the state of controller and supervisor, in bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn specgen_machine_bytes() -> usize {
     size_of::<Machine>()
@@ -194,14 +194,14 @@ pub extern "C" fn specgen_machine_bytes() -> usize {
 /// `machine` points to memory for a `Machine`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_machine_reset(machine: *mut u8) {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     unsafe { machine.cast::<Machine>().write(machine_at_reset()) }
 }
 
-/// One supervised tick: what the other targets run.
+/// One supervised tick, as on the other targets.
 ///
 /// # Safety
-/// `config` holds a loaded `Config`, `machine` a `Machine` put at reset before; `input` points to `MACHINE_INPUT_WORDS` words,
+/// `config` contains a loaded `Config`, `machine` a `Machine` put at reset before; `input` points to `MACHINE_INPUT_WORDS` words,
 /// `output` to `MACHINE_OUTPUT_WORDS` writable words. No two threads step the same machine at once.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_machine_step(
@@ -210,61 +210,61 @@ pub unsafe extern "C" fn specgen_machine_step(
     input: *const u64,
     output: *mut u64,
 ) {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     let (config, machine, input) = unsafe {
         (&*config.cast::<Config>(), &mut *machine.cast::<Machine>(), &*input.cast::<[u64; MACHINE_INPUT_WORDS]>())
     };
     let result = supervise(config, machine, &MachineInput::from_words(input));
     let words = machine_output_words(&result, machine);
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     unsafe { output.cast::<[u64; MACHINE_OUTPUT_WORDS]>().write(words) }
 }
 
-/// Word of each gauge per displacement of each leg, row by row, near the gauges' words.
+/// Change of each gauge's word per displacement of each leg, row by row, linearised at the gauges' words.
 ///
 /// # Safety
 /// `gauges` points to 6 words, `rows` to 36 writable words.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_words_per_leg(gauges: *const u64, rows: *mut u64) {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     let gauges = unsafe { &*gauges.cast::<[u64; 6]>() }.map(Real::from_word);
     let words = controller::words_per_leg(&gauges).map(|row| row.map(Real::to_word));
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     unsafe { rows.cast::<[[u64; 6]; 6]>().write(words) }
 }
 
 /// Fingerprint of a `Machine`.
 ///
 /// # Safety
-/// `machine` holds a `Machine` put at reset before.
+/// `machine` contains a `Machine` put at reset before.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_machine_digest(machine: *const u8) -> u64 {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     unsafe { (*machine.cast::<Machine>()).digest() }
 }
 
 /// A `Machine` as words.
 ///
 /// # Safety
-/// `machine` holds a `Machine` put at reset before; `words` points to `MACHINE_STATE_WORDS` writable words.
+/// `machine` contains a `Machine` put at reset before; `words` points to `MACHINE_STATE_WORDS` writable words.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_machine_save(machine: *const u8, words: *mut u64) {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     let (machine, words) = unsafe { (&*machine.cast::<Machine>(), &mut *words.cast::<[u64; MACHINE_STATE_WORDS]>()) };
     machine.save(words);
 }
 
-/// A `Machine` of words: returns 0, or one more than the index of the first word that no machine holds (then `machine` is as
-/// it was).
+/// Makes a `Machine` from words: returns 0, or one more than the index of the first word that is invalid (then `machine` is
+/// unchanged).
 ///
 /// # Safety
 /// `machine` points to memory for a `Machine`, `words` to `MACHINE_STATE_WORDS` words.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_machine_load(machine: *mut u8, words: *const u64) -> i32 {
-    // SAFETY: the caller's duty.
+    // SAFETY: guaranteed by the caller.
     match Machine::load(unsafe { &*words.cast::<[u64; MACHINE_STATE_WORDS]>() }) {
         Ok(loaded) => {
-            // SAFETY: the caller's duty.
+            // SAFETY: guaranteed by the caller.
             unsafe { machine.cast::<Machine>().write(loaded) };
             0
         }

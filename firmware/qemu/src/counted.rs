@@ -1,4 +1,4 @@
-//! The supervised tick that both programs call, with what it costs.
+//! The supervised tick of both programs, with its cost.
 
 use controller::Config;
 use controller::supervised::{Machine, MachineInput, MachineOutput, supervise};
@@ -6,7 +6,7 @@ use controller::supervised::{Machine, MachineInput, MachineOutput, supervise};
 use crate::instructions::InstructionCounter;
 use crate::stack;
 
-/// One supervised tick with its instructions and, if it is to be `painted`, its stack, bytes; else 0.
+/// One supervised tick with its instructions and, if `painted`, its stack use, bytes; else 0.
 #[allow(unsafe_code)] // The tick is called from assembly that counts it.
 pub fn counted_tick(
     counter: &mut InstructionCounter,
@@ -20,7 +20,7 @@ pub fn counted_tick(
     unsafe { stack::measure(counter, specgen_supervise as *const (), arguments, painted) }
 }
 
-/// What the instruction count, the painted stack and the static stack bound all refer to.
+/// The function to which instruction count, painted stack and static stack bound refer.
 #[unsafe(no_mangle)]
 #[inline(never)]
 #[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.

@@ -1,21 +1,21 @@
 //! Exact instruction counts from SysTick under `-icount shift=10`.
 //!
-//! There the emulator lets every instruction take 2^10 ns of virtual time. SysTick counts the 25 MHz core
-//! clock, 40 ns a count, so one instruction is 25.6 counts and the count tells instructions apart exactly.
-//! Its 24 bits hold 655,000 instructions. Instructions are not cycles: an M7 issues up to two in one.
+//! With that option every instruction takes 2^10 ns of virtual time. SysTick counts the 25 MHz core clock, 40 ns per count, so one
+//! instruction is 25.6 counts, and the count gives the exact number of instructions. Its 24 bits are enough for 655,000
+//! instructions. Instructions are not cycles: an M7 issues up to two per cycle.
 //!
-//! The two readings and the call between them are one piece of assembly, so that the compiler cannot put
-//! anything between: what is counted is the called function, without the call and the return.
+//! The two readings and the call between them are one piece of assembly, so that the compiler cannot insert anything: the count
+//! is that of the called function without call and return.
 
 #![allow(unsafe_code)] // Assembly, and calls from it.
 
 use core::arch::{asm, naked_asm};
 
-/// SysTick's registers: control and status, value to begin anew with, current value.
+/// SysTick's registers: control and status, reload value, current value.
 const CONTROL: *mut u32 = 0xe000_e010 as *mut u32;
 const START: *mut u32 = 0xe000_e014 as *mut u32;
 const CURRENT: *mut u32 = 0xe000_e018 as *mut u32;
-/// In the control register: counts, of the core clock; has come to zero since it was read.
+/// Bits of the control register: enable, core clock; has counted to zero since it was last read.
 const COUNTS: u32 = 1;
 const OF_CORE: u32 = 1 << 2;
 const WRAPPED: u32 = 1 << 16;
@@ -26,42 +26,41 @@ const NANOSECONDS_PER_COUNT: u32 = 40;
 /// 2^10 ns, from `shift=10`.
 const NANOSECONDS_PER_INSTRUCTION: u32 = 1024;
 
-/// Instructions measured for 0, 1, 100 and 1000 `nop`s: anything else than these four numbers says that the
-/// emulator was not run with `-icount shift=10`, so that no count can be trusted.
+/// Instructions measured for 0, 1, 100 and 1000 `nop`s. Any other result means that the emulator was not run with
+/// `-icount shift=10` and counts are invalid.
 pub type SelfTest = [u64; 4];
 
 /// Counts the instructions of a piece of code.
 pub struct InstructionCounter {
-    /// What measuring an empty function costs: the call, its return, one reading. Instructions.
+    /// Instructions measured for an empty function: the call, its return, one reading.
     overhead: u32,
-    /// Measurements that did not fit into the 24 bits.
+    /// Measurements that overflowed the 24 bits.
     overflows: u64,
 }
 
 impl InstructionCounter {
-    /// Starts the timer (no interrupt) and calibrates the overhead by an empty function.
+    /// Starts the timer (without interrupt) and measures the overhead with an empty function.
     pub fn new() -> Self {
-        // SAFETY: registers of the core, which nothing else uses.
+        // SAFETY: registers of the core that nothing else uses.
         unsafe {
             START.write_volatile(RELOAD);
             CURRENT.write_volatile(0);
             CONTROL.write_volatile(COUNTS | OF_CORE);
         }
         let mut counter = Self { overhead: 0, overflows: 0 };
-        // SAFETY: it does nothing.
+        // SAFETY: the function does nothing.
         counter.overhead = unsafe { counter.measure_call(no_nops as *const (), [0; 4]) };
         counter
     }
 
-    /// Calls `function` and counts its instructions, the return left out. Pushes nothing onto the stack.
+    /// Calls `function` and counts its instructions without the return. Pushes nothing onto the stack.
     ///
     /// # Safety
-    /// It must be a function of the C ABI that takes at most four words in registers, and these must be what it
-    /// expects.
+        /// It must be a function of the C ABI with at most four words in registers, and `arguments` must be valid for it.
     #[inline(always)]
     pub unsafe fn measure_call(&mut self, function: *const (), arguments: [usize; 4]) -> u32 {
         let (start, end): (u32, u32);
-        // SAFETY: resets and reads the timer; the call is the caller's promise.
+        // SAFETY: resets and reads the timer; the caller guarantees that the call is valid.
         let control = unsafe {
             CURRENT.write_volatile(0);
             asm!(
@@ -88,12 +87,12 @@ impl InstructionCounter {
         instructions.saturating_sub(self.overhead)
     }
 
-    /// What measuring an empty function costs and every other one is relieved of, instructions.
+    /// Instructions measured for an empty function, which are subtracted from every count.
     pub fn overhead(&self) -> u32 {
         self.overhead
     }
 
-    /// Measurements that took more than 655,000 instructions and are therefore wrong.
+    /// Measurements of more than 655,000 instructions, which are wrong.
     pub fn overflows(&self) -> u64 {
         self.overflows
     }
@@ -101,14 +100,14 @@ impl InstructionCounter {
     /// Counts `nop`s, see [`SelfTest`].
     pub fn self_test(&mut self) -> SelfTest {
         let mut count = |function: unsafe extern "C" fn()| {
-            // SAFETY: it does nothing.
+            // SAFETY: the function contains only `nop`s.
             u64::from(unsafe { self.measure_call(function as *const (), [0; 4]) })
         };
         [count(no_nops), count(one_nop), count(hundred_nops), count(thousand_nops)]
     }
 }
 
-// SAFETY: these four take nothing, leave every register but the program counter as it was, and return.
+// SAFETY: these four take no arguments, change no register, and return.
 #[unsafe(naked)]
 unsafe extern "C" fn no_nops() {
     naked_asm!("bx lr")

@@ -1,6 +1,6 @@
-//! Replays supervised ticks: rows of MACHINE_INPUT_WORDS words in, rows of MACHINE_OUTPUT_WORDS words and the digest of the
-//! machine out. Of some of the ticks that run on, the control law alone is counted, too, on a copy of the state: the difference
-//! is what the supervisor costs.
+//! Replays supervised ticks: reads rows of MACHINE_INPUT_WORDS words, writes rows of MACHINE_OUTPUT_WORDS words and the digest of
+//! the machine. On some running ticks the control law alone is also counted, on a copy of the state: the difference is the cost of
+//! the supervisor.
 
 use crate::counted::counted_tick;
 use crate::instructions::{InstructionCounter, SelfTest};
@@ -15,7 +15,7 @@ use controller::{CONFIG_WORDS, Config, State, TickInput, TickOutput};
 /// Ticks per file access.
 const BATCH: usize = 64;
 
-/// Stages of the statistics: ticks that run on, the law alone in these, all other ticks.
+/// Stages of the statistics: running ticks, the law alone in these, all other ticks.
 const RUNNING: usize = 0;
 const LAW: usize = 1;
 const OTHER: usize = 2;

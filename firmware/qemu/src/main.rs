@@ -2,7 +2,7 @@
 //!
 //! Reads `config.bin` (CONFIG_WORDS words) and `input.bin` (rows of INPUT_WORDS words) from the emulator's
 //! working folder; writes `output.bin` (rows of OUTPUT_WORDS words and the digest of the state after the
-//! tick) and `stats.bin` (see [`stats`]). Where there is a `machine.bin` it replays supervised ticks from that instead, see
+//! tick) and `stats.bin` (see [`stats`]). If there is a `machine.bin`, it replays supervised ticks from that instead, see
 //! [`machine`]. All words are 64 bits, little endian. No control decision is made here.
 
 #![no_std]
@@ -25,13 +25,13 @@ use instructions::InstructionCounter;
 use semihosting::{Exit, File, exit};
 use stages::Stages;
 
-/// The target that this is built for, in the room that the name of a board takes.
+/// The target of this image, padded to the length of a board's name.
 static BOARD: [u8; 25] = *b"specgen-board: qemu     \n";
 /// Ticks per file access.
 const BATCH: usize = 256;
 
 extern "C" fn main() -> ! {
-    // Or the linker leaves it out.
+    // Keeps the symbol in the image.
     core::hint::black_box(&raw const BOARD);
     exit(match replay() {
         Ok(()) => Exit::Done,
@@ -102,7 +102,7 @@ fn replay() -> Result<(), Exit> {
 
 fn read_config() -> Result<Config, Exit> {
     let file = File::open(b"config.bin\0").ok_or(Exit::NoConfig)?;
-    // One word more than is due, so that a file that is too long is found too.
+    // One word more than expected, to detect a file that is too long.
     let mut words = [0; CONFIG_WORDS + 1];
     if file.read(&mut words) != size_of::<[u64; CONFIG_WORDS]>() {
         return Err(Exit::ConfigSize);
@@ -111,13 +111,13 @@ fn read_config() -> Result<Config, Exit> {
     Config::from_words(words).map_err(|error| Exit::ConfigRefused(error.word))
 }
 
-/// Ticks that the stages and the stack are measured on, for that takes longer than the tick: every eighth of the first
-/// 20,000, every 64th of later ones.
+/// Whether stages and stack are measured on this tick. That takes longer than the tick, so it is done on every eighth of the first
+/// 20,000 and every 64th of later ones.
 const fn is_due(tick: u64) -> bool {
     tick.is_multiple_of(if tick < 20_000 { 8 } else { 64 })
 }
 
-/// What the instruction count, the painted stack and the static stack bound all refer to.
+/// The function to which instruction count, painted stack and static stack bound refer.
 #[unsafe(no_mangle)]
 #[inline(never)]
 #[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.

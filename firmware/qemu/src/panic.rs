@@ -1,10 +1,10 @@
 //! The proof that the controller cannot panic.
 //!
-//! The handler calls a function that nobody defines. If the optimiser has removed every panic path, the
-//! handler goes with them and the image links; if one remains, the link fails and names the function.
+//! The handler calls an undefined function. If the optimiser has removed every panic path, the handler is removed, too, and
+//! the image links; if a panic path remains, the link fails with the name of the function.
 //!
-//! To find where it is, `build.rs` turns the proof off if `SPECGEN_LOCATE_PANICS` is set: such an image links
-//! and shows who calls the panic machinery. It is for reading only.
+//! To locate a panic path, `build.rs` disables the proof if `SPECGEN_LOCATE_PANICS` is set. Such an image links and shows which
+//! functions can panic. It is only for inspection.
 
 #![allow(unsafe_code)] // A call that cannot be linked cannot be run.
 
@@ -16,7 +16,7 @@ use crate::semihosting::{Exit, exit};
 #[cfg(not(specgen_locate_panics))]
 #[panic_handler]
 fn panic(_: &PanicInfo) -> ! {
-    // SAFETY: nobody defines it; what calls it does not link.
+    // SAFETY: it is not defined, so code that calls it does not link.
     unsafe extern "C" {
         fn specgen_panic_path_remains() -> !;
     }
@@ -24,7 +24,7 @@ fn panic(_: &PanicInfo) -> ! {
     unsafe { specgen_panic_path_remains() }
 }
 
-// Not inlined, and not without effect: otherwise the calls to it would vanish with it.
+// Neither inlined nor without effect: otherwise the optimiser would remove the calls.
 #[cfg(specgen_locate_panics)]
 #[panic_handler]
 #[inline(never)]

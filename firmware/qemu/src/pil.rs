@@ -1,7 +1,7 @@
-//! Processor in the loop: the controller on an emulated Cortex-M, tick by tick as a host asks for it over the link.
+//! Processor in the loop: the controller on an emulated Cortex-M, stepped tick by tick by a host over the link.
 //!
-//! The frames of `../link` come through the named pipe `pil.in` of the emulator's working folder and go through `pil.out`.
-//! It is the very link that a board speaks over a serial line. No control decision is made here.
+//! The frames of `../link` arrive through the named pipe `pil.in` in the emulator's working folder and are sent through
+//! `pil.out`. It is the same link as that of a board over a serial line. No control decision is made here.
 
 #![no_std]
 #![no_main]
@@ -39,7 +39,7 @@ fn serve() -> Result<(), Exit> {
     let exact = counter.self_test() == [0, 1, 100, 1000];
     let mut device = Lockstep::new(Steps::new(counter, exact));
     let mut endpoint = Endpoint::new();
-    // In this order the host opens its ends.
+    // The host opens its ends in this order.
     let input = Pipe::reader(b"pil.in\0").ok_or(Exit::NoInput)?;
     let output = Pipe::writer(b"pil.out\0").ok_or(Exit::CannotWrite)?;
     let mut bytes = [0; FRAME];

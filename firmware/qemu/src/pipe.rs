@@ -1,7 +1,7 @@
 //! Named pipes of the emulator's working folder, with the host at their other ends.
 //!
-//! A read waits until the host has sent something. Meanwhile the processor stands still, and so does virtual time: the run
-//! is in lock-step with the host, and its instruction counts do not depend on how long that takes.
+//! A read blocks until the host has sent something. Meanwhile processor and virtual time are stopped: the run is in lock-step with
+//! the host, and its instruction counts do not depend on the waiting time.
 
 #![allow(unsafe_code)] // A semihosting call passes raw addresses to the emulator.
 
@@ -13,17 +13,17 @@ pub struct Pipe {
 }
 
 impl Pipe {
-    /// Opens the end that bytes come out of; `name` ends with a zero byte. Waits for the host.
+    /// Opens the read end; `name` ends with a zero byte. Waits for the host.
     pub fn reader(name: &'static [u8]) -> Option<Self> {
         Some(Self { handle: open(name, FOR_READING)? })
     }
 
-    /// Opens the end that bytes go into; `name` ends with a zero byte. Waits for the host.
+    /// Opens the write end; `name` ends with a zero byte. Waits for the host.
     pub fn writer(name: &'static [u8]) -> Option<Self> {
         Some(Self { handle: open(name, FOR_WRITING)? })
     }
 
-    /// Waits for bytes and takes those that are there; how many. 0: the host has closed its end.
+    /// Waits for bytes and reads those available. Returns their number; 0 if the host has closed its end.
     pub fn receive(&self, bytes: &mut [u8]) -> usize {
         let size = bytes.len();
         // SAFETY: at most `size` bytes are written, all within `bytes`.
@@ -33,7 +33,7 @@ impl Pipe {
 
     /// Sends all of the bytes; false if the host has closed its end.
     pub fn send(&self, bytes: &[u8]) -> bool {
-        // SAFETY: they are only read.
+        // SAFETY: the bytes are only read.
         unsafe { write(self.handle, bytes.as_ptr(), bytes.len()) == 0 }
     }
 }

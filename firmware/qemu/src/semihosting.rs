@@ -12,42 +12,42 @@ const CLOSE: usize = 0x02;
 const WRITE: usize = 0x05;
 const READ: usize = 0x06;
 const EXIT_EXTENDED: usize = 0x20;
-/// How a file is opened: as C's "rb" and "wb".
+/// Modes of opening a file: "rb" and "wb" of C.
 pub const FOR_READING: usize = 1;
 pub const FOR_WRITING: usize = 5;
 
-/// One operation with its words.
+/// Performs one operation with its parameter words.
 ///
 /// # Safety
-/// The words are what the operation expects: memory that it may read or write.
+/// The words must be valid for the operation, as must the memory that it reads or writes.
 unsafe fn call(operation: usize, words: &[usize]) -> usize {
     let result;
-    // SAFETY: the caller's promise; the emulator changes nothing but what the words name.
+    // SAFETY: guaranteed by the caller; the emulator changes only memory named by the words.
     unsafe {
         asm!("bkpt #0xab", inout("r0") operation => result, in("r1") words.as_ptr(), options(nostack, preserves_flags));
     }
     result
 }
 
-/// Reads at most `length` bytes; how many did not come.
+/// Reads at most `length` bytes. Returns the number of bytes not read.
 ///
 /// # Safety
 /// `start` may be written for `length` bytes.
 pub unsafe fn read(handle: usize, start: *mut u8, length: usize) -> usize {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { call(READ, &[handle, start as usize, length]) }
 }
 
-/// Writes bytes; how many were not taken.
+/// Writes bytes. Returns the number of bytes not written.
 ///
 /// # Safety
 /// `start` may be read for `length` bytes.
 pub unsafe fn write(handle: usize, start: *const u8, length: usize) -> usize {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { call(WRITE, &[handle, start as usize, length]) }
 }
 
-/// Why the run ended: the emulator's exit status. `codegen/toolchain/src/emulator.rs` of specgen has the words.
+/// Reason of the end of a run: the emulator's exit status. `codegen/toolchain/src/emulator.rs` of specgen has the messages.
 #[derive(Clone, Copy)]
 pub enum Exit {
     /// 0: all ticks ran and all files are written.
@@ -64,12 +64,12 @@ pub enum Exit {
     CannotWrite,
     /// 15: the processor took a fault or an unexpected exception.
     Fault,
-    /// 16: the machine of `firmware/tick` does not run on.
+    /// 16: the machine of `firmware/tick` stopped running.
     #[allow(dead_code)] // Not of `replay`.
     NotRunning,
-    /// 20: tables or settings are not what specgen wrote.
+    /// 20: tables or settings differ from those that specgen wrote.
     Corrupt,
-    /// 64 and more: `Config::from_words` refuses the word of that index, 0 to 63.
+    /// 64 and above: `Config::from_words` refuses the word with that index, 0 to 63.
     ConfigRefused(usize),
 }
 
@@ -95,12 +95,12 @@ impl Exit {
 pub fn exit(code: Exit) -> ! {
     const APPLICATION_EXIT: usize = 0x2_0026;
     loop {
-        // SAFETY: it reads the two words and does not come back.
+        // SAFETY: it reads the two words and does not return.
         unsafe { call(EXIT_EXTENDED, &[APPLICATION_EXIT, code.status()]) };
     }
 }
 
-/// Opens what has that `name`, which ends with a zero byte, on the emulator's host; its handle.
+/// Opens the file `name`, which ends with a zero byte, on the emulator's host. Returns its handle.
 pub fn open(name: &'static [u8], mode: usize) -> Option<usize> {
     let length = name.len().saturating_sub(1);
     // SAFETY: it reads `length` bytes and the zero byte at `name`.
@@ -124,7 +124,7 @@ impl File {
         Some(Self { handle: open(name, FOR_WRITING)? })
     }
 
-    /// Fills `words` (little endian) as far as the file goes; returns the bytes read.
+    /// Fills `words` (little endian) up to the end of the file. Returns the bytes read.
     pub fn read(&self, words: &mut [u64]) -> usize {
         let size = size_of_val(words);
         let start = words.as_mut_ptr().cast::<u8>();
@@ -141,9 +141,9 @@ impl File {
         done
     }
 
-    /// Appends `words` (little endian); false if the file does not take them all.
+    /// Appends `words` (little endian); false if not all could be written.
     pub fn write(&self, words: &[u64]) -> bool {
-        // SAFETY: they are read as bytes.
+        // SAFETY: the words are read as bytes.
         unsafe { write(self.handle, words.as_ptr().cast(), size_of_val(words)) == 0 }
     }
 

@@ -1,7 +1,7 @@
 //! Stack use, by painting.
 //!
-//! The words below the stack pointer are filled with a pattern; after the code has run, the lowest word
-//! that changed tells how deep it went. No interrupt is enabled, so nothing else writes there.
+//! The words below the stack pointer are filled with a pattern; after the code has run, the lowest changed word gives the depth.
+//! No interrupt is enabled, so nothing else writes there.
 
 #![allow(unsafe_code)] // Writes and reads memory below the stack pointer.
 
@@ -11,20 +11,20 @@ use core::sync::atomic::{Ordering, compiler_fence};
 
 use crate::instructions::InstructionCounter;
 
-/// How far below the stack pointer the paint reaches, bytes: 8 KiB, a multiple of 4.
+/// Size of the painted area below the stack pointer, bytes: 8 KiB, a multiple of 4.
 /// A use of this much or more is reported as exactly this much.
 pub const WINDOW: usize = 8192;
 
 const PAINT: u32 = 0x5AFE_C0DE;
 
-/// C returns what is larger through memory of the caller, whatever its fields.
+/// Larger results are returned through memory of the caller in the C ABI, whatever their fields.
 const LARGEST_RESULT_IN_REGISTERS: usize = 32;
 
-/// Calls a C function; its result, its instructions and, if it is to be `painted`, its stack, bytes; else 0. In a frame of
-/// its own, so that the stack pointer stands still around the call.
+/// Calls a C function. Returns its result, its instructions and, if `painted`, its stack use, bytes; else 0. Not inlined, so that the
+/// stack pointer does not change around the call.
 ///
 /// # Safety
-/// `function` returns an `R`, and so first takes the address that it writes it to; then the three `arguments`.
+/// `function` returns an `R`, so it first takes the address of the result, then the three `arguments`.
 #[inline(never)]
 pub unsafe fn measure<R>(
     counter: &mut InstructionCounter,
@@ -36,7 +36,7 @@ pub unsafe fn measure<R>(
     let mut result = MaybeUninit::<R>::uninit();
     let [first, second, third] = arguments;
     let arguments = [(&raw mut result) as usize, first, second, third];
-    // SAFETY: the caller's duty; the function writes the result.
+    // SAFETY: guaranteed by the caller; the function writes the result.
     unsafe {
         let (instructions, depth) = if painted {
             measure_depth(|| counter.measure_call(function, arguments))
@@ -47,13 +47,13 @@ pub unsafe fn measure<R>(
     }
 }
 
-/// Runs `f` and returns the bytes that it used below the stack pointer of the function this is inlined into.
+/// Runs `f` and returns the bytes that it used below the stack pointer of the enclosing function.
 #[inline(always)]
 pub fn measure_depth<T>(f: impl FnOnce() -> T) -> (T, usize) {
     let top: usize;
-    // In assembly, as a called function would paint over its own frame.
-    // SAFETY: the words below the stack pointer belong to nobody while no interrupt is enabled, and
-    // memory.x gives the stack far more than WINDOW.
+    // In assembly, because a called function would paint over its own frame.
+        // SAFETY: the words below the stack pointer are unused while no interrupt is enabled, and the stack is much larger than
+        // WINDOW.
     unsafe {
         asm!(
             "mov {top}, sp",

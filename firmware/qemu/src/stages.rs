@@ -1,13 +1,13 @@
-//! What is counted beside the whole tick: the controller's own list of its parts, called on copies of the state.
+//! Counts of the parts of a tick in the controller's own list, called on copies of the state.
 
 use crate::instructions::InstructionCounter;
 use crate::stats::Stage;
 use controller::stages::{STAGE_COUNT, STAGES, prepare};
 use controller::{Config, State, TickInput};
 
-/// Counts so far.
+/// The counts so far.
 pub struct Stages {
-    /// The whole of `controller::step`, then [`STAGES`].
+    /// `controller::step`, then [`STAGES`].
     counts: [Stage; STAGE_COUNT + 1],
 }
 
@@ -28,7 +28,7 @@ impl Stages {
         self.counts[0].add(instructions);
     }
 
-    /// Measures the parts for the tick that is about to be stepped. Nothing here touches the state that the replay steps.
+    /// Measures the parts for the next tick. The state of the replay is not changed.
     #[inline(never)]
     #[allow(unsafe_code)] // Stages are called from assembly that counts them.
     pub fn measure(&mut self, counter: &mut InstructionCounter, config: &Config, state: &State, input: &TickInput) {
@@ -39,13 +39,13 @@ impl Stages {
                 let mut copy = prepared;
                 let arguments =
                     [(&raw const *config) as usize, (&raw mut copy) as usize, (&raw const *input) as usize, leg];
-                // SAFETY: a stage is a C function of these four words.
+                // SAFETY: a stage is a C function with these four words.
                 count.add(unsafe { counter.measure_call(stage.run as *const (), arguments) });
             }
         }
     }
 
-    /// All of them.
+    /// All stages.
     pub fn all(&self) -> &[Stage] {
         &self.counts
     }

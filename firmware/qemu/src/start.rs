@@ -1,6 +1,6 @@
-//! From reset to `main`, and where faults end.
+//! Startup code from reset to `main`, and the fault handler.
 //!
-//! The emulator needs no more of a runtime than this: no interrupt is ever enabled, and `link.x` says what lies where.
+//! The emulator needs no other runtime: no interrupt is ever enabled, and `link.x` defines the memory layout.
 
 #![allow(unsafe_code)] // Before memory is set up there is only assembly; the processor finds its vectors by their section.
 
@@ -8,7 +8,7 @@ use core::arch::naked_asm;
 
 use crate::semihosting::{Exit, exit};
 
-/// What the processor calls, from the second word of memory on: reset, then every exception of the core.
+/// Vectors from the second word of memory on: reset, then every exception of the core.
 #[used]
 #[unsafe(link_section = ".vector_table")]
 static VECTORS: [unsafe extern "C" fn() -> !; 15] = {
@@ -17,8 +17,8 @@ static VECTORS: [unsafe extern "C" fn() -> !; 15] = {
     vectors
 };
 
-/// Clears and fills memory, turns on the FPU, goes to `main`.
-// SAFETY: the first that runs, with nothing but a stack; it leaves memory as every Rust function expects it.
+/// Initialises memory, enables the FPU, jumps to `main`.
+// SAFETY: runs first, with only a stack, and leaves memory as Rust functions expect it.
 #[unsafe(naked)]
 unsafe extern "C" fn reset() -> ! {
     naked_asm!(
@@ -59,7 +59,7 @@ unsafe extern "C" fn reset() -> ! {
     )
 }
 
-/// A fault of the processor, or an exception that nothing should raise.
+/// Handler of processor faults and unexpected exceptions.
 extern "C" fn fault() -> ! {
     exit(Exit::Fault)
 }

@@ -1,5 +1,5 @@
-//! `stats.bin`: what was measured, as little-endian 64-bit words. This table is the format's only
-//! description; `codegen/toolchain/src/replay.rs` of specgen reads it and refuses another version.
+//! `stats.bin`: the measurements, as little-endian 64-bit words. This table is the only
+//! description of the format; `codegen/toolchain/src/replay.rs` of specgen reads it and refuses other versions.
 //!
 //! | word | meaning |
 //! | --- | --- |
@@ -8,11 +8,11 @@
 //! | 2 | ticks replayed |
 //! | 3, 4, 5 | CONFIG_WORDS, INPUT_WORDS, OUTPUT_WORDS of the controller |
 //! | 6, 7 | bytes of `State`, bytes of `Config` |
-//! | 8 | most stack that one `step` used, bytes |
+//! | 8 | peak stack use of one `step`, bytes |
 //! | 9 | painted window, bytes: word 8 at this value means "this or more" |
-//! | 10 | overhead taken off every count, instructions |
+//! | 10 | overhead subtracted from every count, instructions |
 //! | 11 to 14 | counted for 0, 1, 100, 1000 `nop`s |
-//! | 15 | measurements too long to be counted |
+//! | 15 | measurements that overflowed |
 //! | 16 | number of stages S; then S records of six words |
 //! | +0, +1 | stage name, 16 bytes of ASCII, zero padded |
 //! | +2 | calls |
@@ -35,7 +35,7 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// No calls yet. `name` is ASCII, at most 16 bytes: the rest would be cut off.
+    /// No calls yet. `name` is ASCII and truncated to 16 bytes.
     pub const fn new(name: &str) -> Self {
         let mut padded = [0; 16];
         let bytes = name.as_bytes();
@@ -47,7 +47,7 @@ impl Stage {
         Self { name: padded, calls: 0, smallest: u64::MAX, sum: 0, largest: 0 }
     }
 
-    /// Adds one call of so many instructions.
+    /// Adds one call with so many instructions.
     pub fn add(&mut self, instructions: u32) {
         let instructions = u64::from(instructions);
         self.calls += 1;
@@ -67,7 +67,7 @@ impl Stage {
         core::str::from_utf8(self.name.get(..length).unwrap_or_default()).unwrap_or_default()
     }
 
-    /// Calls; fewest instructions of one, of all together, most of one.
+    /// Calls; fewest instructions of a call, sum over all calls, most of a call.
     pub fn counts(&self) -> [u64; 4] {
         [self.calls, if self.calls == 0 { 0 } else { self.smallest }, self.sum, self.largest]
     }

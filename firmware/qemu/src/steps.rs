@@ -1,4 +1,4 @@
-//! The supervised controller as a machine that a host steps, with what each tick costs.
+//! The supervised controller, stepped by a host, with the cost of each tick.
 
 use controller::supervised::{
     MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_at_reset, machine_output_words,
@@ -12,20 +12,20 @@ use crate::stages::Stages;
 
 const _: () = assert!(CONFIG_WORDS <= WORDS && MACHINE_INPUT_WORDS <= WORDS && MACHINE_OUTPUT_WORDS <= WORDS);
 
-/// Name of the whole tick.
+/// Name of the stage of the whole tick.
 const WHOLE: &str = "supervise";
 
 /// A machine with its settings.
 pub struct Steps {
     counter: InstructionCounter,
-    /// Whether the counter counts: false without `-icount shift=10`.
+    /// Whether counts are valid: false without `-icount shift=10`.
     exact: bool,
     config: Config,
     machine: Machine,
     stages: Stages,
     /// Ticks since the last reset.
     ticks: u64,
-    /// Most stack that a tick was seen to use, bytes.
+    /// Largest measured stack use of a tick, bytes.
     deepest: usize,
 }
 
@@ -73,7 +73,7 @@ impl lockstep::Machine for Steps {
     }
 
     fn step(&mut self, input: &[u64], output: &mut [u64]) -> (u64, u32) {
-        // The link has checked the lengths.
+        // The link checks the lengths.
         let row = input.first_chunk().unwrap_or(&[0; MACHINE_INPUT_WORDS]);
         let input = MachineInput::from_words(row);
         let due = is_due(self.ticks);
@@ -101,7 +101,7 @@ impl lockstep::Machine for Steps {
     }
 }
 
-/// Ticks that the stages and the stack are measured on, for that takes far longer than the tick.
+/// Whether stages and stack are measured on this tick. That takes far longer than the tick.
 const fn is_due(tick: u64) -> bool {
     tick % 32 == 0
 }

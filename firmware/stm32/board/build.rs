@@ -1,4 +1,4 @@
-//! The build script of every board: tells the linker where the memory map is and which layout to use, and refuses a build that
+//! The build script of every board: gives the linker the memory map and the layout, and refuses a build that
 //! would be too slow for a tick.
 
 use std::env::var;
@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::exit;
 
 fn main() {
-    // Cargo always sets it for a build script.
+    // Cargo always sets this for a build script.
     let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
     let manifest = std::fs::read_to_string(root.join("Cargo.toml")).unwrap_or_default();
     let value = |key: &str| {

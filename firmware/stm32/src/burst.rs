@@ -1,7 +1,7 @@
-//! A converter's SPI with its chip select: frames of some bytes at the speed of the wire.
+//! A converter's SPI with its chip select: frames of a few bytes at full bus speed.
 //!
-//! To wait for each byte before the next one is given takes longer than the byte at 25 MHz. Here a frame goes through the FIFO of the
-//! part, by [`Burst`], which each board has for its SPI.
+//! At 25 MHz, waiting for each byte before sending the next takes longer than the byte. So a frame goes through the FIFO of the
+//! SPI, with the [`Burst`] of each board.
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
@@ -9,10 +9,10 @@ use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
 use crate::CycleDelay;
 use crate::pins::Output;
 
-/// After the chip select has been read back, ns: with that, more than 30.
+/// Wait after the chip select was read back, ns: more than 30 in total.
 const SELECT: u32 = 20;
 
-/// The SPI did not move a byte in time: its clock stands.
+/// The SPI did not transfer a byte in time: its clock has stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SpiTimeout;
 
@@ -22,12 +22,12 @@ impl Error for SpiTimeout {
     }
 }
 
-/// Registers of an SPI that is set up, and that nobody else uses.
+/// Registers of an initialised SPI, used exclusively.
 pub trait Burst {
-    /// Moves `count` bytes: the k-th is `send(k)`, and what comes back for it goes to `take`. Ends with the last bit.
+    /// Transfers `count` bytes: sends `send(k)` as the k-th and passes the received byte to `take`. Ends with the last bit.
     ///
     /// # Errors
-    /// [`SpiTimeout`]; the next exchange starts anew.
+    /// [`SpiTimeout`]; the next exchange starts afresh.
     fn exchange(
         &mut self,
         count: usize,
@@ -35,12 +35,12 @@ pub trait Burst {
         take: impl FnMut(usize, u8),
     ) -> Result<(), SpiTimeout>;
 
-    /// The clock of the exchanges that follow: that of frames whose answer counts, or that of others. Where one clock does for both,
-    /// nothing.
+    /// Selects the clock of the following exchanges: slow for frames whose answer is used, or fast. Does nothing if one clock serves
+    /// both.
     fn pace(&mut self, answered: bool);
 }
 
-/// A part behind a chip select. `CYCLES` as in [`CycleDelay`].
+/// A device with a chip select. `CYCLES` as in [`CycleDelay`].
 pub struct Device<BUS, const CYCLES: u32> {
     /// The SPI.
     pub bus: BUS,
@@ -53,8 +53,8 @@ impl<BUS: Burst, const CYCLES: u32> Device<BUS, CYCLES> {
     #[inline]
     fn selected<T>(&mut self, action: impl FnOnce(&mut BUS) -> T) -> T {
         self.select.set(false);
-        // Pin and SPI are on different buses, and the edge must be out 30 ns before the first one of the clock (AD7606): what is
-        // read back has been written.
+        // Pin and SPI are on different buses, and the edge must precede the first clock edge by 30 ns (AD7606). Reading back ensures
+        // that the write has completed.
         let _ = self.select.is_set();
         CycleDelay::<CYCLES>.delay_ns(SELECT);
         let result = action(&mut self.bus);
@@ -62,7 +62,7 @@ impl<BUS: Burst, const CYCLES: u32> Device<BUS, CYCLES> {
         result
     }
 
-    /// The same of a frame whose answer counts.
+    /// The same for a frame whose answer is used.
     #[inline]
     fn answered<T>(&mut self, action: impl FnOnce(&mut BUS) -> T) -> T {
         self.bus.pace(true);
@@ -76,7 +76,7 @@ impl<BUS, const CYCLES: u32> ErrorType for Device<BUS, CYCLES> {
     type Error = SpiTimeout;
 }
 
-/// By `write` alone nothing comes back: all else has the clock of frames whose answer counts.
+/// `write` ignores the answer; all other operations use the clock of frames whose answer is used.
 impl<BUS: Burst, const CYCLES: u32> SpiDevice for Device<BUS, CYCLES> {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), SpiTimeout> {
         self.answered(|bus| {
@@ -108,7 +108,7 @@ impl<BUS: Burst, const CYCLES: u32> SpiDevice for Device<BUS, CYCLES> {
 
 #[inline]
 fn in_place(bus: &mut impl Burst, bytes: &mut [u8]) -> Result<(), SpiTimeout> {
-    // A byte comes back after it was sent, so one place serves both.
+    // A byte is received after it was sent, so one buffer serves both.
     let cells = core::cell::Cell::from_mut(bytes).as_slice_of_cells();
     bus.exchange(
         cells.len(),

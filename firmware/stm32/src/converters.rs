@@ -1,4 +1,4 @@
-//! The converters on their pins: types, and how they are put together.
+//! The converters on their pins: types and construction.
 
 use core::mem::MaybeUninit;
 
@@ -18,7 +18,7 @@ use crate::pulses::{self, Sampling};
 
 /// AD7606 for gauges of up to 16 bits; the pin-compatible AD7608 or AD7606C-18 for up to 18.
 pub const ADC_BITS: usize = if GAUGE_BITS <= 16 { 16 } else { 18 };
-/// What V8 shows: the 2.5 V reference ± 2 % at ±5 V (RANGE low).
+/// Expected range of V8: the 2.5 V reference ± 2 % at ±5 V (RANGE low).
 const REFERENCE: Window = Window::around(2500, 50, 5000, ADC_BITS as u32);
 
 /// The ADC.
@@ -27,9 +27,9 @@ pub type Adc<BUS, const CYCLES: u32> =
 /// The DACs.
 pub type Dacs<BUS, const OUTPUT: usize, const CYCLES: u32> =
     Ad5686rPair<Device<BUS, CYCLES>, Device<BUS, CYCLES>, pulses::Output<OUTPUT>, Enable, CycleDelay<CYCLES>>;
-/// Pins of triggers, those of the spec alone.
+/// Pins of the triggers in the spec.
 pub type TriggerPins = ([Option<Output>; MOST], Option<Input>);
-/// The machine on them. `OUTPUT`: the channel of LDAC, see [`pulses`].
+/// The machine with these converters. `OUTPUT`: the channel of LDAC, see [`pulses`].
 pub type OnBoard<BUS, const OUTPUT: usize, const CYCLES: u32> =
     Board<'static, Adc<BUS, CYCLES>, Dacs<BUS, OUTPUT, CYCLES>, TriggerPins>;
 
@@ -39,7 +39,7 @@ pub struct AdcPins<BUS, const CYCLES: u32> {
     pub spi: Device<BUS, CYCLES>,
     /// CONVST A and B.
     pub start: Sampling,
-    /// BUSY with pull-up, so that a part that is not there is seen.
+    /// BUSY with pull-up, so that a missing part is detected.
     pub busy: LatchedInput,
     /// RESET, low.
     pub reset: Output,
@@ -55,12 +55,12 @@ pub struct DacPins<BUS, const OUTPUT: usize, const CYCLES: u32> {
     pub enable: Enable,
 }
 
-/// SPI of the ADC: SCLK idles high, bits are taken on its falling edge.
+/// SPI of the ADC: SCLK idles high, bits are sampled on its falling edge.
 pub const ADC_MODE: Mode = MODE_2;
-/// SPI of the DACs: SCLK idles low, bits are taken on its falling edge.
+/// SPI of the DACs: SCLK idles low, bits are sampled on its falling edge.
 pub const DAC_MODE: Mode = MODE_1;
 
-/// The pins of the spec's triggers: outputs, low, and the input, pulled down; the others stay as they are after reset.
+/// The pins of the spec's triggers: outputs, low, and the input, pulled down; the others keep their reset state.
 #[must_use]
 pub fn trigger_pins(outputs: [Pin; MOST], input: Pin) -> TriggerPins {
     let mut lines = [(); LINES].into_iter();
@@ -68,20 +68,20 @@ pub fn trigger_pins(outputs: [Pin; MOST], input: Pin) -> TriggerPins {
     (outputs, INPUT.then(|| input.input(Pupdr::PULL_DOWN)))
 }
 
-/// The machine at reset, made where it stays. A function of its own, so that the compiler fills the memory instead of a copy
-/// of it on the stack; `tests/tests/boards.rs` adds up the stack.
+/// Creates the machine at reset in place. A separate function, so that the compiler initialises the memory directly instead of a
+/// copy on the stack; `tests/tests/boards.rs` adds up the stack.
 #[inline(never)]
 pub fn at_reset(memory: &'static mut MaybeUninit<Machine>) -> &'static mut Machine {
     memory.write(machine_at_reset())
 }
 
-/// What the recorder's background copies the machine into, made where it stays.
+/// Creates in place the memory into which the background copies the machine for the recorder.
 #[inline(never)]
 pub fn kept(memory: &'static mut MaybeUninit<MachineSnapshot>, machine: &Machine) -> &'static mut MachineSnapshot {
     memory.write(MachineSnapshot::of(machine))
 }
 
-/// Puts machine (at reset) and converters together. `intact`: what `controller::integrity` found.
+/// Combines the machine at reset with the converters. `intact`: result of `controller::integrity`.
 pub fn board<BUS: Burst, const OUTPUT: usize, const CYCLES: u32>(
     adc: AdcPins<BUS, CYCLES>,
     dac: DacPins<BUS, OUTPUT, CYCLES>,

@@ -1,5 +1,5 @@
-//! What the STM32 boards have in common, on the registers of `stm32-metapac`: a HAL takes longer to compile than all the rest of an
-//! image. The part is a cargo feature that the board's program chooses; pins, clocks and interrupts are the program's, too.
+//! Code shared by the STM32 boards, on the registers of `stm32-metapac`: a HAL takes longer to compile than the rest of an image. The
+//! board's program selects the microcontroller by a cargo feature and defines pins, clocks and interrupts.
 #![no_std]
 #![deny(missing_docs)]
 #![deny(unsafe_code)]

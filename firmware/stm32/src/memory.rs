@@ -1,9 +1,9 @@
-//! Memory copied and cleared in bursts: the compiler's own functions for it move a word at a time, and a copy of the machine has two thousand.
+//! Copies and clears memory in bursts: the compiler's own functions move a word at a time, and the machine has two thousand words.
 
 #![allow(unsafe_code)] // Functions in assembly, under the names that the compiler calls.
 
-// The names that the ABI gives to copying between places that are aligned to four bytes, and to clearing one. The compiler's own
-// are weak, so that these take their place. Eight words at a time, then single ones, then bytes.
+// The ABI's functions for copying and clearing memory that is aligned to four bytes. They replace the compiler's own, which are weak
+// symbols. Eight words at a time, then single words, then bytes.
 core::arch::global_asm!(
     ".section .text.__aeabi_memcpy4,\"ax\",%progbits",
     ".global __aeabi_memcpy4",

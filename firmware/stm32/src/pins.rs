@@ -1,4 +1,4 @@
-//! Pins: what each is for, and single ones as outputs and inputs.
+//! Pins as outputs, inputs and functions of peripherals.
 
 use core::convert::Infallible;
 
@@ -9,12 +9,12 @@ use stm32_metapac::gpio::Gpio;
 use stm32_metapac::gpio::vals::{Moder, Ospeedr, Ot, Pupdr};
 use stm32_metapac::{EXTI, GPIOA, SYSCFG};
 
-/// A pin by port and number. The port has its clock, and nobody else sets up a pin of it meanwhile.
+/// A pin by port and number. The port must have its clock, and no other code may configure its pins at the same time.
 #[derive(Clone, Copy)]
 pub struct Pin(pub Gpio, pub u8);
 
 impl Pin {
-    /// The mode comes last, so that the pin is driven only as it is meant to be.
+    /// Sets the mode last, so that the pin is driven only in its final configuration.
     fn mode(self, mode: Moder, speed: Ospeedr, pull: Pupdr) {
         let Self(port, number) = self;
         let number = usize::from(number);
@@ -24,14 +24,14 @@ impl Pin {
         port.moder().modify(|w| w.set_moder(number, mode));
     }
 
-    /// Gives it to the peripheral that this alternate function of the data sheet's table names.
+    /// Connects it to a peripheral by its alternate function in the data sheet.
     pub fn function(self, function: u8, speed: Ospeedr, pull: Pupdr) {
         let number = usize::from(self.1);
         self.0.afr(number / 8).modify(|w| w.set_afr(number % 8, function));
         self.mode(Moder::ALTERNATE, speed, pull);
     }
 
-    /// An output at this level from the beginning.
+    /// An output with this initial level.
     #[must_use]
     pub fn output(self, high: bool, speed: Ospeedr) -> Output {
         let mut output = Output(self);
@@ -48,14 +48,14 @@ impl Pin {
     }
 }
 
-/// Of a port in the address space, from [`GPIOA`] on.
+/// Distance of ports in the address space, from [`GPIOA`] on.
 const PORT: usize = 0x400;
 
-/// An input whose falls the EXTI latches. No interrupt of the core belongs to it.
+/// An input whose falling edges are latched by the EXTI, without an interrupt.
 pub struct LatchedInput(Input);
 
 impl Pin {
-    /// An input whose falls are latched; no other port has its number there.
+    /// An input with latched falling edges. No other port may use its number in the EXTI.
     #[must_use]
     pub fn latched(self, pull: Pupdr) -> LatchedInput {
         let Self(port, number) = self;
@@ -86,18 +86,18 @@ impl BusyLine for LatchedInput {
     }
 }
 
-/// Gives the pins of an SPI to it: SCK, pulled to its idle level, MOSI, MISO.
+/// Configures the pins of an SPI: SCK, pulled to its idle level, MOSI, MISO.
 pub fn spi_bus([clock, output, input]: [Pin; 3], function: u8, idle: Pupdr) {
     clock.function(function, Ospeedr::VERY_HIGH_SPEED, idle);
     output.function(function, Ospeedr::VERY_HIGH_SPEED, Pupdr::FLOATING);
     input.function(function, Ospeedr::LOW_SPEED, Pupdr::FLOATING);
 }
 
-/// A pin that is driven, push-pull.
+/// A push-pull output.
 pub struct Output(Pin);
 
 impl Output {
-    /// Drives it, without reading the port's other pins.
+    /// Sets its level without a read-modify-write of the port.
     #[inline]
     pub fn set(&mut self, high: bool) {
         let Pin(port, number) = self.0;
@@ -132,7 +132,7 @@ impl OutputPin for Output {
     }
 }
 
-/// A pin that is read.
+/// An input.
 pub struct Input(Pin);
 
 impl Input {

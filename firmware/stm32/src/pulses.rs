@@ -1,8 +1,8 @@
-//! CONVST and LDAC by a timer: sampling and output keep their instants, whatever delays the program.
+//! CONVST and LDAC from a timer: the instants of sampling and output do not depend on delays of the program.
 //!
-//! TIM2 tells this timer when a tick is due ([`crate::timer`]): it counts once from 0 to its end and stops. CONVST rises with count
-//! 1 and rests low. LDAC is low from the output instant to the end, if the codes were written by then; if they are late, the
-//! program gives it.
+//! TIM2 triggers this timer when a tick is due ([`crate::timer`]): it counts once from 0 to its end and stops. CONVST rises at count
+//! 1 and is low otherwise. LDAC is low from the output instant to the end, if the codes were written by then; if they are late, the
+//! program generates the pulse.
 //!
 //! ```text
 //! TIM2   ──┤ due                                        interrupt: tick
@@ -17,14 +17,14 @@ use specgen_hal::{Edge, Fault};
 use stm32_metapac::timer::TimGp16;
 use stm32_metapac::timer::vals::{Mms, Sms, Ts};
 
-/// LDAC low, ns: the AD5686R wants 15.
+/// Width of the LDAC pulse, ns: the AD5686R needs 15.
 const LOW: u32 = 50;
-/// With less left until the output instant the program gives LDAC itself, ns: arming takes as long.
+/// With less time left until the output instant, ns, the program generates LDAC itself: arming takes that long.
 const MARGIN: u32 = 150;
-/// Looks at the timer until waiting for LDAC is given up: more than the longest way to the output instant.
+/// Polls of the timer before waiting for LDAC times out: more than the longest time to the output instant.
 const LOOKS: u32 = 10_000;
 
-/// OCxM: the channel is inactive, active, active from its compare value on. By their numbers: there is a type for each family.
+/// OCxM: the channel is inactive, active, active from its compare value on. As numbers, because each family has its own type.
 const INACTIVE: u32 = 4;
 const ACTIVE: u32 = 5;
 const FROM_COMPARE: u32 = 7;
@@ -33,22 +33,22 @@ const FROM_COMPARE: u32 = 7;
 #[derive(Clone, Copy)]
 pub struct Pulses(TimGp16);
 
-/// Gives the edge of CONVST.
+/// Generates the edge of CONVST.
 pub struct Sampling(Pulses);
 
-/// Gives LDAC, by this channel of the timer, counted from 0.
+/// Generates LDAC on this channel of the timer, counted from 0.
 pub struct Output<const CHANNEL: usize> {
     pulses: Pulses,
-    /// Count of the output instant, and how many before it the program gives LDAC itself.
+    /// Count of the output instant, and of the margin before it.
     at: u16,
     margin: u16,
-    /// The timer is to give it.
+    /// Whether the timer will generate it.
     armed: bool,
 }
 
 impl Pulses {
-    /// A timer that runs at `hertz`, with outputs `nanoseconds` after sampling, sooner if the control period is too short for that:
-    /// an eighth of it is left. Both lines rest; the pins are handed over after this.
+        /// A timer that runs at `hertz`, with outputs `nanoseconds` after sampling, or sooner in a short control period, so that an
+        /// eighth of the period remains. Both lines are idle; the pins are connected after this.
     #[must_use]
     pub fn edges<const SAMPLING: usize, const OUTPUT: usize>(
         timer: TimGp16,
@@ -57,7 +57,7 @@ impl Pulses {
     ) -> (Sampling, Output<OUTPUT>) {
         let longest = PERIOD_NANOSECONDS / 8 * 7;
         let until = if nanoseconds < longest { nanoseconds } else { longest };
-        // One count for CONVST, with which the time begins.
+        // Time starts with CONVST, at count one.
         let counts =
             |time: u32| u16::try_from(u64::from(time) * u64::from(hertz) / 1_000_000_000 + 1).unwrap_or(u16::MAX);
         let (at, low) = (counts(until), counts(LOW));
@@ -98,7 +98,7 @@ impl Pulses {
 }
 
 impl Edge for Sampling {
-    /// Where TIM2 has not started the timer in this tick, the program does.
+    /// Starts the timer if TIM2 has not started it in this tick.
     #[inline]
     fn give(&mut self) -> Result<(), Fault> {
         if !self.0.runs() {
@@ -119,7 +119,7 @@ impl Edge for Sampling {
 }
 
 impl<const CHANNEL: usize> Output<CHANNEL> {
-    /// Whether the output instant has passed since it was armed.
+    /// Whether the output instant has passed since arming.
     #[inline]
     fn is_out(&self) -> bool {
         self.pulses.0.sr().read().ccif(CHANNEL)
@@ -129,7 +129,7 @@ impl<const CHANNEL: usize> Output<CHANNEL> {
     fn now(&mut self) {
         self.pulses.mode::<CHANNEL>(ACTIVE);
         asm::dsb();
-        // Reading the register back for this takes longer than the pulse has to be.
+        // Reading the register back takes longer than the pulse needs.
         self.pulses.mode::<CHANNEL>(INACTIVE);
     }
 }
@@ -138,11 +138,11 @@ impl<const CHANNEL: usize> Edge for Output<CHANNEL> {
     #[inline]
     fn give(&mut self) -> Result<(), Fault> {
         let timer = self.pulses.0;
-        // In this order: a count that has come round to 0 is one of a timer that no longer runs.
+        // In this order: if the count has wrapped to 0, the timer has stopped.
         let count = timer.cnt().read().cnt();
         self.armed = self.pulses.runs() && count.saturating_add(self.margin) < self.at;
         if self.armed {
-            // Written zeros clear, ones leave alone.
+            // Writing 0 clears a flag, 1 leaves it.
             timer.sr().write(|w| {
                 w.0 = u32::MAX;
                 w.set_ccif(CHANNEL, false);
@@ -171,5 +171,5 @@ impl<const CHANNEL: usize> Edge for Output<CHANNEL> {
     }
 }
 
-/// TIM2 tells when a tick is due.
+/// TIM2 triggers at each tick.
 pub(crate) const LEADS: Mms = Mms::COMPARE_PULSE;

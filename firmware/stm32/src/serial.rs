@@ -1,10 +1,10 @@
 //! The link over a USART.
 //!
-//! Received bytes go by DMA into a ring, as a tick may last longer than a byte and an F4 holds one byte only. Answers go out by DMA,
-//! so that the background goes on meanwhile.
+//! DMA moves received bytes into a ring, because a tick may last longer than a byte and an F4 buffers only one. Answers are sent by
+//! DMA, so that the background continues meanwhile.
 //!
-//! What has come in when something goes wrong on the line (noise, framing, overrun) is dropped, and so is a frame by its CRC when more comes in
-//! than the ring holds: that is counted, and the host asks again.
+//! After an error on the line (noise, framing, overrun) the received bytes are dropped. If the ring overflows, the CRC rejects the
+//! frame. Both are counted, and the host repeats its request.
 
 #![allow(unsafe_code)] // Interrupts are enabled.
 
@@ -17,20 +17,20 @@ use specgen_board::{Access, LinkHandler, RequestContext};
 use specgen_link::{Endpoint, FRAME};
 use stm32_metapac::{DMA1, Interrupt};
 
-/// Of the link, with 8 data bits, no parity, one stop bit.
+/// Baud rate of the link, with 8 data bits, no parity, one stop bit.
 pub const BAUD: u32 = 921_600;
-/// What the DMA fills over and over: half of it holds what comes in 2.7 ms.
+/// The circular buffer of the DMA: half of it holds 2.7 ms of data.
 pub type Ring = [AtomicU8; 512];
-/// An answer while it goes out.
+/// An answer while it is being sent.
 pub type Answer = [AtomicU8; FRAME];
 
-/// The interrupt by which the program serves the link. Its own device is not used, so that the others pend it.
+/// The interrupt that serves the link. Its own device is not used; the other interrupts pend it.
 const SERVICE: Interrupt = Interrupt::CEC;
-/// Priority of the interrupts, in the upper half of the byte as all: 8 of 16, below the tick.
+/// Priority of the interrupts, in the upper half of the byte: 8 of 16, below the tick.
 const PRIORITY: u8 = 8 << 4;
 
-/// CR of a stream: enabled, an interrupt at an error, in the middle and at the end; to the peripheral, over and over; memory by bytes
-/// one after the other, highest priority.
+/// CR of a stream: enable, interrupts at an error, at the middle and at the end; direction to the peripheral, circular; memory increment
+/// by bytes, highest priority.
 const ENABLED: u32 = 1;
 const ERROR: u32 = 1 << 2;
 const HALF: u32 = 1 << 3;
@@ -39,27 +39,27 @@ const SENDS: u32 = 1 << 6;
 const CIRCULAR: u32 = 1 << 8;
 const BYTES: u32 = 1 << 10 | 3 << 16;
 
-/// The USART of a board, whose registers differ between the families.
+/// The USART of a board. Its registers differ between families.
 pub trait Port {
-    /// Streams of DMA1 to and from it.
+    /// Stream of DMA1 that sends.
     const SEND: usize;
-    /// See above.
+    /// Stream of DMA1 that receives.
     const RECEIVE: usize;
-    /// Bits of CR that choose its request, or that its DMA needs besides.
+    /// Bits of CR that select its request, or that its DMA needs in addition.
     const STREAM: u32;
-    /// Its interrupt and those of the streams. Each is to call [`interrupt`].
+    /// Its interrupt and those of the streams. Each must call [`interrupt`].
     const INTERRUPTS: [Interrupt; 3];
 
     /// Addresses of the data registers: to send, received.
     fn data() -> [u32; 2];
 
-    /// Hands over its pins, and the requests of the DMA where a multiplexer chooses them.
+    /// Configures its pins, and the DMA requests if there is a multiplexer.
     fn prepare();
 
-    /// Sets it up: DMA both ways, interrupts when the line falls idle and at errors, bits of so many clocks.
+    /// Starts it: DMA in both directions, interrupts on an idle line and on errors, bits of so many clocks.
     fn start(clocks: u32);
 
-    /// Takes back its interrupts. True after an error.
+    /// Clears its interrupts. True after an error.
     fn acknowledge() -> bool;
 }
 
@@ -70,33 +70,32 @@ static FAILED: AtomicBool = AtomicBool::new(false);
 pub struct Line<P> {
     ring: &'static Ring,
     answer: &'static Answer,
-    /// Place of the next byte in the ring.
+    /// Index of the next byte in the ring.
     next: usize,
     port: PhantomData<P>,
 }
 
 impl<P: Port> Line<P> {
-    /// Opens the link. `hertz`: clock of the USART. `ring` and `answer` are where the DMA can reach them.
+    /// Opens the link. `hertz`: clock of the USART. `ring` and `answer` must be in memory that the DMA can access.
     pub fn open(nvic: &mut NVIC, hertz: u32, ring: &'static Ring, answer: &'static Answer) -> Self {
         let [_, received] = P::data();
         P::prepare();
         start_stream::<P>(P::RECEIVE, received, ring, ring.len(), HALF | CIRCULAR);
         P::start((hertz + BAUD / 2) / BAUD);
         for interrupt in P::INTERRUPTS {
-            // SAFETY: they take back what calls them, and pend the service, which the program enables.
+            // SAFETY: the handlers clear their interrupts and pend the service, which the program enables.
             unsafe {
                 nvic.set_priority(interrupt, PRIORITY);
                 NVIC::unmask(interrupt);
             }
         }
         let line = Self { ring, answer, next: 0, port: PhantomData };
-        // Whatever the host has taken for bytes until now ends here.
+        // Ends any garbage that the host has received so far.
         line.send(&[0]);
         line
     }
 
-    /// Takes what has come in, and answers it, for as long as no answer is on its way: the end of one is an interrupt, which comes back
-    /// here.
+        /// Processes received bytes and answers them until an answer is being sent: the interrupt at its end calls this again.
     pub fn serve(&mut self, endpoint: &mut Endpoint, handler: &mut LinkHandler, with: &mut Access<'_>) {
         if FAILED.swap(false, Ordering::Relaxed) {
             self.next = self.end();
@@ -109,7 +108,7 @@ impl<P: Port> Line<P> {
         }
     }
 
-    /// The next byte that has come in.
+    /// The next received byte.
     fn take(&mut self) -> Option<u8> {
         if self.next == self.end() {
             return None;
@@ -119,13 +118,13 @@ impl<P: Port> Line<P> {
         Some(byte)
     }
 
-    /// Place in the ring of the byte that comes in next.
+    /// Index in the ring of the next byte to be received.
     fn end(&self) -> usize {
         let left = usize::from(DMA1.st(P::RECEIVE).ndtr().read().ndt());
         (self.ring.len() - left) % self.ring.len()
     }
 
-    /// Sends from where the DMA can reach it. What does not go out the host asks for again.
+    /// Sends from memory that the DMA can access. If it fails, the host repeats its request.
     fn send(&self, bytes: &[u8]) {
         for (slot, value) in self.answer.iter().zip(bytes) {
             slot.store(*value, Ordering::Relaxed);
@@ -135,21 +134,21 @@ impl<P: Port> Line<P> {
     }
 }
 
-/// Starts a stream that has come to its end, or never ran.
+/// Starts a stream that has finished or never ran.
 fn start_stream<P: Port>(number: usize, register: u32, memory: &'static [AtomicU8], count: usize, more: u32) {
     acknowledge(number);
     let stream = DMA1.st(number);
     stream.par().write_value(register);
     stream.m0ar().write_value(memory.as_ptr() as u32);
     stream.ndtr().write(|w| w.set_ndt(count as u16));
-    // Directly, without its FIFO.
+    // Direct mode, without the FIFO.
     stream.fcr().write(|w| w.0 = 0);
-    // What was written to memory is there.
+    // Earlier writes to memory have completed.
     asm::dmb();
     stream.cr().write(|w| w.0 = P::STREAM | BYTES | ERROR | END | more | ENABLED);
 }
 
-/// Takes back what a stream has to say. An error is one of the program: no such memory.
+/// Clears the interrupts of a stream. An error is a bug of the program: invalid memory.
 fn acknowledge(number: usize) {
     let (register, place) = (number / 4, number % 4);
     assert!(!DMA1.isr(register).read().teif(place));
@@ -159,7 +158,7 @@ fn acknowledge(number: usize) {
     });
 }
 
-/// What the interrupts of USART and streams do: the link is served, below the tick and above the background.
+/// Handler of the interrupts of USART and streams: the link is served below the tick and above the background.
 pub fn interrupt<P: Port>() {
     acknowledge(P::SEND);
     acknowledge(P::RECEIVE);

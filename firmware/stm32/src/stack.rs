@@ -1,23 +1,23 @@
-//! How deep the stack was.
+//! Peak stack use.
 
 #![allow(unsafe_code)] // Memory of the stack is read.
 
 use core::ptr::{self, addr_of};
 
-// SAFETY: symbols of the memory map, of which only the addresses are used.
+// SAFETY: symbols of the memory map; only their addresses are used.
 unsafe extern "C" {
     static _stack_end: u32;
     static _stack_start: u32;
 }
 
-/// Most bytes seen in use, and bytes there are: the words that are no longer what the start of the program filled the stack with
-/// (`paint-stack` of `cortex-m-rt`). One that a frame left out or wrote with just that value is not seen.
+/// Peak bytes in use, and size of the stack, from the words that no longer have the value written at start (`paint-stack` of
+/// `cortex-m-rt`). Words that a frame skipped, or wrote with that value, are not detected.
 pub fn used() -> [u32; 2] {
     let (end, start) = (addr_of!(_stack_end), addr_of!(_stack_start));
     let size = (start as u32).wrapping_sub(end as u32);
     let mut free = 0;
     while free < size {
-        // SAFETY: aligned, and within the memory of the stack, which always can be read.
+        // SAFETY: aligned, and within the memory of the stack, which can always be read.
         let word = unsafe { ptr::read_volatile(end.wrapping_byte_add(free as usize)) };
         if word != cortex_m_rt::STACK_PAINT_VALUE {
             break;

@@ -1,21 +1,21 @@
-//! The supply of the microcontroller: amplifiers off before it is too low to compute by.
+//! The supply of the microcontroller: switches the amplifiers off before the voltage is too low for correct operation.
 //!
-//! The part resets itself at 1.7 V or so. What resets it sooner (brown-out level 3: 2.7 V) stands in the option bytes, which are in
-//! flash and which no program writes lightly: `docs/bring-up.md` says how they are set once. Until then, and before it comes to
-//! that, the voltage detector interrupts at 2.85 V (F446: 2.8 V).
+//! The part resets itself at about 1.7 V. A higher threshold (brown-out level 3: 2.7 V) is set in the option bytes, which are in flash
+//! and which programs should not write: `docs/bring-up.md` shows how to set them once. Even before that, the voltage detector
+//! interrupts at 2.85 V (F446: 2.8 V).
 
 #![allow(unsafe_code)] // An interrupt is enabled.
 
 use cortex_m::peripheral::NVIC;
 use stm32_metapac::{EXTI, Interrupt, PWR};
 
-/// PLS: the last but one threshold.
+/// PLS: the second-highest threshold.
 const THRESHOLD: u8 = 6;
-/// Of the EXTI that the detector is on.
+/// EXTI line of the detector.
 const LINE: usize = 16;
 
-/// Watches the supply from here on: `interrupt`, that of the detector, comes at the highest priority when it is too low, above the tick.
-/// False if it is already.
+/// Monitors the supply from now on: `interrupt`, that of the detector, has the highest priority, above the tick. False if the
+/// supply is already too low.
 #[must_use]
 pub fn watch(interrupt: Interrupt) -> bool {
     PWR.cr1().modify(|w| {
@@ -24,8 +24,8 @@ pub fn watch(interrupt: Interrupt) -> bool {
     });
     EXTI.rtsr(0).modify(|w| w.set_line(LINE, true));
     EXTI.imr(0).modify(|w| w.set_line(LINE, true));
-    // Its priority is that of reset, the highest.
-    // SAFETY: its handler stops the program, whatever it was about to do.
+    // Its priority after reset is the highest.
+    // SAFETY: its handler stops the program at any point.
     unsafe { NVIC::unmask(interrupt) };
     !PWR.csr1().read().pvdo()
 }

@@ -1,5 +1,5 @@
-//! TIM2 as a free-running counter of 32 bits whose first compare channel says when a tick is due: to the core by an interrupt, to
-//! the timer of CONVST and LDAC ([`pulses`]) by its trigger output.
+//! TIM2 as a free-running 32-bit counter whose first compare channel starts each tick: in the core by an interrupt, in the timer of
+//! CONVST and LDAC ([`pulses`]) by its trigger output.
 
 use core::num::NonZeroU32;
 
@@ -9,14 +9,14 @@ use stm32_metapac::{Interrupt, TIM2};
 
 use crate::pulses;
 
-/// Counts in a control period at a timer clock of so many Hz; none if they are no count of the timer.
+/// Counts per control period at a timer clock of so many Hz; none if the timer cannot count them.
 #[must_use]
 pub const fn period(hertz: u32) -> Option<NonZeroU32> {
     let counts = PERIOD_NANOSECONDS as u64 * hertz as u64 / 1_000_000_000;
     if counts < 1 << 31 { NonZeroU32::new(counts as u32) } else { None }
 }
 
-/// Starts the counter, which has its clock and is as after reset; the first interrupt comes one period later.
+/// Starts the counter, which must have its clock and be in its reset state; the first interrupt comes one period later.
 pub fn start(schedule: &mut Schedule) {
     TIM2.psc().write_value(0);
     TIM2.arr().write_value(u32::MAX);
@@ -27,7 +27,7 @@ pub fn start(schedule: &mut Schedule) {
     TIM2.cr1().write(|w| w.set_cen(true));
 }
 
-/// The counter.
+/// The current count.
 #[inline]
 #[must_use]
 pub fn now() -> u32 {
@@ -41,30 +41,30 @@ pub fn is_calm<const COUNTS: u32>() -> bool {
     left > COUNTS && left < u32::MAX / 2
 }
 
-/// The next interrupt comes at this counter value, or at once if it has passed.
+/// Sets the next interrupt to this count, or to now if it has passed.
 #[inline]
 pub fn arm(next: u32) {
     TIM2.ccr(0).write_value(next);
-    // Passed meanwhile: the comparison would come true one turn of the counter later.
+    // Passed meanwhile: the compare would match only after the counter wraps.
     if now().wrapping_sub(next) < u32::MAX / 2 {
         TIM2.egr().write(|w| w.set_ccg(0, true));
     }
 }
 
-/// After a tick that took longer than one may: the next interrupt comes one period from now, and none that came due meanwhile, in the
-/// middle of the time that the timer of CONVST and LDAC takes for this one.
+/// After a tick that overran: the next interrupt comes one period from now. Interrupts that came due meanwhile are dropped, because
+/// they would interfere with the timer of CONVST and LDAC.
 pub fn restart(schedule: &mut Schedule) {
     arm(schedule.restart(now()));
     acknowledge();
-    // The line has fallen by the time that the last write is read back.
+    // Reading back the last write ensures that the line has fallen.
     let _ = TIM2.sr().read();
     NVIC::unpend(Interrupt::TIM2);
 }
 
-/// Takes the interrupt back.
+/// Clears the interrupt.
 #[inline]
 pub fn acknowledge() {
-    // Written zeros clear, ones leave alone.
+    // Writing 0 clears a flag, 1 leaves it.
     TIM2.sr().write(|w| {
         w.0 = u32::MAX;
         w.set_ccif(0, false);

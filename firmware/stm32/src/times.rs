@@ -1,14 +1,14 @@
-//! What decides about the time of a tick, for specgen, which reads it from the image.
+//! Figures that determine the time of a tick. specgen reads them from the image.
 
-/// Registers that are read and written, and instructions.
+/// Register accesses and instructions of an operation.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Work {
-    /// Reads of registers of devices.
+    /// Reads of device registers.
     pub reads: u32,
-    /// Writes to them.
+    /// Writes to device registers.
     pub writes: u32,
-    /// Instructions besides.
+    /// Other instructions.
     pub instructions: u32,
 }
 
@@ -19,20 +19,20 @@ pub struct Times {
     version: u32,
     /// Clock of the core, Hz.
     core: u32,
-    /// FLASH_ACR and CCR, as they are while ticks run.
+    /// FLASH_ACR and CCR while ticks run.
     registers: [u32; 2],
-    /// SCLK of ADC and DACs, and of these where they are read back, Hz.
+    /// SCLK of the ADC, of the DACs, and of the DACs for read-back, Hz.
     sclk: [u32; 3],
-    /// What a byte on a bus takes of the core, while the next one is on the wires.
+    /// Work of the core per byte, while the next one is on the bus.
     byte: Work,
-    /// A frame beside its bytes: select, the first bytes, the end of the last one.
+    /// Work per frame in addition to its bytes: select, the first bytes, the end of the last one.
     frame: Work,
-    /// The interrupt around the tick: what holds it off, the timer, the watchdog, the stop contact; what a frame that is read back has besides.
+    /// The interrupt around the tick: its latency, timer, watchdog, stop contact; and the additional work of a frame that is read back.
     interrupt: Work,
 }
 
 impl Times {
-    /// Clock of the core, Hz; FLASH_ACR and CCR; SCLK of ADC and DACs, and of these where they are read back.
+    /// `core`: clock of the core, Hz; FLASH_ACR and CCR; SCLK of the ADC, of the DACs, and of the DACs for read-back.
     #[must_use]
     pub const fn new(core: u32, registers: [u32; 2], sclk: [u32; 3]) -> Self {
         Self {
@@ -42,8 +42,8 @@ impl Times {
             sclk,
             byte: Work { reads: 3, writes: 1, instructions: 16 },
             frame: Work { reads: 3, writes: 6, instructions: 60 },
-            // With two changes of the DACs' clock; and what the background holds a tick off for longest: 20 knots that it takes from
-            // the link, or 16 words of a record. The copy of the machine is taken only where no tick is due meanwhile.
+                        // Includes two changes of the DACs' clock, and the longest critical section of the background: 20 knots from the link, or
+                        // 16 words of a record. The machine is copied only if no tick is due meanwhile.
             interrupt: Work { reads: 12 + 30, writes: 14, instructions: 190 + 150 },
         }
     }

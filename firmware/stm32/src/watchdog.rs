@@ -1,18 +1,18 @@
-//! The independent watchdog: a reset unless it is fed, by a clock of its own.
+//! The independent watchdog: resets the part unless it is fed. It has its own clock.
 
 use stm32_metapac::iwdg::Iwdg;
 use stm32_metapac::iwdg::vals::{Key, Pr};
 
-/// LSI, Hz, which runs as long as the watchdog does.
+/// LSI, Hz, which runs while the watchdog runs.
 const CLOCK: u32 = 32_000;
-/// Of its prescaler: the smallest.
+/// Its prescaler, the smallest one.
 const DIVIDER: u32 = 4;
 
-/// It runs, and cannot be stopped.
+/// The running watchdog, which cannot be stopped.
 pub struct Watchdog(Iwdg);
 
 impl Watchdog {
-    /// Starts it with a time in µs, of half a second at most.
+    /// Starts it with a timeout in µs, at most half a second.
     #[must_use]
     pub fn start(registers: Iwdg, time: u32) -> Self {
         let counts = time / DIVIDER * CLOCK / 1_000_000;
@@ -23,7 +23,7 @@ impl Watchdog {
         Self(registers)
     }
 
-    /// The time begins anew.
+    /// Restarts the timeout.
     #[inline]
     pub fn feed(&mut self) {
         self.0.kr().write(|w| w.set_key(Key::RESET));

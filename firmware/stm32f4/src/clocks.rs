@@ -1,4 +1,4 @@
-//! Clocks of the NUCLEO-F446RE from 8 MHz at the HSE pin, or HSI: 180 MHz core, 90 MHz timers, 45 and 90 MHz SPI.
+//! Clocks of the NUCLEO-F446RE from 8 MHz at the HSE pin, or from HSI: 180 MHz core, 90 MHz timers, 45 and 90 MHz SPI.
 
 use specgen_link::reset_cause;
 use specgen_stm32::oscillator;
@@ -10,30 +10,29 @@ use stm32_metapac::{DBGMCU, FLASH, PWR, RCC};
 
 /// Clock of TIM2 and TIM3, Hz.
 pub const TIMER: u32 = 90_000_000;
-/// Counts of TIM2 that a copy of the machine takes at most, with as much again: 40 µs.
+/// Twice the longest time of a copy of the machine, in counts of TIM2: 40 µs.
 pub const COPY: u32 = TIMER / 1_000_000 * 40;
-/// What `cortex_m::asm::delay` gets through in a microsecond at most.
+/// The most that `cortex_m::asm::delay` counts in a microsecond.
 pub const DELAY: u32 = 180;
-/// Divides 90 MHz to SCLK of the ADC: 17 MHz at most at 3.3 V, and a divider is a power of two.
+/// Divider from 90 MHz to SCLK of the ADC: at most 17 MHz at 3.3 V, and dividers are powers of two.
 pub const ADC: u32 = 8;
-/// Divides 45 MHz to SCLK of the DACs, where they are written.
+/// Divider from 45 MHz to SCLK of the DACs for writing.
 pub const DAC: u32 = 2;
-/// The same where they are read back: 5.625 MHz. Half a cycle, 88 ns, is more than SDO takes with its resistor: docs/bring-up.md.
+/// The same for read-back: 5.625 MHz. Half a cycle, 88 ns, is longer than the delay of SDO with its resistor: docs/bring-up.md.
 pub const READ_BACK: u32 = 8;
-/// From sampling to the change of the outputs, ns: codes that are written by then are out at this instant, later ones when they are
-/// written.
+/// Time from sampling to the change of the outputs, ns. Codes written later are output when they are written.
 pub const OUTPUT: u32 = 95_000;
 
-/// For the estimate of a tick: 180 MHz; five wait states of the flash, its accelerator on.
+/// Figures for the estimate of a tick: 180 MHz; five wait states of the flash, its accelerator on.
 pub const TIMES: Times =
     Times::new(180_000_000, [0b111 << 8 | 5, 0], [90_000_000 / ADC, 45_000_000 / DAC, 45_000_000 / READ_BACK]);
 
-/// Clocks as above, of every device that is used, too; that of TIM2 and TIM3, Hz, which is twice that of their bus. The core runs from
-/// HSI until then, as after every reset. Names: RM0390, chapters 3 (flash), 5 (PWR) and 6 (RCC).
+/// Starts all clocks, including those of the devices. Returns that of TIM2 and TIM3, Hz, which is twice that of their bus. Until then
+/// the core runs from HSI, as after every reset. Names: RM0390, chapters 3 (flash), 5 (PWR) and 6 (RCC).
 pub fn start() -> u32 {
-    // While a debugger holds the core TIM1 stands still with its outputs off, ENABLE among them (RM0390, debug mode of TIM1).
+    // While a debugger halts the core, TIM1 stops with its outputs off, including ENABLE (RM0390, debug mode of TIM1).
     DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
-    // A debugger sees the core while it sleeps.
+    // Keeps the debug interface active while the core sleeps.
     DBGMCU.cr().modify(|w| {
         w.set_dbg_sleep(true);
         w.set_dbg_stop(true);
@@ -58,7 +57,7 @@ pub fn start() -> u32 {
     RCC.cr().modify(|w| w.set_pllon(true));
     while !RCC.cr().read().pllrdy() {}
 
-    // Wait states of the flash before the clock gets faster.
+    // Set the wait states of the flash before increasing the clock.
     FLASH.acr().write(|w| w.set_latency(Latency::WS5));
     while FLASH.acr().read().latency() != Latency::WS5 {}
     RCC.cfgr().modify(|w| {
@@ -73,7 +72,7 @@ pub fn start() -> u32 {
     TIMER
 }
 
-/// Why the part was reset last, and whether it runs on HSI.
+/// Cause of the last reset, and whether the part runs on HSI.
 pub fn reset_cause() -> u8 {
     let flags = RCC.csr().read();
     RCC.csr().modify(|w| w.set_rmvf(true));
@@ -89,7 +88,7 @@ pub fn reset_cause() -> u8 {
     ])
 }
 
-/// Clocks of devices. What is read back has been written, and by then they run.
+/// Enables the clocks of devices. Reading the registers back ensures that they run.
 fn devices() {
     RCC.ahb1enr().modify(|w| {
         w.set_gpioaen(true);
@@ -113,8 +112,8 @@ fn devices() {
     let _ = RCC.apb2enr().read();
 }
 
-/// The accelerator of the flash: lines of code and constants are kept, and the next line is fetched ahead of time. What it keeps is
-/// emptied first, which is possible only while it is off.
+/// Enables the accelerator of the flash, which caches code and constants and prefetches the next line. Its caches are flushed first,
+/// which is possible only while it is off.
 fn accelerate() {
     FLASH.acr().modify(|w| {
         w.set_icrst(true);

@@ -1,4 +1,4 @@
-//! The wiring: which pin goes where. The table in docs/bring-up.md is this file in words.
+//! The pin assignment. The table in docs/bring-up.md describes it.
 
 use specgen_stm32::burst::Device;
 use specgen_stm32::converters::{ADC_MODE, AdcPins, DAC_MODE, DacPins, TriggerPins, trigger_pins};
@@ -19,10 +19,10 @@ pub const SUPPLY: Interrupt = Interrupt::PVD;
 pub const WATCHDOG: Iwdg = IWDG;
 /// Channel of TIM3 that drives LDAC, counted from 0: CH1.
 pub const OUTPUT: usize = 0;
-/// That of CONVST: CH2.
+/// Channel of CONVST: CH2.
 const SAMPLING: usize = 1;
 
-/// All that the program uses.
+/// All pins of the program.
 pub struct Wiring {
     /// ADC.
     pub adc: AdcPins<Registers, DELAY>,
@@ -30,17 +30,17 @@ pub struct Wiring {
     pub dac: DacPins<Registers, OUTPUT, DELAY>,
     /// Triggers of the spec, in their order.
     pub lines: TriggerPins,
-    /// Emergency stop: a closed contact to ground, at the break input of TIM1; open is stop.
+    /// Emergency stop: a closed contact to ground at the break input of TIM1; open means stop.
     pub stop: Stop,
-    /// Fault of an amplifier: closed to ground while all are well; open is a fault.
+    /// Amplifier fault: closed to ground while all are healthy; open means fault.
     pub fault: Input,
 }
 
-/// Takes the pins; `hertz` is the clock of TIM3. The enable line comes first and is driven low: channel 1 of TIM1, with its break
-/// input.
+/// Configures the pins; `hertz` is the clock of TIM3. The enable line comes first and is driven low: channel 1 of TIM1, with its
+/// break input.
 pub fn take(hertz: u32) -> Wiring {
     let (enable, stop) = enable::guarded::<1>(Pin(GPIOA, 8), Pin(GPIOB, 12));
-    // At rest before the pins are the timer's.
+    // The lines are idle before the pins are connected to the timer.
     let (start, load) = Pulses::edges::<SAMPLING, OUTPUT>(TIM3, hertz, clocks::OUTPUT);
     for pin in [Pin(GPIOC, 7), Pin(GPIOC, 6)] {
         pin.function(2, Ospeedr::VERY_HIGH_SPEED, Pupdr::FLOATING);
@@ -108,7 +108,7 @@ impl Port for Link {
     fn acknowledge() -> bool {
         let status = USART2.sr().read();
         let failed = status.fe() || status.ne() || status.ore();
-        // Cleared by reading the data after the status; only then, as that may take a byte that is the DMA's.
+        // Cleared by reading the data after the status; only in this case, because the read may take a byte from the DMA.
         if failed || status.idle() {
             let _ = USART2.dr().read();
         }

@@ -1,23 +1,23 @@
-//! The SPI of the STM32F4: a byte in its shift register, one before it and one behind it.
+//! The SPI of the STM32F4: a shift register with one byte of transmit and one of receive buffer.
 
 use embedded_hal::spi::{Mode, Phase, Polarity};
 use specgen_stm32::burst::{Burst, SpiTimeout};
 use stm32_metapac::spi::Spi;
 use stm32_metapac::spi::vals::{Br, Cpha, Cpol, Mstr};
 
-/// Looks for each byte until it is given up: some ten times what 11 MHz take.
+/// Polls for each byte before the timeout: some ten times the duration at 11 MHz.
 const LOOKS: usize = 100;
 
-/// Its registers, set up.
+/// Its initialised registers.
 pub struct Registers {
     spi: Spi,
-    /// Of frames that are written, and of those whose answer counts.
+    /// Rates for writing, and for frames whose answer is used.
     rates: [Br; 2],
 }
 
 impl Registers {
-    /// Sets up an SPI that is as after reset, and has its clock and its pins: master, bytes, MSB first, SCLK the clock divided by
-    /// a power of two: of frames that are written, of those whose answer counts.
+        /// Initialises an SPI in its reset state, with clock and pins: master, bytes, MSB first. SCLK is the clock divided by powers of
+        /// two: for writing, and for frames whose answer is used.
     #[must_use]
     pub fn new(spi: Spi, mode: Mode, dividers: [u32; 2]) -> Self {
         let rates = dividers.map(rate);
@@ -31,7 +31,7 @@ impl Registers {
                 Cpha::FIRST_EDGE
             });
             w.set_br(rates[0]);
-            // Its own select is not looked at: as if it were high.
+            // Its own select input is ignored, as if it were high.
             w.set_ssm(true);
             w.set_ssi(true);
             w.set_spe(true);
@@ -39,7 +39,7 @@ impl Registers {
         Self { spi, rates }
     }
 
-    /// The same registers once more, for another chip select.
+    /// A second handle to the same registers, for another chip select.
     #[must_use]
     pub const fn again(&self) -> Self {
         Self { spi: self.spi, rates: self.rates }
@@ -52,7 +52,7 @@ fn rate(divider: u32) -> Br {
 }
 
 impl Burst for Registers {
-    /// Written only while nothing moves: the last bit was taken half a cycle before that.
+    /// Changes the rate only between transfers: the last bit was sampled half a cycle before.
     #[inline]
     fn pace(&mut self, answered: bool) {
         let [written, read] = self.rates;
@@ -79,7 +79,7 @@ impl Burst for Registers {
                 take(taken, self.spi.dr().read().dr() as u8);
                 taken += 1;
             }
-            // Two on their way at most, so that what came is taken before the next one is there.
+            // At most two bytes in flight, so that each received byte is read before the next one arrives.
             if sent < count && sent < taken + 2 && status.txe() {
                 self.spi.dr().write(|w| w.set_dr(u16::from(send(sent))));
                 sent += 1;
@@ -88,7 +88,7 @@ impl Burst for Registers {
         if taken == count {
             return Ok(());
         }
-        // What came late is of no use to the next frame.
+        // Discard a late byte.
         let _ = self.spi.dr().read();
         Err(SpiTimeout)
     }

@@ -1,5 +1,5 @@
-//! Caches, and what may be accessed: memory that is there. What is not there has no access, so that the core, which reads ahead of its
-//! program, does not read where nothing answers. Special are what the DMA shares with the core, and the code in ITCM.
+//! Caches and memory protection: only existing memory is accessible, so that speculative reads of the core do not go to addresses
+//! where nothing answers. Memory shared with the DMA, and code in ITCM, have their own attributes.
 
 #![allow(unsafe_code)] // Registers of the MPU.
 
@@ -8,44 +8,44 @@ use cortex_m::peripheral::{CPUID, MPU, SCB};
 
 use crate::clocks;
 
-/// Of RASR: on, with a size of 2^bits bytes.
+/// RASR: enable, with a size of 2^bits bytes.
 const fn size(bits: u32) -> u32 {
     (bits - 1) << 1 | 1
 }
 
-/// Of RASR: execute never, whoever may access it.
+/// RASR: execute never, for any access.
 const NO_CODE: u32 = 1 << 28;
 const READ_ONLY: u32 = 0b110 << 24;
 const FULL: u32 = 0b011 << 24;
-/// TEX 1 C 0 B 0: normal memory that no cache keeps. C alone: written through, as the default map has flash.
+/// TEX 1 C 0 B 0: normal memory, not cached. C alone: write-through, as flash in the default map.
 const NOT_CACHED: u32 = 0b001 << 19;
 const CACHED: u32 = 1 << 17;
-/// Eighths of a region where it does not count, 512 MB of the whole: there the default map does, for devices and the core's registers.
+/// Disabled eighths of a region, 512 MB of the whole: there the default map applies, for devices and the core's registers.
 const DEVICES: u32 = 1 << (8 + 2) | 1 << (8 + 7);
 
-/// Base and RASR of the regions by their number; of those that overlap the highest counts.
+/// Base and RASR of the regions by number; where regions overlap, the highest number applies.
 const REGIONS: [[u32; 2]; 5] = [
     // No access.
     [0, NO_CODE | DEVICES | size(32)],
     [0x0800_0000, READ_ONLY | CACHED | size(21)],
     // ITCM; a write through a null pointer is a fault.
     [0, READ_ONLY | NOT_CACHED | size(16)],
-    // DTCM, which no cache keeps anyway.
+    // DTCM, which is never cached.
     [0x2000_0000, NO_CODE | FULL | NOT_CACHED | size(17)],
-    // AXI SRAM, where the buffers of the DMA are.
+    // AXI SRAM, with the buffers of the DMA.
     [0x2400_0000, NO_CODE | FULL | NOT_CACHED | size(19)],
 ];
 /// RBAR: the region number of the same write is valid.
 const VALID: u32 = 1 << 4;
 /// READ_ISS_OVERRIDE of the AXI SRAM's port, AXI_TARG7_FN_MOD.
 const AXI_SRAM_READS: *mut u32 = 0x5100_8108 as *mut u32;
-/// CTRL: on, the default map elsewhere.
+/// CTRL: enable, with the default map elsewhere.
 const ENABLED: u32 = 1 << 2 | 1;
 
-/// The regions, then both caches on: code and constants come from flash with wait states.
+/// Sets the regions and enables both caches: flash has wait states for code and constants.
 pub fn enable(mpu: &mut MPU, scb: &mut SCB, cpuid: &mut CPUID) {
     asm::dmb();
-    // SAFETY: what memory.x uses keeps the access that the program needs of it; AXI SRAM nothing has used yet.
+    // SAFETY: memory that memory.x uses keeps the access that the program needs; AXI SRAM is not used yet.
     unsafe {
         for ([base, rights], number) in REGIONS.into_iter().zip(0..) {
             mpu.rbar.write(base | VALID | number);
@@ -54,8 +54,8 @@ pub fn enable(mpu: &mut MPU, scb: &mut SCB, cpuid: &mut CPUID) {
         mpu.ctrl.write(ENABLED);
     }
     if !clocks::is_revision_v() {
-        // ES0392, revision Y: reads of AXI SRAM may be corrupt unless one is issued at a time.
-        // SAFETY: this register alone, before anything reads AXI SRAM.
+        // ES0392, revision Y: reads of AXI SRAM may be corrupt unless they are issued one at a time.
+        // SAFETY: writes only this register, before anything reads AXI SRAM.
         unsafe { AXI_SRAM_READS.write_volatile(1) };
     }
     asm::dsb();

@@ -1,5 +1,5 @@
-//! Clocks of the NUCLEO-H743ZI2 from 8 MHz at the HSE pin, or an eighth of HSI: core 480 MHz, or 400 where the revision allows no more;
-//! buses half of that, timers as the buses; 33.3 and 50 MHz for the SPI of ADC and DACs.
+//! Clocks of the NUCLEO-H743ZI2 from 8 MHz at the HSE pin, or from an eighth of HSI: core 480 MHz, or 400 MHz on older silicon
+//! revisions; buses and timers at half of that; 33.3 and 50 MHz for the SPI of ADC and DACs.
 
 use specgen_link::reset_cause;
 use specgen_stm32::oscillator;
@@ -8,23 +8,22 @@ use stm32_metapac::pwr::vals::Vos;
 use stm32_metapac::rcc::vals::{Hpre, Plldiv, Pllm, Plln, Pllrge, Pllsrc, Pllvcosel, Ppre, Saisel, Spi45sel, Sw};
 use stm32_metapac::{DBGMCU, FLASH, PWR, RCC, SYSCFG};
 
-/// Clock of TIM2 and TIM4 at most, Hz.
+/// Highest clock of TIM2 and TIM4, Hz.
 pub const TIMER: u32 = 240_000_000;
-/// Counts of TIM2 that a copy of the machine takes at most, with as much again: 12 µs.
+/// Twice the longest time of a copy of the machine, in counts of TIM2: 12 µs.
 pub const COPY: u32 = TIMER / 1_000_000 * 12;
-/// What `cortex_m::asm::delay` gets through in a microsecond at most: two a cycle.
+/// The most that `cortex_m::asm::delay` counts in a microsecond: two per cycle.
 pub const DELAY: u32 = 960;
-/// Divides 33.3 MHz to SCLK of the ADC: 17 MHz at most at 3.3 V.
+/// Divider from 33.3 MHz to SCLK of the ADC: at most 17 MHz at 3.3 V.
 pub const ADC: u32 = 2;
-/// Divides 50 MHz to SCLK of the DACs, where they are written.
+/// Divider from 50 MHz to SCLK of the DACs for writing.
 pub const DAC: u32 = 2;
-/// The same where they are read back: 6.25 MHz. Half a cycle, 80 ns, is more than SDO takes with its resistor: docs/bring-up.md.
+/// The same for read-back: 6.25 MHz. Half a cycle, 80 ns, is longer than the delay of SDO with its resistor: docs/bring-up.md.
 pub const READ_BACK: u32 = 8;
-/// From sampling to the change of the outputs, ns: codes that are written by then are out at this instant, later ones when they are
-/// written.
+/// Time from sampling to the change of the outputs, ns. Codes written later are output when they are written.
 pub const OUTPUT: u32 = 48_000;
 
-/// For the estimate of a tick: 480 MHz; four wait states of the flash, both caches.
+/// Figures for the estimate of a tick: 480 MHz; four wait states of the flash, both caches.
 pub const TIMES: Times =
     Times::new(480_000_000, [4, 1 << 17 | 1 << 16], [33_333_333 / ADC, 50_000_000 / DAC, 50_000_000 / READ_BACK]);
 
@@ -36,13 +35,13 @@ pub fn is_revision_v() -> bool {
     DBGMCU.idc().read().rev_id() >= REVISION_V
 }
 
-/// Clocks as above, of every device that is used, too; that of TIM2 and TIM4, Hz, which is twice that of their bus. The core runs from
-/// HSI until then, as after every reset. Names and order: RM0433, chapters 6 (PWR) and 8 (RCC).
+/// Starts all clocks, including those of the devices. Returns that of TIM2 and TIM4, Hz, which is twice that of their bus. Until then
+/// the core runs from HSI, as after every reset. Names and order: RM0433, chapters 6 (PWR) and 8 (RCC).
 pub fn start() -> u32 {
     let fast = is_revision_v();
-    // While a debugger holds the core TIM1 stands still with its outputs off, ENABLE among them (RM0433, debug mode of TIM1).
+    // While a debugger halts the core, TIM1 stops with its outputs off, including ENABLE (RM0433, debug mode of TIM1).
     DBGMCU.apb2fzr1().modify(|w| w.set_tim1(true));
-    // A debugger sees the core while it sleeps.
+    // Keeps the debug interface active while the core sleeps.
     DBGMCU.cr().modify(|w| {
         w.set_dbgsleep_d1(true);
         w.set_dbgstop_d1(true);
@@ -55,14 +54,14 @@ pub fn start() -> u32 {
 
     plls(fast, oscillator::external());
 
-    // Wait states of the flash before the clock gets faster (table: FLASH recommended number of wait states and programming delay).
+// Set the wait states of the flash before increasing the clock (table: FLASH recommended number of wait states and programming delay).
     let latency = if fast { 4 } else { 2 };
     FLASH.acr().write(|w| {
         w.set_latency(latency);
         w.set_wrhighfreq(2);
     });
     while FLASH.acr().read().latency() != latency {}
-    // Prescalers before the clock, too.
+    // Set the prescalers before the clock, too.
     RCC.d1cfgr().modify(|w| {
         w.set_d1cpre(Hpre::DIV1);
         w.set_d1ppre(Ppre::DIV2);
@@ -83,7 +82,7 @@ pub fn start() -> u32 {
     if fast { TIMER } else { 200_000_000 }
 }
 
-/// Why the part was reset last, and whether it runs on HSI.
+/// Cause of the last reset, and whether the part runs on HSI.
 pub fn reset_cause() -> u8 {
     let flags = RCC.rsr().read();
     RCC.rsr().modify(|w| w.set_rmvf(true));
@@ -100,7 +99,7 @@ pub fn reset_cause() -> u8 {
     ])
 }
 
-/// Clocks of devices. What is read back has been written, and by then they run.
+/// Enables the clocks of devices. Reading the registers back ensures that they run.
 fn devices() {
     RCC.ahb4enr().modify(|w| {
         w.set_gpioaen(true);
@@ -125,8 +124,8 @@ fn devices() {
     let _ = RCC.apb4enr().read();
 }
 
-/// The core's supply by the LDO, which is written once after power-up, and its voltage: scale 1, from which alone scale 0 is reached,
-/// by the overdrive.
+/// Sets the core's supply to the LDO, which can be written once after power-up, and its voltage to scale 1, then to scale 0 by the
+/// overdrive, which is possible only from scale 1.
 fn voltage(fast: bool) {
     PWR.cr3().modify(|w| {
         w.set_scuen(true);
@@ -142,8 +141,8 @@ fn voltage(fast: bool) {
     }
 }
 
-/// PLL1 for the core: 960 MHz / 2, or 800 / 2; PLL2 for the SPIs, whatever the core has: 400 MHz / 12 and / 8. Source and dividers are
-/// written while no PLL runs; afterwards they are locked.
+/// Starts PLL1 for the core: 960 MHz / 2, or 800 / 2; and PLL2 for the SPIs, independently of the core: 400 MHz / 12 and / 8. Source
+/// and dividers must be written before any PLL runs; afterwards they are locked.
 fn plls(fast: bool, external: bool) {
     let (source, divider) = if external { (Pllsrc::HSE, Pllm::DIV1) } else { (Pllsrc::HSI, Pllm::DIV8) };
     RCC.pllckselr().modify(|w| {

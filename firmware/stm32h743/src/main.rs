@@ -6,7 +6,7 @@
 //! | 15 | `tick`: TIM2, once a control period |
 //! | 8 of the NVIC | DMA and USART3 |
 //! | 1 | `link`: requests of the host |
-//! | idle | shows the tick that the background is alive, sleeps |
+//! | idle | signals the tick that the background is alive, sleeps |
 #![no_std]
 #![no_main]
 #![allow(unsafe_code)] // Names and sections for the linker.
@@ -19,17 +19,17 @@ mod tightly;
 
 use tightly::is_intact as memory_intact;
 
-/// The target that this is built for, which `specgen flash` takes from the image.
+/// The target of this image, which `specgen flash` reads.
 static BOARD: [u8; 25] = *b"specgen-board: stm32h743\n";
 
-/// Words of the recorder, in the AXI SRAM (512 KiB) that has only the buffers of the DMA besides: 448 KiB with the knots
-/// and samples.
+/// Words of the recorder: 448 KiB of the AXI SRAM (512 KiB), shared with knots and samples. The buffers of the DMA are the only
+/// other contents.
 const RECORD: usize = (448 * 1024 - size_of::<[[i32; 6]; PASSES]>() - size_of::<SampleMemory>()) / size_of::<u64>();
 
-/// Knots of passes that learn, where the controller takes a correction: 192 KiB, half for corrections and half for errors.
+/// Knots of learning passes, if the controller has a correction: 192 KiB, half for corrections and half for errors.
 const PASSES: usize = if controller::passes::POSSIBLE { 8192 } else { 0 };
 
-/// Memories and caches before anything else.
+/// Initialises memories and caches before anything else.
 fn prepare(core: &mut cortex_m::Peripherals) {
     caches::enable(&mut core.MPU, &mut core.SCB, &mut core.CPUID);
 }

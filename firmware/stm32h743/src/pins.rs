@@ -1,4 +1,4 @@
-//! The wiring: which pin goes where. The table in docs/bring-up.md is this file in words.
+//! The pin assignment. The table in docs/bring-up.md describes it.
 
 use specgen_stm32::burst::Device;
 use specgen_stm32::converters::{ADC_MODE, AdcPins, DAC_MODE, DacPins, TriggerPins, trigger_pins};
@@ -21,10 +21,10 @@ pub const SUPPLY: Interrupt = Interrupt::PVD_AVD;
 pub const WATCHDOG: Iwdg = IWDG1;
 /// Channel of TIM4 that drives LDAC, counted from 0: CH2.
 pub const OUTPUT: usize = 1;
-/// That of CONVST: CH4.
+/// Channel of CONVST: CH4.
 const SAMPLING: usize = 3;
 
-/// All that the program uses.
+/// All pins of the program.
 pub struct Wiring {
     /// ADC.
     pub adc: AdcPins<Registers, DELAY>,
@@ -32,17 +32,17 @@ pub struct Wiring {
     pub dac: DacPins<Registers, OUTPUT, DELAY>,
     /// Triggers of the spec, in their order.
     pub lines: TriggerPins,
-    /// Emergency stop: a closed contact to ground, at the break input of TIM1; open is stop.
+    /// Emergency stop: a closed contact to ground at the break input of TIM1; open means stop.
     pub stop: Stop,
-    /// Fault of an amplifier: closed to ground while all are well; open is a fault.
+    /// Amplifier fault: closed to ground while all are healthy; open means fault.
     pub fault: Input,
 }
 
-/// Takes the pins; `hertz` is the clock of TIM4. The enable line comes first and is driven low: channel 2 of TIM1, with its break
-/// input.
+/// Configures the pins; `hertz` is the clock of TIM4. The enable line comes first and is driven low: channel 2 of TIM1, with its
+/// break input.
 pub fn take(hertz: u32) -> Wiring {
     let (enable, stop) = enable::guarded::<2>(Pin(GPIOE, 11), Pin(GPIOE, 15));
-    // At rest before the pins are the timer's.
+    // The lines are idle before the pins are connected to the timer.
     let (start, load) = Pulses::edges::<SAMPLING, OUTPUT>(TIM4, hertz, clocks::OUTPUT);
     for pin in [Pin(GPIOD, 15), Pin(GPIOD, 13)] {
         pin.function(2, Ospeedr::VERY_HIGH_SPEED, Pupdr::FLOATING);
@@ -79,7 +79,7 @@ pub struct Link;
 impl Port for Link {
     const SEND: usize = 0;
     const RECEIVE: usize = 1;
-    /// TRBUFF, or a stream may lock up with a USART (ES0392). The request is chosen by DMAMUX1.
+    /// TRBUFF, without which a stream may lock up with a USART (ES0392). DMAMUX1 selects the request.
     const STREAM: u32 = 1 << 20;
     const INTERRUPTS: [Interrupt; 3] = [Interrupt::USART3, Interrupt::DMA1_STREAM0, Interrupt::DMA1_STREAM1];
 
@@ -113,7 +113,7 @@ impl Port for Link {
 
     fn acknowledge() -> bool {
         let status = USART3.isr().read();
-        // Each flag is cleared by a one at its place.
+        // Writing 1 clears a flag.
         USART3.icr().write(|w| w.0 = status.0);
         status.fe() || status.ne() || status.ore()
     }

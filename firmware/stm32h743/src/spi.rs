@@ -6,26 +6,26 @@ use stm32_metapac::spi::Spi;
 use stm32_metapac::spi::regs::Cr1;
 use stm32_metapac::spi::vals::{Cpha, Cpol, Fthlv, Master, Mbr, Ssiop};
 
-/// Bytes on their way at once: those of the smallest FIFO (SPI4; SPI1 has twice as many).
+/// Bytes in flight at once: the depth of the smallest FIFO (SPI4; SPI1 has twice as much).
 const DEPTH: usize = 8;
-/// Looks for each byte until it is given up: some ten times what 16 MHz take.
+/// Polls for each byte before the timeout: some ten times the duration at 16 MHz.
 const LOOKS: usize = 100;
 
-/// Its registers, set up.
+/// Its initialised registers.
 pub struct Registers {
     spi: Spi,
     /// CR1 while it runs.
     running: Cr1,
-    /// Of frames that are written, and of those whose answer counts.
+    /// Rates for writing, and for frames whose answer is used.
     rates: [Mbr; 2],
 }
 
 impl Registers {
-    /// Sets up an SPI that is as after reset, and has its clock and its pins: master, bytes, MSB first, SCLK the clock divided by
-    /// a power of two: of frames that are written, of those whose answer counts.
-    ///
-    /// Transfers have no size (TSIZE 0): what is in the FIFO goes out, without a start for each. ES0392 (SPI: a master's transfer
-    /// stalls if it is started within a cycle of SCLK after the end of the last one) names this as the way around it.
+        /// Initialises an SPI in its reset state, with clock and pins: master, bytes, MSB first. SCLK is the clock divided by powers of
+        /// two: for writing, and for frames whose answer is used.
+        ///
+        /// Transfers have no size (TSIZE 0): the FIFO is sent without a start for each transfer. This is the workaround of ES0392 for
+        /// transfers that stall if they are started within an SCLK cycle after the end of the last one.
     #[must_use]
     pub fn new(spi: Spi, mode: Mode, dividers: [u32; 2]) -> Self {
         let rates = dividers.map(rate);
@@ -37,7 +37,7 @@ impl Registers {
             } else {
                 Cpha::FIRST_EDGE
             });
-            // Its own select is SSI, which is low, and active when it is high: no mode fault. Its pins are driven while it is off.
+            // Its own select is SSI, which is low and active high, so there is no mode fault. Its pins are driven while it is disabled.
             w.set_ssm(true);
             w.set_ssoe(true);
             w.set_ssiop(Ssiop::ACTIVE_HIGH);
@@ -57,13 +57,13 @@ impl Registers {
         registers
     }
 
-    /// The same registers once more, for another chip select.
+    /// A second handle to the same registers, for another chip select.
     #[must_use]
     pub const fn again(&self) -> Self {
         Self { spi: self.spi, running: self.running, rates: self.rates }
     }
 
-    /// With empty FIFOs.
+    /// Starts with empty FIFOs.
     fn start(&self) {
         self.spi.cr1().modify(|w| w.set_spe(false));
         let mut enabled = self.running;
@@ -79,7 +79,7 @@ fn rate(divider: u32) -> Mbr {
 }
 
 impl Burst for Registers {
-    /// Written only while it is off; its pins are driven then, too.
+    /// Changes the rate only while the SPI is disabled; its pins are driven then, too.
     #[inline]
     fn pace(&mut self, answered: bool) {
         let [written, read] = self.rates;

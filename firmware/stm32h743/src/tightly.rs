@@ -1,12 +1,12 @@
-//! The memories at the core: code of the tick in ITCM, constants in DTCM, both without wait states and without a cache that may
-//! miss. They are copied from flash before anything else runs; `memory.x` says what goes there.
+//! Tightly coupled memories: code of the tick in ITCM, constants in DTCM, both without wait states and without cache misses. They
+//! are copied from flash before anything else runs; `memory.x` assigns their contents.
 
 #![allow(unsafe_code)] // Reads of memory by its address.
 
 use core::ptr::{addr_of, read_volatile};
 
-// Called by cortex-m-rt before any variable has its value: nothing in Rust may run that early. ITCM is written in words; its reset
-// value of ITCMCR lets it (read-modify-write of the 64 bits that a check word covers).
+// Called by cortex-m-rt before variables are initialised: no Rust code may run that early. ITCM is written in words, which the reset
+// value of ITCMCR permits (read-modify-write of the 64 bits that a check word covers).
 core::arch::global_asm!(
     ".section .text.__pre_init,\"ax\",%progbits",
     ".global __pre_init",
@@ -40,9 +40,9 @@ core::arch::global_asm!(
     ".size __pre_init, . - __pre_init",
 );
 
-// SAFETY: symbols of the linker, whose types say no more than that they are aligned.
+// SAFETY: linker symbols; their types only express the alignment.
 unsafe extern "C" {
-    // Begin, end, and where it was copied from: symbols of memory.x, of which only the addresses mean something.
+    // Start, end and source of each copy: symbols of memory.x; only their addresses are used.
     static __sitcm: u32;
     static __eitcm: u32;
     static __litcm: u32;
@@ -51,13 +51,13 @@ unsafe extern "C" {
     static __lconstants: u32;
 }
 
-/// Whether both copies are as in flash.
+/// Whether both copies equal the flash.
 pub fn is_intact() -> bool {
     let code = [addr_of!(__sitcm), addr_of!(__eitcm), addr_of!(__litcm)];
     let constants = [addr_of!(__sconstants), addr_of!(__econstants), addr_of!(__lconstants)];
     [code, constants].into_iter().all(|[begin, end, from]| {
         let words = (end as usize - begin as usize) / size_of::<u32>();
-        // SAFETY: so many words lie at both, as memory.x has them; volatile, as the compiler knows of neither.
+        // SAFETY: memory.x puts this many words at both addresses; volatile, because the compiler knows neither.
         (0..words).all(|k| unsafe { read_volatile(begin.add(k)) == read_volatile(from.add(k)) })
     })
 }

@@ -1,10 +1,10 @@
-//! A board's tick, its drivers included, between stand-ins for its converters: the emulator writes down which instructions it
-//! takes, specgen prices them. Wave, pass, recorder and new settings are there as on a board that has everything to do at once.
+//! A board's tick, including its drivers, with simulated converters: the emulator traces the executed instructions, and specgen
+//! converts them to cycles. Wave, pass, recorder and new settings are active together, as in the worst case on a board.
 //!
-//! Reads rows of INPUT_WORDS words, a closed loop from rest, from `input.bin` in the emulator's working folder, and what the
-//! board's buses take from `rates.bin`; writes what each tick did with them into `counts.bin` ([`parts::COUNTS`] words). A tick
-//! begins at `specgen_timed_tick` and is over at `specgen_timed_end`; what lies between `specgen_aside_begin` and
-//! `specgen_aside_end` is the stand-ins' own.
+//! Reads rows of INPUT_WORDS words, a closed loop from rest, from `input.bin` in the emulator's working folder, and the times of the
+//! board's buses from `rates.bin`; writes the bus operations of each tick to `counts.bin` ([`parts::COUNTS`] words). A tick begins at
+//! `specgen_timed_tick` and ends at `specgen_timed_end`; code between `specgen_aside_begin` and `specgen_aside_end` belongs to the
+//! simulated parts.
 
 #![no_std]
 #![no_main]
@@ -34,29 +34,29 @@ use specgen_runtime::Real as _;
 use specgen_runtime::pass::{Course, Player};
 use specgen_runtime::playback::Knot;
 
-/// Words of the recorder: some blocks, so that a tick that begins one is among those that are seen.
+/// Words of the recorder: several blocks, so that ticks that start a block are included.
 const RECORD: usize = 32 * 1024;
-/// Settings change at every so manieth tick.
+/// Ticks between changes of settings.
 const SETTINGS_EVERY: usize = 16;
 
-/// A host looks on: ticks of its rows.
+/// Ticks per row for a subscribed host.
 const WATCHED: u32 = 100;
 
-/// A pass that keeps a knot in every tick, which is the most that one does. Begun anew when it is over.
+/// A pass with a knot in every tick, the worst case. It restarts when it ends.
 const KNOTS: usize = 64;
 const PASS: Course = Course { spacing: 1, before: 0, ticks: KNOTS as u32, trajectory: 0 };
 
-/// The converters' drivers on stand-ins.
+/// The converters' drivers with simulated parts.
 type Adc<'b> = Ad7606<ADC_BITS, Bus<'b>, Line<'b>, Pin<'b>, Pin<'b>, Delay<'b>>;
 type Dacs<'b> = Ad5686rPair<Bus<'b>, Bus<'b>, Line<'b>, Pin<'b>, Delay<'b>>;
 
-/// What a tick works on.
+/// State of a tick.
 struct Fixture<'m> {
     board: Board<'m, Adc<'m>, Dacs<'m>, [Option<Pin<'m>>; triggers::MOST]>,
     exchange: Exchange,
-    /// Settings that a host wrote.
+    /// Settings written by a host.
     settings: Config,
-    /// Beside the exchange, whose commands are those of the rows.
+    /// Separate from the exchange, whose commands come from the rows.
     wave: Wave,
     waved: [u64; COMMAND_WORDS],
     player: Player<'static, Real>,
@@ -73,7 +73,7 @@ fn run() -> Result<(), Exit> {
     let input = File::open(b"input.bin\0").ok_or(Exit::NoInput)?;
     let output = File::create(b"counts.bin\0").ok_or(Exit::CannotWrite)?;
     let mut machine = machine_at_reset();
-    // It begins to run with the first tick, as after arming.
+    // It enters Running with the first tick, as after arming.
     machine.supervisor.phase = Phase::Holding;
     let mut exchange = Exchange::new();
     let (words, kept, knots, samples) = memories();
@@ -119,7 +119,7 @@ fn run() -> Result<(), Exit> {
         }
         specgen_timed_tick(&mut timed);
         specgen_timed_end();
-        // As the background.
+        // The work of the background.
         let Fixture { board, exchange, .. } = &mut timed;
         catch_up(&mut |action| action(exchange, board.machine_mut()), || true);
         gather(&mut |action| action(exchange, board.machine_mut()));
@@ -128,7 +128,7 @@ fn run() -> Result<(), Exit> {
         }
         ticks += 1;
     }
-    // Ticks of a machine that stopped are not those that are asked about.
+    // Ticks of a machine that stopped running do not count.
     if timed.board.machine().supervisor.phase == Phase::Running { Ok(()) } else { Err(Exit::NotRunning) }
 }
 
@@ -142,7 +142,7 @@ fn dacs(bench: &Bench) -> Dacs<'_> {
     Ad5686rPair::new(first, second, Line { bench, role: Role::Ldac }, Pin { bench }, Delay(bench))
 }
 
-/// What the buses of the board take, ns.
+/// Times of the board's buses, ns.
 fn rates() -> Result<Rates, Exit> {
     let mut words = [0; 6];
     let file = File::open(b"rates.bin\0").ok_or(Exit::NoInput)?;
@@ -153,7 +153,7 @@ fn rates() -> Result<Rates, Exit> {
     Ok(Rates { adc: [adc_byte, adc_frame], dac: [dac_byte, dac_frame], look, back })
 }
 
-/// What the gauges' converter gave.
+/// Codes of the gauges' converter.
 fn codes_of(row: &[u64; INPUT_WORDS]) -> [i32; CHANNELS] {
     let mut codes = [0; CHANNELS];
     for (code, word) in codes.iter_mut().zip(row.iter().skip(COMMAND_WORDS)) {
@@ -170,7 +170,7 @@ fn specgen_timed_tick(timed: &mut Fixture<'_>) {
         waves::write(&motion, timed.wave.sequence(), &mut timed.waved);
     }
     timed.board.tick(&mut timed.exchange, TargetStatus::default());
-    // As the exchange does it: it shares its command, which the rows have here, with no wave.
+    // As in the exchange, which does not combine its command (here from the rows) with a wave.
     if passes::POSSIBLE {
         pass(timed);
     }
@@ -191,11 +191,11 @@ fn pass(timed: &mut Fixture<'_>) {
 #[inline(never)]
 #[allow(unsafe_code)] // As above.
 extern "C" fn specgen_timed_end() {
-    // SAFETY: it does nothing.
+    // SAFETY: a `nop`.
     unsafe { core::arch::asm!("nop") };
 }
 
-/// The recorder's memories, for the one call that there is.
+/// The recorder's memories, for a single call.
 #[allow(unsafe_code, clippy::deref_addrof)] // Statics that are written, to which no plain reference may be taken.
 fn memories() -> (&'static mut [u64], &'static mut MachineSnapshot, &'static mut [Knot], &'static mut SampleMemory) {
     static mut MEMORY: [u64; RECORD] = [0; RECORD];

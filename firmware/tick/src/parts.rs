@@ -1,5 +1,5 @@
-//! Stand-ins for what the drivers of `../hal` talk to: buses, pins, waits, and the parts behind them as far as the drivers look.
-//! They count what a board would spend its time on.
+//! Simulated buses, pins, delays and parts for the drivers of `../hal`, as far as the drivers need them. They count the operations
+//! that take time on a board.
 
 use core::cell::Cell;
 use core::convert::Infallible;
@@ -11,25 +11,25 @@ use specgen_board::GAUGE_BITS;
 use specgen_hal::ad7606::{CONVERSION, INPUTS, Window};
 use specgen_hal::{CHANNELS, Edge, Fault};
 
-/// As `../stm32` has it: what a part of 16 bits cannot give, one of 18 does.
+/// As in `../stm32`: 16 bits if they are enough, else 18.
 pub const ADC_BITS: usize = if GAUGE_BITS <= 16 { 16 } else { 18 };
-/// The reference that V8 shows.
+/// Expected range of V8.
 pub const REFERENCE: Window = Window::around(2500, 50, 5000, ADC_BITS as u32);
 
-/// A board's buses, ns.
+/// Times of a board's buses, ns.
 #[derive(Clone, Copy)]
 pub struct Rates {
-    /// Of a byte on the ADC's bus, and of a frame beside its bytes.
+    /// Time per byte on the ADC's bus, and additional time per frame.
     pub adc: [u64; 2],
-    /// The same of the DACs'.
+    /// The same for the bus of the DACs.
     pub dac: [u64; 2],
-    /// Of a look at a pin.
+    /// Time to poll a pin.
     pub look: u64,
-    /// What a byte that a DAC is read back by takes more.
+    /// Additional time per byte of a read-back.
     pub back: u64,
 }
 
-/// What a tick did: bytes and frames of the ADC, of the DACs, ns of waits, looks at pins and edges of pins.
+/// Operations of a tick: bytes and frames of the ADC, of the DACs, ns of waits, polls of pins and edges of pins.
 pub const COUNTS: usize = 7;
 const ADC: usize = 0;
 const DAC: usize = 2;
@@ -37,22 +37,22 @@ const WAITS: usize = 4;
 const LOOKS: usize = 5;
 const EDGES: usize = 6;
 
-/// All of it, shared by the stand-ins.
+/// State shared by the simulated parts.
 pub struct Bench {
     rates: Cell<Rates>,
-    /// ns that went by.
+    /// Elapsed time, ns.
     now: Cell<u64>,
     converted: Cell<u64>,
     counts: Cell<[u64; COUNTS]>,
-    /// What the gauges' converter gives.
+    /// Codes of the gauges' converter.
     pub codes: Cell<[i32; CHANNELS]>,
-    /// Input and DAC registers of both parts, and the answer that comes with the next frame.
+    /// Input and DAC registers of both parts, and the answer to the next frame.
     registers: Cell<[[[u16; 4]; 2]; 2]>,
     answers: Cell<[u16; 2]>,
 }
 
 impl Bench {
-    /// Nothing done yet.
+    /// The initial state.
     pub const fn new(rates: Rates) -> Self {
         Self {
             rates: Cell::new(rates),
@@ -65,7 +65,7 @@ impl Bench {
         }
     }
 
-    /// What was counted since the last call.
+    /// The counts since the last call.
     pub fn take(&self) -> [u64; COUNTS] {
         self.counts.replace([0; COUNTS])
     }
@@ -97,7 +97,7 @@ impl Bench {
         self.pass(more);
     }
 
-    /// What a DAC answers, and what it takes.
+    /// Executes a frame of a DAC; returns its answer.
     fn exchange(&self, part: usize, frame: [u8; 3]) -> [u8; 2] {
         let [command, high, low] = frame;
         let mut back = [0; 2];
@@ -108,7 +108,7 @@ impl Bench {
             let channel = (command & 0xf).trailing_zeros() as usize;
             match command >> 4 {
                 1 => input.iter_mut().skip(channel).take(1).for_each(|slot| *slot = data),
-                // To one channel at once, or to all.
+                // One channel immediately, or all.
                 3 if command & 0xf == 0xf => (*input, *output) = ([data; 4], [data; 4]),
                 3 => output.iter_mut().skip(channel).take(1).for_each(|slot| *slot = data),
                 9 => *answer = output.get(channel).copied().unwrap_or(0),
@@ -159,7 +159,7 @@ impl spi::ErrorType for Bus<'_> {
 }
 
 impl SpiDevice for Bus<'_> {
-    // What a stand-in does is no work of a tick: these are left out when it is priced.
+    // The work of simulated parts is not part of the tick and excluded from its time.
     #[inline(never)]
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
         specgen_aside(|| {
@@ -186,18 +186,18 @@ impl SpiDevice for Bus<'_> {
     }
 }
 
-/// An edge that a timer gives: one write.
+/// An edge from a timer: one write.
 pub struct Line<'b> {
     pub bench: &'b Bench,
     pub role: Role,
 }
 
-/// What it does.
+/// Effect of an edge.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// It samples.
+    /// Samples the inputs.
     Convst,
-    /// Outputs change.
+    /// Updates the outputs.
     Ldac,
 }
 
@@ -214,7 +214,7 @@ impl Edge for Line<'_> {
     }
 }
 
-/// A pin: BUSY, or one that leads nowhere.
+/// A pin: BUSY, or one that is not connected.
 pub struct Pin<'b> {
     pub bench: &'b Bench,
 }
@@ -262,7 +262,7 @@ impl DelayNs for Delay<'_> {
     }
 }
 
-/// Calls what is no part of a tick, between two functions that the list of blocks shows.
+/// Calls `f`, which is not part of the tick, between two marker functions for the trace.
 #[inline(always)]
 fn specgen_aside(action: impl FnOnce()) {
     specgen_aside_begin();
@@ -274,8 +274,8 @@ fn specgen_aside(action: impl FnOnce()) {
 #[inline(never)]
 #[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.
 extern "C" fn specgen_aside_begin() {
-    // As many as no other of the marks has: what is equal the compiler may make one.
-    // SAFETY: it does nothing.
+    // A different number in each marker, because the compiler may merge equal functions.
+    // SAFETY: `nop`s.
     unsafe { core::arch::asm!("nop", "nop") };
 }
 
@@ -283,6 +283,6 @@ extern "C" fn specgen_aside_begin() {
 #[inline(never)]
 #[allow(unsafe_code)] // As above.
 extern "C" fn specgen_aside_end() {
-    // SAFETY: it does nothing.
+    // SAFETY: `nop`s.
     unsafe { core::arch::asm!("nop", "nop", "nop") };
 }

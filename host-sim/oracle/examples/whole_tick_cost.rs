@@ -1,7 +1,7 @@
-//! Host time of the parts of one simulated tick: `cargo run --release -p oracle --example whole_tick_cost [LIBRARY [LEG]]`,
-//! with the host library of the reference platform's controller for what takes one: the controller's part, everything of the
-//! paper's cases and machining in small, finer and long steps of the plant, and how far their tables are apart. LEG is the class
-//! of the legs, `plays` or `bouc-wen`.
+//! Host time of the parts of one simulated tick: `cargo run --release -p oracle --example whole_tick_cost [LIBRARY [LEG]]`.
+//! LIBRARY is the host library of the reference platform's controller. With it, the example also measures the controller, and the
+//! complete simulation of the paper's cases and machining in small, finer and long steps of the plant, and compares their tables.
+//! LEG is the class of the legs, `plays` or `bouc-wen`.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -16,15 +16,14 @@ use host_sim::trajectory::{Multisine, PaperPath, PaperPose, PoseTrajectory};
 
 const TICKS: usize = 500;
 
-/// Time that this thread has had a processor for, s: other work on the computer does not count. Without a Linux that says it,
-/// the time on the clock.
+/// Processor time of this thread, s, which excludes other work on the computer. Wall-clock time if Linux does not report it.
 fn processor_time(start: Instant) -> f64 {
     let said = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = said.as_deref().and_then(|text| text.split(' ').next()).and_then(|word| word.parse::<f64>().ok());
     nanoseconds.map_or_else(|| start.elapsed().as_secs_f64(), |nanoseconds| nanoseconds * 1e-9)
 }
 
-/// Least time of many tries, ns a tick.
+/// Least time of many tries, ns per tick.
 fn least(mut part: impl FnMut(usize)) -> f64 {
     let mut best = f64::INFINITY;
     for _ in 0..200 {
@@ -40,7 +39,7 @@ fn main() {
     let mut rig = PlatformRig::new(&specimen, &Noise::of(&specimen), 1);
     rig.prepare(&Preparation { peak: 100.0, rate: 200.0, settle: 0.2, update: 5e-5, rest: 0.0 });
     let start = Instant::now();
-    // Legs of different voltages go through it one by one.
+    // Legs with different voltages are computed one by one.
     for (what, peak) in [("legs side by side", 100.0), ("one by one", 99.0)] {
         let mut specimen = specimen.clone();
         specimen.legs[5].u_max = peak;

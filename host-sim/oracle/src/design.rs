@@ -1,6 +1,6 @@
-//! Gains by rule, from nominal data: the sampled linear loop of a platform and its spectral radius.
+//! Gains by rule from nominal data: the sampled linear loop of a platform and its spectral radius.
 //!
-//! One tick of the loop is written as a program on numbers; its matrix is what the program makes of unit vectors.
+//! One tick of the loop is written as a program on numbers. Its matrix is the result of the program for unit vectors.
 
 use nalgebra::DMatrix;
 
@@ -9,7 +9,7 @@ use host_sim::platform::{Matrix6, PlatformParameters, Specimen, StructureParamet
 use super::linear::{Matrix, Vector, matrix, vector};
 use super::notch::{Notch, NotchState};
 
-/// What a platform controller is designed from, SI.
+/// Data for the design of a platform controller, SI.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plant {
     /// Joints, masses, nominal stiffness and damping of the legs.
@@ -48,10 +48,10 @@ impl Gains {
     }
 }
 
-/// How the real plant differs from the one designed for.
+/// Deviation of the real plant from the nominal one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
-    /// λ: displacement per displacement requested.
+    /// λ: displacement per requested displacement.
     pub gain: f64,
     /// Axial stiffness relative to nominal.
     pub stiffness: f64,
@@ -80,7 +80,7 @@ struct SampledLoop {
     delay: usize,
 }
 
-/// Numbers in the state: lag 6, pose 6, rate 6, requests under way 6 each, then those of the controller.
+/// Plant states: lag 6, pose 6, rate 6; delayed requests, 6 per tick, and the states of the controller follow.
 const PHYSICAL: usize = 18;
 
 impl SampledLoop {
@@ -89,7 +89,7 @@ impl SampledLoop {
         for k in &mut real.stiffness {
             *k *= deviation.stiffness;
         }
-        // c = β k with β of the mode as it now is.
+        // c = β k with β of the changed mode.
         for c in &mut real.damping {
             *c *= deviation.damping * libm::sqrt(deviation.stiffness);
         }
@@ -101,7 +101,7 @@ impl SampledLoop {
         let damper = push * legs(&real.damping) * jacobian;
         let drive = push * legs(&real.stiffness) * deviation.gain;
         let mut rates = vec![vec![0.0; PHYSICAL + 6]; PHYSICAL + 6];
-        // A lag far below the period is as good as none; the bound keeps the exponential well scaled.
+        // A lag far below the period is negligible; the bound keeps the exponential well scaled.
         let lag = plant.lag.max(1e-3 * plant.period);
         for row in 0..6 {
             rates[row][row] = -plant.period / lag;
@@ -145,7 +145,7 @@ impl SampledLoop {
         }
         if self.gains.level > 0.0 {
             count += notch + 6 + if self.gains.drift > 0.0 { 6 } else { 0 };
-            // The request of the interval that ended, which the innovation compares with.
+            // The request of the last interval, for the innovation.
             count += 6;
         }
         count
@@ -230,7 +230,7 @@ impl SampledLoop {
                 one[(row, column)] = *value;
             }
         }
-        // Gelfand: |Aⁿ|^(1/n) with n = 2²⁴; unlike an iteration for eigenvalues it always ends.
+        // Gelfand: |Aⁿ|^(1/n) with n = 2²⁴; unlike an iteration for eigenvalues it always terminates.
         const SQUARINGS: i32 = 24;
         let mut logarithm = 0.0;
         for _ in 0..SQUARINGS {
@@ -246,7 +246,7 @@ impl SampledLoop {
     }
 }
 
-/// The largest number up to `bound` that is `good`, to 0.1 %, if all below it are good too.
+/// The largest number up to `bound` that is `good`, to 0.1 %, assuming that all smaller ones are good.
 fn largest(bound: f64, good: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (1e-3, bound);
     while high / low > 1.001 {
@@ -256,14 +256,14 @@ fn largest(bound: f64, good: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
-/// A nominal plant with its notch, ready for design.
+/// A nominal plant with its notch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rule {
     plant: Plant,
     notch_damping: Option<f64>,
 }
 
-/// What the rule gives.
+/// Result of the rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Design {
     /// Ω: largest bandwidth of EWMA alone with a radius below 1, rad/s.
@@ -275,13 +275,13 @@ pub struct Design {
 }
 
 impl Rule {
-    /// For a plant; `notch_damping` is ζ_d of the modal notch, if there is one.
+    /// The design for a plant; `notch_damping` is ζ_d of the modal notch, if there is one.
     #[must_use]
     pub fn new(plant: Plant, notch_damping: Option<f64>) -> Self {
         Self { plant, notch_damping }
     }
 
-    /// For the nominal data of a machine, its legs' lag and a control period (s).
+    /// The design for the nominal data of a machine, its legs' lag and a control period (s).
     #[must_use]
     pub fn of(nominal: &PlatformParameters, lag: f64, period: f64, notch_damping: Option<f64>) -> Self {
         let leg = host_sim::plant::LegParameters::reference();
@@ -289,7 +289,7 @@ impl Rule {
         Self::new(Plant { structure, modal_damping: nominal.modal_damping, lag, period }, notch_damping)
     }
 
-    /// The plant designed for.
+    /// The nominal plant.
     #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.plant
@@ -330,7 +330,7 @@ impl Rule {
         Design { limit, combined: self.shrunk(combined), position: self.shrunk(position) }
     }
 
-    /// `gains`, made smaller until they keep the margins.
+    /// `gains`, reduced until they have the required margins.
     fn shrunk(&self, mut gains: Gains) -> Gains {
         const WEAK: Deviation = Deviation { damping: 0.7, ..Deviation::NONE };
         let cases = [

@@ -1,5 +1,5 @@
-//! Controllers in plain f64, written apart from the emitted ones: oracles for them and for the plants' figures.
-//! For tests alone; slow, with a memory without bounds. Here the leg controller, in `platform` that of poses.
+//! Controllers in plain f64, written independently of the emitted ones: oracles for them and for the plants' figures.
+//! Only for tests: slow, with unbounded memory. This file has the leg controller, `platform` that of poses.
 //!
 //! Hysteresis by `preisach`; run-to-run adaptation (AII.3), (AII.5), (AII.6) in the filter form.
 
@@ -51,7 +51,7 @@ impl Oracle {
     }
 }
 
-/// The emitted controller's interface, as far as it goes here.
+/// The part of the emitted controller's interface that this controller supports.
 fn description() -> Description {
     Description {
         name: "oracle".to_owned(),

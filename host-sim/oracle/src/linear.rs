@@ -1,4 +1,4 @@
-//! Matrices and vectors of six, from and to the simulator's arrays.
+//! Conversions of 6×6 matrices and 6-vectors from and to the simulator's arrays.
 
 use host_sim::platform::{Matrix6, Six};
 use nalgebra::{SMatrix, SVector};

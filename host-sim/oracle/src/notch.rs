@@ -35,7 +35,7 @@ pub(super) struct Notch {
 pub(super) type NotchState = [[f64; 2]; 6];
 
 impl Notch {
-    /// `damping` is ζ of the lowest mode; the others' rise with their frequency.
+    /// `damping` is ζ of the lowest mode; that of other modes is proportional to frequency.
     pub(super) fn new(
         (frequencies, shapes): (&[f64; 6], &Matrix),
         damping: f64,

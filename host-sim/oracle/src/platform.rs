@@ -1,13 +1,13 @@
 //! The platform controller: gauges → pose, set-point, P, F and P/F in task space, six voltages (`sixdof.md` §2 iv).
 //!
 //! ```text
-//! tick at t_n: pose h, Y = Δl(h); q̂ and p of the interval that just ended, T the target at its end
+//! tick at t_n: pose h, Y = Δl(h); q̂ and p of the last interval, T the target at its end
 //! ν = J N(J⁻¹ (Y − (q̂ − p) − δ̂ − φ̂)) ;  δ̂ ← δ̂ + ω1 (ν + φ̂) ;  φ̂ ← φ̂ + ω2 ν        EWMA: φ̂ = 0
 //! e = N(T − h) ;  s ← s + T_s k_I e unless a leg was limited
 //! p = (f_ff(T⁺) − f_rest)/k_a ,  Jᵀ f_ff = M ḧ + G + K_e (h − h_e) or − measured wrench ; k_v as a known part
 //! q = Δl(T⁺) + p + J⁻ᵀ (k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q), P alone: q/ρ̂ ;  q̂ = Γ(u) after converter and limits
 //! ```
-//! N is the modal notch; J in the feedback is that of rest. Velocity forces C ḣ are left out: below 1 pm of leg
+//! N is the modal notch; J in the feedback is that at rest. Velocity forces C ḣ are neglected: below 1 pm of leg
 //! displacement for the motion of a piezo platform. No bumpless change between modes. Set-points: bias by a fifth-order
 //! polynomial, hold and stream.
 
@@ -52,14 +52,14 @@ struct Leg {
     requested: f64,
 }
 
-/// What changes from tick to tick.
+/// State of the controller.
 #[derive(Debug, Clone)]
 struct State {
     legs: [Leg; LEGS],
     pose: Vector,
     velocity: Vector,
     target: PoseTarget,
-    /// p of the interval that just ended, m.
+    /// p of the last interval, m.
     load: Vector,
     /// Δl at the last set-point, m.
     demand: Vector,
@@ -195,7 +195,7 @@ impl PlatformOracle {
         out
     }
 
-    /// The pose at which the gauges read `gauge`, by Newton steps with the slopes of rest.
+    /// The pose for the readings `gauge`, by Newton steps with the slopes at rest.
     fn sense(&self, gauge: &Vector) -> Vector {
         let mut pose = self.gauge_inverse * gauge;
         for _ in 0..8 {
@@ -214,7 +214,7 @@ impl PlatformOracle {
         let weight = vector(&self.masses.weight(&self.geometry, &target.pose));
         let jacobian = matrix(&self.geometry.jacobian(&target.pose));
         let force = mass * vector(&target.acceleration) + weight + push;
-        // J is regular wherever piezo legs reach if it is so at rest.
+        // If J is regular at rest, it is regular within the reach of piezo legs.
         let legs = jacobian.transpose().lu().solve(&force).unwrap_or_else(Vector::zeros);
         (legs - self.carried).component_div(&self.stiffness)
     }
@@ -247,7 +247,7 @@ pub fn description() -> Description {
     }
 }
 
-/// Scalar words before the sixes of a configuration.
+/// Scalar words before the groups of six words of a configuration.
 const SCALARS: usize = 7;
 
 impl TickController for PlatformOracle {
@@ -328,7 +328,7 @@ impl TickController for PlatformOracle {
         }
         let displacement = vector(&self.geometry.extensions(&numbers(&pose)));
 
-        // Feedback on the interval that ended.
+        // Feedback on the last interval.
         let config = &self.config;
         let state = &mut self.state;
         let mode = config.mode;

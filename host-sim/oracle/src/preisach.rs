@@ -1,5 +1,5 @@
-//! A Preisach model: Everett table read off the record's nodes; forward model from the list of all extrema that are not
-//! wiped out; inverse by bisection on that forward model.
+//! A Preisach model: Everett table from the record at its nodes; forward model from the list of all remaining extrema; inverse by
+//! bisection on that forward model.
 
 use host_sim::forc::ReversalRecord;
 
@@ -12,7 +12,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// From a record whose rows meet every node: peak minus the falling branch.
+    /// A table from a record with a row at every node: peak minus the falling branch.
     #[must_use]
     pub fn from_record(record: &ReversalRecord, intervals: usize, drive_max: f64) -> Self {
         let interval = drive_max / intervals as f64;
@@ -66,7 +66,7 @@ impl Memory {
         self.extrema[self.extrema.len() - 1].1
     }
 
-    /// How many extrema stay when the drive goes to `drive`, and the displacement there.
+    /// Number of extrema that remain when the drive goes to `drive`, and the displacement there.
     fn reach(&self, table: &Table, drive: f64) -> (usize, f64) {
         let (last, at_last) = self.extrema[self.extrema.len() - 1];
         let mut kept = self.extrema.len();
@@ -74,11 +74,11 @@ impl Memory {
             return (kept, at_last);
         }
         let rising = drive > last;
-        // Odd places are maxima: going on in the same direction replaces the last extremum.
+        // Odd indices are maxima: continuing in the same direction replaces the last extremum.
         if kept > 1 && kept.is_multiple_of(2) == rising {
             kept -= 1;
         }
-        // Wiping out: a pair of extrema inside the new one is forgotten.
+        // Wiping out: a pair of extrema inside the new one is removed.
         while kept >= 3 {
             let outer = self.extrema[kept - 2].0;
             if (rising && drive >= outer) || (!rising && drive <= outer) {
@@ -107,7 +107,7 @@ impl Memory {
         }
     }
 
-    /// The drive within 0 to `drive_max` (V) that gives `demand` (m), without going there.
+    /// The drive within 0 to `drive_max` (V) that gives `demand` (m), without applying it.
     pub(super) fn solve(&self, table: &Table, drive_max: f64, demand: f64) -> f64 {
         let (mut low, mut high) = (0.0, drive_max);
         for _ in 0..56 {
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn the_memory_agrees_with_a_sum_over_relays() {
-        // One relay per cell of the Preisach plane, driven on the nodes, where a cell is wholly up or down.
+        // One relay per cell of the Preisach plane, driven at the nodes, where a cell is completely up or down.
         let table = table();
         let node = |up: usize, down: usize| table.nodes[up][down];
         let mut relays = [[false; N]; N];

@@ -1,4 +1,4 @@
-//! The DAC driver against words of the data sheet, and against parts that do not answer as it says.
+//! Tests of the DAC driver with words of the data sheet, and with parts that answer differently.
 
 use embedded_hal::spi::ErrorKind;
 use embedded_hal_mock::eh1::delay::NoopDelay;
@@ -11,12 +11,12 @@ type Word = [u8; 3];
 type Ldac = Pulse<Pin, NoopDelay, LDAC_LOW>;
 type Pair = Ad5686rPair<Spi<u8>, Spi<u8>, Ldac, Pin, NoopDelay>;
 
-/// A frame of the data sheet, and what the part sends back meanwhile.
+/// A frame of the data sheet, and the simultaneous answer of the part.
 fn frames(pairs: &[(Word, Word)]) -> Vec<SpiStep<u8>> {
     pairs
         .iter()
         .flat_map(|(sent, answer)| {
-            // Only the frame that does nothing brings an answer that counts.
+            // Only the answer of the no-operation frame is used.
             let step = match sent {
                 [0, 0, 0] => SpiStep::transfer_in_place(sent.to_vec(), answer.to_vec()),
                 _ => SpiStep::write_vec(sent.to_vec()),
@@ -28,7 +28,7 @@ fn frames(pairs: &[(Word, Word)]) -> Vec<SpiStep<u8>> {
 
 const NONE: Word = [0xff, 0xff, 0xff];
 
-/// Power-up as the module's table has it; channel D gives back what `answers` says.
+/// Power-up by the module's table; channel D returns `answers`.
 fn start_words(answers: [u16; 3]) -> Vec<(Word, Word)> {
     let mut words: Vec<(Word, Word)> = [
         [0x60, 0x00, 0x00], // software reset
@@ -52,7 +52,7 @@ fn start_words(answers: [u16; 3]) -> Vec<(Word, Word)> {
 
 const GOOD: [u16; 3] = [0xa55a, 0x5aa5, 0x0000];
 
-/// What a part is told in a tick: which channel is read back, if it is its turn, and what it answers; then the three codes.
+/// Words to a part in a tick: the channel to read back, if it is its turn, with its answer; then the three codes.
 fn write_words(asked: Option<(u8, u16)>, codes: [u16; 3]) -> Vec<(Word, Word)> {
     let mut words = Vec::new();
     if let Some((address, answer)) = asked {
@@ -75,7 +75,7 @@ fn pulse(ldac: &[PinStep]) -> Ldac {
     Pulse { pin: Pin::new(ldac), delay: NoopDelay }
 }
 
-/// A tick: the question while the gauges are converted, then the codes.
+/// A tick: read-back during the conversion of the gauges, then the codes.
 fn tick(dacs: &mut Pair, codes: [i32; 6]) -> Result<(), Fault> {
     dacs.ask().and(dacs.write(&codes))
 }
@@ -128,7 +128,7 @@ fn start_disables_the_amplifiers_first_and_proves_both_parts() {
 
 #[test]
 fn a_part_that_gives_nothing_back_is_found_at_start_and_the_other_is_at_zero_all_the_same() {
-    // SDO open: all ones. The first pattern differs at once.
+    // SDO open: all ones. The first pattern differs.
     let silent = &start_words([0xffff; 3])[..9];
     let mut dacs = pair(silent, &start_words(GOOD), &[], &[low()]);
     assert_eq!(dacs.start(), Err(Fault::ReadBack));

@@ -1,4 +1,4 @@
-//! The ADC driver against frames of the data sheet, and against parts that do not answer as it says.
+//! Tests of the ADC driver with frames of the data sheet, and with parts that answer differently.
 
 use embedded_hal_mock::eh1::delay::NoopDelay;
 use embedded_hal_mock::eh1::digital::{Mock as Pin, State, Transaction as PinStep};
@@ -6,12 +6,12 @@ use embedded_hal_mock::eh1::spi::{Mock as Spi, Transaction as SpiStep};
 use specgen_hal::ad7606::{Ad7606, BusyLine, CONVST_LOW, POLLS, Window};
 use specgen_hal::{Fault, Gauges, Pulse};
 
-/// Two's complement codes of 16 bits as the part sends them.
+/// Codes of 16 bits in two's complement, as the part sends them.
 fn frame16(codes: [i16; 8]) -> Vec<u8> {
     codes.iter().flat_map(|code| code.to_be_bytes()).collect()
 }
 
-/// Codes of 18 bits without gaps, by way of text: another way than the driver's.
+/// Codes of 18 bits without gaps, assembled as text, independently of the driver.
 fn frame18(codes: [i32; 8]) -> Vec<u8> {
     let text: String = codes.iter().map(|code| format!("{:018b}", code & 0x3_ffff)).collect();
     assert_eq!(text.len(), 144);
@@ -27,7 +27,7 @@ fn window(bits: u32) -> Window {
 
 type Start = Pulse<Pin, NoopDelay, CONVST_LOW>;
 
-/// A line that rests high and gets so many low pulses.
+/// A line that is high and gets so many low pulses.
 fn pulses(count: usize) -> Start {
     let steps: Vec<PinStep> = (0..count).flat_map(|_| [PinStep::set(State::Low), PinStep::set(State::High)]).collect();
     Pulse { pin: Pin::new(&steps), delay: NoopDelay }
@@ -41,9 +41,9 @@ fn answer(frame: &[u8]) -> Vec<SpiStep<u8>> {
     ]
 }
 
-/// One read: what BUSY shows at each look, what the SPI does.
+/// One read: BUSY at each poll, and the steps of the SPI.
 fn read<const BITS: usize>(busy: &[State], spi: &[SpiStep<u8>]) -> Result<[i32; 6], Fault> {
-    // After the frame BUSY is looked at once more.
+    // After the frame BUSY is polled once more.
     let after = (!spi.is_empty()).then_some(Low);
     read_with_busy::<BITS>(busy, after, spi)
 }
@@ -89,14 +89,14 @@ fn a_conversion_that_does_not_begin_is_a_fault() {
 #[test]
 fn a_conversion_that_does_not_end_is_given_up() {
     assert_eq!(read::<16>(&vec![High; 1 + POLLS as usize], &[]), Err(Fault::NotEnded));
-    // The last look still counts.
+    // The last poll still counts.
     let mut looks = vec![High; POLLS as usize];
     looks.push(Low);
     let frame = frame16([3, 3, 3, 3, 3, 3, 3, REFERENCE]);
     assert_eq!(read::<16>(&looks, &answer(&frame)), Ok([0x8003; 6]));
 }
 
-/// A line that latches a fall: what each look shows, whether it falls after it is watched, and whether it is.
+/// A line that latches falling edges: its level at each poll, whether it falls after watching began, and whether it is watched.
 struct Latching(std::vec::IntoIter<bool>, bool, bool);
 
 impl BusyLine for Latching {
@@ -160,7 +160,7 @@ fn the_window_is_in_codes_of_the_part() {
     assert_eq!(window(18), Window { low: 195_297, high: 197_918 });
 }
 
-/// The start: reset, then one conversion that must be believable.
+/// The start: reset, then one conversion that must be valid.
 fn start(busy: &[State], spi: &[SpiStep<u8>]) -> Result<(), Fault> {
     let reset = [PinStep::set(High), PinStep::set(Low)];
     let after = (!spi.is_empty()).then_some(Low);

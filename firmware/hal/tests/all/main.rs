@@ -1,4 +1,4 @@
-//! Drivers of converters against recorded transfers, in one binary.
+//! Tests of converter drivers with recorded transfers, in one binary.
 
 mod ad5686r;
 mod ad7606;

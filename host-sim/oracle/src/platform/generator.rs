@@ -13,13 +13,13 @@ pub(super) struct Generator {
 }
 
 impl Generator {
-    /// To `bias` within `time`, s, at a control period, s.
+    /// A generator that moves to `bias` within `time`, s, at a control period, s.
     pub(super) fn new(bias: Six, time: f64, period: f64) -> Self {
         let ticks = libm::round(time / period) as u64;
         Self { bias, ticks, period, tick: 0, last: PoseTarget::default() }
     }
 
-    /// As at power-up.
+    /// Resets to the state at power-up.
     pub(super) fn reset(&mut self) {
         self.tick = 0;
         self.last = PoseTarget::default();

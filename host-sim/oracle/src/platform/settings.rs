@@ -1,4 +1,4 @@
-//! What a platform controller is built from.
+//! Settings of a platform controller.
 
 use crate::design::{Gains, Plant, Rule};
 use crate::preisach::Table;
@@ -19,7 +19,7 @@ pub struct Drive {
     pub code_max: i64,
     /// Largest change of the code per tick.
     pub step_max: i64,
-    /// ρ̂ of a leg, m/V: what P alone takes the drive for.
+    /// ρ̂ of a leg, m/V: the linear gain that P alone uses.
     pub gain: f64,
 }
 
@@ -38,7 +38,7 @@ impl Drive {
     }
 }
 
-/// What a platform controller is built from, SI.
+/// Settings of a platform controller, SI.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// Nominal plant, lag and control period.
@@ -47,7 +47,7 @@ pub struct Settings {
     pub notch_damping: Option<f64>,
     /// P/F gains and bandwidths.
     pub combined: Gains,
-    /// P alone.
+    /// Gains of P alone.
     pub position: Gains,
     /// k_v of P/F and of P alone, N s/m and N m s/rad.
     pub velocity: Six,
@@ -63,12 +63,12 @@ pub struct Settings {
     pub drive: Drive,
     /// Bias pose.
     pub bias: Six,
-    /// Time taken to it, s.
+    /// Time to reach it, s.
     pub bias_time: f64,
 }
 
 impl Settings {
-    /// For a machine, from its nominal data and reversal curves of every leg (32 intervals, 20 V/s), at a control period
+    /// Settings for a machine, from its nominal data and reversal curves of every leg (32 intervals, 20 V/s), at a control period
     /// (s): gains by the study's rule, bias 10 µm up in 0.3 s.
     #[must_use]
     pub fn of(specimen: &Specimen, period: f64, notch_damping: Option<f64>) -> Self {

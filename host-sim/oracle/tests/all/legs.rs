@@ -1,6 +1,6 @@
 //! The figures of the feasibility study (`leg-feedforward.md` §2 and §5), with the oracle in the loop.
 //!
-//! The record is taken from the leg as built; the study's table is the comparison, in nm.
+//! The record is taken from the simulated leg; results are compared with the study's table, in nm.
 
 use host_sim::closed_loop::LEGS;
 use host_sim::forc::ReversalExperiment;
@@ -94,7 +94,7 @@ fn slopes_fall_with_frequency_as_table_1_says() {
 
 #[test]
 fn halving_the_step_changes_the_figures_by_less_than_the_stated_bound() {
-    // Stated in plant/leg.rs. The coarser plant's table is used for both: what is bounded is the plant.
+    // Stated in plant/leg.rs. The coarser plant's table is used for both, because the bound is for the plant.
     let parameters = LegParameters::reference();
     let halved = LegParameters { step_s: 0.5 * parameters.step_s, ..parameters.clone() };
     let mut controller = oracle(&parameters, 16, 0.0, &NoiseParameters::NONE);

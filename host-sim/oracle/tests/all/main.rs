@@ -1,4 +1,4 @@
-//! The figures of the feasibility studies with the oracles in the loop, and the rig that runs them, in one binary.
+//! Figures of the feasibility studies with the oracles in the loop, and tests of the rig, in one binary.
 #![allow(clippy::unwrap_used)] // Helpers of tests, where a panic is a failed test.
 
 mod legs;

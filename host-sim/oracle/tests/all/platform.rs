@@ -36,7 +36,7 @@ fn case_1_at_10_hz_and_machining_have_the_figures_of_the_study() {
     let table = scenario.free_motion(&mut controller, &FREE_MODES, &named).unwrap();
     println!("{}", table.to_text());
     let row = |mode| table.row("case-1", mode, 10.0).unwrap();
-    // Study, base N: Invhys 67/71/21, EWMA 14.2/22.0/4.7, PCC 14.0/22.0/4.7 nm, there on legs of its own tolerances.
+    // Study, base N: Invhys 67/71/21, EWMA 14.2/22.0/4.7, PCC 14.0/22.0/4.7 nm, on legs with other tolerances.
     for (mode, study) in [("pf-invhys", 99.9), ("pf-ewma", 26.6), ("pf-pcc", 26.5)] {
         let found = row(mode).translation_nm();
         assert!((found / study - 1.0).abs() < 0.15, "{mode}: {found} nm, study {study} nm");

@@ -27,7 +27,7 @@ impl PoseTrajectory for Rise {
     }
 }
 
-/// Place of an input word of a platform.
+/// Index of an input word of a platform.
 fn input(name: &str) -> usize {
     oracle::platform::description().input(name).unwrap()
 }
@@ -77,7 +77,7 @@ fn set_points_are_those_of_the_end_of_the_interval_and_come_after_the_bias() {
         assert_eq!(f64::from_bits(row[z]), if streamed > 0 { 10e-6 * time } else { 0.0 });
         assert_eq!(f64::from_bits(row[rate]), if streamed > 0 { 10e-6 } else { 0.0 });
     }
-    // The target is scored at the end of its tick.
+    // The error is evaluated at the end of the tick of the target.
     assert!((run.samples[9].time - 10.0 * INTERVAL).abs() < 1e-15);
     assert!((run.samples[9].target[2] - 10e-9).abs() < 1e-20);
 }
@@ -120,7 +120,7 @@ fn latency_delays_what_the_platform_feels() {
         run.samples.iter().map(|sample| sample.tick.pose[2]).collect::<Vec<_>>()
     };
     let (prompt, late) = (poses(0), poses(3));
-    // Creep goes on meanwhile, by far less than the motion.
+    // Creep continues meanwhile, far smaller than the motion.
     for n in 3..200 {
         assert!((late[n] - prompt[n - 3]).abs() < 1e-9, "{n}: {} {}", late[n], prompt[n - 3]);
     }
@@ -144,7 +144,7 @@ fn faulty_gauges_read_as_declared_and_recover() {
         if faulty {
             assert_eq!(row[stuck], run.rows().nth(start + 19).unwrap()[stuck]);
         } else {
-            // The noise of the run is not shifted by the fault.
+            // The fault does not shift the noise of the run.
             assert_eq!(row[..], good[..], "{tick}");
         }
     }
@@ -173,14 +173,14 @@ fn a_gauge_ends_at_its_range() {
     assert_eq!(rig.read_gauges()[0], 2e-6);
 }
 
-/// Status of a set-point that was refused.
+/// Status of a refused set-point.
 const REFUSED: u32 = 1 << 16;
-/// A micrometre off while it moves to the start; ticks of that.
+/// Error of a micrometre while moving to the start, and the ticks of that.
 const OFF: f64 = 1e-6;
 const APPROACH: u64 = 30;
 
-/// Moves for [`APPROACH`] ticks under the command to move, then plays for `busy` ticks with the tick behind them as the last; `bad` is
-/// the tick of the play in which it refuses its set-point, if it does. Its target is off only while it moves.
+/// Moves for [`APPROACH`] ticks under the command to move, then plays for `busy` ticks plus a last one; `bad` is the tick of the play
+/// in which it refuses its set-point, if any. Its target has an error only during the move.
 fn player(busy: u64, bad: Option<u64>) -> StandIn<impl FnMut(&mut u64, &[u64], &mut [u64])> {
     let target = oracle::platform::description().output("target[0]").unwrap();
     let mut moved = 0;
@@ -216,7 +216,7 @@ fn played(
     rig.play(controller, path, &options, limit)
 }
 
-/// A path of 200 ticks that does not begin at the bias.
+/// A path of 200 ticks that does not start at the bias.
 const PATH: OnBoard =
     OnBoard { selector: 1, approach: Some([OFF, 0.0, 0.0, 0.0, 0.0, 0.0]), ticks: 200, repeats: false };
 
@@ -224,7 +224,7 @@ const PATH: OnBoard =
 fn a_path_is_scored_from_its_first_set_point_to_its_last_and_no_further() {
     let once = OnBoard { approach: None, ..PATH };
     let repeated = OnBoard { repeats: true, ..PATH };
-    // A repetition longer than what is usually followed is followed once.
+    // A repetition longer than the usual time is followed once.
     let long = OnBoard { ticks: 7000, ..repeated };
     let for_ever = u64::MAX - 1;
     for (path, busy, interval, limit, ticks) in [
@@ -240,7 +240,7 @@ fn a_path_is_scored_from_its_first_set_point_to_its_last_and_no_further() {
         assert_eq!(run.samples.len(), ticks, "{path:?} {limit:?}");
         let errors = run.scored().unwrap();
         assert_eq!(errors.coverage(), Coverage::new(ticks, path.ticks, interval), "{path:?} {limit:?}");
-        // The way to the start is no part of the path.
+        // The move to the start is not part of the path.
         assert!(errors.peak_nano()[0] < 1.0, "{path:?}: {} nm", errors.peak_nano()[0]);
         assert!((run.samples[ticks - 1].time - ticks as f64 * interval).abs() < 1e-9);
     }
@@ -257,20 +257,20 @@ fn a_run_that_ends_early_is_an_error_and_no_figure() {
         let text = RunError::EndedEarly { coverage, status }.to_string();
         assert!(text.contains(&format!("after {seconds:.3} s of a path of 0.020 s (status 0x0)")), "{text}");
     }
-    // One that goes on behind its last set-point plays another path.
+    // If it continues after its last set-point, it plays another path.
     for busy in [200, 250] {
         let error = played(&mut player(busy, None), &PATH, INTERVAL, None).unwrap_err();
         let RunError::NotEnded { coverage, status: BUSY } = error else { panic!("{error}") };
         assert_eq!(coverage, Coverage::new(200, 200, INTERVAL));
         assert!(error.to_string().contains("busy after 0.020 s, the whole path (status 0x40000: "), "{error}");
     }
-    // A set-point that is refused ends the run; what it had of errors is not the path's.
+    // A refused set-point ends the run; its errors are not those of the path.
     let run = played(&mut player(199, Some(80)), &PATH, INTERVAL, None).unwrap();
     assert!(!run.is_followed() && run.samples.len() == 80);
     let error = run.scored().unwrap_err();
     let RunError::EndedEarly { coverage, status } = error else { panic!("{error}") };
     assert_eq!((coverage, status), (Coverage::new(79, 200, INTERVAL), REFUSED));
-    // Of a stream, too, which goes on all the same.
+    // Also for a stream, although it continues.
     let StandIn { description, state, mut tick } = follower(0, 0.0);
     let mut refuses = StandIn {
         description,

@@ -22,34 +22,34 @@ use xtask::setup;
 
 /// Its own workspace.
 pub const MANIFEST: &str = "tests/board/Cargo.toml";
-/// What a run takes, as cargo is told.
+/// A package that a run needs, as arguments of cargo.
 type Package = [&'static str; 2];
 const TOOL: Package = ["--manifest-path", MANIFEST];
-/// By itself, its dependencies have other features than beside the tests: it is compiled once more.
+/// Built alone: its dependencies have other features than in the test build, so it is compiled again.
 const SPECGEN: Package = ["--package", "specgen"];
-/// Where `tests/tests/boards.rs` leaves image and spec of each target.
+/// Folder in which `tests/tests/boards.rs` keeps image and spec of each target.
 const TESTED: &str = "target/tests/boards";
-/// When the record of a played motion ends, s after its order: rest and knots take half a second, then it moves.
+/// End of the record of a played motion, s after its command: rest and knots take half a second, then it moves.
 const RECORD: f64 = 0.7;
-/// A record of triggers that is worth comparing has so many edges.
+/// Fewest edges of a record of triggers.
 const LEAST_EDGES: usize = 4;
 /// In the answer to `status`.
-const STANDS: &str = "; status 0x";
+const STATUS: &str = "; status 0x";
 const WAVE: &str = "ramp = 0.05\nseconds = 0.4\n[[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-6, frequency = 5.0 }\n";
 
-/// The estimate of the longest tick over the longest that is seen.
+/// Permitted ratio of the estimated to the observed longest tick.
 const BAND: [f64; 2] = [1.0, 1.5];
 
-/// An image, what it was built from, and where its run leaves its files.
+/// An image, its spec, and the folder for the files of its run.
 #[derive(Clone)]
 struct Trial {
     spec: PathBuf,
     target: &'static str,
     image: PathBuf,
     folder: PathBuf,
-    /// Where specgen and the tool are.
+    /// Folder of specgen and the tool.
     programs: PathBuf,
-    /// Times by the tool's model of cycles; else a cycle an instruction.
+    /// Whether times come from the tool's cycle model; else one cycle per instruction.
     cycles: bool,
 }
 
@@ -102,14 +102,14 @@ fn tested(root: &Path, with_faults: bool) -> ExitCode {
     report.finish()
 }
 
-/// The tests of the models that stand for a board's parts.
+/// The tests of the models of a board's parts.
 fn models(root: &Path) -> Outcome {
     let mut test = cargo(root, &[&["test", "--release", "--quiet", "--locked"], &TOOL[..]].concat());
     test.arg("--target-dir").arg(built_in(root));
     expect_success(test, "see the test above")
 }
 
-/// For the full run: with the estimate of a tick and faults, one image after the other: a host does not wait long for a board that has half a processor.
+/// For the full test run, with the estimate of a tick and faults. One image after the other, because hosts time out if a board gets half a processor.
 pub fn long(root: &Path) -> Outcome {
     each(root, &[SPECGEN, TOOL], |trial| {
         run(trial, false)?;
@@ -151,14 +151,14 @@ fn outcome(result: Result<(), String>) -> Outcome {
     result.map_or_else(Outcome::Failed, |()| Outcome::Passed)
 }
 
-/// What is built and brought before a run.
+/// Builds and installs what a run needs.
 fn built(root: &Path, packages: &[Package]) -> Outcome {
     if let Err(error) = provision::engine(&mut |line| println!("{line}")) {
         return setup::missing(format!("{error}"));
     }
     for package in packages {
         let mut build = cargo(root, &[&["build", "--release", "--quiet", "--locked"], &package[..]].concat());
-        // The same folder for both: what the tool depends on is among the workspace's.
+        // The same folder for both: the dependencies of the tool are in the workspace's.
         build.arg("--target-dir").arg(built_in(root));
         let outcome = expect_success(build, "see above");
         if !matches!(outcome, Outcome::Passed) {
@@ -172,7 +172,7 @@ fn built_in(root: &Path) -> PathBuf {
     std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from)
 }
 
-/// The board is emulated: what the spec assumes is no danger there.
+/// Builds the image. Assumed values of the spec are harmless on an emulated board.
 fn image(trial: &Trial) -> Outcome {
     if let Err(error) = fs::create_dir_all(&trial.folder) {
         return Outcome::Failed(format!("{}: {error}", trial.folder.display()));
@@ -183,7 +183,7 @@ fn image(trial: &Trial) -> Outcome {
     expect_success(build, "see above")
 }
 
-/// The longest tick as `specgen build` estimates it, µs.
+/// The longest tick by the estimate of `specgen build`, µs.
 fn estimated(trial: &Trial) -> Result<f64, String> {
     let mut build = Command::new(trial.programs.join("specgen"));
     build.arg("build").arg(&trial.spec).args(["--json", "--assumed-ok", "--target", trial.target]);
@@ -195,8 +195,8 @@ fn estimated(trial: &Trial) -> Result<f64, String> {
     worst.ok_or_else(|| format!("specgen build estimates no tick: {}", String::from_utf8_lossy(&output.stderr)))
 }
 
-/// Holds the estimate against the longest tick that was seen, whose times are of the same table: it promises that none is
-/// longer, and is to be of use.
+/// Compares the estimate with the longest observed tick, whose times come from the same table: it must be an upper bound, but not a
+/// loose one.
 fn hold(trial: &Trial, report: &session::Report) -> Result<(), String> {
     let (worst, seen) = (estimated(trial)?, report.longest_tick().ok_or("the board reports no ticks")?);
     println!("{}: longest tick {seen:.1} us, {worst:.1} us by specgen build", trial.target);
@@ -219,7 +219,7 @@ fn run(trial: &Trial, brief: bool) -> Result<(), String> {
     let operated = operate(trial, &mut session, brief)
         .and_then(|()| if has_input { wait_for_edge(trial, &mut session) } else { Ok(()) })
         .and_then(|()| motion.as_ref().map_or(Ok(()), |motion| learn(trial, &mut session, motion)));
-    // A board that is gone ended what was under way, which says more.
+    // If the board has stopped, report the interrupted operation, too.
     let report = match (session.report(), &operated) {
         (Err(gone), Err(why)) => return Err(format!("{}: {why}; then {gone}", trial.target)),
         (report, _) => report?,
@@ -291,7 +291,7 @@ fn corrected(table: &str) -> usize {
         .count()
 }
 
-/// Whether a machine of this spec has such a line.
+/// Whether a spec has such a trigger.
 fn has_triggers(path: &Path, such: impl Fn(&Trigger) -> bool) -> Result<bool, String> {
     let source = SpecSource::read(path).map_err(|finding| finding.message)?;
     let (model, _) = spec::load(&source);
@@ -299,16 +299,16 @@ fn has_triggers(path: &Path, such: impl Fn(&Trigger) -> bool) -> Result<bool, St
     Ok(model.task_space.is_some_and(|task| task.triggers.iter().any(such)))
 }
 
-/// A motion that is learned.
+/// A motion to learn.
 struct LearnedMotion {
     name: String,
-    /// Ticks after which its record ends.
+    /// Ticks of its record.
     record: u32,
-    /// What the gauges' noise makes of an error, nm rms.
+    /// Error due to the gauges' noise, nm rms.
     noise: f64,
 }
 
-/// The first trajectory that a machine of this spec learns, if its controller takes a correction.
+/// The first trajectory that a machine of this spec can learn, if its controller has a correction.
 fn learnable(path: &Path) -> Result<Option<LearnedMotion>, String> {
     let source = SpecSource::read(path).map_err(|finding| finding.message)?;
     let (model, _) = spec::load(&source);
@@ -321,8 +321,8 @@ fn learnable(path: &Path) -> Result<Option<LearnedMotion>, String> {
     }))
 }
 
-/// Learns a motion over the link, on the host and in the background of the board, which has to take a good part of its error, and plays it
-/// with a record.
+/// Learns a motion over the link, on the host and in the background of the board. That must remove a large part of the error. Then
+/// plays it with a record.
 fn learn(trial: &Trial, session: &mut Session, motion: &LearnedMotion) -> Result<(), String> {
     let LearnedMotion { name: motion, record, noise } = motion;
     let room = if trial.target.ends_with("f4") { "768" } else { "4096" };
@@ -354,7 +354,7 @@ fn learn(trial: &Trial, session: &mut Session, motion: &LearnedMotion) -> Result
         format!("record arm {record}\nrecord trigger\nplay {motion} correction=learned.json machine=emulated\nstatus");
     for (orders, words) in [
         ("arm\nwait holding 600\nrun\nwait running 600\nset command=0\nwait arrived 600\nstatus", ": running"),
-        (&play, STANDS),
+        (&play, STATUS),
         ("record stop\nrecord download pass.rec", "wrote "),
         ("ramp-down\nwait disarmed 600\nstatus", "disarmed, amplifiers off"),
     ] {
@@ -363,7 +363,7 @@ fn learn(trial: &Trial, session: &mut Session, motion: &LearnedMotion) -> Result
     Ok(())
 }
 
-/// Lets a move wait for the input line, and the line rise.
+/// Makes a move wait for the input line, then raises the line.
 fn wait_for_edge(trial: &Trial, session: &mut Session) -> Result<(), String> {
     let mut host = Host::of(session.command_of(trial, "operate"))?;
     session.command("input low")?;
@@ -385,19 +385,19 @@ fn wait_for_edge(trial: &Trial, session: &mut Session) -> Result<(), String> {
     Ok(())
 }
 
-/// From arming to a record; times are the board's, ms. The record is short: what it holds has to go over the line.
+/// From arming to a record; times are the board's, ms. The record is short, because it is transferred over the link.
 fn operate(trial: &Trial, session: &mut Session, brief: bool) -> Result<(), String> {
     let settings = format!("config write {}\nstatus", trial.spec.display());
     let mut host = Host::of(session.command_of(trial, "operate"))?;
     let whole = [
         ("status\narm\nwait holding 600\nrun\nwait running 600\nset command=0\nstatus", ": running", 200.0),
-        ("record arm 300\nwave wave.toml\nstatus", STANDS, 60.0),
-        (&settings, STANDS, 20.0),
-        ("record trigger\nstatus", STANDS, 60.0),
+        ("record arm 300\nwave wave.toml\nstatus", STATUS, 60.0),
+        (&settings, STATUS, 20.0),
+        ("record trigger\nstatus", STATUS, 60.0),
     ];
     let short = [
         ("status\narm\nwait holding 600\nrun\nwait running 600\nset command=0\nstatus", ": running", 0.0),
-        ("record arm 30\nrecord trigger\nstatus", STANDS, 10.0),
+        ("record arm 30\nrecord trigger\nstatus", STATUS, 10.0),
     ];
     let end = [
         ("record stop\nrecord download run.rec", "wrote ", 0.0),

@@ -1,4 +1,4 @@
-//! The documentation as a book: `docs` with its generated pages, through mdBook of a pinned version.
+//! The documentation as a book: `docs` with its generated pages, built by a pinned version of mdBook.
 
 use std::fs;
 use std::io;
@@ -11,9 +11,9 @@ use xtask::setup;
 
 /// Version of mdBook.
 const VERSION: &str = "0.5.4";
-/// mdBook is installed here.
+/// Installation folder of mdBook.
 const TOOLS: &str = "target/tools";
-/// `docs` with the generated pages.
+/// Copy of `docs` with the generated pages.
 const SOURCE: &str = "target/book-source";
 /// The book as HTML.
 const BOOK: &str = "target/book";
@@ -28,7 +28,7 @@ pub fn command(root: &Path) -> ExitCode {
     report.finish()
 }
 
-/// Writes the book into a folder, which it replaces.
+/// Writes the book to a folder, replacing its contents.
 pub fn build(root: &Path, folder: &Path) -> Outcome {
     let source = root.join(SOURCE);
     if let Err(why) = sources(root, &source) {
@@ -43,7 +43,7 @@ pub fn build(root: &Path, folder: &Path) -> Outcome {
             return setup::missing(format!("mdbook {VERSION} cannot be installed; the pages as Markdown: {SOURCE}"));
         }
     }
-    // mdBook takes a relative folder from that of the sources.
+    // mdBook resolves a relative folder from the folder of the sources.
     let folder = match std::path::absolute(folder) {
         Ok(folder) => folder,
         Err(error) => return Outcome::Failed(format!("{}: {error}", folder.display())),
@@ -71,7 +71,7 @@ fn sources(root: &Path, source: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// Copies a folder with the folders in it.
+/// Copies a folder recursively.
 fn copy(from: &Path, to: &Path) -> io::Result<()> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {

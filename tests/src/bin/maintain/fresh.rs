@@ -1,4 +1,4 @@
-//! `cargo xtask fresh`: what a newcomer types, typed on machines that have nothing yet.
+//! `cargo xtask fresh`: runs the commands of a newcomer on clean machines.
 //!
 //! Each scenario is a minimal Debian made by debootstrap, with a C linker and a copy of this machine's Rust toolchain, without
 //! its target for microcontrollers. The repository is cloned into it at HEAD, and the two commands of the README are run there.
@@ -17,9 +17,9 @@ use specgen_language::interrupt;
 const MAIN_JOB: &str = "cargo run --release -- specs/reference.toml -o out/reference --setup";
 /// The README's tests.
 const TESTS: &str = "cargo xtask test";
-/// Where what a scenario printed is kept, below the repository.
+/// Folder for the output of scenarios, below the repository.
 const KEPT: &str = "target/fresh";
-/// Exit code after Ctrl-C, as shells have it.
+/// Exit code after Ctrl-C, as in shells.
 const INTERRUPTED: u8 = 130;
 
 const USAGE: &str = "usage: cargo xtask fresh [--main-job-only] [SCENARIO…]
@@ -31,24 +31,24 @@ folder for temporary files. A scenario takes about 5 minutes, with the tests abo
 
 Scenarios:";
 
-/// Who runs the commands.
+/// The user who runs the commands.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum User {
     Root,
-    /// Without sudo.
+    /// A user without sudo.
     Plain,
-    /// With a sudo that asks for no password.
+    /// A user with password-less sudo.
     Sudo,
 }
 
-/// A machine and who uses it.
+/// A machine and its user.
 struct Scenario {
     name: &'static str,
     suite: &'static str,
     user: User,
-    /// A package is installed with which apt would have to remove to install the emulator.
+    /// Whether a package is installed that apt would have to remove to install the emulator.
     conflict: bool,
-    /// No network for the main job; what cargo needs is fetched before.
+    /// Whether the main job has no network; cargo's packages are fetched before.
     offline: bool,
 }
 
@@ -62,23 +62,23 @@ const SCENARIOS: [Scenario; 7] = [
     Scenario { name: "trixie-sudo", suite: "trixie", user: User::Sudo, conflict: false, offline: false },
 ];
 
-/// A command that was run.
+/// Result of a command.
 struct CommandResult {
     code: i32,
     took: Duration,
     printed: String,
 }
 
-/// What a scenario came to.
+/// Result of a scenario.
 struct Line {
     name: &'static str,
     job: Option<CommandResult>,
     tests: Option<CommandResult>,
-    /// Why it is not as it should be.
+    /// The failure, if any.
     wrong: Option<String>,
 }
 
-/// How it is called.
+/// Usage.
 pub fn usage() -> String {
     let names: Vec<&str> = SCENARIOS.iter().map(|scenario| scenario.name).collect();
     format!("{USAGE} {}", names.join(", "))
@@ -100,7 +100,7 @@ pub fn fresh(repository: &Path, arguments: &[&str]) -> ExitCode {
             return ExitCode::from(3);
         }
     };
-    // Roots are gone after Ctrl-C too: what runs in them is ended, the rest follows.
+    // Roots are also removed after Ctrl-C: their processes are ended first.
     interrupt::catch(|| INTERRUPTED);
     let pressed = interrupt::heed();
     let mut lines = Vec::new();
@@ -128,7 +128,7 @@ pub fn fresh(repository: &Path, arguments: &[&str]) -> ExitCode {
     if lines.iter().all(|line| line.wrong.is_none()) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// The bits that were compared, as the main job says it.
+/// The number of compared bits that the main job prints.
 fn compared(printed: &str) -> &str {
     let agree = printed.lines().find_map(|line| line.split_once(" agree in every bit over "));
     agree.map_or("none", |(_, ticks)| ticks)
@@ -144,7 +144,7 @@ fn run(scenario: &Scenario, caller: &Caller, repository: &Path, job_only: bool) 
     line
 }
 
-/// Runs it; an error says what is not as it should be.
+/// Runs a scenario.
 fn go(scenario: &Scenario, caller: &Caller, repository: &Path, job_only: bool, line: &mut Line) -> Result<(), String> {
     println!("making a root of {}", scenario.suite);
     let root = Root::new(scenario.suite, caller)?;
@@ -206,7 +206,7 @@ fn go(scenario: &Scenario, caller: &Caller, repository: &Path, job_only: bool, l
     Ok(())
 }
 
-/// Lines of the main job that say how the tools were found.
+/// Whether a line of the main job reports how a tool was found.
 fn is_telling(line: &str) -> bool {
     const STARTS: [&str; 9] = [
         "running: ",

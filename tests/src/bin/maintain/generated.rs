@@ -1,4 +1,4 @@
-//! Committed files that a program writes: checked to be what it would write today, or written anew.
+//! Committed generated files: checks that they are up to date, or regenerates them.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -19,13 +19,13 @@ pub struct GeneratedFolder {
     pub folder: &'static str,
     /// Whether every file in it is generated, so that any other is an error.
     pub whole: bool,
-    /// What it ought to hold, given the repository; or what stands against generating it.
+    /// Generates its expected contents from the repository, or returns the reason why it cannot.
     pub make: fn(&Path) -> Result<Files, String>,
 }
 
-/// All of them. `cargo xtask test` compares, `cargo xtask bless` writes.
+/// All generated folders. `cargo xtask test` compares them, `cargo xtask bless` writes them.
 const GENERATED: &[GeneratedFolder] = &[
-    // Records first: what is compiled below reads them.
+    // Records first, because the compiled specs below read them.
     GeneratedFolder { folder: "specs/records", whole: true, make: make::records },
     GeneratedFolder { folder: "specs", whole: false, make: make::schema },
     GeneratedFolder { folder: "firmware/controller", whole: true, make: make::reference_controller },
@@ -37,7 +37,7 @@ const GENERATED: &[GeneratedFolder] = &[
     GeneratedFolder { folder: "tests/golden", whole: true, make: make::goldens },
 ];
 
-/// In a folder of generated files, the sources of some of them.
+/// Hand-written folders within folders of generated files.
 const BY_HAND: [&str; 1] = ["law"];
 
 /// Pages of the book that are not committed, by their names in `docs`.
@@ -48,7 +48,7 @@ pub fn pages(root: &Path) -> Result<Files, String> {
     make::pages(root)
 }
 
-/// Compares every folder with what would be generated, and generates the pages of the book.
+/// Compares every folder with its expected contents, and generates the pages of the book.
 pub fn check(root: &Path) -> Outcome {
     let stale = match all(root, GENERATED, differences).and_then(|stale| pages(root).map(|_| stale)) {
         Ok(stale) => stale,
@@ -63,7 +63,7 @@ pub fn check(root: &Path) -> Outcome {
     Outcome::Failed(format!("{} files differ; run: cargo xtask bless", stale.len()))
 }
 
-/// Writes every folder anew.
+/// Regenerates every folder.
 pub fn bless(root: &Path) -> Outcome {
     match all(root, GENERATED, replace) {
         Ok(written) => {
@@ -76,7 +76,7 @@ pub fn bless(root: &Path) -> Outcome {
     }
 }
 
-/// Generates each folder and hands it to `act`; gathers what that says.
+/// Generates each folder and passes it to `act`; collects the results.
 fn all(
     root: &Path,
     list: &[GeneratedFolder],
@@ -90,7 +90,7 @@ fn all(
     Ok(lines)
 }
 
-/// One line per file that is missing, has another text, or should not be there.
+/// One line per file that is missing, differs, or should not exist.
 fn differences(root: &Path, generated: &GeneratedFolder, files: &Files) -> io::Result<Vec<String>> {
     let folder = generated.folder;
     let mut lines = Vec::new();
@@ -110,7 +110,7 @@ fn differences(root: &Path, generated: &GeneratedFolder, files: &Files) -> io::R
     Ok(lines)
 }
 
-/// Makes the folder hold exactly these files; one line per change.
+/// Makes the folder contain exactly these files; one line per change.
 fn replace(root: &Path, generated: &GeneratedFolder, files: &Files) -> io::Result<Vec<String>> {
     let lines = differences(root, generated, files)?;
     let base = root.join(generated.folder);
@@ -135,7 +135,7 @@ fn first_difference(found: &[u8], text: &str) -> usize {
     text.as_bytes().iter().take(same).filter(|&&byte| byte == b'\n').count() + 1
 }
 
-/// Files below `folder` as they stand, without [`BY_HAND`] and cargo's `target`; empty if there is no such folder.
+/// Files below `folder`, without [`BY_HAND`] and cargo's `target`; empty if there is no such folder.
 fn committed(folder: &Path) -> io::Result<BTreeMap<String, Vec<u8>>> {
     let mut found = BTreeMap::new();
     let mut open = vec![(folder.to_owned(), String::new())];

@@ -1,4 +1,4 @@
-//! Developer commands that compute with the product. `cargo xtask` runs them and says what they are for: `cargo xtask help`.
+//! Developer commands that use the product's crates. `cargo xtask` runs them; `cargo xtask help` describes them.
 
 mod board;
 mod book;
@@ -35,7 +35,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// A step of another command; none if there is no such step.
+/// Runs a step of another command; none if there is no such step.
 fn step(root: &Path, words: &[&str]) -> Option<Outcome> {
     Some(match *words {
         ["setup"] => microcontroller(),
@@ -47,7 +47,7 @@ fn step(root: &Path, words: &[&str]) -> Option<Outcome> {
     })
 }
 
-/// The exit code that says how a step ended.
+/// The exit code for the outcome of a step.
 fn ended(outcome: Outcome) -> ExitCode {
     match outcome {
         Outcome::Passed => ExitCode::SUCCESS,
@@ -62,7 +62,7 @@ fn ended(outcome: Outcome) -> ExitCode {
     }
 }
 
-/// The cross compiler and QEMU, installed if need be.
+/// Installs the cross compiler and QEMU if needed.
 fn microcontroller() -> Outcome {
     match provision::provision(&mut |line| println!("{line}")) {
         Ok(_) => Outcome::Passed,
@@ -77,7 +77,7 @@ fn misused() -> ExitCode {
 
 #[cfg(test)]
 mod tests {
-    /// `xtask` does without the product's crates.
+    /// `xtask` does not depend on the product's crates.
     #[test]
     fn names_that_two_programs_know_are_the_same() {
         assert_eq!(xtask::setup::TRIPLE, specgen_toolchain::TRIPLE);

@@ -1,4 +1,4 @@
-//! Faults put into a running machine: what becomes of each, and within which time.
+//! Injects faults into a running machine and checks the reaction and its time.
 
 use std::process::Stdio;
 
@@ -9,36 +9,36 @@ use specgen_runtime::supervisor::Reaction;
 use super::Trial;
 use super::session::{Host, Session};
 
-/// Time of the board that the machine gets before a fault and after it, ms.
+/// Time of the board before and after a fault, ms.
 const RUNS: f64 = 50.0;
 const RECOVERS: f64 = 200.0;
-/// A step in which the board is looked at, ms.
+/// Interval between checks of the board, ms.
 const STEP: f64 = 20.0;
-/// Of the emergency contact, in hardware, ms.
+/// Reaction time of the emergency contact, in hardware, ms.
 const CONTACT: f64 = 0.001;
-/// Of the interrupt of the voltage detector, within a tick, ms.
+/// Reaction time of the interrupt of the voltage detector, during a tick, ms.
 const DETECTOR: f64 = 0.002;
-/// How long a debugger holds the core, ms.
+/// Time for which a debugger halts the core, ms.
 const HELD: f64 = 1000.0;
-/// Of the watchdog's 20 ms, with the start of the program behind it, ms.
+/// Reaction time of the watchdog, 20 ms, plus the start of the program, ms.
 const WATCHDOG: f64 = 25.0;
-/// Of a background that is dead, ms.
+/// Reaction time for a dead background, ms.
 const BACKGROUND: f64 = 1000.0;
-/// What a motion takes to come to rest by the limits of stops, ms.
+/// Stopping time of a motion by the limits of stops, ms.
 const STOPS: f64 = 50.0;
-/// How long a machine is watched that is to run on, ms.
+/// Time for which a machine must continue to run, ms.
 const RUNS_ON: f64 = 300.0;
 
 /// Times of a spec, ms.
 struct Times {
     period: f64,
-    /// Of a gauge or converter that is not believed.
+    /// Reaction time for an invalid gauge or converter.
     gauge: f64,
-    /// Until a host that is silent is gone.
+    /// Time of silence after which a host is lost.
     host: f64,
-    /// To come to rest, and down from the highest code.
+    /// Time to stop and ramp down from the highest code.
     down: f64,
-    /// What a fault of an amplifier leads to.
+    /// Reaction to an amplifier fault.
     amplifier: Reaction,
 }
 
@@ -58,21 +58,21 @@ impl Times {
     }
 }
 
-/// What is to become of a fault.
+/// Expected reaction to a fault.
 enum End {
     /// Amplifiers off within so many ms.
     Off(fn(&Times) -> f64),
-    /// Nothing: the host goes on.
+    /// None: the host continues.
     RunsOn,
-    /// What the spec says of a fault of an amplifier.
+    /// The spec's reaction to an amplifier fault.
     Amplifier,
-    /// The machine holds, amplifiers on, and goes on when it is asked to run anew.
+    /// The machine holds with amplifiers on, and continues after a new request to run.
     Holds,
-    /// Amplifiers off while the core is held, then a ramp and the fault that says so.
+    /// Amplifiers off while the core is halted, then a ramp and the fault `stalled`.
     Stalled,
 }
 
-/// Of a DAC some codes may happen to be what they ought to be: a count that leaks takes longer, here at most twice the time.
+/// Some codes of a faulty DAC may be right by chance, and the fault counter leaks: that takes at most twice the time.
 const FAULTS: [(&str, End); 21] = [
     ("stop", End::Off(|_| CONTACT)),
     ("amplifier", End::Amplifier),
@@ -102,7 +102,7 @@ pub fn is_known(name: &str) -> bool {
     FAULTS.iter().any(|(known, _)| *known == name)
 }
 
-/// Every fault on a machine of its own, or the one of this name.
+/// Every fault on a separate machine, or only the one with this name.
 pub fn run(trial: &Trial, only: Option<&str>) -> Result<(), String> {
     let compiled = compile::compile(&trial.spec).map_err(|_| format!("{} is refused", trial.spec.display()))?;
     let times = Times::of(&compiled.ir);
@@ -121,7 +121,7 @@ fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, St
     let mut host = Host::of(session.command_of(trial, "operate"))?;
     host.order("arm\nwait holding 600\nrun\nwait running 600\nset command=0\nstatus", ": running, ")?;
     session.pass(RUNS)?;
-    // The board writes both down with their times.
+    // The board logs both with their times.
     session.log.clear();
     if name == "host-killed" {
         host.end();
@@ -170,17 +170,17 @@ fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, St
                 return Err(format!("amplifiers off after {took:.3} ms, at most {limit:.3} ms"));
             }
             host.end();
-            // Without a clock at its pin it goes on, too.
+            // It continues without a clock at its pin, too.
             if name != "clock" {
                 session.command("heal")?;
             }
             session.pass(RECOVERS)?;
-            shows(trial, &session, told_of(name))?;
+            shows(trial, &session, reset_cause_of(name))?;
             arms_again(trial, &session)?;
             format!("amplifiers off after {took:.3} ms, at most {limit:.3} ms; acknowledged, it arms again")
         }
         End::Stalled => {
-            // What happened is told behind the answer to the command.
+            // The event is reported after the answer to the command.
             session.pass(STEP)?;
             session.report()?;
             let (Some(begun), Some(off)) = (session.logged("fault "), session.first_logged("amplifiers off")) else {
@@ -209,8 +209,8 @@ fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, St
     Ok(text)
 }
 
-/// What `status` says of the board's reset after a fault, for those that end in one.
-fn told_of(name: &str) -> &'static str {
+/// Text of `status` about the board's reset after a fault, for faults that end in one.
+fn reset_cause_of(name: &str) -> &'static str {
     match name {
         "hang" | "hard-fault" | "supply" => "reset cause: reset pin, watchdog\n",
         "amplifier" => "faulted: amplifier fault, amplifiers off",
@@ -220,7 +220,7 @@ fn told_of(name: &str) -> &'static str {
     }
 }
 
-/// A new host is told this by `status`.
+/// Checks the text of `status` for a new host.
 fn shows(trial: &Trial, session: &Session, words: &str) -> Result<(), String> {
     let output = session.command_of(trial, "operate").arg("status").output();
     let output = output.map_err(|error| format!("specgen operate: {error}"))?;
@@ -228,7 +228,7 @@ fn shows(trial: &Trial, session: &Session, words: &str) -> Result<(), String> {
     if text.contains(words) { Ok(()) } else { Err(format!("`status` does not say `{words}`:\n{text}")) }
 }
 
-/// A new host acknowledges once and arms.
+/// Checks that a new host can acknowledge once and arm.
 fn arms_again(trial: &Trial, session: &Session) -> Result<(), String> {
     let mut again = session.command_of(trial, "operate");
     again.args(["acknowledge", "wait 0.2", "arm", "wait holding 60", "ramp-down", "wait disarmed 60"]);

@@ -1,4 +1,4 @@
-//! An emulated board with its machine, from outside.
+//! A running emulated board with its machine.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -14,10 +14,10 @@ use specgen_toolchain::provision;
 
 use super::Trial;
 
-/// What an answer may take, on a computer that does much else.
+/// Longest time of an answer, on a busy computer.
 const ANSWER: Duration = Duration::from_secs(600);
 
-/// Both processes end with it.
+/// The processes of board and plant. Both end with it.
 pub struct Session {
     plant: Child,
     board: Child,
@@ -25,20 +25,20 @@ pub struct Session {
     lines: Receiver<String>,
     socket: PathBuf,
     shared: PathBuf,
-    /// What the board said of itself, each line with its time.
+    /// The board's log, each line with its time.
     pub log: Vec<String>,
 }
 
-/// How a board stands.
+/// State of a board.
 pub struct Report {
     /// `name=value`, separated by blanks.
     pub text: String,
-    /// What was done against data sheets.
+    /// Violations of data sheets.
     pub violations: Vec<String>,
 }
 
 impl Report {
-    /// A number in it.
+    /// A number of the report.
     pub fn value(&self, name: &str) -> Option<f64> {
         let values = self.text.split(' ').filter_map(|word| word.split_once('='));
         values.into_iter().find(|(known, _)| *known == name)?.1.parse().ok()
@@ -46,7 +46,7 @@ impl Report {
 }
 
 impl Report {
-    /// Of all ticks, µs: the last of smallest, mean and largest.
+    /// The longest tick, µs: the last of smallest, mean and largest.
     pub fn longest_tick(&self) -> Option<f64> {
         let times = self.text.split(' ').find_map(|word| word.strip_prefix("tick_us="))?;
         times.rsplit('/').next()?.parse().ok()
@@ -63,7 +63,7 @@ impl Session {
         static BEGUN: AtomicU32 = AtomicU32::new(0);
         let engine = provision::engine(&mut |_| {}).map_err(|error| error.to_string())?;
         let bits = gauge_bits(&trial.spec)?;
-        // A name that no other has.
+        // A unique name.
         let name = format!("board-{}-{}", std::process::id(), BEGUN.fetch_add(1, Ordering::Relaxed));
         let shared = Path::new("/dev/shm").join(format!("specgen-plant-{name}"));
         let socket = trial.folder.join(format!("{name}.sock"));
@@ -99,7 +99,7 @@ impl Session {
         host
     }
 
-    /// Gives the board a command that it answers by one line.
+    /// Sends a command that the board answers with one line.
     pub fn command(&mut self, command: &str) -> Result<Report, String> {
         writeln!(self.commands, "{command}").map_err(|error| format!("the emulated board: {error}"))?;
         let mut violations = Vec::new();
@@ -115,12 +115,12 @@ impl Session {
         }
     }
 
-    /// When the board wrote down last that this happened, ms.
+    /// Time of the last log entry of an event, ms.
     pub fn logged(&self, what: &str) -> Option<f64> {
         self.times(what).next_back()
     }
 
-    /// The same of the first time.
+    /// Time of the first log entry of an event, ms.
     pub fn first_logged(&self, what: &str) -> Option<f64> {
         self.times(what).next()
     }
@@ -134,12 +134,12 @@ impl Session {
         self.command("report")
     }
 
-    /// Its time, ms.
+    /// The board's time, ms.
     pub fn time(&mut self) -> Result<f64, String> {
         self.command("time")?.value("time_ms").ok_or_else(|| "the board does not say its time".to_owned())
     }
 
-    /// Until so much of its time has passed, ms.
+    /// Waits until so much of the board's time has passed, ms.
     pub fn pass(&mut self, time: f64) -> Result<(), String> {
         let end = self.time()? + time;
         while self.time()? < end {
@@ -153,13 +153,13 @@ impl Drop for Session {
     fn drop(&mut self) {
         end(&mut self.board);
         end(&mut self.plant);
-        // Processes that are killed leave them.
+        // Killed processes leave it behind.
         let _ = fs::remove_file(&self.shared);
         let _ = fs::remove_file(&self.socket);
     }
 }
 
-/// The lines of a process as they come.
+/// The output lines of a process as they arrive.
 fn lines_of(output: ChildStdout) -> Receiver<String> {
     let (sender, lines) = channel();
     thread::spawn(move || {
@@ -178,7 +178,7 @@ fn end(process: &mut Child) {
     let _ = process.wait();
 }
 
-/// The board, once the machine is there.
+/// Starts the board once the machine is ready.
 fn started(mut plant: Child, shared: &Path, mut board: Command) -> Result<(Child, Child), String> {
     let there = wait_for(shared, &mut plant);
     match there.and_then(|()| board.spawn().map_err(|error| format!("the emulated board: {error}"))) {
@@ -190,7 +190,7 @@ fn started(mut plant: Child, shared: &Path, mut board: Command) -> Result<(Child
     }
 }
 
-/// Until what the process makes is there.
+/// Waits until the process has created a file.
 fn wait_for(path: &Path, process: &mut Child) -> Result<(), String> {
     let begin = Instant::now();
     while !path.exists() {
@@ -208,7 +208,7 @@ fn gauge_bits(path: &Path) -> Result<String, String> {
     Ok(model.ok_or_else(|| format!("{} is refused", path.display()))?.sensor.bits.to_string())
 }
 
-/// A host that goes on until it is ended.
+/// A host that runs until it is ended.
 pub struct Host {
     process: Child,
     lines: Receiver<String>,
@@ -222,7 +222,7 @@ impl Host {
         Ok(Self { process, lines: lines_of(output) })
     }
 
-    /// Gives orders and waits for these words; the line that they stand in.
+    /// Sends commands and waits for these words; returns the line that contains them.
     pub fn order(&mut self, orders: &str, words: &str) -> Result<String, String> {
         let input = self.process.stdin.as_mut().ok_or("specgen operate has no pipe")?;
         writeln!(input, "{orders}").map_err(|error| format!("specgen operate: {error}"))?;

@@ -1,4 +1,4 @@
-//! The pins of triggers as the emulated board saw them, against the record of the same ticks.
+//! Compares the trigger pins of the emulated board with the record of the same ticks.
 
 use std::fs;
 use std::path::Path;
@@ -31,7 +31,7 @@ fn recorded(table: &str) -> (Vec<Edge>, [i64; 2]) {
     (edges, span)
 }
 
-/// The edges that the board wrote down.
+/// The edges in the board's log.
 fn seen(log: &[String]) -> Vec<Edge> {
     let edge = |line: &String| {
         let words: Vec<&str> = line.split(" ms: trigger ").nth(1)?.split(' ').collect();
@@ -41,15 +41,15 @@ fn seen(log: &[String]) -> Vec<Edge> {
     log.iter().filter_map(edge).collect()
 }
 
-/// How many edges the record has, each of which the board saw in the same tick, and no others.
+/// Number of edges in the record. The board must have logged exactly these in the same ticks.
 ///
-/// Samples count from power-up, as ticks do, but for those that starting the converters takes: the first edge says how many.
+/// Samples are counted from power-up, like ticks, but include those of starting the converters; the first edge gives the offset.
 fn compare(recorded: &[Edge], seen: &[Edge], [begin, end]: [i64; 2]) -> Result<usize, String> {
     let mut best = None;
     for (_, _, sample) in seen {
         let Some((_, _, first)) = recorded.first() else { break };
         let offset = sample - first;
-        // The record says nothing of what was before its first row.
+        // Edges before the first row are not in the record.
         let within: Vec<Edge> = seen
             .iter()
             .map(|(line, level, sample)| (*line, *level, sample - offset))
@@ -72,14 +72,14 @@ fn compare(recorded: &[Edge], seen: &[Edge], [begin, end]: [i64; 2]) -> Result<u
     ))
 }
 
-/// Compares a record's table with what the board wrote down.
+/// Compares a record's table with the board's log.
 pub fn check(table: &Path, log: &[String]) -> Result<usize, String> {
     let text = fs::read_to_string(table).map_err(|error| format!("{}: {error}", table.display()))?;
     let (edges, span) = recorded(&text);
     compare(&edges, &seen(log), span)
 }
 
-/// The tick in which a record's table has the one edge of the input line, and the one in which the command became a move, which is the next.
+/// The tick of the only edge of the input line in a record's table, and the tick of the following move, which must be the next.
 pub fn started(table: &Path) -> Result<[i64; 2], String> {
     let text = fs::read_to_string(table).map_err(|error| format!("{}: {error}", table.display()))?;
     rose_and_moved(&text)

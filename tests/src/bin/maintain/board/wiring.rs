@@ -1,4 +1,4 @@
-//! The wiring check on a board: every single fault of a gauge or a leg, one after the other, is refused and named.
+//! The wiring check on a board: every single fault of a gauge or a leg, one after the other, must be refused and named.
 
 use std::ops::Range;
 
@@ -8,12 +8,12 @@ use specgen_runtime::supervisor::{Fault, Finding};
 use super::Trial;
 use super::session::{Host, Session};
 
-/// A factor of 2 is found with the spread of gauges and legs on it.
+/// Measured gain for a factor of 0.5, with the spread of gauges and legs.
 const HALF: Range<f64> = 0.3..0.72;
 const TWICE: Range<f64> = 1.42..2.8;
 const REFUSED: &str = ": faulted: wiring, ";
 
-/// All of them on one machine, whose plant is wired anew each time that its amplifiers are switched on.
+/// Runs all faults on one machine, whose plant is rewired each time that its amplifiers are switched on.
 pub fn run(trial: &Trial) -> Result<(), String> {
     let compiled = compile::compile(&trial.spec).map_err(|_| format!("{} is refused", trial.spec.display()))?;
     let Some(wiring) = &compiled.ir.supervision.wiring else { return Ok(()) };
@@ -44,7 +44,7 @@ pub fn run(trial: &Trial) -> Result<(), String> {
     }
 }
 
-/// Whether a status line begins with the words of the fault; of a gain, with one that is as wrong.
+/// Whether a status line starts with the words of the fault; for a gain, with a similar one.
 fn is_named(text: &str, fault: Finding) -> bool {
     let (Finding::Gauge(_, Fault::Gain(made)) | Finding::Leg(_, Fault::Gain(made))) = fault else {
         return text.starts_with(&fault.to_string());

@@ -1,4 +1,4 @@
-//! Minimal Debian roots, with what a machine with Rust on it has.
+//! Minimal Debian roots with Rust installed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,24 +9,24 @@ use std::time::Duration;
 use specgen_language::interrupt::{self, Scratch};
 use specgen_toolchain::{TRIPLE, find_program};
 
-/// What Rust itself needs to link programs.
+/// Packages that Rust needs to link programs.
 const C_LINKER: [&str; 2] = ["gcc", "libc6-dev"];
-/// Settings of the environment that say where cargo, rustup and apt reach their servers.
+/// Environment variables for the connections of cargo, rustup and apt.
 const PASSED_ON: [&str; 6] =
     ["CARGO_HTTP_", "CARGO_NET_", "CARGO_REGISTRIES_", "CARGO_SOURCE_", "RUSTUP_DIST_", "RUSTUP_UPDATE_"];
 const PROXIES: [&str; 4] = ["http_proxy", "https_proxy", "no_proxy", "all_proxy"];
-/// Certificates of servers, where Debian has them.
+/// Path of the server certificates in Debian.
 const CERTIFICATES: &str = "etc/ssl/certs/ca-certificates.crt";
 
-/// What is taken from the machine that this runs on.
+/// Settings taken from this machine.
 pub struct Caller {
     /// Folder of the toolchain.
     toolchain: PathBuf,
     rustup: PathBuf,
-    /// Where its apt gets the distribution and its security updates.
+    /// Source of the distribution in its apt, and of the security updates.
     mirror: String,
     security: Option<String>,
-    /// How its apt downloads.
+    /// Download settings of its apt.
     acquire: String,
     environment: Vec<(String, String)>,
 }
@@ -85,7 +85,7 @@ impl Caller {
     }
 }
 
-/// Settings of apt that say how it downloads. What it downloads is each root's own business.
+/// Settings of apt about how it downloads, but not about what.
 fn acquire(dump: &str) -> String {
     let is_empty = |line: &&str| line.ends_with("\"\";");
     let wanted = dump
@@ -94,7 +94,7 @@ fn acquire(dump: &str) -> String {
     wanted.map(|line| format!("{line}\n")).collect()
 }
 
-/// A root, gone when this is dropped.
+/// A root, removed when dropped.
 pub struct Root {
     folder: Scratch,
 }
@@ -108,7 +108,7 @@ impl Root {
         let mut command = namespace(false, None);
         command.args(["debootstrap", "--variant=minbase", suite]).arg(root.path()).arg(&caller.mirror);
         succeed(&mut command, "debootstrap (is debian-archive-keyring up to date?)")?;
-        // The owner of a temporary folder alone may enter it; here it is the root folder of everybody.
+        // By default only the owner may enter a temporary folder; here it is the root folder of all users.
         succeed(Command::new("chmod").arg("755").arg(root.path()), "chmod")?;
         root.write("etc/apt/sources.list", &caller.sources(suite))?;
         root.write("etc/apt/apt.conf.d/00caller", &caller.acquire)?;
@@ -192,7 +192,7 @@ impl Root {
         let bin = home.outside(".cargo/bin");
         let made = fs::create_dir_all(&to).and_then(|()| fs::create_dir_all(&bin));
         made.map_err(|error| format!("{}: {error}", to.display()))?;
-        // Half of a toolchain is its documentation.
+        // Without the documentation, which is half of a toolchain.
         let mut copy = Command::new("sh");
         copy.args(["-c", "tar -C \"$0\" --exclude=./share/doc -cf - . | tar -C \"$1\" -xf -"])
             .arg(&caller.toolchain)
@@ -210,13 +210,13 @@ impl Root {
             self.write(home.outside_name(".cargo/config.toml").as_str(), &config)?;
         }
         self.succeed(&format!("chown -R {user}: {folder}"))?;
-        // If it was never there, that is as well.
+        // It may not be installed.
         home.run(&format!("cd; rustup target remove {TRIPLE}"), false)?;
         Ok(home)
     }
 }
 
-/// The caller's settings of cargo: where its registry is.
+/// The caller's settings of cargo for the registry.
 fn cargo_configuration() -> Option<String> {
     let home =
         std::env::var_os("CARGO_HOME").map(PathBuf::from).or_else(|| Some(std::env::home_dir()?.join(".cargo")))?;
@@ -227,7 +227,7 @@ fn cargo_configuration() -> Option<String> {
 pub struct Home<'a> {
     root: &'a Root,
     user: &'static str,
-    /// As seen from inside.
+    /// Path inside the root.
     folder: &'static str,
     environment: Vec<(String, String)>,
 }
@@ -254,7 +254,7 @@ impl Home<'_> {
             Command::new("git").args(["clone", "--quiet", "--no-hardlinks"]).arg(repository).arg(&to),
             "git clone",
         )?;
-        // A work tree that shares its repository hands over the branch of another.
+        // Cloning a linked work tree would check out the branch of another one.
         let head = text("git", &["-C", &repository.display().to_string(), "rev-parse", "HEAD"])?;
         succeed(
             Command::new("git").arg("-C").arg(&to).args(["checkout", "--quiet", "--detach", &head]),
@@ -263,7 +263,7 @@ impl Home<'_> {
         self.root.succeed(&format!("chown -R {0}: {1}/{CLONE}", self.user, self.folder))
     }
 
-    /// A command in the clone, as the user types it: exit code, and all that it printed.
+    /// Runs a command in the clone, as the user types it. Returns the exit code and the complete output.
     ///
     /// # Errors
     /// It could not be run.
@@ -276,7 +276,7 @@ impl Home<'_> {
         Ok((status.code().unwrap_or(-1), printed))
     }
 
-    /// As [`Home::run`], where there is only one way to end.
+    /// The same as [`Home::run`] for a command that must succeed.
     ///
     /// # Errors
     /// It failed.
@@ -295,8 +295,8 @@ impl Home<'_> {
     }
 }
 
-/// What runs a command with mounts and processes of its own, which end with it: nothing is left mounted in a root, and
-/// nothing of this machine can be removed through one.
+/// A command that runs in its own mount and process namespaces: no mount remains in a root, and nothing of this machine can be
+/// removed through one.
 fn namespace(offline: bool, root: Option<&Path>) -> Command {
     let mut command = Command::new("unshare");
     command.args(["--mount", "--pid", "--fork", "--kill-child"]);
@@ -304,7 +304,7 @@ fn namespace(offline: bool, root: Option<&Path>) -> Command {
         command.arg("--net");
     }
     if let Some(root) = root {
-        // Terminals and shared memory, which tests need, are this machine's.
+        // Tests need terminals and shared memory; they are those of this machine.
         let mounts = "mount -t proc proc \"$0/proc\" && mount --rbind /dev \"$0/dev\" && exec \"$@\"";
         command.args(["sh", "-c", mounts]).arg(root);
     }
@@ -320,8 +320,8 @@ fn succeed(command: &mut Command, what: &str) -> Result<(), String> {
     Err(format!("{what}: {status}\n{}", lines[lines.len().saturating_sub(20)..].join("\n")))
 }
 
-/// Runs to the end, or to Ctrl-C: how it ended, and all that it printed. Of a [`namespace`] nothing goes on after that, so
-/// that its root can be removed.
+/// Runs a command until it ends or Ctrl-C. Returns its status and complete output. No process of a [`namespace`] survives it, so that
+/// its root can be removed.
 fn watched(command: &mut Command) -> Result<(ExitStatus, String), String> {
     let program = command.get_program().display().to_string();
     let failed = |error: std::io::Error| format!("{program}: {error}");
@@ -343,7 +343,7 @@ fn watched(command: &mut Command) -> Result<(ExitStatus, String), String> {
     }
 }
 
-/// What a program prints.
+/// Output of a program.
 fn text(program: &str, words: &[&str]) -> Result<String, String> {
     let output = Command::new(program).args(words).stdin(Stdio::null()).output();
     let output = output.map_err(|error| format!("{program}: {error}"))?;

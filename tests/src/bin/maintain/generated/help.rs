@@ -1,16 +1,16 @@
-//! The page of the book with every command: what `docs/commands.md` has, then the help of each.
+//! The page of the book with every command: `docs/commands.md`, then the help of each command.
 
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-/// Letters in a line of help.
+/// Width of a line of help.
 const WIDTH: usize = 100;
 
 /// The page.
 ///
 /// # Errors
-/// The page by hand cannot be read.
+/// The hand-written page cannot be read.
 pub fn markdown(root: &Path) -> Result<String, String> {
     let path = root.join("docs/commands.md");
     let mut text = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -20,7 +20,7 @@ pub fn markdown(root: &Path) -> Result<String, String> {
     Ok(text)
 }
 
-/// Help of a command, then of those below it.
+/// Adds the help of a command, then of its subcommands.
 fn add(command: clap::Command, path: &str, text: &mut String) {
     let mut command = command.term_width(WIDTH);
     // Writing to a String cannot fail.

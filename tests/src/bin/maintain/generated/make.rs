@@ -1,4 +1,4 @@
-//! What the committed generated files ought to hold.
+//! Contents of the committed generated files.
 
 use super::{Files, help, trace};
 use host_sim::forc::ReversalExperiment;
@@ -16,9 +16,9 @@ const SEED: u64 = 1;
 const REFERENCE_CURVES: u32 = 32;
 /// Reversal curves of the records of six different legs.
 const LEG_CURVES: u32 = 8;
-/// Gains of the six legs against the reference leg's.
+/// Gains of the six legs relative to the reference leg's.
 const LEG_GAINS: [f64; 6] = [0.95, 1.03, 0.98, 1.05, 1.0, 0.97];
-/// Specs whose emitted crate is kept as a golden: small ones, one per scalar.
+/// Specs whose emitted crate is committed as a golden: small ones, one per scalar.
 const GOLDENS: [&str; 2] = ["small-grid", "six-records"];
 
 /// Reversal-curve records of simulated legs: the reference leg's is what `specgen forc` writes.
@@ -57,7 +57,7 @@ pub fn pages(root: &Path) -> Result<Files, String> {
     ]))
 }
 
-/// Packages of others, as a table.
+/// Third-party packages as a table.
 fn dependencies(root: &Path) -> Result<String, String> {
     let path = root.join("tests/dependencies.txt");
     let list = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -80,8 +80,8 @@ pub fn reference_controller(root: &Path) -> Result<Files, String> {
     Ok(emit::emit(&compiled(&root.join("specs/reference.toml"))?.ir))
 }
 
-/// The reference with a correction, a line for a trigger and an input line, for the tests of the boards' common part: files that differ from
-/// [`reference_controller`], and a root that takes the others from there.
+/// The reference with a correction, a trigger output and an input line, for the tests of the code shared by boards: the files that differ
+/// from [`reference_controller`], and a root that includes the others from there.
 pub fn controller_with_passes(root: &Path) -> Result<Files, String> {
     let path = root.join("specs/reference.toml");
     let mut source = SpecSource::read(&path).map_err(|finding| finding.message)?;
@@ -95,7 +95,7 @@ pub fn controller_with_passes(root: &Path) -> Result<Files, String> {
     let mut shared = Vec::new();
     for (path, text) in emitted(compile_source(source)).map_err(|refused| said(&path, &refused))? {
         let Some(name) = path.strip_prefix("src/") else { continue };
-        // The second line of an emitted file names the spec.
+        // The second line of an emitted file contains the spec.
         let body = |text: &str| text.splitn(3, '\n').nth(2).map(str::to_owned);
         let same = reference.get(&path).is_some_and(|reference| body(reference) == body(&text));
         if same && name != "lib.rs" {
@@ -122,7 +122,7 @@ pub fn goldens(root: &Path) -> Result<Files, String> {
         let compiled = compiled(&root.join(format!("specs/features/{name}.toml")))?;
         files.insert(format!("{name}/ir.json"), workspace::ir_text(&compiled.ir));
         for (path, text) in emit::emit(&compiled.ir) {
-            // Cargo would take a manifest here for a package of this repository.
+            // Cargo would treat a manifest here as a package of this repository.
             let path = path.replace("Cargo.toml", "Cargo.toml.golden");
             files.insert(format!("{name}/{path}"), text);
         }

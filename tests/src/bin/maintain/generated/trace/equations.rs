@@ -3,13 +3,13 @@
 /// One equation.
 #[derive(Debug)]
 pub struct Equation {
-    /// As printed, in parentheses where it is cited.
+    /// Number as printed; citations put it in parentheses.
     pub number: &'static str,
-    /// What it says.
+    /// Its subject.
     pub what: &'static str,
-    /// Where the print is wrong, what is used in its place; or nothing.
+    /// Correction, if the print is wrong; else empty.
     pub remark: &'static str,
-    /// Why no code has it; none for the others.
+    /// Reason why there is no code for it; none if there is.
     pub absent: Option<&'static str>,
 }
 
@@ -52,7 +52,7 @@ pub const EQUATIONS: &[Equation] = &[
     used(
         "AI.10",
         "velocity of the extensible part",
-        "its mass centre stands at l − l_e from the base joint; the last term is zero as printed",
+        "its mass centre is at l − l_e from the base joint; the last term is zero as printed",
     ),
     used("AI.11", "cross product with the leg's direction", ""),
     used("AI.12", "inertia of a leg about its joint", ""),

@@ -1,4 +1,4 @@
-//! Which comments cite an equation, and what they stand at.
+//! Finds comments that cite an equation, and the items that they document.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -13,11 +13,11 @@ pub struct Mention {
     pub equation: usize,
     /// Relative to the repository, `/` between the parts.
     pub file: String,
-    /// What the comment documents: the name of an item, or nothing for the whole file.
+    /// The documented item, or empty for the whole file.
     pub item: String,
-    /// Of the comment, from 1.
+    /// Line of the comment, from 1.
     pub line: usize,
-    /// The item is a test, or stands in a file of tests.
+    /// Whether the item is a test, or in a file of tests.
     pub test: bool,
 }
 
@@ -64,7 +64,7 @@ pub fn file(name: &str, text: &str) -> Vec<Mention> {
     mentions
 }
 
-/// Whether a comment is the page of a lint: what it explains is in the rule below.
+/// Whether a comment is the page of a lint, which does not count: the code is in the rule below.
 fn is_page(lines: &[&str]) -> bool {
     let declared = lines.iter().find(|line| !line.starts_with("///"));
     lines[0].starts_with("///") && declared.is_some_and(|line| is_code(line))
@@ -86,7 +86,7 @@ pub fn cited(text: &str) -> BTreeSet<usize> {
     let mut found = BTreeSet::new();
     let mut before: Option<(usize, usize)> = None;
     for (start, _) in text.match_indices('(') {
-        // f(5) is no equation.
+        // f(5) is not a citation.
         if text[..start].ends_with(|c: char| c.is_alphanumeric()) {
             continue;
         }
@@ -104,7 +104,7 @@ pub fn cited(text: &str) -> BTreeSet<usize> {
     found
 }
 
-/// What the comment on line `k` documents, and whether that is a test.
+/// The item that the comment on line `k` documents, and whether it is a test.
 fn place(lines: &[&str], k: usize) -> (String, bool) {
     if lines[k].starts_with("//!") {
         return (String::new(), false);
