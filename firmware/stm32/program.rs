@@ -7,8 +7,7 @@ use specgen_stm32::{converters, timer};
 /// The machine on this board's converters.
 type Board = converters::OnBoard<spi::Registers, { pins::OUTPUT }, { clocks::DELAY }>;
 
-const _: () =
-    assert!(timer::period(clocks::TIMER).is_some(), "the timer of this board cannot count timing.period");
+const _: () = assert!(timer::period(clocks::TIMER).is_some(), "the timer of this board cannot count timing.period");
 
 /// Figures for specgen's estimate of the tick.
 #[unsafe(no_mangle)]
@@ -175,8 +174,8 @@ mod safe {
 
     use specgen_stm32::enable;
 
-        /// Switches the amplifiers off and waits: only the tick feeds the watchdog, so it resets the part within 20 ms. After a reset the
-        /// pull-down holds the enable line low.
+    /// Switches the amplifiers off and waits: only the tick feeds the watchdog, so it resets the part within 20 ms. After a reset the
+    /// pull-down holds the enable line low.
     pub fn stop() -> ! {
         cortex_m::interrupt::disable();
         loop {

@@ -9,13 +9,13 @@ use crate::ir::{Ir, Range, Setting};
 pub fn markdown(platform: &Ir, legs: &Ir) -> String {
     let mut text = String::from(
         "# Settings\n\n\
-                  The `Config` of a controller is what may change while it runs: in code (`with_…` of the emitted `config.rs`), as words \
-                  (records, `--config` of a real-time PC, `specgen tune`) or over the link (`config write SPEC` of `specgen operate`). Each \
-                  word has a range that includes both ends. The ranges come from the spec and are in the emitted `permitted.rs`. A `Config` \
-                  with a word out of range is refused with the name of the word: no setting makes a machine leave the limits of its spec. \
-                  `specgen check` tells whether a setting is stable.\n\n\
-                  The same table checks a snapshot of a state (the start of a record): it permits every state that these settings and any \
-                  inputs can lead to.\n",
+         The `Config` of a controller is what may change while it runs: in code (`with_…` of the emitted `config.rs`), as words \
+         (records, `--config` of a real-time PC, `specgen tune`) or over the link (`config write SPEC` of `specgen operate`). Each \
+         word has a range that includes both ends. The ranges come from the spec and are in the emitted `permitted.rs`. A `Config` \
+         with a word out of range is refused with the name of the word: no setting makes a machine leave the limits of its spec. \
+         `specgen check` tells whether a setting is stable.\n\n\
+         The same table checks a snapshot of a state (the start of a record): it permits every state that these settings and any \
+         inputs can lead to.\n",
     );
     for (title, spec, ir) in
         [("Of a platform", "specs/reference.toml", platform), ("Of six legs", "specs/legs.toml", legs)]

@@ -218,8 +218,8 @@ where
 {
     const BITS: u32 = 16;
 
-        /// Disables the amplifiers, resets both parts with outputs at zero, and checks that both answer: channel D of each must return
-        /// [`PATTERNS`].
+    /// Disables the amplifiers, resets both parts with outputs at zero, and checks that both answer: channel D of each must return
+    /// [`PATTERNS`].
     fn start(&mut self) -> Result<(), Fault> {
         (self.written, self.refuted) = (None, 0);
         self.enable(false)?;

@@ -118,8 +118,8 @@ where
         Self { spi, start, busy, reset, delay, window }
     }
 
-        /// Reads all eight inputs as sampled at the CONVST edge of [`Gauges::begin`]: V1 to V8, 0 to 2^BITS − 1. Takes the rest of the
-        /// 4 µs and the transfer; times out if the conversion does not end within 10 µs.
+    /// Reads all eight inputs as sampled at the CONVST edge of [`Gauges::begin`]: V1 to V8, 0 to 2^BITS − 1. Takes the rest of the
+    /// 4 µs and the transfer; times out if the conversion does not end within 10 µs.
     ///
     /// # Errors
     /// Every [`Fault`] except [`Fault::NotStarted`], [`Fault::ReadBack`] and [`Fault::Code`]; [`Fault::Reference`] only after the

@@ -49,8 +49,8 @@ pub trait Gauges {
         Ok(())
     }
 
-        /// The codes that [`Self::begin`] sampled, 0 to 2^[`Self::BITS`] − 1: 0 at the lowest input, not in two's
-        /// complement. Blocks until they are available. The driver documents how much this time may vary.
+    /// The codes that [`Self::begin`] sampled, 0 to 2^[`Self::BITS`] − 1: 0 at the lowest input, not in two's
+    /// complement. Blocks until they are available. The driver documents how much this time may vary.
     ///
     /// # Errors
     /// The [`Fault`] that makes the codes invalid. The next call starts afresh.
@@ -62,8 +62,8 @@ pub trait Amplifiers {
     /// Bits of a code.
     const BITS: u32;
 
-        /// Disables the amplifiers, initialises the parts with all outputs at code 0, and checks that they answer. Called once at
-        /// power-up, and again after a fault while the amplifiers are disabled. May take a millisecond.
+    /// Disables the amplifiers, initialises the parts with all outputs at code 0, and checks that they answer. Called once at
+    /// power-up, and again after a fault while the amplifiers are disabled. May take a millisecond.
     ///
     /// # Errors
     /// The first [`Fault`] found. The amplifiers are disabled in any case.
@@ -79,15 +79,15 @@ pub trait Amplifiers {
         Ok(())
     }
 
-        /// Outputs six codes, 0 to 2^[`Self::BITS`] − 1. All outputs change simultaneously after the last is written: immediately, or at
-        /// the timer's instant in the tick.
+    /// Outputs six codes, 0 to 2^[`Self::BITS`] − 1. All outputs change simultaneously after the last is written: immediately, or at
+    /// the timer's instant in the tick.
     ///
     /// # Errors
     /// A [`Fault`] means that an output may differ from its code. For a code out of range nothing is written.
     fn write(&mut self, codes: &[i32; CHANNELS]) -> Result<(), Fault>;
 
-        /// Enables (true) or disables the amplifiers; enables them only after the outputs have changed. They are disabled after
-        /// power-up and reset.
+    /// Enables (true) or disables the amplifiers; enables them only after the outputs have changed. They are disabled after
+    /// power-up and reset.
     ///
     /// # Errors
     /// [`Fault::Pin`] if the line cannot be driven.

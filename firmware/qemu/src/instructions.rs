@@ -56,7 +56,7 @@ impl InstructionCounter {
     /// Calls `function` and counts its instructions without the return. Pushes nothing onto the stack.
     ///
     /// # Safety
-        /// It must be a function of the C ABI with at most four words in registers, and `arguments` must be valid for it.
+    /// It must be a function of the C ABI with at most four words in registers, and `arguments` must be valid for it.
     #[inline(always)]
     pub unsafe fn measure_call(&mut self, function: *const (), arguments: [usize; 4]) -> u32 {
         let (start, end): (u32, u32);

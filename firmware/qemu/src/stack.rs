@@ -52,8 +52,8 @@ pub unsafe fn measure<R>(
 pub fn measure_depth<T>(f: impl FnOnce() -> T) -> (T, usize) {
     let top: usize;
     // In assembly, because a called function would paint over its own frame.
-        // SAFETY: the words below the stack pointer are unused while no interrupt is enabled, and the stack is much larger than
-        // WINDOW.
+    // SAFETY: the words below the stack pointer are unused while no interrupt is enabled, and the stack is much larger than
+    // WINDOW.
     unsafe {
         asm!(
             "mov {top}, sp",

@@ -47,8 +47,8 @@ pub struct Output<const CHANNEL: usize> {
 }
 
 impl Pulses {
-        /// A timer that runs at `hertz`, with outputs `nanoseconds` after sampling, or sooner in a short control period, so that an
-        /// eighth of the period remains. Both lines are idle; the pins are connected after this.
+    /// A timer that runs at `hertz`, with outputs `nanoseconds` after sampling, or sooner in a short control period, so that an
+    /// eighth of the period remains. Both lines are idle; the pins are connected after this.
     #[must_use]
     pub fn edges<const SAMPLING: usize, const OUTPUT: usize>(
         timer: TimGp16,

@@ -95,7 +95,7 @@ impl<P: Port> Line<P> {
         line
     }
 
-        /// Processes received bytes and answers them until an answer is being sent: the interrupt at its end calls this again.
+    /// Processes received bytes and answers them until an answer is being sent: the interrupt at its end calls this again.
     pub fn serve(&mut self, endpoint: &mut Endpoint, handler: &mut LinkHandler, with: &mut Access<'_>) {
         if FAILED.swap(false, Ordering::Relaxed) {
             self.next = self.end();

@@ -42,8 +42,8 @@ impl Times {
             sclk,
             byte: Work { reads: 3, writes: 1, instructions: 16 },
             frame: Work { reads: 3, writes: 6, instructions: 60 },
-                        // Includes two changes of the DACs' clock, and the longest critical section of the background: 20 knots from the link, or
-                        // 16 words of a record. The machine is copied only if no tick is due meanwhile.
+            // Includes two changes of the DACs' clock, and the longest critical section of the background: 20 knots from the link, or
+            // 16 words of a record. The machine is copied only if no tick is due meanwhile.
             interrupt: Work { reads: 12 + 30, writes: 14, instructions: 190 + 150 },
         }
     }

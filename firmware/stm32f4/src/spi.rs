@@ -16,8 +16,8 @@ pub struct Registers {
 }
 
 impl Registers {
-        /// Initialises an SPI in its reset state, with clock and pins: master, bytes, MSB first. SCLK is the clock divided by powers of
-        /// two: for writing, and for frames whose answer is used.
+    /// Initialises an SPI in its reset state, with clock and pins: master, bytes, MSB first. SCLK is the clock divided by powers of
+    /// two: for writing, and for frames whose answer is used.
     #[must_use]
     pub fn new(spi: Spi, mode: Mode, dividers: [u32; 2]) -> Self {
         let rates = dividers.map(rate);

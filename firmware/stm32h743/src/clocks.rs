@@ -54,7 +54,7 @@ pub fn start() -> u32 {
 
     plls(fast, oscillator::external());
 
-// Set the wait states of the flash before increasing the clock (table: FLASH recommended number of wait states and programming delay).
+    // Set the wait states of the flash before increasing the clock (table: FLASH recommended number of wait states and programming delay).
     let latency = if fast { 4 } else { 2 };
     FLASH.acr().write(|w| {
         w.set_latency(latency);

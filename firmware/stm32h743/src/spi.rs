@@ -21,11 +21,11 @@ pub struct Registers {
 }
 
 impl Registers {
-        /// Initialises an SPI in its reset state, with clock and pins: master, bytes, MSB first. SCLK is the clock divided by powers of
-        /// two: for writing, and for frames whose answer is used.
-        ///
-        /// Transfers have no size (TSIZE 0): the FIFO is sent without a start for each transfer. This is the workaround of ES0392 for
-        /// transfers that stall if they are started within an SCLK cycle after the end of the last one.
+    /// Initialises an SPI in its reset state, with clock and pins: master, bytes, MSB first. SCLK is the clock divided by powers of
+    /// two: for writing, and for frames whose answer is used.
+    ///
+    /// Transfers have no size (TSIZE 0): the FIFO is sent without a start for each transfer. This is the workaround of ES0392 for
+    /// transfers that stall if they are started within an SCLK cycle after the end of the last one.
     #[must_use]
     pub fn new(spi: Spi, mode: Mode, dividers: [u32; 2]) -> Self {
         let rates = dividers.map(rate);

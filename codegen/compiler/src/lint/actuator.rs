@@ -36,15 +36,15 @@ lints! {
     /// ```
     STRAIN_ODD = "W0802";
 
-        /// # W0803: resonance, stiffness and mass are inconsistent
-        ///
-        /// `actuator.resonance` is compared with sqrt(k_a / m) / 2π, once with the
-        /// extensible part alone as m, once with a sixth of the platform added.
-        ///
-        /// ## Why it matters
-        ///
-        /// The three are not independent. A resonance far from both values usually comes
-        /// from a stiffness in N/um or a mass in the wrong unit.
+    /// # W0803: resonance, stiffness and mass are inconsistent
+    ///
+    /// `actuator.resonance` is compared with sqrt(k_a / m) / 2π, once with the
+    /// extensible part alone as m, once with a sixth of the platform added.
+    ///
+    /// ## Why it matters
+    ///
+    /// The three are not independent. A resonance far from both values usually comes
+    /// from a stiffness in N/um or a mass in the wrong unit.
     ///
     /// ## Example
     ///
@@ -68,12 +68,12 @@ lints! {
 
     /// # W0804: slew rate too high for the stacks
     ///
-        /// At the slew rate, the voltage should take at least a third of a period of the
-        /// resonance to cross its range.
-        ///
-        /// ## Why it matters
-        ///
-        /// A stack driven faster overshoots into tension, which ceramics do not tolerate.
+    /// At the slew rate, the voltage should take at least a third of a period of the
+    /// resonance to cross its range.
+    ///
+    /// ## Why it matters
+    ///
+    /// A stack driven faster overshoots into tension, which ceramics do not tolerate.
     ///
     /// ## Example
     ///
@@ -87,7 +87,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Check V/ms against V/s; otherwise lower the slew rate to the value in the help.
+    /// Check V/ms against V/s; otherwise lower the slew rate to the value in the help.
     ///
     /// ```toml
     /// slew_rate       = "40 V/ms"
@@ -96,12 +96,12 @@ lints! {
 
     /// # W0809: slew rate too low to move the legs
     ///
-        /// At the slew rate, the voltage should cross its range in less than a second.
-        ///
-        /// ## Why it matters
-        ///
-        /// A stack can cross its range in milliseconds. A much lower limit is usually in
-        /// V/s where V/ms was intended.
+    /// At the slew rate, the voltage should cross its range in less than a second.
+    ///
+    /// ## Why it matters
+    ///
+    /// A stack can cross its range in milliseconds. A much lower limit is usually in
+    /// V/s where V/ms was intended.
     ///
     /// ## Example
     ///
@@ -129,9 +129,9 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// Bare ceramic has a damping ratio of 0.0002; glued and loaded stacks have a
-        /// hundred times more. Above 0.6 a leg hardly rings. A value that is too large is
-        /// often a percentage, or a quality factor Q instead of 1/(2 Q).
+    /// Bare ceramic has a damping ratio of 0.0002; glued and loaded stacks have a
+    /// hundred times more. Above 0.6 a leg hardly rings. A value that is too large is
+    /// often a percentage, or a quality factor Q instead of 1/(2 Q).
     ///
     /// ## Example
     ///
@@ -158,8 +158,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// The branches of a loop are interpolated linearly between nodes. With fewer
-        /// nodes the straight segments dominate the error of the inverse.
+    /// The branches of a loop are interpolated linearly between nodes. With fewer
+    /// nodes the straight segments dominate the error of the inverse.
     ///
     /// ## Example
     ///
@@ -173,7 +173,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Use 16 or more; the table grows with the square of the grid.
+    /// Use 16 or more; the table grows with the square of the grid.
     ///
     /// ```toml
     /// grid    = 32

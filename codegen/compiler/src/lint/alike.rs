@@ -14,8 +14,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// Six gauges of one kind have similar calibrations. A factor of three or a
-        /// different sign usually means a coefficient in the wrong unit.
+    /// Six gauges of one kind have similar calibrations. A factor of three or a
+    /// different sign usually means a coefficient in the wrong unit.
     ///
     /// ## Example
     ///
@@ -38,13 +38,13 @@ lints! {
 
     /// # W0847: a strongly nonlinear calibration
     ///
-        /// Each term above the linear one should contribute less than a tenth of the
-        /// range.
-        ///
-        /// ## Why it matters
-        ///
-        /// Gauges are linear within 1 or 2 %. A large coefficient is usually in the wrong
-        /// unit (um/V^2 for nm/V^2).
+    /// Each term above the linear one should contribute less than a tenth of the
+    /// range.
+    ///
+    /// ## Why it matters
+    ///
+    /// Gauges are linear within 1 or 2 %. A large coefficient is usually in the wrong
+    /// unit (um/V^2 for nm/V^2).
     ///
     /// ## Example
     ///
@@ -72,8 +72,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// By (8) the bandwidth of an axis is gain / stiffness. An axis ten times slower
-        /// or faster than the rest usually has a digit too few or too many.
+    /// By (8) the bandwidth of an axis is gain / stiffness. An axis ten times slower
+    /// or faster than the rest usually has a digit too few or too many.
     ///
     /// ## Example
     ///
@@ -96,13 +96,13 @@ lints! {
 
     /// # W0845: gains of two axes swapped?
     ///
-        /// Gains should be proportional to the stiffness of their axes. Two that differ
-        /// from that by a factor of five, and would match if swapped, are reported.
-        ///
-        /// ## Why it matters
-        ///
-        /// z of a hexapod is several times stiffer than x and y, and has higher gains.
-        /// When swapped, one axis is sluggish and the other near its stability limit.
+    /// Gains should be proportional to the stiffness of their axes. Two that differ
+    /// from that by a factor of five, and would match if swapped, are reported.
+    ///
+    /// ## Why it matters
+    ///
+    /// z of a hexapod is several times stiffer than x and y, and has higher gains.
+    /// When swapped, one axis is sluggish and the other near its stability limit.
     ///
     /// ## Example
     ///
@@ -130,8 +130,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// Its inverse is about the time in which integral action removes the error that
-        /// feed-forward leaves. The error of a hysteresis model changes at every reversal.
+    /// Its inverse is about the time in which integral action removes the error that
+    /// feed-forward leaves. The error of a hysteresis model changes at every reversal.
     ///
     /// ## Example
     ///

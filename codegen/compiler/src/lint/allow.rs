@@ -8,14 +8,14 @@ lints! {
 
     /// # E0890: a value far beyond the limit of a check
     ///
-        /// A value seven or more times beyond the limit of a check of the physical lint is
-        /// an error. The message states the factor.
-        ///
-        /// ## Why it matters
-        ///
-        /// A wrong unit is usually wrong by a factor of a thousand or more. Where a value
-        /// enters as its square root, as the stiffness does in a resonance, a thousand
-        /// counts as 32. No sound platform is seven times beyond a limit.
+    /// A value seven or more times beyond the limit of a check of the physical lint is
+    /// an error. The message states the factor.
+    ///
+    /// ## Why it matters
+    ///
+    /// A wrong unit is usually wrong by a factor of a thousand or more. Where a value
+    /// enters as its square root, as the stiffness does in a resonance, a thousand
+    /// counts as 32. No sound platform is seven times beyond a limit.
     ///
     /// ## Example
     ///
@@ -29,8 +29,8 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Correct the value. If it is intended, list its key with the reason in `allow`
-        /// of `[lint]`.
+    /// Correct the value. If it is intended, list its key with the reason in `allow`
+    /// of `[lint]`.
     ///
     /// ```toml
     /// noise = "2 mV"
@@ -39,12 +39,12 @@ lints! {
 
     /// # N0891: an allowed exception
     ///
-        /// `allow` of `[lint]` lists the key of a finding. The message contains the reason.
-        ///
-        /// ## Why it matters
-        ///
-        /// The finding is reduced to a note. It is still shown, so that nobody forgets that
-        /// the value is unusual.
+    /// `allow` of `[lint]` lists the key of a finding. The message contains the reason.
+    ///
+    /// ## Why it matters
+    ///
+    /// The finding is reduced to a note. It is still shown, so that nobody forgets that
+    /// the value is unusual.
     ///
     /// ## Example
     ///
@@ -60,16 +60,16 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// None needed. Remove the entry once the value is no longer unusual.
+    /// None needed. Remove the entry once the value is no longer unusual.
     ALLOWED = "N0891";
 
     /// # W0892: an unused exception
     ///
-        /// Every entry of `allow` in `[lint]` should match a finding.
-        ///
-        /// ## Why it matters
-        ///
-        /// An exception that is not needed would hide the next mistake in that key.
+    /// Every entry of `allow` in `[lint]` should match a finding.
+    ///
+    /// ## Why it matters
+    ///
+    /// An exception that is not needed would hide the next mistake in that key.
     ///
     /// ## Example
     ///
@@ -82,7 +82,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Remove the entry.
+    /// Remove the entry.
     ///
     /// ```toml
     /// [lint]

@@ -9,13 +9,13 @@ lints! {
 
     /// # W0810: inertia of a leg part too small for the leg
     ///
-        /// The radius of gyration of a part, sqrt(I/m), should be at least a fiftieth of
-        /// the leg length.
-        ///
-        /// ## Why it matters
-        ///
-        /// A part extends over much of the leg. A smaller inertia is usually in the wrong
-        /// unit.
+    /// The radius of gyration of a part, sqrt(I/m), should be at least a fiftieth of
+    /// the leg length.
+    ///
+    /// ## Why it matters
+    ///
+    /// A part extends over much of the leg. A smaller inertia is usually in the wrong
+    /// unit.
     ///
     /// ## Example
     ///
@@ -38,13 +38,13 @@ lints! {
 
     /// # W0811: mass centre almost in the joint
     ///
-        /// The distance from the joint to the mass centre should be at least a fiftieth of
-        /// the part's radius of gyration, or exactly 0.
-        ///
-        /// ## Why it matters
-        ///
-        /// A value close to zero is usually in um instead of mm. A part that is balanced
-        /// about its joint has exactly 0.
+    /// The distance from the joint to the mass centre should be at least a fiftieth of
+    /// the part's radius of gyration, or exactly 0.
+    ///
+    /// ## Why it matters
+    ///
+    /// A value close to zero is usually in um instead of mm. A part that is balanced
+    /// about its joint has exactly 0.
     ///
     /// ## Example
     ///
@@ -67,13 +67,13 @@ lints! {
 
     /// # W0856: mass, inertia and mass centre are inconsistent
     ///
-        /// A part of a leg starts at its joint: its radius of gyration should be 0.25 to
-        /// 1.05 times the distance from the joint to its mass centre.
-        ///
-        /// ## Why it matters
-        ///
-        /// A uniform rod has 0.58, and 1.15 about its joint. Otherwise mass, inertia (about
-        /// the mass centre) or centre is wrong, and so is the leg's contribution to (4).
+    /// A part of a leg starts at its joint: its radius of gyration should be 0.25 to
+    /// 1.05 times the distance from the joint to its mass centre.
+    ///
+    /// ## Why it matters
+    ///
+    /// A uniform rod has 0.58, and 1.15 about its joint. Otherwise mass, inertia (about
+    /// the mass centre) or centre is wrong, and so is the leg's contribution to (4).
     ///
     /// ## Example
     ///
@@ -87,7 +87,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Check all three values.
+    /// Check all three values.
     ///
     /// ```toml
     /// fixed_inertia      = "1.07e5 g mm^2"
@@ -96,13 +96,13 @@ lints! {
 
     /// # W0857: a centre of mass outside the legs
     ///
-        /// `platform.center_of_mass` should lie within the joint circle, and at most three
-        /// of its radii above or below it.
-        ///
-        /// ## Why it matters
-        ///
-        /// A centre of mass further out loads the legs unevenly. More often it was measured
-        /// from a point other than P_C.
+    /// `platform.center_of_mass` should lie within the joint circle, and at most three
+    /// of its radii above or below it.
+    ///
+    /// ## Why it matters
+    ///
+    /// A centre of mass further out loads the legs unevenly. More often it was measured
+    /// from a point other than P_C.
     ///
     /// ## Example
     ///
@@ -130,8 +130,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// The rim bounds the I_zz of a plate that carries its joints on the rim. A moment
-        /// outside the range is usually in the wrong unit, or not about the mass centre.
+    /// The rim bounds the I_zz of a plate that carries its joints on the rim. A moment
+    /// outside the range is usually in the wrong unit, or not about the mass centre.
     ///
     /// ## Example
     ///
@@ -154,13 +154,14 @@ lints! {
 
     /// # W0813: moments of inertia in the wrong order?
     ///
-        /// On a platform whose joints are spread equally along x and y, I_xx and I_yy should
-        /// be within a factor of two, and within 1.3 if one of them is close to I_zz.
-        ///
-        /// ## Why it matters
-        ///
-        /// `platform.inertia` is I_xx, I_yy, I_zz in {P}, with z along the axis of the
-        /// hexapod. CAD programs often use y for that axis.
+    /// On a platform whose joints are spread equally along x and y, I_xx and I_yy
+    /// should be within a factor of two, and within 1.3 if one of them is close to
+    /// I_zz.
+    ///
+    /// ## Why it matters
+    ///
+    /// `platform.inertia` is I_xx, I_yy, I_zz in {P}, with z along the axis of the
+    /// hexapod. CAD programs often use y for that axis.
     ///
     /// ## Example
     ///
@@ -174,7 +175,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Put the moments in this order.
+    /// Put the moments in this order.
     ///
     /// ```toml
     /// inertia        = ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e6 g mm^2"]
@@ -183,13 +184,13 @@ lints! {
 
     /// # W0814: leg and platform of very different mass
     ///
-        /// The mass of a leg part should be between 1/5000 of the platform's mass and five
-        /// times the platform's mass.
-        ///
-        /// ## Why it matters
-        ///
-        /// In (4) the legs add a few per cent to the platform. A very different proportion
-        /// usually means grams for kilograms.
+    /// The mass of a leg part should be between 1/5000 of the platform's mass and five
+    /// times the platform's mass.
+    ///
+    /// ## Why it matters
+    ///
+    /// In (4) the legs add a few per cent to the platform. A very different proportion
+    /// usually means grams for kilograms.
     ///
     /// ## Example
     ///
@@ -212,14 +213,14 @@ lints! {
 
     /// # W0865: moments of inertia about another point?
     ///
-        /// I_xx + I_yy − I_zz is twice the integral of z² dm about the centre of mass. The
-        /// rms z from it should be less than the height of the platform above the base.
-        ///
-        /// ## Why it matters
-        ///
-        /// Moments about another point, such as the base or the origin of a CAD model, are
-        /// larger by mass times distance squared (parallel axis theorem). The computed leg
-        /// forces are then too large, and so is the feed-forward.
+    /// I_xx + I_yy − I_zz is twice the integral of z² dm about the centre of mass. The
+    /// rms z from it should be less than the height of the platform above the base.
+    ///
+    /// ## Why it matters
+    ///
+    /// Moments about another point, such as the base or the origin of a CAD model, are
+    /// larger by mass times distance squared (parallel axis theorem). The computed leg
+    /// forces are then too large, and so is the feed-forward.
     ///
     /// ## Example
     ///

@@ -9,13 +9,13 @@ lints! {
 
     /// # E0870: a budget below the size of the tables
     ///
-        /// Before the build, `[target.budget]` is compared with the size of tables and
-        /// reversal memories, and with the least time and instructions of a tick.
-        ///
-        /// ## Why it matters
-        ///
-        /// The image cannot be smaller than its tables: n(n+1)/2 nodes for each different
-        /// leg.
+    /// Before the build, `[target.budget]` is compared with the size of tables and
+    /// reversal memories, and with the least time and instructions of a tick.
+    ///
+    /// ## Why it matters
+    ///
+    /// The image cannot be smaller than its tables: n(n+1)/2 nodes for each different
+    /// leg.
     ///
     /// ## Example
     ///
@@ -29,7 +29,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Check the unit; otherwise use a coarser grid or a shorter reversal memory.
+    /// Check the unit; otherwise use a coarser grid or a shorter reversal memory.
     ///
     /// ```toml
     /// flash        = "128 KiB"
@@ -38,12 +38,12 @@ lints! {
 
     /// # W0871: a budget that has no effect
     ///
-        /// A budget should not be hundreds of times the size of the tables, and the time of
-        /// a tick not longer than the period.
-        ///
-        /// ## Why it matters
-        ///
-        /// An image that has grown tenfold would still be within the budget.
+    /// A budget should not be hundreds of times the size of the tables, and the time of
+    /// a tick not longer than the period.
+    ///
+    /// ## Why it matters
+    ///
+    /// An image that has grown tenfold would still be within the budget.
     ///
     /// ## Example
     ///
@@ -57,7 +57,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Check KiB against MiB. A good budget is the measured size plus a tenth.
+    /// Check KiB against MiB. A good budget is the measured size plus a tenth.
     ///
     /// ```toml
     /// flash        = "128 KiB"
@@ -70,8 +70,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// Microcontrollers have more flash than RAM, and controllers need more flash:
-        /// tables are constants.
+    /// Microcontrollers have more flash than RAM, and controllers need more flash:
+    /// tables are constants.
     ///
     /// ## Example
     ///
@@ -85,7 +85,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Check whether the two are swapped.
+    /// Check whether the two are swapped.
     ///
     /// ```toml
     /// ram          = "32 KiB"
@@ -94,12 +94,12 @@ lints! {
 
     /// # N0872: memory and time are measured by a build
     ///
-        /// `specgen check` knows only the size of tables and reversal memories.
-        ///
-        /// ## Why it matters
-        ///
-        /// Code size, stack and instructions per tick are known once the image is built
-        /// and run. Until then these parts of the budget are not checked.
+    /// `specgen check` knows only the size of tables and reversal memories.
+    ///
+    /// ## Why it matters
+    ///
+    /// Code size, stack and instructions per tick are known once the image is built
+    /// and run. Until then these parts of the budget are not checked.
     ///
     /// ## Example
     ///

@@ -7,13 +7,13 @@ lints! {
 
     /// # W0829: work piece too soft or too stiff
     ///
-        /// Along each axis, the stiffness of the work piece should be between a thousandth
-        /// and twenty times that of the platform on its legs.
-        ///
-        /// ## Why it matters
-        ///
-        /// A softer work piece does not matter in (5). Against a stiffer one the legs
-        /// deflect instead of moving the platform.
+    /// Along each axis, the stiffness of the work piece should be between a thousandth
+    /// and twenty times that of the platform on its legs.
+    ///
+    /// ## Why it matters
+    ///
+    /// A softer work piece does not matter in (5). Against a stiffer one the legs
+    /// deflect instead of moving the platform.
     ///
     /// ## Example
     ///
@@ -36,13 +36,13 @@ lints! {
 
     /// # W0838: lever arm of the contact too long
     ///
-        /// Rotational over translational stiffness is a lever arm squared. The lever arm
-        /// should be less than three radii of the platform.
-        ///
-        /// ## Why it matters
-        ///
-        /// The contact is on the platform, so its lever arm is at most about a radius.
-        /// N m/rad and N m/deg differ by a factor of 57.
+    /// Rotational over translational stiffness is a lever arm squared. The lever arm
+    /// should be less than three radii of the platform.
+    ///
+    /// ## Why it matters
+    ///
+    /// The contact is on the platform, so its lever arm is at most about a radius.
+    /// N m/rad and N m/deg differ by a factor of 57.
     ///
     /// ## Example
     ///
@@ -56,7 +56,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Check the unit of the rotational stiffness.
+    /// Check the unit of the rotational stiffness.
     ///
     /// ```toml
     /// stiffness = ["2.4e6 N/m", "2.4e6 N/m", "3e6 N/m", "3.8e3 N m/rad", "3.8e3 N m/rad", "0 N m/rad"]
@@ -65,13 +65,13 @@ lints! {
 
     /// # W0839: contact force beyond the travel of the legs
     ///
-        /// At the bias, the force of the work piece, stiffness × (bias − rest) as in (5),
-        /// should not deflect the legs by more than their travel.
-        ///
-        /// ## Why it matters
-        ///
-        /// The platform cannot move against such a contact. `control.environment.rest` is
-        /// the pose at which the work piece is unloaded, relative to the rest pose.
+    /// At the bias, the force of the work piece, stiffness × (bias − rest) as in (5),
+    /// should not deflect the legs by more than their travel.
+    ///
+    /// ## Why it matters
+    ///
+    /// The platform cannot move against such a contact. `control.environment.rest` is
+    /// the pose at which the work piece is unloaded, relative to the rest pose.
     ///
     /// ## Example
     ///

@@ -18,14 +18,14 @@ lints! {
 
     /// # W0893: one value that would explain several findings
     ///
-        /// If there are several findings, the spec is checked again with one value
-        /// changed by a power of ten, its sign or its order. The change that removes most
-        /// findings is reported first.
-        ///
-        /// ## Why it matters
-        ///
-        /// One mistake in the voltage can cause ten findings about other keys. The value
-        /// that explains most of them is the first to check.
+    /// If there are several findings, the spec is checked again with one value
+    /// changed by a power of ten, its sign or its order. The change that removes most
+    /// findings is reported first.
+    ///
+    /// ## Why it matters
+    ///
+    /// One mistake in the voltage can cause ten findings about other keys. The value
+    /// that explains most of them is the first to check.
     ///
     /// ## Example
     ///
@@ -39,7 +39,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Check that value first; correcting it may remove the other findings.
+    /// Check that value first; correcting it may remove the other findings.
     ///
     /// ```toml
     /// voltage         = ["0 V", "100 V"]

@@ -9,13 +9,13 @@ lints! {
 
     /// # W0805: amplifier too slow for the slew rate
     ///
-        /// A first-order lag slews at most at range / lag. `actuator.slew_rate` should not
-        /// exceed that.
-        ///
-        /// ## Why it matters
-        ///
-        /// The controller assumes a slew rate that the amplifier does not reach, so its
-        /// model of the voltage runs ahead.
+    /// A first-order lag slews at most at range / lag. `actuator.slew_rate` should not
+    /// exceed that.
+    ///
+    /// ## Why it matters
+    ///
+    /// The controller assumes a slew rate that the amplifier does not reach, so its
+    /// model of the voltage runs ahead.
     ///
     /// ## Example
     ///
@@ -38,12 +38,12 @@ lints! {
 
     /// # W0806: amplifier current too low for the slew rate
     ///
-        /// For one leg, capacitance × slew_rate should not exceed `amplifier.current`.
-        ///
-        /// ## Why it matters
-        ///
-        /// I = C dU/dt: at its current limit the amplifier limits the slew rate itself, and
-        /// the controller does not know. C is that of all stacks of a leg.
+    /// For one leg, capacitance × slew_rate should not exceed `amplifier.current`.
+    ///
+    /// ## Why it matters
+    ///
+    /// I = C dU/dt: at its current limit the amplifier limits the slew rate itself, and
+    /// the controller does not know. C is that of all stacks of a leg.
     ///
     /// ## Example
     ///
@@ -75,8 +75,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// Amplifiers for piezo stacks have 0.1 to 10 mV rms. Far more or far less usually
-        /// means a wrong unit.
+    /// Amplifiers for piezo stacks have 0.1 to 10 mV rms. Far more or far less usually
+    /// means a wrong unit.
     ///
     /// ## Example
     ///
@@ -99,15 +99,15 @@ lints! {
 
     /// # W0864: capacitance inconsistent with stiffness and stroke
     ///
-        /// The electrical energy at full voltage, C V²/2, is compared with the elastic
-        /// energy of the blocked leg over its stroke, k d²/2. The elastic energy should be
-        /// between 0.001 and 5 times the electrical energy.
-        ///
-        /// ## Why it matters
-        ///
-        /// Ceramics convert at most half of the electrical energy into mechanical energy. A
-        /// capacitance in nF instead of uF, or of one stack instead of all, makes the
-        /// current and the possible slew rate wrong by the same factor.
+    /// The electrical energy at full voltage, C V²/2, is compared with the elastic
+    /// energy of the blocked leg over its stroke, k d²/2. The elastic energy should be
+    /// between 0.001 and 5 times the electrical energy.
+    ///
+    /// ## Why it matters
+    ///
+    /// Ceramics convert at most half of the electrical energy into mechanical energy. A
+    /// capacitance in nF instead of uF, or of one stack instead of all, makes the
+    /// current and the possible slew rate wrong by the same factor.
     ///
     /// ## Example
     ///
@@ -134,7 +134,7 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// The platform dithers between two codes by that much. 16 bits are usual.
+    /// The platform dithers between two codes by that much. 16 bits are usual.
     ///
     /// ## Example
     ///
@@ -161,8 +161,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// Two or more bits are never used, and one code moves the leg at least four times
-        /// as far as necessary.
+    /// Two or more bits are never used, and one code moves the leg at least four times
+    /// as far as necessary.
     ///
     /// ## Example
     ///
@@ -185,13 +185,13 @@ lints! {
 
     /// # W0819: rest voltage differs from amplifiers that are off
     ///
-        /// `supervisor.rest_voltage` should be 0 V if `actuator.voltage` includes it.
-        ///
-        /// ## Why it matters
-        ///
-        /// A stack whose amplifier is off discharges to 0 V. With another rest voltage the
-        /// legs jump when the amplifiers are switched on, and again when they are switched
-        /// off.
+    /// `supervisor.rest_voltage` should be 0 V if `actuator.voltage` includes it.
+    ///
+    /// ## Why it matters
+    ///
+    /// A stack whose amplifier is off discharges to 0 V. With another rest voltage the
+    /// legs jump when the amplifiers are switched on, and again when they are switched
+    /// off.
     ///
     /// ## Example
     ///
@@ -204,7 +204,8 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Leave the key out, unless the amplifiers themselves ramp slowly when they switch.
+    /// Leave the key out, unless the amplifiers themselves ramp slowly when they
+    /// switch.
     REST_NOT_ZERO = "W0819";
 }
 

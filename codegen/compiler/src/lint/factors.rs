@@ -11,15 +11,15 @@ lints! {
 
     /// # W0888: a value far from its default
     ///
-        /// Times, counts and bounds of `[supervisor]`, and `control.dynamics_tolerance`,
-        /// should be within a factor of 50 of their defaults. `disagreement` and
-        /// `tracking_error`, which are fractions of a range, should not exceed that range.
-        /// `disturbance` should be at most 50 times its default, a thirtieth of the stroke.
-        ///
-        /// ## Why it matters
-        ///
-        /// A fault detected after ten seconds instead of ten milliseconds is detected too
-        /// late. Such a time is usually in the wrong unit.
+    /// Times, counts and bounds of `[supervisor]`, and `control.dynamics_tolerance`,
+    /// should be within a factor of 50 of their defaults. `disagreement` and
+    /// `tracking_error`, which are fractions of a range, should not exceed that range.
+    /// `disturbance` should be at most 50 times its default, a thirtieth of the stroke.
+    ///
+    /// ## Why it matters
+    ///
+    /// A fault detected after ten seconds instead of ten milliseconds is detected too
+    /// late. Such a time is usually in the wrong unit.
     ///
     /// ## Example
     ///
@@ -43,13 +43,13 @@ lints! {
 
     /// # W0889: a factor far from 1
     ///
-        /// Factors of `[robust]` should be between 0.25 and 4, and their range should
-        /// include 1.
-        ///
-        /// ## Why it matters
-        ///
-        /// They multiply the nominal value: 0.05 is not a tolerance of 5 % but a twentieth
-        /// of the mass, and 5 is five times the mass.
+    /// Factors of `[robust]` should be between 0.25 and 4, and their range should
+    /// include 1.
+    ///
+    /// ## Why it matters
+    ///
+    /// They multiply the nominal value: 0.05 is not a tolerance of 5 % but a twentieth
+    /// of the mass, and 5 is five times the mass.
     ///
     /// ## Example
     ///
@@ -63,7 +63,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Write the smallest and the largest factor.
+    /// Write the smallest and the largest factor.
     ///
     /// ```toml
     /// [robust]

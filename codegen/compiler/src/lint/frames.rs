@@ -8,15 +8,15 @@ lints! {
 
     /// # W0881: a point in the wrong frame
     ///
-        /// Points in {P} are relative to the centre of the platform joints, points in {B}
-        /// to that of the base joints, `geometry.height` below. A point of a gauge, a
-        /// target, a joint, the centre of mass or the tool is reported if it is 0.83 to
-        /// 1.25 heights above or below its own body: in the other frame it would be at it.
-        ///
-        /// ## Why it matters
-        ///
-        /// The lever arm of a gauge or a load is then wrong by the height, and tilts are
-        /// read as translations.
+    /// Points in {P} are relative to the centre of the platform joints, points in {B}
+    /// to that of the base joints, `geometry.height` below. A point of a gauge, a
+    /// target, a joint, the centre of mass or the tool is reported if it is 0.83 to
+    /// 1.25 heights above or below its own body: in the other frame it would be at it.
+    ///
+    /// ## Why it matters
+    ///
+    /// The lever arm of a gauge or a load is then wrong by the height, and tilts are
+    /// read as translations.
     ///
     /// ## Example
     ///
@@ -31,7 +31,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Measure z from the origin of the frame that the key requires.
+    /// Measure z from the origin of the frame that the key requires.
     ///
     /// ```toml
     /// point     = ["0 mm", "80 mm", "180 mm"]

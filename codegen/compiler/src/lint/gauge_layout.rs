@@ -16,12 +16,12 @@ lints! {
 
     /// # W0826: a poor gauge layout that one mistake would explain
     ///
-        /// If the gauges measure some motion badly, each sign and each order of two
-        /// coordinates is tried. One that makes the layout good is reported.
-        ///
-        /// ## Why it matters
-        ///
-        /// For a badly measured motion, the condition number amplifies the gauge noise.
+    /// If the gauges measure some motion badly, each sign and each order of two
+    /// coordinates is tried. One that makes the layout good is reported.
+    ///
+    /// ## Why it matters
+    ///
+    /// For a badly measured motion, the condition number amplifies the gauge noise.
     ///
     /// ## Example
     ///
@@ -35,7 +35,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Correct the gauge named in the message.
+    /// Correct the gauge named in the message.
     ///
     /// ```toml
     /// point     = ["-80 mm", "0 mm", "180 mm"]
@@ -44,14 +44,14 @@ lints! {
 
     /// # N0883: gauges and joints numbered in opposite directions
     ///
-        /// Seen from above, the three gauges along the axis are numbered in the opposite
-        /// direction to the joints.
-        ///
-        /// ## Why it matters
-        ///
-        /// Any order is possible. But if x or y of the gauges has the wrong sign, the
-        /// layout is mirrored: everything else looks right, but rotations are measured with
-        /// the wrong sign.
+    /// Seen from above, the three gauges along the axis are numbered in the opposite
+    /// direction to the joints.
+    ///
+    /// ## Why it matters
+    ///
+    /// Any order is possible. But if x or y of the gauges has the wrong sign, the
+    /// layout is mirrored: everything else looks right, but rotations are measured with
+    /// the wrong sign.
     ///
     /// ## Example
     ///

@@ -10,15 +10,15 @@ lints! {
 
     /// # W0848: a gauge that breaks the pattern of the others
     ///
-        /// Gauges usually share one height or one radius, measure along the axis, along
-        /// their radius or tangentially, or form an equilateral triangle. A gauge that does
-        /// not, but would with a different sign, digit or order of its coordinates, is
-        /// reported.
-        ///
-        /// ## Why it matters
-        ///
-        /// If a gauge is not where the spec says, its lever arm is wrong: the pose has
-        /// tilts that do not exist.
+    /// Gauges usually share one height or one radius, measure along the axis, along
+    /// their radius or tangentially, or form an equilateral triangle. A gauge that does
+    /// not, but would with a different sign, digit or order of its coordinates, is
+    /// reported.
+    ///
+    /// ## Why it matters
+    ///
+    /// If a gauge is not where the spec says, its lever arm is wrong: the pose has
+    /// tilts that do not exist.
     ///
     /// ## Example
     ///

@@ -8,14 +8,14 @@ lints! {
 
     /// # W0884: gauge points and directions rotated
     ///
-        /// Gauges that measure across the axis usually measure along a radius or a tangent.
-        /// Three or more that are all rotated from it by the same angle are reported. 45
-        /// degrees is not: gauges at the corners of a square have it.
-        ///
-        /// ## Why it matters
-        ///
-        /// Points and directions are then in frames that are rotated against each other,
-        /// and measured translations are rotated, too.
+    /// Gauges that measure across the axis usually measure along a radius or a tangent.
+    /// Three or more that are all rotated from it by the same angle are reported. 45
+    /// degrees is not: gauges at the corners of a square have it.
+    ///
+    /// ## Why it matters
+    ///
+    /// Points and directions are then in frames that are rotated against each other,
+    /// and measured translations are rotated, too.
     ///
     /// ## Example
     ///
@@ -70,8 +70,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// With a short lever arm, a rotation changes the readings little and is lost in
-        /// noise. The usual cause is points in cm that were written as mm.
+    /// With a short lever arm, a rotation changes the readings little and is lost in
+    /// noise. The usual cause is points in cm that were written as mm.
     ///
     /// ## Example
     ///
@@ -162,7 +162,7 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// There is no target there. Coordinates are usually in the wrong order or unit.
+    /// There is no target there. Coordinates are usually in the wrong order or unit.
     ///
     /// ## Example
     ///

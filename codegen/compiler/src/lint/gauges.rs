@@ -8,12 +8,12 @@ lints! {
 
     /// # E0328: two identical gauges
     ///
-        /// No two gauges may have the same `point` and the same `direction`.
-        ///
-        /// ## Why it matters
-        ///
-        /// There are then only five independent readings, and one motion of the platform
-        /// is not measured. Usually a section was copied and not changed.
+    /// No two gauges may have the same `point` and the same `direction`.
+    ///
+    /// ## Why it matters
+    ///
+    /// There are then only five independent readings, and one motion of the platform
+    /// is not measured. Usually a section was copied and not changed.
     ///
     /// ## Example
     ///
@@ -40,8 +40,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// Noise far below the resolution of the converter cannot be measured. The unit is
-        /// wrong, or the value is a data-sheet resolution at 1 Hz bandwidth.
+    /// Noise far below the resolution of the converter cannot be measured. The unit is
+    /// wrong, or the value is a data-sheet resolution at 1 Hz bandwidth.
     ///
     /// ## Example
     ///
@@ -64,15 +64,15 @@ lints! {
 
     /// # W0821: ends of the range in different units?
     ///
-        /// Neither end of `sensor.range` should be a hundred times further from rest than
-        /// the other. Nor should it be both five times further and five times beyond the
-        /// motion of the platform. The range of a leg's gauge should end within five
-        /// strokes.
-        ///
-        /// ## Why it matters
-        ///
-        /// The whole range determines the step of the converter, and so the noise of the
-        /// loop.
+    /// Neither end of `sensor.range` should be a hundred times further from rest than
+    /// the other. Nor should it be both five times further and five times beyond the
+    /// motion of the platform. The range of a leg's gauge should end within five
+    /// strokes.
+    ///
+    /// ## Why it matters
+    ///
+    /// The whole range determines the step of the converter, and so the noise of the
+    /// loop.
     ///
     /// ## Example
     ///
@@ -95,13 +95,13 @@ lints! {
 
     /// # W0846: an end of the range that is nearly zero
     ///
-        /// An end of `sensor.range`, if it is not zero, should be at least a thousandth
-        /// of the range from rest.
-        ///
-        /// ## Why it matters
-        ///
-        /// It is usually nm written for um. Creep and drift alone would move the reading out
-        /// of the range.
+    /// An end of `sensor.range`, if it is not zero, should be at least a thousandth
+    /// of the range from rest.
+    ///
+    /// ## Why it matters
+    ///
+    /// It is usually nm written for um. Creep and drift alone would move the reading
+    /// out of the range.
     ///
     /// ## Example
     ///
@@ -124,13 +124,13 @@ lints! {
 
     /// # W0823: a coordinate that is nearly zero
     ///
-        /// A coordinate of a gauge, if it is not zero, should not be tiny compared with the
-        /// size of the platform.
+    /// A coordinate of a gauge, if it is not zero, should not be tiny compared with the
+    /// size of the platform.
     ///
     /// ## Why it matters
     ///
-        /// It is usually um or m written for mm. The lever arm of the gauge about that axis
-        /// would vanish.
+    /// It is usually um or m written for mm. The lever arm of the gauge about that axis
+    /// would vanish.
     ///
     /// ## Example
     ///
@@ -154,12 +154,12 @@ lints! {
 
     /// # W0824: gauges of opposite sign
     ///
-        /// Parallel gauges should have the same direction.
-        ///
-        /// ## Why it matters
-        ///
-        /// A wrong sign makes the feedback positive, and the loop is unstable. Check it by
-        /// moving the platform by hand before the amplifiers are switched on.
+    /// Parallel gauges should have the same direction.
+    ///
+    /// ## Why it matters
+    ///
+    /// A wrong sign makes the feedback positive, and the loop is unstable. Check it by
+    /// moving the platform by hand before the amplifiers are switched on.
     ///
     /// ## Example
     ///
@@ -183,14 +183,14 @@ lints! {
 
     /// # W0886: gauge noise of many steps
     ///
-        /// `sensor.noise` should be less than 40 steps of a converter of 18 bits or fewer.
-        /// Noise beyond that of any gauge is reported as W0303.
-        ///
-        /// ## Why it matters
-        ///
-        /// A converter is matched to its gauge. If its last five bits were only noise, the
-        /// converter would be wasted. Usually the noise is in the wrong unit, or peak to
-        /// peak.
+    /// `sensor.noise` should be less than 40 steps of a converter of 18 bits or fewer.
+    /// Noise beyond that of any gauge is reported as W0303.
+    ///
+    /// ## Why it matters
+    ///
+    /// A converter is matched to its gauge. If its last five bits were only noise, the
+    /// converter would be wasted. Usually the noise is in the wrong unit, or peak to
+    /// peak.
     ///
     /// ## Example
     ///
@@ -213,13 +213,13 @@ lints! {
 
     /// # W0822: gauge step too coarse
     ///
-        /// One code of a gauge should be less than a thousandth of the stroke. It should
-        /// also be finer than the noise if the range is more than five times the motion to
-        /// measure.
-        ///
-        /// ## Why it matters
-        ///
-        /// Feedback cannot do better than one step; the platform dithers within it.
+    /// One code of a gauge should be less than a thousandth of the stroke. It should
+    /// also be finer than the noise if the range is more than five times the motion to
+    /// measure.
+    ///
+    /// ## Why it matters
+    ///
+    /// Feedback cannot do better than one step; the platform dithers within it.
     ///
     /// ## Example
     ///

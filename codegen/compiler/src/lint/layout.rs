@@ -8,12 +8,12 @@ lints! {
 
     /// # W0815: joints that would touch
     ///
-        /// Two joints of one body should be more than a hundredth of a leg length apart.
-        ///
-        /// ## Why it matters
-        ///
-        /// The legs would have to be thinner than that. Usually the angle between two
-        /// joints is in the wrong unit, or the half angle was given.
+    /// Two joints of one body should be more than a hundredth of a leg length apart.
+    ///
+    /// ## Why it matters
+    ///
+    /// The legs would have to be thinner than that. Usually the angle between two
+    /// joints is in the wrong unit, or the half angle was given.
     ///
     /// ## Example
     ///
@@ -91,14 +91,14 @@ lints! {
 
     /// # W0817: radii and height out of proportion
     ///
-        /// Base radius, platform radius and height should each be within a factor of five
-        /// of the geometric mean of the other two. The base should be at most 2.5 times as
-        /// wide as the platform.
-        ///
-        /// ## Why it matters
-        ///
-        /// A very flat or very tall hexapod is soft in some directions. More often a unit is
-        /// wrong.
+    /// Base radius, platform radius and height should each be within a factor of five
+    /// of the geometric mean of the other two. The base should be at most 2.5 times as
+    /// wide as the platform.
+    ///
+    /// ## Why it matters
+    ///
+    /// A very flat or very tall hexapod is soft in some directions. More often a unit
+    /// is wrong.
     ///
     /// ## Example
     ///

@@ -9,14 +9,14 @@ lints! {
 
     /// # W0887: limits of rotations and translations far apart
     ///
-        /// Limits of speed, acceleration and jerk of rotations should be within a factor of
-        /// ten of those of translations, as motion at the joints or as fractions of the
-        /// workspace.
-        ///
-        /// ## Why it matters
-        ///
-        /// Degrees instead of milliradians are 17 times too fast, radians instead of
-        /// degrees 57 times. That may violate no other limit, but it shakes the platform.
+    /// Limits of speed, acceleration and jerk of rotations should be within a factor of
+    /// ten of those of translations, as motion at the joints or as fractions of the
+    /// workspace.
+    ///
+    /// ## Why it matters
+    ///
+    /// Degrees instead of milliradians are 17 times too fast, radians instead of
+    /// degrees 57 times. That may violate no other limit, but it shakes the platform.
     ///
     /// ## Example
     ///
@@ -39,11 +39,11 @@ lints! {
 
     /// # W0840: moves beyond the slew rate
     ///
-        /// At `control.setpoint.speed` no leg should need more than `actuator.slew_rate`.
-        ///
-        /// ## Why it matters
-        ///
-        /// A move at that speed runs into the slew limit and lags its profile.
+    /// At `control.setpoint.speed` no leg should need more than `actuator.slew_rate`.
+    ///
+    /// ## Why it matters
+    ///
+    /// A move at that speed runs into the slew limit and lags its profile.
     ///
     /// ## Example
     ///
@@ -94,14 +94,14 @@ lints! {
 
     /// # W0842: a limit of moves without effect
     ///
-        /// Within the workspace, moves should reach the limits of speed, acceleration and
-        /// jerk, and reaching them should take more than a tick. A stop should take more
-        /// than a tick. A correction should be at least ten codes of the converter.
-        ///
-        /// ## Why it matters
-        ///
-        /// A limit that is reached within a tick, or never, has no effect. It is usually
-        /// wrong by a factor of 1000.
+    /// Within the workspace, moves should reach the limits of speed, acceleration and
+    /// jerk, and reaching them should take more than a tick. A stop should take more
+    /// than a tick. A correction should be at least ten codes of the converter.
+    ///
+    /// ## Why it matters
+    ///
+    /// A limit that is reached within a tick, or never, has no effect. It is usually
+    /// wrong by a factor of 1000.
     ///
     /// ## Example
     ///
@@ -115,7 +115,7 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Choose speed / acceleration and acceleration / jerk of some ten ticks.
+    /// Choose speed / acceleration and acceleration / jerk of some ten ticks.
     ///
     /// ```toml
     /// acceleration = ["10 mm/s^2", "10 mm/s^2", "10 mm/s^2", "100 mrad/s^2", "100 mrad/s^2", "100 mrad/s^2"]
@@ -129,8 +129,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// The limit protects the machine from jumps in the host's set-points. A limit this
-        /// high lets every jump pass.
+    /// The limit protects the machine from jumps in the host's set-points. A limit this
+    /// high lets every jump pass.
     ///
     /// ## Example
     ///
@@ -158,8 +158,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// Streams are meant for fast set-points. A limit far below that of moves probably
-        /// has the wrong unit, and every faster stream is refused.
+    /// Streams are meant for fast set-points. A limit far below that of moves probably
+    /// has the wrong unit, and every faster stream is refused.
     ///
     /// ## Example
     ///
@@ -182,12 +182,12 @@ lints! {
 
     /// # W0844: a tiny workspace bound
     ///
-        /// A bound should be more than 0.5 % of the travel that the legs give this axis.
-        ///
-        /// ## Why it matters
-        ///
-        /// It is usually nm written for um, or urad for mrad. Nearly every set-point on
-        /// that axis would be refused.
+    /// A bound should be more than 0.5 % of the travel that the legs give this axis.
+    ///
+    /// ## Why it matters
+    ///
+    /// It is usually nm written for um, or urad for mrad. Nearly every set-point on
+    /// that axis would be refused.
     ///
     /// ## Example
     ///

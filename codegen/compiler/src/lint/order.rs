@@ -8,15 +8,16 @@ lints! {
 
     /// # W0882: joints numbered clockwise
     ///
-        /// `base_joints` and `platform_joints` should be listed counter-clockwise, seen
-        /// from above, as equations (1) and (2) number them.
-        ///
-        /// ## Why it matters
-        ///
-        /// In right-handed coordinates with z up, the paper numbers legs counter-clockwise.
-        /// If yours are clockwise, y may have the wrong sign or x and y may be swapped: then
-        /// the geometry is a mirror image, and rotations have the wrong sign. The lists may
-        /// also be in reverse order. Numbering legs clockwise on purpose is allowed.
+    /// `base_joints` and `platform_joints` should be listed counter-clockwise, seen
+    /// from above, as equations (1) and (2) number them.
+    ///
+    /// ## Why it matters
+    ///
+    /// In right-handed coordinates with z up, the paper numbers legs counter-clockwise.
+    /// If yours are clockwise, y may have the wrong sign or x and y may be swapped:
+    /// then the geometry is a mirror image, and rotations have the wrong sign. The
+    /// lists may also be in reverse order. Numbering legs clockwise on purpose is
+    /// allowed.
     ///
     /// ## Example
     ///
@@ -78,13 +79,13 @@ lints! {
 
     /// # W0818: legs that cross
     ///
-        /// Swapping two platform joints should not make the legs shorter. Nor should
-        /// starting one list at another joint, or reversing it.
-        ///
-        /// ## Why it matters
-        ///
-        /// Both lists of joints are in the order of the legs. If two are swapped, each
-        /// voltage goes to the wrong leg. A layout with crossed legs is possible, but rare.
+    /// Swapping two platform joints should not make the legs shorter. Nor should
+    /// starting one list at another joint, or reversing it.
+    ///
+    /// ## Why it matters
+    ///
+    /// Both lists of joints are in the order of the legs. If two are swapped, each
+    /// voltage goes to the wrong leg. A layout with crossed legs is possible, but rare.
     ///
     /// ## Example
     ///

@@ -13,9 +13,9 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// The key is the smaller of the two angles between neighbouring joints. Beyond 60
-        /// degrees a joint is closer to the next pair than to its partner: the larger angle
-        /// was given, and the legs are not numbered as in (1) and (2).
+    /// The key is the smaller of the two angles between neighbouring joints. Beyond 60
+    /// degrees a joint is closer to the next pair than to its partner: the larger angle
+    /// was given, and the legs are not numbered as in (1) and (2).
     ///
     /// ## Example
     ///

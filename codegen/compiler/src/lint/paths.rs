@@ -16,13 +16,13 @@ lints! {
 
     /// # E0850: trajectory beyond the slew rate
     ///
-        /// Along a trajectory no leg may need a faster change of voltage than
-        /// `actuator.slew_rate`, even if its gain is a quarter above the mean.
-        ///
-        /// ## Why it matters
-        ///
-        /// The leg would lag from the first fast segment on, and the platform would leave
-        /// its path on all axes.
+    /// Along a trajectory no leg may need a faster change of voltage than
+    /// `actuator.slew_rate`, even if its gain is a quarter above the mean.
+    ///
+    /// ## Why it matters
+    ///
+    /// The leg would lag from the first fast segment on, and the platform would leave
+    /// its path on all axes.
     ///
     /// ## Example
     ///
@@ -45,13 +45,13 @@ lints! {
 
     /// # W0851: trajectory near the slew rate
     ///
-        /// Along a trajectory a leg should stay within `actuator.slew_rate` even where the
-        /// gain of its stacks is lowest.
-        ///
-        /// ## Why it matters
-        ///
-        /// The gain varies by some ten per cent over a hysteresis loop. Where it is lowest,
-        /// the same motion needs more voltage.
+    /// Along a trajectory a leg should stay within `actuator.slew_rate` even where the
+    /// gain of its stacks is lowest.
+    ///
+    /// ## Why it matters
+    ///
+    /// The gain varies by some ten per cent over a hysteresis loop. Where it is lowest,
+    /// the same motion needs more voltage.
     ///
     /// ## Example
     ///
@@ -79,8 +79,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// The amplifier would limit the current and so the slew rate, and the controller
-        /// would not know.
+    /// The amplifier would limit the current and so the slew rate, and the controller
+    /// would not know.
     ///
     /// ## Example
     ///
@@ -108,13 +108,13 @@ lints! {
 
     /// # W0853: trajectory whose inertia deflects the legs
     ///
-        /// Along a trajectory, the inertia force by (3) over the stiffness of a leg should be
-        /// less than a tenth of the stroke.
-        ///
-        /// ## Why it matters
-        ///
-        /// Feed-forward compensates the deflection, but the reach check ignores it: near the
-        /// ends of the strokes the compensation runs out of travel.
+    /// Along a trajectory, the inertia force by (3) over the stiffness of a leg should
+    /// be less than a tenth of the stroke.
+    ///
+    /// ## Why it matters
+    ///
+    /// Feed-forward compensates the deflection, but the reach check ignores it: near
+    /// the ends of the strokes the compensation runs out of travel.
     ///
     /// ## Example
     ///
@@ -140,11 +140,11 @@ lints! {
 
     /// # W0854: trajectory near the lowest mode
     ///
-        /// The frequency of a sinusoid should be below a fifth of the lowest mode.
-        ///
-        /// ## Why it matters
-        ///
-        /// A higher frequency excites the mode: the platform moves further than its legs.
+    /// The frequency of a sinusoid should be below a fifth of the lowest mode.
+    ///
+    /// ## Why it matters
+    ///
+    /// A higher frequency excites the mode: the platform moves further than its legs.
     ///
     /// ## Example
     ///

@@ -8,13 +8,13 @@ lints! {
 
     /// # W0866: a requirement that is always met
     ///
-        /// A precision, noise or error limit should be at most a twentieth of the stroke,
-        /// for a rotation at most a twentieth of the workspace.
-        ///
-        /// ## Why it matters
-        ///
-        /// Any platform meets a looser limit, so it checks nothing. The unit is probably
-        /// wrong.
+    /// A precision, noise or error limit should be at most a twentieth of the stroke,
+    /// for a rotation at most a twentieth of the workspace.
+    ///
+    /// ## Why it matters
+    ///
+    /// Any platform meets a looser limit, so it checks nothing. The unit is probably
+    /// wrong.
     ///
     /// ## Example
     ///

@@ -8,12 +8,12 @@ lints! {
 
     /// # W0830: a time too short to have an effect
     ///
-        /// Lag, lead, dead time and the width of a trigger's pulse should be at least a
-        /// hundredth of a tick, or 0.
-        ///
-        /// ## Why it matters
-        ///
-        /// A shorter time has no effect. It is usually us written for ms.
+    /// Lag, lead, dead time and the width of a trigger's pulse should be at least a
+    /// hundredth of a tick, or 0.
+    ///
+    /// ## Why it matters
+    ///
+    /// A shorter time has no effect. It is usually us written for ms.
     ///
     /// ## Example
     ///
@@ -36,14 +36,14 @@ lints! {
 
     /// # W0831: lead longer than the delay
     ///
-        /// `control.lead`, and `lead` of a trajectory, should be at most 1.25 times the sum
-        /// of amplifier lag and tick. `hysteresis.dead_time` of six legs should be at most
-        /// three times the sum of these and a period of the legs' resonance.
-        ///
-        /// ## Why it matters
-        ///
-        /// The lead makes the feed-forward run ahead of the set-point by the delay of
-        /// amplifier and sampling. With a longer lead the legs are early.
+    /// `control.lead`, and `lead` of a trajectory, should be at most 1.25 times the sum
+    /// of amplifier lag and tick. `hysteresis.dead_time` of six legs should be at most
+    /// three times the sum of these and a period of the legs' resonance.
+    ///
+    /// ## Why it matters
+    ///
+    /// The lead makes the feed-forward run ahead of the set-point by the delay of
+    /// amplifier and sampling. With a longer lead the legs are early.
     ///
     /// ## Example
     ///
@@ -56,9 +56,9 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Leave the key out: the compiler then uses the delay from command to pose, which
-        /// `specgen check --details` states. Or write at most the sum of amplifier lag and
-        /// tick; `specgen sim` shows which lead is best on a path with corners.
+    /// Leave the key out: the compiler then uses the delay from command to pose, which
+    /// `specgen check --details` states. Or write at most the sum of amplifier lag and
+    /// tick; `specgen sim` shows which lead is best on a path with corners.
     ///
     /// ```toml
     /// lead            = "0.1 ms"
@@ -71,8 +71,8 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// It is the time constant with which the offset after a change of mode decays. A
-        /// shorter time makes a step in the voltage; with a longer time the offset remains.
+    /// It is the time constant with which the offset after a change of mode decays. A
+    /// shorter time makes a step in the voltage; with a longer time the offset remains.
     ///
     /// ## Example
     ///
@@ -99,7 +99,7 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// The filter would delay the velocity in the derivative term of (7).
+    /// The filter would delay the velocity in the derivative term of (7).
     ///
     /// ## Example
     ///
@@ -122,14 +122,14 @@ lints! {
 
     /// # W0834: period and modes are inconsistent
     ///
-        /// One period of the platform's lowest mode should have between four and three
-        /// thousand ticks.
-        ///
-        /// ## Why it matters
-        ///
-        /// With fewer ticks the loop hardly samples the mode. With more, the tick is far
-        /// faster than anything to control. Period, stiffness or masses are usually in the
-        /// wrong unit.
+    /// One period of the platform's lowest mode should have between four and three
+    /// thousand ticks.
+    ///
+    /// ## Why it matters
+    ///
+    /// With fewer ticks the loop hardly samples the mode. With more, the tick is far
+    /// faster than anything to control. Period, stiffness or masses are usually in the
+    /// wrong unit.
     ///
     /// ## Example
     ///
@@ -156,9 +156,9 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// The gauges show the effect of a tick only after their lag. A much faster tick
-        /// costs computation and gains nothing, and the stability check allows only small
-        /// gains. Usually the unit is wrong.
+    /// The gauges show the effect of a tick only after their lag. A much faster tick
+    /// costs computation and gains nothing, and the stability check allows only small
+    /// gains. Usually the unit is wrong.
     ///
     /// ## Example
     ///
@@ -171,8 +171,8 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Check `sensor.lag` (us or ms): for a gauge or filter of first order it is
-        /// 1/(2 pi bandwidth), and the lags of several in series add up.
+    /// Check `sensor.lag` (us or ms): for a gauge or filter of first order it is
+    /// 1/(2 pi bandwidth), and the lags of several in series add up.
     ///
     /// ```toml
     /// lag = "0.2 ms"
@@ -181,14 +181,14 @@ lints! {
 
     /// # W0869: a mode above half the tick rate
     ///
-        /// No mode of the platform should be above half the tick rate, unless the gauges
-        /// attenuate it to less than a third.
-        ///
-        /// ## Why it matters
-        ///
-        /// Such a mode is aliased to a lower frequency, and the loop responds to the alias.
-        /// The stability check includes it at its nominal frequency only. If the mode
-        /// shifts by a few hertz, its alias shifts by as much in the other direction.
+    /// No mode of the platform should be above half the tick rate, unless the gauges
+    /// attenuate it to less than a third.
+    ///
+    /// ## Why it matters
+    ///
+    /// Such a mode is aliased to a lower frequency, and the loop responds to the alias.
+    /// The stability check includes it at its nominal frequency only. If the mode
+    /// shifts by a few hertz, its alias shifts by as much in the other direction.
     ///
     /// ## Example
     ///
@@ -202,8 +202,8 @@ lints! {
     ///
     /// ## Fix
     ///
-        /// Sample faster than twice the highest mode, or filter the gauges and include the
-        /// filter in `sensor.lag`.
+    /// Sample faster than twice the highest mode, or filter the gauges and include the
+    /// filter in `sensor.lag`.
     ///
     /// ```toml
     /// period = "200 us"

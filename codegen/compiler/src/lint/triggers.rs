@@ -10,13 +10,13 @@ lints! {
 
     /// # W0877: a trigger with at most one pulse
     ///
-        /// `step` of a trigger of kind "position" should not be longer than the distance
-        /// from `start` to `stop`. `last` of any trigger should not be before its `first`.
-        ///
-        /// ## Why it matters
-        ///
-        /// There is then a pulse only at `start`, or none at all. Usually one of the values
-        /// is in the wrong unit.
+    /// `step` of a trigger of kind "position" should not be longer than the distance
+    /// from `start` to `stop`. `last` of any trigger should not be before its `first`.
+    ///
+    /// ## Why it matters
+    ///
+    /// There is then a pulse only at `start`, or none at all. Usually one of the values
+    /// is in the wrong unit.
     ///
     /// ## Example
     ///
@@ -39,15 +39,15 @@ lints! {
 
     /// # E0874: step of a trigger too small
     ///
-        /// `step` of a trigger must be larger than its `hysteresis`, whose default is ten
-        /// times the noise of the measured pose. From `start` to `stop` there may be at
-        /// most a million steps.
-        ///
-        /// ## Why it matters
-        ///
-        /// A trigger position is armed again only when the pose has moved away from it by
-        /// the hysteresis. With closer positions, noise would decide which of them give a
-        /// pulse.
+    /// `step` of a trigger must be larger than its `hysteresis`, whose default is ten
+    /// times the noise of the measured pose. From `start` to `stop` there may be at
+    /// most a million steps.
+    ///
+    /// ## Why it matters
+    ///
+    /// A trigger position is armed again only when the pose has moved away from it by
+    /// the hysteresis. With closer positions, noise would decide which of them give a
+    /// pulse.
     ///
     /// ## Example
     ///
@@ -78,14 +78,14 @@ lints! {
 
     /// # W0875: hysteresis of a trigger within the noise
     ///
-        /// `hysteresis` should be at least ten times the noise of the measured pose (rms)
-        /// along the axis.
-        ///
-        /// ## Why it matters
-        ///
-        /// At rest near a trigger position, noise crosses it back and forth. A hysteresis of
-        /// ten times the rms is exceeded by chance at most once in 10⁶ ticks. With less,
-        /// noise gives several pulses at one position.
+    /// `hysteresis` should be at least ten times the noise of the measured pose (rms)
+    /// along the axis.
+    ///
+    /// ## Why it matters
+    ///
+    /// At rest near a trigger position, noise crosses it back and forth. A hysteresis
+    /// of ten times the rms is exceeded by chance at most once in 10⁶ ticks. With less,
+    /// noise gives several pulses at one position.
     ///
     /// ## Example
     ///
@@ -115,13 +115,13 @@ lints! {
 
     /// # W0876: pulses of a trigger overlap
     ///
-        /// At the largest speed of moves, `control.setpoint.speed`, the pulse at one
-        /// position should end before the next position is passed.
-        ///
-        /// ## Why it matters
-        ///
-        /// Each pulse has its own edge: the line is low for at least a tick before it. A
-        /// position that is passed earlier gives no pulse and is counted as missed.
+    /// At the largest speed of moves, `control.setpoint.speed`, the pulse at one
+    /// position should end before the next position is passed.
+    ///
+    /// ## Why it matters
+    ///
+    /// Each pulse has its own edge: the line is low for at least a tick before it. A
+    /// position that is passed earlier gives no pulse and is counted as missed.
     ///
     /// ## Example
     ///

@@ -12,9 +12,9 @@ lints! {
     ///
     /// ## Why it matters
     ///
-        /// λ is the gain of the stack over the identified gain. It is about 0.5 at small
-        /// signals and 0.25 at cryogenic temperature. No temperature or amplitude changes
-        /// it more.
+    /// λ is the gain of the stack over the identified gain. It is about 0.5 at small
+    /// signals and 0.25 at cryogenic temperature. No temperature or amplitude changes
+    /// it more.
     ///
     /// ## Example
     ///
@@ -37,12 +37,12 @@ lints! {
 
     /// # W0836: adaptation too slow
     ///
-        /// The level estimate should follow within half a second.
-        ///
-        /// ## Why it matters
-        ///
-        /// The error of a hysteresis model changes at every reversal of the motion. An
-        /// estimate that is slower than the motion corrects the error of an earlier branch.
+    /// The level estimate should follow within half a second.
+    ///
+    /// ## Why it matters
+    ///
+    /// The error of a hysteresis model changes at every reversal of the motion. An
+    /// estimate that is slower than the motion corrects the error of an earlier branch.
     ///
     /// ## Example
     ///
@@ -65,13 +65,13 @@ lints! {
 
     /// # W0837: drift and level estimates do not match
     ///
-        /// The drift estimate of PCC (AII.6) should be slower than the level estimate, but
-        /// less than two thousand times slower.
-        ///
-        /// ## Why it matters
-        ///
-        /// If it is faster, it extrapolates noise as drift. If it is two thousand times
-        /// slower, it has no effect. Often the two values are swapped.
+    /// The drift estimate of PCC (AII.6) should be slower than the level estimate, but
+    /// less than two thousand times slower.
+    ///
+    /// ## Why it matters
+    ///
+    /// If it is faster, it extrapolates noise as drift. If it is two thousand times
+    /// slower, it has no effect. Often the two values are swapped.
     ///
     /// ## Example
     ///
