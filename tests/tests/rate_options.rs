@@ -91,7 +91,7 @@ fn cost(name: &str, emitted: &Emitted, image: &Image) {
     let mut tight = model.target.clone();
     tight.budget.instructions = Some(m.used.instructions.unwrap() - 1);
     let words = specgen::budget::over(&tight, &m.used).join("; ");
-    assert!(words.contains("shrink it by 1; most of it: "), "{words}");
+    assert!(words.contains("reduce it by 1; largest: "), "{words}");
 }
 
 /// The table of costs in docs/hysteresis.md has the committed figures.

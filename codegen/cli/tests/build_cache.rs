@@ -111,7 +111,7 @@ fn an_unchanged_spec_is_built_once_and_everything_else_anew() {
         };
         let [entry] = counted.entries().try_into().unwrap();
         edit(&entry, |bytes| flip(bytes));
-        assert_eq!(asks(&REPLAY).matches("warning: a kept build was damaged").count(), 1);
+        assert_eq!(asks(&REPLAY).matches("warning: a cached build was damaged").count(), 1);
         assert!(counted.entries().is_empty());
         folder.write("legs.toml", folder.read("legs.toml").replace("name = \"", "name = \"other-"));
         asks(&SIM);
@@ -123,7 +123,7 @@ fn an_unchanged_spec_is_built_once_and_everything_else_anew() {
     edit(&entry, |bytes| flip(bytes));
     let (builds, run) = counted.builds_with(&mut counted.command(&REPLAY));
     assert_eq!(builds, 1);
-    assert_eq!(run.stderr.matches("warning: a kept build was damaged").count(), 1, "{}", run.stderr);
+    assert_eq!(run.stderr.matches("warning: a cached build was damaged").count(), 1, "{}", run.stderr);
     assert_eq!(counted.builds(&REPLAY), 0);
 
     // Another source.
@@ -166,7 +166,7 @@ fn a_cache_that_cannot_be_written_costs_one_line() {
     let mut nowhere = counted.command(&SIM);
     let (builds, run) = counted.builds_with(nowhere.env("SPECGEN_CACHE", "/dev/null/cache"));
     assert_eq!(builds, 1);
-    assert_eq!(run.stderr.matches("warning: what was built could not be kept").count(), 1, "{}", run.stderr);
+    assert_eq!(run.stderr.matches("warning: the build could not be cached").count(), 1, "{}", run.stderr);
     let mut nowhere = counted.command(&SIM);
     let (builds, run) = counted.builds_with(nowhere.arg("--json").env("SPECGEN_CACHE", "/dev/null/cache"));
     assert_eq!((builds, run.stderr.as_str()), (1, ""));

@@ -82,7 +82,7 @@ fn an_image_is_built_checked_weighed_and_only_flashed_if_it_passes() {
     // Over budget: who takes most, and by how much to shrink; nothing is flashed.
     folder.spec("tight.toml", &[("flash        = \"128 KiB\"", &format!("flash = \"{} B\"", flash - 10))]);
     let tight = ["build", "tight.toml", "--target", "qemu", "-o", "tight", "--no-measure", "--target-dir", &dir];
-    folder.run(&tight).says(1, &["target.budget.flash allows", "shrink it by 10", "most of it: "]);
+    folder.run(&tight).says(1, &["target.budget.flash allows", "reduce it by 10", "largest: "]);
     let (code, document) = json(&folder, &tight);
     assert_eq!((code, document["result"]["failures"].as_array().unwrap().len()), (1, 1), "{document:#}");
 

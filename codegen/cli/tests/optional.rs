@@ -72,9 +72,9 @@ fn set_up_that_fails_says_what_was_tried_and_the_job_goes_on() {
     let folder = Folder::new();
     let nothing = tempfile::tempdir().unwrap();
     let run = Run::of(&mut main_job(&folder, nothing.path(), &["--setup"]));
-    run.says(0, &["there is no rustup", "there is no apt-get", "going on without"]);
+    run.says(0, &["rustup was not found", "apt-get was not found", "going on without"]);
     assert!(run.stderr.contains("left out: the image for the microcontroller"), "{}", run.stderr);
-    assert!(run.stderr.contains("could not be set up: rustup target add: there is no rustup"), "{}", run.stderr);
+    assert!(run.stderr.contains("could not be set up: rustup target add: rustup was not found"), "{}", run.stderr);
     assert!(folder.path("out/law/src/platform/step.rs").is_file());
     if length(false, true) {
         let required = ["--setup", "--require-target"];

@@ -1,4 +1,4 @@
-//! Debian's packages, by apt: installed as root, or downloaded with a state of apt's own.
+//! Installs Debian packages as root, or downloads them with a private apt state.
 
 use super::places::Places;
 use super::process::{self, first_line};
@@ -11,24 +11,24 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// Longest time of one call: a hundred megabytes over a slow line.
+/// Time limit of one call: enough for a hundred megabytes on a slow connection.
 const LIMIT: Duration = Duration::from_secs(1800);
-/// For packages that would ask something.
+/// For packages that would ask questions.
 const NO_QUESTIONS: &str = "DEBIAN_FRONTEND=noninteractive";
-/// In the language that is understood here.
+/// The parser below reads English messages only.
 const PLAIN: &str = "LC_ALL=C";
 
-/// Why a way of getting a tool did not lead there.
+/// Why a method of getting a tool failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Refusal {
-    /// apt reaches no server; another call of it will not either.
+    /// apt reaches no server, so further calls are pointless.
     NoNetwork,
-    /// In words.
+    /// Any other reason, as text.
     Other(String),
 }
 
 impl Refusal {
-    /// In words.
+    /// A refusal with this text.
     pub fn other(text: impl Into<String>) -> Self {
         Self::Other(text.into())
     }
@@ -37,46 +37,46 @@ impl Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoNetwork => f.write_str("apt has no network"),
+            Self::NoNetwork => f.write_str("apt has no network connection"),
             Self::Other(text) => f.write_str(text),
         }
     }
 }
 
-/// An apt-get, with what it takes to run it.
+/// How to call apt-get.
 pub struct Apt {
-    /// The words before those of a call.
+    /// Program and leading arguments of every call.
     words: Vec<OsString>,
-    /// Folder of its own state and cache; none for the system's.
+    /// Folder of its private state and cache; `None` for the system's apt.
     own: Option<PathBuf>,
 }
 
 impl Apt {
-    /// The system's, if this user may install: as root, or with a sudo that asks for no password.
+    /// The system's apt, if this user may install: as root, or through sudo without a password.
     ///
     /// # Errors
-    /// What is in the way.
+    /// Why this user may not install.
     pub fn of_the_system(places: &Places) -> Result<Self, Refusal> {
-        let apt = places.program("apt-get").ok_or_else(|| Refusal::other("there is no apt-get"))?;
+        let apt = places.program("apt-get").ok_or_else(|| Refusal::other("apt-get was not found"))?;
         let id = places.program("id").unwrap_or_else(|| "id".into());
         if first_line(Command::new(id).arg("-u")).as_deref() == Some("0") {
             return Ok(Self { words: vec![apt.into()], own: None });
         }
-        let sudo = places.program("sudo").ok_or_else(|| Refusal::other("not root, and there is no sudo"))?;
+        let sudo = places.program("sudo").ok_or_else(|| Refusal::other("not root, and sudo was not found"))?;
         let mut asked = Command::new(&sudo);
         asked.args(["-n", "true"]).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
         if !asked.status().is_ok_and(|status| status.success()) {
-            return Err(Refusal::other("not root, and sudo asks for a password"));
+            return Err(Refusal::other("not root, and sudo requires a password"));
         }
-        // sudo hands no environment on.
+        // sudo clears the environment.
         let words = vec![sudo.into(), "-n".into(), "env".into(), NO_QUESTIONS.into(), PLAIN.into(), apt.into()];
         Ok(Self { words, own: None })
     }
 
-    /// One that only downloads, into `folder`, as if nothing were installed.
+    /// An apt that only downloads into `folder`, and treats every package as not installed.
     ///
     /// # Errors
-    /// What the file system says.
+    /// If the folders cannot be created.
     pub fn of_its_own(apt: &Path, folder: &Path) -> io::Result<Self> {
         let folder = folder.join("apt");
         for path in ["state/lists/partial", "cache/archives/partial"] {
@@ -94,32 +94,32 @@ impl Apt {
             at("State::status", "status"),
             at("Cache", "cache"),
             at("Log", "log"),
-            // As root apt would become another user, who may not write here.
+            // As root, apt would switch to a user who may not write here.
             "-oAPT::Sandbox::User=root".into(),
             "-oAcquire::Languages=none".into(),
         ];
         Ok(Self { words: words.into(), own: Some(folder) })
     }
 
-    /// How it is run, for people.
+    /// The command as shown to the user.
     #[must_use]
     pub fn shown(&self, packages: &[&str]) -> String {
         let sudo = self.words.first().is_some_and(|word| Path::new(word).ends_with("sudo"));
         format!("{}apt-get install {}", if sudo { "sudo " } else { "" }, packages.join(" "))
     }
 
-    /// Installs packages; rather not at all than with the removal of another.
+    /// Installs packages. Refuses if another package would have to be removed.
     ///
     /// # Errors
-    /// Why not, in words.
+    /// Why the installation failed.
     pub fn install(&self, packages: &[&str]) -> Result<(), Refusal> {
         self.run(&["--no-remove"], packages)
     }
 
-    /// Downloads packages with all that they depend on; the files.
+    /// Downloads packages with all their dependencies and returns the files.
     ///
     /// # Errors
-    /// Why not, in words.
+    /// Why the download failed.
     pub fn download(&self, packages: &[&str]) -> Result<Vec<PathBuf>, Refusal> {
         self.run(&["--download-only"], packages)?;
         let folder = self.own.as_deref().unwrap_or(Path::new("/var")).join("cache/archives");
@@ -133,16 +133,16 @@ impl Apt {
     }
 
     fn run(&self, options: &[&str], packages: &[&str]) -> Result<(), Refusal> {
-        // Lists may be old or absent on a fresh machine; if they cannot be had, the rest may still succeed.
+        // Package lists may be old or absent. If they cannot be updated, the installation may still succeed.
         let update = self.call(&["update", "-qq"], &[])?;
-        // Not `-qq`: what would be removed is not said then.
+        // Not `-qq`: that hides which packages would be removed.
         let options = [&["install", "-y", "-q", "--no-install-recommends"], options].concat();
         let install = self.call(&options, packages)?;
         if install.success() {
             return Ok(());
         }
-        let said = [update.stderr, install.stderr, install.stdout].join("\n");
-        Err(refusal(&said))
+        let output = [update.stderr, install.stderr, install.stdout].join("\n");
+        Err(refusal(&output))
     }
 
     fn call(&self, options: &[&str], packages: &[&str]) -> Result<process::ProgramOutput, Refusal> {
@@ -158,8 +158,8 @@ impl Apt {
     }
 }
 
-/// What apt printed, in one line.
-fn refusal(said: &str) -> Refusal {
+/// One line from the output of apt.
+fn refusal(output: &str) -> Refusal {
     const NO_NETWORK: [&str; 6] = [
         "Temporary failure resolving",
         "Could not resolve",
@@ -168,14 +168,14 @@ fn refusal(said: &str) -> Refusal {
         "Network is unreachable",
         "Connection timed out",
     ];
-    if NO_NETWORK.iter().any(|words| said.contains(words)) {
+    if NO_NETWORK.iter().any(|words| output.contains(words)) {
         return Refusal::NoNetwork;
     }
-    let mut removed = said.lines().skip_while(|line| !line.contains("will be REMOVED")).skip(1);
-    let line = |start: &str| said.lines().find_map(|line| line.strip_prefix(start)).map(str::trim);
+    let mut removed = output.lines().skip_while(|line| !line.contains("will be REMOVED")).skip(1);
+    let line = |start: &str| output.lines().find_map(|line| line.strip_prefix(start)).map(str::trim);
     Refusal::other(match removed.next() {
         Some(packages) => format!("apt-get would have to remove {}", packages.trim()),
-        None => format!("apt-get refuses: {}", line("E:").unwrap_or("it does not say why")),
+        None => format!("apt-get failed: {}", line("E:").unwrap_or("no reason given")),
     })
 }
 
@@ -184,14 +184,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_apt_prints_becomes_one_line() {
+    fn apt_output_is_reduced_to_one_line() {
         let removal = "The following packages will be REMOVED:\n  qemu-utils\nThe following NEW packages\n\
                        E: Packages need to be removed but remove is disabled.\n";
         assert_eq!(refusal(removal).to_string(), "apt-get would have to remove qemu-utils");
         let offline = "W: Failed to fetch x  Temporary failure resolving 'x'\nE: Unable to locate package a\n";
         assert_eq!(refusal(offline), Refusal::NoNetwork);
         let unknown = refusal("E: Unable to locate package a\n");
-        assert_eq!(unknown.to_string(), "apt-get refuses: Unable to locate package a");
-        assert!(refusal("").to_string().contains("does not say why"));
+        assert_eq!(unknown.to_string(), "apt-get failed: Unable to locate package a");
+        assert!(refusal("").to_string().contains("no reason given"));
     }
 }

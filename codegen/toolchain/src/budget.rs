@@ -1,48 +1,47 @@
-//! What a controller uses against what the spec allows and the part has; over it, who uses most and by how much to shrink.
+//! Resource use of a controller against the budget of the spec and the size of the part; for an excess, the largest users.
 
 use serde::Serialize;
 
 use specgen_language::model::Target;
 
-/// As many users as a refusal names.
+/// Number of users that a message lists.
 const NAMED: usize = 3;
 
-/// Figures of a built image.
+/// Resource use of a built image.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ImageUsage {
     /// Bytes of flash.
     pub flash: u64,
-    /// Who takes them: name, bytes.
+    /// Flash by owner: name, bytes.
     pub flash_by: Vec<(String, u64)>,
-    /// Bytes of RAM, State, settings and the stack of a tick included; none if a part of them is not known.
+    /// Bytes of RAM including `State`, settings and the stack of a tick; `None` if one of them is unknown.
     pub ram: Option<u64>,
-    /// Bytes of the parts that are known: it takes at least these.
+    /// Bytes of the known parts: a lower bound.
     pub ram_least: u64,
-    /// Who takes them: name, bytes.
+    /// RAM by owner: name, bytes.
     pub ram_by: Vec<(String, u64)>,
-    /// Bytes of the stack of a tick at most; none without a bound.
+    /// Stack bound of a tick, bytes; `None` if it cannot be bounded.
     pub stack: Option<u64>,
     /// Frames of the deepest path: function, bytes.
     pub stack_by: Vec<(String, u64)>,
-    /// Mean instructions of a tick, rounded up; none if not counted.
+    /// Mean instructions of a tick, rounded up; `None` if not counted.
     pub instructions: Option<u64>,
-    /// Its stages, by what they take of a tick.
+    /// Instructions by stage: name, instructions per tick.
     pub instructions_by: Vec<(String, u64)>,
 }
 
-/// A figure, and what holds it.
+/// A resource and its limit.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct BudgetLine {
     /// `flash`, `RAM`, `stack` or `instructions`.
     pub what: &'static str,
     /// Bytes; mean instructions of a tick.
     pub used: u64,
-    /// At most this, and who says so: a key of the spec, or the part. None: nobody.
+    /// The limit and its source: a key of the spec, or the part. `None` if there is no limit.
     pub most: Option<(u64, String)>,
 }
 
-/// Every figure with its limit. What is not known is left out: RAM of which a part is missing, a stack without a bound, instructions that were
-/// not counted.
+/// All known figures with their limits. Omits RAM if a part of it is unknown, an unbounded stack, and instructions that were not counted.
 #[must_use]
 pub fn held(target: &Target, used: &ImageUsage) -> Vec<BudgetLine> {
     let (part, budget) = (target.mcu.part(), &target.budget);
@@ -64,13 +63,13 @@ pub fn held(target: &Target, used: &ImageUsage) -> Vec<BudgetLine> {
     held
 }
 
-/// What is over budget, in words; nothing if all is within.
+/// One message per exceeded limit.
 #[must_use]
 pub fn over(target: &Target, used: &ImageUsage) -> Vec<String> {
     let mut over = Vec::new();
     let mut held = held(target, used);
     if used.ram.is_none() {
-        // A part that is too much is enough.
+        // The known parts alone may exceed the limit.
         let part = ImageUsage { ram: Some(used.ram_least), ..ImageUsage::default() };
         held.extend(self::held(target, &part).into_iter().filter(|one| one.what == "RAM"));
     }
@@ -84,7 +83,7 @@ pub fn over(target: &Target, used: &ImageUsage) -> Vec<String> {
         };
         let verb = if from.contains('.') { "allows" } else { "has" };
         over.push(format!(
-            "{what} takes {}{} {unit}, {from} {verb} {}: shrink it by {}{}",
+            "{what} uses {}{} {unit}, {from} {verb} {}: reduce it by {}{}",
             if what == "RAM" && used.ram.is_none() { "at least " } else { "" },
             group(amount),
             group(most),
@@ -108,7 +107,7 @@ fn users(by: &[(String, u64)], whole: u64) -> String {
         .take(NAMED)
         .map(|(name, amount)| format!("{name} {} ({} %)", group(*amount), share(*amount)))
         .collect();
-    if named.is_empty() { String::new() } else { format!("; most of it: {}", named.join(", ")) }
+    if named.is_empty() { String::new() } else { format!("; largest: {}", named.join(", ")) }
 }
 
 /// A count with thousands separated.
@@ -146,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_over_is_named_with_who_takes_most_and_by_how_much_to_shrink() {
+    fn an_excess_is_reported_with_the_largest_users() {
         let mut target = Target { mcu: Mcu::Mps2An500, budget: Budget::NONE };
         assert_eq!(over(&target, &used()), Vec::<String>::new());
         target.budget =
@@ -155,14 +154,12 @@ mod tests {
         target.budget.instructions = Some(4000);
         assert_eq!(
             over(&target, &used()),
-            [
-                "instructions takes 4,107 per tick, target.budget.instructions allows 4,000: shrink it by 107; most of it: \
-                 load 1,761 (43 %), learn 437 (11 %)"
-            ]
+            ["instructions uses 4,107 per tick, target.budget.instructions allows 4,000: reduce it by 107; largest: \
+                 load 1,761 (43 %), learn 437 (11 %)"]
         );
         target.budget.flash = Some(59_999);
         let words = over(&target, &used()).join("\n");
-        assert!(words.contains("shrink it by 1; most of it: controller 40,000 (67 %), runtime"), "{words}");
+        assert!(words.contains("reduce it by 1; largest: controller 40,000 (67 %), runtime"), "{words}");
         (target.budget.ram, target.budget.stack) = (Some(1), Some(1));
         assert_eq!(over(&target, &used()).len(), 4);
         assert!(
@@ -180,7 +177,7 @@ mod tests {
         assert_eq!(over(&target, &part), Vec::<String>::new());
         target.budget.ram = Some(1439);
         let words = over(&target, &part).join("\n");
-        assert!(words.contains("RAM takes at least 1,440 bytes") && words.contains("shrink it by 1"), "{words}");
+        assert!(words.contains("RAM uses at least 1,440 bytes") && words.contains("reduce it by 1"), "{words}");
     }
 
     #[test]
@@ -188,7 +185,7 @@ mod tests {
         let target = Target { mcu: Mcu::named("stm32f446re").unwrap(), budget: Budget::NONE };
         assert_eq!(over(&target, &used()), Vec::<String>::new());
         let words = over(&target, &ImageUsage { flash: 600_000, ..used() }).join("\n");
-        assert!(words.contains("stm32f446re has 524,288") && words.contains("shrink it by 75,712"), "{words}");
+        assert!(words.contains("stm32f446re has 524,288") && words.contains("reduce it by 75,712"), "{words}");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Builds DIR/qemu of an emitted workspace into an image.
+//! Builds `DIR/qemu` of an emitted workspace into an image.
 
 use super::cache;
 use super::error::TargetError;
@@ -12,19 +12,19 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-/// Building `core`, the dependencies and the image from nothing takes about a minute on two cores.
+/// A clean build of `core`, the dependencies and the image takes about a minute on two cores.
 const LIMIT: Duration = Duration::from_secs(900);
 
 /// A linked image, ready for [`replay`](super::replay()) and the analyses.
 #[derive(Debug, Clone)]
 pub struct Image {
-    /// The part that it is for.
+    /// The part that it was built for.
     pub mcu: Mcu,
     /// The ELF file.
     pub elf: Vec<u8>,
-    /// Where cargo left it; the next build into the same folder overwrites it.
+    /// Where cargo put it; the next build into the same folder overwrites it.
     pub path: PathBuf,
-    /// `rustc --version` of the compiler that made it.
+    /// `rustc --version` of its compiler.
     pub compiler: String,
 }
 
@@ -33,12 +33,12 @@ pub const EMULATED: &str = "qemu";
 
 /// Builds `dir/qemu` for the core of `mcu`, with the toolchain that [`toolchain::find`] finds.
 ///
-/// `target_dir` keeps what can be used again: share it between builds. It is locked while one runs.
+/// `target_dir` holds reusable build products: share it between builds. It is locked during a build.
 /// `Cargo.lock` is respected; nothing is downloaded if the crates are in cargo's cache.
 ///
 /// # Errors
-/// [`TargetError::MissingTool`] without a cross compiler, [`TargetError::BrokenTool`] if it lacks a crate or a part of its own,
-/// [`TargetError::PanicPath`] if the controller can panic, [`TargetError::BuildFailed`] for everything else that cargo says.
+/// [`TargetError::MissingTool`] without a cross compiler, [`TargetError::BrokenTool`] if a crate or a component of it is missing,
+/// [`TargetError::PanicPath`] if the controller can panic, [`TargetError::BuildFailed`] for any other error of cargo.
 pub fn build_image(dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, TargetError> {
     build_image_with(&toolchain::find()?, dir, mcu, target_dir)
 }
@@ -51,7 +51,7 @@ pub fn build_image_with(toolchain: &Toolchain, dir: &Path, mcu: Mcu, target_dir:
     build_program(toolchain, dir, EMULATED, mcu, target_dir, &["--bin", "replay"])
 }
 
-/// Builds the image of `dir/qemu` that `specgen_operate::pil` talks to, as [`build_image`] does that of the replay.
+/// Like [`build_image`], but builds the image that `specgen_operate::pil` talks to.
 ///
 /// # Errors
 /// As [`build_image`].
@@ -59,7 +59,7 @@ pub fn build_pil(dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, Targe
     build_program(&toolchain::find()?, dir, EMULATED, mcu, target_dir, &["--bin", "pil", "--features", "pil"])
 }
 
-/// Builds the firmware in `dir/folder` for `mcu`; `lockstep`: so that a host may step its machine.
+/// Builds the firmware in `dir/folder` for `mcu`; with `lockstep`, a host can step the machine tick by tick.
 ///
 /// # Errors
 /// As [`build_image`].
@@ -86,10 +86,10 @@ fn build_program(
     let package = dir.join(folder);
     let place = if folder == EMULATED { mcu.part().emulated } else { mcu.part().name };
     let what = format!("{} for {place}", package.display());
-    // Parts share the folder: cargo keeps what was made with other flags, and what runs on the host is made once.
+    // All parts share one target folder: cargo keeps builds with other flags apart and compiles host tools only once.
     let request = BuildRequest { package: &package, target_dir, rustc_args: &[], locked: true };
     let cpu = format!("-Ctarget-cpu={}", mcu.part().core);
-    // A package may have several images; the one that is meant comes last.
+    // A package may have several images; the requested one comes last.
     let link = |command: &mut Command| {
         cargo_artifact(command, &request, &what, |message| message["executable"].as_str().map(PathBuf::from))
     };
@@ -100,10 +100,10 @@ fn build_program(
     };
     let executable = link(&mut cargo()).map_err(|error| match error {
         TargetError::PanicPath { what, text } => {
-            // Once more without the proof, to see where the panic paths are.
+            // Link again without the panic check, to locate the panic paths.
             let traced = link(cargo().env("SPECGEN_LOCATE_PANICS", "1"));
             let sites = traced.and_then(|image| panics::sites(&image.bytes));
-            // The first error stands whether or not the search for its cause succeeds.
+            // Report the original error even if the search fails.
             let text = sites.map_or(text, |sites| sites.join("\n"));
             TargetError::PanicPath { what, text }
         }
@@ -114,9 +114,9 @@ fn build_program(
 
 /// A file that cargo built.
 pub(super) struct Artifact {
-    /// Where cargo left it, or where what was [kept](cache) was put. Another build into the same folder overwrites it.
+    /// Where cargo put it, or where a [cached](cache) build was restored. Another build into the same folder overwrites it.
     pub path: PathBuf,
-    /// Its content, read before any other build could.
+    /// Its content, read before another build can replace it.
     pub bytes: Vec<u8>,
 }
 
@@ -124,15 +124,15 @@ pub(super) struct Artifact {
 pub(super) struct BuildRequest<'a> {
     /// Folder of the package.
     pub package: &'a Path,
-    /// Where cargo keeps its work.
+    /// The target folder of cargo.
     pub target_dir: &'a Path,
-    /// For `cargo rustc`: what follows `--`.
+    /// Arguments of `cargo rustc` after `--`.
     pub rustc_args: &'a [&'a str],
-    /// Refuse if `Cargo.lock` is absent or does not fit: for packages with dependencies from a registry.
+    /// Fail if `Cargo.lock` is absent or out of date: for packages with registry dependencies.
     pub locked: bool,
 }
 
-/// Runs a cargo build and reads the artifact that `pick` recognises among cargo's messages.
+/// Runs a cargo build and reads the artifact that `pick` selects from cargo's messages.
 pub(super) fn cargo_artifact(
     command: &mut Command,
     request: &BuildRequest<'_>,
@@ -146,13 +146,13 @@ pub(super) fn cargo_artifact(
     fs::create_dir_all(&target_dir).map_err(|e| TargetError::io("creating", &target_dir, e))?;
     let lock_path = target_dir.join("specgen.lock");
     let lock = File::create(&lock_path).map_err(|e| TargetError::io("creating", &lock_path, e))?;
-    // Cargo's own lock ends with cargo; this one lasts until the artifact is read. Dropping the file frees it.
+    // Cargo releases its own lock when it exits; this one is held until the artifact has been read.
     lock.lock().map_err(|e| TargetError::io("locking", &lock_path, e))?;
     if let Some((path, bytes)) = slot.as_ref().map(|slot| slot.fetch(&target_dir)).transpose()?.flatten() {
         return Ok(Artifact { path, bytes });
     }
     command
-        // Cargo reads its configuration from the working folder upwards, so work where the package is.
+        // Cargo reads its configuration from the working folder upwards, so run it in the package.
         .current_dir(package)
         .args(["--message-format=json-render-diagnostics", "--color=never"])
         .arg("--target-dir")
@@ -177,21 +177,21 @@ pub(super) fn cargo_artifact(
         .next_back()
         .ok_or_else(|| TargetError::BuildFailed {
             what: what.to_owned(),
-            text: "cargo reports success, but no artifact of the expected kind".into(),
+            text: "cargo succeeded but reported no artifact of the expected kind".into(),
         })?;
     let bytes = fs::read(&path).map_err(|e| TargetError::io("reading", &path, e))?;
-    // What cargo found made and only took for up to date may have been damaged since it was.
+    // If cargo considered the artifact fresh, it may have been damaged since it was built: do not cache it.
     if let Some(slot) = slot.filter(|_| !fresh) {
         slot.keep(&target_dir, &path, &bytes);
     }
     Ok(Artifact { path, bytes })
 }
 
-/// What cargo printed, in our words where we know better.
+/// Turns cargo's output into an error, in our own words for known causes.
 fn failure(what: &str, finished: &ProgramOutput) -> TargetError {
     let text = useful_part(&finished.stderr);
     if finished.status.is_none() {
-        let text = format!("still running after {} s, ended; it had printed:\n{text}", LIMIT.as_secs());
+        let text = format!("stopped after the limit of {} s; output so far:\n{text}", LIMIT.as_secs());
         return TargetError::BuildFailed { what: what.to_owned(), text };
     }
     let is_proof = |line: &&str| line.contains("undefined") && line.contains("specgen_panic_path_remains");
@@ -199,7 +199,7 @@ fn failure(what: &str, finished: &ProgramOutput) -> TargetError {
         let text = line.trim().to_owned();
         return TargetError::PanicPath { what: what.to_owned(), text };
     }
-    // The machine's fault, not the workspace's: no network for a crate, a compiler that is there by half.
+    // The machine is at fault, not the workspace: no network for a crate, or an incomplete compiler.
     const BROKEN: [&str; 5] = [
         "failed to download",
         "failed to get `",
@@ -214,7 +214,7 @@ fn failure(what: &str, finished: &ProgramOutput) -> TargetError {
     TargetError::BuildFailed { what: what.to_owned(), text }
 }
 
-/// From the first error on, without the linker's command line, at most forty lines.
+/// The output from the first error on, without the linker's command line; at most forty lines.
 fn useful_part(stderr: &str) -> String {
     let lines: Vec<&str> = stderr
         .lines()

@@ -1,10 +1,10 @@
-//! Builds that are kept by what they are made of, so that nothing is compiled twice: `builds` in the
-//! [folder of the user's cache](user_cache::folder).
+//! Build cache in `builds` of the [user's cache folder](user_cache::folder), keyed by everything that determines the bytes of a
+//! build.
 //!
-//! An entry is one file: its name is the `key` of the build, its first line the SHA-256 of that name and of all that follows.
-//! It is written beside its place and renamed, and checked whenever it is taken: one that is damaged is removed and built
-//! anew. What was used longest ago goes first when there is too much. Programs that run at once may share the folder. Where it
-//! cannot be written, builds are made as if it were not there; [`trouble`] says so.
+//! An entry is one file. Its name is the `key` of the build; its first line is the SHA-256 of that name and of the rest of the
+//! file. It is written to a temporary file, renamed, and verified on every use. A damaged entry is removed and rebuilt. When the
+//! cache is full, the least recently used entries are removed first. Concurrent programs may share the folder. If the folder
+//! cannot be written, builds run without a cache and [`trouble`] returns a warning.
 
 mod key;
 
@@ -22,18 +22,18 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::SystemTime;
 
-/// Bytes that are kept at most. A host library has half a million, a program of a real-time PC ten times as many.
+/// Size limit, bytes. A host library takes half a megabyte, a program for a real-time PC ten times as much.
 pub const LIMIT: u64 = 1_000_000_000;
 
 static OFF: AtomicBool = AtomicBool::new(false);
 static TROUBLE: Mutex<Option<String>> = Mutex::new(None);
 
-/// From now on this process takes nothing that was kept and keeps nothing.
+/// Disables the cache for the rest of this process.
 pub fn switch_off() {
     OFF.store(true, Ordering::Relaxed);
 }
 
-/// The first thing that went wrong with kept builds in this process, in words for a warning. No build fails by it.
+/// The first problem with the cache in this process, as a warning. A build never fails because of the cache.
 #[must_use]
 pub fn trouble() -> Option<String> {
     TROUBLE.lock().ok()?.clone()
@@ -45,31 +45,31 @@ fn say(text: String) {
     }
 }
 
-/// The folder of kept builds.
+/// The build cache.
 #[derive(Debug, Clone)]
 pub struct Cache {
     folder: PathBuf,
     limit: u64,
 }
 
-/// How much is kept.
+/// Size of the cache.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Extent {
-    /// Builds.
+    /// Number of builds.
     pub builds: usize,
-    /// Bytes that they take.
+    /// Bytes.
     pub bytes: u64,
 }
 
-/// What was found under a key.
+/// A cached artifact.
 #[derive(Debug, PartialEq, Eq)]
 struct CachedFile {
-    /// Where cargo had left it in its target folder.
+    /// Path within cargo's target folder.
     place: PathBuf,
     bytes: Vec<u8>,
 }
 
-/// A file in the folder.
+/// A file in the cache folder.
 struct Entry {
     path: PathBuf,
     used: SystemTime,
@@ -77,39 +77,39 @@ struct Entry {
 }
 
 impl Entry {
-    /// Whether it is a whole build, and not what an ended process left.
+    /// False for a temporary file that a killed process left.
     fn is_build(&self) -> bool {
         self.path.extension().is_none()
     }
 }
 
 impl Cache {
-    /// That of the user; none if [`user_cache::folder`] has none.
+    /// The user's cache; `None` if [`user_cache::builds`] has none.
     #[must_use]
     pub fn of_user() -> Option<Self> {
         Some(Self { folder: user_cache::builds()?, limit: LIMIT })
     }
 
-    /// Where it is, whether or not something is kept yet.
+    /// Its folder, which may not exist yet.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// How much is in it now.
+    /// Its current size.
     ///
     /// # Errors
-    /// [`TargetError::Io`] if it cannot be listed.
+    /// [`TargetError::Io`] if the folder cannot be listed.
     pub fn extent(&self) -> Result<Extent, TargetError> {
         let entries = self.entries().map_err(|e| TargetError::io("listing", &self.folder, e))?;
         let builds = entries.iter().filter(|entry| entry.is_build()).count();
         Ok(Extent { builds, bytes: entries.iter().map(|entry| entry.bytes).sum() })
     }
 
-    /// Removes all that is kept, and says how much that was.
+    /// Removes all entries and returns their total size.
     ///
     /// # Errors
-    /// [`TargetError::Io`] if something cannot be removed.
+    /// [`TargetError::Io`] if a file cannot be removed.
     pub fn clear(&self) -> Result<Extent, TargetError> {
         let extent = self.extent()?;
         for entry in self.entries().map_err(|e| TargetError::io("listing", &self.folder, e))? {
@@ -118,7 +118,7 @@ impl Cache {
         Ok(extent)
     }
 
-    /// All files; none if there is no folder.
+    /// All files; empty if the folder does not exist.
     fn entries(&self) -> io::Result<Vec<Entry>> {
         let listed = match fs::read_dir(&self.folder) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
@@ -127,7 +127,7 @@ impl Cache {
         let mut entries = Vec::new();
         for entry in listed {
             let entry = entry?;
-            // Another process may just have removed it.
+            // Another process may have removed it just now.
             let Ok(metadata) = entry.metadata() else { continue };
             if metadata.is_file() {
                 entries.push(Entry { path: entry.path(), used: metadata.modified()?, bytes: metadata.len() });
@@ -136,7 +136,7 @@ impl Cache {
         Ok(entries)
     }
 
-    /// What is kept under this key, if it is there and whole.
+    /// The entry for this key, if it exists and is intact.
     fn fetch(&self, key: &str) -> Option<CachedFile> {
         let path = self.folder.join(key);
         let mut file = File::open(&path).ok()?;
@@ -144,15 +144,15 @@ impl Cache {
         let read = file.read_to_end(&mut content);
         let found = read.ok().and_then(|_| unpack(key, &content));
         if found.is_none() {
-            say(format!("a kept build was damaged and is built anew: {}", path.display()));
+            say(format!("a cached build was damaged and is rebuilt: {}", path.display()));
             let _ = remove(&path);
         }
-        // For whoever looks for what was used longest ago; on a read-only disk nobody does.
+        // Marks the entry as recently used. Failing on a read-only disk is harmless.
         let _ = file.set_modified(SystemTime::now());
         found
     }
 
-    /// Keeps a build, and lets go of others if there is too much.
+    /// Stores a build and removes old ones if the cache is too large.
     fn keep(&self, key: &str, place: &Path, bytes: &[u8]) -> io::Result<()> {
         let content = pack(key, place, bytes);
         if content.len() as u64 > self.limit {
@@ -166,7 +166,7 @@ impl Cache {
     fn make_room(&self, newest: &str) -> io::Result<()> {
         let mut entries = self.entries()?;
         let mut bytes: u64 = entries.iter().map(|entry| entry.bytes).sum();
-        // Two of the same moment: whichever, but the same one everywhere.
+        // Ties are broken by path, so that the order is deterministic.
         entries.sort_by(|a, b| (a.used, &a.path).cmp(&(b.used, &b.path)));
         for entry in entries.iter().filter(|entry| !entry.path.ends_with(newest)) {
             if bytes <= self.limit {
@@ -179,7 +179,7 @@ impl Cache {
     }
 }
 
-/// Removes a file that another process may have removed before.
+/// Removes a file; it is no error if another process already did.
 fn remove(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
@@ -187,7 +187,7 @@ fn remove(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Writes a file beside its place and renames it: nobody finds half of it, and whoever has mapped or runs the old one keeps it.
+/// Replaces a file atomically: readers never see half of it, and a process that has mapped or runs the old file keeps it.
 pub(super) fn replace(path: &Path, content: &[u8], executable: bool) -> io::Result<()> {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let _whole = interrupt::whole();
@@ -205,7 +205,7 @@ pub(super) fn replace(path: &Path, content: &[u8], executable: bool) -> io::Resu
     })
 }
 
-/// Digest, place and content; the digest covers the key, so that an entry under another name is none.
+/// Digest, path and content. The digest covers the key, so an entry under another name is invalid.
 fn pack(key: &str, place: &Path, bytes: &[u8]) -> Vec<u8> {
     let body = [place.as_os_str().as_encoded_bytes(), b"\n", bytes].concat();
     let digest = sha256(&[key.as_bytes(), b"\n", &body].concat());
@@ -224,15 +224,15 @@ fn unpack(key: &str, content: &[u8]) -> Option<CachedFile> {
     is_below.then(|| CachedFile { place, bytes: body[end + 1..].to_vec() })
 }
 
-/// One build to be made or taken.
+/// A cache slot for one build.
 pub(super) struct Slot {
     cache: Cache,
     recipe: Recipe,
 }
 
 impl Slot {
-    /// The place for what `command` makes of `package` with `rustc_args`; none if nothing is to be kept, or if something may
-    /// decide about the bytes that a key does not see.
+    /// The slot for building `package` with `command` and `rustc_args`; `None` if the cache is off, or if something outside the key could
+    /// change the output.
     pub fn of(command: &Command, package: &Path, rustc_args: &[&str]) -> Option<Self> {
         let cache = if OFF.load(Ordering::Relaxed) { None } else { Cache::of_user() }?;
         Self::within(cache, command, package, rustc_args)
@@ -242,10 +242,10 @@ impl Slot {
         Some(Self { cache, recipe: Recipe::of(command, package, rustc_args)? })
     }
 
-    /// What was made earlier, if it was, put where cargo would have left it in `target_dir`: path and bytes.
+    /// A cached build, restored to its path in `target_dir`: path and bytes.
     ///
     /// # Errors
-    /// [`TargetError::Io`] if it cannot be put there.
+    /// [`TargetError::Io`] if it cannot be written.
     pub fn fetch(&self, target_dir: &Path) -> Result<Option<(PathBuf, Vec<u8>)>, TargetError> {
         let Some(CachedFile { place, bytes }) = self.cache.fetch(&self.recipe.key()) else { return Ok(None) };
         let path = target_dir.join(place);
@@ -253,18 +253,18 @@ impl Slot {
         Ok(Some((path, bytes)))
     }
 
-    /// Keeps what was built, unless its sources were changed meanwhile.
+    /// Stores what was built, unless its sources have changed since.
     pub fn keep(self, target_dir: &Path, built: &Path, bytes: &[u8]) {
         let Ok(place) = built.strip_prefix(target_dir) else { return };
         if self.recipe.is_current()
             && let Err(error) = self.cache.keep(&self.recipe.key(), place, bytes)
         {
-            say(format!("what was built could not be kept in {}: {error}", self.cache.folder.display()));
+            say(format!("the build could not be cached in {}: {error}", self.cache.folder.display()));
         }
     }
 }
 
-/// Makes sure that a library or program has this content. What is there already is read and compared, not believed.
+/// Ensures that a library or program has this content. An existing file is read and compared.
 pub(super) fn put(path: &Path, bytes: &[u8]) -> Result<(), TargetError> {
     if fs::read(path).is_ok_and(|there| there == bytes) {
         return Ok(());

@@ -1,7 +1,7 @@
-//! Who calls whom in a linked Thumb-2 image, read from its instructions.
+//! Call graph of a linked Thumb-2 image, read from its instructions.
 //!
-//! The branches themselves are decoded, so that neither relocations nor a disassembler is needed; mapping
-//! symbols distinguish code from data. What cannot be followed is kept, never dropped.
+//! Branches are decoded directly, so neither relocations nor a disassembler are needed; mapping
+//! symbols distinguish code from data. Unresolvable branches are recorded, never dropped.
 
 use super::error::TargetError;
 use super::thumb::{self, Branch};
@@ -11,21 +11,21 @@ use std::collections::{BTreeMap, BTreeSet};
 /// A function of the image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Function {
-    /// Demangled; the first in alphabetical order if several symbols stand here.
+    /// Demangled; the first in alphabetical order if several symbols share the address.
     pub name: String,
     /// Bytes of code and literals.
     pub size: u64,
-    /// Bytes of stack that it takes for itself: as the compiler says, else as its instructions say, else unknown.
+    /// Bytes of its own stack frame: from the compiler, else from its instructions, else unknown.
     pub frame: Option<u64>,
-    /// Whether [`Function::frame`] is what the compiler says.
+    /// Whether [`Function::frame`] comes from the compiler.
     pub from_compiler: bool,
-    /// The frame from its instructions alone.
+    /// Frame size from the instructions alone.
     pub pushed: Option<u64>,
-    /// Addresses of the functions that it calls or ends in, each with the addresses where it does.
+    /// Addresses of called functions, tail calls included, each with the addresses of the calls.
     pub calls: BTreeMap<u64, Vec<u64>>,
     /// Addresses of calls and jumps through a register.
     pub indirect: Vec<u64>,
-    /// Branch targets outside of it that are no function's start.
+    /// Branch targets outside the function that are not the start of a function.
     pub strays: Vec<u64>,
 }
 
@@ -71,7 +71,7 @@ impl CallGraph {
             let Some((section_end, code)) = section_at(&file, address)? else {
                 continue;
             };
-            // Assembly may declare no size: then it reaches to the next function.
+            // Assembly may declare no size: then the function extends to the next one.
             let next = starts.iter().find(|&&start| start > address).copied().unwrap_or(section_end);
             let size = if *declared > 0 { *declared } else { next.min(section_end) - address };
             let length = usize::try_from(size).unwrap_or(usize::MAX).min(code.len());
@@ -92,7 +92,7 @@ impl CallGraph {
                     function.add(instruction.place, branch, address..address + size, &names);
                 }
             }
-            // Its jump goes through a register, and leads to where its name says.
+            // A thunk jumps through a register to the function in its name.
             if let Some(target) = thunks.get(&address).and_then(|name| symbols.get(name)) {
                 function.calls = BTreeMap::from([(*target, std::mem::take(&mut function.indirect))]);
             }
@@ -122,14 +122,14 @@ impl Function {
     }
 }
 
-/// What the linker calls a jump to a function that is too far away for a branch: one in a memory of its own.
+/// Prefix of the linker's thunks: jumps to functions out of branch range, in another memory.
 const THUNK: &str = "__Thumbv7ABSLongThunk_";
 
 fn malformed(error: object::Error) -> TargetError {
     TargetError::MalformedImage { text: error.to_string() }
 }
 
-/// `$t`, `$d` and their numbered forms: code and data begin here (ARM IHI 0044, 5.5.5).
+/// `$t`, `$d` and their numbered forms mark the start of code and data (ARM IHI 0044, 5.5.5).
 fn mapping(name: &str) -> Option<bool> {
     match name.split('.').next() {
         Some("$t" | "$a") => Some(true),
@@ -138,13 +138,13 @@ fn mapping(name: &str) -> Option<bool> {
     }
 }
 
-/// End of the section that holds the address, and its bytes from there on.
+/// End of the section that contains the address, and its bytes from there on.
 fn section_at<'a>(file: &object::File<'a>, address: u64) -> Result<Option<(u64, &'a [u8])>, TargetError> {
     for section in file.sections() {
         let end = section.address() + section.size();
         if section.kind() == object::SectionKind::Text && (section.address()..end).contains(&address) {
             let data = section.data().map_err(malformed)?;
-            // The offset is below the section's size; an image that lies about its data gives no bytes.
+            // The offset is below the section's size; if the image lies about its data, the result is empty.
             let offset = usize::try_from(address - section.address()).unwrap_or(usize::MAX);
             return Ok(Some((end, data.get(offset..).unwrap_or_default())));
         }
@@ -184,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn uleb128_reads_several_bytes_and_refuses_a_cut_one() {
+    fn uleb128_reads_several_bytes_and_refuses_a_truncated_one() {
         assert_eq!(uleb128(&[0xe5, 0x8e, 0x26, 7]), Some((624_485, &[7][..])));
         assert_eq!(uleb128(&[0x80]), None);
     }

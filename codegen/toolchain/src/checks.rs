@@ -1,7 +1,7 @@
 //! What the tick of an image must not do: panic, allocate, call through a register, recurse, or compute `f64` in software.
 //!
-//! Everything that the tick can reach is looked at, by its branches ([`CallGraph`](super::callgraph)); a finding names the
-//! function and, where the image has line information, the lines that call it.
+//! Checks everything that the tick can reach ([`CallGraph`](super::callgraph)). A finding names the function and, if the image has line
+//! information, the lines that call it.
 
 use super::callgraph::{CallGraph, Function};
 use super::error::TargetError;
@@ -10,65 +10,65 @@ use super::{image, stack};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Functions that are one tick, under the names that targets give them.
+/// Names of the tick function on the different targets.
 pub const TICKS: [&str; 3] = ["specgen_tick", "specgen_supervise", stack::STEP_SYMBOL];
-/// As many places as a finding names.
+/// Number of places that a finding lists.
 const NAMED: usize = 4;
 
-/// What is asked of an image beyond its tick.
+/// Optional rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rules {
-    /// The core computes `f64` in software: then a tick must not.
+    /// The core computes `f64` in software, so a tick must not use it.
     pub single: bool,
-    /// No panic and no allocator anywhere, not only out of the tick's reach.
+    /// No panic and no allocator anywhere in the image, reachable or not.
     pub whole_image: bool,
 }
 
-/// A rule that is broken.
+/// A violated rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
-    /// A panic can be reached, or is in the image.
+    /// A panic is reachable, or present in the image.
     Panic,
-    /// An allocator can be reached, or is in the image.
+    /// An allocator is reachable, or present in the image.
     Allocation,
-    /// A call or jump through a register: where it leads is not known.
+    /// A call or jump through a register, whose target is unknown.
     IndirectCall,
     /// `f64` in software.
     SoftDouble,
-    /// A function that calls itself, or one that moves the stack pointer by what is only known in a run: no stack bound.
+    /// Recursion, or a stack frame whose size is only known at run time: no stack bound.
     Unbounded,
-    /// A tick used more stack than the bound allows: the bound is wrong.
+    /// A tick used more stack than the static bound: the bound is wrong.
     StackBound,
 }
 
-/// A broken rule and where.
+/// A violation and its place.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Fault {
-    /// Which.
+    /// The rule.
     pub rule: Rule,
-    /// Function, way there, lines.
+    /// Function, call path, source lines.
     pub text: String,
 }
 
-/// What was found out about the tick of an image.
+/// Result of checking the tick of an image.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct TickChecks {
-    /// The function that counts as one tick.
+    /// Name of the tick function.
     pub tick: String,
-    /// Functions that it can reach, itself included.
+    /// Number of reachable functions, itself included.
     pub functions: usize,
     /// Bytes of their code.
     pub code: u64,
-    /// Static bound of its stack, bytes; none if there is no bound.
+    /// Static stack bound, bytes; `None` if there is none.
     pub stack: Option<u64>,
     /// The deepest path, each function with its frame, bytes.
     pub path: Vec<(String, u64)>,
-    /// Broken rules; none in an image that may be flashed.
+    /// Violations; empty for an image that may be flashed.
     pub faults: Vec<Fault>,
 }
 
-/// Checks the tick of an image: `tick`, or the first of [`TICKS`] that it has.
+/// Checks the tick of an image: `tick`, or the first of [`TICKS`] that exists.
 ///
 /// # Errors
 /// [`TargetError::MalformedImage`] if the file is damaged or has no such function.
@@ -77,7 +77,7 @@ pub fn check(elf: &[u8], tick: Option<&str>, rules: Rules) -> Result<TickChecks,
     let debug = panics::debug_info(elf)?;
     let named = tick.or_else(|| TICKS.into_iter().find(|name| graph.symbols.contains_key(*name)));
     let root = named.ok_or_else(|| TargetError::MalformedImage {
-        text: format!("it has none of the functions {}: which one is the tick?", TICKS.join(", ")),
+        text: format!("none of the tick functions {} exists", TICKS.join(", ")),
     })?;
     let bound = stack::bound(elf, root)?;
     let start = graph.symbols.get(root).copied().or_else(|| by_name(&graph, root));
@@ -101,13 +101,13 @@ pub fn check(elf: &[u8], tick: Option<&str>, rules: Rules) -> Result<TickChecks,
         }
     }
     for cycle in &bound.recursion {
-        add(Rule::Unbounded, format!("{} call each other without end in sight", cycle.join(" and ")));
+        add(Rule::Unbounded, format!("{} form a recursion", cycle.join(" and ")));
     }
     for name in &bound.unsized_functions {
-        add(Rule::Unbounded, format!("{name} moves the stack pointer by what is only known in a run"));
+        add(Rule::Unbounded, format!("{name} moves the stack pointer by an amount known only at run time"));
     }
     for name in &bound.strays {
-        add(Rule::Unbounded, format!("{name} branches to what is no function"));
+        add(Rule::Unbounded, format!("{name} branches to an address that is not a function"));
     }
     if rules.whole_image {
         let footprint = image::footprint(elf)?;
@@ -117,7 +117,7 @@ pub fn check(elf: &[u8], tick: Option<&str>, rules: Rules) -> Result<TickChecks,
             (Rule::Allocation, footprint.allocator_symbols, "allocator"),
         ] {
             if !symbols.is_empty() && !reached(rule, &faults) {
-                faults.push(Fault { rule, text: format!("the image holds the {what} {}", some(&symbols)) });
+                faults.push(Fault { rule, text: format!("the image contains the {what} {}", some(&symbols)) });
             }
         }
     }
@@ -133,19 +133,19 @@ pub fn check(elf: &[u8], tick: Option<&str>, rules: Rules) -> Result<TickChecks,
 }
 
 impl TickChecks {
-    /// Adds the fault of a tick that was seen to use more stack than the bound.
+    /// Adds a violation if a tick was measured to use more stack than the bound.
     pub fn hold_against_painted(&mut self, painted: u64) {
         if let Some(bound) = self.stack
             && painted > bound
         {
-            let text = format!("a tick used {painted} bytes of stack, and the static bound is {bound}");
+            let text = format!("a tick used {painted} bytes of stack; the static bound is {bound}");
             self.faults.push(Fault { rule: Rule::StackBound, text });
         }
     }
 }
 
-/// Functions of `compiler_builtins` that do arithmetic or conversions of `f64`, by the names of the run-time ABI and by
-/// those of libgcc.
+/// Functions of `compiler_builtins` for arithmetic or conversions of `f64`, by their names in the run-time ABI and in
+/// libgcc.
 fn is_soft_double(name: &str) -> bool {
     let name = name.rsplit("::").next().unwrap_or(name);
     if let Some(helper) = name.strip_prefix("__aeabi_") {
@@ -167,15 +167,15 @@ fn some(names: &[String]) -> String {
     if more == 0 { list } else { format!("{list} and {more} more") }
 }
 
-/// Everything that a function can reach.
+/// Functions reachable from a root.
 struct Reach<'a> {
     graph: &'a CallGraph,
-    /// Each function that is reached, and the one that it was first reached from.
+    /// Each reachable function and its predecessor on a shortest path.
     parents: BTreeMap<u64, Option<u64>>,
 }
 
 impl<'a> Reach<'a> {
-    /// Breadth first, so that the way there is a shortest one.
+    /// Breadth first, for shortest paths.
     fn from(graph: &'a CallGraph, root: u64) -> Self {
         let mut parents = BTreeMap::from([(root, None)]);
         let mut ring = vec![root];
@@ -203,7 +203,7 @@ impl<'a> Reach<'a> {
         self.functions().filter(move |(_, function)| function.calls.contains_key(&callee))
     }
 
-    /// Function, the way to it from the tick, the lines that call it.
+    /// Message with the call path from the tick and the lines that call the function.
     fn words(&self, debug: &DebugInfo<'_>, what: &str, address: u64) -> Result<String, TargetError> {
         let name = |address: u64| self.graph.functions.get(&address).map_or("?", |function| function.name.as_str());
         let mut way = vec![name(address)];
@@ -228,7 +228,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn helpers_for_double_precision_are_told_from_others() {
+    fn helpers_for_double_precision_are_recognised() {
         let double = [
             "__aeabi_dmul",
             "__aeabi_dadd",
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bound_below_what_was_painted_is_a_fault() {
+    fn a_bound_below_the_painted_stack_is_a_fault() {
         let mut checked = TickChecks {
             tick: "t".to_owned(),
             functions: 1,

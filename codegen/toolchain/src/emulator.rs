@@ -1,4 +1,4 @@
-//! Runs an image in QEMU, in a folder of its own, with a time limit.
+//! Runs an image in QEMU, in its own folder, with a time limit.
 
 use super::build::Image;
 use super::error::TargetError;
@@ -15,31 +15,31 @@ pub struct Emulator {
     pub program: PathBuf,
     /// The first line of `--version`.
     pub version: String,
-    /// Folders of its libraries, if it does not find them by itself.
+    /// Folders of its libraries, if the loader does not find them.
     pub libraries: Vec<PathBuf>,
 }
 
-/// Its program, and the name of Debian's package.
+/// Name of the program and of Debian's package.
 pub(super) const PROGRAM: &str = "qemu-system-arm";
-/// A machine that every version has that is good enough.
+/// A machine that every sufficiently recent version has.
 const MACHINE: &str = "mps2-an500";
 
-/// How the firmware says why it ended: the codes of `firmware/qemu/src/semihosting.rs`.
+/// Exit codes of the firmware: see `firmware/qemu/src/semihosting.rs`.
 const EXITS: [(i32, &str); 8] = [
     (10, "the firmware cannot open config.bin"),
-    (11, "config.bin does not hold as many words as the controller's Config"),
+    (11, "config.bin does not have the number of words of the controller's Config"),
     (12, "the firmware cannot open input.bin"),
-    (13, "input.bin ends within a row: rows must hold as many words as the controller's TickInput"),
+    (13, "input.bin ends within a row: a row must have the number of words of the controller's TickInput"),
     (14, "the firmware cannot write output.bin or stats.bin; is the disk full?"),
-    (15, "the processor took a fault"),
-    (16, "the machine that is timed does not run on"),
-    (20, "tables or settings in the image are not what specgen wrote: it was changed after the link"),
+    (15, "the processor raised a fault"),
+    (16, "the machine under timing left the phase Running"),
+    (20, "tables or settings in the image were changed after linking"),
 ];
-/// Statuses from here on name the word of the configuration that the controller refuses.
+/// Exit codes from here on give the index of the configuration word that the controller refuses.
 const CONFIG_REFUSED: i32 = 64;
 
 impl Emulator {
-    /// The first that works, on `PATH`, in the usual folders, or among what [`provision`](super::provision) has unpacked.
+    /// The first working emulator on `PATH`, in the usual folders, or unpacked by [`provision`](super::provision).
     ///
     /// # Errors
     /// [`TargetError::MissingTool`] with the command that installs it.
@@ -47,10 +47,10 @@ impl Emulator {
         Self::find_in(&Places::here())
     }
 
-    /// [`Emulator::find`] in given places.
+    /// [`Emulator::find`] in the given places.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Emulator::find`].
     pub fn find_in(places: &Places) -> Result<Self, TargetError> {
         let unpacked = places.unpacked(PROGRAM).and_then(|at| Some((at.program(PROGRAM)?, at.libraries())));
         let candidates: Vec<_> = places.all(PROGRAM).map(|program| (program, Vec::new())).chain(unpacked).collect();
@@ -60,14 +60,14 @@ impl Emulator {
             looked: match candidates.first() {
                 None => format!("{PROGRAM} on PATH and in specgen's cache"),
                 Some((broken, _)) => {
-                    format!("{PROGRAM} that works; {} does not run, or does not know {MACHINE}", broken.display())
+                    format!("a working {PROGRAM}; {} does not run or does not support {MACHINE}", broken.display())
                 }
             },
-            command: format!("{}   (by hand: {})", super::SET_UP, install_command()),
+            command: format!("{}   (manually: {})", super::SET_UP, install_command()),
         })
     }
 
-    /// The program, if it runs and knows the machine.
+    /// The program, if it runs and supports the machine.
     fn at(program: &Path, libraries: &[PathBuf]) -> Option<Self> {
         let version = first_line(with_libraries(Command::new(program).arg("--version"), libraries))?;
         let mut machines = Command::new(program);
@@ -77,12 +77,12 @@ impl Emulator {
         knows.then(|| Self { program: program.to_owned(), version, libraries: libraries.to_vec() })
     }
 
-    /// Runs the image to its end with `folder` as its working folder: semihosting files live there.
+    /// Runs the image to its end in `folder`, which holds the semihosting files.
     ///
-    /// `-icount shift=10` makes the run repeatable and lets the firmware count instructions. `more` are arguments besides.
+    /// `-icount shift=10` makes the run repeatable and lets the firmware count instructions. `more` are additional arguments.
     ///
     /// # Errors
-    /// [`TargetError::EmulatorTimeout`] at the limit, [`TargetError::EmulatorFailed`] for any other end than
+    /// [`TargetError::EmulatorTimeout`] at the limit, [`TargetError::EmulatorFailed`] for any exit other than
     /// the firmware's own "done".
     pub fn run(&self, image: &Image, folder: &Path, more: &[&str], limit: Duration) -> Result<(), TargetError> {
         let mut command = self.command(image, folder)?;
@@ -98,7 +98,7 @@ impl Emulator {
         Err(TargetError::EmulatorFailed { text: ended(status, &finished.stderr) })
     }
 
-    /// What starts the image with `folder` as its working folder.
+    /// The command that runs the image in `folder`.
     pub fn command(&self, image: &Image, folder: &Path) -> Result<Command, TargetError> {
         let kernel = folder.join("image.elf");
         std::fs::write(&kernel, &image.elf).map_err(|e| TargetError::io("writing", &kernel, e))?;
@@ -113,13 +113,13 @@ impl Emulator {
     }
 }
 
-/// What installs it, for whoever may.
+/// The command that installs it.
 #[must_use]
 pub fn install_command() -> String {
     if cfg!(target_os = "macos") { "brew install qemu".into() } else { format!("apt-get install {PROGRAM} on Debian") }
 }
 
-/// Why it ended, and what it printed.
+/// Reason of the exit, and what the emulator printed.
 pub fn ended(status: ExitStatus, stderr: &str) -> String {
     let mut text = match status.code() {
         Some(code) if code >= CONFIG_REFUSED => format!(

@@ -1,4 +1,4 @@
-//! The Unicorn engine, on which the repository's emulated boards run: a library that is opened at run time (`tests/board`).
+//! The Unicorn engine, which runs the repository's emulated boards (`tests/board`): a library loaded at run time.
 
 use super::error::TargetError;
 use super::places::Places;
@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 /// Debian's package.
 pub(super) const PACKAGE: &str = "libunicorn2";
 const FILE: &str = "libunicorn.so.2";
-/// The variable of the environment that names the library instead.
+/// Environment variable with the path of the library.
 const VARIABLE: &str = "SPECGEN_UNICORN";
-/// Where the system has libraries, with one folder for each architecture in it.
+/// The system's library folders are below this one, one per architecture.
 const USUAL: &str = "/usr/lib";
 
-/// The library, where it is named, among the system's, or among what was unpacked.
+/// The library from [`VARIABLE`], the system's folders, or the unpacked packages.
 ///
 /// # Errors
 /// [`TargetError::MissingTool`] with the command that installs it.
@@ -24,12 +24,12 @@ pub fn find_in(places: &Places) -> Result<PathBuf, TargetError> {
     let found = named.into_iter().chain(folders.map(|folder| folder.join(FILE))).find(|file| file.is_file());
     found.ok_or_else(|| TargetError::MissingTool {
         tool: "the Unicorn engine".into(),
-        looked: format!("{FILE} among the system's libraries and in specgen's cache, and {VARIABLE}"),
+        looked: format!("{FILE} in the system's library folders and specgen's cache, and in {VARIABLE}"),
         command: install_command(),
     })
 }
 
-/// What installs it, for whoever may.
+/// The command that installs it.
 #[must_use]
 pub fn install_command() -> String {
     format!("apt-get install {PACKAGE} on Debian; elsewhere set {VARIABLE} to the library of unicorn 2")

@@ -1,40 +1,40 @@
-//! What can go wrong between an emitted workspace and its measured figures.
+//! Errors between an emitted workspace and its measured figures.
 
 use std::fmt;
 use std::path::PathBuf;
 
 use specgen_language::outcome::Failure;
 
-/// A failure of a tool, of a build or of the emulator, with what to do about it.
+/// A failure of a tool, a build or the emulator, with advice.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum TargetError {
     /// A tool is not installed. Exit code class "environment".
     MissingTool {
-        /// What is missing.
+        /// The tool.
         tool: String,
-        /// Where it was looked for.
+        /// Where it was searched.
         looked: String,
         /// The command that installs it.
         command: String,
     },
-    /// A tool could not be brought onto this machine.
+    /// A tool could not be installed.
     SetUpFailed {
-        /// What is missing.
+        /// The tool.
         tool: String,
-        /// Each way that was tried, and where it ended.
+        /// Each method that was tried, and why it failed.
         tried: Vec<String>,
-        /// What is left to do by hand.
+        /// How to install it manually.
         command: String,
     },
-    /// A tool is there and does not do its work on this machine.
+    /// A tool exists but does not work on this machine.
     BrokenTool {
-        /// Which.
+        /// The tool.
         tool: String,
         /// The useful part of what it printed.
         text: String,
     },
-    /// This program is linked statically and cannot load a library: what needs the built controller is left out.
+    /// This program is linked statically and cannot load a library, so it cannot run the built controller.
     Static,
     /// The compiler or the linker refused the emitted workspace.
     BuildFailed {
@@ -47,53 +47,53 @@ pub enum TargetError {
     PanicPath {
         /// What was being built.
         what: String,
-        /// The places, one a line, where they could be found; else what the linker printed.
+        /// The panic sites, one per line, if they could be found; else the linker's output.
         text: String,
     },
     /// The emulator ended without a result.
     EmulatorFailed {
-        /// What it did.
+        /// What it reported.
         text: String,
     },
-    /// The emulator was still running after the time limit, and was ended.
+    /// The emulator was stopped at the time limit.
     EmulatorTimeout {
         /// The limit, s.
         seconds: u64,
     },
-    /// The replay's files do not hold what the firmware promises to write.
+    /// The output files of the replay do not have the expected layout.
     MalformedStats {
-        /// What was found and what was expected.
+        /// Actual and expected.
         text: String,
     },
-    /// What the caller wants replayed does not fit together.
+    /// The inputs of a replay are inconsistent.
     BadRequest {
-        /// What was found and what was expected.
+        /// Actual and expected.
         text: String,
     },
     /// The image is not what the analysis expects.
     MalformedImage {
-        /// What was found and what was expected.
+        /// Actual and expected.
         text: String,
     },
     /// A file or folder cannot be read or written.
     Io {
-        /// What was being done.
+        /// The operation.
         doing: String,
-        /// The file, or the folder.
+        /// The file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
 }
 
 impl TargetError {
-    /// True if the machine lacks something, false if the emitted workspace is to blame (exit codes 3 and 1).
+    /// True if the machine is at fault, false if the emitted workspace is (exit codes 3 and 1).
     #[must_use]
     pub fn is_environment(&self) -> bool {
         self.is_of_a_tool() || matches!(self, Self::Io { .. })
     }
 
-    /// True if what is missing or broken is a tool that not every machine has: what needs it can be left out.
+    /// True if an optional tool is missing or broken: steps that need it can be skipped.
     #[must_use]
     pub fn is_of_a_tool(&self) -> bool {
         matches!(self, Self::MissingTool { .. } | Self::SetUpFailed { .. } | Self::BrokenTool { .. } | Self::Static)
@@ -109,35 +109,34 @@ impl fmt::Display for TargetError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::MissingTool { tool, looked, command } => {
-                write!(f, "{tool} is not installed (looked for {looked}); install it with: {command}")
+                write!(f, "{tool} is not installed (searched for {looked}); install it with: {command}")
             }
             Self::SetUpFailed { tool, tried, command } => {
-                write!(f, "{tool} could not be set up: {}; by hand: {command}", tried.join("; "))
+                write!(f, "{tool} could not be set up: {}; install it manually: {command}", tried.join("; "))
             }
             Self::BrokenTool { tool, text } => write!(f, "{tool} does not work on this machine: {text}"),
             Self::Static => f.write_str(
-                "this specgen is linked statically and cannot load the controller that it would build; take the command \
-                 for glibc (specgen-VERSION-x86_64-unknown-linux-gnu.tar.gz), or build it from the sources: \
+                "this specgen is linked statically and cannot load the controller that it builds; use the release \
+                 for glibc (specgen-VERSION-x86_64-unknown-linux-gnu.tar.gz), or build it from source: \
                  cargo install --path codegen/cli --locked",
             ),
             Self::BuildFailed { what, text } => write!(f, "building {what} failed:\n{text}"),
             Self::PanicPath { what, text } => write!(
                 f,
-                "{what} can panic: a panic path is left after optimisation, so the link was refused.\n\
-                 Look for an index without a bound, an integer division by a run-time value, a slice range, \
+                "{what} can panic: a panic path remains after optimisation, so linking failed.\n\
+                 Look for an unchecked index, an integer division by a run-time value, a slice range, \
                  or an unwrap in the controller or the runtime.\n{text}"
             ),
             Self::EmulatorFailed { text } => {
                 write!(f, "the emulator ended without a result: {text}")
             }
-            Self::EmulatorTimeout { seconds } => write!(
-                f,
-                "the emulator was still running after {seconds} s and was ended; replay fewer ticks or allow more time"
-            ),
+            Self::EmulatorTimeout { seconds } => {
+                write!(f, "the emulator was stopped after {seconds} s; replay fewer ticks or increase the time limit")
+            }
             Self::MalformedStats { text } => {
                 write!(f, "the replay's result cannot be used: {text}")
             }
-            Self::BadRequest { text } => write!(f, "this cannot be replayed: {text}"),
+            Self::BadRequest { text } => write!(f, "invalid replay input: {text}"),
             Self::MalformedImage { text } => write!(f, "the image cannot be analysed: {text}"),
             Self::Io { doing, path, source } => write!(f, "{doing} {}: {source}", path.display()),
         }

@@ -1,4 +1,4 @@
-//! Builds DIR/host of an emitted workspace into a shared library for this machine.
+//! Builds `DIR/host` of an emitted workspace into a shared library for this machine.
 
 use super::build::{BuildRequest, cargo_artifact};
 use super::cache;
@@ -7,28 +7,28 @@ use super::process::{clean_command, find_in_path};
 use crate::sha256;
 use std::path::{Path, PathBuf};
 
-/// A shared library may leave symbols undefined unless asked otherwise, and then the proof that nothing can
-/// panic would never fail. libc is for `memcpy` and `memset`, which the compiler calls by itself.
+/// By default a shared library may leave symbols undefined, and then the panic check would never fail.
+/// libc provides `memcpy` and `memset`, which the compiler calls implicitly.
 const LINK: [&str; 2] = ["-Clink-arg=-Wl,-z,defs", "-Clink-arg=-lc"];
 
-/// Without optimisation at the link: the controller's crate already holds the code of the runtime that it uses, and a second pass doubles
-/// the time of the build. A user's own build has it, by the profile of the emitted workspace.
+/// Without link-time optimisation: the controller's crate already contains the runtime code that it uses, and a second pass doubles
+/// the build time. A user's own build uses LTO, by the profile of the emitted workspace.
 const PROFILE: [(&str, &str); 2] = [("CARGO_PROFILE_RELEASE_LTO", "off"), ("CARGO_PROFILE_RELEASE_DEBUG", "0")];
 
 /// Builds `dir/host` (a `cdylib` that links only if nothing in it can panic) and returns the library's path.
 ///
-/// `target_dir` keeps what can be used again. The library is copied to a name that holds a digest of its
-/// content, so that a later build into the same folder cannot change what the path means.
+/// `target_dir` holds reusable build products. The library is copied to a name that contains a digest of its
+/// content, so that a later build cannot change what the path means.
 ///
 /// # Errors
 /// [`TargetError::MissingTool`] without cargo, [`TargetError::PanicPath`] if the controller can panic,
-/// [`TargetError::BuildFailed`] for everything else that cargo says.
+/// [`TargetError::BuildFailed`] for any other error of cargo.
 pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
     let cargo = cargo()?;
     let package = dir.join("host");
     let target_dir = target_dir.join("host");
     let mut command = clean_command(cargo);
-    // `cargo rustc`, so that the link flags below reach this crate alone.
+    // `cargo rustc`, so that the link flags below apply to this crate only.
     command.envs(PROFILE).args(["rustc", "--release", "--lib"]);
     let request = BuildRequest { package: &package, target_dir: &target_dir, rustc_args: &LINK, locked: false };
     let library = cargo_artifact(&mut command, &request, &package.display().to_string(), |message| {
@@ -39,24 +39,24 @@ pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetErr
     keep(&library.path, &library.bytes)
 }
 
-/// [`build_library`] for a caller that loads it into this process.
+/// [`build_library`] for a library to be loaded into this process.
 ///
 /// # Errors
-/// As there; [`TargetError::Static`] before anything is built, if this process cannot load a library.
+/// As [`build_library`]; [`TargetError::Static`], before building anything, if this process cannot load a library.
 pub fn build_loadable(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
     refuse_static()?;
     build_library(dir, target_dir)
 }
 
-/// musl's loader is no part of a static program.
+/// A static musl program has no loader.
 fn refuse_static() -> Result<(), TargetError> {
     if cfg!(all(target_env = "musl", target_feature = "crt-static")) { Err(TargetError::Static) } else { Ok(()) }
 }
 
-/// Builds the program in `dir/folder` for this machine and returns its path. Its dependencies are those of its lock file.
+/// Builds the program in `dir/folder` for this machine and returns its path. Dependencies come from its lock file.
 ///
 /// # Errors
-/// [`TargetError::MissingTool`] without cargo, [`TargetError::BuildFailed`] for everything that cargo says.
+/// [`TargetError::MissingTool`] without cargo, [`TargetError::BuildFailed`] for any error of cargo.
 pub fn build_program(dir: &Path, folder: &str, target_dir: &Path) -> Result<PathBuf, TargetError> {
     let package = dir.join(folder);
     let target_dir = target_dir.join(folder);
@@ -70,12 +70,12 @@ pub fn build_program(dir: &Path, folder: &str, target_dir: &Path) -> Result<Path
 }
 
 /// Builds `sources/fmu.c` together with the static library of `package` into one shared library, `target_dir/NAME` with the
-/// ending of this host, and returns its path. Nothing of the package is visible from outside, so that a process may load several.
-/// Its dependencies are those of the lock file beside its folder, if there is one.
+/// extension of this host, and returns its path. It exports none of the package's symbols, so a process may load several.
+/// Dependencies come from the lock file beside its folder, if there is one.
 ///
 /// # Errors
 /// [`TargetError::MissingTool`] without cargo or a C compiler, [`TargetError::PanicPath`] if the controller can panic,
-/// [`TargetError::BuildFailed`] for everything else that these say.
+/// [`TargetError::BuildFailed`] for any other error of these tools.
 pub fn build_unit(sources: &Path, package: &Path, target_dir: &Path, name: &str) -> Result<PathBuf, TargetError> {
     let mut command = clean_command(cargo()?);
     command.envs(PROFILE).args(["rustc", "--release", "--lib", "--crate-type", "staticlib"]);
@@ -95,7 +95,7 @@ pub fn build_unit(sources: &Path, package: &Path, target_dir: &Path, name: &str)
     command.args(["-std=c11", "-O2", "-Wall", "-Wextra", "-fPIC", "-fvisibility=hidden", "-shared"]);
     command.arg(sources.join("fmu.c")).arg(&archive.path).arg("-o").arg(&library);
     if cfg!(target_os = "linux") {
-        // No undefined symbol in the code that is used: a call of the panic handler does not link.
+        // With no undefined symbols allowed, a call of the panic handler does not link.
         command.args(["-Wl,-z,defs", "-Wl,--gc-sections", "-Wl,--exclude-libs,ALL", "-lm", "-lpthread", "-ldl", "-lc"]);
     }
     let what = sources.join("fmu.c").display().to_string();
@@ -119,8 +119,8 @@ fn cargo() -> Result<PathBuf, TargetError> {
     })
 }
 
-/// Copies the library to a name that only this content has. A file that has the name already is replaced unless it has the
-/// content, too: it may have been cut off or damaged since.
+/// Copies the library to a name derived from its content. An existing file is replaced unless its content matches:
+/// it may have been truncated or damaged.
 fn keep(built: &Path, bytes: &[u8]) -> Result<PathBuf, TargetError> {
     let name = format!("specgen-{}{}", &sha256(bytes)[..16], std::env::consts::DLL_SUFFIX);
     let kept = built.with_file_name(name);
@@ -128,10 +128,10 @@ fn keep(built: &Path, bytes: &[u8]) -> Result<PathBuf, TargetError> {
     Ok(kept)
 }
 
-/// Writes a file beside its place and renames it, so that nobody finds half of it.
+/// Writes a file atomically.
 ///
 /// # Errors
-/// [`TargetError::Io`]; nothing is left then.
+/// [`TargetError::Io`]; no partial file is left behind.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), TargetError> {
     cache::replace(path, bytes, false).map_err(|error| TargetError::io("writing", path, error))
 }
@@ -142,7 +142,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn a_kept_library_is_never_believed_by_its_name() {
+    fn a_kept_library_is_verified_by_its_content() {
         let folder = tempfile::tempdir().unwrap();
         let built = folder.path().join("libcontroller_host.so");
         let content = b"a library".to_vec();
@@ -152,7 +152,7 @@ mod tests {
             let mapped = fs::File::open(&kept).unwrap();
             assert_eq!(keep(&built, &content).unwrap(), kept);
             assert_eq!(fs::read(&kept).unwrap(), content);
-            // Another file of that name, so that a process that has mapped the old one does not see its end move.
+            // The file must be replaced, not rewritten: a process that has mapped the old one must not see it shrink.
             assert_eq!(mapped.metadata().unwrap().len(), damaged.len() as u64);
         }
     }

@@ -1,9 +1,9 @@
-//! What an image takes, and what it must not contain.
+//! Memory use of an image, and symbols it must not contain.
 
 use super::error::TargetError;
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind};
 
-/// Section of the memory that a board's recorder has: what is left over, and no part of what the program needs.
+/// Section of a board's recorder memory: it uses whatever RAM the program leaves free.
 pub const RECORDER: &str = ".record";
 
 /// Memory of an image.
@@ -13,12 +13,12 @@ pub struct Footprint {
     pub flash: u64,
     /// Of these, code and its literals.
     pub code: u64,
-    /// Of these, constants: the tables of the controller, for the greatest part.
+    /// Of these, constants: mostly the tables of the controller.
     pub constants: u64,
-    /// Bytes of RAM that are taken statically, the memory of a recorder left out. The state and the buffers of the replay live
+    /// Bytes of statically allocated RAM, without the recorder. The state and the buffers of the replay are
     /// on the stack.
     pub ram: u64,
-    /// Bytes of the memory of a recorder.
+    /// Bytes of the recorder's memory.
     pub recorder: u64,
     /// Symbols of the panic machinery, demangled; empty in an image that cannot panic.
     pub panic_symbols: Vec<String>,
@@ -29,7 +29,7 @@ pub struct Footprint {
 /// Measures an image.
 ///
 /// # Errors
-/// [`TargetError::MalformedImage`] if it is no ELF file or its tables are damaged.
+/// [`TargetError::MalformedImage`] if it is not an ELF file or its tables are damaged.
 pub fn footprint(elf: &[u8]) -> Result<Footprint, TargetError> {
     let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
     let file = object::File::parse(elf).map_err(malformed)?;
@@ -47,7 +47,7 @@ pub fn footprint(elf: &[u8]) -> Result<Footprint, TargetError> {
             SectionKind::Text => result.code += section.size(),
             SectionKind::UninitializedData if section.name() == Ok(RECORDER) => result.recorder += section.size(),
             SectionKind::UninitializedData => result.ram += section.size(),
-            // Writable: its values are copied from flash at the start.
+            // Writable: initial values are copied from flash at startup.
             _ if is_writable(section.flags()) => {
                 result.ram += section.size();
                 result.flash += section.size();
@@ -90,10 +90,10 @@ pub(super) fn is_allocator(name: &str) -> bool {
         || matches!(name, "malloc" | "calloc" | "realloc" | "free")
 }
 
-/// Functions that a shared library offers, sorted.
+/// Functions that a shared library exports, sorted.
 ///
 /// # Errors
-/// [`TargetError::MalformedImage`] if it is no ELF file or its tables are damaged.
+/// [`TargetError::MalformedImage`] if it is not an ELF file or its tables are damaged.
 pub fn exported(elf: &[u8]) -> Result<Vec<String>, TargetError> {
     let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
     let file = object::File::parse(elf).map_err(malformed)?;

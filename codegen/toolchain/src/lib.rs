@@ -6,15 +6,15 @@
 //!                              ─replay──────────→ outputs, state digests, instructions, painted stack
 //! DIR/host ─host::build_library→ shared library
 //! ```
-//! [`toolchain`] is the one place that looks for a cross compiler, [`places`] says where tools may be, [`provision`] brings them.
-//! Nothing here knows TOML, the IR or the control law; the words it moves are opaque.
+//! Only [`toolchain`] looks for a cross compiler, [`places`] lists where tools may be, [`provision`] installs them.
+//! This crate knows nothing of TOML, the IR or the control law; it treats their words as opaque.
 //!
-//! | module | what |
+//! | module | purpose |
 //! |---|---|
-//! | [`checks`], [`size`], [`budget`] | rules of the tick in the image; bytes by owner; figures against budget and part |
-//! | [`trace`], [`time`] | executed blocks, priced by `specgen-cycles`; the longest tick of a board against the period |
-//! | [`targets`] | the list of targets |
-//! | [`cache`] | builds by the digest of everything that determines their bytes, checked when used |
+//! | [`checks`], [`size`], [`budget`] | rules for the tick; bytes by owner; figures against budget and part |
+//! | [`trace`], [`time`] | executed blocks and their cost by `specgen-cycles`; the longest tick of a board against the period |
+//! | [`targets`] | the list of build targets |
+//! | [`cache`] | build cache, keyed by everything that determines the bytes and verified on use |
 
 use std::io::Write as _;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -54,7 +54,7 @@ pub use process::find_in_path as find_program;
 pub use replay::{ReplayResult, replay, replay_machine};
 pub use size::{ASSUMED_MARK, ASSUMED_SEPARATOR, IDENTITY_MARK};
 
-/// Rust's name of the compilation target of every [`Mcu`](specgen_language::model::Mcu) here.
+/// Rust target triple of every [`Mcu`](specgen_language::model::Mcu).
 pub const TRIPLE: &str = "thumbv7em-none-eabihf";
 
 /// SHA-256 in hex.
@@ -63,10 +63,10 @@ pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// What brings the tools that are missing.
+/// The command that installs missing tools.
 pub const SET_UP: &str = "specgen SPEC --setup, or in the repository cargo xtask setup";
 
-/// What is there to build for a microcontroller and to run the image.
+/// Tools to build for a microcontroller and to run the image.
 #[derive(Debug, Clone)]
 pub struct Tools {
     /// The cross compiler.
@@ -75,21 +75,21 @@ pub struct Tools {
     pub emulator: emulator::Emulator,
 }
 
-/// The cross compiler and the emulator, or what is missing and the command that installs it.
+/// The cross compiler and the emulator.
 ///
 /// # Errors
-/// [`TargetError::MissingTool`], for the first of the two that is not there.
+/// [`TargetError::MissingTool`] for the first of the two that is missing.
 pub fn available() -> Result<Tools, TargetError> {
     Ok(Tools { toolchain: toolchain::find()?, emulator: emulator::Emulator::find()? })
 }
 
-/// Set to `1`, a tool that a test misses is a failure, and not only a skip that is said: `cargo xtask test` brings them first.
+/// If this variable is `1`, a test fails instead of being skipped when a tool is missing. `cargo xtask test` installs them first.
 pub const REQUIRE_TOOLS: &str = "SPECGEN_REQUIRE_TOOLS";
 
-/// What a test needs, if it was found. Where it is missing, that is [`skipped`].
+/// The tool that a test needs. If it is missing, the test is reported as [`skipped`].
 ///
 /// # Errors
-/// What is missing, if [`REQUIRE_TOOLS`] is `1`.
+/// The missing tool, if [`REQUIRE_TOOLS`] is `1`.
 pub fn found_or_skipped<T>(found: Result<T, TargetError>) -> Result<Option<T>, TargetError> {
     match found {
         Err(missing) if std::env::var_os(REQUIRE_TOOLS).is_none_or(|value| value != "1") => {
@@ -100,11 +100,11 @@ pub fn found_or_skipped<T>(found: Result<T, TargetError>) -> Result<Option<T>, T
     }
 }
 
-/// Says, past what the test runner holds back, that the test of this thread was not run, or not wholly, and how many that is so far.
+/// Reports, bypassing the test runner's capture, that the current test was skipped in whole or in part, with a running count.
 pub fn skipped(why: &str) {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let count = COUNT.fetch_add(1, Ordering::Relaxed) + 1;
     let thread = std::thread::current();
-    // Where nobody can read it, there is nobody to tell.
+    // If stderr is closed, there is nobody to report to.
     let _ = writeln!(std::io::stderr(), "skipped {count}: {}: {why}", thread.name().unwrap_or("a test"));
 }

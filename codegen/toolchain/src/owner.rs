@@ -1,18 +1,17 @@
-//! The crate that code came from, by the path of its source file.
+//! The crate that code belongs to, by the path of its source file.
 
-/// Code without line information: assembly, and libraries that came compiled.
+/// Code without line information: assembly and precompiled libraries.
 pub(super) const NO_LINES: &str = "without line information";
 
-/// Crates of the compiler's library that an image may hold.
+/// Crates of the compiler's library that an image may contain.
 const LIBRARY: [&str; 5] = ["core", "alloc", "compiler-builtins", "stdarch", "portable-simd"];
 
-/// The crate that a source file belongs to: by the registry's `name-version`, the library of the compiler, else the folder that holds `src`. Folders
-/// of the machine above that count for nothing, whatever their names.
+/// The crate of a source file: the registry's `name-version`, the compiler's library, else the folder above `src`. Outer folders are ignored.
 pub(super) fn crate_of_file(path: &str) -> String {
     source_of(path).0
 }
 
-/// The crate of a source file, and the file within its folder `src`.
+/// The crate of a source file, and the path below its folder `src`.
 pub(super) fn source_of(path: &str) -> (String, String) {
     let path = path.replace('\\', "/");
     let parts: Vec<&str> = path.split('/').collect();
@@ -23,7 +22,7 @@ pub(super) fn source_of(path: &str) -> (String, String) {
     if let Some(at) = package.filter(|at| without_version(part(*at)) != part(*at)) {
         return (without_version(part(at)).to_owned(), from(at + 2));
     }
-    // `…/rust/library/core/…`, or `rustc-1.96` or a digest in place of `rust`.
+    // `…/rust/library/core/…`, with `rustc-1.96` or a digest in place of `rust`.
     let of_compiler = |at: usize| {
         let above = |by: usize| at.checked_sub(by).map_or("", part);
         above(1) == "rust" || above(1).starts_with("rustc") || above(2) == "rustc"
@@ -35,7 +34,7 @@ pub(super) fn source_of(path: &str) -> (String, String) {
     let source = parts.iter().rposition(|part| *part == "src");
     match source.map(|at| (at, at.checked_sub(1).map_or("", part))) {
         Some((at, folder)) if !folder.is_empty() && folder != "." => (folder.to_owned(), from(at + 1)),
-        // Paths of the package that is built itself start with `src`.
+        // Paths of the package being built start with `src`.
         Some((0, _)) => ("firmware".to_owned(), from(1)),
         _ => (NO_LINES.to_owned(), String::new()),
     }

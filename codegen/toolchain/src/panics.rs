@@ -1,4 +1,4 @@
-//! Where an image can still panic: the lines that call the panic machinery, inlined callers included.
+//! Locates what can still panic in an image: the lines that call the panic machinery, inlined callers included.
 
 use super::callgraph::{CallGraph, Function};
 use super::error::TargetError;
@@ -8,10 +8,10 @@ use addr2line::gimli::{self, Dwarf, EndianSlice, LittleEndian};
 use object::{Object, ObjectSection};
 use std::collections::BTreeSet;
 
-/// One line per place that can panic, in the order of the addresses: the source line, then those that it was
-/// inlined into, outwards. Lines of the core library are left out.
+/// One entry per panic site, in the order of addresses: the source line, then the lines it was
+/// inlined into, outwards. Lines of the core library are omitted.
 ///
-/// The image must have been linked with the proof turned off (see `firmware/qemu/src/panic.rs`).
+/// The image must have been linked with the panic check turned off (see `firmware/qemu/src/panic.rs`).
 ///
 /// # Errors
 /// [`TargetError::MalformedImage`] if the file or its debug information is damaged.
@@ -31,7 +31,7 @@ pub fn sites(elf: &[u8]) -> Result<Vec<String>, TargetError> {
     Ok(found.into_iter().map(|(_, line)| line).filter(|line| seen.insert(line.clone())).collect())
 }
 
-/// Functions of the core library that reach the panic handler, and the handler.
+/// The panic handler and the functions of the core library that reach it.
 fn machinery(graph: &CallGraph) -> BTreeSet<u64> {
     let is_handler = |f: &Function| f.name.ends_with("rust_begin_unwind");
     let mut found: BTreeSet<u64> =
@@ -67,7 +67,7 @@ pub(super) fn debug_info(elf: &[u8]) -> Result<DebugInfo<'_>, TargetError> {
     Context::from_dwarf(Dwarf::load(section)?).map_err(malformed)
 }
 
-/// The lines of some places in a function, each once.
+/// The source lines of some addresses in a function, without duplicates.
 pub(super) fn lines<'a>(
     debug: &DebugInfo<'_>,
     function: &Function,

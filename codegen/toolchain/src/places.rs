@@ -1,28 +1,28 @@
-//! Where the tools for microcontrollers may be: the one list of folders that every search goes through.
+//! Where tools may be: the list of folders used by every search.
 
 use super::user_cache;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The variable of the environment with the folders to search instead of `PATH` and the usual ones, written as `PATH` is.
+/// Environment variable with the folders to search instead of `PATH` and the usual ones, in the format of `PATH`.
 pub const VARIABLE: &str = "SPECGEN_TOOLS";
 
 /// Name of the folder of unpacked packages in the user's cache.
 const FOLDER: &str = "tools";
-/// Where programs are even if `PATH` does not say so.
+/// Usual program folders, searched even if they are not on `PATH`.
 const USUAL: [&str; 3] = ["/usr/local/bin", "/usr/bin", "/opt/homebrew/bin"];
 
 /// Folders to search.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Places {
-    /// Folders of programs, the first comes first.
+    /// Program folders, in search order.
     pub programs: Vec<PathBuf>,
-    /// Where packages are unpacked for this user alone; none without a cache folder.
+    /// Where packages are unpacked for this user; `None` without a cache folder.
     pub unpacked: Option<PathBuf>,
 }
 
 impl Places {
-    /// Those of this machine and user.
+    /// The places of this machine and user.
     #[must_use]
     pub fn here() -> Self {
         let folders = |name| std::env::var_os(name).map(|list| std::env::split_paths(&list).collect::<Vec<PathBuf>>());
@@ -33,10 +33,10 @@ impl Places {
         Self::of(programs, user_cache::folder().map(|cache| cache.join(FOLDER)))
     }
 
-    /// Each folder once, and so that it is found from another working folder too.
+    /// Removes duplicates and makes paths absolute, so that they hold in any working folder.
     fn of(programs: Vec<PathBuf>, unpacked: Option<PathBuf>) -> Self {
         let mut seen = std::collections::BTreeSet::new();
-        // An empty path has no absolute one.
+        // `absolute` fails for an empty path.
         let mut programs: Vec<PathBuf> = programs.iter().filter_map(|path| std::path::absolute(path).ok()).collect();
         programs.retain(|folder| seen.insert(folder.clone()));
         Self { programs, unpacked: unpacked.and_then(|path| std::path::absolute(path).ok()) }
@@ -53,27 +53,27 @@ impl Places {
         self.programs.iter().map(move |folder| folder.join(name)).filter(|file| file.is_file())
     }
 
-    /// The packages that were unpacked under this name, if they were.
+    /// The packages unpacked under this name.
     #[must_use]
     pub fn unpacked(&self, name: &str) -> Option<PackageFolder> {
         PackageFolder::at(&self.unpacked.as_deref()?.join(name))
     }
 
-    /// Where packages are unpacked to.
+    /// The folder for unpacked packages.
     #[must_use]
     pub fn cache(&self) -> Option<&Path> {
         self.unpacked.as_deref()
     }
 }
 
-/// A folder with unpacked packages.
+/// A folder of unpacked packages.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PackageFolder {
     root: PathBuf,
 }
 
 impl PackageFolder {
-    /// The folder, if it is there.
+    /// The folder, if it exists.
     #[must_use]
     pub fn at(root: &Path) -> Option<Self> {
         root.is_dir().then(|| Self { root: root.to_owned() })
@@ -91,7 +91,7 @@ impl PackageFolder {
         self.root.join("usr/bin")
     }
 
-    /// Folders of its libraries: those that Debian names after the architecture, whichever that is.
+    /// Folders of its libraries, which Debian names after the architecture.
     #[must_use]
     pub fn libraries(&self) -> Vec<PathBuf> {
         let mut found = Vec::new();

@@ -1,4 +1,4 @@
-//! Running other programs: captured, with a time limit, free of the environment of an outer cargo.
+//! Runs other programs: with captured output, a time limit, and without the environment of an outer cargo.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// What a program printed and how it ended.
+/// Output and exit status of a program.
 pub struct ProgramOutput {
-    /// `None` if it was ended at the time limit.
+    /// `None` if it was stopped at the time limit.
     pub status: Option<ExitStatus>,
     /// Standard output, with anything that is not UTF-8 replaced.
     pub stdout: String,
@@ -18,14 +18,14 @@ pub struct ProgramOutput {
 }
 
 impl ProgramOutput {
-    /// It ended by itself and says that all is well.
+    /// True if it exited by itself with success.
     pub fn success(&self) -> bool {
         self.status.is_some_and(|status| status.success())
     }
 }
 
-/// Variables that change what cargo builds, by the beginning of their names: `cargo test` sets some for what runs inside it,
-/// people set others. The same spec gives the same bytes, so a build sees none of them.
+/// Prefixes of variables that change what cargo builds: `cargo test` sets some of them, users set others.
+/// The same spec must give the same bytes, so builds see none of them.
 const LEAKS: [&str; 19] = [
     "RUSTC",
     "RUSTDOC",
@@ -44,22 +44,22 @@ const LEAKS: [&str; 19] = [
     "CARGO_TARGET_",
     "CARGO_UNSTABLE_",
     "__CARGO",
-    // Of build scripts.
+    // For build scripts.
     "DEFMT_",
     "SPECGEN_LOCATE_PANICS",
 ];
-/// Points into the outer toolchain; another compiler would load that one's libraries.
+/// Points into the outer toolchain; another compiler would load the wrong libraries.
 const LIBRARIES: &str = "LD_LIBRARY_PATH";
-/// How many compilers run at once is no flag.
+/// The number of parallel jobs does not affect the output.
 const JOBS: &str = "CARGO_BUILD_JOBS";
-/// Without these some machines cannot link at all.
+/// Some machines cannot link without these.
 const LINKING: [&str; 6] =
     ["COMPILER_PATH", "GCC_EXEC_PREFIX", "LIBRARY_PATH", "LD_RUN_PATH", "MACOSX_DEPLOYMENT_TARGET", "SDKROOT"];
 
-/// Whether a build sees this variable of the caller's and may make other bytes by it.
+/// Whether a build sees this variable and its output may depend on it.
 pub fn decides_on_link(name: &OsStr) -> bool {
     let name = name.to_string_lossy();
-    // The linker of an image is looked for by `toolchain`.
+    // `toolchain` chooses the linker of an image.
     let of_target = name.starts_with("CARGO_TARGET_") && name.ends_with("_LINKER") && !name.contains("THUMB");
     of_target || LINKING.contains(&&*name)
 }
@@ -69,8 +69,8 @@ fn leaks(name: &OsStr) -> bool {
     text == LIBRARIES || LEAKS.iter().any(|leak| text.starts_with(leak)) && text != JOBS && !decides_on_link(name)
 }
 
-/// A command that no outer cargo, rustc wrapper or flag of the caller's environment leaks into. Where crates come from and
-/// which toolchain is meant stays the caller's choice.
+/// A command without the outer cargo's variables and the caller's wrappers and flags. Crate sources and toolchain selection
+/// remain the caller's choice.
 pub fn clean_command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     for (name, _) in std::env::vars_os().filter(|(name, _)| leaks(name)) {
@@ -79,17 +79,17 @@ pub fn clean_command(program: impl AsRef<OsStr>) -> Command {
     command
 }
 
-/// Lets the program find libraries in these folders; in none, nothing is changed.
+/// Adds library folders for the program; no change if there are none.
 pub fn with_libraries<'a>(command: &'a mut Command, folders: &[PathBuf]) -> &'a mut Command {
-    // A folder whose name cannot stand in a list would not be found by the loader either.
+    // The loader could not find a folder whose name cannot be part of a list.
     if let Some(list) = std::env::join_paths(folders).ok().filter(|_| !folders.is_empty()) {
         command.env("LD_LIBRARY_PATH", list);
     }
     command
 }
 
-/// Runs to the end, or to the limit, with what it prints going to two files in `scratch`: a pipe
-/// that nobody empties would stop the program.
+/// Runs a program until it exits or the time limit expires. Its output goes to two files in `scratch`: a full pipe
+/// would block the program.
 pub fn run(command: &mut Command, scratch: &Path, limit: Duration) -> io::Result<ProgramOutput> {
     let out = scratch.join("specgen-stdout.txt");
     let err = scratch.join("specgen-stderr.txt");
@@ -119,12 +119,12 @@ pub fn find_in_path(name: &str) -> Option<PathBuf> {
     std::env::split_paths(&path).map(|folder| folder.join(name)).find(|file| file.is_file())
 }
 
-/// First line that the program prints, or `None` if it cannot be run or fails.
+/// First line of the program's output, or `None` if it cannot be run or fails.
 pub fn first_line(command: &mut Command) -> Option<String> {
     Some(printed(command)?.lines().next().unwrap_or_default().trim().to_owned())
 }
 
-/// All that the program prints, or `None` if it cannot be run or fails.
+/// The program's output, or `None` if it cannot be run or fails.
 pub fn printed(command: &mut Command) -> Option<String> {
     let output = command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned())
@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_changes_a_build_does_not_leak_and_what_a_machine_needs_is_handed_on() {
+    fn variables_that_change_a_build_are_removed_and_others_kept() {
         for name in [
             "RUSTFLAGS",
             "RUSTC_WRAPPER",

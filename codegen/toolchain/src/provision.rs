@@ -1,11 +1,11 @@
-//! Brings what building and running for a microcontroller needs, by the first way that leads there.
+//! Installs what is needed to build and run for a microcontroller, using the first method that works.
 //!
-//! 1. What is there already, if it works.
-//! 2. The compiler by `rustup target add`.
-//! 3. Debian's packages, installed as root or with a sudo that asks for no password.
+//! 1. The installed tool, if it works.
+//! 2. `rustup target add` for the compiler.
+//! 3. Debian's packages, installed as root or through sudo without a password.
 //! 4. The same packages, [unpacked] into a folder of the user's cache.
 //!
-//! Nothing that is installed is removed, no configuration is edited, nobody is asked for a password.
+//! It removes no installed package, edits no configuration and asks for no password.
 
 use super::apt::{Apt, Refusal};
 use super::emulator::{self, Emulator};
@@ -18,24 +18,24 @@ use specgen_language::interrupt::Scratch;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Longest time for rustup: it downloads some megabytes.
+/// Time limit of rustup, which downloads some megabytes.
 const RUSTUP_LIMIT: Duration = Duration::from_secs(600);
 
-/// Brings what is missing and returns what is there then. `say` gets every step before it is taken.
+/// Installs missing tools and returns all tools. `say` receives each step before it starts.
 ///
 /// # Errors
-/// [`TargetError::SetUpFailed`] for what cannot be had, with what was tried and what is left to do by hand.
+/// [`TargetError::SetUpFailed`] with the methods that were tried and what to do manually.
 pub fn provision(say: &mut dyn FnMut(&str)) -> Result<Tools, TargetError> {
     provision_in(&Places::here(), say)
 }
 
-/// [`provision`] in given places.
+/// [`provision`] in the given places.
 fn provision_in(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Tools, TargetError> {
     let toolchain = compiler(places, say);
-    // Of use without a compiler too: `pil --elf`.
+    // The emulator is useful without a compiler: `pil --elf`.
     let emulator = emulator(places, say);
     if let (Err(_), Err(second)) = (&toolchain, &emulator) {
-        // The first is returned.
+        // Only the first error is returned, so report the second here.
         say(&second.to_string());
     }
     let tools = Tools { toolchain: toolchain?, emulator: emulator? };
@@ -70,7 +70,7 @@ fn emulator(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Emulator, Targ
     found.ok_or_else(|| search.failed("QEMU for ARM", emulator::install_command()))
 }
 
-/// Brings the engine of the emulated boards and returns where it is. Not among [`Tools`]: only this repository's tests need it.
+/// Installs the engine of the emulated boards and returns its path. Not part of [`Tools`]: only this repository's tests need it.
 ///
 /// # Errors
 /// As [`provision`].
@@ -85,24 +85,24 @@ pub fn engine(say: &mut dyn FnMut(&str)) -> Result<PathBuf, TargetError> {
     found.ok_or_else(|| search.failed("the Unicorn engine", engine::install_command()))
 }
 
-/// What looks for a tool; it alone judges whether a way has led there.
+/// Looks for a tool; decides whether a method worked.
 type Find<'a, T> = &'a dyn Fn() -> Result<T, TargetError>;
 
 /// The search for one tool.
 struct Search<'a> {
     places: &'a Places,
     say: &'a mut dyn FnMut(&str),
-    /// Each way, and where it ended.
+    /// Each method that was tried, and why it failed.
     tried: Vec<String>,
 }
 
 impl Search<'_> {
-    /// What is there; else what is missing is said.
+    /// The installed tool; reports if it is missing.
     fn already<T>(&mut self, find: Find<'_, T>) -> Option<T> {
         find().map_err(|missing| (self.say)(&missing.to_string())).ok()
     }
 
-    /// Debian's packages, in both ways.
+    /// Installs or unpacks Debian's packages.
     fn debian<T>(&mut self, packages: &[&str], find: Find<'_, T>) -> Option<T> {
         let mut offline = false;
         let installed = self.way("apt-get install", find, |places, say| {
@@ -120,7 +120,7 @@ impl Search<'_> {
         })
     }
 
-    /// Goes one way; none, with a note of why, if the tool is not there at its end.
+    /// Tries one method. If the tool is still missing, returns `None` and records why.
     fn way<T>(
         &mut self,
         name: &str,
@@ -130,7 +130,7 @@ impl Search<'_> {
         let why = match go(self.places, &mut *self.say) {
             Ok(()) => match find() {
                 Ok(found) => return Some(found),
-                Err(_) => "done, but what it brought does not work".to_owned(),
+                Err(_) => "the installed tool does not work".to_owned(),
             },
             Err(refusal) => refusal.to_string(),
         };
@@ -145,7 +145,7 @@ impl Search<'_> {
 }
 
 fn rustup(places: &Places, say: &mut dyn FnMut(&str)) -> Result<(), Refusal> {
-    let rustup = places.program("rustup").ok_or_else(|| Refusal::other("there is no rustup"))?;
+    let rustup = places.program("rustup").ok_or_else(|| Refusal::other("rustup was not found"))?;
     say(&format!("running: rustup target add {TRIPLE}"));
     let failed = |error: std::io::Error| Refusal::other(format!("rustup cannot be run: {error}"));
     let scratch = Scratch::new().map_err(failed)?;
@@ -154,8 +154,8 @@ fn rustup(places: &Places, say: &mut dyn FnMut(&str)) -> Result<(), Refusal> {
     if done.success() {
         return Ok(());
     }
-    let why = done.stderr.lines().find_map(|line| line.strip_prefix("error: ")).unwrap_or("it does not say why");
-    // What follows are addresses and causes of causes.
+    let why = done.stderr.lines().find_map(|line| line.strip_prefix("error: ")).unwrap_or("no reason given");
+    // The rest are addresses and nested causes.
     Err(Refusal::other(why.split(": ").next().unwrap_or(why)))
 }
 

@@ -1,6 +1,6 @@
 //! Replays recorded ticks on the emulated microcontroller.
 //!
-//! The files in between are little-endian 64-bit words; `firmware/qemu/src/main.rs` describes the first
+//! All files are little-endian 64-bit words; `firmware/qemu/src/main.rs` describes the first
 //! three, `firmware/qemu/src/stats.rs` the layout of `stats.bin`.
 
 use super::build::Image;
@@ -17,10 +17,10 @@ const VERSION: u64 = 1;
 const HEADER: usize = 17;
 /// Words of a stage record.
 const RECORD: usize = 6;
-/// What the counter must find for 0, 1, 100 and 1000 `nop`s.
+/// Expected counts for 0, 1, 100 and 1000 `nop`s.
 const SELF_TEST: [u64; 4] = [0, 1, 100, 1000];
 
-/// What the microcontroller computed, and what that cost.
+/// Outputs of the microcontroller, and their cost.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReplayResult {
     /// OUTPUT_WORDS words per tick, bit patterns.
@@ -38,34 +38,34 @@ pub struct ReplayStats {
     pub ticks: u64,
     /// CONFIG_WORDS of the controller in the image.
     pub config_words: usize,
-    /// INPUT_WORDS of it.
+    /// INPUT_WORDS of the controller.
     pub input_words: usize,
-    /// OUTPUT_WORDS of it.
+    /// OUTPUT_WORDS of the controller.
     pub output_words: usize,
-    /// Bytes of `State` on that machine.
+    /// Size of `State` on the microcontroller, bytes.
     pub state_bytes: u64,
-    /// Bytes of `Config` on that machine.
+    /// Size of `Config` on the microcontroller, bytes.
     pub config_bytes: u64,
-    /// Most stack that one `step` used, bytes, found by painting.
+    /// Most stack used by one `step`, bytes, found by stack painting.
     pub painted_stack: u64,
-    /// What the painting can see at most, bytes.
+    /// Size of the painted area, bytes: the most that can be detected.
     pub painted_window: u64,
     /// Instructions per call; the first stage is `step`, the whole tick.
     pub stages: Vec<StageStats>,
 }
 
-/// Instructions of one stage, exact: from the call to the return, measuring overhead taken off.
+/// Instructions of one stage, exact: from call to return, less the measuring overhead.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StageStats {
     /// Its name.
     pub name: String,
     /// Calls measured.
     pub calls: u64,
-    /// Fewest instructions of a call.
+    /// Fewest instructions of one call.
     pub smallest: u64,
-    /// Of all calls together.
+    /// Instructions of all calls together.
     pub sum: u64,
-    /// Most instructions of a call.
+    /// Most instructions of one call.
     pub largest: u64,
 }
 
@@ -78,7 +78,7 @@ impl StageStats {
 }
 
 impl ReplayStats {
-    /// The stage of that name.
+    /// The stage with that name.
     #[must_use]
     pub fn stage(&self, name: &str) -> Option<&StageStats> {
         self.stages.iter().find(|stage| stage.name == name)
@@ -87,12 +87,12 @@ impl ReplayStats {
 
 /// Replays `inputs`, one row of INPUT_WORDS words per tick, from a fresh state under `config`.
 ///
-/// Takes about 4 s for 100,000 short ticks. The result depends on nothing but the arguments.
+/// Takes about 4 s for 100,000 short ticks. The result depends only on the arguments.
 ///
 /// # Errors
 /// [`TargetError::MissingTool`] without QEMU; [`TargetError::BadRequest`] if rows differ in length;
 /// [`TargetError::EmulatorFailed`] if the firmware refuses the words; [`TargetError::EmulatorTimeout`];
-/// [`TargetError::MalformedStats`] if what it wrote is incomplete or its counter fails its self-test.
+/// [`TargetError::MalformedStats`] if the output is incomplete or the instruction counter fails its self-test.
 pub fn replay(
     image: &Image,
     config: &[u64],
@@ -102,9 +102,9 @@ pub fn replay(
     replay_from("input.bin", image, config, inputs, limit)
 }
 
-/// Replays supervised ticks, rows of MACHINE_INPUT_WORDS words, from a machine at reset. Output rows have
-/// MACHINE_OUTPUT_WORDS words; digests and sizes are those of the machine. Stages: `supervise`, ticks that run on; `law`, the
-/// control law alone in these; `other phases`.
+/// Replays supervised ticks, rows of MACHINE_INPUT_WORDS words, from reset. Output rows have
+/// MACHINE_OUTPUT_WORDS words; digests and sizes are those of the supervised machine. Stages: `supervise`, ticks that stay in Running; `law`,
+/// the control law alone in these; `other phases`.
 ///
 /// # Errors
 /// As [`replay`].
@@ -137,14 +137,14 @@ fn replay_from(
     let stats = parse_stats(&read_words(&folder.path().join("stats.bin"))?)?;
     let words = read_words(&folder.path().join("output.bin"))?;
     let row = stats.output_words + 1;
-    // Rows of another width than the controller's could still add up to whole rows.
+    // Rows of the wrong width could still add up to whole rows.
     if stats.input_words != width && !inputs.is_empty() {
         let text = format!("input rows have {width} words, the controller takes {}", stats.input_words);
         return Err(TargetError::BadRequest { text });
     }
     if stats.ticks != inputs.len() as u64 || words.len() != inputs.len() * row {
         let text = format!(
-            "{} input rows went in, {} ticks and {} output words came out; expected {row} words per tick",
+            "{} input rows gave {} ticks and {} output words; expected {row} words per tick",
             inputs.len(),
             stats.ticks,
             words.len()
@@ -176,15 +176,15 @@ fn parse_stats(words: &[u64]) -> Result<ReplayStats, TargetError> {
     let malformed = |text: String| Err(TargetError::MalformedStats { text });
     if words.len() < HEADER || words[0] != MAGIC || words[1] != VERSION {
         return malformed(format!(
-            "stats.bin is not of layout version {VERSION} ({} words); emit the workspace again with this specgen",
+            "stats.bin ({} words) does not have layout version {VERSION}; rebuild the workspace with this specgen",
             words.len()
         ));
     }
-    // A usize here is no smaller than on the microcontroller, whose numbers these are.
+    // `usize` is at least as large here as on the microcontroller.
     let size = |word: u64| usize::try_from(word).unwrap_or(usize::MAX);
     if words[11..15] != SELF_TEST {
         return malformed(format!(
-            "the instruction counter found {:?} for {SELF_TEST:?} nops; is this QEMU's -icount shift=10 exact?",
+            "the instruction counter read {:?} for {SELF_TEST:?} nops; -icount shift=10 of this QEMU may be inexact",
             &words[11..15]
         ));
     }
@@ -192,7 +192,7 @@ fn parse_stats(words: &[u64]) -> Result<ReplayStats, TargetError> {
         return malformed(format!("{} measurements took more than 655,000 instructions", words[15]));
     }
     if words.len() != HEADER.saturating_add(size(words[16]).saturating_mul(RECORD)) {
-        return malformed(format!("stats.bin has {} words, which is not {} stages", words.len(), words[16]));
+        return malformed(format!("stats.bin has {} words, which does not fit {} stages", words.len(), words[16]));
     }
     Ok(ReplayStats {
         ticks: words[2],
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_of_malformed_stats_is_refused_in_words() {
+    fn every_kind_of_malformed_stats_is_reported() {
         let spoil = |at: usize, word: u64| {
             let mut words = good();
             words[at] = word;
@@ -249,8 +249,8 @@ mod tests {
         assert!(spoil(1, 2).contains("layout version 1"));
         assert!(spoil(14, 999).contains("999"));
         assert!(spoil(15, 4).contains("655,000"));
-        assert!(spoil(16, 2).contains("not 2 stages"));
-        assert!(spoil(16, u64::MAX).contains("not 18446744073709551615 stages"));
+        assert!(spoil(16, 2).contains("not fit 2 stages"));
+        assert!(spoil(16, u64::MAX).contains("not fit 18446744073709551615 stages"));
         assert!(parse_stats(&[]).unwrap_err().to_string().contains("0 words"));
     }
 }

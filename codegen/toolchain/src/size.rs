@@ -1,7 +1,7 @@
-//! Who takes the memory of an image: by section, and by the source that the bytes come from.
+//! Memory use of an image: by section, and by the source of the bytes.
 //!
-//! Code is assigned by line information, byte by byte, so that what was inlined counts for whom it was written by;
-//! constants and variables by their symbols.
+//! Code is assigned byte by byte by line information, so inlined code counts for the crate it was written in;
+//! constants and variables are assigned by their symbols.
 
 use super::checks;
 use super::error::TargetError;
@@ -13,35 +13,35 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, Sym
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What the line in every image begins with that says where its controller comes from.
+/// Start of the identity line in every image: where its controller comes from.
 pub const IDENTITY_MARK: &str = "specgen-identity: ";
-/// What the line behind it begins with, which names what nobody measured; there is none where all is.
+/// Start of the next line, which lists unmeasured parameters; absent if all were measured.
 pub const ASSUMED_MARK: &str = "assumed: ";
-/// What stands between the names.
+/// Separator of the names.
 pub const ASSUMED_SEPARATOR: &str = ", ";
-/// What the line begins with by which an image names the target that it is built for.
+/// Start of the line that names the target of an image.
 const BOARD_MARK: &str = "specgen-board: ";
-/// Longest such line that is believed, bytes.
+/// Longest accepted list of assumptions, bytes.
 const LONGEST_ASSUMED: usize = 1 << 16;
-/// Longest identity that is believed, bytes.
+/// Longest accepted identity, bytes.
 const LONGEST_IDENTITY: usize = 512;
-/// Constants without a symbol: literals of the compiler, and those that it merged.
+/// Constants without a symbol: literals, and constants merged by the compiler.
 const UNNAMED: &str = "unnamed constants";
 
-/// Sections that take memory of the microcontroller, and who takes it.
+/// Memory use by section and by owner.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Size {
-    /// Compiler, platform and spec, as the image says; none if it was made by something else.
+    /// Compiler, platform and spec from the identity line; `None` for a foreign image.
     pub identity: Option<String>,
-    /// The target that it is built for, as the image says; none if it says none, as images for boards of one's own.
+    /// The target named in the image; `None` if it names none, as images for custom boards.
     pub target: Option<&'static str>,
-    /// What its controller rests on that nobody measured, as the image says.
+    /// Unmeasured parameters named in the image.
     pub assumed: Vec<String>,
-    /// In the order of the image.
+    /// In image order.
     pub sections: Vec<Section>,
-    /// By bytes of flash, the most first.
+    /// Owners, the largest in flash first.
     pub owners: Vec<Owner>,
-    /// Variables by their names, the largest first: bytes.
+    /// Variables and their bytes, the largest first.
     pub variables: Vec<(String, u64)>,
 }
 
@@ -54,13 +54,13 @@ pub struct Section {
     pub address: u64,
     /// Bytes.
     pub bytes: u64,
-    /// Whether it takes flash: all that has content.
+    /// Whether it takes flash: everything with content.
     pub flash: bool,
-    /// Whether it takes RAM: all that can be written.
+    /// Whether it takes RAM: everything writable.
     pub ram: bool,
 }
 
-/// What comes from one source.
+/// Bytes from one source.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Owner {
     /// `controller`, `runtime`, a crate, `core`.
@@ -86,7 +86,7 @@ impl Size {
         self.sections.iter().filter(|section| section.flash).map(|section| section.bytes).sum()
     }
 
-    /// Bytes of RAM that are taken statically, the memory of a recorder left out.
+    /// Bytes of statically allocated RAM, without the recorder.
     #[must_use]
     pub fn ram(&self) -> u64 {
         self.sections
@@ -96,7 +96,7 @@ impl Size {
             .sum()
     }
 
-    /// Bytes of the memory of a recorder.
+    /// Bytes of the recorder's memory.
     #[must_use]
     pub fn recorder(&self) -> u64 {
         self.sections.iter().filter(|section| section.name == RECORDER).map(|section| section.bytes).sum()
@@ -106,7 +106,7 @@ impl Size {
 /// Measures an image.
 ///
 /// # Errors
-/// [`TargetError::MalformedImage`] if it is no ELF file or its tables are damaged.
+/// [`TargetError::MalformedImage`] if it is not an ELF file or its tables are damaged.
 pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
     let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
     let file = object::File::parse(elf).map_err(malformed)?;
@@ -152,7 +152,7 @@ pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
     Ok(Size { identity, target, assumed, sections, owners, variables })
 }
 
-/// The tick of an image, if it has one that is known: see [`checks::check`].
+/// Whether the image has a tick function that [`checks::check`] knows.
 #[must_use]
 pub fn has_tick(elf: &[u8]) -> bool {
     let Ok(file) = object::File::parse(elf) else { return false };
@@ -167,12 +167,12 @@ fn owner<'a>(owners: &'a mut BTreeMap<String, Owner>, name: &str) -> &'a mut Own
     owners.entry(name.to_owned()).or_insert_with(|| Owner { name: name.to_owned(), ..Owner::default() })
 }
 
-/// Code between two addresses by the file of its lines; a line reaches to the next, literals after it included.
+/// Assigns the code between two addresses by source file; a line extends to the next one, including literals after it.
 fn code(debug: &DebugInfo<'_>, start: u64, end: u64, owners: &mut BTreeMap<String, Owner>) -> Result<(), TargetError> {
     let malformed = |error: addr2line::gimli::Error| TargetError::MalformedImage { text: error.to_string() };
     let mut known = start;
     for (address, bytes, location) in debug.find_location_range(start, end).map_err(malformed)? {
-        // Rows come in the order of their addresses; one that reaches back counts from where the last one ended.
+        // Rows are sorted by address; an overlapping row counts from the end of the last one.
         let (from, to) = (address.max(known), (address + bytes).min(end));
         if to <= from {
             continue;
@@ -185,7 +185,7 @@ fn code(debug: &DebugInfo<'_>, start: u64, end: u64, owners: &mut BTreeMap<Strin
     Ok(())
 }
 
-/// Constants between two addresses by the crate of their symbols.
+/// Assigns the constants between two addresses by the crate of their symbols.
 fn constants(file: &object::File<'_>, start: u64, end: u64, owners: &mut BTreeMap<String, Owner>) {
     let mut symbols: Vec<(u64, u64, String)> = file
         .symbols()
@@ -206,7 +206,7 @@ fn constants(file: &object::File<'_>, start: u64, end: u64, owners: &mut BTreeMa
     owner(owners, UNNAMED).constants += end - known;
 }
 
-/// `controller` of `controller::hysteresis::EVERETT_0`, also where it stands for an implementation: `<controller::…`.
+/// `controller` for `controller::hysteresis::EVERETT_0`, also if it is part of an implementation: `<controller::…`.
 fn crate_of_symbol(name: &str) -> &str {
     let name = name.trim_start_matches(['<', '&']);
     match name.split_once("::") {
@@ -217,7 +217,7 @@ fn crate_of_symbol(name: &str) -> &str {
     }
 }
 
-/// The identity line in the bytes of a section, and what the line behind it names as assumed.
+/// The identity in the bytes of a section, and the assumptions on the next line.
 fn find_identity(bytes: &[u8]) -> Option<(String, Vec<String>)> {
     let bytes = behind(bytes, IDENTITY_MARK)?;
     let identity = line(bytes, LONGEST_IDENTITY)?;
@@ -232,13 +232,13 @@ fn find_target(bytes: &[u8]) -> Option<&'static str> {
     Target::named(line(behind(bytes, BOARD_MARK)?, LONGEST_IDENTITY)?.trim_end()).map(|target| target.name)
 }
 
-/// What stands behind a mark.
+/// The bytes after a mark.
 fn behind<'a>(bytes: &'a [u8], mark: &str) -> Option<&'a [u8]> {
     let start = bytes.windows(mark.len()).position(|window| window == mark.as_bytes())?;
     bytes.get(start + mark.len()..)
 }
 
-/// The line that `bytes` begin with, if it is text.
+/// The first line of `bytes`, if it is text.
 fn line(bytes: &[u8], longest: usize) -> Option<String> {
     let line: Vec<u8> = bytes.iter().take(longest).take_while(|byte| **byte != b'\n').copied().collect();
     String::from_utf8(line).ok()
@@ -249,7 +249,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_and_symbols_are_told_by_their_crate() {
+    fn files_and_symbols_are_assigned_to_crates() {
         for (path, expected) in [
             ("/home/me/out/controller/src/gauges.rs", "controller"),
             ("controller/src/setpoint/x.rs", "controller"),
@@ -259,7 +259,7 @@ mod tests {
             ("src/main.rs", "firmware"),
             ("qemu/src/main.rs", "qemu"),
             ("asm.S", NO_LINES),
-            // Wherever a user builds.
+            // Independent of where a user builds.
             ("/home/runtime/controller/out/board/src/cycle.rs", "board"),
             ("/home/me/library/core/controller/src/gauges.rs", "controller"),
             ("/rustc/0123abcd/library/alloc/src/vec/mod.rs", "alloc"),
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn an_identity_is_found_where_it_lies_and_nowhere_else() {
+    fn an_identity_is_found_only_after_its_mark() {
         let line = format!("\0\0{IDENTITY_MARK}specgen 0.1.0, platform x, f64, spec 00\nrest");
         let identity = "specgen 0.1.0, platform x, f64, spec 00".to_owned();
         assert_eq!(find_identity(line.as_bytes()), Some((identity.clone(), Vec::new())));

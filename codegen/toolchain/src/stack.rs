@@ -1,9 +1,9 @@
 //! Static bound of the stack that one call of `controller::step` can use.
 //!
-//! Sum of the frames along the deepest path of the call graph. A frame is what the compiler's `.stack_sizes`
-//! says; for assembly and precompiled libraries, which have none, what the instructions push.
-//! The bound holds only if [`StackBound::is_complete`]; what stands against it is listed, not ignored.
-//! Interrupts come on top: 8 words each, 26 with the FPU.
+//! Sum of the frames along the deepest path of the call graph. Frame sizes come from the compiler's `.stack_sizes`;
+//! for assembly and precompiled libraries, which have none, from the instructions.
+//! The bound holds only if [`StackBound::is_complete`]; anything that invalidates it is listed.
+//! Interrupts need 8 more words each, 26 with the FPU.
 
 use super::callgraph::CallGraph;
 use super::error::TargetError;
@@ -11,30 +11,30 @@ use object::{Object, ObjectSection, ObjectSymbol};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The function that counts as one step: `firmware/qemu/src/main.rs` wraps `controller::step` in it.
+/// The function of one step: `firmware/qemu/src/main.rs` wraps `controller::step` in it.
 pub const STEP_SYMBOL: &str = "specgen_step";
 
-/// A bound and what it rests on.
+/// A stack bound and what could invalidate it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StackBound {
     /// Bytes along the deepest path, the root's own frame included.
     pub bytes: u64,
     /// That path: function and its frame, bytes, from the root down.
     pub path: Vec<(String, u64)>,
-    /// Bytes of code that one call can reach, literals included.
+    /// Bytes of reachable code, literals included.
     pub code_bytes: u64,
-    /// Functions that call themselves, directly or through others: a cycle each, as names.
+    /// Cycles of functions that call themselves, directly or indirectly, as names.
     pub recursion: Vec<Vec<String>>,
     /// Functions that call or jump through a register.
     pub indirect: Vec<String>,
-    /// Functions that move the stack pointer by what is only known in a run; their frame counts as 0.
+    /// Functions that move the stack pointer by an amount known only at run time; their frames count as 0.
     pub unsized_functions: Vec<String>,
-    /// Functions that branch to what is no function.
+    /// Functions that branch to an address that is not a function.
     pub strays: Vec<String>,
 }
 
 impl StackBound {
-    /// Nothing is missing: no run can use more than [`StackBound::bytes`].
+    /// True if nothing invalidates the bound: no run can use more than [`StackBound::bytes`].
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.recursion.is_empty()
@@ -44,7 +44,7 @@ impl StackBound {
     }
 }
 
-/// The bound for everything that `root` (a symbol as it stands in the image, or demangled) can reach.
+/// The bound for everything reachable from `root`, a symbol of the image or a demangled name.
 ///
 /// # Errors
 /// [`TargetError::MalformedImage`] if the file is damaged or has no such function.
@@ -54,11 +54,11 @@ pub fn bound(elf: &[u8], root: &str) -> Result<StackBound, TargetError> {
     Ok(bound_in(&graph, start))
 }
 
-/// Where the function begins.
+/// Start address of the function.
 fn start_of(graph: &CallGraph, root: &str) -> Result<u64, TargetError> {
     let demangled = || graph.functions.iter().find(|(_, function)| function.name == root).map(|(address, _)| *address);
     graph.symbols.get(root).copied().or_else(demangled).ok_or_else(|| TargetError::MalformedImage {
-        text: format!("it has no function `{root}`; was it stripped, or made by another specgen?"),
+        text: format!("it has no function `{root}`; it may be stripped or built by another specgen"),
     })
 }
 
@@ -91,25 +91,25 @@ fn bound_in(graph: &CallGraph, start: u64) -> StackBound {
     }
 }
 
-/// An exception frame with the registers of the FPU, and its alignment.
+/// An exception frame with FPU registers and alignment.
 const EXCEPTION: u64 = 26 * 4 + 4;
-/// Interrupts of a board's program (`firmware/stm32/program.rs`): the tick, above all others; what answers the host, below.
+/// Interrupts of a board's program (`firmware/stm32/program.rs`): the tick has the highest priority, the link handler a lower one.
 const TICK: &str = "TIM2";
 const BACKGROUND: &str = "CEC";
 
-/// The stack of a board's whole program.
+/// Stack of a board's whole program.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Reserve {
-    /// Bytes that its memory map gives the stack.
+    /// Bytes reserved for the stack in the memory map.
     pub reserved: u64,
-    /// Bytes of initialisation, which runs alone.
+    /// Bytes used by initialisation, which runs alone.
     pub startup: u64,
-    /// Bytes after it: the program, what answers the host, an interrupt of the link and the tick, one on top of the other.
+    /// Bytes used after it: the program, the link handler, a link interrupt and the tick, nested.
     pub running: u64,
 }
 
 impl Reserve {
-    /// Of an image; none if it has no board's memory map.
+    /// The stack reserve of an image; `None` if it has no memory map of a board.
     ///
     /// # Errors
     /// [`TargetError::MalformedImage`] if the file is damaged.
@@ -137,29 +137,29 @@ impl Reserve {
         }))
     }
 
-    /// The larger of the two.
+    /// The larger of `startup` and `running`.
     #[must_use]
     pub fn needed(&self) -> u64 {
         self.startup.max(self.running)
     }
 }
 
-/// Vectors of the core, before those of interrupts.
+/// Number of core vectors before those of interrupts.
 const SYSTEM: usize = 16;
 
 /// Depth-first walk of the call graph.
 struct Walk<'a> {
     graph: &'a CallGraph,
-    /// Bytes from this function down, and the callee that needs them, of every function that is done.
+    /// For every finished function: bytes from it down, and the callee that needs them.
     deepest: BTreeMap<u64, (u64, Option<u64>)>,
-    /// Functions on the way from the root to here.
+    /// Functions on the path from the root to the current one.
     open: Vec<u64>,
-    /// Cycles found, each starting at its lowest address so that it is found once.
+    /// Cycles found, each rotated to start at its lowest address, so that each is reported once.
     cycles: BTreeSet<Vec<u64>>,
 }
 
 impl Walk<'_> {
-    /// Bytes from here down. The recursion here is no deeper than the image has functions.
+    /// Bytes from this function down. The recursion is at most as deep as the image has functions.
     fn visit(&mut self, address: u64) -> u64 {
         if let Some(&(bytes, _)) = self.deepest.get(&address) {
             return bytes;
@@ -178,7 +178,7 @@ impl Walk<'_> {
         let mut below = (0, None);
         for &callee in function.calls.keys() {
             let bytes = self.visit(callee);
-            // A callee that needs nothing still belongs on the path, but not one that is still open.
+            // A callee that needs no stack still belongs on the path, unless it is still open.
             let closed = self.deepest.contains_key(&callee);
             if closed && (bytes > below.0 || below.1.is_none()) {
                 below = (bytes, Some(callee));

@@ -1,4 +1,4 @@
-//! What a workspace can be built for, by the names that `--target` takes.
+//! Build targets, by the names that `--target` takes.
 
 use specgen_language::model::{BOARDS, Mcu};
 
@@ -18,7 +18,7 @@ pub enum Kind {
 /// A target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Target {
-    /// As `--target` names it, and its folder in the workspace.
+    /// Its name for `--target`, and its folder in the workspace.
     pub name: &'static str,
     /// How it is built.
     pub kind: Kind,
@@ -57,7 +57,7 @@ impl Target {
         TARGETS.into_iter().find(|target| target.name == name)
     }
 
-    /// The board of a part; the emulated machine if it has none.
+    /// The board of a part; the emulated machine if there is none.
     #[must_use]
     pub fn of(mcu: Mcu) -> Self {
         let board = TARGETS.into_iter().find(|target| target.kind == Kind::Board(mcu));
@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_part_has_a_target_and_every_name_one() {
+    fn every_part_and_every_name_has_a_target() {
         for target in TARGETS {
             assert_eq!(Target::named(target.name), Some(target));
         }

@@ -1,5 +1,5 @@
-//! The few Thumb-2 instructions that decide where a function goes and how much stack it takes
-//! (ARM DDI 0403, A5 and A7.7). Everything else is skipped over.
+//! Decodes the few Thumb-2 instructions that determine control flow and stack use
+//! (ARM DDI 0403, A5 and A7.7). All others are skipped.
 
 use std::collections::BTreeMap;
 
@@ -16,25 +16,25 @@ pub struct Instruction {
     second: Option<u16>,
 }
 
-/// A way out of the straight line.
+/// A branch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Branch {
-    /// To come back.
+    /// With return.
     Call(u64),
-    /// Not to come back: a loop, or a call in tail position.
+    /// Without return: a loop, or a tail call.
     Jump(u64),
-    /// To wherever a register says.
+    /// To an address in a register.
     Register,
 }
 
-/// The instructions of the code that stands at `address`. `marks` says where code (true) and data begin.
+/// Decodes the code at `address`. `marks` gives where code (true) and data (false) begin.
 pub fn decode(address: u64, code: &[u8], marks: &BTreeMap<u64, bool>) -> Vec<Instruction> {
     let half = |at: usize| code.get(at..at + 2).map(|b| u16::from_le_bytes([b[0], b[1]]));
     let mut found = Vec::new();
     let mut at = 0;
     while let Some(first) = half(at) {
         let place = address + at as u64;
-        // Code unless the last mark at or before here says data.
+        // Code, unless the last mark up to here is for data.
         if marks.range(..=place).next_back().is_some_and(|(_, &is_code)| !is_code) {
             at += 2;
             continue;
@@ -46,32 +46,32 @@ pub fn decode(address: u64, code: &[u8], marks: &BTreeMap<u64, bool>) -> Vec<Ins
     found
 }
 
-/// The instruction at the beginning of `code`, which stands at `address`.
+/// The first instruction of `code`, which is at `address`.
 pub fn one(address: u64, code: &[u8]) -> Option<Instruction> {
     let length = if u16::from_le_bytes([*code.first()?, *code.get(1)?]) >> 11 < 0b11101 { 2 } else { 4 };
     decode(address, code.get(..length)?, &BTreeMap::new()).pop()
 }
 
-/// Bytes of stack that a function with these instructions takes at most: all that it pushes, once each.
-/// `None` if the stack pointer is moved in a way that is only known in a run.
+/// Upper bound of the stack frame of a function, bytes: the sum of all its pushes.
+/// `None` if the stack pointer is moved by an amount known only at run time.
 ///
-/// Right for compiled code, which moves the stack pointer in its prologue and never in a loop.
+/// Valid for compiled code, which moves the stack pointer in its prologue and never in a loop.
 pub fn frame(instructions: &[Instruction]) -> Option<u64> {
     instructions.iter().map(Instruction::takes_stack).sum()
 }
 
 impl Instruction {
-    /// Bytes.
+    /// Size, bytes.
     pub fn size(&self) -> u32 {
         if self.second.is_some() { 4 } else { 2 }
     }
 
-    /// Its halves; 0 for the second of a short one.
+    /// Its halfwords; the second is 0 for a short instruction.
     pub fn halves(&self) -> [u32; 2] {
         [u32::from(self.first), u32::from(self.second.unwrap_or(0))]
     }
 
-    /// Whether anything but the next instruction may follow.
+    /// Whether control may continue elsewhere than at the next instruction.
     pub fn ends_block(&self) -> bool {
         let op = self.first;
         self.branch().is_some()
@@ -90,7 +90,7 @@ impl Instruction {
             }
     }
 
-    /// Where it may go, beside on.
+    /// The branch, if it is one.
     pub fn branch(&self) -> Option<Branch> {
         match self.second {
             None => self.narrow_branch(),
@@ -139,14 +139,14 @@ impl Instruction {
         (loads_pc && self.first & 0xf != STACK_POINTER).then_some(Branch::Register)
     }
 
-    /// Target of a branch whose offset has so many bits; the program counter reads as four bytes ahead.
+    /// Target of a branch with an offset of `bits` bits; the program counter reads four bytes ahead.
     fn target(&self, offset: u32, bits: u32) -> u64 {
         let shift = 32 - bits;
         let offset = (offset << shift).cast_signed() >> shift;
         self.place.wrapping_add(4).wrapping_add_signed(i64::from(offset))
     }
 
-    /// Bytes by which it lowers the stack pointer; `None` if that depends on the run.
+    /// Bytes by which it lowers the stack pointer; `None` if known only at run time.
     fn takes_stack(&self) -> Option<u64> {
         match self.second {
             None => self.narrow_takes_stack(),
@@ -184,7 +184,7 @@ impl Instruction {
             _ if first & 0xfbef == 0xf1ad && destination == STACK_POINTER => {
                 Some(u64::from(expanded(immediate12(first, second))))
             }
-            // ADD.W and ADDW SP, SP, #constant give back.
+            // ADD.W and ADDW SP, SP, #constant release stack.
             _ if matches!(first & 0xfbef, 0xf10d | 0xf20d) && destination == STACK_POINTER => Some(0),
             // Any other data processing into SP, with a register or an immediate operand.
             _ if (first >> 9 == 0b111_0101 || (first >> 11 == 0b11110 && second >> 15 == 0))
@@ -204,7 +204,6 @@ fn immediate12(first: u16, second: u16) -> u64 {
 
 /// ThumbExpandImm.
 fn expanded(immediate: u64) -> u32 {
-    // Twelve bits.
     let immediate = (immediate & 0xfff) as u32;
     let byte = immediate & 0xff;
     match immediate >> 8 {
@@ -228,7 +227,7 @@ mod tests {
         all(bytes).iter().filter_map(Instruction::branch).collect()
     }
 
-    /// Encodings as GNU `as` prints them for code at 0x1000.
+    /// Encodings as printed by GNU `as` for code at 0x1000.
     #[test]
     fn branches_are_decoded() {
         // bl 0xffc: f7ff fffc
@@ -257,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lowers_the_stack_pointer_is_added_up() {
+    fn pushes_add_up_to_the_frame() {
         // push {r4, r5, lr}; sub sp, #16; vpush {d8}; push.w {r8, r9}; str r11, [sp, #-8]!; sub.w sp, sp, #1024
         let code = [
             0x30, 0xb5, 0x84, 0xb0, 0x2d, 0xed, 0x02, 0x8b, 0x2d, 0xe9, 0x00, 0x03, 0x4d, 0xf8, 0x08, 0xbd, 0xad, 0xf5,

@@ -1,16 +1,16 @@
-//! How long a tick takes on a board: what it computes, by the model of cycles ([`specgen_cycles`]); what it waits for, by the
-//! clocks that stand in the board's image; how the interrupt begins and ends.
+//! Duration of a tick on a board: computing time by the cycle model ([`specgen_cycles`]), waiting time by the clocks recorded in the
+//! board's image, and the entry and return of the interrupt.
 //!
-//! | what | how |
+//! | part | estimate |
 //! |---|---|
-//! | law, recorder, wave, the drivers | every instruction of `firmware/tick` on the emulated core, priced; worst tick seen |
-//! | law | besides: by how much the longest tick of the exercise has more instructions than the mean one |
-//! | buses | bytes and frames that the drivers moved, by SCLK and by the registers that a byte and a frame take |
-//! | waits | what the drivers waited: the conversion, and what data sheets ask for |
-//! | interrupt | entry and return, the timer; what holds the tick off: knots of a pass, a piece of a record |
-//! | caches | empty when a tick begins; constants are there |
+//! | law, recorder, wave, drivers | every instruction of `firmware/tick` on the emulated core, priced; the worst traced tick |
+//! | law | also: excess of the longest tick of the exercise over the mean, in instructions |
+//! | buses | bytes and frames of the drivers, by SCLK and the register accesses per byte and frame |
+//! | waits | waits of the drivers: conversion and data-sheet delays |
+//! | interrupt | entry, return and timer; what delays the tick: samples of a pass, a piece of a record |
+//! | caches | empty at the start of a tick; constants are present |
 //!
-//! Interrupts of the link are below the tick and do not delay it.
+//! Link interrupts have a lower priority than the tick and do not delay it.
 
 use object::{Object, ObjectSection, ObjectSymbol};
 use serde::Serialize;
@@ -22,19 +22,19 @@ use super::error::TargetError;
 use super::image::RECORDER;
 use super::trace::{Memory, Share, TickShares, Trace, Transfers};
 
-/// The symbol of a board's [`Clocks`]: `firmware/stm32/src/times.rs`.
+/// Symbol of a board's [`Clocks`]: `firmware/stm32/src/times.rs`.
 const SYMBOL: &str = "SPECGEN_TIMES";
-/// Where the flash begins; memory of the core lies below.
+/// Start of the flash; tightly coupled memory is below.
 const FLASH: u64 = 0x0800_0000;
-/// Of its layout.
+/// Layout version.
 const VERSION: u32 = 2;
 const WORDS: usize = 16;
-/// A tick that leaves less of its period has little room.
+/// A tick that leaves less than this share of its period is tight.
 const ROOM: f64 = 0.2;
-/// The period that would do has so much room: other set-points come with another period.
+/// Margin on the suggested period: the set-points change with the period.
 const MARGIN: f64 = 1.02;
 
-/// Registers that are read and written, and instructions.
+/// Register reads and writes, and instructions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Work {
     reads: u64,
@@ -42,21 +42,21 @@ struct Work {
     instructions: u64,
 }
 
-/// A look at a pin.
+/// Reading a pin.
 const LOOK: Work = Work { reads: 1, writes: 0, instructions: 0 };
 
-/// What a board's image says of itself.
+/// Clock settings recorded in a board's image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Clocks {
     /// Hz.
     core: u64,
     /// FLASH_ACR and CCR.
     registers: [u32; 2],
-    /// Hz: of ADC and DACs, and of these where they are read back.
+    /// SCLK of ADC and DACs, and of DAC read-back, Hz.
     sclk: [u64; 3],
     byte: Work,
     frame: Work,
-    /// Around the tick, in its interrupt.
+    /// Overhead of the tick's interrupt.
     interrupt: Work,
     family: Family,
     tightly_coupled: bool,
@@ -65,10 +65,10 @@ pub struct Clocks {
 }
 
 impl Clocks {
-    /// Those of a board's image.
+    /// The clocks in a board's image.
     ///
     /// # Errors
-    /// [`TargetError::MalformedImage`] if the file is damaged, or no board's image of this specgen.
+    /// [`TargetError::MalformedImage`] if the file is damaged or not a board image of this specgen.
     pub fn of(elf: &[u8], mcu: Mcu) -> Result<Self, TargetError> {
         let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
         let file = object::File::parse(elf).map_err(malformed)?;
@@ -102,7 +102,7 @@ impl Clocks {
         })
     }
 
-    /// Where the code of a tick lies.
+    /// Memory that holds the code of a tick.
     #[must_use]
     pub fn memory(&self) -> Memory {
         Memory {
@@ -114,7 +114,7 @@ impl Clocks {
         }
     }
 
-    /// Of a byte and a frame on the buses of ADC and DACs, of a look at a pin, and what a byte that is read back takes more, ns.
+    /// Time per byte and per frame on the buses of ADC and DACs, per pin read, and extra time per read-back byte, ns.
     #[must_use]
     pub fn buses(&self) -> [u64; 6] {
         let nanoseconds = |cycles: u64| cycles * 1_000_000_000 / self.core;
@@ -129,40 +129,40 @@ impl Clocks {
     }
 }
 
-/// What the law takes, tick by tick.
+/// Cost of the control law.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Law {
-    /// Ticks that were priced, each with empty caches: the first ones of the exercise.
+    /// Number of priced ticks, each with empty caches: the first ones of the exercise.
     pub ticks: u64,
-    /// Of them all, rounded down.
+    /// Mean, rounded down.
     pub mean: Share,
-    /// Most instructions, and most cycles or what the longest tick of the exercise would take.
+    /// Most instructions; most cycles, or the estimate for the longest tick of the exercise.
     pub longest: Share,
 }
 
-/// A tick's time, µs, modelled.
+/// Modelled time of a tick, µs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Estimate {
-    /// Which board.
+    /// The board.
     pub board: &'static str,
-    /// The period of the spec.
+    /// Period of the spec.
     pub period: f64,
     /// Clock of the core, MHz.
     pub core: f64,
     /// The worst tick.
     pub worst: f64,
-    /// What it is made of: name and time.
+    /// Its parts: name and time.
     pub parts: Vec<(&'static str, f64)>,
-    /// What the law takes of a core.
+    /// Cost of the control law on the core.
     pub law: Law,
-    /// Bytes, frames, waits of the tick with the most of them.
+    /// Bytes, frames and waits of the tick with the most.
     pub moved: Transfers,
-    /// The shortest period that leaves a little, in steps of 1 µs.
+    /// The shortest period that leaves a small margin, in steps of 1 µs.
     pub shortest: f64,
 }
 
 impl Estimate {
-    /// Of the traced ticks. `spread`: most instructions of the law in a long run over its mean.
+    /// Estimate from the traced ticks. `spread`: most instructions of the law in a long run over its mean.
     ///
     /// # Errors
     /// As [`Trace::price`].
@@ -174,7 +174,7 @@ impl Estimate {
         let mean = |of: fn(&Share) -> u64| ticks.iter().map(|tick| of(&tick.law)).sum::<u64>() / count;
         let mean = Share { instructions: mean(|law| law.instructions), cycles: mean(|law| law.cycles) };
         let law = most(|tick| tick.law.cycles).max((mean.cycles as f64 * spread) as u64);
-        // The wave and the recorder's block do not come in every tick; a worst one has them all.
+        // Not every tick has the wave and a recorder block; the worst tick has both.
         let sum = |moved: &Transfers| -> (f64, f64, f64) {
             let [adc_byte, adc_frame, dac_byte, dac_frame, ..] = clocks.buses();
             let pins = clocks.cycles(Work { reads: moved.looks, writes: moved.edges, instructions: 0 });
@@ -222,20 +222,20 @@ impl Estimate {
         self.worst > self.period
     }
 
-    /// The period that leaves enough, in steps of 1 µs.
+    /// A period with enough margin, in steps of 1 µs.
     #[must_use]
     pub fn roomy(&self) -> f64 {
         up(self.worst * MARGIN / (1.0 - ROOM))
     }
 
-    /// It fits, and leaves less than a fifth of the period.
+    /// It fits, but leaves less than a fifth of the period.
     #[must_use]
     pub fn tight(&self) -> bool {
         !self.too_long() && self.worst > (1.0 - ROOM) * self.period
     }
 }
 
-/// The next whole number; times of ticks are far below 2^53 µs.
+/// Rounds up; tick times are far below 2^53 µs.
 fn up(value: f64) -> f64 {
     let whole = value as u64 as f64;
     if whole < value { whole + 1.0 } else { whole }
@@ -258,9 +258,9 @@ mod tests {
         }
     }
 
-    /// What the findings say to write is accepted, and nothing much shorter would be.
+    /// The suggested periods are accepted, and not much longer than needed.
     #[test]
-    fn the_periods_that_are_named_fit() {
+    fn suggested_periods_fit() {
         for worst in [0.01, 19.99, 20.0, 49.1, 147.8, 999.9] {
             let one = estimate(worst, worst * 0.999);
             assert!(one.too_long() && !one.tight(), "{worst}");
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_image_of_a_board_is_refused() {
+    fn an_image_without_clocks_is_refused() {
         assert!(Clocks::of(b"no image", Mcu::named("stm32h743zi").unwrap()).is_err());
     }
 }

@@ -1,13 +1,13 @@
-//! The one place that finds a cross compiler.
+//! Finds a cross compiler.
 //!
-//! In order, and without touching anyone's configuration:
+//! In this order, without changing any configuration:
 //! 1. the `rustc` on `PATH` has the target installed (`rustup target add`);
 //! 2. the `rustc` on `PATH` has its sources (`rustup component add rust-src`): `core` is built from them;
-//! 3. a `rustc` further down `PATH` or in `/usr/bin`, such as Debian's `rustc-web cargo-web rust-web-src`: the same way;
-//! 4. the same packages as [`provision`](super::provision) has unpacked them.
+//! 3. a `rustc` further down `PATH` or in `/usr/bin`, such as Debian's `rustc-web cargo-web rust-web-src`: likewise;
+//! 4. the same packages, unpacked by [`provision`](super::provision).
 //!
-//! Building `core`, `-Z emit-stack-sizes` and `-Z location-detail` are not stable, so `RUSTC_BOOTSTRAP=1` is set for these builds
-//! alone. The linker is `rust-lld` of that compiler, of the one on `PATH`, or LLVM's `ld.lld`.
+//! Building `core`, `-Z emit-stack-sizes` and `-Z location-detail` are unstable, so `RUSTC_BOOTSTRAP=1` is set for these builds
+//! only. The linker is `rust-lld` of that compiler or of the one on `PATH`, or LLVM's `ld.lld`.
 
 use super::TRIPLE;
 use super::error::TargetError;
@@ -16,36 +16,36 @@ use super::process::{clean_command, first_line, with_libraries};
 use std::path::PathBuf;
 use std::process::Command;
 
-/// What [`TargetError::MissingTool`] calls a linker, where a compiler alone is not enough.
+/// Name of the linker in [`TargetError::MissingTool`].
 pub(super) const LINKER: &str = "a linker for ARM images";
 
 /// Where `core` for the target comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CoreLibrary {
-    /// Installed with the compiler. Its assembly and `compiler_builtins` carry no stack sizes.
+    /// Installed with the compiler. Its assembly and `compiler_builtins` have no stack sizes.
     Installed,
     /// Built from the compiler's sources together with the image.
     FromSource,
 }
 
-/// A compiler for the target, with its cargo and a linker.
+/// A compiler for the target, with its cargo and linker.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Toolchain {
     /// The compiler.
     pub rustc: PathBuf,
     /// Its cargo.
     pub cargo: PathBuf,
-    /// The linker, if the compiler would not find one by itself.
+    /// The linker, if the compiler has none of its own.
     pub linker: Option<PathBuf>,
     /// Where `core` comes from.
     pub core: CoreLibrary,
     /// `rustc --version`.
     pub version: String,
-    /// Folders of the compiler's libraries, if it does not find them by itself.
+    /// Folders of the compiler's libraries, if the loader does not find them.
     pub libraries: Vec<PathBuf>,
 }
 
-/// A compiler that may or may not serve.
+/// A compiler to be checked.
 #[derive(Debug, Clone)]
 struct Candidate {
     rustc: PathBuf,
@@ -53,7 +53,7 @@ struct Candidate {
     libraries: Vec<PathBuf>,
 }
 
-/// Debian's packages of a compiler, and the name under which they are unpacked.
+/// Debian's packages of a compiler; the first is the name under which they are unpacked.
 pub(super) const PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 /// Debian's package of the linker.
 pub(super) const LINKER_PACKAGE: &str = "lld";
@@ -66,23 +66,23 @@ pub fn find() -> Result<Toolchain, TargetError> {
     find_in(&Places::here())
 }
 
-/// [`find`] in given places.
+/// [`find`] in the given places.
 ///
 /// # Errors
-/// As there.
+/// As [`find`].
 pub fn find_in(places: &Places) -> Result<Toolchain, TargetError> {
     let mut elsewhere = places.programs.clone();
     elsewhere.extend(places.unpacked(PACKAGES[0]).map(|unpacked| unpacked.programs()));
     choose(&candidates(places), &elsewhere)
 }
 
-/// Whether a linker is there for a compiler that comes without one.
+/// Whether there is a linker for a compiler without one of its own.
 pub(super) fn has_linker(places: &Places) -> bool {
     let sysroots = candidates(places).into_iter().filter_map(|candidate| Sysroot::of(&candidate));
     sysroots.into_iter().any(|sysroot| sysroot.rust_lld().is_some()) || lld(&places.programs).is_some()
 }
 
-/// Every compiler that has a cargo.
+/// Every compiler with a cargo.
 fn candidates(places: &Places) -> Vec<Candidate> {
     let mut found: Vec<Candidate> = Vec::new();
     if let (Some(rustc), Some(cargo)) = (places.program("rustc"), places.program("cargo")) {
@@ -102,7 +102,7 @@ fn candidates(places: &Places) -> Vec<Candidate> {
     found
 }
 
-/// The first candidate that serves; linkers are looked for beside every candidate, then in `elsewhere`.
+/// The first suitable candidate; linkers are searched beside every candidate, then in `elsewhere`.
 fn choose(candidates: &[Candidate], elsewhere: &[PathBuf]) -> Result<Toolchain, TargetError> {
     let probed: Vec<(&Candidate, Sysroot)> =
         candidates.iter().filter_map(|candidate| Some((candidate, Sysroot::of(candidate)?))).collect();
@@ -130,18 +130,18 @@ fn choose(candidates: &[Candidate], elsewhere: &[PathBuf]) -> Result<Toolchain, 
         Some(rustc) => TargetError::MissingTool {
             tool: LINKER.into(),
             looked: format!("rust-lld beside {} and on PATH, ld.lld on PATH", rustc.display()),
-            command: format!("{}   (by hand: apt-get install {LINKER_PACKAGE})", super::SET_UP),
+            command: format!("{}   (manually: apt-get install {LINKER_PACKAGE})", super::SET_UP),
         },
         None => TargetError::MissingTool {
             tool: format!("a Rust compiler for {TRIPLE}"),
             looked: "the target or rust-src in the rustc on PATH, Debian's rustc-web in /usr and in specgen's cache"
                 .into(),
-            command: format!("{}   (by hand: {})", super::SET_UP, install_command()),
+            command: format!("{}   (manually: {})", super::SET_UP, install_command()),
         },
     })
 }
 
-/// What installs one, for whoever may.
+/// The command that installs one.
 #[must_use]
 pub fn install_command() -> String {
     let debian = if cfg!(target_os = "macos") {
@@ -152,7 +152,7 @@ pub fn install_command() -> String {
     format!("rustup target add {TRIPLE}{debian}")
 }
 
-/// Whether a compiler is older than the one that images are measured with; Debian without its updates has one. Emitted code itself
+/// Whether a compiler is older than the one used for measurements, as in Debian without updates. Emitted code itself
 /// builds with Rust 1.85.
 fn is_old(version: &str) -> bool {
     let numbers = |text: &str| -> Option<(u32, u32)> {
@@ -163,7 +163,7 @@ fn is_old(version: &str) -> bool {
     found.is_some_and(|found| Some(found) < numbers(env!("CARGO_PKG_RUST_VERSION")))
 }
 
-/// The folder a compiler belongs to.
+/// The sysroot of a compiler.
 struct Sysroot {
     path: PathBuf,
     host: String,
@@ -203,14 +203,14 @@ fn lld(folders: &[PathBuf]) -> Option<PathBuf> {
 }
 
 impl Toolchain {
-    /// `cargo build --release` for the target with these flags for rustc, before the arguments of the caller.
+    /// `cargo build --release` for the target with these rustc flags, to be followed by the caller's arguments.
     ///
-    /// Flags of the caller's environment and configuration do not apply: the figures must not depend on them.
+    /// Ignores flags from the caller's environment and configuration, since the figures must not depend on them.
     #[must_use]
     pub fn cargo_build(&self, rustflags: &[&str]) -> Command {
         let mut flags: Vec<String> = rustflags.iter().map(|&flag| flag.to_owned()).collect();
         flags.push("-Zemit-stack-sizes".into());
-        // Nobody reads where a panic is from on a microcontroller, and paths of this machine do not belong into its flash.
+        // Panic locations are of no use on a microcontroller, and paths of this machine do not belong in its flash.
         flags.push("-Zlocation-detail=none".into());
         if let Some(linker) = &self.linker {
             flags.push(format!("-Clinker={}", linker.display()));
@@ -220,9 +220,9 @@ impl Toolchain {
         with_libraries(&mut command, &self.libraries)
             .env("RUSTC", &self.rustc)
             .env("RUSTC_BOOTSTRAP", "1")
-            // For a HAL that logs by `defmt`: `examples/own-board/src/machine.rs`.
+            // For a HAL that logs through `defmt`: `examples/own-board/src/machine.rs`.
             .env("DEFMT_LOG", "off")
-            // Encoded, so that a path with a space stays one flag.
+            // Encoded, so that a path may contain spaces.
             .env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"))
             .args(["build", "--release", "--target", TRIPLE]);
         if self.core == CoreLibrary::FromSource {
@@ -239,7 +239,7 @@ mod tests {
     use std::os::unix::fs::PermissionsExt;
     use std::path::Path;
 
-    /// A compiler that only knows where it lives.
+    /// A fake compiler that only reports its sysroot.
     fn fake(root: &Path, name: &str, files: &[&str]) -> Candidate {
         let sysroot = root.join(name);
         fs::create_dir_all(&sysroot).unwrap();
@@ -263,7 +263,7 @@ mod tests {
     const LLD: &str = "lib/rustlib/host/bin/rust-lld";
 
     #[test]
-    fn an_installed_target_is_taken_before_sources() {
+    fn an_installed_target_is_preferred_to_sources() {
         let root = tempfile::tempdir().unwrap();
         let rustup = fake(root.path(), "rustup", &[TARGET, SOURCE, LLD]);
         let debian = fake(root.path(), "debian", &[SOURCE]);
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_compiler_with_sources_borrows_the_linker_of_another() {
+    fn a_compiler_with_sources_uses_the_linker_of_another() {
         let root = tempfile::tempdir().unwrap();
         let rustup = fake(root.path(), "rustup", &[LLD]);
         let debian = fake(root.path(), "debian", &[SOURCE]);
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn lld_of_the_distribution_serves_where_there_is_no_rust_lld() {
+    fn lld_of_the_distribution_replaces_a_missing_rust_lld() {
         let root = tempfile::tempdir().unwrap();
         let debian = fake(root.path(), "debian", &[SOURCE]);
         let bin = root.path().join("bin");
@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn an_old_compiler_does_not_serve() {
+    fn an_old_compiler_is_not_used() {
         assert!(is_old("rustc 1.85.1 (4eb161250 2025-03-15)"));
         assert!(!is_old("rustc 1.95.0 (x)") && !is_old("rustc 2.0.0-nightly") && !is_old("mine"));
         let root = tempfile::tempdir().unwrap();
@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_is_named_with_the_command_that_installs_it() {
+    fn a_missing_tool_is_reported_with_the_command_that_installs_it() {
         let root = tempfile::tempdir().unwrap();
         let bare = fake(root.path(), "bare", &[LLD]);
         let error = choose(&[bare], &[]).unwrap_err();

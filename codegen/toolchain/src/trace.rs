@@ -1,7 +1,7 @@
-//! Which instructions a board's tick takes, as the emulator writes them down, and what they cost by the model of cycles.
+//! Traces the instructions of a board's tick in the emulator and prices them by the cycle model.
 //!
-//! The image is that of `firmware/tick`: the board's tick between stand-ins for its converters. The emulator names the blocks
-//! that it executes; what lies between two of them is decoded here, and has to end in a branch that leads from one to the next.
+//! The image is that of `firmware/tick`: the board's tick with stand-ins for its converters. The emulator logs the blocks
+//! it executes. The instructions between two of them are decoded here; they must end in a branch from one to the next.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -21,12 +21,12 @@ use super::panics::{self, DebugInfo};
 use super::replay::{read_words, write_words};
 use super::thumb::{self, Branch, Instruction};
 
-/// Where a tick begins, and where it is over; where what is no part of it begins, and where that is over.
+/// Start and end of a tick; start and end of code that does not count.
 const MARKS: [&str; 4] = ["specgen_timed_tick", "specgen_timed_end", "specgen_aside_begin", "specgen_aside_end"];
-/// A block ends with its page, the smallest of which has so many bytes.
+/// A block ends with its page; this is the smallest page size, bytes.
 const PAGE: u64 = 1024;
 
-/// What a part of a tick takes.
+/// Cost of a part of a tick.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Share {
     /// Instructions.
@@ -35,21 +35,21 @@ pub struct Share {
     pub cycles: u64,
 }
 
-/// What a tick takes, by who takes it.
+/// Cost of a tick by owner.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct TickShares {
-    /// The law under its supervisor.
+    /// The supervised law.
     pub law: Share,
     /// The recorder: row, digest, settings, snapshot.
     pub recorder: Share,
     /// The wave.
     pub wave: Share,
-    /// What the board does between them.
+    /// Code of the board around them.
     pub board: Share,
 }
 
 impl TickShares {
-    /// All of it.
+    /// The sum.
     #[must_use]
     pub fn whole(&self) -> Share {
         let all = [self.law, self.recorder, self.wave, self.board];
@@ -60,37 +60,37 @@ impl TickShares {
     }
 }
 
-/// Where a part keeps the code of a tick, and how fast it gets it.
+/// Memory layout and speed for the code of a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Memory {
     /// The core and its flash interface.
     pub family: Family,
     /// First address of the flash.
     pub flash: u64,
-    /// Where the recorder writes.
+    /// Address of the recorder's memory.
     pub recorder: u32,
-    /// FLASH_ACR and CCR, as the model of cycles reads them.
+    /// FLASH_ACR and CCR, inputs of the cycle model.
     pub registers: [u32; 2],
-    /// The tick's code does not lie in flash but in memory without waits.
+    /// The tick's code is in tightly coupled memory instead of flash.
     pub tightly_coupled: bool,
 }
 
-/// What a tick did with its converters, as `firmware/tick` counts it.
+/// Converter accesses of a tick, as counted by `firmware/tick`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Transfers {
     /// Bytes from the ADC.
     pub adc_bytes: u64,
-    /// In so many frames.
+    /// Frames from the ADC.
     pub adc_frames: u64,
     /// Bytes to the DACs.
     pub dac_bytes: u64,
-    /// In so many frames.
+    /// Frames to the DACs.
     pub dac_frames: u64,
-    /// Waits, ns: the conversion, and what data sheets ask for.
+    /// Waits, ns: conversion and data-sheet delays.
     pub waits: u64,
-    /// Looks at pins.
+    /// Pin reads.
     pub looks: u64,
-    /// Edges of pins.
+    /// Pin edges.
     pub edges: u64,
 }
 
@@ -101,17 +101,17 @@ impl Transfers {
     }
 }
 
-/// The blocks of every tick, by their addresses, and what it did with its converters.
+/// Addresses of the executed blocks of every tick, and its converter accesses.
 #[derive(Debug)]
 pub struct Trace<'a> {
     elf: &'a [u8],
-    /// Runs of blocks that follow each other.
+    /// By tick: runs of consecutive blocks.
     ticks: Vec<Vec<Vec<u64>>>,
     /// By tick.
     pub moved: Vec<Transfers>,
 }
 
-/// Runs the image on `inputs`, rows as for [`replay`](super::replay()), with the words that `firmware/tick` reads from `rates.bin`.
+/// Runs the image on `inputs`, with rows as for [`replay`](super::replay()) and the words that `firmware/tick` reads from `rates.bin`.
 ///
 /// # Errors
 /// As [`replay`](super::replay()).
@@ -139,12 +139,12 @@ pub fn trace<'a>(
     }
     let Reader { ticks, within, .. } = reader;
     if ticks.len() != inputs.len() || moved.len() != inputs.len() || within {
-        return Err(misread(format!("{} ticks of {} are written down", ticks.len(), inputs.len())));
+        return Err(misread(format!("{} of {} ticks were logged", ticks.len(), inputs.len())));
     }
     Ok(Trace { elf: &image.elf, ticks, moved })
 }
 
-/// Puts blocks into ticks.
+/// Assigns blocks to ticks.
 struct Reader {
     marks: [u64; 4],
     ticks: Vec<Vec<Vec<u64>>>,
@@ -162,7 +162,7 @@ impl Reader {
         let Some(tick) = self.ticks.last_mut().filter(|_| self.within) else { return };
         let Some(run) = tick.last_mut() else { return };
         if !executed {
-            // It was written down and did not run.
+            // It was logged but did not run.
             if run.last() == Some(&address) {
                 run.pop();
             }
@@ -181,8 +181,8 @@ impl Reader {
     }
 }
 
-/// `Trace 0: 0x7f0c4c000100 [00400000/0000012c/00000110/ff000201] name`: a block and its address; `Stopped execution of TB chain
-/// before 0x7f0c4c000100 [0000012c] name`: one that did not run.
+/// `Trace 0: 0x7f0c4c000100 [00400000/0000012c/00000110/ff000201] name`: an executed block and its address; `Stopped execution of TB chain
+/// before 0x7f0c4c000100 [0000012c] name`: a block that did not run.
 fn block(line: &[u8]) -> Option<(bool, u64)> {
     let text = std::str::from_utf8(line).ok()?;
     let inside = text.split_once('[')?.1.split_once(']')?.0;
@@ -193,10 +193,10 @@ fn block(line: &[u8]) -> Option<(bool, u64)> {
 }
 
 impl Trace<'_> {
-    /// What each tick takes. Before each one the background has been through the caches: they are empty.
+    /// Cost of each tick. Caches are empty at its start, because the background has run in between.
     ///
     /// # Errors
-    /// [`TargetError::MalformedImage`] if blocks do not follow each other as the image says.
+    /// [`TargetError::MalformedImage`] if the sequence of blocks does not match the image.
     pub fn price(&self, memory: &Memory) -> Result<Vec<TickShares>, TargetError> {
         let code = Code::of(self.elf)?;
         let debug = panics::debug_info(self.elf)?;
@@ -211,7 +211,7 @@ impl Trace<'_> {
                 for pair in blocks.iter().flat_map(|run| run.windows(2)) {
                     code.walk(pair[0], pair[1], |instruction| {
                         let address = instruction.place + if memory.tightly_coupled { 0 } else { memory.flash };
-                        // Addresses of these parts have 32 bits.
+                        // Addresses have 32 bits on these parts.
                         let mut cycles = cost.of(address as u32, instruction.size(), instruction.halves());
                         let (who, far) =
                             places.entry(instruction.place).or_insert_with(|| who(&debug, instruction.place));
@@ -235,7 +235,7 @@ impl Trace<'_> {
     }
 }
 
-/// For whom an instruction was written.
+/// Owner of an instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum CodeOwner {
     Law,
@@ -244,7 +244,7 @@ enum CodeOwner {
     Board,
 }
 
-/// By the file of its line, and of those that it was inlined into; whether what it stores goes to the recorder's memory.
+/// The owner by the source file of the line and of its inlined callers; true if its stores go to the recorder's memory.
 fn who(debug: &DebugInfo<'_>, address: u64) -> (CodeOwner, bool) {
     let mut found = (CodeOwner::Board, false);
     let Ok(mut frames) = debug.find_frames(address).skip_all_loads() else { return found };
@@ -259,7 +259,7 @@ fn who(debug: &DebugInfo<'_>, address: u64) -> (CodeOwner, bool) {
     found
 }
 
-/// For whom a line of a file was written, by its crate and its place there, never by the folders above; none if its callers say.
+/// The owner by crate and path within it, ignoring outer folders; `None` if the callers decide.
 fn of_file(path: &str) -> Option<(CodeOwner, bool)> {
     let (owner, file) = owner::source_of(path);
     let is_law = matches!(owner.as_str(), "controller" | "law" | "runtime");
@@ -268,7 +268,7 @@ fn of_file(path: &str) -> Option<(CodeOwner, bool)> {
     }
     let name = file.rsplit('/').next().unwrap_or_default();
     match name {
-        // A block begins with the state, which the snapshot writes where the block lies.
+        // The state at the start of a block is written by the snapshot, to the block.
         "ring.rs" | "snapshot.rs" => Some((CodeOwner::Recorder, true)),
         _ if file.starts_with("snapshot/") => Some((CodeOwner::Recorder, true)),
         "recorder.rs" | "record.rs" | "recording.rs" | "digest.rs" => Some((CodeOwner::Recorder, false)),
@@ -278,7 +278,7 @@ fn of_file(path: &str) -> Option<(CodeOwner, bool)> {
     }
 }
 
-/// The code of an image, section by section.
+/// The code sections of an image.
 struct Code<'a> {
     sections: Vec<(u64, &'a [u8])>,
 }
@@ -299,11 +299,11 @@ impl<'a> Code<'a> {
         })
     }
 
-    /// Every instruction of a block, up to where the next one begins.
+    /// Visits every instruction of a block, up to the start of the next one.
     fn walk(&self, block: u64, next: u64, each: impl FnMut(&Instruction)) -> Result<(), TargetError> {
         let astray = |at: u64| misread(format!("from {block:#x} the emulator went to {next:#x}, past {at:#x}"));
         let (mut at, mut walked) = (block, Vec::new());
-        // Instructions before `next`, where the block goes on past it.
+        // Number of instructions before `next`, if the block continues past it.
         let mut within = None;
         loop {
             if at == next && at != block {
@@ -319,12 +319,12 @@ impl<'a> Code<'a> {
                     _ => true,
                 };
                 if !leads {
-                    // Where its clock had something to do the emulator stops within a block, and goes on from there.
+                    // For a clock event the emulator stops within a block and resumes from there.
                     walked.truncate(within.ok_or_else(|| astray(at))?);
                 }
                 break;
             }
-            // A page may end here, or within the next instruction.
+            // A page may end here or within the next instruction.
             if at == next && (at / PAGE != block / PAGE || (at + 2) / PAGE != block / PAGE) {
                 break;
             }
@@ -335,10 +335,10 @@ impl<'a> Code<'a> {
 }
 
 fn misread(text: String) -> TargetError {
-    TargetError::MalformedStats { text: format!("the emulator's list of blocks is not understood: {text}") }
+    TargetError::MalformedStats { text: format!("unexpected block in the emulator's log: {text}") }
 }
 
-/// Addresses of the [`MARKS`].
+/// Addresses of [`MARKS`].
 fn marks(elf: &[u8]) -> Result<[u64; 4], TargetError> {
     let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
     let file = object::File::parse(elf).map_err(malformed)?;
@@ -349,7 +349,7 @@ fn marks(elf: &[u8]) -> Result<[u64; 4], TargetError> {
         *slot = symbol.ok_or_else(missing)?.address() & !1;
     }
     if (1..MARKS.len()).any(|k| found[..k].contains(&found[k])) {
-        return Err(TargetError::MalformedImage { text: format!("some of {} are one function", MARKS.join(", ")) });
+        return Err(TargetError::MalformedImage { text: format!("some of {} share an address", MARKS.join(", ")) });
     }
     Ok(found)
 }
@@ -359,7 +359,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_wrote_an_instruction_does_not_depend_on_the_folder() {
+    fn owners_do_not_depend_on_outer_folders() {
         let [law, board, recorder, far, wave] = [
             Some((CodeOwner::Law, false)),
             None,
@@ -367,7 +367,7 @@ mod tests {
             Some((CodeOwner::Recorder, true)),
             Some((CodeOwner::Wave, false)),
         ];
-        // What a controller is made of, relative as cargo has it, and below folders whose names say something else.
+        // Parts of a controller, relative as in cargo, and below folders with misleading names.
         for folder in
             ["", "/tmp/out/", "/home/me/runtime/out/", "/home/controller/src/wave/snapshot/", "/w/library/core/"]
         {
@@ -413,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn a_block_ends_in_a_branch_that_leads_to_the_next() {
+    fn a_block_ends_in_a_branch_to_the_next() {
         // movs r0, #1; subs r0, #1; bne .-2; bx lr
         let bytes = [0x01, 0x20, 0x01, 0x38, 0xfd, 0xd1, 0x70, 0x47];
         let code = Code { sections: vec![(0x1000, &bytes)] };
@@ -421,11 +421,11 @@ mod tests {
             let mut count = 0;
             code.walk(from, to, |_| count += 1).map(|()| count).ok()
         };
-        // The loop's head within the block is no end of it.
+        // The loop's head within the block does not end it.
         assert_eq!(count(0x1000, 0x1002), Some(3));
         assert_eq!(count(0x1002, 0x1006), Some(2));
         assert_eq!(count(0x1006, 0x2000), Some(1));
-        // Cut where the emulator's clock was due: at an instruction, and nowhere else.
+        // A clock event of the emulator may cut a block only between instructions.
         assert_eq!(count(0x1000, 0x1004), Some(2));
         assert_eq!(count(0x1000, 0x1003), None);
         assert_eq!(count(0x1002, 0x1008), None);

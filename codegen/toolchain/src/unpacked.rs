@@ -1,8 +1,8 @@
-//! Packages of the distribution, unpacked with their libraries into a folder of the user's cache and run from there.
+//! Packages of the distribution, unpacked with their libraries into the user's cache and run from there.
 //!
-//! No rights are needed, nothing is installed and nothing removed: apt works with a state of its own, in which no package is
-//! installed, so that none conflicts. A folder is put in place by one rename and is whole or not there; whether what is in it
-//! runs on this machine is asked by whoever looks for a program.
+//! This needs no privileges, and installs and removes nothing: apt uses a private state in which no package is installed,
+//! so nothing conflicts. A folder is put in place by one rename, so it is complete or absent. The search for a program
+//! checks whether it runs on this machine.
 
 use super::apt::{Apt, Refusal};
 use super::places::Places;
@@ -14,18 +14,18 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
-/// Not unpacked: the loader of this machine fits its own C library only.
+/// Not unpacked: the loader of this machine works only with its own C library.
 const OF_THE_SYSTEM: [&str; 2] = ["libc6_", "libc-bin_"];
-/// Texts for people, which no program here reads.
+/// Documentation, which no program here reads.
 const UNUSED: [&str; 4] = ["usr/share/doc", "usr/share/man", "usr/share/info", "usr/share/locale"];
-/// Longest time for one package, s.
+/// Time limit for one package.
 const LIMIT: Duration = Duration::from_secs(300);
 
-/// Downloads packages with all that they depend on and unpacks them as `name`; what was there under this name goes.
-/// If `works` says so once it is this process' turn, another has done it meanwhile.
+/// Downloads packages with all their dependencies and unpacks them as `name`, replacing an older folder of this name.
+/// Does nothing if `works` is true once the lock is held: another process has done it meanwhile.
 ///
 /// # Errors
-/// Why not, in words.
+/// Why it failed.
 pub(super) fn fetch(
     name: &str,
     packages: &[&str],
@@ -35,15 +35,14 @@ pub(super) fn fetch(
 ) -> Result<(), Refusal> {
     let folder = places
         .cache()
-        .ok_or_else(|| Refusal::other("there is no cache folder to unpack into (neither XDG_CACHE_HOME nor a home)"))?;
+        .ok_or_else(|| Refusal::other("no cache folder (neither XDG_CACHE_HOME nor a home folder is set)"))?;
     let [apt, dpkg] = ["apt-get", "dpkg-deb"].map(|program| places.program(program));
-    let apt = apt.ok_or_else(|| Refusal::other("there is no apt-get"))?;
-    let dpkg = dpkg.ok_or_else(|| Refusal::other("there is no dpkg-deb"))?;
+    let apt = apt.ok_or_else(|| Refusal::other("apt-get was not found"))?;
+    let dpkg = dpkg.ok_or_else(|| Refusal::other("dpkg-deb was not found"))?;
     let failed = |error: io::Error| Refusal::other(format!("{}: {error}", folder.display()));
 
     fs::create_dir_all(folder).map_err(failed)?;
     let lock = File::create(folder.join("lock")).map_err(failed)?;
-    // Dropping the file frees it.
     lock.lock().map_err(failed)?;
     if works() {
         return Ok(());
@@ -64,12 +63,12 @@ pub(super) fn fetch(
         }
     }
     for path in UNUSED {
-        // Only to save room.
+        // Only saves space.
         let _ = fs::remove_dir_all(root.join(path));
     }
     let place = folder.join(name);
     if place.exists() {
-        // A folder cannot be renamed onto one that is not empty. What does not run is no loss.
+        // A folder cannot be renamed onto a non-empty one. The old tool does not work, so losing it is harmless.
         fs::rename(&place, scratch.path().join("old")).map_err(failed)?;
     }
     fs::rename(&root, &place).map_err(failed)
@@ -80,7 +79,7 @@ fn is_of_the_system(archive: &Path) -> bool {
     OF_THE_SYSTEM.iter().any(|start| name.starts_with(start))
 }
 
-/// What a process that was killed has left; nobody else is at work while the lock is held.
+/// Removes what a killed process left behind; safe while the lock is held.
 fn remove_stale(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         if entry.file_name().to_string_lossy().starts_with(".tmp") {

@@ -1,20 +1,20 @@
-//! The folders of the user's cache that specgen may fill: kept builds, and tools that were unpacked for this user alone.
-//! Everything in them can be made again; removing them is always safe.
+//! Folders in the user's cache: cached builds, and tools unpacked for this user.
+//! They can be removed at any time; specgen recreates what it needs.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-/// The variable of the environment that names another folder for kept builds; empty for none. Tools stay where they are: a
-/// command that keeps no builds still needs them.
+/// Environment variable that moves the build cache to another folder; empty disables it. It does not move the tools,
+/// which a command needs even without a build cache.
 pub const VARIABLE: &str = "SPECGEN_CACHE";
 
-/// `specgen` in the system's folder for caches: `XDG_CACHE_HOME`, `~/.cache`, on macOS `~/Library/Caches`. None without a home.
+/// `specgen` in the system's cache folder: `XDG_CACHE_HOME`, `~/.cache`, on macOS `~/Library/Caches`. `None` without a home folder.
 #[must_use]
 pub fn folder() -> Option<PathBuf> {
     below(&variable, std::env::home_dir().as_deref(), cfg!(target_os = "macos"))
 }
 
-/// Where builds are kept: `builds` in the folder that [`VARIABLE`] names, else in [`folder`]. None if the variable is empty.
+/// The build cache: `builds` in the folder named by [`VARIABLE`], else in [`folder`]. `None` if the variable is empty.
 #[must_use]
 pub fn builds() -> Option<PathBuf> {
     match variable(VARIABLE) {
@@ -29,7 +29,7 @@ fn variable(name: &str) -> Option<OsString> {
 }
 
 fn below(variable: &dyn Fn(&str) -> Option<OsString>, home: Option<&Path>, mac: bool) -> Option<PathBuf> {
-    // The XDG specification: a relative path is to be ignored.
+    // The XDG specification says to ignore relative paths.
     let xdg = variable("XDG_CACHE_HOME").map(PathBuf::from).filter(|path| path.is_absolute());
     let below_home = || home.map(|home| home.join(if mac { "Library/Caches" } else { ".cache" }));
     xdg.or_else(below_home).map(|folder| folder.join("specgen"))

@@ -1,4 +1,4 @@
-//! What decides about the bytes of a build: its sources, its command with all flags, and who carries it out.
+//! The cache key: everything that determines the bytes of a build - sources, command with all flags, and tools.
 
 use crate::process::{clean_command, decides_on_link, find_in_path, printed};
 use sha2::{Digest, Sha256};
@@ -9,21 +9,21 @@ use std::process::Command;
 use std::time::UNIX_EPOCH;
 use toml::Value;
 
-/// Changes with the meaning of a key.
+/// Increase when the meaning of a key changes.
 const VERSION: &str = "3";
-/// Keys of cargo's configuration that bring in what a key does not see: other sources, files, or another compiler.
+/// Keys of cargo's configuration with effects that the cache key cannot see: other sources, files, or another compiler.
 const BEYOND: [&[&str]; 4] = [&["paths"], &["patch"], &["include"], &["build", "rustc"]];
 
-/// What was found before a build.
+/// State of the inputs before a build.
 pub(super) struct Recipe {
     package: PathBuf,
-    /// Of everything but the sources.
+    /// Digest of everything but the sources.
     context: Digester,
     sources: [u8; 32],
 }
 
 impl Recipe {
-    /// None if something may decide that cannot be read.
+    /// `None` if something that affects the output cannot be read.
     pub fn of(command: &Command, package: &Path, rustc_args: &[&str]) -> Option<Self> {
         let mut context = Digester::default();
         context.add(VERSION);
@@ -40,7 +40,7 @@ impl Recipe {
             context.add(value.as_encoded_bytes());
         }
         rustc_args.iter().for_each(|argument| context.add(argument));
-        // Cargo sees it so, too: it works there.
+        // Cargo resolves links as well, since it runs in this folder.
         let package = fs::canonicalize(package).ok()?;
         configuration(&package, &mut context)?;
         tools(command, &package, &mut context)?;
@@ -48,14 +48,14 @@ impl Recipe {
         Some(Self { package, context, sources })
     }
 
-    /// The name of the build.
+    /// The key of the build.
     pub fn key(&self) -> String {
         let mut key = self.context.clone();
         key.add(self.sources);
         key.digest().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// Whether the sources are those that this was made of.
+    /// True if the sources have not changed since.
     pub fn is_current(&self) -> bool {
         sources(&self.package) == Some(self.sources)
     }
@@ -66,12 +66,12 @@ struct Digester(Sha256);
 
 impl Digester {
     fn add(&mut self, bytes: impl AsRef<[u8]>) {
-        // The length keeps neighbours apart.
+        // The length separates neighbouring fields.
         self.0.update((bytes.as_ref().len() as u64).to_le_bytes());
         self.0.update(bytes.as_ref());
     }
 
-    /// A file by its place, size and time, or every file below a folder, if it is there: for what only an installation changes.
+    /// Adds path, size and time of a file, or of every file below a folder, if it exists: for files that only an installation changes.
     fn stamp(&mut self, path: &Path) -> Option<()> {
         let Ok(path) = fs::canonicalize(path) else { return Some(()) };
         let metadata = fs::metadata(&path).ok()?;
@@ -93,9 +93,9 @@ impl Digester {
     }
 }
 
-/// Cargo, compiler, libraries that come with it, linkers.
+/// Adds cargo, compiler, the compiler's libraries, and linkers.
 fn tools(command: &Command, package: &Path, context: &mut Digester) -> Option<()> {
-    // Cargo runs where the package is, and may be a proxy that picks the compiler by that.
+    // Cargo may be a proxy that picks the compiler by the working folder, so ask in the package.
     let ask = |program: &Path, arguments: &[&str]| printed(clean_command(program).current_dir(package).args(arguments));
     let variable = |name: &str| command.get_envs().find(|(set, _)| *set == name).and_then(|(_, value)| value);
     let compiler = variable("RUSTC").map_or_else(|| PathBuf::from("rustc"), PathBuf::from);
@@ -103,7 +103,7 @@ fn tools(command: &Command, package: &Path, context: &mut Digester) -> Option<()
     context.add(ask(&compiler, &["-vV"])?);
     let sysroot = ask(&compiler, &["--print", "sysroot"])?;
     let sysroot = Path::new(sysroot.trim_end());
-    // A compiler of one's own is built again without a new version.
+    // A locally built compiler may change without a new version.
     let libraries = fs::read_dir(sysroot.join("lib")).into_iter().flatten().flatten();
     let driver = libraries.filter(|entry| entry.file_name().to_string_lossy().starts_with("librustc_driver"));
     let mut files: Vec<PathBuf> = driver.map(|entry| entry.path()).collect();
@@ -116,7 +116,7 @@ fn tools(command: &Command, package: &Path, context: &mut Digester) -> Option<()
     given.map(PathBuf::from).chain(on_path).try_for_each(|linker| context.stamp(&linker))
 }
 
-/// What cargo's own configuration files say, from the package's folder upwards and in cargo's home.
+/// Adds cargo's configuration files, from the package's folder upwards and in cargo's home.
 fn configuration(package: &Path, context: &mut Digester) -> Option<()> {
     let home = std::env::var_os("CARGO_HOME").filter(|home| !home.is_empty()).map(PathBuf::from);
     let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo")));
@@ -132,7 +132,7 @@ fn configuration(package: &Path, context: &mut Digester) -> Option<()> {
             if BEYOND.iter().any(|keys| keys.iter().try_fold(&table, |value, key| value.get(key)).is_some()) {
                 return None;
             }
-            // Paths in it are meant from where it is; the package's own has none.
+            // Relative paths in a configuration depend on its folder. The package's own configuration has none.
             if folder != package.join(".cargo") {
                 context.add(path.as_os_str().as_encoded_bytes());
             }
@@ -142,14 +142,14 @@ fn configuration(package: &Path, context: &mut Digester) -> Option<()> {
     Some(())
 }
 
-/// Digest of every file that a build of the package can see: the package, what its manifest names by a path, what theirs do,
-/// and manifest and lock file of the workspace. None if something cannot be read.
+/// Digest of all files that a build of the package can see: the package, its path dependencies recursively,
+/// and manifest and lock file of the workspace. `None` if one cannot be read.
 fn sources(package: &Path) -> Option<[u8; 32]> {
     let root = package.parent().unwrap_or(package);
     let mut files = BTreeMap::new();
     let mut open = vec![package.to_owned(), root.join("Cargo.toml")];
-    // Cargo makes one if there is none; it says nothing where nothing comes from elsewhere. A package that is a workspace of
-    // its own has its own.
+    // Cargo creates a missing lock file; one without registry sources carries no information. A package that is its own workspace
+    // has its own lock file.
     let lock = root.join("Cargo.lock");
     let says = |text: String| text.lines().any(|line| line.starts_with("source = "));
     if !package.join("Cargo.lock").is_file() && fs::read_to_string(&lock).is_ok_and(says) {
@@ -168,14 +168,14 @@ fn sources(package: &Path) -> Option<[u8; 32]> {
     }
     let mut digest = Digester::default();
     for (path, content) in files {
-        // The same workspace in another folder is the same.
+        // Relative, so that a copy of the workspace in another folder has the same key.
         digest.add(path.strip_prefix(root).unwrap_or(&path).as_os_str().as_encoded_bytes());
         digest.add(content);
     }
     Some(digest.digest())
 }
 
-/// All that a manifest in `folder` names by a key `path`, if it is there: cargo has the words for what is not.
+/// All existing paths that a manifest in `folder` names by a key `path`. Cargo reports missing ones.
 fn named(folder: &Path, manifest: &str) -> Vec<PathBuf> {
     const KEY: &str = "path";
     let value = |(at, _)| {
@@ -186,7 +186,7 @@ fn named(folder: &Path, manifest: &str) -> Vec<PathBuf> {
     paths.filter_map(|path| fs::canonicalize(folder.join(path)).ok()).collect()
 }
 
-/// A file, or all below a folder but what cargo made.
+/// Adds a file, or all files below a folder except cargo's output.
 fn collect(path: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) -> Option<()> {
     if path.is_file() {
         files.insert(path.to_owned(), fs::read(path).ok()?);

@@ -1,7 +1,7 @@
 use super::*;
 use std::time::Duration;
 
-/// A workspace of a program and what it uses; `extra` goes into a folder that it does not use.
+/// A workspace with a program and the package it uses. `extra` goes into an unused folder.
 fn workspace(root: &Path, used: &str, extra: &str) -> PathBuf {
     for (name, text) in [
         ("Cargo.toml", "[workspace]\n"),
@@ -21,7 +21,7 @@ fn workspace(root: &Path, used: &str, extra: &str) -> PathBuf {
     root.join("program")
 }
 
-/// Cargo and compiler in a folder: programs that answer what is asked of them before a build.
+/// Fake cargo and compiler that answer the queries made before a build.
 struct Tools {
     folder: tempfile::TempDir,
 }
@@ -37,7 +37,7 @@ impl Tools {
             );
             let path = tools.folder.path().join(name);
             replace(&path, script.as_bytes(), true).unwrap();
-            // While another thread starts a program, this may count as being written still.
+            // While another thread forks, the file may still count as open for writing.
             while Command::new(&path).output().is_err() {
                 std::thread::sleep(Duration::from_millis(1));
             }
@@ -63,7 +63,7 @@ fn key(command: &Command, package: &Path, rustc_args: &[&str]) -> String {
 }
 
 #[test]
-fn equal_sources_in_two_folders_share_a_key_and_everything_that_is_seen_changes_it() {
+fn equal_sources_in_two_folders_share_a_key_and_every_input_changes_it() {
     let tools = Tools::new();
     let key_of = |used: &str, extra: &str, flag: &str, variable: &str, rustc: &[&str]| {
         let dir = tempfile::tempdir().unwrap();
@@ -72,7 +72,7 @@ fn equal_sources_in_two_folders_share_a_key_and_everything_that_is_seen_changes_
     };
     let one = key_of("a", "x", "build", "1", &[]);
     assert_eq!(one, key_of("a", "x", "build", "1", &[]));
-    assert_eq!(one, key_of("a", "y", "build", "1", &[]), "a folder that is not used");
+    assert_eq!(one, key_of("a", "y", "build", "1", &[]), "an unused folder");
     let others = [
         key_of("b", "x", "build", "1", &[]),
         key_of("a", "x", "rustc", "1", &[]),
@@ -85,7 +85,7 @@ fn equal_sources_in_two_folders_share_a_key_and_everything_that_is_seen_changes_
 }
 
 #[test]
-fn another_cargo_compiler_library_or_linker_changes_the_key() {
+fn a_new_cargo_compiler_library_or_linker_changes_the_key() {
     let (tools, dir) = (Tools::new(), tempfile::tempdir().unwrap());
     let package = workspace(dir.path(), "a", "x");
     let root = tools.folder.path();
@@ -116,16 +116,16 @@ fn another_cargo_compiler_library_or_linker_changes_the_key() {
             differs(file);
         }
     }
-    // Of this size already: it is seen from the time.
+    // Same size: only the time changes.
     File::options().append(true).open(root.join("ld")).unwrap().set_modified(SystemTime::UNIX_EPOCH).unwrap();
     differs("time");
-    // A compiler that does not answer decides about bytes that nobody knows.
+    // If the compiler does not answer, its output is unknown.
     fs::remove_file(root.join("rustc")).unwrap();
     assert!(Recipe::of(&tools.command(), &package, &[]).is_none());
 }
 
 #[test]
-fn what_cargo_is_configured_with_changes_the_key() {
+fn the_configuration_of_cargo_changes_the_key() {
     let (tools, dir) = (Tools::new(), tempfile::tempdir().unwrap());
     let package = workspace(&dir.path().join("w"), "a", "x");
     let with = |text: &str| {
@@ -147,12 +147,12 @@ fn what_cargo_is_configured_with_changes_the_key() {
 }
 
 #[test]
-fn a_lock_file_counts_if_it_says_something_and_what_changes_meanwhile_is_not_kept() {
+fn a_lock_file_with_sources_counts_and_changed_sources_are_not_cached() {
     let (tools, dir) = (Tools::new(), tempfile::tempdir().unwrap());
     let package = workspace(dir.path(), "a", "x");
     let recipe = Recipe::of(&tools.command(), &package, &[]).unwrap();
     let lock = |text: &str| fs::write(dir.path().join("Cargo.lock"), text).unwrap();
-    // As cargo makes it where there is none.
+    // As cargo creates it.
     lock("version = 4\n\n[[package]]\nname = \"program\"\n");
     assert!(recipe.is_current());
     lock("version = 4\n\n[[package]]\nname = \"libm\"\nsource = \"registry\"\n");
@@ -171,7 +171,7 @@ fn cache(root: &Path, limit: u64) -> Cache {
 }
 
 #[test]
-fn what_was_kept_is_found_again_and_nothing_else() {
+fn a_stored_build_is_found_again_and_nothing_else() {
     let (tools, dir) = (Tools::new(), tempfile::tempdir().unwrap());
     let package = workspace(&dir.path().join("w"), "a", "x");
     let target = dir.path().join("target");
@@ -180,7 +180,7 @@ fn what_was_kept_is_found_again_and_nothing_else() {
     let first = slot("build");
     assert_eq!(first.fetch(&target).unwrap(), None);
     first.keep(&target, &built, b"artifact");
-    // Twice: the second finds the first one's file in its way, damaged.
+    // Twice: the second round finds the file of the first, damaged.
     for _ in 0..2 {
         let found = slot("build").fetch(&target).unwrap();
         assert_eq!(found, Some((built.clone(), b"artifact".to_vec())));
@@ -193,7 +193,7 @@ fn what_was_kept_is_found_again_and_nothing_else() {
 }
 
 #[test]
-fn every_flipped_bit_and_every_cut_is_seen_and_removed() {
+fn every_flipped_bit_and_every_truncation_is_detected() {
     let dir = tempfile::tempdir().unwrap();
     let cache = cache(dir.path(), 1000);
     let (key, other) = ("a".repeat(64), "b".repeat(64));
@@ -212,7 +212,7 @@ fn every_flipped_bit_and_every_cut_is_seen_and_removed() {
         assert_eq!(cache.fetch(&key), None, "{}", String::from_utf8_lossy(&damaged));
         assert!(!path.exists());
     }
-    // Whole, but another's.
+    // Intact, but stored under another key.
     fs::write(cache.folder.join(&other), &whole).unwrap();
     assert_eq!(cache.fetch(&other), None);
     fs::write(&path, &whole).unwrap();
@@ -224,7 +224,7 @@ fn every_flipped_bit_and_every_cut_is_seen_and_removed() {
 }
 
 #[test]
-fn what_was_used_longest_ago_goes_first() {
+fn the_least_recently_used_build_is_removed_first() {
     let dir = tempfile::tempdir().unwrap();
     let cache = cache(dir.path(), 450);
     let place = Path::new("x");
@@ -232,21 +232,21 @@ fn what_was_used_longest_ago_goes_first() {
         let file = File::open(cache.folder.join(key)).unwrap();
         file.set_modified(SystemTime::now() - Duration::from_secs(seconds)).unwrap();
     };
-    // 67 bytes around each content.
+    // Each entry adds 67 bytes to its content.
     for (key, seconds) in [("a", 30), ("b", 20), ("c", 10)] {
         cache.keep(key, place, &[0; 80]).unwrap();
         age(key, seconds);
     }
-    // Used, so it is the newest.
+    // Used just now, so it is the newest.
     assert!(cache.fetch("a").is_some());
     cache.keep("d", place, &[0; 80]).unwrap();
     let there = |key: &str| cache.folder.join(key).is_file();
     assert_eq!(["a", "b", "c", "d"].map(there), [true, false, true, true]);
     assert!(cache.extent().unwrap().bytes <= 450);
-    // Larger than all that may be kept: nothing goes for it.
+    // Larger than the limit: not stored, and nothing is removed for it.
     cache.keep("e", place, &[0; 500]).unwrap();
     assert_eq!(cache.extent().unwrap(), Extent { builds: 3, bytes: 441 });
-    // What a process that was killed left is no build, and goes like one.
+    // A temporary file of a killed process is not a build, and is removed like one.
     fs::write(cache.folder.join("f.1-0.part"), [0; 100]).unwrap();
     age("f.1-0.part", 100);
     assert_eq!(cache.extent().unwrap(), Extent { builds: 3, bytes: 541 });
@@ -256,13 +256,13 @@ fn what_was_used_longest_ago_goes_first() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_no_failure() {
+fn an_unwritable_folder_is_no_failure() {
     let (tools, dir) = (Tools::new(), tempfile::tempdir().unwrap());
     let package = workspace(&dir.path().join("w"), "a", "x");
     fs::write(dir.path().join("builds"), "a file").unwrap();
     let slot = Slot::within(cache(dir.path(), 1000), &tools.command(), &package, &[]).unwrap();
     assert_eq!(slot.fetch(&dir.path().join("target")).unwrap(), None);
     slot.keep(dir.path(), &dir.path().join("program"), b"artifact");
-    let said = trouble().unwrap();
-    assert!(!said.contains('\n'), "{said}");
+    let warning = trouble().unwrap();
+    assert!(!warning.contains('\n'), "{warning}");
 }

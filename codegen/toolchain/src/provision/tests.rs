@@ -1,4 +1,4 @@
-//! The order of the ways, on programs that are made up: no test here reaches a network or installs anything.
+//! The order of methods, tested with fake programs: no test here uses a network or installs anything.
 
 use super::*;
 use std::fs;
@@ -13,16 +13,16 @@ const USER: &str = "echo 1000";
 const OFFLINE: &str = "case \"$*\" in *update*) echo \"W: Temporary failure resolving 'x'\" >&2; exit 0;; esac\n\
                        echo 'E: Unable to locate package' >&2; exit 100";
 
-/// A machine with these programs, and nothing else.
+/// A machine with only these programs.
 struct Machine {
     folder: tempfile::TempDir,
-    said: Vec<String>,
+    messages: Vec<String>,
     cache: bool,
 }
 
 impl Machine {
     fn with(programs: &[(&str, &str)]) -> Self {
-        let machine = Self { folder: tempfile::tempdir().unwrap(), said: Vec::new(), cache: true };
+        let machine = Self { folder: tempfile::tempdir().unwrap(), messages: Vec::new(), cache: true };
         fs::create_dir(machine.path("bin")).unwrap();
         for (name, script) in programs {
             machine.program(name, script);
@@ -45,14 +45,14 @@ impl Machine {
     }
 
     fn emulator(&mut self) -> Result<Emulator, TargetError> {
-        emulator(&self.places(), &mut |line| self.said.push(line.to_owned()))
+        emulator(&self.places(), &mut |line| self.messages.push(line.to_owned()))
     }
 
     fn compiler(&mut self) -> Result<Toolchain, TargetError> {
-        compiler(&self.places(), &mut |line| self.said.push(line.to_owned()))
+        compiler(&self.places(), &mut |line| self.messages.push(line.to_owned()))
     }
 
-    /// An apt-get that installs by writing an emulator, refuses to if `conflict`, and "downloads" one package.
+    /// A fake apt-get that installs by writing an emulator, fails with a conflict if `conflict`, and "downloads" one package.
     fn apt(&self, conflict: bool) {
         let bin = self.path("bin");
         let installs = if conflict {
@@ -100,11 +100,11 @@ fn is_below(path: &Path, folder: &Path) -> bool {
 }
 
 #[test]
-fn what_is_there_and_works_is_taken_and_nothing_is_run() {
+fn a_working_tool_is_used_and_nothing_is_run() {
     let mut machine = Machine::with(&[("qemu-system-arm", QEMU), ("id", ROOT)]);
     machine.apt(false);
     assert!(is_below(&machine.emulator().unwrap().program, &machine.path("bin")));
-    assert_eq!((machine.calls(), machine.said.len()), (String::new(), 0));
+    assert_eq!((machine.calls(), machine.messages.len()), (String::new(), 0));
 }
 
 #[test]
@@ -117,33 +117,33 @@ fn root_installs_and_removes_nothing() {
 }
 
 #[test]
-fn sudo_is_used_only_if_it_asks_for_nothing() {
+fn sudo_is_used_only_if_it_requires_no_password() {
     let sudo = "shift; exec \"$@\"";
     let mut machine = Machine::with(&[("id", USER), ("sudo", sudo)]);
     machine.apt(false);
     assert!(is_below(&machine.emulator().unwrap().program, &machine.path("bin")));
     assert!(
-        machine.said.iter().any(|line| line == "running: sudo apt-get install qemu-system-arm"),
+        machine.messages.iter().any(|line| line == "running: sudo apt-get install qemu-system-arm"),
         "{:?}",
-        machine.said
+        machine.messages
     );
 
     let mut machine = Machine::with(&[("id", USER), ("sudo", "exit 1")]);
     machine.apt(false);
     assert!(is_below(&machine.emulator().unwrap().program, &machine.path("tools")));
-    assert!(machine.said.contains(&"apt-get install: not root, and sudo asks for a password".to_owned()));
+    assert!(machine.messages.contains(&"apt-get install: not root, and sudo requires a password".to_owned()));
     assert!(!machine.calls().contains("--no-remove"));
 }
 
 #[test]
-fn a_conflict_leads_to_unpacking_which_the_next_run_finds() {
+fn after_a_conflict_packages_are_unpacked_and_found_by_the_next_run() {
     let mut machine = Machine::with(&[("id", ROOT)]);
     machine.apt(true);
     let found = machine.emulator().unwrap();
     assert!(is_below(&found.program, &machine.path("tools/qemu-system-arm")));
     assert_eq!(found.libraries, [machine.path("tools/qemu-system-arm/usr/lib/any-linux-gnu")]);
-    assert!(machine.said.contains(&"apt-get install: apt-get would have to remove qemu-utils".to_owned()));
-    // Nothing half-done, no archives, no texts.
+    assert!(machine.messages.contains(&"apt-get install: apt-get would have to remove qemu-utils".to_owned()));
+    // No partial results, archives or documentation.
     assert_eq!(machine.left(), ["lock", "qemu-system-arm"]);
     assert!(!machine.path("tools/qemu-system-arm/usr/share/doc").exists());
     let calls = machine.calls();
@@ -153,42 +153,42 @@ fn a_conflict_leads_to_unpacking_which_the_next_run_finds() {
 }
 
 #[test]
-fn what_does_not_run_is_not_used_and_is_replaced() {
+fn a_broken_tool_is_not_used_and_is_replaced() {
     let mut machine = Machine::with(&[("id", USER), ("qemu-system-arm", BROKEN_QEMU)]);
     machine.apt(false);
     let unpacked = machine.path("tools/qemu-system-arm/usr/bin");
     fs::create_dir_all(&unpacked).unwrap();
     fs::copy(machine.path("bin/qemu-system-arm"), unpacked.join("qemu-system-arm")).unwrap();
     let error = Emulator::find_in(&machine.places()).unwrap_err().to_string();
-    assert!(error.contains("does not run, or does not know mps2-an500"), "{error}");
+    assert!(error.contains("does not run or does not support mps2-an500"), "{error}");
     assert!(is_below(&machine.emulator().unwrap().program, &unpacked));
-    assert!(machine.said.contains(&"apt-get install: not root, and there is no sudo".to_owned()));
+    assert!(machine.messages.contains(&"apt-get install: not root, and sudo was not found".to_owned()));
     assert_eq!(machine.left(), ["lock", "qemu-system-arm"]);
 }
 
 #[test]
-fn without_network_one_line_says_so_and_nothing_is_left() {
+fn a_missing_network_is_reported_once_and_nothing_is_left() {
     for id in [ROOT, USER] {
         let mut machine = Machine::with(&[("id", id), ("apt-get", OFFLINE), ("dpkg-deb", "exit 1")]);
         let error = machine.emulator().unwrap_err();
         assert!(error.is_of_a_tool());
         let text = error.to_string();
-        assert_eq!(text.matches("apt has no network").count(), 1, "{text}");
+        assert_eq!(text.matches("apt has no network connection").count(), 1, "{text}");
         assert_eq!(text.lines().count(), 1, "{text}");
         assert!(id == ROOT || machine.left() == ["lock"]);
     }
 }
 
 #[test]
-fn where_nothing_can_be_done_each_way_is_named() {
+fn if_nothing_works_every_method_is_reported() {
     let mut machine = Machine::with(&[("id", USER)]);
     machine.cache = false;
     let text = machine.emulator().unwrap_err().to_string();
-    for words in ["there is no apt-get", "there is no cache folder", "XDG_CACHE_HOME", "by hand: "] {
+    for words in ["apt-get was not found", "there is no cache folder", "XDG_CACHE_HOME", "install it manually: "] {
         assert!(text.contains(words), "no `{words}` in: {text}");
     }
     let text = machine.compiler().unwrap_err().to_string();
-    assert!(text.contains("there is no rustup") && text.contains("by hand: rustup target add"), "{text}");
+    assert!(text.contains("rustup was not found") && text.contains("install it manually: rustup target add"), "{text}");
 }
 
 #[test]
@@ -208,9 +208,12 @@ fn rustup_comes_before_the_distribution() {
     );
     machine.program("rustup", "echo 'error: could not download' >&2; exit 1");
     let text = machine.compiler().unwrap_err().to_string();
-    assert!(text.contains("rustup target add: could not download; apt-get install: apt has no network"), "{text}");
+    assert!(
+        text.contains("rustup target add: could not download; apt-get install: apt has no network connection"),
+        "{text}"
+    );
     machine.program("rustup", &format!("mkdir -p {}", library.display()));
-    machine.said.clear();
+    machine.messages.clear();
     assert!(machine.compiler().is_ok());
-    assert!(machine.said.iter().all(|line| !line.contains("apt-get install:")), "{:?}", machine.said);
+    assert!(machine.messages.iter().all(|line| !line.contains("apt-get install:")), "{:?}", machine.messages);
 }
