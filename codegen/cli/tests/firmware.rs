@@ -127,7 +127,7 @@ fn flashing(folder: &Folder, emulated: &str) {
         ["nothing was flashed: board.elf is for stm32h743, not for stm32f4", "specgen build SPEC --target stm32f4"];
     flash(&path, &[&board[..], &["--target", "stm32f4"]].concat()).says(2, &other);
     flash(&path, &[&board[..], &["--target", "qemu"]].concat()).says(2, &["is for stm32h743, not for qemu"]);
-    for (image, words) in [(emulated, "qemu is no board"), ("nameless.elf", "does not say which board it is for")] {
+    for (image, words) in [(emulated, "qemu is not a board"), ("nameless.elf", "does not name its board")] {
         let refused = Run::of(folder.command().env("PATH", &path).args(["flash", image]).args(board));
         refused.says(2, &["nothing was flashed", words]);
     }
@@ -137,7 +137,7 @@ fn flashing(folder: &Folder, emulated: &str) {
     // An image that fails a check is not flashed.
     edited(folder, image, "spoilt.elf", b"specgen-identity: ", b"specgen-identitx: ");
     let refused = Run::of(folder.command().env("PATH", &path).args(["flash", "spoilt.elf"]).args(board));
-    refused.says(1, &["holds no identity", "nothing was flashed"]);
+    refused.says(1, &["no specgen identity line", "nothing was flashed"]);
     assert_eq!(asked(), "");
 
     let done = flash(&path, &[&board[..], &["--target", "stm32h743"]].concat());
@@ -165,7 +165,7 @@ fn flashing(folder: &Folder, emulated: &str) {
 fn what_does_not_fit_together_is_refused_before_anything_is_built() {
     let folder = Folder::new();
     let flash = folder.run(&["flash", "legs.toml", "-o", "unwritten"]);
-    flash.says(2, &["qemu is no board", "--target stm32h743"]);
+    flash.says(2, &["qemu is not a board", "--target stm32h743"]);
     assert!(!folder.path("unwritten").exists());
     let before = folder.listing();
     folder
@@ -194,7 +194,7 @@ fn an_image_of_this_machine_is_weighed_without_the_checks_of_another() {
     let run = folder.run(&["size", &own.display().to_string()]);
     assert_eq!(run.code, 0, "{run:#?}");
     assert!(
-        run.stdout.contains("flash by owner") && run.stdout.contains("are for images of Cortex-M"),
+        run.stdout.contains("flash by owner") && run.stdout.contains("only for Cortex-M images"),
         "{}",
         run.stdout
     );

@@ -1,4 +1,4 @@
-//! The main job on machines that lack the tools for microcontrollers: it does the rest, says what was left out, and fails only
+//! The main job on machines that lack the tools for microcontrollers: it does the rest, says what was skipped, and fails only
 //! if that is asked for.
 
 use std::path::Path;
@@ -29,11 +29,11 @@ fn without_tools_everything_else_is_done_and_one_line_says_what_was_left_out() {
     let nothing = tempfile::tempdir().unwrap();
     let run = Run::of(&mut main_job(&folder, nothing.path(), &[]));
     run.says(0, &[]);
-    let lines: Vec<&str> = run.stderr.lines().filter(|line| line.contains("left out:")).collect();
+    let lines: Vec<&str> = run.stderr.lines().filter(|line| line.contains("skipped:")).collect();
     assert_eq!(lines.len(), 1, "{}", run.stderr);
     let verdict = [
         "legs is good so far on 10 assumed values: ",
-        "  left out the image for the microcontroller (time, memory, bits)\n",
+        "  skipped  the image for the microcontroller (time, memory, bits)\n",
         " --setup\n",
     ];
     assert!(verdict.iter().all(|words| run.stdout.contains(words)), "{}", run.stdout);
@@ -54,7 +54,7 @@ fn without_tools_everything_else_is_done_and_one_line_says_what_was_left_out() {
     // Required, it is exit code 3 with the same result.
     if length(false, true) {
         let run = Run::of(&mut main_job(&folder, nothing.path(), &["--require-target"]));
-        run.says(3, &["error: left out: the image for the microcontroller"]);
+        run.says(3, &["error: skipped: the image for the microcontroller"]);
         assert!(run.stderr.contains("host library: "), "{}", run.stderr);
     }
     for (more, code) in [(&["--json", "--require-target"][..], 3), (&["--json"], 0)].into_iter().take(length(1, 2)) {
@@ -72,8 +72,8 @@ fn set_up_that_fails_says_what_was_tried_and_the_job_goes_on() {
     let folder = Folder::new();
     let nothing = tempfile::tempdir().unwrap();
     let run = Run::of(&mut main_job(&folder, nothing.path(), &["--setup"]));
-    run.says(0, &["rustup was not found", "apt-get was not found", "going on without"]);
-    assert!(run.stderr.contains("left out: the image for the microcontroller"), "{}", run.stderr);
+    run.says(0, &["rustup was not found", "apt-get was not found", "continuing without"]);
+    assert!(run.stderr.contains("skipped: the image for the microcontroller"), "{}", run.stderr);
     assert!(run.stderr.contains("could not be set up: rustup target add: rustup was not found"), "{}", run.stderr);
     assert!(folder.path("out/law/src/platform/step.rs").is_file());
     if length(false, true) {
@@ -106,7 +106,7 @@ fn without_the_emulator_alone_the_image_is_built_and_looked_at() {
     assert!(image["stack_bound"].as_u64().unwrap() > 100, "{document:#}");
     assert_eq!(image["forbidden_symbols"], serde_json::json!([]));
     let missing = document["result"]["missing"].as_str().unwrap();
-    assert!(missing.starts_with("left out: running the image"), "{missing}");
+    assert!(missing.starts_with("skipped: running the image"), "{missing}");
     assert!(missing.contains("apt-get install qemu-system-arm"), "{missing}");
     assert_eq!(missing.lines().count(), 1);
     // State and settings are not in what is known of the RAM: there is no figure of it, and it says so.

@@ -81,7 +81,7 @@ fn a_platform_beyond_the_gain_that_the_eigenvalues_allow_diverges_and_below_it_i
             assert_eq!(run.code, 0, "λ {gain:.2}: {run:#?}");
             assert!(run.stdout.contains("gate: passed (none diverged)"), "{}", run.stdout);
         } else {
-            run.says(1, &["not robust: 1 of 1 runs have diverged, the first of them gain"]);
+            run.says(1, &["not robust: 1 of 1 runs diverged, first gain"]);
             assert!(run.stdout.contains("diverged: error beyond 3000 nm after"), "{}", run.stdout);
         }
     }
@@ -156,8 +156,8 @@ fn what_cannot_be_run_is_refused_with_a_fix_and_nothing_is_written() {
         ("legs.toml", &["--max-error", "1 urad"], "in the form \"<number> nm\""),
         ("legs.toml", &["--max-orientation", "1 urad"], "is for a spec with [control]"),
         ("legs.toml", &["--quantile", "101"], "up to 100"),
-        ("legs.toml", &["--trajectory", "case-1"], "name one of leg, multisine"),
-        ("reference.toml", &["--trajectory", "leg"], "name one of case-1, case-2, machining, multisine"),
+        ("legs.toml", &["--trajectory", "case-1"], "choose one of leg, multisine"),
+        ("reference.toml", &["--trajectory", "leg"], "choose one of case-1, case-2, machining, multisine"),
         ("legs.toml", &["--replay", "mass"], "one of nominal, mass-low"),
     ];
     for (spec, more, fix) in cases {

@@ -159,8 +159,8 @@ fn what_cannot_be_tuned_is_refused_with_a_fix() {
     let cases: &[(&str, &[&str], &str, &str)] = &[
         ("minimal.toml", &[], "E0701", "adaptation.mode"),
         ("legs.toml", &["--what", "gains"], "E0701", "--what all"),
-        ("legs.toml", &["--bounds", "level=0.5:0.1"], "E0702", "the smaller one first"),
-        ("legs.toml", &["--bounds", "level=0:1"], "E0702", "the smaller one first"),
+        ("legs.toml", &["--bounds", "level=0.5:0.1"], "E0702", "the smaller value first"),
+        ("legs.toml", &["--bounds", "level=0:1"], "E0702", "the smaller value first"),
         ("legs.toml", &["--bounds", "ki=1:2"], "E0702", "as far as --what"),
         ("legs.toml", &["--bounds", "level=0.8:0.9"], "E0703", "--gain-margin 1.5"),
         ("legs.toml", &["--frequency", "400", "--seconds", "0.1"], "E0705", "lower --frequency"),
@@ -235,10 +235,10 @@ fn candidates_of_a_file_have_the_scores_of_the_search() {
         score("[]", "1")["parameters"].as_array().unwrap().iter().map(|one| one["name"].clone()).collect();
     assert_eq!(names, ["level", "drift"]);
     for (text, says) in [
-        ("[{\"level\": 2}]", "candidate 0, from 0: level is 2, not within its bounds"),
+        ("[{\"level\": 2}]", "candidate 0, from 0: level is 2, outside its bounds"),
         (
             "[{}, {\"kp[0]\": 1}]",
-            "candidate 1, from 0: nothing that is tuned here is called `kp[0]`; expected level, drift",
+            "candidate 1, from 0: no tuned parameter is called `kp[0]`; expected level, drift",
         ),
         ("[{\"level\": null}]", "expected an array of objects"),
         ("{}", "expected an array of objects"),

@@ -10,7 +10,7 @@ use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_studies::learning::{LearnError, RepeatableMachine};
 use specgen_studies::lessons::{self, MachineSource, Options, SessionResult, failure};
-use specgen_studies::trajectory::Followed;
+use specgen_studies::trajectory::NamedTrajectory;
 
 use crate::commands::{Operator, SessionError, lost_link, motion_name};
 use crate::line::Line;
@@ -34,7 +34,7 @@ struct OnLine<'a> {
 }
 
 impl MachineSource for OnLine<'_> {
-    fn motion_name(&self, followed: &Followed) -> String {
+    fn motion_name(&self, followed: &NamedTrajectory) -> String {
         motion_name(&followed.name)
     }
 

@@ -109,5 +109,5 @@ def test_what_progress_raises_is_raised() -> None:
     def progress(line: str) -> None:
         raise LookupError(line)
 
-    with pytest.raises(LookupError, match="controller: the compiled spec"):
+    with pytest.raises(LookupError, match="controller: run-time law"):
         specgen.simulate(REFERENCE, progress=progress)

@@ -1,4 +1,4 @@
-//! A folder with a commented spec of the user's own platform and a simulated record of its legs, from some
+//! Creates a folder with a commented spec of the user's own platform and a simulated record of its legs, from about
 //! fifteen answers.
 
 mod draft;
@@ -26,30 +26,30 @@ use specgen_language::ui::Ui;
 
 /// Name of the spec in its folder.
 const SPEC: &str = "platform.toml";
-/// For editors that know TOML schemas.
+/// JSON schema for editors that support it.
 const SCHEMA: &str = "platform.schema.json";
-/// The record that stands for measured ones.
+/// A simulated record in place of measured ones.
 const RECORD: &str = "leg.csv";
-/// Sections of a spec whose gauges see the platform.
+/// Spec sections of a platform whose gauges measure its pose.
 const TASK_SPACE: &[&str] = &["control", "gauge", "adaptation"];
-/// Radius of the gauges beside that of the platform's joints.
+/// Radius of the gauges relative to that of the platform's joints.
 const GAUGE_RADIUS: f64 = 0.8;
-/// Range of a gauge that sees the platform, beside what it sees of the largest motion of one axis.
+/// Range of a pose gauge relative to its largest reading for motion along a single axis.
 const GAUGE_ROOM: f64 = 1.06;
-/// Declared workspace beside what an axis alone reaches.
+/// Declared workspace relative to the reach of a single axis.
 const SHARE: f64 = 0.9;
-/// Speed of streams: bounds of the workspace in a second.
+/// Stream speed: workspace bounds per second.
 const STREAM: f64 = 20.0;
-/// Most that a stream covers in a tick, in bounds of the workspace.
+/// Largest stream step per tick, in workspace bounds.
 const STALE_SHARE: f64 = 0.004;
 
-// Keys that others are computed from.
+// Keys that other values are computed from.
 const GEOMETRY: [&str; 3] = ["geometry.base_radius", "geometry.platform_radius", "geometry.height"];
 const MASS: &str = "platform.mass";
 const STROKE: &str = "actuator.stroke";
 const VOLTAGE: &str = "actuator.voltage";
 const STIFFNESS: &str = "actuator.axial_stiffness";
-/// What the reach of the platform depends on, and what stands against it.
+/// What the reach of the platform depends on, and what limits it.
 const REACH_FROM: &[&str] = &[
     GEOMETRY[0],
     GEOMETRY[1],
@@ -62,20 +62,20 @@ const REACH_FROM: &[&str] = &[
     "workspace.rotation",
 ];
 
-/// What was given, by the option of its question.
+/// User-supplied values, by the option of their question.
 pub type Answers = BTreeMap<&'static str, String>;
 
-/// Makes the folder with a spec, of six `legs` with gauges of their own or of a platform, and a simulated record. The rest of the
-/// answers `is_asked` for.
+/// Creates the folder with a spec and a simulated record, for six `legs` with their own gauges or for a platform. If `is_asked`, prompts
+/// for the missing answers.
 ///
 /// # Errors
-/// There is such a folder, an answer is wrong, or a file cannot be written.
+/// The folder exists, an answer is invalid, or a file cannot be written.
 pub fn run(folder: &Path, legs: bool, is_asked: bool, answers: &Answers, ui: &mut Ui) -> Result<(), Failure> {
     let name = folder.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let is_free = !folder.exists() || std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
     if !is_free {
         let shown = folder.display();
-        return Err(Failure::Usage(format!("`{shown}` is there already; give another name, or remove it")));
+        return Err(Failure::Usage(format!("`{shown}` already exists; choose another name or remove it")));
     }
     let mut draft = Draft::default();
     if legs {
@@ -96,18 +96,18 @@ pub fn run(folder: &Path, legs: bool, is_asked: bool, answers: &Answers, ui: &mu
     }
     fit_workspace(&mut draft, name, place);
     let compiled = compile::compile_source(source(&draft, name, place));
-    // Whatever is wrong with it: the answers are not lost.
+    // Write the spec even if it is invalid, so that the answers are not lost.
     files.push((SPEC.to_owned(), draft.text(name).into_bytes()));
     write_folder(folder, &files)?;
     report(folder, &draft, compiled, ui)
 }
 
-/// The spec as it stands, as if it lay at `place`.
+/// The current spec, as if saved at `place`.
 fn source(draft: &Draft, name: &str, place: &Path) -> SpecSource {
     SpecSource { display_name: SPEC.to_owned(), text: draft.text(name), dir: place.to_owned() }
 }
 
-/// What is wrong with the value at `key`, if anything.
+/// The finding about the value at `key`, if any.
 fn wrong(draft: &Draft, name: &str, place: &Path, key: &str) -> Option<Diagnostic> {
     let (_, findings) = spec::load_as_far(&source(draft, name, place));
     let blamed = |found: &Diagnostic| found.severity == Severity::Error && found.key.starts_with(key);
@@ -130,14 +130,14 @@ fn take_options(draft: &mut Draft, answers: &Answers, name: &str, place: &Path) 
     if refused.is_empty() { Ok(()) } else { Err(Failure::Usage(refused.join("\n"))) }
 }
 
-/// Asks on standard input for what was not given; an empty line takes the value in brackets.
+/// Prompts on standard input for missing values; an empty line accepts the value in brackets.
 fn ask_the_rest(draft: &mut Draft, name: &str, place: &Path) -> Result<(), Failure> {
     let open: Vec<&Question> = QUESTIONS.iter().filter(|one| one.asked && !draft.is_given(one.key)).collect();
     if open.is_empty() {
         return Ok(());
     }
-    prompt("An empty line takes the value in brackets. Give numbers with their units.\n");
-    prompt("Do six gauges see the platform, or has each leg its own? [platform] ");
+    prompt("Press Enter to accept the value in brackets. Give numbers with their units.\n");
+    prompt("Do six gauges measure the platform's pose, or does each leg have its own gauge? [platform] ");
     loop {
         match line(&open)?.as_str() {
             "" | "platform" => break,
@@ -174,18 +174,18 @@ fn prompt(text: &str) {
     let _ = io::stderr().flush();
 }
 
-/// A line of standard input; where it has ended, an error that names what is `open`.
+/// Reads a line of standard input; at its end, returns an error that names the `open` questions.
 fn line(open: &[&Question]) -> Result<String, Failure> {
     let mut line = String::new();
     let read = io::stdin().read_line(&mut line).map_err(environment)?;
-    // Nobody pressed the key that would end the line of the question.
+    // End the line of the question, since no Enter key did.
     if read == 0 || !io::stdin().is_terminal() {
         prompt("\n");
     }
     if read == 0 {
         let names: Vec<String> = open.iter().map(|one| format!("--{}", one.option)).collect();
         return Err(Failure::Usage(format!(
-            "standard input ended before all was answered; give {}, or take the rest from a spec by --like reference",
+            "standard input ended before all questions were answered; give {}, or take the other values from a spec with --like reference",
             names.join(", ")
         )));
     }
@@ -198,7 +198,7 @@ fn values(literal: &str) -> Vec<f64> {
     plain.split(',').map(|text| quantity::parse(text.trim()).map_or(0.0, |found| found.value)).collect()
 }
 
-/// What follows from other values, where it was not given and they were.
+/// Computes dependent values that were not given, if their inputs were.
 fn compute(draft: &mut Draft) {
     let known = draft.clone();
     let value = |key: &str| values(&known.literal(key)).first().copied().unwrap_or(0.0);
@@ -206,9 +206,9 @@ fn compute(draft: &mut Draft) {
     let span = volts.last().unwrap_or(&0.0) - volts.first().unwrap_or(&0.0);
     let (stroke, mass, stiffness) = (value(STROKE), value(MASS), value(STIFFNESS));
     let [base, platform, height] = GEOMETRY.map(value);
-    // Roughly: the joints of a leg stand 60 degrees apart.
+    // Roughly: the joints of a leg are 60 degrees apart.
     let leg = (height * height + base * base + platform * platform - base * platform).sqrt();
-    // A thick disc.
+    // As a thick disc.
     let disc = |factor: f64| format!("\"{} g mm^2\"", figures(mass * platform * platform * factor * 1e9, 3));
     let mm = |x: f64| format!("\"{} mm\"", figures(x * 1e3, 5));
     let um = |x: f64| format!("\"{} um\"", figures(x * 1e6, 3));
@@ -219,13 +219,13 @@ fn compute(draft: &mut Draft) {
 
     draft.compute("platform.inertia", &[MASS, GEOMETRY[1]], format!("[{0}, {0}, {1}]", disc(0.3), disc(0.5)));
     for [part, mass] in [["fixed", "leg.fixed_mass"], ["extensible", "leg.extensible_mass"]] {
-        // A rod of half the leg.
+        // As a rod of half the leg's length.
         let inertia = value(mass) * (leg / 2.0) * (leg / 2.0) / 12.0;
         draft.compute(&format!("leg.{part}_center"), &GEOMETRY, centre.clone());
         draft.compute(&format!("leg.{part}_inertia"), &GEOMETRY, format!("\"{} g mm^2\"", figures(inertia * 1e9, 3)));
     }
     if span > 0.0 {
-        // Rounded up: at the highest voltage the stack makes the whole stroke.
+        // Rounded up, so that the stack reaches its full stroke at the highest voltage.
         let gain = format!("\"{} um/V\"", rounded_up(stroke * 1e6 / span, 4));
         draft.compute("actuator.stacks", &[STROKE, VOLTAGE], "1".to_owned());
         draft.compute("actuator.stack_gain", &[STROKE, VOLTAGE], gain);
@@ -243,7 +243,7 @@ fn compute(draft: &mut Draft) {
     if !draft.has("gauge[0].point") {
         draft.set("sensor.range", format!("[{}, {}]", um(-0.05 * stroke), um(1.15 * stroke)), Origin::Computed);
     }
-    // Until it is known what the legs reach: what any platform reaches, and gauges that see it.
+    // Initial values until the reach of the legs is known: within the reach of any platform, and with sufficient gauge range.
     draft.compute("workspace.translation", REACH_FROM, format!("[\"1 um\", \"1 um\", {}]", um(stroke / 5.0)));
     draft.compute("workspace.rotation", REACH_FROM, "[\"1 urad\", \"1 urad\", \"1 urad\"]".to_owned());
     draft.compute("control.setpoint.bias", REACH_FROM, bias(stroke / 6.0));
@@ -252,12 +252,12 @@ fn compute(draft: &mut Draft) {
     }
 }
 
-/// The bias of `z` m.
+/// A bias with `z` in m.
 fn bias(z: f64) -> String {
     format!("[\"0 um\", \"0 um\", \"{} um\", \"0 urad\", \"0 urad\", \"0 urad\"]", figures(z * 1e6, 2))
 }
 
-/// `value` with so many significant digits, as people write it.
+/// `value` with the given number of significant digits, in plain notation.
 fn figures(value: f64, digits: i32) -> String {
     rounded(value, digits, f64::round)
 }
@@ -274,7 +274,7 @@ fn rounded(value: f64, digits: i32, to_whole: impl Fn(f64) -> f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    // Powers of ten by the parser, so that the shortest decimal comes out.
+    // Parses powers of ten, so that the shortest decimal results.
     let read = |text: String| text.parse::<f64>().unwrap_or(value);
     let shown = format!("{value:e}");
     let power: i32 = shown.rsplit('e').next().and_then(|text| text.parse().ok()).unwrap_or(0);
@@ -283,24 +283,24 @@ fn rounded(value: f64, digits: i32, to_whole: impl Fn(f64) -> f64) -> String {
     if (1e-4..1e6).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
 }
 
-/// A record of one of these legs, simulated; none where the spec does not say what they are.
+/// A simulated record of a leg; `None` if the spec is not complete enough.
 fn simulated_record(draft: &Draft, name: &str, place: &Path) -> Option<String> {
     let (model, _) = spec::load_as_far(&source(draft, name, place));
     Some(simulate(&model?, &Experiment::default()).to_csv())
 }
 
-/// Sets workspace, bias, speed of streams and range of the gauges to what the legs reach, where they were not given.
+/// Fits workspace, bias, stream speed and gauge range to the reach of the legs, where they were not given.
 fn fit_workspace(draft: &mut Draft, name: &str, place: &Path) {
     let (Some(model), _) = spec::load_as_far(&source(draft, name, place)) else { return };
     let Ok(platform) = lower::platform(&model) else { return };
     let reach = reach::measure(&model, &platform, model.actuator.stroke, &[0.0; 6]);
     let mut bounds: [f64; 6] = core::array::from_fn(|axis| {
         let [low, high] = reach.axes[axis].from_middle;
-        // z begins at the lower end of the strokes.
+        // z counts from the lower end of the stroke.
         SHARE * if axis == 2 { high } else { low.abs().min(high.abs()) }
     });
     if model.task_space.is_some() {
-        // What a gauge sees of one axis alone is to stay in its range, with a little room.
+        // A gauge must stay in range for motion along any single axis, with a little margin.
         let joint = model.geometry.platform_joints[0];
         let radius = GAUGE_RADIUS * (joint[0] * joint[0] + joint[1] * joint[1]).sqrt();
         let lever = [1.0, 1.0, 1.0, radius, radius, radius];
@@ -321,29 +321,29 @@ fn fit_workspace(draft: &mut Draft, name: &str, place: &Path) {
     draft.compute("control.setpoint.bias", REACH_FROM, bias(bounds[2] / 2.0));
     draft.compute("workspace.translation", REACH_FROM, format!("[{}]", list(0..3, "um", 1e6)));
     draft.compute("workspace.rotation", REACH_FROM, format!("[{}]", list(3..6, "mrad", 1e3)));
-    // Slow ticks: what goes by until a stream counts as stale stays small beside the workspace.
+    // For slow ticks, limit the motion during the time until a stream counts as stale.
     let stream = STREAM.min(STALE_SHARE / model.timing.period);
     let speeds = [list(0..3, "mm/s", 1e3 * stream), list(3..6, "mrad/s", 1e3 * stream)];
     let from = [REACH_FROM, &["timing.period"]].concat();
     draft.compute("control.setpoint.stream_speed", &from, format!("[{}]", speeds.join(", ")));
 }
 
-/// A platform that was begun.
+/// Result of creating a platform.
 #[derive(Serialize)]
-struct Begun {
+struct NewPlatform {
     folder: String,
     files: [&'static str; 3],
-    /// Paths of the values that nobody gave, as the spec names them.
+    /// Paths in the spec of the values that the user did not give.
     assumed: Vec<String>,
-    /// What the legs reach; none where they do not hold a platform.
+    /// Reach of the legs; `None` if they cannot hold a platform.
     reach: Option<Reach>,
-    /// Commands to go on with.
+    /// Suggested next commands.
     next: [String; 3],
 }
 
-impl Outcome for Begun {
+impl Outcome for NewPlatform {
     fn text(&self) -> String {
-        let mut text = format!("{} is written, and its spec is good\n", self.folder);
+        let mut text = format!("wrote {}; its spec is valid\n", self.folder);
         if let Some(reach) = &self.reach {
             let bounds = |axes: core::ops::Range<usize>, scale: f64| {
                 let items = reach.axes[axes].iter().map(|axis| format!("±{}", figures(axis.declared * scale, 2)));
@@ -351,14 +351,14 @@ impl Outcome for Begun {
             };
             text.push_str(&format!("  workspace {} µm and {} mrad from rest\n", bounds(0..3, 1e6), bounds(3..6, 1e3)));
         }
-        text.push_str(&format!("  {} values are assumed: `assumed` in {SPEC} names them\n", self.assumed.len()));
-        text.push_str(&format!("  {RECORD} is simulated: put a record of your legs in its place\nnext\n"));
+        text.push_str(&format!("  {} values are assumed; `assumed` in {SPEC} lists them\n", self.assumed.len()));
+        text.push_str(&format!("  {RECORD} is simulated: replace it with a record of your legs\nnext\n"));
         self.next.iter().for_each(|command| text.push_str(&format!("  {command}\n")));
         text
     }
 }
 
-/// Says what was written, whether it is good, and what to do next.
+/// Reports what was written, whether it is valid, and the next steps.
 fn report(folder: &Path, draft: &Draft, compiled: Result<Compilation, Refusal>, ui: &mut Ui) -> Result<(), Failure> {
     let shown = folder.display().to_string();
     let spec = folder.join(SPEC);
@@ -368,7 +368,7 @@ fn report(folder: &Path, draft: &Draft, compiled: Result<Compilation, Refusal>, 
         Err(refused) => {
             ui.findings(refused.source.as_ref(), &refused.findings);
             let message =
-                format!("{shown} is written, but its spec is refused: change what is named above, then `{check}`");
+                format!("wrote {shown}, but its spec is refused: correct the findings above, then run `{check}`");
             return Err(Failure::Gate(message));
         }
     };
@@ -379,6 +379,6 @@ fn report(folder: &Path, draft: &Draft, compiled: Result<Compilation, Refusal>, 
         shell::line("specgen").path(&spec).words("-o").path(folder.join("controller")).into(),
     ];
     let files = [SPEC, RECORD, SCHEMA];
-    ui.result(&Begun { folder: shown, files, assumed: draft.assumed(), reach: compiled.reach, next });
+    ui.result(&NewPlatform { folder: shown, files, assumed: draft.assumed(), reach: compiled.reach, next });
     Ok(())
 }

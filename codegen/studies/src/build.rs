@@ -1,4 +1,4 @@
-//! The main job: spec to a workspace, built and checked, and measured where the tools for it are there.
+//! The main command: turns a spec into a workspace, builds and checks it, and measures it if the tools are installed.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -18,22 +18,22 @@ use specgen_language::{model, shell};
 use specgen_toolchain as target;
 use specgen_toolchain::budget::{self, group};
 
-/// What is written and built.
+/// What to write and build.
 #[derive(Debug)]
 pub struct Options {
     /// The spec file.
     pub spec: PathBuf,
     /// The output folder.
     pub output: Option<PathBuf>,
-    /// The source only.
+    /// Write the source only.
     pub no_build: bool,
-    /// With the crates of a board.
+    /// Include the crates of a board.
     pub board: bool,
-    /// Bring what is missing first.
+    /// Install missing tools first.
     pub setup: bool,
-    /// With everything that was found and measured.
+    /// Show all findings and measurements.
     pub details: bool,
-    /// Fail where a tool for the microcontroller is missing.
+    /// Fail if a tool for the microcontroller is missing.
     pub require_target: bool,
     /// Refuse a spec with warnings.
     pub deny_warnings: bool,
@@ -49,37 +49,37 @@ struct Summary {
     table_bytes: usize,
     host_library: Option<String>,
     measurement: Option<Measurement>,
-    /// What the image shows without being run, where it could not be.
+    /// Static figures of the image, if it could not be run.
     image: Option<Inspection>,
-    /// What was left out, why, and what brings it.
+    /// What was skipped, why, and how to install what is missing.
     missing: Option<String>,
     over_budget: Vec<String>,
     verdict: Verdict,
     #[serde(skip)]
     details: bool,
-    /// Of the controller's scalar.
+    /// Bits of the controller's scalar.
     #[serde(skip)]
     bits: u32,
     /// Cells per axis of its tables.
     #[serde(skip)]
     grid: usize,
-    /// What identification and the stability check found, where it is to be shown: the best lead of each trajectory takes a second.
+    /// Results of identification and the stability check, if they are to be shown: finding the best lead of each trajectory takes a second.
     #[serde(skip)]
     found: String,
-    /// Part and budget of the spec.
+    /// Part and budget from the spec.
     #[serde(skip)]
     limits: model::Target,
 }
 
-/// Writes the workspace, builds and measures it as far as asked, and shows the verdict.
+/// Writes the workspace, builds and measures it as requested, and shows the verdict.
 ///
 /// # Errors
-/// The spec is refused or not ready, the folder cannot be written, a build fails, or a budget is exceeded.
+/// The spec is refused or incomplete, the folder cannot be written, a build fails, or a budget is exceeded.
 pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     let spec = &options.spec;
     let set_up = if options.setup { target::provision::provision(&mut |step| ui.progress(step)).err() } else { None };
     if let Some(error) = &set_up {
-        ui.progress(&format!("{error}; going on without"));
+        ui.progress(&format!("{error}; continuing without it"));
     }
     let compiled = spec_file::quietly(spec, ui)?;
     spec_file::accept(&compiled, &compiled.findings, options.deny_warnings)?;
@@ -100,7 +100,7 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
 
     let mut summary = Summary::of(&compiled, &output, options.details);
     summary.files = files.len();
-    // What was written is whole, whatever follows.
+    // The workspace is complete, whatever fails below.
     let built = if options.no_build {
         summary.missing = Some("not built: --no-build".to_owned());
         summary.verdict.unmeasured = Some("time, memory, bits: --no-build".to_owned());
@@ -111,9 +111,9 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     let refused = match built {
         Ok(()) => None,
         Err(Failure::Tool { message, is_missing: true }) => {
-            // Set-up knows more of the same tool: what was tried.
+            // Set-up reports more about the same tool: what it tried.
             let undone = summary.undone();
-            let missing = format!("left out: {undone}: {}", set_up.map_or(message, |error| error.to_string()));
+            let missing = format!("skipped: {undone}: {}", set_up.map_or(message, |error| error.to_string()));
             summary.verdict.unmeasured = Some(undone.to_owned());
             summary.missing = Some(missing.clone());
             if !options.require_target {
@@ -138,7 +138,7 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     }
 }
 
-/// Host library, image, and the exercise on both.
+/// Builds host library and image, and runs the exercise on both.
 fn build(compiled: &Compilation, output: &Path, summary: &mut Summary, ui: &Ui) -> Result<(), Failure> {
     let target_dir = output.join("target");
     ui.runs(ControllerForm::Emitted);
@@ -190,7 +190,7 @@ impl Summary {
         }
     }
 
-    /// What a missing tool leaves out.
+    /// What a missing tool makes impossible.
     fn undone(&self) -> &'static str {
         match (&self.host_library, &self.image) {
             (None, _) => "building",
@@ -199,11 +199,11 @@ impl Summary {
         }
     }
 
-    /// Why what was made must not be used, if so.
+    /// Why the result must not be used, if so.
     fn fault(&self) -> Option<String> {
         if let Some(difference) = self.measurement.as_ref().and_then(|m| m.first_difference.as_ref()) {
             return Some(format!(
-                "the emulated machine computes other bits than the host: {difference}; report this as a defect of specgen with the spec"
+                "host and emulated machine compute different bits: {difference}; report this as a specgen bug and attach the spec"
             ));
         }
         if !self.over_budget.is_empty() {
@@ -225,7 +225,7 @@ impl Outcome for Summary {
 }
 
 impl Summary {
-    /// Everything that was found and measured.
+    /// All findings and measurements.
     fn details(&self) -> String {
         let mut out = String::new();
         let budget = &self.limits.budget;
@@ -245,12 +245,12 @@ impl Summary {
         }
         let of = |budget: Option<u64>| budget.map_or(String::new(), |b| format!(" of {}", group(b)));
         let bound = |bytes: Option<u64>| {
-            bytes.map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes at most", group(bytes), of(budget.stack)))
+            bytes.map_or("unbounded".to_owned(), |bytes| format!("at most {}{} bytes", group(bytes), of(budget.stack)))
         };
         let flash = |out: &mut String, [all, code, constants, tick]: [u64; 4]| {
             let _ = writeln!(
                 out,
-                "    flash         {}{} bytes: {} code, {} constants; a tick reaches {} bytes of code",
+                "    flash         {}{} bytes: {} code, {} constants; the tick reaches {} bytes of code",
                 group(all),
                 of(budget.flash),
                 group(code),
@@ -261,19 +261,25 @@ impl Summary {
         if let Some(i) = &self.image {
             let _ = writeln!(out, "  {} ({}), not run:", i.machine, i.compiler);
             flash(&mut out, [i.flash, i.code, i.constants, i.tick_code]);
-            out.push_str("    RAM           not measured: State and settings are known only in a run\n");
-            let _ = writeln!(out, "    stack a tick  {} (static)", bound(i.stack_bound));
+            out.push_str(
+                "    RAM           not measured: the sizes of State and settings are known only at run time\n",
+            );
+            let _ = writeln!(out, "    tick stack    {} (static)", bound(i.stack_bound));
         }
         if let Some(m) = &self.measurement {
             let _ = writeln!(out, "  {} ({}):", m.machine, m.compiler);
             flash(&mut out, [m.flash, m.code, m.constants, m.tick_code]);
             let ram = m.used.ram.map_or_else(
-                || "not known, the stack of a tick has no bound".to_owned(),
-                |ram| format!("{}{} bytes with the stack of a tick", group(ram), of(budget.ram)),
+                || "unknown: the tick's stack is unbounded".to_owned(),
+                |ram| format!("{}{} bytes including the tick's stack", group(ram), of(budget.ram)),
             );
             let _ = writeln!(out, "    RAM           {ram}, of which State {}", group(m.state));
-            let _ =
-                writeln!(out, "    stack a tick  {} (static), {} seen", bound(m.stack_bound), group(m.stack_painted));
+            let _ = writeln!(
+                out,
+                "    tick stack    {} (static), {} measured",
+                bound(m.stack_bound),
+                group(m.stack_painted)
+            );
             for stage in &m.stages {
                 let budget = if stage.name == "step" { of(budget.instructions) } else { String::new() };
                 let _ = writeln!(
@@ -306,7 +312,7 @@ impl Summary {
     }
 }
 
-/// Commands that come next.
+/// Suggested next commands.
 fn next(spec: &Path, output: &Path, summary: &Summary, mcu: model::Mcu) -> Vec<String> {
     if !summary.over_budget.is_empty() {
         return vec![shell::on("specgen size", spec, "")];
@@ -319,7 +325,7 @@ fn next(spec: &Path, output: &Path, summary: &Summary, mcu: model::Mcu) -> Vec<S
     ["specgen sim", "specgen report"].into_iter().chain(flash).map(|command| shell::on(command, spec, "")).collect()
 }
 
-/// What exceeds the spec's `[target.budget]` or the part, and what the image must not do, in words.
+/// Messages for every exceeded limit of `[target.budget]` or the part, and for every violation in the image.
 fn over_budget(compiled: &Compilation, summary: &Summary) -> Vec<String> {
     let (used, checks) = match (&summary.measurement, &summary.image) {
         (Some(m), _) => (&m.used, &m.checks),

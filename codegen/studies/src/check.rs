@@ -1,4 +1,4 @@
-//! Every finding about a spec, nothing written.
+//! Reports every finding about a spec; writes nothing.
 
 use std::path::Path;
 
@@ -21,9 +21,9 @@ use specgen_language::outcome::{Failure, Outcome, Refusal};
 use specgen_language::shell;
 use specgen_language::ui::Ui;
 
-/// A good spec and what is known of it.
+/// A valid spec and its properties.
 #[derive(Serialize)]
-struct Checked<'a> {
+struct CheckReport<'a> {
     name: &'a str,
     digest: &'a str,
     verdict: Verdict,
@@ -43,7 +43,7 @@ struct Checked<'a> {
     details: bool,
 }
 
-/// Bounds of rounding errors over the largest ones found.
+/// Bounds of rounding errors relative to the largest ones found.
 #[derive(Serialize)]
 struct Ratio {
     legs: [Option<f64>; 6],
@@ -51,13 +51,13 @@ struct Ratio {
     measured: Option<[Option<f64>; 6]>,
 }
 
-/// Reports every finding about a spec, and the verdict; with everything else below if `details`.
+/// Reports every finding about a spec, and the verdict; with further properties if `details`.
 ///
 /// # Errors
-/// The spec is refused or not ready, or has a warning and these are denied.
+/// The spec is refused or incomplete, or it has a warning and warnings are denied.
 pub fn run(spec: &Path, details: bool, deny_warnings: bool, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = spec_file::quietly(spec, ui)?;
-    // Findings come of the bounds; what was found by trial, which takes longer, is shown only where it is asked for.
+    // Findings use the bounds. The search for actual errors takes longer and runs only if its result is shown.
     let shown_whole = details || ui.is_json();
     let precision = if shown_whole { precision::of } else { precision::bounds };
     let precision = precision(&compiled.model, &compiled.ir)
@@ -77,7 +77,7 @@ pub fn run(spec: &Path, details: bool, deny_warnings: bool, ui: &mut Ui) -> Resu
     let mut verdict = Verdict::of(&compiled, "time, memory, bits: the next command measures them");
     verdict.next = vec![shell::on("specgen", spec, "-o DIR"), shell::on("specgen sim", spec, "")];
     let failed = (verdict.answer == Answer::NotReady).then(|| verdict.headline());
-    let checked = Checked {
+    let checked = CheckReport {
         name: &compiled.ir.name,
         digest: &compiled.ir.digest,
         verdict,
@@ -97,7 +97,7 @@ pub fn run(spec: &Path, details: bool, deny_warnings: bool, ui: &mut Ui) -> Resu
     ui.judged(&checked, failed)
 }
 
-impl Outcome for Checked<'_> {
+impl Outcome for CheckReport<'_> {
     fn text(&self) -> String {
         let verdict = self.verdict.text();
         if !self.details {

@@ -10,7 +10,7 @@ use specgen_language::outcome::{Failure, environment};
 use specgen_language::ui::{ControllerForm, Ui};
 use specgen_toolchain::host::build_loadable;
 
-/// A controller whose runs end with the command.
+/// A controller that stops when the command is interrupted.
 pub struct Interruptible(pub Controller);
 
 impl TickController for Interruptible {
@@ -35,7 +35,7 @@ impl TickController for Interruptible {
     }
 }
 
-/// The emitted controller if the user asks for it, else [`at_run_time`].
+/// The emitted controller if requested, else [`at_run_time`].
 ///
 /// # Errors
 /// It cannot be built or loaded.
@@ -43,29 +43,29 @@ pub fn chosen(compiled: &Compilation, is_emitted: bool, ui: &Ui) -> Result<Contr
     if is_emitted { emitted(compiled, ui) } else { at_run_time(compiled, ui) }
 }
 
-/// The law on the constants of a compiled spec: the bits of the emitted controller, and nothing is built.
+/// The law with the constants of a compiled spec: bit-identical to the emitted controller, without a build.
 ///
 /// # Errors
-/// The constants do not fit together.
+/// The constants are inconsistent.
 pub fn at_run_time(compiled: &Compilation, ui: &Ui) -> Result<Controller, Failure> {
     ui.runs(ControllerForm::RunTime);
-    ui.progress("controller: the compiled spec, not built");
+    ui.progress("controller: run-time law on the compiled spec");
     specgen_run_time::controller(&compiled.ir).map_err(environment)
 }
 
-/// The emitted controller, built for this host from the same files that the main job writes. What it was built in is gone
-/// when this returns; the library stays loaded.
+/// The emitted controller, built for this host from the files that the main command writes. The build folder is removed
+/// on return; the library stays loaded.
 fn emitted(compiled: &Compilation, ui: &Ui) -> Result<Controller, Failure> {
     let scratch = Scratch::new().map_err(environment)?;
     let workspace = scratch.path().join("controller");
     workspace::write_scratch(&workspace, &compiled.files)?;
     ui.runs(ControllerForm::Emitted);
-    ui.progress("controller: the emitted one, built for this host");
+    ui.progress("controller: emitted code, built for this host");
     let library = build_loadable(&workspace, &scratch.path().join("target"))?;
     Controller::load(&library).map_err(environment)
 }
 
-/// Worker threads: as many as asked for, else as many as the computer has.
+/// Number of worker threads: as requested, else as the computer has.
 pub fn threads(asked: Option<u32>) -> usize {
     asked.map_or_else(
         || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),

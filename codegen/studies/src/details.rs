@@ -1,4 +1,4 @@
-//! Everything that is known of a compiled spec, a line each: below the verdict of `check` and of the main job, and on the page.
+//! Properties of a compiled spec, one per line: shown below the verdict of `check` and of the main command, and on the page.
 
 use std::fmt::Write as _;
 
@@ -9,17 +9,17 @@ use specgen_identify::Report;
 
 use crate::lead::{self, LeadOf};
 
-/// What identification and the stability check found, a line each.
+/// Results of identification and the stability check, one per line.
 pub fn of(compiled: &Compilation) -> String {
     let mut text = String::new();
     let assumed = compiled.assumptions.list();
     if !assumed.is_empty() {
         // Writing to a String cannot fail, here and below.
-        let _ = writeln!(text, "  nobody measured {}:", compiled.assumptions.summary());
+        let _ = writeln!(text, "  not measured: {}", compiled.assumptions.summary());
         assumed.iter().for_each(|one| text.push_str(&format!("    {one}\n")));
     }
     for (name, report) in compiled.model.hysteresis.records.iter().zip(&compiled.records) {
-        let what = report.as_ref().map_or_else(|| "a table, taken as it is".to_owned(), Report::summary);
+        let what = report.as_ref().map_or_else(|| "a given table".to_owned(), Report::summary);
         let _ = writeln!(text, "  record {name}: {what}");
     }
     if let Some(margins) = &compiled.margins
@@ -27,7 +27,7 @@ pub fn of(compiled: &Compilation) -> String {
     {
         let _ = writeln!(
             text,
-            "  adaptation: λ < {limit:.3} without leg dynamics; sampled leg has spectral radius {:.4}; \
+            "  adaptation: λ < {limit:.3} without leg dynamics; spectral radius of the sampled leg {:.4}; \
              stable up to level weight {largest:.4} (here {})",
             margins.spectral_radius, compiled.model.adaptation.level_weight
         );
@@ -39,14 +39,14 @@ pub fn of(compiled: &Compilation) -> String {
         let LeadOf { name, lead, best, errors: [error, least] } = &one;
         let _ = write!(
             text,
-            "  trajectory {name}: lead {:.4} ms leaves {:.1} nm rms by the model",
+            "  trajectory {name}: lead {:.4} ms gives {:.1} nm rms error by the model",
             lead * 1e3,
             error * 1e9
         );
         let _ = if one.is_proposed() {
             writeln!(
                 text,
-                ";\n    its corners ask for less: lead = \"{:.3} ms\" in its [[trajectory]] leaves {:.1} nm",
+                ";\n    less is better for its corners: lead = \"{:.3} ms\" in its [[trajectory]] gives {:.1} nm",
                 best * 1e3,
                 least * 1e9
             )
@@ -62,7 +62,7 @@ pub fn of(compiled: &Compilation) -> String {
         let current = demand.current.map_or_else(String::new, |amperes| format!(", {:.3} A", amperes));
         let _ = writeln!(
             text,
-            "  trajectory {}: legs at up to {:.1} um/s, which takes {:.3} of {:.3} V/ms{current}; inertia bends them by {:.2} nm",
+            "  trajectory {}: leg speed up to {:.1} um/s, using {:.3} of {:.3} V/ms{current}; deflection by inertia {:.2} nm",
             demand.name,
             demand.leg_speed * 1e6,
             demand.slew * 1e-3,
@@ -82,13 +82,13 @@ pub fn of(compiled: &Compilation) -> String {
     let [[pose, turned], [by_gauges, turned_by_gauges], [by_amplifiers, turned_by_amplifiers]] = parts;
     let _ = writeln!(
         text,
-        "  pose at rest: {pose} nm and {turned} nrad rms as the gauges show it; {by_gauges} nm and {turned_by_gauges} nrad by the gauges, \
-         {by_amplifiers} nm and {turned_by_amplifiers} nrad by the amplifiers"
+        "  pose at rest: {pose} nm and {turned} nrad rms as measured; {by_gauges} nm and {turned_by_gauges} nrad from gauge noise, \
+         {by_amplifiers} nm and {turned_by_amplifiers} nrad from amplifier noise"
     );
     if let (Some(noise), Some(task)) = (&compiled.pose_noise, &compiled.ir.task_space) {
         let _ = writeln!(
             text,
-            "  gauges: {:.2} nm rms each with quantisation; pose {} nm and {} nrad rms; legs {} nm rms; found in {} passes to {:.1e} m, {:.1e} rad",
+            "  gauges: {:.2} nm rms each including quantisation; pose {} nm and {} nrad rms; legs {} nm rms; forward kinematics: {} iterations, error {:.1e} m, {:.1e} rad",
             noise.reading * 1e9,
             list(&noise.pose[..3]),
             list(&noise.pose[3..]),

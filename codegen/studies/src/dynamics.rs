@@ -1,4 +1,4 @@
-//! M, C ḣ, G, J and leg forces of a platform at given states, by the model that its controller uses.
+//! M, C ḣ, G, J and leg forces of a platform at given states, from the model that its controller uses.
 
 use std::f64::consts::FRAC_PI_4;
 use std::path::Path;
@@ -18,19 +18,19 @@ use specgen_language::ui::{ControllerForm, Ui};
 use specgen_numerics::{coriolis, displacements, gravity, jacobian, leg_forces, mass_matrix};
 use specgen_run_time::Dynamics;
 
-/// Leg lengths over those at rest.
+/// Valid range of leg lengths relative to those at rest.
 const LENGTH_RATIOS: std::ops::RangeInclusive<f64> = 0.7..=1.3;
-/// Longest file of states, bytes.
+/// Largest file of states, bytes.
 const LARGEST: u64 = 64 << 20;
 
-/// A state as given, with its name.
+/// A named state.
 struct State {
     id: String,
     given: [[f64; 6]; 3],
 }
 
-/// Computes the dynamics of a spec at the states of a file, and shows or writes them. Poses are from rest, or absolute; computed by
-/// the controller in its scalar, or by the model.
+/// Computes the dynamics of a spec at the states in a file, and shows or writes them. Poses are relative to rest or absolute; computed by
+/// the controller in its scalar type, or by the model.
 ///
 /// # Errors
 /// A file cannot be read or written, the spec is refused, or a state is out of range.
@@ -97,12 +97,12 @@ impl Outcome for ResultFile {
     }
 }
 
-/// The range that the dynamics are exact in, see [`specgen_runtime::dynamics`]. Lengths by the textbook formula: outside, the
-/// kernel's own are wrong.
+/// Checks the range in which the dynamics are exact, see [`specgen_runtime::dynamics`]. Uses the textbook formula for lengths, because
+/// the kernel's lengths are wrong outside that range.
 fn within_range(model: &Model, pose: &[f64; 6]) -> Result<(), String> {
     let [x, y, z, a, b, c] = *pose;
     if [a, b, c].iter().any(|angle| angle.abs() > FRAC_PI_4) {
-        return Err(format!("an angle is beyond ±{FRAC_PI_4:.4} rad, for which the dynamics are made"));
+        return Err(format!("an angle exceeds ±{FRAC_PI_4:.4} rad, the range of the dynamics"));
     }
     let turn = Rotation3::from_euler_angles(a, b, c);
     let geometry = &model.geometry;
@@ -112,8 +112,8 @@ fn within_range(model: &Model, pose: &[f64; 6]) -> Result<(), String> {
         let ratio = (Vector3::new(x, y, geometry.height + z) + turn * joint - base).norm() / rest;
         if !LENGTH_RATIOS.contains(&ratio) {
             return Err(format!(
-                "leg {leg} has {ratio:.3} of its length at rest, beyond {} to {}, for which the dynamics are made; is the pose absolute or \
-                 from rest (--from-rest)?",
+                "the length of leg {leg} is {ratio:.3} of that at rest, outside {} to {}, the range of the dynamics; is the pose absolute or \
+                 relative to rest (--from-rest)?",
                 LENGTH_RATIOS.start(),
                 LENGTH_RATIOS.end()
             ));
@@ -153,7 +153,7 @@ fn read_states(path: &Path) -> Result<Vec<State>, Failure> {
         given.into_iter().enumerate().map(|(k, given)| State { id: k.to_string(), given }).collect()
     };
     if states.is_empty() {
-        return Err(refuse("no states in it".to_owned()));
+        return Err(refuse("the file has no states".to_owned()));
     }
     Ok(states)
 }

@@ -1,4 +1,4 @@
-//! The controller for other programs: a C library, a Python module or an FMU.
+//! Exports the controller to other programs: as a C library, a Python module or an FMU.
 
 pub mod fmu;
 
@@ -20,7 +20,7 @@ use specgen_language::outcome::{Failure, Outcome, environment};
 use specgen_language::output::{claim, write_folder};
 use specgen_language::ui::{ControllerForm, Ui};
 
-/// Requests to the supervisor, by their words.
+/// Requests to the supervisor, by name.
 const REQUESTS: [(&str, u32); 6] = [
     ("NONE", Request::None as u32),
     ("ARM", Request::Arm as u32),
@@ -29,7 +29,7 @@ const REQUESTS: [(&str, u32); 6] = [
     ("RAMP_DOWN", Request::RampDown as u32),
     ("ACKNOWLEDGE", Request::Acknowledge as u32),
 ];
-/// Bits of its events.
+/// Event bits of the supervisor.
 const EVENTS: [(&str, u32); 7] = [
     ("MISSED_TICK", supervisor::MISSED_TICK),
     ("LINK_LOST", supervisor::LINK_LOST),
@@ -39,15 +39,15 @@ const EVENTS: [(&str, u32); 7] = [
     ("AMPLIFIER", supervisor::AMPLIFIER),
     ("STALLED", supervisor::STALLED),
 ];
-/// Of the words that the caller's memory is made of, bytes.
+/// Alignment of the words in the caller's memory, bytes.
 const ALIGNMENT: usize = 8;
 const TICK: &str = include_str!("export/tick.c");
 const EXAMPLE: &str = include_str!("export/example.c");
 const PYTHON: &str = include_str!("export/controller.py");
-/// What compiles the example in C.
+/// The command that compiles the C example.
 const COMPILE: &str = "cc -std=c11 -Wall example.c tick.c -L. -lcontroller -Wl,-rpath,'$ORIGIN' -o example";
 
-/// A C header, the library for this host, and two sources that use them.
+/// Writes a C header, the library for this host, and two sources that use them.
 ///
 /// # Errors
 /// The spec is refused, the library cannot be built, or a file cannot be written.
@@ -59,7 +59,7 @@ pub fn c(spec: &Path, output: &Path, ui: &mut Ui) -> Result<(), Failure> {
     })
 }
 
-/// The library for this host, and a module that steps it in any Python.
+/// Writes the library for this host, and a Python module that steps it.
 ///
 /// # Errors
 /// As [`c`].
@@ -67,12 +67,12 @@ pub fn python(spec: &Path, output: &Path, ui: &mut Ui) -> Result<(), Failure> {
     export(spec, output, ui, |machine| Ok((vec![("controller.py", module(machine))], "python3 -i controller.py")))
 }
 
-/// Name of the library.
+/// File name of the library.
 fn library_name() -> String {
     format!("{}controller{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX)
 }
 
-/// Builds the library of a spec, and writes it beside texts that use it; those come with the line that begins with them.
+/// Builds the library of a spec and writes it together with `texts` that use it. These come with the first command to run.
 fn export(
     spec: &Path,
     output: &Path,
@@ -95,7 +95,7 @@ fn export(
     files.push((library_name(), bytes));
     write_folder(output, &files)?;
     let names = files.iter().map(|(name, _)| name.clone()).collect();
-    ui.result(&Exported { folder: output.display().to_string(), files: names, next });
+    ui.result(&Export { folder: output.display().to_string(), files: names, next });
     Ok(())
 }
 
@@ -122,28 +122,28 @@ fn module(machine: &Supervised) -> String {
         .replace("@whole@", &list(&whole))
 }
 
-/// Whether its memory can be that of a C header.
+/// Checks that the memory of a C header is sufficiently aligned for the controller.
 fn fits(machine: &Supervised) -> Result<(), Failure> {
     match machine.controller().layouts().iter().find(|layout| layout.align() > ALIGNMENT) {
         None => Ok(()),
         Some(layout) => Err(Failure::Environment(format!(
-            "the controller's memory is aligned to {} bytes, that of a C header to {ALIGNMENT}",
+            "the controller's memory needs an alignment of {} bytes, but the C header provides {ALIGNMENT}",
             layout.align()
         ))),
     }
 }
 
-/// Files that were written.
+/// An export.
 #[derive(Serialize)]
-struct Exported {
+struct Export {
     folder: String,
     files: Vec<String>,
-    /// The line that begins with them.
+    /// The first command to run.
     #[serde(skip)]
     next: &'static str,
 }
 
-impl Outcome for Exported {
+impl Outcome for Export {
     fn text(&self) -> String {
         format!("wrote {} to {}\n  {}\n", self.files.join(", "), self.folder, self.next)
     }
@@ -156,9 +156,9 @@ fn header(machine: &Supervised) -> String {
     let [state, config, whole] = controller.layouts();
     let real = if about.scalar.bits() == 32 { ("float", "uint32_t") } else { ("double", "uint64_t") };
     let mut text = format!(
-        "/* Controller of `{}`, spec digest {}, specgen {}. Written by `specgen export c`.\n   \
-         All numbers travel as words of 64 bits: whole numbers as they are, reals by their bit pattern ({}), zero-extended. Units: m, \
-         rad,\n   N, V, s. Nothing here allocates, and nothing panics. */\n\
+        "/* Controller of `{}`, spec digest {}, specgen {}. Generated by `specgen export c`.\n   \
+         All numbers are passed as 64-bit words: integers as they are, reals as bit patterns ({}), zero-extended. Units: m, \
+         rad,\n   N, V, s. No function allocates or panics. */\n\
          #ifndef SPECGEN_CONTROLLER_H\n#define SPECGEN_CONTROLLER_H\n\n\
          #include <stddef.h>\n#include <stdint.h>\n#include <string.h>\n\n\
          #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
@@ -169,7 +169,7 @@ fn header(machine: &Supervised) -> String {
     // Writing to a String cannot fail.
     let _ = write!(
         text,
-        "/* What the caller keeps: enough for targets whose pointers have at most 64 bits. */\n\
+        "/* Memory owned by the caller, large enough for pointers of up to 64 bits. */\n\
          typedef struct {{ uint64_t memory[{}]; }} specgen_config;\n\
          typedef struct {{ uint64_t memory[{}]; }} specgen_state;\n\
          typedef struct {{ uint64_t memory[{}]; }} specgen_machine;\n\n",
@@ -215,7 +215,7 @@ fn header(machine: &Supervised) -> String {
     text
 }
 
-/// Words of 64 bits that hold it.
+/// Number of 64-bit words that hold it.
 fn words(layout: Layout) -> usize {
     layout.size().div_ceil(ALIGNMENT)
 }
@@ -226,7 +226,7 @@ fn identifier(name: &str) -> String {
 }
 
 const DECLARATIONS: &str = "\
-/* Version of the library's interface: SPECGEN_ABI_VERSION, or it is not for this header. */
+/* Interface version of the library; must equal SPECGEN_ABI_VERSION. */
 uint32_t specgen_abi_version(void);
 /* Lines `key=value` in UTF-8 about the library, not ended by a zero. */
 void specgen_describe(const uint8_t **text, size_t *length);
@@ -252,11 +252,11 @@ uint64_t specgen_state_digest(const specgen_state *state);
 ";
 
 const CHECK: &str = "\
-/* 0 if the library is the one that this header was written for: interface, digest of the spec, memory. */
+/* Returns 0 if the library matches this header: interface version, spec digest, memory sizes. */
 static inline int specgen_check(void) {
-    const char *wanted = \"\\ndigest=\" SPECGEN_DIGEST \"\\n\";
+    const char *expected = \"\\ndigest=\" SPECGEN_DIGEST \"\\n\";
     const uint8_t *text = NULL;
-    size_t length = 0, at, count = strlen(wanted);
+    size_t length = 0, at, count = strlen(expected);
     if (specgen_abi_version() != SPECGEN_ABI_VERSION) {
         return 1;
     }
@@ -265,7 +265,7 @@ static inline int specgen_check(void) {
     }
     specgen_describe(&text, &length);
     for (at = 0; at + count <= length; at++) {
-        if (memcmp(text + at, wanted, count) == 0) {
+        if (memcmp(text + at, expected, count) == 0) {
             return 0;
         }
     }

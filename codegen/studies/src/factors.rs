@@ -1,4 +1,4 @@
-//! What varies, from where to where, and who said so.
+//! Uncertain parameters: which vary, their ranges, and the origin of each range.
 
 use std::fmt;
 
@@ -6,34 +6,34 @@ use serde::{Deserialize, Serialize};
 
 use specgen_language::model::Model;
 
-/// Something that a machine has more or less of than its spec says.
+/// A parameter of a machine that may deviate from its spec.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Factor {
-    /// On mass and inertia of the platform; of legs with their own gauges on the moved mass, by their resonance.
+    /// Mass and inertia of the platform; for legs with their own gauges the moving mass, through the resonance.
     Mass,
-    /// On the axial stiffness of a leg.
+    /// Axial stiffness of a leg.
     Stiffness,
-    /// On the damping ratio.
+    /// Damping ratio.
     Damping,
-    /// λ, on the gain of a leg.
+    /// λ, the gain of a leg.
     Gain,
-    /// On the thresholds of a leg's plays: the width of its loop.
+    /// Thresholds of a leg's play operators: the width of its loop.
     Hysteresis,
-    /// On its creep.
+    /// Creep of a leg.
     Creep,
-    /// On the lag of an amplifier.
+    /// Lag of an amplifier.
     Lag,
-    /// On the lag of the gauges.
+    /// Lag of the gauges.
     GaugeLag,
-    /// On the noise of gauges, amplifiers and force sensor.
+    /// Noise of gauges, amplifiers and force sensor.
     Noise,
-    /// Control intervals by which voltages come late: no factor but a whole number.
+    /// Delay of the voltages in control intervals: an integer, not a factor.
     DelayTicks,
 }
 
 impl Factor {
-    /// All, in the order of reports.
+    /// All parameters, in the order of reports.
     pub const ALL: [Self; 10] = [
         Self::Mass,
         Self::Stiffness,
@@ -47,7 +47,7 @@ impl Factor {
         Self::DelayTicks,
     ];
 
-    /// As options, corners and `[robust]` call it.
+    /// Its name in options, corners and `[robust]`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -64,13 +64,13 @@ impl Factor {
         }
     }
 
-    /// Whether each leg has its own value in a draw.
+    /// Whether each leg has its own value in a random machine.
     #[must_use]
     pub fn of_each_leg(self) -> bool {
         matches!(self, Self::Stiffness | Self::Gain | Self::Hysteresis | Self::Creep | Self::Lag | Self::GaugeLag)
     }
 
-    /// The value of a machine as its data sheet.
+    /// The nominal value.
     #[must_use]
     pub fn nominal(self) -> f64 {
         if self == Self::DelayTicks { 0.0 } else { 1.0 }
@@ -83,11 +83,11 @@ impl fmt::Display for Factor {
     }
 }
 
-/// Who said how much a factor varies.
+/// Origin of a range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Origin {
-    /// Nobody.
+    /// specgen's default.
     Default,
     /// `[robust]`, or `adaptation.gain_ratio`.
     Spec,
@@ -105,47 +105,47 @@ impl fmt::Display for Origin {
     }
 }
 
-/// Range of one factor.
+/// Range of one parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FactorRange {
-    /// Which.
+    /// The parameter.
     pub factor: Factor,
-    /// Smallest and largest value.
+    /// Lower and upper limit.
     pub range: [f64; 2],
-    /// Who said so.
+    /// Origin of the range.
     pub origin: Origin,
 }
 
-/// A range that a user gives: `mass=5 %`, `gain=0.9:1.1`, `delay_ticks=2`.
+/// A range given by the user: `mass=5 %`, `gain=0.9:1.1`, `delay_ticks=2`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UserRange {
-    /// Which.
+    /// The parameter.
     pub factor: Factor,
-    /// Smallest and largest value.
+    /// Lower and upper limit.
     pub range: [f64; 2],
 }
 
-/// Largest factor, as in the key table.
+/// Largest factor, as in the key table of the spec.
 const LARGEST: f64 = 10.0;
-/// Most ticks of delay, as in the key table.
+/// Largest delay in ticks, as in the key table of the spec.
 const MOST_TICKS: f64 = 100.0;
 
 impl UserRange {
     /// Reads `NAME=RANGE`.
     ///
     /// # Errors
-    /// In words: what is wrong and how it is written.
+    /// A message with the error and the expected format.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let how = "write NAME=PART such as mass=5%, NAME=LOW:HIGH such as gain=0.9:1.1, or delay_ticks=1";
+        let how = "write NAME=PERCENT such as mass=5%, NAME=LOW:HIGH such as gain=0.9:1.1, or delay_ticks=1";
         let Some((name, value)) = text.split_once('=') else { return Err(format!("found `{text}`; {how}")) };
         let name = name.trim();
         let Some(factor) = Factor::ALL.into_iter().find(|factor| factor.name() == name) else {
             let known: Vec<&str> = Factor::ALL.iter().map(|factor| factor.name()).collect();
-            return Err(format!("nothing is called `{name}`; expected one of {}", known.join(", ")));
+            return Err(format!("unknown parameter `{name}`; expected one of {}", known.join(", ")));
         };
         let number = |part: &str| -> Result<f64, String> {
             let found = part.trim().parse().ok().filter(|value: &f64| value.is_finite());
-            found.ok_or_else(|| format!("`{}` in `{text}` is no number; {how}", part.trim()))
+            found.ok_or_else(|| format!("`{}` in `{text}` is not a number; {how}", part.trim()))
         };
         let value = value.trim();
         let range = match (value.split_once(':'), value.strip_suffix('%')) {
@@ -162,10 +162,10 @@ impl UserRange {
     }
 }
 
-/// Whether a machine can be so.
+/// Checks that a machine can have these values.
 fn check(factor: Factor, [low, high]: [f64; 2]) -> Result<(), String> {
     if low > high {
-        return Err(format!("{factor} from {low} to {high} holds nothing; give the smaller value first"));
+        return Err(format!("{factor} from {low} to {high} is an empty range; give the smaller value first"));
     }
     if factor == Factor::DelayTicks {
         let whole = low.fract() == 0.0 && high.fract() == 0.0;
@@ -179,17 +179,17 @@ fn check(factor: Factor, [low, high]: [f64; 2]) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "{factor} from {low} to {high} times what the spec says: expected factors above 0, up to {LARGEST}; a part such as 5% \
+        "{factor} from {low} to {high} times the spec's value: expected factors above 0 and up to {LARGEST}; a percentage such as 5% \
          must be below 100%"
     ))
 }
 
-/// Every factor with its range.
+/// All parameters with their ranges.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Factors(Vec<FactorRange>);
 
 impl Factors {
-    /// Of the options, else of the spec, else by default.
+    /// Ranges from the options, else from the spec, else the defaults.
     #[must_use]
     pub fn of(model: &Model, given: &[UserRange]) -> Self {
         let declared = &model.robust;
@@ -203,13 +203,13 @@ impl Factors {
                 Factor::Hysteresis => (declared.hysteresis, about(0.1)),
                 Factor::Creep => (declared.creep, about(0.1)),
                 Factor::Lag => (declared.lag, about(0.2)),
-                // What is not there does not vary.
+                // A parameter that is zero does not vary.
                 Factor::GaugeLag if model.sensor.lag == 0.0 => (declared.gauge_lag, about(0.0)),
                 Factor::GaugeLag => (declared.gauge_lag, about(0.2)),
                 Factor::Noise => (declared.noise, about(0.5)),
                 Factor::DelayTicks => (declared.delay_ticks.map(|ticks| [0.0, f64::from(ticks)]), [0.0, 1.0]),
             };
-            // The last of several options counts, as everywhere.
+            // The last option wins, as elsewhere.
             let option = given.iter().rev().find(|given| given.factor == factor).map(|given| given.range);
             let (range, origin) = match (option, spec) {
                 (Some(range), _) => (range, Origin::Option),
@@ -221,15 +221,15 @@ impl Factors {
         Self(Factor::ALL.into_iter().map(one).collect())
     }
 
-    /// In the order of [`Factor::ALL`].
+    /// The ranges, in the order of [`Factor::ALL`].
     pub fn iter(&self) -> impl Iterator<Item = &FactorRange> {
         self.0.iter()
     }
 
-    /// Range of one.
+    /// The range of one parameter.
     #[must_use]
     pub fn range(&self, factor: Factor) -> [f64; 2] {
-        // Every factor has its row; a machine as its data sheet otherwise.
+        // Every parameter has an entry; nominal otherwise.
         self.0.iter().find(|one| one.factor == factor).map_or([factor.nominal(); 2], |one| one.range)
     }
 }
@@ -239,7 +239,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_are_read_in_three_ways() {
+    fn ranges_have_three_formats() {
         let range = |text: &str| UserRange::parse(text).map(|given| (given.factor, given.range));
         let (factor, [low, high]) = range("mass=5 %").unwrap();
         assert!(factor == Factor::Mass && (low - 0.95).abs() < 1e-12 && (high - 1.05).abs() < 1e-12);
@@ -250,13 +250,13 @@ mod tests {
     }
 
     #[test]
-    fn what_no_machine_can_have_is_refused_with_a_fix() {
+    fn impossible_ranges_are_refused_with_a_fix() {
         for (text, fix) in [
-            ("mass", "write NAME=PART"),
+            ("mass", "write NAME=PERCENT"),
             ("weight=5%", "expected one of mass"),
             ("mass=5", "such as mass=5%"),
-            ("mass=x%", "is no number"),
-            ("mass=nan:1", "is no number"),
+            ("mass=x%", "is not a number"),
+            ("mass=nan:1", "is not a number"),
             ("mass=-0.5:1", "expected factors above 0"),
             ("mass=150%", "must be below 100%"),
             ("mass=-5%", "the smaller value first"),

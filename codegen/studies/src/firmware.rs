@@ -1,4 +1,4 @@
-//! A workspace with one target, built, checked, and held against its budget.
+//! Builds a workspace for one target, checks it, and compares it with its budget.
 
 pub mod flash;
 pub mod size;
@@ -29,26 +29,26 @@ use specgen_toolchain::stack::Reserve;
 use specgen_toolchain::targets::{Kind, Target};
 use specgen_toolchain::{self as target, Image, TargetError};
 
-/// What is built of a spec.
+/// What to build of a spec.
 #[derive(Debug)]
 pub struct Options {
-    /// Name of the target; that of the spec's part if there is none.
+    /// Name of the target; default: the target of the spec's part.
     pub target: Option<String>,
     /// The output folder.
     pub output: Option<PathBuf>,
-    /// Where cargo builds for microcontrollers.
+    /// Target folder of cargo for microcontrollers.
     pub target_dir: Option<PathBuf>,
-    /// With lock-step.
+    /// Build with lock-step.
     pub lockstep: bool,
-    /// Without the emulator.
+    /// Skip the emulator.
     pub no_measure: bool,
-    /// A board may rest on what nobody measured.
+    /// Accept a board whose controller rests on unmeasured values.
     pub assumed_ok: bool,
     /// Refuse a spec with warnings.
     pub deny_warnings: bool,
 }
 
-/// What was built for a target.
+/// The build for a target.
 #[derive(Debug, Serialize)]
 struct BuildResult {
     name: String,
@@ -63,23 +63,23 @@ struct BuildResult {
     checks: Option<TickChecks>,
     measurement: Option<Measurement>,
     used: Option<ImageUsage>,
-    /// Of a board's whole program.
+    /// Stack of a board's whole program.
     stack: Option<Reserve>,
-    /// What the controller rests on that nobody measured.
+    /// Unmeasured values that the controller rests on.
     assumed: Assumptions,
-    /// What differs from what the spec says, or was left out.
+    /// Deviations from the spec, and skipped steps.
     notes: Vec<String>,
-    /// What is over budget or must not be: nothing is flashed then.
+    /// Exceeded budgets and violations: the image must not be flashed.
     failures: Vec<String>,
-    /// Of the controller's scalar.
+    /// Bits of the controller's scalar.
     #[serde(skip)]
     bits: u32,
-    /// Part and budget of the spec.
+    /// Part and budget from the spec.
     #[serde(skip)]
     limits: model::Target,
 }
 
-/// Builds a spec for one target, checks the image and holds it against the budget.
+/// Builds a spec for one target, checks the image and compares it with the budget.
 ///
 /// # Errors
 /// The spec is refused, the folder cannot be written, a build fails, or the image must not be used.
@@ -88,12 +88,12 @@ pub fn run(spec: &Path, options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     ui.judged(&made, refusal(&made))
 }
 
-/// What every ELF file begins with.
+/// Magic number of ELF files.
 const ELF: [u8; 4] = [0x7f, b'E', b'L', b'F'];
 
-/// The file if it is an ELF image; none if it is something else, which can only be a spec.
+/// The file if it is an ELF image; `None` if it is something else, which can only be a spec.
 fn read_image(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
-    // The compiler has the words for a spec that cannot be read, and reads one that comes through a pipe.
+    // The compiler reports unreadable specs, and accepts pipes.
     let Ok(mut file) = files::open_file(path) else { return Ok(None) };
     let mut first = Vec::new();
     let begun = file.by_ref().take(ELF.len() as u64).read_to_end(&mut first).and_then(|_| file.rewind());
@@ -109,17 +109,17 @@ fn refusal(made: &BuildResult) -> Option<String> {
     (!list.is_empty()).then(|| format!("{} for {} is refused:{list}", made.target, made.board))
 }
 
-/// What an image is built for.
+/// Purpose of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Purpose {
-    /// For a machine: a board's is a real one.
+    /// To run; on a board this means a real machine.
     Machine,
-    /// For a board, that is written to it.
+    /// To be flashed to a board.
     Board,
 }
 
 impl Purpose {
-    /// Refuses a target that the command has no use for.
+    /// Refuses a target that does not suit the command.
     fn takes(self, target: Target) -> Result<(), Failure> {
         if self == Self::Board && !matches!(target.kind, Kind::Board(_)) {
             return Err(flash::not_a_board(target.name));
@@ -128,7 +128,7 @@ impl Purpose {
     }
 }
 
-/// Refuses a board whose controller would rest on what nobody measured, unless that is accepted.
+/// Refuses a board whose controller rests on unmeasured values, unless accepted.
 fn accept_assumptions(target: Target, compiled: &Compilation, options: &Options) -> Result<(), Failure> {
     let is_real = matches!(target.kind, Kind::Board(_));
     if !is_real || options.assumed_ok || compiled.assumptions.is_empty() {
@@ -138,13 +138,13 @@ fn accept_assumptions(target: Target, compiled: &Compilation, options: &Options)
     Err(Refusal { source: Some(compiled.source.clone()), findings }.into())
 }
 
-/// Compiles, writes, builds, checks, measures. What does not do for the purpose is refused before anything is written.
+/// Compiles, writes, builds, checks and measures. An unsuitable target is refused before anything is written.
 fn make(spec: &Path, options: &Options, purpose: Purpose, ui: &mut Ui) -> Result<BuildResult, Failure> {
     let compiled = spec_file::quietly(spec, ui)?;
     spec_file::accept(&compiled, &compiled.findings, options.deny_warnings)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
     let declared = compiled.model.target.mcu;
-    // clap lets only known names through.
+    // clap accepts only known names.
     let target = options.target.as_deref().and_then(Target::named).unwrap_or_else(|| Target::of(declared));
     purpose.takes(target)?;
     if let Kind::Board(mcu) = target.kind
@@ -155,10 +155,10 @@ fn make(spec: &Path, options: &Options, purpose: Purpose, ui: &mut Ui) -> Result
     accept_assumptions(target, &compiled, options)?;
     if options.lockstep && !matches!(target.kind, Kind::Board(_)) {
         let boards = BOARDS.map(|board| board.folder).join(", ");
-        let message = format!("--lockstep is for the targets {boards}; {} has it in any case or never", target.name);
+        let message = format!("--lockstep applies only to the targets {boards}, not to {}", target.name);
         return Err(Failure::Usage(message));
     }
-    // What is missing is said before anything is written.
+    // Report missing tools before writing anything.
     if matches!(target.kind, Kind::Emulated | Kind::Board(_)) {
         target::toolchain::find()?;
     }
@@ -174,7 +174,7 @@ fn make(spec: &Path, options: &Options, purpose: Purpose, ui: &mut Ui) -> Result
     build(&compiled, target, &folders, options, ui)
 }
 
-/// An image for another core than the spec's would compute other bits, or in software.
+/// An image for another core than the spec's would compute other bits, or use software floating point.
 fn wrong_part(compiled: &Compilation, mcu: Mcu, target: Target) -> Option<Diagnostic> {
     let (declared, part) = (compiled.model.target.mcu.part(), mcu.part());
     if (declared.core, declared.double) == (part.core, part.double) {
@@ -186,7 +186,7 @@ fn wrong_part(compiled: &Compilation, mcu: Mcu, target: Target) -> Option<Diagno
         &["target.mcu", "target"],
         codes::WRONG_PART,
         format!(
-            "the spec is for {} ({}), but target {} is the {} with {} ({})",
+            "the spec is for {} ({}), but target {} has the {} with {} ({})",
             declared.name, declared.core, target.name, part.board, part.name, part.core
         ),
         format!(
@@ -264,7 +264,7 @@ fn build(
             made.stack = Reserve::of(&image.elf)?;
             if mcu != declared {
                 made.notes.push(format!(
-                    "the spec declares {}; built for {} of the same core, whose memory is the limit where no budget is declared",
+                    "the spec declares {}; built for {} with the same core, whose memory is the limit if no budget is declared",
                     declared.part().name,
                     mcu.part().name
                 ));
@@ -276,7 +276,7 @@ fn build(
                 verify::time_board(&compiled.model, mcu, Some(&image.elf), folders, &host, &mut measurement)?;
                 made.measurement = Some(measurement);
             } else {
-                let why = if measure { "see above" } else { "--no-measure" };
+                let why = if measure { "see the note above" } else { "--no-measure" };
                 made.notes.push(format!("the time of a tick was not estimated: {why}"));
             }
             made.failures.extend(late(compiled, made.measurement.as_ref(), ui));
@@ -292,7 +292,7 @@ fn build(
     Ok(made)
 }
 
-/// Says what is to be said about the time of a tick; why the controller must not be used, if it is too long.
+/// Reports findings about the time of a tick. Returns why the controller must not be used, if it is too long.
 pub(crate) fn late(compiled: &Compilation, measurement: Option<&Measurement>, ui: &mut Ui) -> Option<String> {
     let finding = time::finding(compiled, measurement?.time.as_ref()?)?;
     let failure = format!("{}: {}; {}", finding.code, finding.message, finding.help);
@@ -301,15 +301,15 @@ pub(crate) fn late(compiled: &Compilation, measurement: Option<&Measurement>, ui
     fails.then_some(failure)
 }
 
-/// The boards' converter has a filter that a spec may not know of.
+/// A note if the board's converter has a filter that the spec does not model.
 fn unknown_filter(model: &model::Model) -> Option<&'static str> {
     (model.sensor.lag == 0.0).then_some(
-        "the AD7606 of this board filters its inputs, and the spec has no `sensor.lag`: write, in [sensor]: lag = \"15 us\" or more, \
-         so that stability and margins contain it",
+        "the AD7606 of this board filters its inputs, but the spec has no `sensor.lag`: write, in [sensor]: lag = \"15 us\" or more, \
+         so that stability and margins include it",
     )
 }
 
-/// Size and checks of an image, and the image under a name that stays.
+/// Size and checks of an image; copies the image to a permanent name.
 fn examine(made: &mut BuildResult, image: &Image, whole_image: bool, output: &Path) -> Result<(), Failure> {
     let folder = output.join("target");
     std::fs::create_dir_all(&folder).map_err(|error| TargetError::io("creating", &folder, error))?;
@@ -323,7 +323,7 @@ fn examine(made: &mut BuildResult, image: &Image, whole_image: bool, output: &Pa
     Ok(())
 }
 
-/// The exercise on the host and on the emulated machine of the same core, if there is an emulator.
+/// Runs the exercise on the host and on the emulated machine with the same core, if there is an emulator.
 fn emulate(
     compiled: &Compilation,
     folders: &Folders<'_>,
@@ -362,23 +362,23 @@ fn emulate(
     Ok(Some((measurement, host)))
 }
 
-/// Fills in what fails: budget, checks, bits.
+/// Adds failures of budget, checks and bits.
 fn hold_against_budget(made: &mut BuildResult, compiled: &Compilation, target: Target) {
     let measured = made.measurement.as_ref();
     let used = match (target.kind, &made.size, &made.checks) {
-        // The image is the one that was measured.
+        // Use the figures of the measured image.
         (Kind::Emulated, _, _) if measured.is_some() => measured.map(|m| m.used.clone()),
         (_, Some(size), Some(checks)) => Some(ImageUsage {
             flash: size.flash(),
             flash_by: size.owners.iter().map(|owner| (owner.name.clone(), owner.flash())).collect(),
-            // State and settings of the image that is replayed are on its stack, and known only in a run.
+            // The replay image keeps State and settings on its stack, so their sizes are known only at run time.
             ram: checks.stack.filter(|_| target.kind != Kind::Emulated).map(|stack| size.ram() + stack),
             ram_least: size.ram() + checks.stack.unwrap_or(0),
             ram_by: size
                 .variables
                 .iter()
                 .cloned()
-                .chain([("stack of a tick".to_owned(), checks.stack.unwrap_or(0))])
+                .chain([("tick stack".to_owned(), checks.stack.unwrap_or(0))])
                 .collect(),
             stack: checks.stack,
             stack_by: checks.path.clone(),
@@ -397,10 +397,10 @@ fn hold_against_budget(made: &mut BuildResult, compiled: &Compilation, target: T
     made.used = used;
     if let Some(stack) = made.stack.as_ref().filter(|stack| stack.needed() > stack.reserved) {
         made.failures.push(format!(
-            "the program's stack takes {} bytes ({}), its memory map gives it {}: make State and settings smaller \
-             (hysteresis.memory), or the STACK of memory.x larger",
+            "the program's stack needs {} bytes ({}), but its memory map reserves {}: make State and settings smaller \
+             (hysteresis.memory), or STACK in memory.x larger",
             group(stack.needed()),
-            if stack.startup > stack.running { "initialisation" } else { "tick and interrupts on top of each other" },
+            if stack.startup > stack.running { "initialisation" } else { "tick and nested interrupts" },
             group(stack.reserved)
         ));
     }
@@ -411,7 +411,7 @@ fn hold_against_budget(made: &mut BuildResult, compiled: &Compilation, target: T
         }
     }
     if let Some(difference) = measured.and_then(|m| m.first_difference.as_ref()) {
-        made.failures.push(format!("the emulated machine computes other bits than the host: {difference}"));
+        made.failures.push(format!("host and emulated machine compute different bits: {difference}"));
     }
 }
 
@@ -422,7 +422,7 @@ mod tests {
     use specgen_language::SpecSource;
 
     #[test]
-    fn who_has_an_ad7606_is_told_of_its_filter_until_the_spec_has_it() {
+    fn the_filter_of_an_ad7606_is_noted_unless_the_spec_models_it() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/reference.toml");
         let plain = SpecSource::read(&path).unwrap();
         let mut filtered = plain.clone();

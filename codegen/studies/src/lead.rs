@@ -1,14 +1,14 @@
-//! The lead of a trajectory: as much of the delay from command to pose as its corners bear.
+//! The lead of a trajectory: as much of the delay from command to pose as its corners permit.
 //!
-//! With a lead τ the legs are asked for x_d + τ ẋ_d. What is then left of the motion is linear in τ,
+//! With a lead τ the legs receive x_d + τ ẋ_d. The remaining error is linear in τ,
 //!
 //! ```text
-//! e = S (x_d − G (x_d + ẍ_d/ω² + τ Δx_d/T)) = a + τ b          G: request to pose without feedback, S: what feedback leaves
+//! e = S (x_d − G (x_d + ẍ_d/ω² + τ Δx_d/T)) = a + τ b          G: request to pose without feedback, S: sensitivity
 //! ```
-//! so that the mean square of e over the motion and the rest behind it is least for τ = −⟨a, b⟩/⟨b, b⟩. On a smooth path b is −ẋ_d, late by the
-//! feedback, and a the delay times ẋ_d: τ is the delay. At each jump of ẋ_d by Δv the request steps by τ Δv, which rings with the modes: of its own
-//! a jump is best asked for with τ = δ²/(2 H), δ the delay and H the integral of the squared step error, so that more and larger jumps beside
-//! less motion make τ less. Hysteresis is not in the model.
+//! so the mean square of e over the motion and the rest after it is least for τ = −⟨a, b⟩/⟨b, b⟩. On a smooth path b is −ẋ_d, filtered by the
+//! feedback, and a is the delay times ẋ_d, so τ is the delay. At each jump of ẋ_d by Δv the request steps by τ Δv, which excites the modes. For a
+//! single jump the best lead is τ = δ²/(2 H), with δ the delay and H the integral of the squared step error: more and larger jumps with
+//! less motion reduce τ. Hysteresis is not modelled.
 
 use serde::Serialize;
 use specgen_compiler::compile::Compilation;
@@ -18,31 +18,31 @@ use specgen_language::model::{self, TrajectoryKind};
 use crate::learning::{Learnable, Motion};
 use host_sim::trajectory::{PaperPath, PaperPose};
 
-/// A lead of which the error is less than this part of that with the usual lead is worth proposing.
+/// A lead is proposed if it reduces the error to less than this share of the error with the usual lead.
 const WORTH: f64 = 0.97;
 
-/// What the lead does to a trajectory of the spec, by the model.
+/// Effect of the lead on a trajectory of the spec, by the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LeadOf {
     /// The trajectory.
     pub name: String,
-    /// The lead that it is played with, s.
+    /// The lead in use, s.
     pub lead: f64,
     /// The best, s.
     pub best: f64,
-    /// Error at the joints over the motion and 0.1 s of rest behind it, rms, m: with these two.
+    /// Rms error at the joints over the motion and 0.1 s of rest after it, m: with the lead in use and with the best one.
     pub errors: [f64; 2],
 }
 
 impl LeadOf {
-    /// Whether the best one is so much better that the spec should have it.
+    /// Whether the best lead is so much better that it should be proposed.
     #[must_use]
     pub fn is_proposed(&self) -> bool {
         self.errors[1] < WORTH * self.errors[0]
     }
 }
 
-/// Of each trajectory of the paper's kinds; none for six legs. Waveforms are splines without corners: the usual lead is theirs.
+/// The lead of each trajectory of the paper's kinds; none for six legs. Waveforms are splines without corners and use the usual lead.
 #[must_use]
 pub fn of(compiled: &Compilation) -> Vec<LeadOf> {
     let model = &compiled.model;
@@ -57,7 +57,7 @@ pub fn of(compiled: &Compilation) -> Vec<LeadOf> {
         let error = |lead: f64| {
             let square =
                 (squares + lead * (2.0 * products + lead * leads)) / (motion.corrected - motion.scored.start) as f64;
-            // Rounding may leave a tiny one below zero.
+            // Rounding may give a tiny negative value.
             libm::sqrt(if square > 0.0 { square } else { 0.0 })
         };
         let lead = trajectory.lead.unwrap_or(usual);
@@ -68,7 +68,7 @@ pub fn of(compiled: &Compilation) -> Vec<LeadOf> {
     each.filter(|one| one.best.is_finite()).collect()
 }
 
-/// The path as the simulator has it.
+/// The path as the simulator plays it.
 #[must_use]
 pub fn streamed(path: model::PaperPath) -> PaperPath {
     match path {
@@ -78,7 +78,7 @@ pub fn streamed(path: model::PaperPath) -> PaperPath {
     }
 }
 
-/// ⟨a, a⟩, ⟨a, b⟩ and ⟨b, b⟩ over the motion and the rest behind it, angles times the radius, m², m² /s, m²/s².
+/// ⟨a, a⟩, ⟨a, b⟩ and ⟨b, b⟩ over the motion and the rest after it, with angles times the radius: m², m²/s, m²/s².
 fn products(learnable: &Learnable, motion: &Motion) -> [f64; 3] {
     let (law, tuning) = learnable.law();
     let closed_loop: &ClosedLoop = learnable.closed_loop();
@@ -99,7 +99,7 @@ fn products(learnable: &Learnable, motion: &Motion) -> [f64; 3] {
         places.push(place);
         last = place;
     }
-    // At the end of each interval, which is where the next begins.
+    // Value at the end of each interval, which is the start of the next.
     let shown = closed_loop.without_feedback(&requests);
     let late: Vec<[f64; 6]> =
         places.iter().zip(&shown).map(|(place, shown)| std::array::from_fn(|mode| place[mode] - shown[mode])).collect();

@@ -1,4 +1,4 @@
-//! A motion that repeats, learned between passes: what is asked for, the correction that is kept, and what came of it.
+//! The command `learn`: options, the kept correction, and the report.
 
 mod excite;
 
@@ -28,50 +28,50 @@ use crate::learning::{
     RepeatableMachine, Response, Table, Update, course, knots, learn, takes_correction,
 };
 use crate::machine::{PlantOptions, run_failure};
-use crate::trajectory::{self, Followed};
+use crate::trajectory::{self, NamedTrajectory};
 
-/// Why nothing is learned with a measured response.
+/// Message if learning with a measured response converges nowhere.
 const UNKNOWN: &str =
-    "too little is known of the measured response for learning; measure it along a longer motion by --excite";
-/// How long the machine may take to its bias pose, s.
+    "the measured response is too uncertain for learning; measure it along a longer motion with --excite";
+/// Time limit for reaching the bias pose, s.
 const ARMING: f64 = 60.0;
 
-/// What is learned, and how.
+/// Options of `learn`.
 #[derive(Debug)]
 pub struct Options {
     /// Name of the motion.
     pub trajectory: Option<String>,
     /// Hz.
     pub frequency: Option<f64>,
-    /// Passes that are learned from.
+    /// Number of passes to learn from.
     pub passes: u32,
     /// Highest frequency, Hz.
     pub bandwidth: f64,
-    /// Ranges in place of those of the spec.
+    /// Ranges that replace those of the spec.
     pub vary: Vec<UserRange>,
-    /// Begin with what the model says.
+    /// Start with a correction from the model.
     pub prepare: bool,
-    /// Begin with this correction.
+    /// Start with this correction.
     pub from: Option<PathBuf>,
-    /// File of a measured response: nothing is learned.
+    /// Measure the response into this file instead of learning.
     pub excite: Option<PathBuf>,
-    /// A response that was measured.
+    /// File of a measured response to use.
     pub response: Option<PathBuf>,
-    /// Knots of the device, if it makes the corrections.
+    /// Knot capacity of the device, if it computes the corrections.
     pub on_device: Option<u32>,
-    /// File of the correction.
+    /// Output file of the correction.
     pub output: Option<PathBuf>,
-    /// What a machine at the end of a link is called.
+    /// Name of a machine on a link.
     pub machine: Option<String>,
     /// The simulated machine.
     pub plant: PlantOptions,
 }
 
 impl Options {
-    /// Refuses files that cannot be read or written, before the minutes of the rest.
+    /// Refuses unreadable or unwritable files before a long run.
     ///
     /// # Errors
-    /// There is such a file.
+    /// A file cannot be read or written.
     pub fn check(&self) -> Result<(), Failure> {
         self.plant.leg()?;
         [&self.from, &self.response].into_iter().flatten().try_for_each(|path| check_input(path))?;
@@ -79,13 +79,13 @@ impl Options {
     }
 }
 
-/// Who makes the corrections, and by what.
+/// The method that computes the corrections.
 enum Rule {
     Host(Box<Update>),
     Device(Plan),
 }
 
-/// What is learned, and how.
+/// Everything needed for learning.
 struct Study {
     compiled: Compilation,
     convergence: Convergence,
@@ -97,18 +97,18 @@ struct Study {
     spacing: u32,
 }
 
-/// Learns on the simulated machine of a spec, and shows what came of it.
+/// Learns on the simulated machine of a spec, and reports the result.
 ///
 /// # Errors
 /// The spec or an option is refused, a run fails, or a file cannot be written.
 pub fn simulated(options: &Options, compiled: Compilation, ui: &mut Ui) -> Result<(), Failure> {
-    run(options, compiled, &mut Simulated(&options.plant), ui)
+    run(options, compiled, &mut SimulatedMachine(&options.plant), ui)
 }
 
-/// The same on a machine.
+/// Learns on a machine, and reports the result.
 ///
 /// # Errors
-/// As [`simulated`], or the machine ends before it is asked to.
+/// As [`simulated`], or the machine stops early.
 pub fn run(options: &Options, compiled: Compilation, bed: &mut impl MachineSource, ui: &mut Ui) -> Result<(), Failure> {
     if let Some(path) = &options.excite {
         return excite::run(options, path, &compiled, bed, ui);
@@ -129,32 +129,32 @@ pub fn run(options: &Options, compiled: Compilation, bed: &mut impl MachineSourc
             Ok(())
         }
         (Some(found), None) => {
-            let message = format!("interrupted: what was learned so far is kept{down}");
+            let message = format!("interrupted; the best correction so far is kept{down}");
             Err(Failure::Interrupted { message, result: ui.shown(&found) })
         }
-        (None, None) => Err(Failure::Gate(format!("interrupted before the first pass was over{down}"))),
+        (None, None) => Err(Failure::Gate(format!("interrupted during the first pass{down}"))),
     }
 }
 
-/// The result of a session on a machine.
+/// Result of a session on a machine.
 pub struct SessionResult<F> {
-    /// The figures, if the machine made its passes.
+    /// The result of the work, if the machine completed its passes.
     pub found: Option<F>,
-    /// Why the session ended early.
+    /// Why the session ended early, if it did.
     pub why: Option<String>,
-    /// The state in which a machine at the end of a link was left, after "; ".
+    /// The final state of a machine on a link, after "; ".
     pub down: String,
 }
 
-/// The machine that makes the passes: simulated, or at the end of a link.
+/// A machine for passes: simulated, or on a link.
 pub trait MachineSource {
     /// Name of a motion on this machine.
-    fn motion_name(&self, followed: &Followed) -> String;
+    fn motion_name(&self, followed: &NamedTrajectory) -> String;
 
-    /// Where it begins a motion that it has, in the user's coordinates, m and rad.
+    /// Start pose of a motion stored on the machine, in the user's coordinates, m and rad.
     fn start(&self) -> Option<[f64; 6]>;
 
-    /// Does work on the machine, and keeps what it gives, however the machine ends.
+    /// Does work on the machine, and returns its result however the session ends.
     ///
     /// # Errors
     /// The machine cannot be reached, or the work fails.
@@ -168,10 +168,10 @@ pub trait MachineSource {
 }
 
 /// The simulated machine of the spec.
-struct Simulated<'a>(&'a PlantOptions);
+struct SimulatedMachine<'a>(&'a PlantOptions);
 
-impl MachineSource for Simulated<'_> {
-    fn motion_name(&self, followed: &Followed) -> String {
+impl MachineSource for SimulatedMachine<'_> {
+    fn motion_name(&self, followed: &NamedTrajectory) -> String {
         format!("{} at {} Hz", followed.name, followed.frequency)
     }
 
@@ -200,7 +200,7 @@ impl MachineSource for Simulated<'_> {
     }
 }
 
-/// The motion, and what it is called.
+/// The motion and its name.
 fn motion_of(options: &Options, bed: &impl MachineSource, compiled: &Compilation) -> Result<(Motion, String), Failure> {
     let model = &compiled.model;
     let task = takes_correction(compiled)?;
@@ -213,7 +213,7 @@ fn motion_of(options: &Options, bed: &impl MachineSource, compiled: &Compilation
     Ok((motion, name))
 }
 
-/// What the machine is called.
+/// The name of the machine.
 fn machine_name(options: &Options) -> String {
     let PlantOptions { plant, seed, .. } = &options.plant;
     let shape = plant.as_ref().map_or_else(|| "plays".to_owned(), |path| path.display().to_string());
@@ -222,14 +222,14 @@ fn machine_name(options: &Options) -> String {
 
 fn learnable_of(compiled: &Compilation) -> Result<Learnable, Failure> {
     Learnable::of(compiled)
-        .ok_or_else(|| Failure::Environment("the platform has no modes, which the spec was checked for".to_owned()))
+        .ok_or_else(|| Failure::Environment("the platform has no modes, although the spec was checked".to_owned()))
 }
 
 fn study(options: &Options, bed: &impl MachineSource, compiled: Compilation) -> Result<Study, Failure> {
     let (motion, motion_name) = motion_of(options, bed, &compiled)?;
     let machine_name = machine_name(options);
     let mut learnable = learnable_of(&compiled)?;
-    let mut refused = format!("{NOWHERE}, or measure the response of the machine by --excite");
+    let mut refused = format!("{NOWHERE}, or measure the machine's response with --excite");
     if let Some(path) = &options.response {
         let named = |error| Failure::Gate(format!("{}: {error}", path.display()));
         let response = Response::of_file(path).map_err(named)?;
@@ -242,8 +242,8 @@ fn study(options: &Options, bed: &impl MachineSource, compiled: Compilation) -> 
     let plan = options.on_device.map(|room| {
         Plan::new(&learnable, &motion, &convergence, &factors, room as usize).ok_or_else(|| {
             Failure::Gate(format!(
-                "no plan of this motion fits into {room} knots and converges on every machine within the declared intervals; learn without \
-                 --on-device, or a shorter motion"
+                "no plan for this motion fits into {room} knots and converges on every machine within the declared intervals; omit \
+                 --on-device or use a shorter motion"
             ))
         })
     });
@@ -255,7 +255,7 @@ fn study(options: &Options, bed: &impl MachineSource, compiled: Compilation) -> 
     Ok(Study { compiled, convergence, motion, rule, motion_name, machine_name, begin, spacing })
 }
 
-/// Makes the passes; the reader sees each, and may end them.
+/// Runs the passes, reporting each; the user may stop them.
 fn passes(
     options: &Options,
     study: &Study,
@@ -277,7 +277,7 @@ fn passes(
     learned
 }
 
-/// Writes the table of the best pass, if a file is named.
+/// Writes the table of the best pass to the output file, if one is given.
 fn keep(
     options: &Options,
     study: &Study,
@@ -289,9 +289,9 @@ fn keep(
     if let Some(path) = &options.output {
         let names = [compiled.ir.digest.as_str(), machine_name, motion_name];
         let mut knots = learned.knots.clone();
-        // Nothing learned, from nothing: a correction of zeros, which plays as none.
+        // Nothing was learned and nothing given: write a correction of zeros, which has no effect.
         knots.resize(course(motion, *spacing, 0).knots() as usize, [0; 6]);
-        let zeros = if knots.iter().all(|knot| *knot == [0; 6]) { ", all of them zero," } else { "" };
+        let zeros = if knots.iter().all(|knot| *knot == [0; 6]) { ", all zero," } else { "" };
         let table = Table::new(names, [*spacing, motion.scored.start as u32], start, knots);
         write_file(path, table.to_json().as_bytes())?;
         ui.progress(&format!("wrote {} knots{zeros} to {}", table.knots.len(), path.display()));
@@ -306,19 +306,19 @@ fn keep(
     })
 }
 
-/// What lets a machine learn up to the bandwidth that was asked for, where not every one within the intervals would converge.
+/// How to learn up to the requested bandwidth, if not every machine within the intervals would converge there.
 fn help(options: &Options, study: &Study) -> Option<String> {
     let Study { compiled, convergence, .. } = study;
     let [_, highest] = convergence.band;
     let damped = compiled.model.task_space.as_ref().is_some_and(|task| task.active_damping);
     let mend = match (damped, convergence.measured) {
-        // Its room for knots may be what ends it, and it takes no measured response.
+        // The device's capacity may be the limit, and it cannot use a measured response.
         _ if options.on_device.is_some() => return None,
         (false, _) => "damp the modes: `control.active_damping = true`",
         (true, false) => "measure the response: --excite, then --response",
         (true, true) => return None,
     };
-    (highest < options.bandwidth).then(|| format!("to learn beyond {highest:.0} Hz, {mend}"))
+    (highest < options.bandwidth).then(|| format!("to learn above {highest:.0} Hz, {mend}"))
 }
 
 fn gate(error: impl Into<LearnError>) -> Failure {
@@ -326,7 +326,7 @@ fn gate(error: impl Into<LearnError>) -> Failure {
     failure(&error, error.to_string())
 }
 
-/// A motion that was not made to its end has no figure.
+/// The failure of a command whose motion was not completed.
 pub fn failure(error: &LearnError, message: String) -> Failure {
     match error {
         LearnError::Run(RunError::EndedEarly { .. }) | LearnError::Status(_) => {
@@ -336,7 +336,7 @@ pub fn failure(error: &LearnError, message: String) -> Failure {
     }
 }
 
-/// The correction of the first pass, and the ticks from knot to knot.
+/// The initial correction, and the ticks between knots.
 fn begin(
     options: &Options,
     compiled: &Compilation,
@@ -358,26 +358,25 @@ fn begin(
     Ok((table.knots, table.spacing))
 }
 
-/// Why learning ended, and whose correction is kept.
+/// Why learning ended, and which correction is kept.
 fn kept(learned: &LearningResult) -> Vec<String> {
-    // Without passes to learn from there is nothing to say.
+    // Without passes to learn from there is nothing to report.
     let Some(noise) = learned.noise_nm else { return Vec::new() };
     let last = learned.passes.len() - 1;
     let why = match learned.ending {
-        Ending::NoGain => Some(format!("pass {last} gained nothing: learning ended")),
-        Ending::Growth => Some(format!("the error grew in pass {last}: learning ended")),
+        Ending::NoGain => Some(format!("learning stopped: pass {last} brought no improvement")),
+        Ending::Growth => Some(format!("learning stopped: the error grew in pass {last}")),
         Ending::AllPasses | Ending::Interruption | Ending::Machine => None,
     };
     let which = match learned.best {
-        0 => "kept: the correction of pass 0, which learning began with".to_owned(),
+        0 => "kept: the initial correction (pass 0)".to_owned(),
         best => format!("kept: the correction of pass {best}"),
     };
-    let noise =
-        format!("passes under one correction differ by {noise:.2} nm by the gauges, and a gain is more than that");
+    let noise = format!("repeatability without learning {noise:.2} nm by the gauges; an improvement must exceed this");
     why.into_iter().chain([which, noise]).collect()
 }
 
-/// What came of it.
+/// Report of `learn`.
 #[derive(Serialize)]
 struct Lesson {
     name: String,
@@ -386,7 +385,7 @@ struct Lesson {
     convergence: Convergence,
     #[serde(flatten)]
     learned: LearningResult,
-    /// What lets it learn to higher frequencies, where it was asked to.
+    /// How to learn to higher frequencies, if they were requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     help: Option<String>,
 }
@@ -402,14 +401,14 @@ impl Outcome for Lesson {
             many => format!("{:.1} -> {:.1} nm rms in {many} passes", first.translation_nm, best.translation_nm),
         };
         let mut text = format!("{name}: {motion}, {gained} ({machine})\n");
-        text.push_str(&format!("  each pass measured over {}\n", best.coverage));
+        text.push_str(&format!("  measured part of each pass: {}\n", best.coverage));
         // Writing to a String cannot fail, here and below.
         let _ = writeln!(
             text,
-            "  learned {low:.1} to {high:.0} Hz; each pass multiplies the error by {:.2} or less {}, worst at {:.0} Hz",
+            "  learned {low:.1} to {high:.0} Hz; each pass multiplies the error by at most {:.2} {}, worst at {:.0} Hz",
             convergence.radius,
             if convergence.measured {
-                "by the\n  measured response"
+                "for the\n  measured response"
             } else {
                 "on every machine within\n  the intervals"
             },
@@ -419,8 +418,8 @@ impl Outcome for Lesson {
         row(&mut text, &columns, &[&"pass", &"nm rms", &"nrad rms", &"gauges, nm", &""]);
         for (number, pass) in learned.passes.iter().enumerate() {
             let Pass { translation_nm, orientation_nrad, measured_nm, status, .. } = pass;
-            let said = [if number == learned.best { "kept" } else { "" }.to_owned(), status_words(*status)];
-            let said: Vec<String> = said.into_iter().filter(|text| !text.is_empty()).collect();
+            let notes = [if number == learned.best { "kept" } else { "" }.to_owned(), status_words(*status)];
+            let notes: Vec<String> = notes.into_iter().filter(|text| !text.is_empty()).collect();
             row(
                 &mut text,
                 &columns,
@@ -429,7 +428,7 @@ impl Outcome for Lesson {
                     &format_args!("{translation_nm:.1}"),
                     &format_args!("{orientation_nrad:.0}"),
                     &format_args!("{measured_nm:.1}"),
-                    &said.join(", "),
+                    &notes.join(", "),
                 ],
             );
         }

@@ -1,21 +1,21 @@
-//! Runs of a compiled controller against simulated machines and images, and the jobs of commands that build or write one.
+//! Runs compiled controllers on simulated machines and images, and implements the commands that build or write one.
 //!
-//! | module | what |
+//! | module | content |
 //! |---|---|
-//! | [`build`], [`firmware`] | the main job; an image for one target: build, size, flash |
-//! | [`check`], [`details`] | findings and verdict of a spec; all that is known of it |
-//! | [`export`] | the controller in C and Python, and as a unit of FMI |
-//! | [`begin`] | a new spec from some answers |
-//! | [`controllers`], [`trajectory`], [`runs`] | what is run, what is followed, and errors on board |
+//! | [`build`], [`firmware`] | the main command; an image for one target: build, size, flash |
+//! | [`check`], [`details`] | findings and verdict of a spec; all its properties |
+//! | [`export`] | the controller as C library, Python module and FMI unit |
+//! | [`begin`] | a new spec from a few answers |
+//! | [`controllers`], [`trajectory`], [`runs`] | which controller runs which trajectory, and errors on board |
 //! | [`machine`], [`reversal_curves`] | the simulated machine of a spec; the record of a leg |
 //! | [`dynamics`] | M, C, G, J and leg forces at given states |
-//! | [`tuning`] | `evaluate` scores one setting on one machine and is the base of every study; searches; the result as an edit of the spec |
-//! | [`factors`], [`robust`] | what varies; corners and draws, parts of a study, quantiles, gate |
-//! | [`learning`], [`lessons`] | iterative learning: convergence, passes, update, measured response; the job of `learn` |
+//! | [`tuning`] | `evaluate` scores a setting on a machine and underlies every study; searches; the result as an edit of the spec |
+//! | [`factors`], [`robust`] | uncertain parameters; corners and random machines, shards, quantiles, gate |
+//! | [`learning`], [`lessons`] | iterative learning: convergence, passes, update, measured response; the command `learn` |
 //! | [`lead`] | the lead of each trajectory, by the model |
-//! | [`paper`], [`reproduce`] | the paper's values and its list of experiments |
-//! | [`verdict`] | the first lines of `check`, the main job and the report |
-//! | [`verify`] | the same input record on host and microcontroller, compared by bits, counted |
+//! | [`paper`], [`reproduce`] | the paper's printed values and its experiments |
+//! | [`verdict`] | the first lines of `check`, the main command and the report |
+//! | [`verify`] | the same input record on host and microcontroller, compared bit by bit, with instruction counts |
 
 pub mod begin;
 pub mod build;

@@ -1,7 +1,7 @@
-//! The machine that a spec describes, for the simulator: everything that the spec says of it, nothing of the controller.
+//! The simulated machine of a spec: everything that the spec says about the machine, nothing about the controller.
 //!
-//! What a spec does not say is the reference plant's: the hysteresis of a leg, its creep and asymmetry, scaled to the
-//! declared leg gain and voltages; the force sensor. A machine is not its data sheet: its legs are out of tolerance.
+//! What a spec does not specify is taken from the reference plant: hysteresis, creep and asymmetry of a leg, scaled to the
+//! declared leg gain and voltages; the force sensor. The legs deviate from nominal within their tolerances.
 
 use core::array::from_fn;
 use std::path::PathBuf;
@@ -17,9 +17,9 @@ use specgen_language::files;
 use specgen_language::model::{Model, TaskSpace};
 use specgen_language::outcome::Failure;
 
-/// Gain of the reference leg's controller, 5 × 0.1262 µm/V: what its measured gain is relative to, m/V.
+/// Gain of the reference leg's controller, 5 × 0.1262 µm/V, to which its measured gain is related, m/V.
 const REFERENCE_GAIN: f64 = 0.631e-6;
-/// Integration steps in a period of the fastest mode, at least.
+/// Minimum number of integration steps per period of the fastest mode.
 const STEPS_PER_PERIOD: f64 = 60.0;
 /// Longest and shortest integration step, s.
 const STEPS: [f64; 2] = [1e-7, 2e-5];
@@ -38,14 +38,14 @@ pub fn run_failure(error: RunError) -> Failure {
     }
 }
 
-/// The simulated legs that a user asks for.
+/// Options of the simulated legs.
 #[derive(Debug, Clone)]
 pub struct PlantOptions {
-    /// A known leg, or a file of leg parameters: the shape of the hysteresis. The reference leg without it.
+    /// A built-in leg, or a file of leg parameters: the shape of the hysteresis. Default: the reference leg.
     pub plant: Option<PathBuf>,
-    /// Without noise and quantisation of gauge and amplifier.
+    /// No noise and no quantisation of gauge and amplifier.
     pub no_noise: bool,
-    /// Of the noise, and of the tolerances of a platform.
+    /// Seed of the noise and of the tolerances of a platform.
     pub seed: u64,
 }
 
@@ -71,7 +71,7 @@ impl PlantOptions {
         Ok((leg, noise))
     }
 
-    /// A platform of such legs, out of tolerance, prepared.
+    /// A platform of such legs with tolerances, prepared.
     ///
     /// # Errors
     /// As [`Self::leg`].
@@ -79,7 +79,7 @@ impl PlantOptions {
         Ok(self.platform_of(model, task, &self.leg()?))
     }
 
-    /// The same of other legs.
+    /// The same with another leg.
     #[must_use]
     pub fn platform_of(&self, model: &Model, task: &TaskSpace, leg: &LegParameters) -> (Specimen, PlatformScenario) {
         let specimen = specimen(model, task, leg, Some(self.seed));
@@ -89,7 +89,7 @@ impl PlantOptions {
     }
 }
 
-/// Six legs of these parameters under the voltages of the spec, prepared.
+/// Six legs with these parameters under the voltages of the spec, prepared.
 #[must_use]
 pub fn legs(
     model: &Model,
@@ -102,13 +102,13 @@ pub fn legs(
     LegScenario::resting(parameters, noise, seed, samples_per_period, voltages)
 }
 
-/// A machine of the spec with tolerances of `seed` (legs ± 10 %, stiffness ± 5 %), or as its data sheet with none. `leg`
+/// A machine of the spec with tolerances from `seed` (legs ± 10 %, stiffness ± 5 %), or nominal if `None`. `leg`
 /// gives the shape of the hysteresis.
 #[must_use]
 pub fn specimen(model: &Model, task: &TaskSpace, leg: &LegParameters, seed: Option<u64>) -> Specimen {
     let leg = self::leg(model, leg);
     let mut nominal = nominal(model, task);
-    // A stiff light platform has modes that the usual step is too long for.
+    // The usual step is too long for the modes of a stiff light platform.
     let fastest = Specimen::ideal(&nominal, &leg).structure().modes().0[5] / core::f64::consts::TAU;
     let needed = 1.0 / (STEPS_PER_PERIOD * fastest);
     nominal.step_s = if needed < STEPS[0] {
@@ -124,7 +124,7 @@ pub fn specimen(model: &Model, task: &TaskSpace, leg: &LegParameters, seed: Opti
     }
 }
 
-/// That machine, prepared, with the gauges of the spec, in steps as long as the control interval; `noise` as [`Noise::of`] it or
+/// That machine, prepared, with the gauges of the spec and steps of one control interval; `noise` is from [`Noise::of`] or
 /// [`Noise::NONE`].
 #[must_use]
 pub fn scenario(model: &Model, task: &TaskSpace, specimen: &Specimen, noise: &Noise, seed: u64) -> PlatformScenario {
@@ -141,7 +141,7 @@ pub fn scenario(model: &Model, task: &TaskSpace, specimen: &Specimen, noise: &No
     scenario
 }
 
-/// The trajectory of the spec with this number, as its controller plays it; none if it has no such one.
+/// The trajectory with this number, as the controller plays it; `None` if the spec has none.
 #[must_use]
 pub fn on_board(compiled: &Compilation, selector: u32) -> Option<OnBoard> {
     let setpoints = &compiled.ir.task_space.as_ref()?.setpoints;
@@ -150,7 +150,7 @@ pub fn on_board(compiled: &Compilation, selector: u32) -> Option<OnBoard> {
     Some(OnBoard { selector, approach, ticks: path.ticks() as usize, repeats: path.repeats() })
 }
 
-/// Pose of the user's zero: the bias, and the offset of the work frame.
+/// Pose of the user's zero: the bias plus the offset of the work frame.
 fn bias(task: &TaskSpace) -> [f64; 6] {
     let mut bias = task.setpoint.bias;
     for (value, offset) in bias.iter_mut().zip(&task.frames.work[..3]) {
@@ -159,8 +159,8 @@ fn bias(task: &TaskSpace) -> [f64; 6] {
     bias
 }
 
-/// A leg with the displacement (µm), the voltages (V, from the lowest), the lag (s) and the noise of the spec; what a spec does
-/// not say is as in `leg`: the shape of the hysteresis, the creep.
+/// A leg with the displacement (µm), the voltages (V, from the lowest), the lag (s) and the noise of the spec; everything else,
+/// such as the shape of the hysteresis and the creep, is that of `leg`.
 #[must_use]
 pub fn leg(model: &Model, leg: &LegParameters) -> LegParameters {
     let [low, high] = model.actuator.voltage;
@@ -209,7 +209,7 @@ fn nominal(model: &Model, task: &TaskSpace) -> PlatformParameters {
         extensible_center_m: leg.extensible_center,
         axial_stiffness_n_per_m: model.actuator.axial_stiffness,
         modal_damping: task.modal_damping,
-        // The amplifier is as fast as the spec says, no faster.
+        // The current limit gives the slew rate of the spec.
         amplifier_current_a: model.actuator.slew_rate * reference.stack_capacitance_f,
         lowest_voltage_v: model.actuator.voltage[0],
         rest_voltage_v: model.rest_voltage(),

@@ -1,4 +1,4 @@
-//! The paper beside us: what it prints, why ours differs, and its two studies that follow no trajectory: the stability
+//! Comparison with the paper: its printed values, reasons for differences, and its two studies without a trajectory: the stability
 //! region of Fig. 29 and the genetic algorithm of Table 3.
 
 pub mod convergence;

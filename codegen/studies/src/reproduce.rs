@@ -1,4 +1,4 @@
-//! The paper's whole list of experiments, ours beside the paper's.
+//! The paper's experiments, with our results beside the printed ones.
 //!
 //! ```text
 //! embedded (specs in the binary) → compile → emitted controllers → legs, platform (tables) ─→ table → write (md, csv, json)

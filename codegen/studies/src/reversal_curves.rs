@@ -1,4 +1,4 @@
-//! The experiment that records reversal curves, on a simulated leg that is not of the controller's model class; or its drive alone,
+//! Records reversal curves of a simulated leg outside the controller's model class, or only computes the drive signal
 //! for a generator.
 
 use std::fmt::Write as _;
@@ -13,24 +13,24 @@ use specgen_language::outcome::Failure;
 
 use crate::machine;
 
-/// Curves where nothing else is said.
+/// Default number of curves.
 const CURVES: u32 = 32;
-/// Time in which the drive crosses its range, s.
+/// Time for the drive to cross its range, s.
 const CROSSING: f64 = 5.0;
-/// Samples of a drive for a generator are at most so many.
+/// Largest number of samples of a drive for a generator.
 const MOST_SAMPLES: f64 = 1e7;
 
-/// How a leg is recorded.
+/// Options of a recording.
 pub struct Experiment {
-    /// Reversal curves, and cells per axis.
+    /// Number of reversal curves and of cells per axis.
     pub grid: Option<u32>,
     /// Slope of the drive, V/s.
     pub rate: Option<f64>,
-    /// Of the noise.
+    /// Seed of the noise.
     pub seed: u64,
-    /// Without noise of the gauge.
+    /// No gauge noise.
     pub no_noise: bool,
-    /// What a spec does not say of a leg: the shape of its hysteresis, its creep.
+    /// Properties of a leg that a spec does not specify: shape of the hysteresis, creep.
     pub shape: LegParameters,
 }
 
@@ -41,7 +41,7 @@ impl Default for Experiment {
 }
 
 impl Experiment {
-    /// Records a leg of a spec, whose records need not be there, or the reference leg.
+    /// Records a leg of a spec, whose own records may be missing, or the reference leg.
     ///
     /// # Errors
     /// The spec is refused.
@@ -52,7 +52,7 @@ impl Experiment {
         }
     }
 
-    /// Records `leg`, whose lowest voltage is `lowest`, V.
+    /// Records `leg`; `lowest` is its lowest voltage, V.
     fn run(&self, leg: &LegParameters, curves: u32, lowest: f64) -> ReversalRecord {
         let noise = if self.no_noise { NoiseParameters::NONE } else { leg.noise };
         let reference = ReversalExperiment::reference(self.grid.unwrap_or(curves));
@@ -63,7 +63,7 @@ impl Experiment {
         record
     }
 
-    /// The drive of the experiment for a generator, as CSV: of a spec, or from 0 to 100 V, unless a `range` is given, V.
+    /// The drive signal as CSV, for a generator: over `range` (V) if given, else over the range of the spec, else from 0 to 100 V.
     ///
     /// # Errors
     /// The spec is refused, or the drive has too many samples.
@@ -80,7 +80,7 @@ impl Experiment {
         if rows > MOST_SAMPLES {
             let most = sampling * MOST_SAMPLES / rows;
             return Err(Failure::Usage(format!(
-                "the drive goes on for {:.0} s, {rows:.1e} samples at {} Hz: give --sampling {:.0}, or a higher --rate",
+                "the drive takes {:.0} s, {rows:.1e} samples at {} Hz: use --sampling {:.0} or a higher --rate",
                 experiment.duration(),
                 sampling,
                 most.floor()
@@ -96,7 +96,7 @@ impl Experiment {
     }
 }
 
-/// A record of a leg as `model` describes it.
+/// A record of a leg of `model`.
 pub fn simulate(model: &Model, experiment: &Experiment) -> ReversalRecord {
     let leg = machine::leg(model, &experiment.shape);
     // At most `MAX_GRID`.

@@ -1,10 +1,10 @@
-//! What the closed loop does on machines that are not their data sheet: corners and random draws of declared uncertainties.
+//! Closed-loop behaviour on machines that deviate from nominal: corners and random machines within declared uncertainties.
 //!
 //! ```text
-//! factors (spec, options, defaults) → plan: nominal, corners, draws with a seed each → run (emitted controller) → quantiles → gate
+//! factors (spec, options, defaults) → plan: nominal, corners, random machines with a seed each → run (emitted controller) → quantiles → gate
 //!                                   └ shards, each run anywhere, merged ┘
 //! ```
-//! Each member of a plan is a machine of its own, prepared from the start, under the spec's own settings.
+//! Each member of a plan is a separate machine, prepared from scratch, with the spec's own settings.
 
 pub mod deviation;
 pub mod gate;

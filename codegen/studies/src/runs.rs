@@ -1,4 +1,4 @@
-//! Runs of a spec's own controller: which laws and trajectories it has, and the errors of a trajectory on board.
+//! Runs of a spec's own controller: its laws and trajectories, and the errors of a trajectory played on board.
 
 use std::fmt::Write as _;
 
@@ -13,10 +13,10 @@ use specgen_language::model::{Adaptation, TaskSpace};
 use specgen_language::outcome::Failure;
 use specgen_language::spec::nearest;
 
-/// Bits of the status that say that a leg was limited.
+/// Status bits for a limited leg.
 pub const LEG_LIMITED: u32 = 0x3f;
 
-/// Refuses `samples` ticks a period at `hertz` if a law of the spec is unstable at that interval: the check of the spec is for
+/// Refuses `samples` ticks per period at `hertz` if a law of the spec is unstable at that interval, since the spec was only checked at
 /// its own period.
 ///
 /// # Errors
@@ -28,7 +28,7 @@ pub fn judge(compiled: &Compilation, hertz: f64, samples: u32) -> Result<(), Fai
     let Err(findings) = stability::check(&model) else { return Ok(()) };
     let why = findings.first().map_or("", |finding| finding.message.as_str());
     Err(Failure::Gate(format!(
-        "--samples {samples} at {hertz} Hz is an interval of {:.1} µs, not the {:.1} µs of timing.period: there {why}. Take \
+        "--samples {samples} at {hertz} Hz gives an interval of {:.1} µs instead of the {:.1} µs of timing.period, for which {why}. Use \
          --samples {:.0}, which is timing.period",
         model.timing.period * 1e6,
         period * 1e6,
@@ -36,7 +36,7 @@ pub fn judge(compiled: &Compilation, hertz: f64, samples: u32) -> Result<(), Fai
     )))
 }
 
-/// The laws that the spec gives weights for: with a weight of zero a law adapts nothing, and its row would say nothing.
+/// The laws with weights in the spec: with a weight of zero a law adapts nothing, and its row would be meaningless.
 pub fn modes(adaptation: &Adaptation) -> Vec<(&'static str, u32)> {
     let given = |mode: &str| match mode {
         "ewma" => adaptation.level_weight > 0.0,
@@ -49,7 +49,7 @@ pub fn modes(adaptation: &Adaptation) -> Vec<(&'static str, u32)> {
 /// Number of a trajectory of the spec.
 ///
 /// # Errors
-/// There is none of that name.
+/// There is no trajectory with that name.
 pub fn selector(task: &TaskSpace, name: &str) -> Result<u32, Failure> {
     let names: Vec<&str> = task.trajectories.iter().map(|trajectory| trajectory.name.as_str()).collect();
     let place = names.iter().position(|known| *known == name);
@@ -57,27 +57,27 @@ pub fn selector(task: &TaskSpace, name: &str) -> Result<u32, Failure> {
         let meant =
             nearest(name, names.iter().copied()).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
         Failure::Usage(if names.is_empty() {
-            format!("the spec has no trajectory, so no `{name}`: add a [[trajectory]], or leave --trajectory out")
+            format!("the spec has no trajectories, hence no `{name}`: add a [[trajectory]] or omit --trajectory")
         } else {
-            format!("the spec has {}, but not `{name}`{meant}", names.join(", "))
+            format!("the spec has no trajectory `{name}`, only {}{meant}", names.join(", "))
         })
     })
 }
 
-/// A trajectory on board: the true pose against the controller's target, axis by axis.
+/// Errors of a trajectory played on board: true pose against the controller's target, per axis.
 #[derive(Debug, Serialize)]
-pub struct Played {
+pub struct TrajectoryErrors {
     trajectory: String,
     #[serde(flatten)]
     coverage: Coverage,
-    /// Root mean square error of x, y, z (nm) and of the angles (nrad).
+    /// Rms error of x, y, z (nm) and of the angles (nrad).
     rms_nano: [f64; 6],
     peak_nano: [f64; 6],
-    /// Norm of the root mean squares of x, y and z, nm.
+    /// Norm of the rms errors of x, y and z, nm.
     translation_nm: f64,
 }
 
-impl Played {
+impl TrajectoryErrors {
     /// Errors of a run.
     pub fn of(trajectory: &str, errors: &PoseErrors) -> Self {
         Self {
@@ -89,10 +89,10 @@ impl Played {
         }
     }
 
-    /// Whole lines.
+    /// Complete lines.
     pub fn text(&self) -> String {
         let Self { trajectory, coverage, rms_nano, peak_nano, translation_nm } = self;
-        let mut out = format!("{trajectory}, on board, {coverage}: true pose against the controller's target\n");
+        let mut out = format!("{trajectory}, on board, {coverage}: true pose minus controller target\n");
         for (axis, name) in AXES.iter().enumerate() {
             let unit = if axis < 3 { "nm" } else { "nrad" };
             // Writing to a String cannot fail, here and below.

@@ -1,4 +1,4 @@
-//! What is followed, by the name that a user gives.
+//! Trajectories by the names that a user gives.
 
 use host_sim::trajectory::{PaperPath, Step};
 
@@ -9,39 +9,39 @@ use specgen_language::model::TrajectoryKind;
 use specgen_language::outcome::Failure;
 use specgen_language::shell;
 
-/// Operating frequency unless asked otherwise, Hz.
+/// Default operating frequency, Hz.
 const FREQUENCY: f64 = 10.0;
 /// Length of the multisine, s.
 const SECONDS: f64 = 1.0;
 
-/// A trajectory with what it is called.
-pub struct Followed {
-    /// As its user named it.
+/// A trajectory and its name.
+pub struct NamedTrajectory {
+    /// Name given by the user.
     pub name: String,
     /// Hz.
     pub frequency: f64,
-    /// For a case.
+    /// What to run.
     pub choice: TrajectoryChoice,
 }
 
-/// What `--trajectory` and `--frequency` mean for this spec.
+/// The trajectory selected by `--trajectory` and `--frequency`.
 ///
-/// The spec's own paths are known by their names, with their own frequency unless one is asked for. The paper's names mean
-/// the paper's paths at the usual frequency, unless the spec gives another path that name.
+/// A name refers to the spec's own path if it has one, at that path's own frequency by default. Otherwise the paper's names refer to
+/// the paper's paths at the default frequency.
 ///
 /// # Errors
-/// There is none of that name.
+/// There is no trajectory with that name.
 pub fn chosen(
     trajectory: Option<&str>,
     frequency: Option<f64>,
     seed: u64,
     compiled: &Compilation,
-) -> Result<Followed, Failure> {
+) -> Result<NamedTrajectory, Failure> {
     let platform = compiled.model.task_space.as_ref();
     let asked = frequency;
     let frequency = asked.unwrap_or(FREQUENCY);
     let name = trajectory.unwrap_or(if platform.is_some() { "case-1" } else { "leg" });
-    let followed = |frequency, choice| Ok(Followed { name: name.to_owned(), frequency, choice });
+    let followed = |frequency, choice| Ok(NamedTrajectory { name: name.to_owned(), frequency, choice });
     let paper = |path, frequency| followed(frequency, TrajectoryChoice::Paper { path, frequency });
     let own = platform.and_then(|task| task.trajectories.iter().find(|one| one.name == name));
     if let (Some(own), Some(_)) = (own, trajectory) {
@@ -54,8 +54,8 @@ pub fn chosen(
                 followed(1.0 / time, TrajectoryChoice::Step(Step { to, time }))
             }
             _ => Err(Failure::Usage(format!(
-                "the spec's trajectory `{name}` is a waveform or as printed, which this command does not follow; name \
-                 another, or play it once by `{}`",
+                "the spec's trajectory `{name}` is a waveform or an uncorrected printed path, which this command does not support; choose \
+                 another, or play it once with `{}`",
                 shell::line("specgen sim SPEC --trajectory").word(name)
             ))),
         };
@@ -78,7 +78,7 @@ pub fn chosen(
             }
             let add = if platform.is_some() { ", or add a [[trajectory]] to the spec" } else { "" };
             Err(Failure::Usage(format!(
-                "there is no trajectory `{name}` for this spec; name one of {}{add}",
+                "this spec has no trajectory `{name}`; choose one of {}{add}",
                 known.join(", ")
             )))
         }

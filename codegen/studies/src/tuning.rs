@@ -1,12 +1,12 @@
-//! Gains and weights from the simulated loop with the emitted controller.
+//! Tunes gains and weights by simulating the loop with the emitted controller.
 //!
 //! ```text
 //! spec → space (what may change) → relay test → start ─┐
 //!                genetic | cma: ask ─→ feasible (margins) ─→ evaluate (simulation) ─→ tell
 //!                                      └ archive: history, best, front ─→ write (spec)
 //! ```
-//! Settings are words of the controller's `Config`: nothing is built per candidate. What breaks a margin is rejected
-//! before it is simulated, what meets a limit of voltage or stroke while it is; neither is scored.
+//! Settings are words of the controller's `Config`: nothing is built per candidate. A candidate that violates a margin is rejected
+//! before simulation; one that reaches a limit of voltage or stroke is rejected during simulation. Neither is scored.
 
 pub mod cma;
 pub mod evaluate;

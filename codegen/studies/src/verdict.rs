@@ -1,4 +1,4 @@
-//! Whether a platform is ready, and the figures that decide: what `specgen check`, the main job and the report say first.
+//! Whether a platform is ready, and the figures that decide: the first lines of `specgen check`, the main command and the report.
 
 mod figure;
 mod known;
@@ -14,51 +14,50 @@ use crate::verify::{Inspection, Measurement};
 
 pub use figure::{Figure, Limit, Mark, Subject};
 
-/// Longest line of [`Verdict::text`], letters.
+/// Longest line of [`Verdict::text`], in characters.
 pub const WIDTH: usize = 80;
-/// Names of the coordinates of a pose; figures of neighbours stand in one group of a line.
+/// Names of pose coordinates; neighbouring figures share a group in a line.
 const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
-/// Beyond this no gain ratio and no delay (ticks) is looked for.
+/// Largest gain ratio and largest delay (ticks) searched.
 const LOOKED_AT: [f64; 2] = [10.0, 5.0];
-/// Name of the figure that stands for limits on errors which no run was held against.
+/// Name of the figure for error limits that no run was compared with.
 const NOT_SIMULATED: &str = "not simulated";
 
-/// The answer to whether this platform may be run.
+/// Whether this platform may be run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Answer {
-    /// Every figure that has a limit keeps it.
+    /// Every figure is within its limit.
     Ready,
-    /// So far yes: time, memory or bits are not measured, or limits on errors not simulated.
+    /// Yes so far: time, memory or bits are not measured, or errors with limits not simulated.
     NotMeasured,
-    /// A figure is beyond its limit.
+    /// A figure exceeds its limit.
     NotReady,
 }
 
 /// Whether a platform is ready, and the figures that decide.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Of the platform.
+    /// Name of the platform.
     pub name: String,
-    /// Of spec and records, SHA-256.
+    /// SHA-256 of spec and records.
     pub digest: String,
-    /// Whether it is ready.
+    /// The answer.
     pub answer: Answer,
-    /// Warnings about the spec.
+    /// Number of warnings about the spec.
     pub warnings: usize,
-    /// What the figures rest on that nobody measured. It changes no answer, but a real machine takes the controller only if its user accepts
-    /// it.
+    /// Unmeasured values that the figures rest on. They do not change the answer, but a real machine accepts the controller only if its user does.
     pub assumed: Assumptions,
-    /// By subject, in the order of [`Subject::ALL`].
+    /// In the order of [`Subject::ALL`].
     pub figures: Vec<Figure>,
-    /// Why time, memory or bits are not measured, if they are not.
+    /// Why time, memory or bits are not measured, if so.
     pub unmeasured: Option<String>,
-    /// Commands that come next.
+    /// Suggested next commands.
     pub next: Vec<String>,
 }
 
 impl Verdict {
-    /// What is known of a spec that compiled, before it is built. `unmeasured`: why it is not.
+    /// The verdict on a compiled spec before it is built. `unmeasured`: why it is not.
     #[must_use]
     pub fn of(compiled: &Compilation, unmeasured: &str) -> Self {
         let warnings = compiled.findings.iter().filter(|finding| finding.severity == Severity::Warning).count();
@@ -76,7 +75,7 @@ impl Verdict {
         verdict
     }
 
-    /// Adds a figure, and answers with it. An error that was simulated takes the place of those that were not.
+    /// Adds a figure and updates the answer. A simulated error replaces the entry for unsimulated ones.
     pub fn push(&mut self, figure: Figure) {
         if figure.subject == Subject::Tracking {
             self.figures.retain(|one| one.name != NOT_SIMULATED);
@@ -87,7 +86,7 @@ impl Verdict {
         self.judge();
     }
 
-    /// Adds what a run on the emulated machine showed.
+    /// Adds the results of a run on the emulated machine.
     pub fn measured(&mut self, compiled: &Compilation, measurement: &Measurement) {
         self.unmeasured = None;
         self.image(compiled, &measurement.used, measurement.checks.faults.iter().map(|fault| &fault.text));
@@ -106,7 +105,7 @@ impl Verdict {
         self.push(Figure::fact(Subject::Bits, "host and microcontroller", words, good));
     }
 
-    /// Adds what an image shows that was not run, for the reason that [`Verdict::unmeasured`] gives.
+    /// Adds the results of inspecting an image that was not run, for the reason in [`Verdict::unmeasured`].
     pub fn inspected(&mut self, compiled: &Compilation, inspection: &Inspection) {
         self.image(compiled, &inspection.used, inspection.checks.faults.iter().map(|fault| &fault.text));
     }
@@ -122,7 +121,7 @@ impl Verdict {
             });
         }
         if used.stack.is_none() {
-            let words = "the stack of a tick has no bound".to_owned();
+            let words = "the tick's stack is unbounded".to_owned();
             self.push(Figure::fact(Subject::Memory, "stack", words, compiled.model.target.budget.stack.is_none()));
         }
         for fault in faults {
@@ -140,7 +139,7 @@ impl Verdict {
         };
     }
 
-    /// The figures that are why it is not ready.
+    /// The figures that exceed their limits.
     pub fn beyond(&self) -> impl Iterator<Item = &Figure> {
         self.figures.iter().filter(|figure| figure.mark == Mark::Beyond)
     }
@@ -175,27 +174,27 @@ impl Verdict {
         }
     }
 
-    /// What the figures of a subject are, in one line; none if there are none.
+    /// The figures of a subject, in one line; `None` if there are none.
     #[must_use]
     pub fn line(&self, subject: Subject) -> Option<String> {
         let figures: Vec<&Figure> = self.figures.iter().filter(|figure| figure.subject == subject).collect();
         let groups: Vec<&[&Figure]> = figures.chunk_by(together).collect();
-        // Neighbours of one unit say it once, and so over what they were measured.
+        // Neighbours with the same unit and measured part show these once.
         let alike = |a: &Figure, b: &Figure| a.unit == b.unit && a.coverage == b.coverage;
         let runs = groups.chunk_by(|a, b| alike(a[0], b[0]) && a[0].words.is_none() && b[0].words.is_none());
-        let said: Vec<String> = runs
+        let parts: Vec<String> = runs
             .map(|run| {
-                let text = run.iter().map(|group| said(group)).collect::<Vec<_>>().join(", ");
+                let text = run.iter().map(|group| group_text(group)).collect::<Vec<_>>().join(", ");
                 let unit = if run[0][0].unit == "bytes" { "KiB" } else { run[0][0].unit };
                 let text = if unit.is_empty() || text.contains(unit) { text } else { format!("{text} {unit}") };
                 run[0][0].coverage.map_or(text.clone(), |coverage| format!("{text} over {}", coverage.brief()))
             })
             .collect();
-        (!said.is_empty()).then(|| said.join(", "))
+        (!parts.is_empty()).then(|| parts.join(", "))
     }
 
-    /// At most ten lines of at most [`WIDTH`] letters, eleven with limits on errors: the answer, a line a subject, what is assumed, what
-    /// comes next.
+    /// At most ten lines of at most [`WIDTH`] characters, eleven with limits on errors: the answer, one line per subject, assumptions, and
+    /// next commands.
     #[must_use]
     pub fn text(&self) -> String {
         let mut lines = vec![self.headline()];
@@ -205,7 +204,7 @@ impl Verdict {
             lines.push(format!("  {:<9}{}", "assumed", self.assumed.summary().replace(" assumed value", " value")));
         }
         if let Some(why) = &self.unmeasured {
-            lines.push(format!("  {:<9}{why}", "left out"));
+            lines.push(format!("  {:<9}{why}", "skipped"));
         }
         let mut next = String::new();
         for command in &self.next {
@@ -225,26 +224,26 @@ fn is_axis(figure: &Figure) -> bool {
     AXES.contains(&figure.name.as_str())
 }
 
-/// Whether neighbours are coordinates that are written as one group.
+/// Whether neighbours are coordinates to be written as one group.
 fn together(a: &&Figure, b: &&Figure) -> bool {
     let both = is_axis(a) && is_axis(b) && a.subject == b.subject;
     both && a.unit == b.unit && a.relation() == b.relation() && a.words == b.words
 }
 
-/// A figure beyond its limit, or coordinates that are, as the reason of an answer: `flash 68.4 > 64`, `noise x/y 6.1/5.4 > 5/5 nm`.
+/// Exceeded limits as a reason: `flash 68.4 > 64`, `noise x/y 6.1/5.4 > 5/5 nm`.
 fn why(group: &[&Figure]) -> String {
     let first = group[0];
     if first.words.is_some() {
         return first.subject.name().to_owned();
     }
     if !is_axis(first) {
-        return said(group);
+        return group_text(group);
     }
     let names: Vec<&str> = group.iter().map(|figure| figure.name.as_str()).collect();
-    format!("{} {} {} {}", first.subject.name(), names.join("/"), said(group), first.unit)
+    format!("{} {} {} {}", first.subject.name(), names.join("/"), group_text(group), first.unit)
 }
 
-/// A line that is too long, with dots where it is cut, which is between two figures: all of it is in the details.
+/// Shortens a line that is too long, between two figures; the details contain all of it.
 fn cut(line: &str) -> String {
     const MORE: &str = ", …";
     if line.chars().count() <= WIDTH {
@@ -256,8 +255,8 @@ fn cut(line: &str) -> String {
     whole.map_or_else(letters, |part| format!("{part}{MORE}"))
 }
 
-/// One figure, or neighbours that are coordinates: `54.9/52.4/73.7 ≥ 50/50/52 µm`.
-fn said(group: &[&Figure]) -> String {
+/// One figure, or neighbouring coordinates: `54.9/52.4/73.7 ≥ 50/50/52 µm`.
+fn group_text(group: &[&Figure]) -> String {
     let first = group[0];
     if let Some(words) = &first.words {
         return words.clone();
@@ -314,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn one_figure_beyond_its_limit_is_enough() {
+    fn one_exceeded_limit_is_enough() {
         let mut verdict = empty();
         verdict.push(Figure::new(Subject::Memory, "flash", 70_000.0, "bytes").at_most(65_536.0, "spec"));
         verdict.push(Figure::new(Subject::Memory, "RAM", 70.0, "bytes").at_most(70.0, "spec"));
@@ -331,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_measured_is_counted_in_the_headline_and_a_line() {
+    fn assumptions_are_counted_in_the_headline_and_listed() {
         let mut verdict = empty();
         verdict.next.clear();
         verdict.unmeasured = None;
@@ -358,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn no_line_is_longer_than_a_terminal_is_wide() {
+    fn no_line_is_wider_than_a_terminal() {
         let mut verdict = empty();
         verdict.push(Figure::fact(Subject::Bits, "bits", "they DIFFER ".repeat(20), false));
         verdict.unmeasured = Some("µ".repeat(100));

@@ -1,5 +1,5 @@
 //! Exercises a built controller: the same input record on the host and on the emulated microcontroller, compared bit for
-//! bit, with what a tick costs there.
+//! bit, with the cost of a tick.
 
 mod legs;
 mod platform;
@@ -26,16 +26,16 @@ use specgen_toolchain::{self as target, Image, TargetError, image, size, stack};
 pub const TICKS: u32 = 20_000;
 /// Seed of the noise in the exercise.
 const SEED: u64 = 1;
-/// The stage that is the whole tick.
+/// The stage of the whole tick.
 const WHOLE: &str = "step";
-/// Longest time the emulator may take, s.
+/// Time limit of the emulator.
 const LIMIT: Duration = Duration::from_secs(600);
 
-/// A controller, reset and configured as it is, at work: six legs on what their own gauges say, a platform in closed loop
+/// Exercises a controller with its current state and configuration: six legs on readings of their own gauges, a platform in closed loop
 /// with a simulated machine.
 ///
 /// # Errors
-/// It lacks a word, or a voltage is not finite.
+/// The controller lacks a word, or a voltage is not finite.
 pub fn exercise(controller: &mut dyn TickController, model: &Model, ir: &Ir, ticks: u32) -> Result<Trace, RunError> {
     match &model.task_space {
         Some(task) => platform::exercise(controller, model, task, ticks),
@@ -43,17 +43,17 @@ pub fn exercise(controller: &mut dyn TickController, model: &Model, ir: &Ir, tic
     }
 }
 
-/// The controller in a library of this host, exercised, and what it did.
+/// Loads the controller from a library of this host and exercises it; returns the trace as well.
 ///
 /// # Errors
-/// It cannot be loaded, or as [`exercise`].
+/// The library cannot be loaded, or as [`exercise`].
 pub fn exercised(library: &Path, compiled: &Compilation) -> Result<(Controller, Trace), Failure> {
     let mut controller = Controller::load(library).map_err(environment)?;
     let trace = exercise(&mut controller, &compiled.model, &compiled.ir, TICKS).map_err(environment)?;
     Ok((controller, trace))
 }
 
-/// What the image costs and whether it computes the same bits.
+/// Cost of the image, and whether it computes the same bits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Measurement {
     /// Emulated machine.
@@ -66,15 +66,15 @@ pub struct Measurement {
     pub code: u64,
     /// Of these, constants (tables).
     pub constants: u64,
-    /// Bytes of RAM taken statically, plus Config and State: all but the stack, which [`ImageUsage::ram`] has, too.
+    /// Bytes of statically allocated RAM plus Config and State: everything but the stack, which [`ImageUsage::ram`] includes.
     pub ram_without_stack: u64,
     /// Bytes of State.
     pub state: u64,
     /// Bytes of code that a tick can reach.
     pub tick_code: u64,
-    /// Static bound of a tick's stack, bytes; none if the call graph cannot be bounded.
+    /// Static bound of a tick's stack, bytes; `None` if it cannot be bounded.
     pub stack_bound: Option<u64>,
-    /// Stack that ticks were seen to use, bytes.
+    /// Measured stack use of ticks, bytes.
     pub stack_painted: u64,
     /// Panic or allocator symbols in the image.
     pub forbidden_symbols: Vec<String>,
@@ -82,20 +82,20 @@ pub struct Measurement {
     pub stages: Vec<Stage>,
     /// Ticks compared with the host.
     pub ticks: u64,
-    /// First word that differs from the host's, in words.
+    /// First word that differs from the host's, as text.
     pub first_difference: Option<String>,
-    /// What the tick must not do, looked for in the image.
+    /// Results of the tick checks.
     pub checks: TickChecks,
-    /// What a budget is held against.
+    /// Figures for the budget.
     pub used: ImageUsage,
-    /// How long a tick takes on the spec's board, if it has one; see [`time_board`].
+    /// Time of a tick on the spec's board, if it has one; see [`time_board`].
     pub time: Option<Estimate>,
 }
 
-/// What an image shows without being run.
+/// Static figures of an image.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
-    /// Emulated machine that it is for.
+    /// Emulated machine of the image.
     pub machine: String,
     /// `rustc --version` of the cross compiler.
     pub compiler: String,
@@ -105,17 +105,17 @@ pub struct Inspection {
     pub code: u64,
     /// Of these, constants (tables).
     pub constants: u64,
-    /// Bytes of RAM taken statically. Config and State are not in it: their size is only known in a run.
+    /// Bytes of statically allocated RAM, without Config and State, whose sizes are known only at run time.
     pub ram_static: u64,
     /// Bytes of code that a tick can reach.
     pub tick_code: u64,
-    /// Static bound of a tick's stack, bytes; none if the call graph cannot be bounded.
+    /// Static bound of a tick's stack, bytes; `None` if it cannot be bounded.
     pub stack_bound: Option<u64>,
     /// Panic or allocator symbols in the image.
     pub forbidden_symbols: Vec<String>,
-    /// What the tick must not do, looked for in the image.
+    /// Results of the tick checks.
     pub checks: TickChecks,
-    /// What a budget is held against.
+    /// Figures for the budget.
     pub used: ImageUsage,
 }
 
@@ -142,10 +142,10 @@ impl Measurement {
     }
 }
 
-/// Looks at an image without running it.
+/// Inspects an image without running it.
 ///
 /// # Errors
-/// The image is not one of specgen's.
+/// The image was not built by specgen.
 pub fn inspect(image: &Image) -> Result<Inspection, TargetError> {
     let footprint = image::footprint(&image.elf)?;
     let bound = stack::bound(&image.elf, stack::STEP_SYMBOL)?;
@@ -166,10 +166,10 @@ pub fn inspect(image: &Image) -> Result<Inspection, TargetError> {
     })
 }
 
-/// Replays `host`'s inputs under the configuration `config` on the emulated machine and measures it.
+/// Replays `host`'s inputs with the configuration `config` on the emulated machine and measures it.
 ///
 /// # Errors
-/// The emulator is missing or fails, or the image is not one of specgen's.
+/// The emulator is missing or fails, or the image was not built by specgen.
 pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measurement, TargetError> {
     let seen = inspect(image)?;
     let mut checks = seen.checks;
@@ -204,16 +204,16 @@ pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measuremen
     })
 }
 
-/// Ticks that are traced, from rest on.
+/// Number of traced ticks, starting from rest.
 const TRACED: usize = 96;
-/// Folder of the image that is traced.
+/// Folder of the traced image.
 const TICK: &str = "tick";
 
-/// Estimates how long a tick takes on a board, from what the workspace in `folder` builds into `cache`: its image, unless `elf`
-/// is that, and that of a tick on the emulated core. `host` is the exercise that was measured. Nothing for a spec without a board.
+/// Estimates the time of a tick on a board. Builds the workspace in `folder` into `cache`: the board's image, unless given as
+/// `elf`, and that of a tick on the emulated core. `host` is the measured exercise. `None` for a spec without a board.
 ///
 /// # Errors
-/// The images do not build, or the emulator fails.
+/// The images cannot be built, or the emulator fails.
 pub fn time_board(
     model: &Model,
     mcu: Mcu,
@@ -245,7 +245,7 @@ pub fn time_board(
     Ok(())
 }
 
-/// What the replay image uses, and who of it. Without a run neither Config and State are known, nor with them the RAM, nor instructions.
+/// Resource use of the replay image by owner. Without a run Config and State, hence RAM, and instructions are unknown.
 fn used(
     image: &Image,
     stats: Option<&target::replay::ReplayStats>,
@@ -256,12 +256,8 @@ fn used(
     let words = stats.map_or(Vec::new(), |stats| {
         vec![("State".to_owned(), stats.state_bytes), ("Config".to_owned(), stats.config_bytes)]
     });
-    let ram_by: Vec<(String, u64)> = words
-        .iter()
-        .cloned()
-        .chain([("stack of a tick".to_owned(), stack)])
-        .chain(size.variables.iter().cloned())
-        .collect();
+    let ram_by: Vec<(String, u64)> =
+        words.iter().cloned().chain([("tick stack".to_owned(), stack)]).chain(size.variables.iter().cloned()).collect();
     let ram_least = size.ram() + words.iter().map(|(_, bytes)| bytes).sum::<u64>() + stack;
     Ok(ImageUsage {
         flash: size.flash(),
@@ -276,22 +272,22 @@ fn used(
     })
 }
 
-/// Instructions of the stages over a whole tick: those of a leg count six times. Stages are measured on some ticks only, one
-/// that happens once a tick as often as any.
+/// Instructions of the stages per tick: those of a leg count six times. Each stage is measured only on some ticks, but
+/// stages that run once per tick equally often.
 fn per_tick(stats: &target::replay::ReplayStats) -> Vec<(String, u64)> {
     let stages = || stats.stages.iter().filter(|stage| stage.name != WHOLE && stage.calls > 0);
     let ticks = stages().map(|stage| stage.calls).min().unwrap_or(1);
     stages().map(|stage| (stage.name.clone(), (stage.sum as f64 / ticks as f64).round() as u64)).collect()
 }
 
-/// The record's inputs, a row for each tick.
+/// The inputs of the record, one row per tick.
 #[must_use]
 pub fn inputs(host: &Trace) -> Vec<Vec<u64>> {
     let per_row = host.description().input_names.len();
     host.rows().map(|row| row[..per_row].to_vec()).collect()
 }
 
-/// The record's inputs on the emulated machine: its trace, and what was measured.
+/// Replays the inputs of the record on the emulated machine; returns its trace and measurements.
 ///
 /// # Errors
 /// As [`target::replay()`].

@@ -199,7 +199,7 @@ fn a_response_is_refused_for_anything_else() {
     assert_eq!(back, response);
     assert_eq!(back.is_for("digest", "machine"), Ok(()));
     for (digest, machine) in [("other", "machine"), ("digest", "other")] {
-        assert!(back.is_for(digest, machine).unwrap_err().to_string().contains("measure it anew by --excite"));
+        assert!(back.is_for(digest, machine).unwrap_err().to_string().contains("measure it again with --excite"));
     }
     let cut = text.lines().take(4).collect::<Vec<_>>().join("\n");
     for wrong in ["", "{}", &cut, &text.replace("response 1", "response 9")] {

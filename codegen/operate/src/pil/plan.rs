@@ -253,7 +253,7 @@ impl Plan {
                 draw(Run::Platform { title: name, interval: scenario.options.interval, run: &run });
                 match run.scored() {
                     Ok(errors) => {
-                        let played = runs::Played::of(name, errors);
+                        let played = runs::TrajectoryErrors::of(name, errors);
                         report.errors = played.text();
                         report.on_board = Some(played);
                     }

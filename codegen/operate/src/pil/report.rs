@@ -12,7 +12,7 @@ use serde_json::Value;
 use specgen_compiler::compile::Compilation;
 use specgen_language::outcome::Outcome;
 use specgen_language::table::{left, right, row};
-use specgen_studies::runs::Played;
+use specgen_studies::runs::TrajectoryErrors;
 
 use super::difference::Difference;
 use super::lockstep::Cost;
@@ -53,7 +53,7 @@ pub struct Report {
     /// Platform, against a work part.
     pub machining: Value,
     /// Platform, a trajectory on board.
-    pub on_board: Option<Played>,
+    pub on_board: Option<TrajectoryErrors>,
     /// Runs that did not come to the end of their path.
     pub ended_early: Vec<String>,
     /// Errors in words.

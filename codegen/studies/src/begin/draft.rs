@@ -1,4 +1,4 @@
-//! The text of a new spec: a template in which values stand for keys, each with where it comes from.
+//! The text of a new spec: a template and values by key, each with its origin.
 
 use std::collections::BTreeMap;
 
@@ -9,33 +9,33 @@ const HEAD: &str = "\
 # `assumed` names them. Take an entry out once its value is measured or decided: `specgen check` counts the rest, and a real
 # board takes the controller with --assumed-ok only while any remain. docs/spec-reference.md has every key.
 ";
-/// Widest line of the list of assumed values, letters.
+/// Widest line of the list of assumed values, in characters.
 const WIDTH: usize = 110;
-/// Its file says of itself that it is simulated.
+/// The file itself says that it is simulated.
 const RECORDS: &str = "hysteresis.records";
 
-/// Where a value comes from.
+/// Origin of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     Given,
     Computed,
 }
 
-/// A spec that is being written: TOML literals by key path, such as `geometry.height` or `gauge[2].point`.
+/// A spec being written: TOML literals by key path, such as `geometry.height` or `gauge[2].point`.
 #[derive(Debug, Clone, Default)]
 pub struct Draft {
     values: BTreeMap<String, (String, Origin)>,
-    /// Sections that the spec does not have.
+    /// Sections to omit.
     without: &'static [&'static str],
 }
 
 impl Draft {
-    /// Puts `literal` at `key`.
+    /// Sets `key` to `literal`.
     pub fn set(&mut self, key: &str, literal: String, origin: Origin) {
         self.values.insert(key.to_owned(), (literal, origin));
     }
 
-    /// Puts a computed value where none was given and any of what it is computed `from` is no longer the template's.
+    /// Sets a computed value, unless one was given or all its inputs (`from`) are still the template's.
     pub fn compute(&mut self, key: &str, from: &[&str], literal: String) {
         if !self.is_given(key) && from.iter().any(|input| self.values.contains_key(*input)) {
             self.set(key, literal, Origin::Computed);
@@ -46,7 +46,7 @@ impl Draft {
         matches!(self.values.get(key), Some((_, Origin::Given)))
     }
 
-    /// Leaves sections out, their subsections too.
+    /// Omits sections and their subsections.
     pub fn leave_out(&mut self, sections: &'static [&'static str]) {
         self.without = sections;
     }
@@ -56,14 +56,14 @@ impl Draft {
         self.entries().any(|(found, ..)| found == key)
     }
 
-    /// The TOML literal at `key`; that of the template where nothing else was set.
+    /// The TOML literal at `key`; the template's if nothing else was set.
     pub fn literal(&self, key: &str) -> String {
         let set = self.values.get(key).map(|(literal, _)| literal.clone());
         set.or_else(|| lines().find(|(found, ..)| found == key).map(|(_, _, value, _)| value.to_owned()))
             .unwrap_or_default()
     }
 
-    /// Paths of the values that nobody gave: taken from the template, or computed. The gauges' places are one.
+    /// Paths of the values that the user did not give: template values and computed ones. The gauges' positions count as one.
     pub fn assumed(&self) -> Vec<String> {
         let open = self.entries().map(|(key, ..)| key).filter(|key| key != RECORDS && !self.is_given(key));
         let mut paths: Vec<String> =
@@ -72,7 +72,7 @@ impl Draft {
         paths
     }
 
-    /// The whole file.
+    /// The complete file.
     pub fn text(&self, name: &str) -> String {
         let mut text = format!("{HEAD}schema = 1\nname = \"{name}\"\n{}", list(&self.assumed()));
         let mut header = "";
@@ -103,7 +103,7 @@ impl Draft {
     }
 }
 
-/// Of each line of the template: key path, header of its section, value, comment.
+/// Each line of the template: key path, section header, value, comment.
 fn lines() -> impl Iterator<Item = (String, &'static str, &'static str, &'static str)> {
     let mut header = "";
     let mut gauges = 0;
@@ -120,7 +120,7 @@ fn lines() -> impl Iterator<Item = (String, &'static str, &'static str, &'static
     })
 }
 
-/// The key that names assumed values; nothing where there are none.
+/// The key `assumed`; empty if there are no assumed values.
 fn list(paths: &[String]) -> String {
     if paths.is_empty() {
         return String::new();
@@ -137,7 +137,7 @@ fn list(paths: &[String]) -> String {
     format!("assumed = [\n    {}\n]\n", lines.join("\n    "))
 }
 
-/// A section with its values and comments in columns.
+/// A section with values and comments in aligned columns.
 fn aligned(header: &str, rows: &[[String; 3]]) -> String {
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let (keys, values) = (width(0), width(1));

@@ -1,19 +1,19 @@
-//! What `specgen new` asks or takes as options, and how an answer becomes a TOML literal.
+//! Questions and options of `specgen new`, and their answers as TOML literals.
 
 use specgen_language::spec::keys::{self, Item, Shape};
 use specgen_language::spec::quantity::{self, Dimension};
 
-/// One value that a user can give.
+/// A value that the user can give.
 pub struct Question {
     /// Its option, without the dashes.
     pub option: &'static str,
     /// The paper's symbol and common names, taken as options too.
     pub aliases: &'static [&'static str],
-    /// Where it stands in the spec.
+    /// Its key in the spec.
     pub key: &'static str,
-    /// Whether it is asked for; the rest has a value that fits most platforms.
+    /// Whether the user is prompted for it; other values have a default that fits most platforms.
     pub asked: bool,
-    /// What is asked.
+    /// The question.
     pub text: &'static str,
 }
 
@@ -30,8 +30,8 @@ const fn row(
     Question { option, aliases, key, asked, text }
 }
 
-/// In the order in which they are asked.
-// One question a line: this is a table.
+/// In prompt order.
+// A table: one question per line.
 #[rustfmt::skip]
 pub const QUESTIONS: &[Question] = &[
     row(ASKED, "base-radius", &["r_B"], "geometry.base_radius", "Radius of the circle through the base joints, r_B"),
@@ -45,35 +45,35 @@ pub const QUESTIONS: &[Question] = &[
     row(ASKED, "voltage", &["drive"], "actuator.voltage", "Lowest and highest voltage of a leg"),
     row(ASKED, "stiffness", &["k_a", "axial-stiffness"], "actuator.axial_stiffness", "Axial stiffness of a leg, k_a"),
     row(ASKED, "resonance", &["f_0"], "actuator.resonance", "First axial resonance of a leg as mounted"),
-    row(ASKED, "slew-rate", &["slew"], "actuator.slew_rate", "Fastest change of voltage that amplifier and stack stand"),
+    row(ASKED, "slew-rate", &["slew"], "actuator.slew_rate", "Largest slew rate that amplifier and stack can take"),
     row(ASKED, "gauge-noise", &["sensor-noise"], "sensor.noise", "Noise of a gauge, rms"),
     row(ASKED, "rate", &["period", "T_s"], "timing.period", "Control rate or period"),
-    row(OPTION, "gauge-range", &["sensor-range"], "sensor.range", "Smallest and largest displacement that a gauge can report"),
+    row(OPTION, "gauge-range", &["sensor-range"], "sensor.range", "Lowest and highest displacement that a gauge can report"),
     row(OPTION, "gauge-bits", &["sensor-bits"], "sensor.bits", "Resolution of the gauges' converter, bits"),
     row(OPTION, "dac-bits", &[], "dac.bits", "Resolution of the output converter, bits"),
     row(OPTION, "dac-range", &[], "dac.range", "Volts at the stack at code 0 and at full scale"),
     row(OPTION, "amplifier-lag", &["lag"], "amplifier.lag", "Time constant of the amplifiers"),
     row(OPTION, "amplifier-noise", &[], "amplifier.noise", "Noise of the amplifiers, rms"),
     row(OPTION, "modal-damping", &["zeta"], "control.modal_damping", "Damping ratio of the lowest mode of the platform"),
-    row(OPTION, "translation", &[], "workspace.translation", "Bounds on x, y and z from rest; what the legs reach if not given"),
-    row(OPTION, "rotation", &[], "workspace.rotation", "Bounds on the three angles; what the legs reach if not given"),
+    row(OPTION, "translation", &[], "workspace.translation", "Bounds on x, y and z from rest; default: the reach of the legs"),
+    row(OPTION, "rotation", &[], "workspace.rotation", "Bounds on the three angles; default: the reach of the legs"),
     row(OPTION, "mcu", &[], "target.mcu", "Microcontroller"),
 ];
 
 impl Question {
-    /// What an answer looks like, for help and prompt.
+    /// Example of an answer, for help and prompt.
     pub fn example(&self) -> String {
         let example = keys::key(self.key).map_or("", |key| key.example);
         if self.option == "rate" { "20 kHz or 50 us".to_owned() } else { plain(example) }
     }
 }
 
-/// A TOML literal as a user types it: without quotes and brackets.
+/// A TOML literal without quotes and brackets, as a user types it.
 pub fn plain(literal: &str) -> String {
     literal.replace(['[', ']', '"'], "")
 }
 
-/// The TOML literal of an answer: quoted where the key takes text, a list where it takes one, a rate as its period.
+/// The TOML literal of an answer: quoted, as a list, or as the period of a rate, as the key requires.
 pub fn literal(question: &Question, answer: &str) -> String {
     let Some(key) = keys::key(question.key) else { return quoted(answer) };
     let (item, list) = match key.shape {
@@ -97,7 +97,7 @@ fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace(['\\', '"', '\n', '\r'], ""))
 }
 
-/// The period of a rate such as "20 kHz"; anything else as it is.
+/// The period of a rate such as "20 kHz"; any other text unchanged.
 fn period(text: &str) -> String {
     match quantity::parse(text) {
         Ok(found) if found.dimension == Dimension::FREQUENCY && found.value > 0.0 => {

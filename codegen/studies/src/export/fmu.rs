@@ -1,4 +1,4 @@
-//! Controller and simulated machine as FMI 2.0 co-simulation units, with their sources.
+//! Exports controller and simulated machine as FMI 2.0 co-simulation units, with their sources.
 
 mod controller;
 mod plant;
@@ -19,7 +19,7 @@ use specgen_language::outcome::{Failure, Outcome, environment};
 use specgen_language::output::{claim, write_folder, write_scratch};
 use specgen_language::ui::Ui;
 
-/// Where FMI 2.0 looks for the library of this host.
+/// Folder of this host's library in FMI 2.0.
 const PLATFORM: &str = match (cfg!(target_os = "windows"), cfg!(target_os = "macos")) {
     (true, _) => "win64",
     (_, true) => "darwin64",
@@ -28,7 +28,7 @@ const PLATFORM: &str = match (cfg!(target_os = "windows"), cfg!(target_os = "mac
 const UNIT: &str = include_str!("fmu/unit.c");
 const BUILD: &str = include_str!("fmu/build.sh");
 
-/// FMI 2.0 co-simulation units of the controller under its supervisor, and of the simulated machine, with their sources.
+/// Writes FMI 2.0 co-simulation units of the supervised controller and of the simulated machine, with their sources.
 ///
 /// # Errors
 /// The spec is refused, a unit cannot be built, or a file cannot be written.
@@ -39,7 +39,7 @@ pub fn run(spec: &Path, output: &Path, with_plant: bool, ui: &mut Ui) -> Result<
     if with_plant {
         built.push(plant::built(&compiled, ui)?);
     }
-    let shown = |built: &Built| Exported {
+    let shown = |built: &PackedUnit| Export {
         file: output.join(&built.name).display().to_string(),
         variables: built.variables,
         bytes: built.bytes.len(),
@@ -47,18 +47,18 @@ pub fn run(spec: &Path, output: &Path, with_plant: bool, ui: &mut Ui) -> Result<
     let exported = built.iter().map(shown).collect();
     let files: Vec<_> = built.into_iter().map(|built| (built.name, built.bytes)).collect();
     write_folder(output, &files)?;
-    ui.result(&AllExported { units: exported });
+    ui.result(&ExportList { units: exported });
     Ok(())
 }
 
-/// A unit, ready to be written.
-struct Built {
+/// A packed unit.
+struct PackedUnit {
     name: String,
     bytes: Vec<u8>,
     variables: usize,
 }
 
-/// In the order of the names, without times: the same files give the same bytes.
+/// Sorted by name, without timestamps: the same files give the same bytes.
 fn zipped(files: &BTreeMap<String, Vec<u8>>) -> io::Result<Vec<u8>> {
     let mut out = Cursor::new(Vec::new());
     let mut archive = ZipArchiveWriter::new(&mut out);
@@ -73,22 +73,22 @@ fn zipped(files: &BTreeMap<String, Vec<u8>>) -> io::Result<Vec<u8>> {
     Ok(out.into_inner())
 }
 
-/// What was written.
+/// Result of an export.
 #[derive(Serialize)]
-struct AllExported {
-    units: Vec<Exported>,
+struct ExportList {
+    units: Vec<Export>,
 }
 
 #[derive(Serialize)]
-struct Exported {
+struct Export {
     file: String,
     variables: usize,
     bytes: usize,
 }
 
-impl Outcome for AllExported {
+impl Outcome for ExportList {
     fn text(&self) -> String {
-        let line = |unit: &Exported| {
+        let line = |unit: &Export| {
             let megabytes = unit.bytes as f64 / 1e6;
             format!("wrote {}, FMI 2.0 co-simulation, {} variables, {megabytes:.1} MB\n", unit.file, unit.variables)
         };
@@ -96,27 +96,27 @@ impl Outcome for AllExported {
     }
 }
 
-/// A word of the tick.
+/// A variable: one word of a tick.
 struct Variable {
     name: String,
-    /// In the words of FMI.
+    /// As FMI names it.
     causality: &'static str,
     kind: WordKind,
-    /// Its word before anything is set.
+    /// Its initial word.
     start: u64,
 }
 
-/// What is said of a unit.
+/// Properties of a unit.
 struct Unit<'a> {
     compiled: &'a Compilation,
-    /// Name of the platform, and what kind of unit it is, as an identifier of C.
+    /// C identifier: name of the platform and kind of unit.
     identifier: String,
-    /// What it is, before the name of the platform.
+    /// What it is: the text before the name of the platform.
     what: &'static str,
     scalar: Scalar,
-    /// Whether settings may change while it runs.
+    /// Whether settings may change at run time.
     tunable: bool,
-    /// By value reference: inputs, outputs, settings.
+    /// In the order of value references: inputs, outputs, settings.
     variables: Vec<Variable>,
 }
 
@@ -140,7 +140,7 @@ impl<'a> Unit<'a> {
         format!("{{{}-{}{kind}}}", self.compiled.ir.digest, env!("CARGO_PKG_VERSION"))
     }
 
-    /// `fmu.h`, with what else is to be in it.
+    /// `fmu.h`, followed by `more`.
     fn header(&self, more: &str) -> String {
         let count = |causality| self.variables.iter().filter(|variable| variable.causality == causality).count();
         let kind = |variable: &Variable| if variable.kind == WordKind::Real { 'r' } else { 'i' };
@@ -149,7 +149,7 @@ impl<'a> Unit<'a> {
         format!(
             "/* Written by `specgen export fmu`. */\n#ifndef FMU_H\n#define FMU_H\n\n#include <stdint.h>\n\n#define FMU_GUID \"{}\"\n\
              #define FMU_PERIOD {:e}\n#define FMU_TUNABLE {}\nenum {{ FMU_INPUTS = {}, FMU_OUTPUTS = {}, FMU_SETTINGS = {} }};\n\
-             /* By value reference: r real, i whole; words before anything is set. */\n\
+             /* By value reference: r real, i integer; initial words. */\n\
              static const char FMU_KINDS[] = \"{}\";\nstatic const uint64_t FMU_STARTS[] = {{\n{}\n}};\n{more}\n#endif\n",
             self.guid(),
             self.compiled.model.timing.period,
@@ -162,7 +162,7 @@ impl<'a> Unit<'a> {
         )
     }
 
-    /// Writes `own` and what all units have into a folder: package, archive and libraries are those of the build. All of them.
+    /// Writes `own` and the common sources into a folder, with package, archive and libraries of the build. Returns all of them.
     fn write_sources(
         &self,
         folder: &Path,
@@ -180,13 +180,17 @@ impl<'a> Unit<'a> {
     }
 
     /// The unit with its library and its sources.
-    fn packed(&self, library: &Path, sources: impl IntoIterator<Item = (String, String)>) -> Result<Built, Failure> {
+    fn packed(
+        &self,
+        library: &Path,
+        sources: impl IntoIterator<Item = (String, String)>,
+    ) -> Result<PackedUnit, Failure> {
         let mut files = BTreeMap::from([("modelDescription.xml".to_owned(), self.description().into_bytes())]);
         let place = format!("binaries/{PLATFORM}/{}{}", self.identifier, std::env::consts::DLL_SUFFIX);
         files.insert(place, fs::read(library).map_err(environment)?);
         files.extend(sources.into_iter().map(|(name, text)| (format!("sources/{name}"), text.into_bytes())));
         let bytes = zipped(&files).map_err(environment)?;
-        Ok(Built { name: format!("{}.fmu", self.identifier), bytes, variables: self.variables.len() })
+        Ok(PackedUnit { name: format!("{}.fmu", self.identifier), bytes, variables: self.variables.len() })
     }
 
     /// `modelDescription.xml`.
@@ -205,8 +209,8 @@ impl<'a> Unit<'a> {
             self.what,
             self.identifier,
         );
-        // Outputs change by steps alone: none depends on an input of the same moment, so that units in a ring are no algebraic loop.
-        // Before the first step a machine is what its fixed settings made of it.
+        // Outputs are discrete and none depends on an input of the same step, so units in a ring form no algebraic loop.
+        // Before the first step, the outputs of a machine depend on its fixed settings.
         let of_start = |(reference, variable): (usize, &Variable)| {
             (variable.causality == "parameter" && !self.tunable).then(|| (reference + 1).to_string())
         };
@@ -248,7 +252,7 @@ impl<'a> Unit<'a> {
     }
 }
 
-/// As text within XML.
+/// Escaped for XML.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }

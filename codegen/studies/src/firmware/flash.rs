@@ -1,4 +1,4 @@
-//! Builds and checks an image, then lets probe-rs write it.
+//! Builds and checks an image, then flashes it with probe-rs.
 
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::Path;
@@ -19,10 +19,10 @@ use specgen_toolchain::{budget, find_program};
 
 /// The program that talks to the debug probe.
 const PROBE_RS: &str = "probe-rs";
-/// How to get it.
+/// The command that installs it.
 const INSTALL: &str = "cargo install probe-rs-tools --locked";
 
-/// Builds and checks an image, then lets probe-rs write it, with the options of `probe`; asks before, unless `yes`.
+/// Builds and checks an image, then flashes it with probe-rs and the options of `probe`; asks for confirmation unless `yes`.
 ///
 /// # Errors
 /// The image must not be used, or probe-rs is missing or fails.
@@ -31,7 +31,7 @@ pub fn run(file: &Path, options: &Options, probe: &[&str], yes: bool, ui: &mut U
         Some(elf) => of_image(file, &elf, options, ui)?,
         None => of_spec(file, options, ui)?,
     };
-    let Ready { image, mcu } = ready;
+    let CheckedImage { image, mcu } = ready;
     let image = shell::no_option(image);
     let part = mcu.part();
     let Some(chip) = part.chip else {
@@ -43,8 +43,8 @@ pub fn run(file: &Path, options: &Options, probe: &[&str], yes: bool, ui: &mut U
     let commands = format!("  {}\n  {}", shown(&download), shown(&reset));
     let Some(program) = find_program(PROBE_RS) else {
         return Err(Failure::Environment(format!(
-            "{PROBE_RS} is not installed (looked for on PATH), so nothing was flashed; {image} is checked. \
-             Install it with: {INSTALL}\nthen, with the amplifiers off, run this again, or by hand:\n{commands}"
+            "{PROBE_RS} is not installed (searched on PATH), so nothing was flashed; {image} passed its checks. \
+             Install it with: {INSTALL}\nthen, with the amplifiers off, run this command again, or run:\n{commands}"
         )));
     };
     if !yes {
@@ -52,14 +52,14 @@ pub fn run(file: &Path, options: &Options, probe: &[&str], yes: bool, ui: &mut U
     }
     for (what, words) in [("writing", download), ("restarting", reset)] {
         ui.progress(&format!("{what}: {}", shown(&words)));
-        // Its progress is for the eyes; on standard output stands our result alone.
+        // Its progress goes to standard error; standard output carries only our result.
         let output = Command::new(&program).args(&words).stdin(Stdio::null()).stdout(std::io::stderr()).status();
         match output {
             Ok(status) if status.success() => {}
             Ok(status) => {
                 return Err(Failure::Environment(format!(
-                    "{PROBE_RS} failed ({status}) at {what} {image}; the flash may hold part of an image: keep the amplifiers \
-                     off, check cable and power of the board, and run again:\n{commands}"
+                    "{PROBE_RS} failed ({status}) at {what} {image}; the flash may hold a partial image: keep the amplifiers \
+                     off, check the board's cable and power, and run again:\n{commands}"
                 )));
             }
             Err(error) => {
@@ -67,26 +67,26 @@ pub fn run(file: &Path, options: &Options, probe: &[&str], yes: bool, ui: &mut U
             }
         }
     }
-    ui.result(&Flashed { flashed: image, board: part.board, chip });
+    ui.result(&FlashReport { flashed: image, board: part.board, chip });
     Ok(())
 }
 
 #[derive(Serialize)]
-struct Flashed {
+struct FlashReport {
     flashed: String,
     board: &'static str,
     chip: &'static str,
 }
 
-impl Outcome for Flashed {
+impl Outcome for FlashReport {
     fn text(&self) -> String {
         format!("flashed {} to {} ({}), verified and restarted\n", self.flashed, self.board, self.chip)
     }
 }
 
-/// An image at hand, looked at before it is flashed.
+/// An existing image, checked before it is flashed.
 #[derive(Serialize)]
-struct Examined {
+struct ImageReport {
     image: String,
     failures: Vec<String>,
     #[serde(skip)]
@@ -95,32 +95,32 @@ struct Examined {
     checks: TickChecks,
 }
 
-impl Outcome for Examined {
+impl Outcome for ImageReport {
     fn text(&self) -> String {
         text::sections(&self.size) + &text::checked(&self.checks)
     }
 }
 
 /// An image that passed every check.
-struct Ready {
+struct CheckedImage {
     image: String,
     mcu: Mcu,
 }
 
-fn of_spec(file: &Path, options: &Options, ui: &mut Ui) -> Result<Ready, Failure> {
+fn of_spec(file: &Path, options: &Options, ui: &mut Ui) -> Result<CheckedImage, Failure> {
     let made = make(file, options, Purpose::Board, ui)?;
     let result = ui.shown(&made);
     if let Some(message) = refusal(&made) {
         return Err(Failure::Judged { message: format!("{message}\nnothing was flashed"), result });
     }
     match Target::named(made.target).map(|target| target.kind) {
-        Some(Kind::Board(mcu)) => Ok(Ready { image: made.artifact, mcu }),
+        Some(Kind::Board(mcu)) => Ok(CheckedImage { image: made.artifact, mcu }),
         _ => Err(not_a_board(&made.board)),
     }
 }
 
-/// The same checks for an image at hand, which says what board it is for.
-fn of_image(file: &Path, elf: &[u8], options: &Options, ui: &mut Ui) -> Result<Ready, Failure> {
+/// The same checks for an existing image, which names its board.
+fn of_image(file: &Path, elf: &[u8], options: &Options, ui: &mut Ui) -> Result<CheckedImage, Failure> {
     let image = file.display().to_string();
     let size = size(elf)?;
     let mcu = board_of(&image, size.target, options.target.as_deref())?;
@@ -137,38 +137,37 @@ fn of_image(file: &Path, elf: &[u8], options: &Options, ui: &mut Ui) -> Result<R
     let mut failures: Vec<String> = checked.faults.iter().map(|fault| fault.text.clone()).collect();
     failures.extend(budget::over(&limits, &used));
     if size.identity.is_none() {
-        failures
-            .push("it holds no identity of a controller: was it made by specgen, and does it check itself?".to_owned());
+        failures.push("it has no specgen identity line, so it is not a specgen controller image".to_owned());
     }
     if !size.assumed.is_empty() && !options.assumed_ok {
         failures.push(format!(
-            "{}: it rests on what nobody measured ({}): measure it, take its entries out of `assumed` in the spec and build again; or \
-             accept it with --assumed-ok",
+            "{}: it rests on unmeasured values ({}): measure them, remove them from `assumed` in the spec and build again, or \
+             accept them with --assumed-ok",
             codes::ASSUMED_ON_BOARD.id,
             size.assumed.join(", ")
         ));
     }
-    let examined = Examined { image, failures, size, checks: checked };
+    let examined = ImageReport { image, failures, size, checks: checked };
     let result = ui.shown(&examined);
-    let Examined { image, failures, .. } = examined;
+    let ImageReport { image, failures, .. } = examined;
     if failures.is_empty() {
-        return Ok(Ready { image, mcu });
+        return Ok(CheckedImage { image, mcu });
     }
     let list: String = failures.iter().map(|failure| format!("\n  {failure}")).collect();
     let message = format!("{image} is refused for {}:{list}\nnothing was flashed", part.board);
     Err(Failure::Judged { message, result })
 }
 
-/// The part of the board that an image is built for, unless `--target` names another one.
+/// The part of the image's board, or of the one in `--target`.
 fn board_of(image: &str, target: Option<&str>, named: Option<&str>) -> Result<Mcu, Failure> {
     let Some(target) = target else {
         return Err(Failure::Usage(format!(
-            "nothing was flashed: {image} does not say which board it is for; build it anew with specgen build SPEC --target NAME"
+            "nothing was flashed: {image} does not name its board; rebuild it with specgen build SPEC --target NAME"
         )));
     };
     match Target::named(target).map(|target| target.kind) {
         _ if named.is_some_and(|named| named != target) => Err(Failure::Usage(format!(
-            "nothing was flashed: {image} is for {target}, not for {0}: leave --target out, or make an image for {0} with \
+            "nothing was flashed: {image} is for {target}, not for {0}: omit --target, or build an image for {0} with \
              specgen build SPEC --target {0}",
             named.unwrap_or_default()
         ))),
@@ -179,14 +178,14 @@ fn board_of(image: &str, target: Option<&str>, named: Option<&str>) -> Result<Mc
 
 pub(super) fn not_a_board(name: &str) -> Failure {
     let boards = BOARDS.map(|board| format!("--target {}", board.folder)).join(" or ");
-    Failure::Usage(format!("nothing was flashed: {name} is no board with a debug probe; name one by {boards}"))
+    Failure::Usage(format!("nothing was flashed: {name} is not a board with a debug probe; choose one with {boards}"))
 }
 
-/// A controller that starts with its amplifiers on could move the platform.
+/// Asks that the amplifiers be off: a controller that starts with its amplifiers on could move the platform.
 fn confirm(ui: &Ui, board: &str) -> Result<(), Failure> {
     if ui.is_json() || !std::io::stdin().is_terminal() {
         return Err(Failure::Usage(
-            "nothing was flashed: switch the amplifiers off, then say so by --yes (nobody is there to be asked)"
+            "nothing was flashed: switch the amplifiers off, then confirm with --yes (there is no terminal to ask on)"
                 .to_owned(),
         ));
     }

@@ -1,4 +1,4 @@
-//! Who takes the memory of an image, and what its tick reaches.
+//! Memory use of an image by owner, and the code that its tick reaches.
 
 use std::path::Path;
 
@@ -12,11 +12,11 @@ use specgen_toolchain::TargetError;
 use specgen_toolchain::checks::{self, Rules, TickChecks};
 use specgen_toolchain::size::{Size, has_tick, size};
 
-/// What was made of a spec, by owner and function.
+/// Size of a build, by owner and function.
 #[derive(Serialize)]
-struct Built(BuildResult);
+struct BuildListing(BuildResult);
 
-impl Outcome for Built {
+impl Outcome for BuildListing {
     fn text(&self) -> String {
         let Self(made) = self;
         let size = made.size.iter().map(|size| text::sections(size) + &text::owners(size));
@@ -26,35 +26,35 @@ impl Outcome for Built {
 }
 
 #[derive(Serialize)]
-struct Examined {
+struct ImageListing {
     file: String,
     size: Size,
     checks: Option<TickChecks>,
-    /// Only Thumb code is followed; on a PC the operating system's own checks apply.
+    /// Whether the tick can be checked: only Thumb code is analysed. On a PC the operating system's own checks apply.
     #[serde(skip)]
     is_thumb: bool,
 }
 
-impl Outcome for Examined {
+impl Outcome for ImageListing {
     fn text(&self) -> String {
         let checks = match &self.checks {
             Some(checks) => text::checked(checks),
             None if self.is_thumb => {
-                format!("  no function {} in it: name the one that is a tick by --tick\n", checks::TICKS.join(", "))
+                format!("  it has no function {}: name its tick function with --tick\n", checks::TICKS.join(", "))
             }
-            None => "  checks of the tick and the stack bound are for images of Cortex-M\n".to_owned(),
+            None => "  tick checks and the stack bound are available only for Cortex-M images\n".to_owned(),
         };
         format!("{}\n{}{}{checks}", self.file, text::sections(&self.size), text::owners(&self.size))
     }
 }
 
-/// Shows the size of a spec that is built first, or of an image, whose `tick` function computes no f64 if `single`.
+/// Shows the size of a spec's build, or of an image. `tick` names its tick function, which must not compute f64 if `single`.
 ///
 /// # Errors
 /// The spec is refused, a build fails, or the image is malformed or has faults.
 pub fn run(path: &Path, options: &Options, tick: Option<&str>, single: bool, ui: &mut Ui) -> Result<(), Failure> {
     let Some(bytes) = read_image(path)? else {
-        let built = Built(make(path, options, Purpose::Machine, ui)?);
+        let built = BuildListing(make(path, options, Purpose::Machine, ui)?);
         return ui.judged(&built, refusal(&built.0));
     };
     let malformed = |error: object::Error| TargetError::MalformedImage { text: format!("{}: {error}", path.display()) };
@@ -66,5 +66,5 @@ pub fn run(path: &Path, options: &Options, tick: Option<&str>, single: bool, ui:
     let faults = checks.as_ref().map_or(0, |checks| checks.faults.len());
     let file = path.display().to_string();
     let failed = (faults > 0).then(|| format!("{faults} faults in {file}"));
-    ui.judged(&Examined { file, size, checks, is_thumb }, failed)
+    ui.judged(&ImageListing { file, size, checks, is_thumb }, failed)
 }

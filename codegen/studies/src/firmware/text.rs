@@ -1,4 +1,4 @@
-//! What was built, in words.
+//! Text report of a build.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use specgen_toolchain::budget::{ImageUsage, group};
 use specgen_toolchain::checks::TickChecks;
 use specgen_toolchain::size::Size;
 
-/// As many owners and variables as are listed.
+/// Number of owners and variables listed.
 const LISTED: usize = 12;
 
 impl Outcome for BuildResult {
@@ -33,7 +33,7 @@ impl Outcome for BuildResult {
             let [startup, running, reserved] = [stack.startup, stack.running, stack.reserved].map(group);
             let _ = writeln!(
                 out,
-                "  stack in all  {startup} bytes of {reserved} to start, {running} with tick and interrupts on each other"
+                "  stack         {startup} of {reserved} bytes at startup, {running} with tick and nested interrupts"
             );
         }
         if let Some(estimate) = self.measurement.as_ref().and_then(|m| m.time.as_ref()) {
@@ -62,33 +62,33 @@ impl BuildResult {
         let limits = &self.limits.budget;
         let _ = writeln!(out, "  flash         {}{} bytes", group(used.flash), of(limits.flash));
         let ram = match used.ram {
-            Some(ram) => format!("{}{} bytes, the stack of a tick included", group(ram), of(limits.ram)),
-            None if used.stack.is_none() => "not known: the stack of a tick has no bound".to_owned(),
-            None => "not measured: State and settings are known only in a run".to_owned(),
+            Some(ram) => format!("{}{} bytes including the tick's stack", group(ram), of(limits.ram)),
+            None if used.stack.is_none() => "unknown: the tick's stack is unbounded".to_owned(),
+            None => "not measured: the sizes of State and settings are known only at run time".to_owned(),
         };
         let _ = writeln!(out, "  RAM           {ram}");
         let bound = used
             .stack
-            .map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes at most", group(bytes), of(limits.stack)));
-        let _ = writeln!(out, "  stack a tick  {bound} (static)");
+            .map_or("unbounded".to_owned(), |bytes| format!("at most {}{} bytes", group(bytes), of(limits.stack)));
+        let _ = writeln!(out, "  tick stack    {bound} (static)");
         if let Some(instructions) = used.instructions {
             let counted = self.measurement.as_ref().map_or(String::new(), |m| {
                 format!(
-                    "; counted on {}, the same core and code: flash wait states and caches are not in it",
+                    "; counted on {} with the same core and code; flash wait states and caches are not included",
                     m.machine
                 )
             });
             let of = of(limits.instructions);
-            let _ = writeln!(out, "  instructions  {}{of} a tick, mean{counted}", group(instructions));
+            let _ = writeln!(out, "  instructions  {}{of} per tick, mean{counted}", group(instructions));
         }
     }
 }
 
-/// Who takes the flash.
+/// Flash by owner.
 pub fn owners(size: &Size) -> String {
     let columns = [left(26).behind("  "), right(10).behind(" "), right(10).behind(" "), right(10).behind(" ")];
     let mut out = String::new();
-    row(&mut out, &columns, &[&"flash by owner, bytes", &"code", &"constants", &"all"]);
+    row(&mut out, &columns, &[&"flash by owner, bytes", &"code", &"constants", &"total"]);
     let (shown, rest) = size.owners.split_at(LISTED.min(size.owners.len()));
     let mut line = |name: &str, code: u64, constants: u64| {
         row(
@@ -141,7 +141,7 @@ pub fn sections(size: &Size) -> String {
     out
 }
 
-/// What was looked for in the tick.
+/// Results of the tick checks.
 pub fn checked(checks: &TickChecks) -> String {
     let mut out = String::new();
     let _ = writeln!(
@@ -157,7 +157,7 @@ pub fn checked(checks: &TickChecks) -> String {
         }
     );
     let path: Vec<String> = checks.path.iter().map(|(name, frame)| format!("{name} {frame}")).collect();
-    let bound = checks.stack.map_or("not bounded".to_owned(), |bytes| format!("{} bytes at most", group(bytes)));
+    let bound = checks.stack.map_or("unbounded".to_owned(), |bytes| format!("at most {} bytes", group(bytes)));
     let _ = writeln!(out, "  stack: {bound}: {}", path.join(" → "));
     for fault in &checks.faults {
         let _ = writeln!(out, "  FAULT {}", fault.text);

@@ -1,4 +1,4 @@
-//! How long the tick of a board takes, held against its period, in words.
+//! Compares the modelled time of a board's tick with its period; text report.
 
 use std::fmt::Write as _;
 
@@ -6,21 +6,19 @@ use specgen_compiler::compile::Compilation;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_toolchain::time::Estimate;
 
-/// What is to be said about it.
+/// The finding about the time of a tick, if any.
 pub fn finding(compiled: &Compilation, estimate: &Estimate) -> Option<Diagnostic> {
     let Estimate { board, worst, period, shortest, parts, .. } = estimate;
     let most = parts.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    let most = most.map_or(String::new(), |(name, time)| format!("; most of it: {name}, {time:.1} us"));
+    let most = most.map_or(String::new(), |(name, time)| format!("; largest part: {name}, {time:.1} us"));
     let budget = compiled.model.target.budget.time.map(|seconds| seconds * 1e6);
     if let Some(budget) = budget.filter(|budget| worst > budget && !estimate.too_long()) {
         return Some(Diagnostic::at(
             &compiled.model.spans,
             &["target.budget.time"],
             codes::TICK_TOO_LONG,
-            format!(
-                "a tick on {board} takes {worst:.1} us (modelled), which is longer than its budget of {budget:.1} us{most}"
-            ),
-            format!("write, in [target.budget]: time = \"{shortest} us\" or more, or give the tick less to do"),
+            format!("a tick on {board} takes {worst:.1} us (modelled), longer than its budget of {budget:.1} us{most}"),
+            format!("write, in [target.budget]: time = \"{shortest} us\" or more, or reduce the work per tick"),
         ));
     }
     let (code, verdict) = if estimate.too_long() {
@@ -34,20 +32,20 @@ pub fn finding(compiled: &Compilation, estimate: &Estimate) -> Option<Diagnostic
         &compiled.model.spans,
         &["timing.period", "timing"],
         code,
-        format!("a tick on {board} takes {worst:.1} us (modelled), which {verdict} the period of {period:.1} us{most}"),
+        format!("a tick on {board} takes {worst:.1} us (modelled): this {verdict} the period of {period:.1} us{most}"),
         if estimate.too_long() {
             format!("write, in [timing]: period = \"{shortest} us\", {:.1} kHz, or more", 1e3 / shortest)
         } else {
-            format!("write, in [timing]: period = \"{} us\" or more, or give the tick less to do", estimate.roomy())
+            format!("write, in [timing]: period = \"{} us\" or more, or reduce the work per tick", estimate.roomy())
         },
     ))
 }
 
-/// Where the time goes.
+/// The time of a tick by part.
 pub fn text(estimate: &Estimate) -> String {
     let Estimate { worst, period, core, law, shortest, .. } = estimate;
     let mut out = format!(
-        "  longest tick  {worst:.1} us of {period:.1} (modelled, {core:.0} MHz), {:.0} % room; {shortest} us would do: {:.1} kHz\n",
+        "  longest tick  {worst:.1} us of {period:.1} (modelled, {core:.0} MHz), {:.0} % margin; shortest period {shortest} us ({:.1} kHz)\n",
         100.0 * (1.0 - worst / period),
         1e3 / shortest
     );
@@ -88,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn a_budget_of_time_below_the_period_is_held_and_what_is_said_to_write_is_accepted() {
+    fn a_time_budget_below_the_period_is_checked_and_the_suggested_one_is_accepted() {
         let (tight, tick) = (spec("time = \"40 us\""), estimate(47.3, 49.0));
         let found = finding(&tight, &tick).unwrap();
         assert_eq!((found.key.as_str(), found.severity), ("target.budget.time", Severity::Error));
@@ -96,7 +94,7 @@ mod tests {
         assert!(found.help.contains("time = \"49 us\""), "{}", found.help);
         assert!(finding(&spec("time = \"49 us\""), &tick).is_none());
         assert!(finding(&spec(""), &tick).is_none());
-        // Beyond the period, that is what counts.
+        // If the tick exceeds the period as well, the period is reported.
         let late = finding(&tight, &estimate(101.0, 104.0)).unwrap();
         assert!(late.message.contains("the period of 100.0 us"), "{}", late.message);
     }

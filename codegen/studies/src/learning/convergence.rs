@@ -1,4 +1,4 @@
-//! How far up in frequency learning converges, for every machine within the declared intervals.
+//! Frequency up to which learning converges for every machine within the declared intervals.
 
 use std::f64::consts::TAU;
 
@@ -12,75 +12,75 @@ use super::matrix::{Matrix6c, inverse, larger, left, multiply, norm, spectral_ra
 use super::response::{Bin, Response};
 use crate::factors::{Factor, Factors};
 
-/// Largest spectral radius of Q (I − T L) that is let pass: the error of a pass against that of the one before.
+/// Largest permitted spectral radius of Q (I − T L): the error of a pass relative to that of the pass before.
 pub const LARGEST_RADIUS: f64 = 0.9;
-/// Order of Q at its upper end, and at its lower one.
+/// Order of Q at its upper and at its lower end.
 const ORDERS: [f64; 2] = [8.0, 4.0];
-/// Where the loop leaves less of a correction than this it is not learned: the feedback does it.
+/// A correction is not learned where the loop passes less of it than this: there the feedback suffices.
 const LEAST_LEFT: f64 = 0.004;
-/// Parts of the inverse that are tried: less of it learns more slowly, and bears more of what is not known.
+/// Candidate shares of the inverse: a smaller share learns more slowly, but tolerates more uncertainty.
 const SHARES: [f64; 7] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4];
-/// Knots in a period of f_c.
+/// Knots per period of f_c.
 const KNOTS: f64 = 3.5;
-/// Behind the last frequency nothing is learned.
+/// Factor on the highest frequency, beyond which nothing is learned.
 const JUST_BEYOND: f64 = 1.001;
-/// Radius at which the whole inverse is good enough.
+/// Radius at which the full inverse is used.
 const FAST: f64 = 0.5;
-/// Frequencies looked at between a hundredth of the highest and it, and as many more about each mode.
+/// Number of frequencies between a hundredth of the highest one and the highest, and as many again around each mode.
 const GRID: u32 = 160;
-/// About a mode: from this part of its frequency less to as much more.
+/// Half-width of the grid around a mode, relative to its frequency.
 const ABOUT: f64 = 0.25;
-/// Stiffnesses over masses looked at, evenly spaced, ends included.
+/// Number of stiffness-to-mass ratios, evenly spaced, limits included.
 const STIFFNESSES: u32 = 5;
 
-/// A loop that can learn, as it starts.
+/// A loop for which learning is possible.
 pub struct Learnable {
     pub(super) closed_loop: ClosedLoop,
     law: Law,
     tuning: Tuning,
     /// τ, s.
     pub(super) lead: f64,
-    /// T of the machine, where it was measured.
+    /// Measured T of the machine, if any.
     measured: Option<Response>,
 }
 
-/// What learning may do on every machine within the intervals.
+/// Result of the convergence analysis for every machine within the intervals.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Convergence {
-    /// Below the first learning leaves the error to the feedback; the second is f_c. Hz.
+    /// Below the first frequency the error is left to the feedback; the second is f_c. Hz.
     pub band: [f64; 2],
     /// Largest bound of ρ(Q (I − T L)) over frequencies and machines.
     pub radius: f64,
-    /// Where, Hz.
+    /// Frequency of the largest bound, Hz.
     pub at: f64,
-    /// Whether T was measured: then it is shown for what it may be on that machine, else for every machine within the intervals.
+    /// Whether T was measured: then the bound covers its uncertainty, else every machine within the intervals.
     pub measured: bool,
-    /// From here on T is the measured one, Hz; nowhere, where none was measured.
+    /// Lowest frequency of the measured T, Hz; infinite if none was measured.
     #[serde(skip)]
     pub(super) edge: f64,
-    /// That bound without Q at frequencies (Hz), rising.
+    /// The bound without Q at frequencies (Hz) in ascending order.
     #[serde(skip)]
     pub bounds: Vec<[f64; 2]>,
-    /// The part of T⁻¹ that is learned with at frequencies (Hz), rising.
+    /// The share of T⁻¹ used at frequencies (Hz) in ascending order.
     #[serde(skip)]
     pub(super) shares: Vec<[f64; 2]>,
 }
 
 impl Convergence {
-    /// Ticks of `period` (s) from knot to knot of a table that holds what Q lets through.
+    /// Ticks between knots of a table that can hold what Q passes; `period` in s.
     #[must_use]
     pub fn spacing(&self, period: f64) -> u32 {
         spacing(self.band[1], period)
     }
 
-    /// The band about the best known frequency in which learning with T⁻¹ converges whatever T is within three standard errors of what was
-    /// measured, up to `wish` (Hz); none if there is no such band.
+    /// The band around the best-measured frequency in which learning with T⁻¹ converges for any T within three standard errors of the
+    /// measurement, up to `wish` (Hz); `None` if there is none.
     fn measured(response: &Response, wish: f64) -> Option<Self> {
         let bins = &response.bins;
         let radii: Vec<f64> = bins.iter().map(Bin::doubt).collect();
         let inside = |k: &usize| bins[*k].hertz <= wish;
         let best = (0..radii.len()).filter(inside).min_by(|a, b| radii[*a].total_cmp(&radii[*b]))?;
-        // A NaN is not known.
+        // NaN counts as not converging.
         let known = |k: &usize| radii[*k] <= LARGEST_RADIUS;
         if !known(&best) {
             return None;
@@ -88,11 +88,11 @@ impl Convergence {
         let first = (0..best).rev().find(|k| !known(k)).map_or(0, |k| k + 1);
         let behind = (best..radii.len()).find(|k| !known(k)).unwrap_or(radii.len());
         let low = bins[first].hertz;
-        // What is not known is not learned: there Q alone decides.
+        // Outside the known band nothing is learned; there only Q applies.
         let learned = |k: usize| k >= first && k < behind;
         let radius = |k: usize| if learned(k) { radii[k] } else { 1.0 };
         let above: Vec<[f64; 2]> = (first..radii.len()).map(|k| [bins[k].hertz, radius(k)]).collect();
-        // Nothing is known beyond the last.
+        // Nothing is known beyond the last bin.
         let end = [bins.last()?.hertz, 1.0];
         let high = highest_passed(above.into_iter().chain([end]), wish)?;
         if low >= high {
@@ -109,7 +109,7 @@ impl Convergence {
         Some(found)
     }
 
-    /// Takes in what an error is multiplied with at a frequency (Hz) before Q.
+    /// Adds the factor by which the error is multiplied at a frequency (Hz), without Q.
     fn meet(&mut self, hertz: f64, radius: f64) {
         self.bounds.push([hertz, radius]);
         let radius = radius * self.passed(hertz);
@@ -126,7 +126,7 @@ impl Convergence {
         below * cut(hertz, high)
     }
 
-    /// The part of T⁻¹ at a frequency, Hz.
+    /// The share of T⁻¹ used at a frequency, Hz.
     pub(super) fn share(&self, hertz: f64) -> f64 {
         let above = self.shares.partition_point(|[at, _]| *at <= hertz);
         match (above.checked_sub(1).and_then(|below| self.shares.get(below)), self.shares.get(above)) {
@@ -138,7 +138,7 @@ impl Convergence {
 }
 
 impl Learnable {
-    /// The loop of a spec with `[control]` in the mode that it starts in; none for six legs.
+    /// The loop of a spec with `[control]` in its initial mode; `None` for six legs.
     #[must_use]
     pub fn of(compiled: &Compilation) -> Option<Self> {
         let (model, task) = (&compiled.model, compiled.model.task_space.as_ref()?);
@@ -161,18 +161,18 @@ impl Learnable {
         &self.closed_loop
     }
 
-    /// The control mode that it starts in, and its numbers.
+    /// The initial control mode and its gains.
     pub(crate) fn law(&self) -> (Law, &Tuning) {
         (self.law, &self.tuning)
     }
 
-    /// Of its modes, rad/s.
+    /// Natural frequencies of its modes, rad/s.
     #[must_use]
     pub fn modes(&self) -> [f64; 6] {
         self.closed_loop.basis.frequencies
     }
 
-    /// The same with T as it was measured, not as the model has it.
+    /// The same loop with the measured T instead of the model's.
     #[must_use]
     pub fn with(self, measured: Response) -> Self {
         Self { measured: Some(measured), ..self }
@@ -189,14 +189,14 @@ impl Learnable {
         closed_loop.correction_response(self.law, &self.tuning, conditions, &angles)
     }
 
-    /// G, without feedback.
+    /// G: the response without feedback.
     pub(super) fn open_loop(&self, frequencies: &[f64]) -> Vec<Matrix6c> {
         let law = Law::Feedforward(Estimator::Invhys);
         let open = Self { closed_loop: self.closed_loop.clone(), law, tuning: Tuning::NONE, lead: 0.0, measured: None };
         open.nominal(frequencies)
     }
 
-    /// T that is learned with at frequencies (Hz), rising: the model's below an edge, from there on the measured one.
+    /// The T used for learning at frequencies (Hz) in ascending order: the model's below `edge`, the measured one above.
     pub(super) fn known(&self, frequencies: &[f64], edge: f64) -> Vec<Matrix6c> {
         let slower = frequencies.partition_point(|hertz| *hertz < edge);
         let mut all = self.nominal(&frequencies[..slower]);
@@ -206,13 +206,13 @@ impl Learnable {
         all
     }
 
-    /// T as the compiler's model has it.
+    /// T by the compiler's model.
     pub(super) fn nominal(&self, frequencies: &[f64]) -> Vec<Matrix6c> {
         self.response(&self.closed_loop, &Conditions::NOMINAL, frequencies)
     }
 
-    /// The highest f_c up to `wish` (Hz) at which learning converges on every machine within `factors`, or with a measured T whatever it
-    /// may be; none where it does at no frequency looked at.
+    /// The highest f_c up to `wish` (Hz) at which learning converges on every machine within `factors`, or for a measured T within its
+    /// uncertainty; `None` if it converges at no frequency.
     #[must_use]
     pub fn convergence(&self, factors: &Factors, wish: f64) -> Option<Convergence> {
         if let Some(response) = &self.measured {
@@ -222,7 +222,7 @@ impl Learnable {
         let (inverses, shares, radii) = self.modelled(&frequencies, factors);
         let highest = highest_passed(frequencies.iter().zip(&radii).map(|(hertz, radius)| [*hertz, *radius]), wish)?;
         let lowest = *frequencies.first()?;
-        // The slowest frequency at which every mode answers.
+        // The lowest frequency at which every mode responds.
         let answers = frequencies.iter().zip(&inverses).find(|(_, inverse)| norm(inverse) * LEAST_LEFT <= 1.0);
         let low = answers.map(|(hertz, _)| *hertz).filter(|hertz| *hertz > lowest).unwrap_or(0.0);
         if !(highest > lowest && highest > low) {
@@ -244,8 +244,8 @@ impl Learnable {
         Some(found)
     }
 
-    /// With the model's T, and the machines within `factors`, for what is slower than a measured one is known: a sweep of a pass says little of
-    /// slow motion, of which feedback leaves little, and there mass and stiffness hardly count.
+    /// Extends a measured band downwards with the model's T and the machines within `factors`: a sweep during a pass tells little about
+    /// slow motion, most of which the feedback suppresses, and there mass and stiffness hardly matter.
     fn slower(&self, found: Convergence, factors: &Factors, wish: f64) -> Convergence {
         let frequencies: Vec<f64> = self.grid(wish).into_iter().filter(|hertz| *hertz < found.edge).collect();
         let (inverses, shares, radii) = self.modelled(&frequencies, factors);
@@ -268,7 +268,7 @@ impl Learnable {
         whole
     }
 
-    /// By the model, at each frequency (Hz): T⁻¹, the part of it that is learned with, and the radius on every machine within `factors`.
+    /// By the model, at each frequency (Hz): T⁻¹, the share of it used, and the largest radius over the machines within `factors`.
     fn modelled(&self, frequencies: &[f64], factors: &Factors) -> (Vec<Matrix6c>, Vec<f64>, Vec<f64>) {
         let inverses: Vec<Matrix6c> = self.nominal(frequencies).iter().map(inverse).collect();
         let mut radii = vec![[0.0; SHARES.len()]; frequencies.len()];
@@ -277,7 +277,7 @@ impl Learnable {
             for ((radii, real), inverse) in radii.iter_mut().zip(&real).zip(&inverses) {
                 let product = multiply(real, inverse);
                 for (radius, share) in radii.iter_mut().zip(SHARES) {
-                    // A NaN is no convergence.
+                    // NaN means no convergence.
                     *radius = larger(*radius, spectral_radius(&left(&product, share)));
                 }
             }
@@ -291,7 +291,7 @@ impl Learnable {
         (inverses, shares, radii)
     }
 
-    /// Frequencies up to where Q lets nothing through, rising, closest about the modes.
+    /// Frequencies up to where Q passes nothing, in ascending order, densest around the modes.
     pub(super) fn grid(&self, wish: f64) -> Vec<f64> {
         let highest = highest(wish, self.closed_loop.period);
         let share = |k: u32| f64::from(k) / f64::from(GRID - 1);
@@ -331,7 +331,7 @@ impl Learnable {
     }
 }
 
-/// The highest f_c up to `wish` (Hz) whose Q leaves each radius at its frequency (Hz) below the largest; none where one is no number.
+/// The highest f_c up to `wish` (Hz) whose Q keeps the radius at each frequency (Hz) below the largest permitted; `None` if a radius is NaN.
 fn highest_passed(radii: impl Iterator<Item = [f64; 2]>, wish: f64) -> Option<f64> {
     let mut highest = wish;
     for [hertz, radius] in radii {
@@ -347,13 +347,13 @@ fn highest_passed(radii: impl Iterator<Item = [f64; 2]>, wish: f64) -> Option<f6
     Some(highest)
 }
 
-/// Ticks of `period` (s) from knot to knot for what is learned up to a frequency, Hz.
+/// Ticks between knots for learning up to a frequency, Hz; `period` in s.
 pub(super) fn spacing(bandwidth: f64, period: f64) -> u32 {
     let apart = libm::floor(1.0 / (KNOTS * bandwidth * period));
     if apart >= 1.0 { apart as u32 } else { 1 }
 }
 
-/// Where Q of f_c (Hz) lets less than a ten-thousandth through, or the fastest that can be sampled well, Hz.
+/// Frequency (Hz) at which Q of f_c passes less than a ten-thousandth, or the highest that can be sampled well.
 pub(super) fn highest(bandwidth: f64, period: f64) -> f64 {
     let (cut, fastest) = (3.2 * bandwidth, 0.45 / period);
     if cut < fastest { cut } else { fastest }

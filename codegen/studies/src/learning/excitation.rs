@@ -1,12 +1,12 @@
-//! Measures T of a running machine: passes of a motion in which the correction is a sweep, and what the gauges show of it.
+//! Measures T of a running machine: passes of a motion with a sweep as correction, and the response of the gauges.
 //!
 //! ```text
-//! c_k = ± V a H_k s(t)        s: sine of rising frequency, each octave for as long;  H_k: row k of a conference matrix, H Hᵀ = 5 I
-//! y_k = T c_k + y₀ + noise    y₀: what the motion itself leaves, the same in every pass
-//! T = Σ y_k c_kᴴ (Σ c_k c_kᴴ)⁻¹       over twelve passes and the bins of 2.5 Hz or 2 %;  what is left of y_k gives its standard error
+//! c_k = ± V a H_k s(t)        s: sine of rising frequency, the same time per octave;  H_k: row k of a conference matrix, H Hᵀ = 5 I
+//! y_k = T c_k + y₀ + noise    y₀: error of the motion itself, the same in every pass
+//! T = Σ y_k c_kᴴ (Σ c_k c_kᴴ)⁻¹       over twelve passes and bins of 2.5 Hz or 2 %;  the residual of y_k gives its standard error
 //! ```
-//! Each sweep is made with both signs, so that y₀ and what is even in c cancel. The loop is closed and the machine moves as it does when it
-//! learns: hysteresis, delay and stiffness are in T as they are. H1 of several inputs: Bendat and Piersol, Random Data, 7.4.
+//! Each sweep is played with both signs, so y₀ and even-order terms of c cancel. The loop is closed and the machine moves as it does when
+//! learning, so T includes hysteresis, delay and stiffness as they are. H1 estimator for several inputs: Bendat and Piersol, Random Data, 7.4.
 
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -23,7 +23,7 @@ use super::response::{Bin, Response};
 use super::table::knots;
 use super::update::{kept, mapped};
 
-/// Rows that are orthogonal, of signs and one zero each.
+/// A conference matrix: orthogonal rows of signs with one zero each.
 const CONFERENCE: [[i8; 6]; 6] = [
     [0, 1, 1, 1, 1, 1],
     [1, 0, 1, -1, -1, 1],
@@ -32,38 +32,38 @@ const CONFERENCE: [[i8; 6]; 6] = [
     [1, -1, -1, 1, 0, 1],
     [1, 1, -1, -1, 1, 0],
 ];
-/// Passes that are measured.
+/// Number of measured passes.
 pub const PASSES: usize = 2 * CONFERENCE.len();
-/// Highest frequency of the sweep over that to be learned, and at most so much of the rate of knots.
+/// Highest frequency of the sweep over that to be learned, and its limit as a share of the table rate.
 const BEYOND: f64 = 1.6;
 const RATE: f64 = 0.4;
-/// Amplitude at the joints over the noise of a gauge, and at most so much of what the limits of a correction let through.
+/// Amplitude at the joints over the noise of a gauge, and its limit as a share of the limit of a correction.
 const OVER_NOISE: f64 = 50.0;
 const WITHIN: f64 = 0.5;
-/// Where the loop leaves little, the sweep is larger: as much again at the first frequency, Hz, and in proportion to its inverse down to the other.
+/// Where the loop passes little, the sweep is larger: twice as large at the first frequency, Hz, and in inverse proportion down to the second.
 const SLOW: [f64; 2] = [100.0, 10.0];
-/// How fast a correction may come, s from nothing to its limit.
+/// Shortest time in which a correction may rise from zero to its limit, s.
 const ONSET: f64 = 1e-3;
-/// Over which a sweep fades in and out, s.
+/// Fade-in and fade-out time of a sweep, s.
 const FADE: f64 = 5e-3;
-/// Width of a bin, Hz, and where it is more as a part of its frequency: half of the narrowest resonance that feedback leaves on usual platforms.
+/// Width of a bin, Hz, and its minimum relative to the frequency: half of the narrowest resonance that feedback leaves on usual platforms.
 const WIDTH: [f64; 2] = [2.5, 0.02];
-/// Digits that a file keeps.
+/// Significant digits in a file.
 const DIGITS: usize = 5;
 
-/// Twelve corrections that are played in passes of a motion.
+/// Twelve corrections to be played during passes of a motion.
 pub struct Excitation {
     passes: Vec<Vec<Knot>>,
     /// Lowest and highest frequency, Hz.
     pub band: [f64; 2],
-    /// Largest along an axis, angles at the joints, m.
+    /// Largest value along an axis, with angles at the joints, m.
     pub amplitude: f64,
-    /// Ticks from knot to knot.
+    /// Ticks between knots.
     pub spacing: u32,
 }
 
 impl Excitation {
-    /// For learning up to a frequency (Hz), within the `limit` of a correction; `noise` of a gauge rms, m.
+    /// For learning up to a frequency (Hz), within the `limit` of a correction; `noise` is that of a gauge, rms. Both in m.
     #[must_use]
     pub fn new(learnable: &Learnable, motion: &Motion, bandwidth: f64, [limit, noise]: [f64; 2]) -> Self {
         let period = learnable.closed_loop.period;
@@ -71,13 +71,13 @@ impl Excitation {
         let time = motion.scored.end as f64 * period;
         let [wish, fastest] = [BEYOND * bandwidth, RATE / (f64::from(spacing) * period)];
         let band = [1.0 / time, if wish < fastest { wish } else { fastest }];
-        // Of its rate at the end, of its size in the beginning.
+        // Limited by its rate at the end and by its size at the beginning.
         let rate = limit / (TAU * (band[1] + SLOW[0]) * ONSET);
         let size = limit / larger(0.0);
         let bearable = WITHIN * if size < rate { size } else { rate };
         let wanted = OVER_NOISE * noise;
         let amplitude = if wanted > 0.0 && wanted < bearable { wanted } else { bearable };
-        // Modes alike at the joints, and what they sum up to on the axis that has most.
+        // Equal amplitudes of the modes at the joints, and their sum on the axis with the largest.
         let from_modal = &learnable.closed_loop.basis.from_modal;
         let at_joints =
             |axis: usize, mode: usize| from_modal[axis][mode].abs() * if axis < 3 { 1.0 } else { motion.radius };
@@ -100,11 +100,11 @@ impl Excitation {
         Self { passes, band, amplitude, spacing }
     }
 
-    /// Makes the passes, after one that is not counted, and gives T with its standard error; `names` are the digest of the spec and the machine.
-    /// `watch` hears of each pass and may end it.
+    /// Runs the passes, after one that is discarded, and returns T with its standard error; `names` are the digest of the spec and the machine.
+    /// `watch` is called after each pass and may stop.
     ///
     /// # Errors
-    /// If the machine does not make a pass, or limits hold back what it is excited with, or it was ended.
+    /// If the machine fails to make a pass, limits restrict the excitation, or it was stopped.
     pub fn measure(
         &self,
         machine: &mut dyn RepeatableMachine,
@@ -144,7 +144,7 @@ impl Excitation {
             let width = if part > least { part } else { least };
             if width > 1.0 { width as usize } else { 1 }
         };
-        // Zeros behind the signals tie bins together.
+        // Zero padding correlates neighbouring bins.
         let tied = length as f64 / motion.corrected as f64;
         let held = f64::from(self.spacing) * period;
         let mut bins = Vec::new();
@@ -166,12 +166,12 @@ impl Excitation {
     }
 }
 
-/// Amplitude of the sweep at a frequency (Hz) over that at its end.
+/// Amplitude of the sweep at a frequency (Hz) relative to that at its end.
 fn larger(hertz: f64) -> f64 {
     1.0 + SLOW[0] / if hertz > SLOW[1] { hertz } else { SLOW[1] }
 }
 
-/// A sine whose frequency rises from the lower end of a band (Hz) to the upper over so many ticks, in equal times by equal factors; 0 from there on.
+/// A sine whose frequency rises exponentially from the lower end of a band (Hz) to the upper in the given ticks; 0 afterwards.
 fn sweep(ticks: usize, all: usize, period: f64, [low, high]: [f64; 2]) -> Vec<f64> {
     let time = ticks as f64 * period;
     let growth = libm::log(high / low) / time;
@@ -188,7 +188,7 @@ fn sweep(ticks: usize, all: usize, period: f64, [low, high]: [f64; 2]) -> Vec<f6
         .collect()
 }
 
-/// T and its standard errors of the bins of a group, over passes of (given, shown) spectra; of `tied` bins one is independent.
+/// T and its standard errors for a group of bins, over passes of (input, output) spectra; one of `tied` bins is independent.
 fn regression(
     pairs: &[[[Vec<Complex64>; 6]; 2]],
     group: std::ops::Range<usize>,
@@ -215,7 +215,7 @@ fn regression(
     let response = multiply(&shown_given, &inverse);
     let mut left = [0.0; 6];
     for bin in group.clone() {
-        // What every pass shows is the motion's.
+        // The mean over all passes is the response to the motion itself.
         let mut mean = [[0.0; 2]; 6];
         for [_, shown] in pairs {
             for (mean, value) in mean.iter_mut().zip(at(shown, bin)) {
@@ -232,13 +232,13 @@ fn regression(
             }
         }
     }
-    // Of each bin the mean is taken out, of the group one response.
+    // Degrees of freedom: one mean per bin and one response per group are removed.
     let free = (group.len() * (pairs.len() - 1)) as f64 - 6.0;
     let error = std::array::from_fn(|i| std::array::from_fn(|j| libm::sqrt(tied * left[i] / free * inverse[j][j][0])));
     (response, error)
 }
 
-/// To the digits of a file.
+/// Rounds to the digits of a file.
 fn rounded(value: f64) -> f64 {
     format!("{value:.DIGITS$e}").parse().unwrap_or(value)
 }

@@ -1,28 +1,28 @@
-//! Whether a pass is better than another one by more than passes differ without learning.
+//! Decides whether a pass is better than another by more than passes differ without learning.
 //!
 //! ```text
-//! d: error of a pass less that of another one under the same correction, tick by tick
+//! d: difference in error of two passes under the same correction, tick by tick
 //! d_b = mean of (e + e') d over part b of the motion, b = 1 … B
 //! noise = max(2 √Σ d_b² / B, |Σ d_b| / B)
 //! ```
-//! The mean squares of two errors e and e' that differ by d differ by the mean of (e + e') d. So `noise` is what the mean squares of two passes
-//! differ by when nothing was learned in between: twice the standard error of their difference if the parts differ at random, the difference itself
-//! if all of them differ alike, as drift makes them. It holds the noise of both passes, and scales with what is left of the error.
+//! If two errors e and e' differ by d, their mean squares differ by the mean of (e + e') d. So `noise` is the difference in mean square of two
+//! passes without learning in between: twice the standard error if the parts differ at random, the difference itself
+//! if all parts differ alike, as with drift. It contains the noise of both passes and scales with the remaining error.
 
 use std::cmp::Ordering;
 
 use super::motion::Motion;
-use super::seen::PassObservation;
+use super::observation::PassObservation;
 
-/// B: parts of a motion.
+/// B: number of parts of a motion.
 const PARTS: usize = 16;
-/// Standard errors that count as noise.
+/// Number of standard errors that count as noise.
 const SURE: f64 = 2.0;
 
-/// Of the translation, of the angles times the radius of the joints, and of both.
+/// For translation, for angles times the joint radius, and for both.
 type Kinds = [f64; 3];
 
-/// What a pass showed by the gauges, over the motion itself.
+/// Measured error of a pass, over the motion itself.
 #[derive(Debug, Clone)]
 pub(super) struct Score {
     /// Mean squares, m².
@@ -31,43 +31,43 @@ pub(super) struct Score {
     error: Vec<[f64; 6]>,
 }
 
-/// By what passes under the same correction differ, tick by tick, m.
+/// Difference between passes under the same correction, tick by tick, m.
 #[derive(Debug, Clone)]
 pub(super) struct Noise(Vec<[f64; 6]>);
 
-/// What becomes of a pass and its correction.
+/// Decision on a pass and its correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {
-    /// It gains: its correction is kept.
+    /// An improvement: keep its correction.
     Keep,
-    /// Within the noise: learning goes on, and the correction is not kept.
+    /// Within the noise: continue learning, discard the correction.
     GoOn,
-    /// Learning ends, and the correction is not kept.
+    /// Stop learning, discard the correction.
     Stop,
 }
 
-/// Judges passes one after the other.
+/// Decides on one pass after the other.
 pub(super) struct Judge {
     noise: Noise,
     first: Score,
     best: Score,
-    /// The last pass gained nothing.
+    /// The last pass was no improvement.
     idle: bool,
 }
 
 impl Judge {
-    /// After the `first` pass and the one before it, under the same correction.
+    /// From the `first` pass and the one before it under the same correction.
     pub(super) fn new(first: Score, before: &Score) -> Self {
         let (first, noise) = first.repeated(before);
         Self { noise, best: first.clone(), first, idle: false }
     }
 
-    /// What repetitions of the first pass differ by in the root mean square of the whole error, nm.
+    /// Noise of the first pass in terms of its rms error, nm.
     pub(super) fn noise_nm(&self) -> f64 {
         self.noise.nm(&self.first)
     }
 
-    /// The next pass.
+    /// Decides on the next pass.
     pub(super) fn judge(&mut self, pass: Score) -> Verdict {
         match pass.beside([&self.first, &self.best], &self.noise) {
             Some(Ordering::Less) => {
@@ -83,7 +83,7 @@ impl Judge {
     }
 }
 
-/// Sum of products along the three axes from this one on.
+/// Sum of products of three axes, starting at `first`.
 fn product(a: &[f64; 6], b: &[f64; 6], first: usize) -> f64 {
     (first..first + 3).map(|axis| a[axis] * b[axis]).sum()
 }
@@ -94,7 +94,7 @@ fn kinds(of: impl Fn(usize) -> f64) -> Kinds {
 }
 
 impl Score {
-    /// Of a pass.
+    /// The score of a pass.
     pub(super) fn of(seen: &PassObservation, motion: &Motion) -> Self {
         let scaled =
             |error: &[f64; 6]| std::array::from_fn(|axis| error[axis] * if axis < 3 { 1.0 } else { motion.radius });
@@ -103,8 +103,8 @@ impl Score {
         Self { squares: kinds(mean), error }
     }
 
-    /// Of the first pass, beside the one before it under the same correction, and the noise of both. Its error is their mean: that of one alone is
-    /// not independent of the noise.
+    /// The score of the first pass and its noise, from two passes under the same correction. Uses the mean of both errors: the error of one
+    /// alone is not independent of the noise.
     pub(super) fn repeated(self, before: &Self) -> (Self, Noise) {
         let pairs = || self.error.iter().zip(&before.error);
         let of = |with: fn(f64, f64) -> f64| {
@@ -114,8 +114,8 @@ impl Score {
         (Self { error: mean, ..self }, Noise(difference))
     }
 
-    /// How this pass stands to the best one: less if it is better by more than the noise, and neither translation nor angles are worse than in the
-    /// first pass by more than that; greater if it is worse than one of them by more than the noise; equal in between, none if it is no number.
+    /// Compares this pass with the best one. `Less`: better by more than the noise, with neither translation nor angles worse than in the
+    /// first pass by more than the noise. `Greater`: worse in one of them by more than the noise. `Equal`: in between. `None`: not a number.
     pub(super) fn beside(&self, [first, best]: [&Self; 2], noise: &Noise) -> Option<Ordering> {
         let ([.., both], [.., least]) = (self.squares, best.squares);
         let [.., apart] = noise.between(self, best);
@@ -134,7 +134,7 @@ impl Score {
 }
 
 impl Noise {
-    /// What the mean squares of two passes differ by without learning, m².
+    /// Difference in mean square of two passes without learning, m².
     fn between(&self, one: &Score, other: &Score) -> Kinds {
         let width = self.0.len().div_ceil(PARTS).max(1);
         let count = self.0.len().div_ceil(width) as f64;
@@ -154,7 +154,7 @@ impl Noise {
         [of(&[0]), of(&[3]), of(&[0, 3])]
     }
 
-    /// In the root mean square of the whole error of a pass, nm.
+    /// The noise in terms of the rms error of a pass, nm.
     pub(super) fn nm(&self, score: &Score) -> f64 {
         let [.., both] = self.between(score, score);
         let root = libm::sqrt(score.squares[2]);
@@ -168,23 +168,23 @@ mod tests {
 
     const TICKS: usize = 320;
 
-    /// x and rx of every tick.
+    /// Errors x and rx in every tick.
     fn score(x: impl Fn(usize) -> f64, rx: f64) -> Score {
         let error: Vec<[f64; 6]> = (0..TICKS).map(|tick| [x(tick), 0.0, 0.0, rx, 0.0, 0.0]).collect();
         let mean = |first| error.iter().map(|error| product(error, error, first)).sum::<f64>() / TICKS as f64;
         Score { squares: kinds(mean), error }
     }
 
-    /// Two passes of 3 and 1 that differ by 0.2 at random.
+    /// Two passes of 3 and 1 with a random difference of 0.2.
     fn equal() -> (Score, Noise) {
         let other = |tick: usize| if (tick / 20).is_multiple_of(2) { 3.1 } else { 2.9 };
         score(|tick| 6.0 - other(tick), 1.0).repeated(&score(other, 1.0))
     }
 
     #[test]
-    fn a_gain_is_more_than_two_equal_passes_differ_by() {
+    fn an_improvement_exceeds_the_noise_of_equal_passes() {
         let (first, noise) = equal();
-        // Parts of ±0.2 · 6: the mean of sixteen of them is known to 2 · 1.2/√16.
+        // Parts of ±0.2 · 6: the mean of sixteen parts is known to 2 · 1.2/√16.
         let found = noise.between(&first, &first);
         for (found, expected) in found.iter().zip([0.6, 0.0, 0.6]) {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
@@ -196,7 +196,7 @@ mod tests {
             (2.95, 1.0, Some(Ordering::Equal)),
             (3.05, 1.0, Some(Ordering::Equal)),
             (3.3, 1.0, Some(Ordering::Greater)),
-            // The sum is less, and a part of it worse than without learning.
+            // The sum is better, but one kind is worse than without learning.
             (1.0, 1.1, Some(Ordering::Greater)),
             (3.3, 0.0, Some(Ordering::Greater)),
             (3.05, 0.0, Some(Ordering::Less)),
@@ -204,7 +204,7 @@ mod tests {
         ] {
             assert_eq!(beside(x, rx), expected, "{x} {rx}");
         }
-        // Better than the first, and not than the best; the smaller the error, the smaller the noise.
+        // Better than the first but not than the best. A smaller error has a smaller noise.
         let best = score(|_| 0.5, 0.0);
         assert_eq!(score(|_| 0.65, 0.0).beside([&first, &best], &noise), Some(Ordering::Greater));
         assert_eq!(score(|_| 0.45, 0.0).beside([&first, &best], &noise), Some(Ordering::Equal));
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn two_passes_without_a_gain_or_one_that_is_worse_end_learning() {
+    fn two_passes_without_improvement_or_one_worse_pass_stop_learning() {
         let before = |tick: usize| if (tick / 20).is_multiple_of(2) { 3.1 } else { 2.9 };
         let judged = |passes: &[f64]| -> Vec<Verdict> {
             let mut judge = Judge::new(score(|tick| 6.0 - before(tick), 1.0), &score(before, 1.0));
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn drift_counts_whole() {
+    fn drift_counts_in_full() {
         let (first, noise) = score(|_| 3.1, 1.0).repeated(&score(|_| 3.0, 1.0));
         let [translation, ..] = noise.between(&first, &first);
         assert!((translation - 0.61).abs() < 1e-12, "{translation}");

@@ -1,11 +1,11 @@
-//! Matrices of six by six complex numbers.
+//! Complex 6×6 matrices.
 
 use specgen_numerics::nyquist::{Complex, over, plus, square, times};
 
-/// Squarings of the matrix whose norm bounds its spectral radius: ‖M³²‖^(1/32).
+/// Number of squarings for the bound of the spectral radius: ‖M³²‖^(1/32).
 const SQUARINGS: i32 = 5;
 
-/// Six by six, complex.
+/// A complex 6×6 matrix.
 pub(super) type Matrix6c = [[Complex; 6]; 6];
 
 /// I − share · product.
@@ -19,7 +19,7 @@ pub(super) fn multiply(a: &Matrix6c, b: &Matrix6c) -> Matrix6c {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..6).fold([0.0; 2], |sum, k| plus(sum, times(a[i][k], b[k][j])))))
 }
 
-/// Bound of the spectral radius from above, close: ‖M^n‖^(1/n).
+/// A close upper bound of the spectral radius: ‖M^n‖^(1/n).
 pub(super) fn spectral_radius(matrix: &Matrix6c) -> f64 {
     let mut power = *matrix;
     let mut scale = 0.0;
@@ -28,7 +28,7 @@ pub(super) fn spectral_radius(matrix: &Matrix6c) -> f64 {
         if norm == 0.0 || !norm.is_finite() {
             return norm;
         }
-        // Kept near 1, with its logarithm beside it.
+        // Normalised to 1; the logarithm of the factor is kept separately.
         power = power.map(|row| row.map(|value| value.map(|part| part / norm)));
         power = multiply(&power, &power);
         scale = 2.0 * (scale + libm::log(norm));
@@ -36,18 +36,18 @@ pub(super) fn spectral_radius(matrix: &Matrix6c) -> f64 {
     libm::exp((scale + libm::log(norm(&power))) / libm::exp2(f64::from(SQUARINGS)))
 }
 
-/// Largest sum of magnitudes of a row.
+/// Largest row sum of magnitudes.
 pub(super) fn norm(matrix: &Matrix6c) -> f64 {
     let sums = matrix.iter().map(|row| row.iter().map(|value| libm::sqrt(square(*value))).sum::<f64>());
     sums.fold(0.0, larger)
 }
 
-/// The larger of two; a NaN where one is none.
+/// The larger of two; NaN if either is.
 pub(super) fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b <= a { a } else { b }
 }
 
-/// By elimination with row pivots; not finite where there is none.
+/// The inverse by elimination with row pivots; not finite for a singular matrix.
 pub(super) fn inverse(matrix: &Matrix6c) -> Matrix6c {
     let mut a = *matrix;
     let mut b: Matrix6c = std::array::from_fn(|i| std::array::from_fn(|j| [f64::from(i == j), 0.0]));
@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_inverse_is_one_and_the_radius_is_bounded_closely() {
+    fn the_inverse_is_correct_and_the_bound_of_the_radius_close() {
         let mut state = 1_u32;
         let mut draw = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -81,7 +81,7 @@ mod tests {
         let matrix: Matrix6c = std::array::from_fn(|_| std::array::from_fn(|_| [draw(), draw()]));
         let off = left(&multiply(&matrix, &inverse(&matrix)), 1.0);
         assert!(norm(&off) < 1e-13, "{off:?}");
-        // Similar to a triangle: its eigenvalues are those on the diagonal.
+        // Similar to a triangular matrix, so its eigenvalues are on the diagonal.
         let triangle: Matrix6c = std::array::from_fn(|i| {
             std::array::from_fn(|j| {
                 if j < i {
@@ -97,7 +97,7 @@ mod tests {
         let radius = spectral_radius(&similar);
         let expected = libm::hypot(0.5, 0.3);
         assert!(radius >= expected * (1.0 - 1e-9) && radius < 1.15 * expected, "{radius} {expected}");
-        // What is no number in one entry has no bound.
+        // A NaN entry leaves no bound.
         for (row, column) in [(0, 0), (3, 1), (5, 5)] {
             let mut spoilt = similar;
             spoilt[row][column][1] = f64::NAN;

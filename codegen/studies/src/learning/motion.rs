@@ -1,16 +1,16 @@
-//! A pass of a motion, tick by tick, from rest to rest at one pose.
+//! A pass of a motion, tick by tick, starting and ending at rest in the same pose.
 
 use std::ops::Range;
 
 use host_sim::closed_loop::{RunError, ticks_within};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 
-/// Rest before and after the motion, and after the way back: what comes before the start is prepared, what rings is learned from; s.
+/// Rest before and after the motion, and after the return, s: preparation before the start and ringing after the end are learned as well.
 const BEFORE: f64 = 0.05;
 const AFTER: f64 = 0.1;
-/// Shortest way back to where the motion began, s.
+/// Shortest return to the start of the motion, s.
 const BACK: f64 = 0.2;
-/// Largest slope of a way from rest to rest, in lengths by times.
+/// Largest slope of a move from rest to rest, normalised to length and time.
 const SLOPE: f64 = 1.875;
 
 /// A pass.
@@ -20,19 +20,19 @@ pub struct Motion {
     pub targets: Vec<PoseTarget>,
     /// Ticks of the motion itself.
     pub scored: Range<usize>,
-    /// Ticks that a correction may be given for: those, and the rest before and after it.
+    /// Number of ticks that a correction may cover: the motion, and the rest before and after it.
     pub corrected: usize,
-    /// Of the platform's joints, m: what angles count with.
+    /// Radius of the platform's joints, m, by which angles are multiplied.
     pub radius: f64,
-    /// Of a tick, s.
+    /// Length of a tick, s.
     pub interval: f64,
 }
 
 impl Motion {
-    /// Of a trajectory, at intervals (s); back to its start no faster than `speed` (m/s and rad/s of each axis). Angles count with `radius` (m).
+    /// A pass of a trajectory, sampled at intervals (s), with a return no faster than `speed` (m/s and rad/s of each axis); `radius` in m.
     ///
     /// # Errors
-    /// If it has no tick, or too many.
+    /// If it has no ticks, or too many.
     pub fn of(trajectory: &dyn PoseTrajectory, interval: f64, speed: &[f64; 6], radius: f64) -> Result<Self, RunError> {
         let [before, after] = [BEFORE, AFTER].map(|time| libm::round(time / interval) as usize);
         let ticks = ticks_within(trajectory.duration(), interval)?;

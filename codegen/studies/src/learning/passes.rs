@@ -1,4 +1,4 @@
-//! Passes over a machine, simulated or real, until learning is done.
+//! Runs passes on a machine, simulated or real, until learning stops.
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -14,34 +14,34 @@ use specgen_runtime::playback::{self, Knot, UNIT};
 
 use super::gain::{Judge, Score, Verdict};
 use super::motion::Motion;
+use super::observation::PassObservation;
 use super::plan::Plan;
-use super::seen::PassObservation;
 use super::table::knots;
 use super::update::Update;
 
-/// Status bits of set-points that were refused or stale: the motion was not made.
+/// Status bits for refused or stale set-points: the motion was not made.
 const NOT_FOLLOWED: u32 = 0x3_0000;
-/// Status bits of gauges that were not believed.
+/// Status bits for implausible gauges.
 const GAUGES: u32 = 0x3f00;
-/// Status bits of legs that the limits held back.
+/// Status bits for legs at a limit.
 const LEGS: u32 = 0x3f;
-/// Status bit of a correction that the limits held back.
+/// Status bit for a limited correction.
 const CORRECTION_LIMITED: u32 = 1 << 20;
-/// An error above this part of the least one grows.
+/// The error counts as growing above this multiple of the smallest one.
 const GROWS: f64 = 1.5;
 
-/// Why nothing is learned.
+/// Reasons learning is refused.
 #[derive(Debug)]
 pub enum LearnError {
-    /// The simulated machine does not make a pass.
+    /// The simulated machine cannot make a pass.
     Run(RunError),
-    /// A pass with these status bits: the controller refused a set-point, or believed no gauge.
+    /// A pass ended with these status bits: the controller refused a set-point or rejected a gauge.
     Status(u32),
-    /// Limits held back what the machine was to be excited with, with these status bits.
+    /// Limits restricted the excitation, with these status bits.
     Limited(u32),
-    /// The machine ended a pass; why is known to whoever operates it.
+    /// The machine ended a pass; its operator knows why.
     Ended,
-    /// The device does not learn with its plan.
+    /// The device refuses the plan.
     Refused,
 }
 
@@ -51,18 +51,18 @@ impl fmt::Display for LearnError {
             Self::Run(error) => error.fmt(f),
             Self::Status(status) => write!(
                 f,
-                "the controller does not make this motion: {}; make it slower, or raise control.setpoint.stream_speed or the \
+                "the controller cannot follow this motion: {}; make it slower, or raise control.setpoint.stream_speed or the \
                  workspace in the spec",
                 status_words(*status)
             ),
             Self::Limited(status) => write!(
                 f,
-                "limits held the sweep back, so that it shows no response: {}; leave more room: a smaller motion, or a larger \
+                "limits restricted the sweep, so the response could not be measured: {}; use a smaller motion or a larger \
                  control.correction",
                 status_words(*status)
             ),
             Self::Ended => f.write_str("the machine ended a pass"),
-            Self::Refused => f.write_str("the device does not learn with this plan"),
+            Self::Refused => f.write_str("the device refuses this learning plan"),
         }
     }
 }
@@ -75,17 +75,17 @@ impl From<RunError> for LearnError {
     }
 }
 
-/// Who makes the correction of the next pass.
+/// Computes the correction of the next pass.
 #[derive(Clone, Copy)]
 pub enum Learner<'a> {
-    /// The host, by the spectra of a whole pass.
+    /// The host, from the spectra of a whole pass.
     Host(&'a Update),
-    /// The machine's own device, in its background.
+    /// The machine's own device, in its background loop.
     Device(&'a Plan),
 }
 
 impl Learner<'_> {
-    /// The correction of the next pass, of the one that was `played` and what was `seen`.
+    /// The correction of the next pass, from the one `played` and the observation `seen`.
     fn next(
         self,
         machine: &mut dyn RepeatableMachine,
@@ -106,50 +106,50 @@ impl Learner<'_> {
 
 /// A machine that can repeat a motion.
 pub trait RepeatableMachine {
-    /// A pass of the motion under the correction of these knots, so many ticks apart.
+    /// Runs a pass of the motion with a correction given by knots, `spacing` ticks apart.
     ///
     /// # Errors
-    /// If the machine does not make it.
+    /// If the machine does not complete it.
     fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<PassObservation, LearnError>;
 
-    /// The correction that its device makes of the one that was played and what was seen.
+    /// The correction that the device computes from the one played and the observation.
     ///
     /// # Errors
-    /// If the device does not learn with this plan.
+    /// If the device refuses the plan.
     fn next(&mut self, plan: &Plan, played: &[Knot], seen: &PassObservation) -> Result<Vec<Knot>, LearnError> {
         plan.next(played, &seen.kept).ok_or(LearnError::Refused)
     }
 
-    /// Learning is over, and this correction is kept: a machine that has another one in its memory gets this one.
+    /// Learning has ended with this correction: a machine with another one in memory loads this one.
     ///
     /// # Errors
-    /// If the machine does not take it.
+    /// If the machine refuses it.
     fn keep(&mut self, _motion: &Motion, _knots: &[Knot], _spacing: u32) -> Result<(), LearnError> {
         Ok(())
     }
 }
 
-/// The course of a pass, in which the trajectory of this number is played.
+/// The course of a pass of the trajectory with this number.
 #[must_use]
 pub fn course(motion: &Motion, spacing: u32, trajectory: u32) -> Course {
     Course { spacing, before: motion.scored.start as u32, ticks: motion.corrected as u32, trajectory }
 }
 
-/// Errors tick by tick, m and rad, as they were kept from knot to knot.
+/// Errors tick by tick, m and rad, held between the recorded knots.
 #[must_use]
 pub fn held(errors: &[Knot], spacing: u32, ticks: usize) -> Vec<[f64; 6]> {
     let metres = |knot: &Knot| knot.map(|value| f64::from(value) * UNIT);
     errors.iter().flat_map(|knot| std::iter::repeat_n(metres(knot), spacing as usize)).take(ticks).collect()
 }
 
-/// Root mean square of the translation's error as a norm, nm, of what a pass kept.
+/// Rms error of the translation as a norm, nm, from the recorded errors of a pass.
 #[must_use]
 pub fn translation_nm(errors: &[Knot]) -> f64 {
     let squares = errors.iter().flat_map(|knot| &knot[..3]).map(|value| f64::from(*value) * f64::from(*value));
     libm::sqrt(squares.sum::<f64>() / errors.len() as f64) * UNIT * 1e9
 }
 
-/// The same player as on a machine.
+/// Uses the same player as a real machine.
 impl RepeatableMachine for Bench<'_> {
     fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<PassObservation, LearnError> {
         let course = course(motion, spacing, 0);
@@ -175,15 +175,15 @@ impl RepeatableMachine for Bench<'_> {
 /// Errors of a pass, over the motion itself.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pass {
-    /// Root mean square of the translation's true error as a norm, nm.
+    /// Rms true error of the translation as a norm, nm.
     pub translation_nm: f64,
-    /// Of the angles', nrad.
+    /// Rms true error of the angles as a norm, nrad.
     pub orientation_nrad: f64,
-    /// Of both as the gauges show them, angles times the radius of the joints, nm: what decides.
+    /// Rms measured error of both, with angles times the joint radius, nm: the criterion.
     pub measured_nm: f64,
-    /// Status bits seen.
+    /// Accumulated status bits.
     pub status: u32,
-    /// What was measured of the motion.
+    /// The measured part of the motion.
     #[serde(flatten)]
     pub coverage: Coverage,
 }
@@ -212,61 +212,61 @@ impl Pass {
         })
     }
 
-    /// Whether the limits held the correction back.
+    /// Whether the correction was limited.
     #[must_use]
     pub fn limited(&self) -> bool {
         self.status & CORRECTION_LIMITED != 0
     }
 }
 
-/// Why no more passes were made.
+/// Why learning ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ending {
-    /// All were made that were asked for.
+    /// All requested passes were made.
     AllPasses,
-    /// The last one was worse than the best one by more than the noise, or two one after the other were no better than it by more than that.
+    /// The last pass was worse than the best one by more than the noise, or two consecutive passes were not better by more than the noise.
     NoGain,
-    /// The error of the last one was half as large again as that of the best one, or more.
+    /// The error of the last pass was at least half as large again as that of the best one.
     Growth,
-    /// Whoever watched them ended them.
+    /// The user stopped it.
     Interruption,
     /// The machine ended a pass.
     Machine,
 }
 
-/// What came of it.
+/// Result of learning.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LearningResult {
-    /// The first is without correction, or with the one that learning began with.
+    /// The first pass has no correction, or the initial one.
     pub passes: Vec<Pass>,
-    /// The pass whose correction is kept: the last one that was better than those before it by more than the noise; 0 if none was.
+    /// The pass whose correction is kept: the last one better than all before it by more than the noise; 0 if there is none.
     pub best: usize,
     /// Its knots.
     #[serde(skip)]
     pub knots: Vec<Knot>,
-    /// What two passes under one correction differ by in [`Pass::measured_nm`], nm; none where no pass was to be learned from.
+    /// Difference of two passes under the same correction in [`Pass::measured_nm`], nm; `None` if there was nothing to learn from.
     pub noise_nm: Option<f64>,
-    /// Why it ended.
+    /// Why learning ended.
     pub ending: Ending,
 }
 
 impl LearningResult {
-    /// Whether the error grew in the last pass.
+    /// Whether learning ended because the error grew.
     #[must_use]
     pub fn grew(&self) -> bool {
         self.ending == Ending::Growth
     }
 }
 
-/// Makes up to `count` passes beyond the first and learns from each. A correction is kept if its pass is better than the best one before it by
-/// more than the noise of both, and worse than the first neither in translation nor in angles. A pass that is worse by more than the noise ends
-/// learning, and so do two one after the other that gain nothing. Two passes before the first are not counted: only after one is the hysteresis
-/// as in every repetition, and the second shows what repetitions differ by. `begin` is the correction of these three, none of no knots. A
-/// machine that ends a pass later than the first ends learning. `watch` hears of each pass and may end it.
+/// Makes up to `count` passes after the first and learns from each. A correction is kept if its pass is better than the best one before it by
+/// more than the noise of both, and not worse than the first pass in translation or angles. A pass worse by more than the noise ends learning,
+/// and so do two consecutive passes without improvement. Two passes before the first do not count: only after one pass is the hysteresis
+/// as in every repetition, and the second shows the differences between repetitions. `begin` is the correction of these three; no knots means
+/// no correction. If the machine ends a pass after the first, learning ends. `watch` is called after each pass and may stop learning.
 ///
 /// # Errors
-/// If the machine does not make a pass, or not the motion.
+/// If the machine does not complete a pass or does not follow the motion.
 pub fn learn(
     machine: &mut dyn RepeatableMachine,
     motion: &Motion,
@@ -303,7 +303,7 @@ pub fn learn(
             followed(machine.pass(motion, &played, spacing)?)
         });
         seen = match passed {
-            // What was learned so far is worth keeping.
+            // Keep what was learned so far.
             Err(LearnError::Ended) => {
                 learned.ending = Ending::Machine;
                 return Ok(learned);
@@ -318,7 +318,7 @@ pub fn learn(
         if found == Verdict::Keep {
             (learned.best, learned.knots) = (number, played.clone());
         } else if found == Verdict::Stop {
-            // A NaN grows, too.
+            // NaN counts as growth.
             let within =
                 matches!(pass.measured_nm.partial_cmp(&(GROWS * least)), Some(Ordering::Less | Ordering::Equal));
             learned.ending = if within { Ending::NoGain } else { Ending::Growth };
@@ -331,13 +331,13 @@ pub fn learn(
     Ok(learned)
 }
 
-/// A pass in which the motion was made and seen.
+/// Checks that the motion was made and observed in a pass.
 pub(super) fn followed(seen: PassObservation) -> Result<PassObservation, LearnError> {
     let bad = seen.status & (NOT_FOLLOWED | GAUGES);
     if bad == 0 { Ok(seen) } else { Err(LearnError::Status(bad)) }
 }
 
-/// A pass in which no limit held a leg or the correction back.
+/// Checks that no limit affected a leg or the correction in a pass.
 pub(super) fn unlimited(seen: PassObservation) -> Result<PassObservation, LearnError> {
     let bad = seen.status & (LEGS | CORRECTION_LIMITED);
     if bad == 0 { Ok(seen) } else { Err(LearnError::Limited(bad)) }

@@ -1,4 +1,4 @@
-//! What a device learns with by itself: the impulse responses of Q and Q T⁻¹ between knots, and the proof that they converge.
+//! Learning plan of a device: the impulse responses of Q and Q T⁻¹ at the knots, and the proof that learning with them converges.
 
 use std::f64::consts::TAU;
 
@@ -14,49 +14,50 @@ use super::motion::Motion;
 use super::update::FADE;
 use crate::factors::Factors;
 
-/// Knots to both sides at most: what reaches further is what the feedback does.
+/// Longest response to each side, in knots: the feedback deals with anything slower.
 const REACH: usize = 512;
-/// Part of the reach from which on the responses fade out.
+/// Share of the reach after which the responses fade out.
 const WHOLE: f64 = 0.7;
-/// Frequencies of the design in two reaches.
+/// Frequencies of the design per two reaches.
 const FINE: usize = 8;
-/// f_c of the next trial where one does not converge, and the least that is tried, Hz.
+/// Factor on f_c after a trial that does not converge, and the lowest f_c tried, Hz.
 const LOWER: f64 = 0.93;
 const LEAST: f64 = 100.0;
-/// Frequencies at which the proof looks, evenly from 0 on, besides those about the modes.
+/// Number of evenly spaced frequencies in the proof, in addition to those around the modes.
 const EVEN: u32 = 200;
 
-/// A plan, and what is known of it.
+/// A plan and its properties.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// How the device learns with it.
+    /// Learning settings of the device.
     pub settings: Settings,
-    /// Its rows, behind the knots of a pass.
+    /// Rows of the plan, stored after the knots of a pass.
     pub rows: Vec<Knot>,
-    /// What it does on every machine: band, and the largest bound of the spectral radius of Q − Q T⁻¹ T_real.
+    /// Band, and largest bound of the spectral radius of Q − Q T⁻¹ T_real over the machines.
     pub convergence: Convergence,
     /// Ticks from knot to knot.
     pub spacing: u32,
 }
 
-/// What the design is for.
+/// Inputs of the design.
 struct Grid {
     period: f64,
     spacing: u32,
     reach: usize,
 }
 
-/// Responses of a plan in the time of knots.
+/// Impulse responses of a plan, in knots.
 struct Taps {
-    /// h_m of each mode, from −M on.
+    /// h_m of each mode, starting at m = −M.
     learned: Vec<[f64; 6]>,
-    /// q_m, from 0 on.
+    /// q_m, starting at m = 0.
     kept: Vec<f64>,
 }
 
 impl Plan {
-    /// For passes of a motion on a device that has room for `capacity` knots of corrections and as many of errors; the highest f_c up to that of
-    /// `convergence`, and that fits. None if it converges at none on every machine within `factors`.
+    /// A plan for passes of a motion on a device that can store `capacity` knots of corrections and as many of errors.
+    /// Uses the highest f_c up to that of `convergence` that fits. `None` if learning converges at no frequency on every machine within
+    /// `factors`.
     #[must_use]
     pub fn new(
         learnable: &Learnable,
@@ -80,7 +81,7 @@ impl Plan {
                     let real = learnable.response(closed_loop, conditions, &frequencies);
                     for (real, hertz) in real.iter().zip(&frequencies) {
                         let found = spectral_radius(&grid.left(&taps, real, *hertz));
-                        // A NaN is no convergence, and stays.
+                        // NaN means no convergence, and is kept.
                         [radius, at] = if radius.is_nan() || found <= radius { [radius, at] } else { [found, *hertz] };
                     }
                 }
@@ -94,7 +95,7 @@ impl Plan {
         None
     }
 
-    /// The correction that a device makes of the one that it played and the errors that it kept, by its own kernel. None if it would refuse.
+    /// The device's next correction, computed by its own kernel from the one played and the recorded errors. `None` if it would refuse.
     #[must_use]
     pub fn next(&self, played: &[Knot], errors: &[Knot]) -> Option<Vec<Knot>> {
         let knots = errors.len();
@@ -110,7 +111,7 @@ impl Plan {
     }
 }
 
-/// How far the responses may reach; none if there is no room for the knots.
+/// Longest possible response, in knots; `None` if the knots do not fit.
 fn reach(knots: usize, capacity: usize) -> Option<usize> {
     let fits = |reach: usize| knots + plan_rows(reach) <= capacity;
     let others = knots + knots.div_ceil(6) <= capacity;
@@ -118,7 +119,7 @@ fn reach(knots: usize, capacity: usize) -> Option<usize> {
     (1..=most).rev().find(|reach| others && fits(*reach))
 }
 
-/// Frequencies of the proof, Hz: up to half the rate of knots, beyond which they play and see images of lower ones.
+/// Frequencies of the proof, Hz: up to half the knot rate, above which only aliases are seen and played.
 fn looked_at(learnable: &Learnable, wish: &Convergence, apart: f64) -> Vec<f64> {
     let highest = 0.5 / apart;
     let mut all: Vec<f64> = learnable.grid(wish.band[1]).into_iter().filter(|hertz| *hertz < highest).collect();
@@ -127,12 +128,12 @@ fn looked_at(learnable: &Learnable, wish: &Convergence, apart: f64) -> Vec<f64> 
 }
 
 impl Grid {
-    /// Time from knot to knot, s.
+    /// Time between knots, s.
     fn apart(&self) -> f64 {
         f64::from(self.spacing) * self.period
     }
 
-    /// Of a frequency (Hz), what a device sees and plays of it: the mean of an error over the ticks of a knot, in whose middle it stands, and a spline
+    /// Response of the device itself at a frequency (Hz): it averages the error over the ticks around a knot, and plays a spline
     /// through knots.
     fn shown(&self, hertz: f64) -> Complex {
         let angle = 0.5 * TAU * hertz * self.period;
@@ -183,7 +184,7 @@ impl Grid {
         if far <= WHOLE { 1.0 } else { 0.5 + 0.5 * libm::cos(0.5 * TAU * (far - WHOLE) / (1.0 - WHOLE)) }
     }
 
-    /// Q − Q T⁻¹ T_real at a frequency (Hz): what is left of an error after a pass.
+    /// Q − Q T⁻¹ T_real at a frequency (Hz): the part of an error that remains after a pass.
     fn left(&self, taps: &Taps, real: &Matrix6c, hertz: f64) -> Matrix6c {
         let angle = TAU * hertz * self.apart();
         let [mut learned, mut kept] = [[[0.0; 2]; 6], [[taps.kept[0], 0.0]; 6]];
@@ -217,7 +218,7 @@ impl Grid {
         debug_assert_eq!(rows.len(), HEAD);
         rows.extend(&taps.learned);
         rows.extend(taps.kept.chunks(6).map(|part| std::array::from_fn(|k| part.get(k).copied().unwrap_or(0.0))));
-        // Sums are of f32; what a plan holds is rounded once.
+        // The device sums in f32, so the plan is rounded once, here.
         let rows = rows.iter().map(|row| row.map(|value| (value as f32).to_bits().cast_signed())).collect();
         let knot = |time: f64| libm::ceil(time / self.apart()) as u32;
         Plan {

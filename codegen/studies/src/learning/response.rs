@@ -1,4 +1,4 @@
-//! The response of a running loop to a correction, as it was measured: its file, and how well it is known.
+//! Measured response of a running loop to a correction: its file and its uncertainty.
 
 use std::path::Path;
 
@@ -9,9 +9,9 @@ use specgen_numerics::nyquist::square;
 use super::matrix::{Matrix6c, inverse, multiply, spectral_radius};
 use super::table::TableError;
 
-/// Version of the file.
+/// Format and version of the file.
 const FORMAT: &str = "specgen response 1";
-/// Standard errors that the response may be off in every entry.
+/// Assumed uncertainty of every entry, in standard errors.
 const ERRORS: f64 = 3.0;
 
 /// T at one frequency.
@@ -20,35 +20,35 @@ const ERRORS: f64 = 3.0;
 pub struct Bin {
     /// Hz.
     pub hertz: f64,
-    /// What the gauges show of each mode by the correction of each mode: rows are shown, columns given; real and imaginary part.
+    /// Response of the gauges to corrections, in modal coordinates: rows are outputs, columns inputs; real and imaginary part.
     pub response: Matrix6c,
     /// Standard error of the magnitude of each entry.
     pub error: [[f64; 6]; 6],
 }
 
-/// T of a machine, measured with its loop closed and running, in the modal coordinates of its spec.
+/// T of a machine, measured in closed loop while running, in the modal coordinates of its spec.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Response {
-    /// What the file is.
+    /// Format and version.
     format: String,
     /// Digest of the spec.
     pub digest: String,
-    /// The machine, as its user calls it.
+    /// The user's name of the machine.
     pub machine: String,
-    /// By rising frequency, at least two.
+    /// In ascending order of frequency, at least two.
     pub bins: Vec<Bin>,
 }
 
 impl Response {
-    /// Of the spec of a digest and a machine.
+    /// For the digest of a spec and a machine.
     #[must_use]
     pub fn new([digest, machine]: [&str; 2], bins: Vec<Bin>) -> Self {
         let [digest, machine] = [digest, machine].map(str::to_owned);
         Self { format: FORMAT.to_owned(), digest, machine, bins }
     }
 
-    /// Its file: JSON, a frequency a line.
+    /// The file content: JSON, one frequency per line.
     #[must_use]
     pub fn to_json(&self) -> String {
         let head =
@@ -57,34 +57,36 @@ impl Response {
         format!("{},\n\"bins\":[\n{}\n]}}\n", head.trim_end_matches('}'), lines.join(",\n"))
     }
 
-    /// The response of a file.
+    /// Reads a file.
     ///
     /// # Errors
-    /// If it cannot be read, or is none.
+    /// If it cannot be read or is not a response.
     pub fn of_file(path: &Path) -> Result<Self, TableError> {
-        Self::read(&files::text(path).map_err(|unread| TableError::Unread(format!("it cannot be read: {unread}")))?)
+        Self::read(&files::text(path).map_err(|unread| TableError::Unread(format!("cannot be read: {unread}")))?)
     }
 
-    /// The response of a file's text.
+    /// Parses the text of a file.
     ///
     /// # Errors
-    /// If it is none.
+    /// If it is not a response.
     pub fn read(text: &str) -> Result<Self, TableError> {
         let response: Self = serde_json::from_str(text).map_err(|error| TableError::Response(error.to_string()))?;
         if response.format != FORMAT {
-            return Err(TableError::Response(format!("its format is `{}`, expected `{FORMAT}`", response.format)));
+            return Err(TableError::Response(format!("the format is `{}`, expected `{FORMAT}`", response.format)));
         }
         let bins = &response.bins;
         if bins.len() < 2 || !(bins[0].hertz > 0.0 && bins.windows(2).all(|pair| pair[0].hertz < pair[1].hertz)) {
-            return Err(TableError::Response("`bins` are not two or more, by rising frequency".to_owned()));
+            return Err(TableError::Response(
+                "`bins` must be at least two, in ascending order of frequency".to_owned(),
+            ));
         }
         Ok(response)
     }
 
-    /// Whether it is of this spec and machine.
+    /// Checks that it belongs to this spec and machine.
     ///
     /// # Errors
-    /// What it is of instead.
+    /// If it belongs to another.
     pub fn is_for(&self, digest: &str, machine: &str) -> Result<(), TableError> {
         let other = |what, there: &str, here: &str| Err(TableError::Measured(what, there.to_owned(), here.to_owned()));
         if self.digest != digest {
@@ -96,7 +98,7 @@ impl Response {
         Ok(())
     }
 
-    /// T at a frequency, Hz, along a straight line between those that were measured; beyond them that of the last.
+    /// T at a frequency, Hz, interpolated linearly; constant beyond the measured range.
     #[must_use]
     pub fn at(&self, hertz: f64) -> Matrix6c {
         let above = self.bins.partition_point(|bin| bin.hertz <= hertz);

@@ -1,4 +1,4 @@
-//! The learned correction as a table: knots, and a file that says for what they were learned.
+//! The learned correction as a table of knots, and its file with spec, machine and motion.
 
 use std::fmt;
 use std::path::Path;
@@ -7,43 +7,43 @@ use serde::{Deserialize, Serialize};
 use specgen_language::files;
 use specgen_runtime::playback::{Knot, UNIT};
 
-/// Version of the file.
+/// Format and version of the file.
 const FORMAT: &str = "specgen correction 1";
 
-/// A correction that was learned.
+/// A learned correction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
-    /// What the file is.
+    /// Format and version.
     format: String,
     /// Digest of the spec.
     pub digest: String,
-    /// The machine that it was learned on, as its user calls it.
+    /// The user's name of the machine on which it was learned.
     pub machine: String,
-    /// The motion, as its user calls it.
+    /// The user's name of the motion.
     pub motion: String,
-    /// Ticks from knot to knot.
+    /// Ticks between knots.
     pub spacing: u32,
     /// Ticks of rest before the motion.
     pub before: u32,
-    /// Where the motion begins, in the user's coordinates, m and rad.
+    /// Start pose of the motion, in the user's coordinates, m and rad.
     pub start: [f64; 6],
-    /// Knots: pm and prad.
+    /// Knots, pm and prad.
     pub knots: Vec<Knot>,
 }
 
-/// Why a file is not taken.
+/// Why a file is refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TableError {
-    /// It cannot be read.
+    /// The file cannot be read.
     Unread(String),
-    /// It is none.
+    /// Not a correction file.
     Format(String),
-    /// It is of another spec, machine or motion: what, there, here.
+    /// It is for another spec, machine or motion: kind, value in the file, current value.
     Other(&'static str, String, String),
-    /// It is no response.
+    /// Not a response file.
     Response(String),
-    /// It is a response of another spec or machine: what, there, here.
+    /// The response of another spec or machine: kind, value in the file, current value.
     Measured(&'static str, String, String),
 }
 
@@ -51,13 +51,13 @@ impl fmt::Display for TableError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unread(why) => f.write_str(why),
-            Self::Format(why) => write!(f, "this is no correction that `specgen learn` wrote: {why}"),
+            Self::Format(why) => write!(f, "not a correction written by `specgen learn`: {why}"),
             Self::Other(what, there, here) => {
-                write!(f, "it was learned for the {what} `{there}`, not `{here}`; learn anew, without --from")
+                write!(f, "it was learned for the {what} `{there}`, not `{here}`; learn again without --from")
             }
-            Self::Response(why) => write!(f, "this is no response that `specgen learn --excite` wrote: {why}"),
+            Self::Response(why) => write!(f, "not a response written by `specgen learn --excite`: {why}"),
             Self::Measured(what, there, here) => {
-                write!(f, "it was measured with the {what} `{there}`, not `{here}`; measure it anew by --excite")
+                write!(f, "it was measured with the {what} `{there}`, not `{here}`; measure it again with --excite")
             }
         }
     }
@@ -66,7 +66,7 @@ impl fmt::Display for TableError {
 impl std::error::Error for TableError {}
 
 impl Table {
-    /// A table for the spec of a digest, a machine and a motion, by its name, from this start on; `spacing` and `before` in ticks.
+    /// A table for the digest of a spec, a machine and a named motion from this start pose; `spacing` and `before` in ticks.
     #[must_use]
     pub fn new(
         [digest, machine, motion]: [&str; 3],
@@ -78,7 +78,7 @@ impl Table {
         Self { format: FORMAT.to_owned(), digest, machine, motion, spacing, before, start, knots }
     }
 
-    /// Its file: JSON, a knot a line.
+    /// The file content: JSON, one knot per line.
     #[must_use]
     pub fn to_json(&self) -> String {
         let head = serde_json::json!({
@@ -90,36 +90,36 @@ impl Table {
         format!("{},\n\"knots\":[\n{}\n]}}\n", head.trim_end_matches('}'), lines.join(",\n"))
     }
 
-    /// The table of a file.
+    /// Reads a file.
     ///
     /// # Errors
-    /// If it cannot be read, or is none.
+    /// If it cannot be read or is not a correction.
     pub fn of_file(path: &Path) -> Result<Self, TableError> {
-        Self::read(&files::text(path).map_err(|unread| TableError::Unread(format!("it cannot be read: {unread}")))?)
+        Self::read(&files::text(path).map_err(|unread| TableError::Unread(format!("cannot be read: {unread}")))?)
     }
 
-    /// The table of a file's text.
+    /// Parses the text of a file.
     ///
     /// # Errors
-    /// If it is none.
+    /// If it is not a correction.
     pub fn read(text: &str) -> Result<Self, TableError> {
         let table: Self = serde_json::from_str(text).map_err(|error| TableError::Format(error.to_string()))?;
         if table.format != FORMAT {
-            return Err(TableError::Format(format!("its format is `{}`, expected `{FORMAT}`", table.format)));
+            return Err(TableError::Format(format!("the format is `{}`, expected `{FORMAT}`", table.format)));
         }
         if table.spacing == 0 {
-            return Err(TableError::Format("`spacing` is 0, expected a number of ticks".to_owned()));
+            return Err(TableError::Format("`spacing` is 0; it must be at least 1 tick".to_owned()));
         }
         if !table.start.iter().all(|place| place.is_finite()) {
-            return Err(TableError::Format("`start` is no pose".to_owned()));
+            return Err(TableError::Format("`start` is not a pose".to_owned()));
         }
         Ok(table)
     }
 
-    /// Whether it is for this spec, machine and motion.
+    /// Checks that it is for this spec, machine and motion.
     ///
     /// # Errors
-    /// What it is not for.
+    /// If it is for another.
     pub fn is_for(&self, digest: &str, machine: &str, motion: &str) -> Result<(), TableError> {
         let other = |what, there: &str, here: &str| Err(TableError::Other(what, there.to_owned(), here.to_owned()));
         if self.digest != digest {
@@ -135,7 +135,7 @@ impl Table {
     }
 }
 
-/// Knots of the spline that passes through every `spacing`-th value of a signal (m and rad), which begins and ends at 0.
+/// Knots of the spline through every `spacing`-th value of a signal (m and rad) that starts and ends at 0.
 #[must_use]
 pub fn knots(signal: &[[f64; 6]], spacing: u32) -> Vec<Knot> {
     let values: Vec<[f64; 6]> = signal.iter().step_by(spacing as usize).copied().collect();
@@ -153,7 +153,7 @@ pub fn knots(signal: &[[f64; 6]], spacing: u32) -> Vec<Knot> {
         let mut next = 0.0;
         for (knot, [above, value]) in knots.iter_mut().zip(&eliminated).rev() {
             next = value - above * next;
-            // Beyond the range of a word is beyond every limit; the cast saturates.
+            // A value beyond the word's range is beyond every limit; the cast saturates.
             knot[axis] = libm::round(next) as i32;
         }
     }
@@ -166,7 +166,7 @@ mod tests {
     use specgen_runtime::playback;
 
     #[test]
-    fn the_spline_passes_through_the_signal_at_its_knots_and_near_it_between() {
+    fn the_spline_interpolates_the_signal() {
         let signal: Vec<[f64; 6]> = (0..1001)
             .map(|tick| {
                 let t = f64::from(tick) / 1000.0;
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_comes_back_and_is_refused_for_anything_else() {
+    fn a_table_is_read_back_and_refused_for_another_use() {
         let knots = vec![[1, -2, 3, 4, 5, i32::MIN]; 3];
         let table = Table::new(["d1", "stage 7", "case-1 10 Hz"], [5, 7], [0.1; 6], knots);
         let back = Table::read(&table.to_json()).unwrap();
@@ -196,7 +196,7 @@ mod tests {
             [("d2", "stage 7", "case-1 10 Hz"), ("d1", "stage 8", "case-1 10 Hz"), ("d1", "stage 7", "x")]
         {
             let error = back.is_for(digest, machine, motion).unwrap_err().to_string();
-            assert!(error.contains("learn anew"), "{error}");
+            assert!(error.contains("learn again"), "{error}");
         }
         for text in ["", "{}", &table.to_json().replace("correction 1", "correction 9")] {
             assert!(Table::read(text).is_err(), "{text}");

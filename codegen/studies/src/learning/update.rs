@@ -1,4 +1,4 @@
-//! c ← Q (c + L e), by the Fourier transform of a whole pass.
+//! The update c ← Q (c + L e), by the Fourier transform of a whole pass.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -10,28 +10,28 @@ use super::matrix::{Matrix6c, inverse};
 use super::motion::Motion;
 use specgen_numerics::Matrix6;
 
-/// Over which a correction fades in and out, s.
+/// Fade-in and fade-out time of a correction, s.
 pub(super) const FADE: [f64; 2] = [5e-3, 20e-3];
-/// Power of a bin over that of white noise up to which it counts as noise.
+/// Bins with power up to this multiple of the white-noise power count as noise.
 const NOISE: f64 = 3.0;
 
-/// The change of a correction between passes of one length.
+/// Update of a correction between passes of one length.
 pub struct Update {
-    /// L and Q, at the frequencies that Q lets through.
+    /// L and Q at the frequencies that Q passes.
     bins: Vec<(Matrix6c, f64)>,
     to_modal: Matrix6,
     from_modal: Matrix6,
     length: usize,
     fade: [usize; 2],
-    /// Ticks of rest that a pass begins with.
+    /// Ticks of rest at the start of a pass.
     rest: usize,
-    /// Ticks that an error is the mean of.
+    /// Ticks over which an error is averaged.
     spacing: usize,
     transforms: [Arc<dyn Fft<f64>>; 2],
 }
 
 impl Update {
-    /// For passes of a motion whose errors are means over `spacing` ticks each, which lose a part of what is fast.
+    /// For passes of a motion with errors averaged over `spacing` ticks, which attenuates high frequencies.
     #[must_use]
     pub fn new(learnable: &Learnable, motion: &Motion, convergence: &Convergence, spacing: u32) -> Self {
         let width = f64::from(spacing) * learnable.closed_loop.period;
@@ -43,7 +43,7 @@ impl Update {
                 .map(|(response, hertz)| {
                     let share = convergence.share(*hertz) / kept(hertz * width);
                     let part = match share {
-                        // A response that is not known may have no inverse.
+                        // Where the response is unknown, it may have no inverse.
                         0.0 => [[[0.0; 2]; 6]; 6],
                         _ => inverse(response).map(|row| row.map(|value| value.map(|part| share * part))),
                     };
@@ -53,7 +53,7 @@ impl Update {
         })
     }
 
-    /// With L in modal coordinates and Q, at the frequencies (Hz) that Q of f_c lets through.
+    /// With L in modal coordinates and Q, at the frequencies (Hz) that Q of f_c passes.
     fn of(
         learnable: &Learnable,
         motion: &Motion,
@@ -62,11 +62,11 @@ impl Update {
         design: impl FnOnce(&[f64]) -> Vec<(Matrix6c, f64)>,
     ) -> Self {
         let period = learnable.closed_loop.period;
-        // Twice the length, so that the end does not reach around into the beginning.
+        // Twice the length, so that the end does not wrap around to the beginning.
         let length = (2 * motion.corrected).next_power_of_two();
         let hertz = |bin: usize| bin as f64 / (length as f64 * period);
         let bins = 1 + (highest(bandwidth, period) * length as f64 * period) as usize;
-        // What is constant stands at half of the slowest frequency.
+        // The constant term uses half of the lowest frequency.
         let frequencies: Vec<f64> = (0..bins).map(|bin| if bin == 0 { 0.5 * hertz(1) } else { hertz(bin) }).collect();
         Self {
             bins: design(&frequencies),
@@ -80,12 +80,12 @@ impl Update {
         }
     }
 
-    /// What lag and modes would leave of a motion, by the model: a correction that takes it out before the first pass.
+    /// A correction that compensates lag and modes by the model, before the first pass.
     ///
     /// ```text
-    /// c = Q G⁻¹ (x_d − G r)        r = x_d + τ Δx_d/T_s + ẍ_d/ω², each mode: what the legs are asked for, with lead and load
+    /// c = Q G⁻¹ (x_d − G r)        r = x_d + τ Δx_d/T_s + ẍ_d/ω², per mode: the request to the legs with lead and load
     /// ```
-    /// G is the channel from the request to the gauges that nothing is fed back in, and Q that of f_c (Hz): nothing is late in it.
+    /// G is the open-loop channel from the request to the gauges, and Q that of f_c (Hz), without phase.
     #[must_use]
     pub fn prepared(learnable: &Learnable, motion: &Motion, bandwidth: f64) -> Vec<[f64; 6]> {
         let closed_loop = &learnable.closed_loop;
@@ -125,7 +125,7 @@ impl Update {
         update.next(&vec![[0.0; 6]; motion.corrected], &error)
     }
 
-    /// The next correction, of the one that was played and the error that was measured, tick by tick, m and rad.
+    /// The next correction, from the one played and the measured error, tick by tick, m and rad.
     #[must_use]
     pub fn next(&self, correction: &[[f64; 6]], error: &[[f64; 6]]) -> Vec<[f64; 6]> {
         let ticks = correction.len();
@@ -162,8 +162,8 @@ impl Update {
             .collect()
     }
 
-    /// Variance of white noise in each mode of an error that begins at rest, of single ticks: half of the mean square of the differences
-    /// of its means there, times the ticks of one.
+    /// Variance of white noise in each mode per tick, from the rest at the start of a pass: half of the mean square of the differences
+    /// between averages there, times the ticks per average.
     fn noise(&self, error: &[[f64; 6]]) -> [f64; 6] {
         let rest: Vec<[f64; 6]> =
             error.iter().take(self.rest).step_by(self.spacing).map(|pose| mapped(&self.to_modal, pose)).collect();
@@ -173,7 +173,7 @@ impl Update {
         })
     }
 
-    /// Spectra of the modes of a signal in pose coordinates.
+    /// Modal spectra of a signal in pose coordinates.
     fn spectra(&self, signal: &[[f64; 6]]) -> [Vec<Complex64>; 6] {
         let modal: Vec<[f64; 6]> = signal.iter().map(|pose| mapped(&self.to_modal, pose)).collect();
         std::array::from_fn(|mode| {
@@ -184,7 +184,7 @@ impl Update {
         })
     }
 
-    /// 0 at both ends, 1 but for the fades.
+    /// The fade window: 0 at both ends, 1 between the fades.
     fn share(&self, tick: usize, ticks: usize) -> f64 {
         let part = |inward: usize, fade: usize| {
             if inward >= fade { 1.0 } else { 0.5 - 0.5 * libm::cos(0.5 * TAU * inward as f64 / fade as f64) }
@@ -193,8 +193,8 @@ impl Update {
     }
 }
 
-/// What means over a time of which a period is `1/cycles`, held for as long, leave of a frequency: sinc²; half where it is less, for little
-/// of that is let through.
+/// Attenuation by averaging and holding over `cycles` periods: sinc², but at least one half, since little of higher frequencies
+/// is passed.
 pub(super) fn kept(cycles: f64) -> f64 {
     let angle = 0.5 * TAU * cycles;
     let part = if angle > 0.0 { libm::sin(angle) / angle } else { 1.0 };

@@ -1,4 +1,4 @@
-//! The response of a running machine to a correction, measured in passes of a motion.
+//! Measures the response of a running machine to a correction, during passes of a motion.
 
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
@@ -45,7 +45,7 @@ pub(super) fn run(
         },
         |response, ui| {
             write_file(path, response.to_json().as_bytes())?;
-            let modes = learnable.heard(&response);
+            let modes = learnable.mode_measurements(&response);
             ui.progress(&format!("wrote the response at {} frequencies to {}", response.bins.len(), path.display()));
             Ok(MeasuredResponse {
                 name: compiled.ir.name.clone(),
@@ -61,21 +61,23 @@ pub(super) fn run(
     let SessionResult { found, why, down } = done;
     match found {
         Some(found) => ui.judged(&found, why),
-        None => Err(Failure::Gate(why.unwrap_or_else(|| format!("interrupted before the last sweep was over{down}")))),
+        None => {
+            Err(Failure::Gate(why.unwrap_or_else(|| format!("interrupted before the last sweep was complete{down}"))))
+        }
     }
 }
 
-/// What was measured.
+/// Report of a measurement.
 #[derive(Serialize)]
 struct MeasuredResponse {
     name: String,
     machine: String,
-    /// Of the sweeps, Hz.
+    /// Band of the sweeps, Hz.
     band: [f64; 2],
-    /// At the joints, along the axis that moves most, nm.
+    /// Amplitude at the joints, along the axis with the largest motion, nm.
     amplitude_nm: f64,
     modes: [ModeMeasurement; 6],
-    /// How far up learning converges with it, if anywhere.
+    /// Convergence of learning with this response, if any.
     convergence: Option<Convergence>,
     file: String,
 }
@@ -87,7 +89,7 @@ impl Outcome for MeasuredResponse {
             "{name}: response of the running loop from {low:.1} to {high:.0} Hz, {PASSES} sweeps of\n  {amplitude_nm:.0} nm ({machine})\n"
         );
         let columns = [right(10), right(20), right(20), right(14)];
-        row(&mut text, &columns, &[&"mode, Hz", &"largest", &"by the model", &"known to"]);
+        row(&mut text, &columns, &[&"mode, Hz", &"peak", &"model", &"std. error"]);
         for ModeMeasurement { frequency, largest, modelled, error } in modes {
             let at = |[hertz, gain]: &[f64; 2]| format!("{gain:.2} at {hertz:.0} Hz");
             let cells = [format!("{frequency:.1}"), at(largest), at(modelled), format!("{:.1} %", 100.0 * error)];
@@ -97,9 +99,9 @@ impl Outcome for MeasuredResponse {
         let _ = match convergence {
             Some(Convergence { band: [low, high], radius, at, .. }) => writeln!(
                 text,
-                "  learning with --response {file} converges from {low:.1} to {high:.0} Hz:\n  error times {radius:.2} a pass or less, worst at {at:.0} Hz"
+                "  learning with --response {file} converges from {low:.1} to {high:.0} Hz:\n  error factor per pass at most {radius:.2}, worst at {at:.0} Hz"
             ),
-            None => writeln!(text, "  too little is known of it for learning; measure along a longer motion"),
+            None => writeln!(text, "  it is too uncertain for learning; measure along a longer motion"),
         };
         text
     }

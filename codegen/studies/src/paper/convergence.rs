@@ -1,4 +1,4 @@
-//! The genetic algorithm with the settings of Table 3 on the emitted controller: how the cost (9) falls.
+//! The genetic algorithm with the settings of Table 3 on the emitted controller: convergence of the cost (9).
 
 use std::num::NonZero;
 use std::sync::atomic::AtomicBool;
@@ -16,30 +16,30 @@ use crate::tuning::{
 };
 use specgen_compiler::compile::Compilation;
 
-/// As `specgen tune` has it: margins, and the multisine's highest frequency (Hz) and length (s).
+/// As in `specgen tune`: required margins, and highest frequency (Hz) and length (s) of the multisine.
 const REQUIRED: RequiredMargins = RequiredMargins { gain: 2.0, delay: 0.5 };
 const MULTISINE: [f64; 2] = [10.0, 2.0];
-/// Factor on the spec's own numbers until they hold the margins, and how often.
+/// Factor on the spec's own gains until they meet the margins, and the largest number of reductions.
 const SHRINK: f64 = 0.85;
 const SHRINKS: usize = 40;
 
-/// What the search did.
+/// Result of the search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Convergence {
     /// Seed of strings, machine, noise and multisine.
     pub seed: u64,
-    /// Numbers that are tuned.
+    /// Number of tuned parameters.
     pub dimension: usize,
     /// By generation.
     pub history: Vec<Generation>,
-    /// The best.
+    /// The best candidate.
     pub best: Option<Candidate>,
 }
 
-/// Why there is no search.
+/// Why the search is impossible.
 #[derive(Debug)]
 pub enum ConvergenceError {
-    /// The spec's mode uses nothing that is tuned.
+    /// The spec's mode uses none of the tuned parameters.
     NothingToTune(String),
     /// A run failed.
     Run(RunError),
@@ -54,11 +54,11 @@ impl std::fmt::Display for ConvergenceError {
     }
 }
 
-/// Runs `generations` of 100 strings from the numbers of the spec, made smaller until they hold the margins. The bytes do
+/// Runs `generations` of 100 strings, starting from the spec's parameters, reduced until they meet the margins. The bytes do
 /// not depend on the number of threads.
 ///
 /// # Errors
-/// If nothing is tuned, or a run fails.
+/// If there is nothing to tune, or a run fails.
 pub fn run(
     compiled: &Compilation,
     controller: &Controller,
@@ -95,7 +95,7 @@ pub fn run(
     Ok(Convergence { seed, dimension: space.dimension(), best: search.best().copied(), history: search.history })
 }
 
-/// Genes of the spec's own numbers, smaller where they do not hold the margins; none if no size does.
+/// Genes of the spec's own parameters, reduced if they do not meet the margins; `None` if no reduction does.
 fn start(space: &Space, feasibility: &Feasibility, own: Setting) -> Option<Vec<f64>> {
     let mut setting = own;
     for _ in 0..=SHRINKS {

@@ -1,8 +1,8 @@
-//! Fig. 29: up to which λ the adaptation is stable, by the paper's formulas and by the emitted controller.
+//! Fig. 29: the largest λ for which the adaptation is stable, by the paper's formulas and by the emitted controller.
 //!
-//! The controller runs on six legs without dynamics that answer λ times what it requests, counted from where they stand;
-//! each leg has a λ of its own. A step of 0.2 µm disturbs them. Where the loop is stable, what is left of it dies away; where
-//! it is not, it grows until a limit or a gauge out of range holds it, far from where it should stand.
+//! The controller runs on six legs without dynamics, whose displacement is λ times the request relative to their initial position;
+//! each leg has its own λ. A step of 0.2 µm disturbs them. If the loop is stable, the disturbance decays; otherwise
+//! it grows until a limit or a gauge range stops it, far from the target.
 
 use host_sim::closed_loop::LEGS;
 use host_sim::controller::{ControllerError, TickController};
@@ -11,37 +11,37 @@ use serde::Serialize;
 
 use specgen_compiler::stability::{ewma_limit, pcc_limit};
 
-/// Runs of a trial, and how many of its last ones are looked at.
+/// Number of runs of a trial, and number of final runs that are checked.
 const RUNS: usize = 700;
 const LAST: usize = 60;
-/// The run in which the disturbance comes. Before it the legs do what is requested: at first they are slewed to their place.
+/// The run of the disturbance. Before it the legs follow the request exactly, since they first slew to their place.
 const DISTURBED: usize = 60;
-/// Place at which the legs stand, and size of the disturbance, m.
+/// Position of the legs, and size of the disturbance, m.
 const PLACE: f64 = 20e-6;
 const DISTURBANCE: f64 = 0.2e-6;
-/// A leg within this of where it should stand has settled, m: steps of the converter times λ are less, and what grows by 1 %
-/// a run is a hundred times more in the end.
+/// A leg within this distance of its target has settled, m. Converter steps times λ are smaller, and a growth of 1 %
+/// per run ends a hundred times larger.
 const SETTLED: f64 = 1e-6;
-/// λ looked at, and how often the interval is cut by seven.
+/// Range of λ, and number of times the interval is divided by seven.
 const RANGE: [f64; 2] = [0.05, 60.0];
 const CUTS: usize = 5;
 
 /// One pair of weights.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Limit {
-    /// ω (EWMA) or ω1.
+    /// ω (EWMA) or ω1 (PCC).
     pub level: f64,
-    /// ω2; none: EWMA.
+    /// ω2; `None` for EWMA.
     pub drift: Option<f64>,
-    /// λ below which the paper has it stable.
+    /// Stability limit of λ in the paper.
     pub printed: f64,
-    /// By the corrected formula.
+    /// Limit by the corrected formula.
     pub jury: f64,
-    /// λ up to which the emitted controller settles.
+    /// Largest λ at which the emitted controller settles.
     pub emitted: f64,
 }
 
-/// Weights at which the emitted controller is tried.
+/// Weights at which the emitted controller is run.
 pub const TRIED: [(f64, Option<f64>); 10] = [
     (0.1, None),
     (0.252, None),
@@ -61,7 +61,7 @@ pub fn printed(level: f64, drift: Option<f64>) -> f64 {
     drift.map_or(2.0, |drift| pcc_limit(level, drift))
 }
 
-/// The right limit of λ on a leg without dynamics.
+/// The correct limit of λ for a leg without dynamics.
 #[must_use]
 pub fn jury(level: f64, drift: Option<f64>) -> f64 {
     drift.map_or_else(|| ewma_limit(level), |drift| pcc_limit(level, drift))
@@ -71,7 +71,7 @@ pub fn jury(level: f64, drift: Option<f64>) -> f64 {
 /// `run_interval` ticks.
 ///
 /// # Errors
-/// If it lacks a word, or refuses weights within (0, 1].
+/// If the controller lacks a word or refuses weights within (0, 1].
 pub fn limits(controller: &mut dyn TickController, run_interval: u32) -> Result<Vec<Limit>, ControllerError> {
     TRIED
         .iter()
@@ -82,7 +82,7 @@ pub fn limits(controller: &mut dyn TickController, run_interval: u32) -> Result<
         .collect()
 }
 
-/// λ up to which the loop settles, found by trying six values at once.
+/// The largest λ at which the loop settles, found by trying six values at a time.
 fn emitted_limit(
     controller: &mut dyn TickController,
     level: f64,
@@ -103,14 +103,14 @@ fn emitted_limit(
         let part = (high - low) / (LEGS + 1) as f64;
         let ratios: [f64; LEGS] = std::array::from_fn(|leg| low + part * (leg + 1) as f64);
         let settled = settles(controller, &ratios, run_interval as usize)?;
-        // The first that does not settle ends the region, whatever comes beyond it.
+        // The region ends at the first value that does not settle.
         let stable = settled.iter().take_while(|settled| **settled).count();
         (low, high) = (low + part * stable as f64, low + part * (stable + 1) as f64);
     }
     Ok(0.5 * (low + high))
 }
 
-/// Whether legs of these λ settle after the disturbance.
+/// Whether legs with these λ settle after the disturbance.
 fn settles(
     controller: &mut dyn TickController,
     ratios: &[f64; LEGS],
@@ -124,7 +124,7 @@ fn settles(
     let mut input = vec![0; description.input_names.len()];
     let mut output = vec![0; description.output_names.len()];
     let (mut reading, mut largest) = ([PLACE; LEGS], [0.0_f64; LEGS]);
-    // The legs answer at once, so nothing changes within a run.
+    // The legs respond immediately, so nothing changes within a run.
     for tick in 0..RUNS * run_interval {
         let run = tick / run_interval;
         for leg in 0..LEGS {
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_print_of_ewma_is_right_at_weight_one_alone() {
+    fn the_printed_limit_of_ewma_is_correct_only_at_weight_one() {
         assert_eq!(printed(1.0, None), jury(1.0, None));
         assert!((jury(0.252, None) - 7.937).abs() < 1e-3 && printed(0.252, None) == 2.0);
         assert_eq!(printed(0.252, Some(0.011)), jury(0.252, Some(0.011)));

@@ -1,4 +1,4 @@
-//! Why a value of ours is not the paper's.
+//! Reasons why a value differs from the paper's.
 
 use serde::{Serialize, Serializer};
 
@@ -26,7 +26,7 @@ pub enum Remark {
     BelowResolution,
     /// (AII.18).
     Ewma,
-    /// None of the known reasons.
+    /// No known reason.
     Unexplained,
 }
 
@@ -54,49 +54,49 @@ impl Remark {
         }
     }
 
-    /// The reason in words.
+    /// The reason as text.
     #[must_use]
     pub fn text(self) -> &'static str {
         match self {
             Self::Agrees => "Within 10 % of the paper.",
             Self::Bias => {
-                "The paper prints δ (headed \"bias α\") without saying what its zero is; ours counts from the gauge zeroed \
-                 at 0 V after a saturating sweep, of one of five stacks. Only the slope decides λ."
+                "The paper prints δ (headed \"bias α\") without defining its zero; ours is relative to the gauge zeroed \
+                 at 0 V after a saturating sweep, for one of five stacks. Only the slope determines λ."
             }
             Self::UpperBound => {
-                "The paper's EWMA and PCC rows do not follow from its description: an honest simulation with the printed \
-                 weights on a plant that does match its Invhys row and its slopes comes out 8 to 17 times lower, and for a \
+                "The paper's EWMA and PCC rows do not follow from its description: a faithful simulation with the printed \
+                 weights, on a plant that matches its Invhys row and its slopes, gives values 8 to 17 times lower, and for a \
                  static plant no spectrum of disturbances gives the paper's ratios. They are upper bounds and a ranking \
-                 (Invhys > EWMA > PCC), which ours keeps."
+                 (Invhys > EWMA > PCC), which our results preserve."
             }
             Self::Tracking => {
-                "The machine is ours: geometry, gauge layout, stiffness and the order of the gains are not printed (gains \
-                 appear twice, at 1e-6 without units), so gains follow the compiler's rule and the feed-forward carries \
-                 inertia and gravity. The printed paths jump; the corrected ones are followed. The paper's values are upper \
+                "The machine is our own: geometry, gauge layout, stiffness and the order of the gains are not printed (gains \
+                 appear twice, at 1e-6 without units), so gains follow the compiler's rule, and the feed-forward includes \
+                 inertia and gravity. The printed paths have jumps; we follow the corrected ones. The paper's values are upper \
                  bounds."
             }
             Self::Angles => {
-                "Printed as \"n rad\" and read as µrad: π/72 rad would need ±4.4 mm from legs of 60 µm, so rotations are \
-                 mrad and their errors µrad. Machine and gains are ours, as for the translations."
+                "Printed as \"n rad\", interpreted as µrad: π/72 rad would need ±4.4 mm from legs of 60 µm, so rotations are \
+                 mrad and their errors µrad. Machine and gains are our own, as for the translations."
             }
             Self::Suspect => {
-                "The printed 100.149 breaks its row (531.8 and 631.13 at 1 and 10 Hz) and its column; a digit is probably \
-                 lost. Machine and gains are ours besides."
+                "The printed 100.149 does not fit its row (531.8 and 631.13 at 1 and 10 Hz) and its column; a digit is probably \
+                 missing. Machine and gains are our own as well."
             }
             Self::WorkParts => {
-                "Stiffness of the work parts and the tip's place are not printed and assumed (glass 3 MN/m, aluminium \
-                 1.2 MN/m, tip 40 mm above the platform); gains and machine are ours, and x(t) is missing in print."
+                "Stiffness of the work parts and position of the tip are not printed; they are assumed (glass 3 MN/m, aluminium \
+                 1.2 MN/m, tip 40 mm above the platform); gains and machine are our own, and x(t) is missing in print."
             }
             Self::BelowResolution => {
-                "The printed angles, 1.6 to 28 nrad, are about or below what the paper's own gauges can see: 2.2 nm at ±80 mm \
-                 is 20 nrad. Ours are true angles: with P/F what gauge noise leaves, with P also what the part's torque \
-                 turns."
+                "The printed angles, 1.6 to 28 nrad, are at or below the resolution of the paper's own gauges: 2.2 nm at ±80 mm \
+                 is 20 nrad. Ours are true angles: with P/F the effect of gauge noise, with P also the rotation by the part's \
+                 torque."
             }
             Self::Ewma => {
-                "(AII.18) prints 0 < λ < 2 for every weight, which is its ω = 1 case; right is 0 < λω < 2, and the emitted \
-                 controller settles up to that."
+                "(AII.18) prints 0 < λ < 2 for every weight, which holds only for ω = 1; correct is 0 < λω < 2, and the emitted \
+                 controller settles up to this limit."
             }
-            Self::Unexplained => "Differs by more than 10 %, and the known errors of the paper do not say why.",
+            Self::Unexplained => "Differs by more than 10 %; the known errors of the paper do not explain it.",
         }
     }
 }

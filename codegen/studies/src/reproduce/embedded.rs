@@ -1,4 +1,4 @@
-//! The specs of the paper's experiments, in the binary: they are found without the repository too.
+//! The specs of the paper's experiments, embedded in the binary, so that they work without the repository.
 
 use std::fs;
 use std::io;
@@ -10,11 +10,11 @@ use specgen_language::spec::SpecSource;
 pub const LEGS: &str = include_str!("../../../../specs/legs.toml");
 /// The platform, section 4.
 pub const PLATFORM: &str = include_str!("../../../../specs/reference.toml");
-/// The record that both name.
+/// The record that both use.
 const RECORD: (&str, &str) =
     ("records/reference-forc.csv", include_str!("../../../../specs/records/reference-forc.csv"));
 
-/// `text` as a spec in `folder`, into which its record is written.
+/// `text` as a spec in `folder`; writes its record there.
 ///
 /// # Errors
 /// If the record cannot be written.

@@ -12,14 +12,14 @@ use crate::paper::{printed, region};
 /// Control ticks per period of the trajectory, as in `specgen sim`.
 pub const SAMPLES: u32 = 500;
 
-/// Six equal reference legs, prepared, with their noise from `seed`.
+/// Six equal reference legs, prepared, with noise from `seed`.
 #[must_use]
 pub fn scenario(seed: u64) -> LegScenario {
     let leg = LegParameters::reference();
     LegScenario::new(&std::array::from_fn(|_| leg.clone()), &leg.noise, seed, SAMPLES)
 }
 
-/// Table 1. `stack_gain` is ρ̂ of one stack, µm/V, and `stacks` how many a leg has.
+/// Table 1. `stack_gain` is ρ̂ of one stack, µm/V, and `stacks` the number of stacks per leg.
 ///
 /// # Errors
 /// As [`LegScenario::linearity`].
@@ -36,13 +36,13 @@ pub fn table_1(
         let row = |quantity, unit, values, reason| Row::numbers(["invhys", quantity], at, unit, values, reason);
         rows.push(row("slope ρ", "µm/V", [slope, ours.gain_ratio * stack_gain], Remark::Unexplained));
         let relative = [printed::slope_ratio(index), ours.relative_slope];
-        rows.push(row("slope over that at 0.1 Hz", "", relative, Remark::Unexplained));
+        rows.push(row("slope relative to 0.1 Hz", "", relative, Remark::Unexplained));
         rows.push(row("bias δ", "µm", [bias, ours.offset_um / f64::from(stacks)], Remark::Bias));
     }
     Ok(Table {
         id: "table-1",
-        title: "Table 1, Fig. 4: straight line of displacement on virtual voltage, inverse model alone",
-        how: "least squares of Y on X over the last period, all six legs; slope and bias of one stack of five"
+        title: "Table 1, Fig. 4: linear fit of displacement over virtual voltage, inverse model only",
+        how: "least-squares fit of Y over X for the last period, all six legs; slope and bias of one of five stacks"
             .to_owned(),
         command: "specgen sim specs/legs.toml",
         rows,
@@ -68,7 +68,7 @@ pub fn table_2(scenario: &LegScenario, controller: &mut dyn TickController) -> R
     Ok(Table {
         id: "table-2",
         title: "Table 2, Figs 6 to 8: tracking error of the leg trajectory",
-        how: format!("root mean square over the whole path and six legs, {SAMPLES} ticks a period, weights as printed"),
+        how: format!("rms over the whole path and six legs, {SAMPLES} ticks per period, printed weights"),
         command: "specgen sim specs/legs.toml",
         rows,
     })
@@ -88,8 +88,8 @@ pub fn figure_29(controller: &mut dyn TickController, run_interval: u32) -> Resu
     });
     Ok(Table {
         id: "figure-29",
-        title: "Fig. 29, (AII.18) and (AII.19): largest stable adaptation ratio λ = ρ/ρ̂ over the weights",
-        how: "paper: its formulas; ours: λ at which the emitted controller no longer settles on legs without dynamics after a step of 0.2 µm".to_owned(),
+        title: "Fig. 29, (AII.18) and (AII.19): largest stable adaptation ratio λ = ρ/ρ̂ for different weights",
+        how: "paper: its formulas; ours: λ at which the emitted controller no longer settles after a step of 0.2 µm on legs without dynamics".to_owned(),
         command: "specgen reproduce",
         rows: rows.collect(),
     })

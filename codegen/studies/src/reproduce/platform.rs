@@ -22,7 +22,7 @@ pub fn parts() -> [(&'static str, WorkPart); 2] {
 /// Frequency of the machining path, Hz.
 pub const MACHINING_FREQUENCY: f64 = 1.0;
 
-/// A case at a frequency in every mode, into `table`.
+/// Runs a case at a frequency in every mode and adds the results to `table`.
 ///
 /// # Errors
 /// As [`PlatformScenario::run`].
@@ -54,8 +54,8 @@ pub fn tables(runs: &PoseTable, case: &str) -> [Table; 2] {
         ]
     } else {
         [
-            "Table 7, Figs 17, 19, 21: case 2, moving along z and turning about x and y: translation error",
-            "Table 8, Figs 18, 20, 22: case 2, moving along z and turning about x and y: rotation error",
+            "Table 7, Figs 17, 19, 21: case 2, moving along z and rotating about x and y: translation error",
+            "Table 8, Figs 18, 20, 22: case 2, moving along z and rotating about x and y: rotation error",
         ]
     };
     let rows = |turning: bool| {
@@ -87,13 +87,13 @@ pub fn tables(runs: &PoseTable, case: &str) -> [Table; 2] {
     [false, true].map(|turning| Table {
         id: ids[usize::from(turning)],
         title: titles[usize::from(turning)],
-        how: "P/F, true pose against bias and corrected path, root mean square over the whole path; one machine within tolerances (seed 1), one nominal record for six legs".to_owned(),
+        how: "P/F, rms error of the true pose against bias plus corrected path, over the whole path; one machine within tolerances (seed 1), one nominal record for six legs".to_owned(),
         command: "specgen sim specs/reference.toml --frequency 0.1,1,10",
         rows: rows(turning),
     })
 }
 
-/// One work part in both modes, into `table`.
+/// Runs one work part in both modes and adds the results to `table`.
 ///
 /// # Errors
 /// As [`PlatformScenario::against`].
@@ -142,7 +142,7 @@ pub fn table_9(runs: &MachiningTable) -> Table {
     Table {
         id: "table-9",
         title: "Table 9, Figs 23 to 28: machining, P against P/F",
-        how: "mean of the norm of the true error over the whole path; in touch with a linear work part from the start of the path"
+        how: "mean of the norm of the true error over the whole path; in contact with a linear work part from the start of the path"
             .to_owned(),
         command: "specgen sim specs/reference.toml",
         rows,

@@ -1,46 +1,46 @@
-//! A table of the paper beside ours.
+//! A table of the paper with our results.
 
 use host_sim::coverage::Coverage;
 use serde::Serialize;
 
 use crate::paper::remark::Remark;
 
-/// A value, or a setting in words.
+/// A number or a text.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Cell {
-    /// In the unit of the row.
+    /// A number in the unit of the row.
     Number(f64),
-    /// In words.
+    /// A text.
     Text(String),
 }
 
 /// One comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// What was done, such as `pcc`.
+    /// The condition, such as `pcc`.
     pub case: String,
-    /// What was measured, such as `x`.
+    /// The measured quantity, such as `x`.
     pub quantity: String,
-    /// Operating frequency, Hz, if there is one.
+    /// Operating frequency, Hz, if any.
     pub frequency_hz: Option<f64>,
-    /// Of both values; empty for ratios and words.
+    /// Unit of both values; empty for ratios and texts.
     pub unit: &'static str,
     /// As printed.
     pub paper: Cell,
-    /// Of the emitted controller.
+    /// Result of the emitted controller.
     pub ours: Cell,
-    /// Ours over the paper's.
+    /// Ours divided by the paper's.
     pub ratio: Option<f64>,
-    /// Why they differ; none where there is nothing to compare.
+    /// Why they differ; `None` if there is nothing to compare.
     pub remark: Option<Remark>,
-    /// Over what ours was measured, of the error on a path.
+    /// The measured part of the path, for errors along a path.
     #[serde(flatten)]
     pub coverage: Option<Coverage>,
 }
 
 impl Row {
-    /// Two numbers, and why they differ if they do.
+    /// Two numbers, and the reason for a difference.
     #[must_use]
     pub fn numbers(
         [case, quantity]: [&str; 2],
@@ -62,7 +62,7 @@ impl Row {
         }
     }
 
-    /// The same, ours measured over this part of a path; none where it was not made.
+    /// The same, with the measured part of the path; `None` if no path was run.
     #[must_use]
     pub fn over(self, coverage: Option<Coverage>) -> Self {
         Self { coverage, ..self }
@@ -74,18 +74,18 @@ impl Row {
 pub struct Table {
     /// For file names: `table-5`.
     pub id: &'static str,
-    /// What it is called in the paper, and what it shows.
+    /// Its name in the paper, and its content.
     pub title: &'static str,
-    /// How ours was made.
+    /// How our values were obtained.
     pub how: String,
-    /// The command that makes it alone.
+    /// The command that produces it alone.
     pub command: &'static str,
-    /// Rows in the order of the paper.
+    /// Rows in the paper's order.
     pub rows: Vec<Row>,
 }
 
 impl Table {
-    /// Remarks that its rows need, each once.
+    /// Remarks used by its rows, without duplicates.
     #[must_use]
     pub fn remarks(&self) -> Vec<Remark> {
         let mut remarks: Vec<Remark> = self.rows.iter().filter_map(|row| row.remark).collect();

@@ -1,4 +1,4 @@
-//! One machine of many: by how much it differs from its data sheet.
+//! Deviation of one machine from nominal.
 
 use host_sim::closed_loop::LEGS;
 use host_sim::plant::LegParameters;
@@ -12,45 +12,45 @@ use crate::machine;
 use crate::tuning::genetic::unit;
 use specgen_language::model::{Model, TaskSpace};
 
-/// Apart from the streams of noise and tolerances.
+/// Separates its random numbers from those of noise and tolerances.
 const STREAM: u64 = 21;
-/// A structure with more damping than this rings no more, and the leg plant takes no ratio of 1.
+/// With more damping a structure no longer rings, and the leg plant accepts no ratio of 1.
 const MOST_DAMPING: f64 = 0.99;
 
 /// Factors of one leg.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LegDeviation {
-    /// On its axial stiffness.
+    /// Of its axial stiffness.
     pub stiffness: f64,
-    /// On its gain.
+    /// Of its gain.
     pub gain: f64,
-    /// On the thresholds of its plays.
+    /// Of the thresholds of its play operators.
     pub hysteresis: f64,
-    /// On its creep.
+    /// Of its creep.
     pub creep: f64,
-    /// On the lag of its amplifier.
+    /// Of the lag of its amplifier.
     pub lag: f64,
-    /// On the lag of its gauge; the gauges of a platform have that of the first leg.
+    /// Of the lag of its gauge; the gauges of a platform have that of the first leg.
     pub gauge_lag: f64,
 }
 
 /// Factors of one machine.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Deviation {
-    /// On mass and inertia.
+    /// Of mass and inertia.
     pub mass: f64,
-    /// On the damping ratio.
+    /// Of the damping ratio.
     pub damping: f64,
-    /// On all noise.
+    /// Of all noise.
     pub noise: f64,
-    /// Control intervals by which voltages come late.
+    /// Delay of the voltages in control intervals.
     pub delay_ticks: u32,
-    /// Of the legs.
+    /// Of each leg.
     pub legs: [LegDeviation; LEGS],
 }
 
 impl Deviation {
-    /// Six equal legs with the value that `of` gives for each factor.
+    /// Six equal legs, with the value of each factor from `of`.
     #[must_use]
     pub fn common(of: impl Fn(Factor) -> f64) -> Self {
         let leg = LegDeviation {
@@ -65,13 +65,13 @@ impl Deviation {
             mass: of(Factor::Mass),
             damping: of(Factor::Damping),
             noise: of(Factor::Noise),
-            // A whole number from 0 to 100 by the checks of its range.
+            // The range check ensures an integer from 0 to 100.
             delay_ticks: of(Factor::DelayTicks) as u32,
             legs: [leg; LEGS],
         }
     }
 
-    /// Uniform within the ranges, from `seed` alone; every leg on its own.
+    /// Uniformly distributed within the ranges, from `seed` only; every leg separately.
     #[must_use]
     pub fn drawn(factors: &Factors, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -91,7 +91,7 @@ impl Deviation {
         });
         let [low, high] = factors.range(Factor::DelayTicks);
         let delay_ticks = (low + libm::floor(unit(&mut rng) * (high - low + 1.0))) as u32;
-        // Last, so that a seed means the machine that it meant before there was this factor.
+        // Drawn last, so that the machine of a seed did not change when this factor was added.
         let [low, high] = factors.range(Factor::GaugeLag);
         for leg in &mut legs {
             leg.gauge_lag = low + (high - low) * unit(&mut rng);
@@ -99,7 +99,7 @@ impl Deviation {
         Self { mass, damping, noise, delay_ticks, legs }
     }
 
-    /// Six legs with their own gauges. Mass and stiffness act by their resonance.
+    /// Six legs with their own gauges. Mass and stiffness act through the resonance.
     #[must_use]
     pub fn legs_of(&self, leg: &LegParameters) -> [LegParameters; LEGS] {
         self.legs.map(|deviation| {
@@ -110,7 +110,7 @@ impl Deviation {
         })
     }
 
-    /// The platform that a spec describes, so far off; `leg` gives the shape of the hysteresis.
+    /// The platform of a spec with this deviation; `leg` gives the shape of the hysteresis.
     #[must_use]
     pub fn specimen(&self, model: &Model, task: &TaskSpace, leg: &LegParameters) -> Specimen {
         let mut specimen = machine::specimen(model, task, leg, None);
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn amplifier_and_gauge_have_lags_of_their_own() {
+    fn amplifier_and_gauge_have_separate_lags() {
         let leg = LegParameters { gauge_lag_s: 15e-6, ..LegParameters::reference() };
         for (factor, expected) in [(Factor::Lag, [1.5, 1.0]), (Factor::GaugeLag, [1.0, 1.5])] {
             let longer = Deviation::common(|one| if one == factor { 1.5 } else { one.nominal() }).legs_of(&leg);

@@ -1,4 +1,4 @@
-//! Whether the figures will do.
+//! Limits on the results.
 
 use serde::Serialize;
 
@@ -6,22 +6,22 @@ use super::plan::Member;
 use super::quantiles::quantile;
 use super::run::{Figures, Outcome};
 
-/// What must not be exceeded.
+/// The limits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Gate {
     /// Largest rms error of the translation, or of the legs, nm.
     pub error_nm: Option<f64>,
     /// Largest rms error of the angles, nrad.
     pub orientation_nrad: Option<f64>,
-    /// Largest such error of the translation that a machine has learned, nm.
+    /// Largest rms translation error after learning, nm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learned_nm: Option<f64>,
-    /// Quantile of the draws that is compared, %; none for the largest of draws and corners.
+    /// Quantile of the random machines that is compared, %; `None` for the largest value of all machines.
     pub quantile: Option<f64>,
 }
 
 impl Gate {
-    /// Why the runs do not pass, one reason a line; nothing if they do.
+    /// Why the runs fail, one reason per line; empty if they pass.
     #[must_use]
     pub fn reasons(&self, runs: &[(Member, Outcome)]) -> Vec<String> {
         let mut reasons = Vec::new();
@@ -31,7 +31,7 @@ impl Gate {
             .map(|(member, _)| member.name.as_str())
             .collect();
         if let Some(first) = lost.first() {
-            reasons.push(format!("{} of {} runs have diverged, the first of them {first}", lost.len(), runs.len()));
+            reasons.push(format!("{} of {} runs diverged, first {first}", lost.len(), runs.len()));
         }
         let grew: Vec<&str> = runs
             .iter()
@@ -40,7 +40,7 @@ impl Gate {
             .collect();
         if let Some(first) = grew.first() {
             reasons.push(format!(
-                "the error grew in learning on {} of {} machines, the first of them {first}",
+                "the error grew during learning on {} of {} machines, first {first}",
                 grew.len(),
                 runs.len()
             ));
@@ -64,9 +64,9 @@ impl Gate {
                 Some(found) => {
                     reasons.push(format!("{which} rms {what} is {found:.2} {unit}, above {limit:.2} {unit}"));
                 }
-                // Of diverged runs the first reason speaks.
-                None if compared.is_empty() => reasons.push(format!("no draw to take the {which} rms {what} from")),
-                None => reasons.push(format!("{which} rms {what} falls on a run that diverged")),
+                // The first reason covers diverged runs.
+                None if compared.is_empty() => reasons.push(format!("no random machine for the {which} rms {what}")),
+                None => reasons.push(format!("{which} rms {what} is that of a diverged run")),
             }
         }
         reasons
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_counts_corners_and_a_quantile_only_draws() {
+    fn the_maximum_includes_corners_but_a_quantile_does_not() {
         let runs = [run("mass-low", false, Some(50.0)), run("7", true, Some(10.0)), run("8", true, Some(20.0))];
         let reasons = |error_nm, quantile| {
             Gate { error_nm: Some(error_nm), orientation_nrad: None, learned_nm: None, quantile }.reasons(&runs)
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_learned_has_a_limit_of_its_own_and_must_not_grow() {
+    fn learning_has_its_own_limit_and_must_not_diverge() {
         let with = |name: &str, error_nm: f64, grew: bool| {
             let learned = Some(LearningFigures { error_nm, passes: 5, grew, coverage: Coverage::default() });
             let (member, _) = run(name, true, None);
@@ -112,17 +112,17 @@ mod tests {
         assert!(gate(Some(4.0)).reasons(&runs).is_empty() && gate(None).reasons(&runs).is_empty());
         assert_eq!(gate(Some(3.9)).reasons(&runs), ["largest rms learned error is 4.00 nm, above 3.90 nm"]);
         let grown = [with("1", 3.0, false), with("2", 4.0, true)];
-        assert!(gate(None).reasons(&grown)[0].contains("grew in learning on 1 of 2 machines, the first of them 2"));
-        // Machines that learned nothing pass no limit of what is learned.
+        assert!(gate(None).reasons(&grown)[0].contains("grew during learning on 1 of 2 machines, first 2"));
+        // Machines that did not learn fail the limit on learning.
         assert!(!gate(Some(4.0)).reasons(&[run("1", true, Some(1.0))]).is_empty());
     }
 
     #[test]
-    fn a_diverged_run_fails_whatever_is_asked_for() {
+    fn a_diverged_run_fails_every_gate() {
         let runs = [run("all-soft", false, None), run("7", true, Some(10.0))];
         for quantile in [None, Some(50.0)] {
             let gate = Gate { error_nm: None, orientation_nrad: None, learned_nm: None, quantile };
-            assert_eq!(gate.reasons(&runs), ["1 of 2 runs have diverged, the first of them all-soft"]);
+            assert_eq!(gate.reasons(&runs), ["1 of 2 runs diverged, first all-soft"]);
         }
         let gate = Gate { error_nm: Some(1e9), orientation_nrad: None, learned_nm: None, quantile: None };
         assert_eq!(gate.reasons(&runs).len(), 2);

@@ -1,4 +1,4 @@
-//! Learning of a motion that repeats, on machines that are not their data sheet.
+//! Learning of a repeated motion on machines that deviate from nominal.
 
 use host_sim::closed_loop::RunError;
 use host_sim::coverage::Coverage;
@@ -9,9 +9,9 @@ use crate::learning::{Convergence, Learnable, Motion, Update};
 use crate::tuning::TrajectoryChoice;
 use specgen_compiler::compile::Compilation;
 
-/// How every machine learns: alike, for none knows what it is.
+/// Learning settings, the same for every machine, since the deviation of a machine is unknown.
 pub struct Learning {
-    /// How far up.
+    /// Band and bound.
     pub convergence: Convergence,
     pub(super) motion: Motion,
     pub(super) update: Update,
@@ -19,26 +19,26 @@ pub struct Learning {
     pub(super) passes: usize,
 }
 
-/// What a machine learned.
+/// Result of learning on a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LearningFigures {
-    /// Root mean square of the translation's true error as a norm in the best pass, nm.
+    /// Rms true translation error as a norm in the best pass, nm.
     pub error_nm: f64,
-    /// Passes before it.
+    /// Number of passes before it.
     pub passes: u32,
     /// Whether learning ended because the error grew.
     pub grew: bool,
-    /// What was measured of the motion in that pass.
+    /// The measured part of the motion in that pass.
     #[serde(flatten)]
     pub coverage: Coverage,
 }
 
 impl Learning {
-    /// Of a trajectory in so many passes, up to a frequency (Hz) or where every machine within `factors` converges; none if they converge
-    /// nowhere, or the controller has no platform.
+    /// Learning of a trajectory in so many passes, up to a frequency (Hz) or to where every machine within `factors` converges; `None` if they
+    /// converge nowhere, or the controller has no platform.
     ///
     /// # Errors
-    /// If the trajectory has no tick, or too many.
+    /// If the trajectory has no ticks, or too many.
     pub fn of(
         compiled: &Compilation,
         trajectory: &TrajectoryChoice,

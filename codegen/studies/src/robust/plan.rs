@@ -1,4 +1,4 @@
-//! Which machines are tried: the nominal one, corners, random draws.
+//! The machines of a study: nominal, corners, random.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -7,47 +7,47 @@ use serde::{Deserialize, Serialize};
 use super::deviation::Deviation;
 use super::factors::{Factor, Factors};
 
-/// With so many factors or fewer, every combination of their ends is a corner.
+/// Up to this number of varied factors, every combination of their limits is a corner.
 const FACTORIAL: usize = 4;
-/// Apart from the streams of noise, tolerances and deviations.
+/// Separates its random numbers from those of noise, tolerances and deviations.
 const STREAM: u64 = 22;
 
 /// One machine of a plan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Member {
-    /// `nominal`, of a corner such as `mass-low`, or the seed of a draw.
+    /// `nominal`, the name of a corner such as `mass-low`, or the seed of a random machine.
     pub name: String,
-    /// Seed of the noise; of a draw of everything.
+    /// Seed of the noise; for a random machine of everything.
     pub seed: u64,
-    /// Whether it was drawn.
+    /// Whether it is a random machine.
     pub drawn: bool,
-    /// What it is.
+    /// Its deviation from nominal.
     pub deviation: Deviation,
 }
 
-/// All of them, in the order in which they are reported.
+/// All machines, in the order of reports.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// The nominal machine first, then corners, then draws.
+    /// The nominal machine, then corners, then random machines.
     pub members: Vec<Member>,
 }
 
 impl Plan {
-    /// The nominal machine, corners with the noise of `seed`, and `samples` draws whose seeds come from `seed`.
+    /// The nominal machine, corners with the noise of `seed`, and `samples` random machines with seeds from `seed`.
     #[must_use]
     pub fn new(factors: &Factors, samples: u32, seed: u64) -> Self {
         let mut members = corners(factors, seed);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(STREAM);
-        // 53 bits, which every reader of JSON keeps.
+        // 53 bits, which every JSON reader preserves.
         members.extend((0..samples).map(|_| draw(factors, rng.next_u64() >> 11)));
         Self { members }
     }
 
-    /// One member alone: a draw by its seed, or the nominal machine or a corner by its name.
+    /// A single member: a random machine by its seed, or the nominal machine or a corner by its name.
     ///
     /// # Errors
-    /// If nothing is called so: what there is.
+    /// If there is no such machine; lists the existing names.
     pub fn alone(factors: &Factors, name: &str, seed: u64) -> Result<Self, String> {
         if let Ok(seed) = name.parse() {
             return Ok(Self { members: vec![draw(factors, seed)] });
@@ -57,7 +57,10 @@ impl Plan {
             Some(corner) => Ok(Self { members: vec![corner.clone()] }),
             None => {
                 let names: Vec<&str> = corners.iter().map(|corner| corner.name.as_str()).collect();
-                Err(format!("no machine is called `{name}`; name the seed of a draw, or one of {}", names.join(", ")))
+                Err(format!(
+                    "no machine is called `{name}`; give the seed of a random machine, or one of {}",
+                    names.join(", ")
+                ))
             }
         }
     }
@@ -67,8 +70,8 @@ fn draw(factors: &Factors, seed: u64) -> Member {
     Member { name: seed.to_string(), seed, drawn: true, deviation: Deviation::drawn(factors, seed) }
 }
 
-/// The end of a factor's range that brings the loop nearer to its edge: more gain, more delay, less damping. Mass and
-/// stiffness move the modes, for which both directions are tried.
+/// The limit of a factor's range that brings the loop closer to instability: more gain, more delay, less damping. Mass and
+/// stiffness shift the modes, so both directions are tried.
 fn bad_end(factor: Factor, stiff: bool) -> usize {
     match factor {
         Factor::Damping => 0,
@@ -81,7 +84,7 @@ fn bad_end(factor: Factor, stiff: bool) -> usize {
 fn corners(factors: &Factors, seed: u64) -> Vec<Member> {
     let mut members: Vec<Member> = Vec::new();
     let mut add = |name: String, deviation: Deviation| {
-        // An end that is nominal, or a combination that is one end alone, is not tried twice.
+        // Skips corners equal to an earlier one, such as a limit that is nominal.
         if members.iter().all(|other| other.deviation != deviation) {
             members.push(Member { name, seed, drawn: false, deviation });
         }
@@ -100,7 +103,7 @@ fn corners(factors: &Factors, seed: u64) -> Vec<Member> {
             add(one.factor.to_string(), alone(low));
         }
     }
-    // What is known and differs from 1 is so in every combination.
+    // A known deviation (without a range) is part of every combination.
     if varied.len() <= FACTORIAL {
         for combination in 0..1_usize << varied.len() {
             let end = |factor: Factor| {
@@ -128,7 +131,7 @@ mod tests {
     use crate::robust::factors::UserRange;
     use specgen_compiler::compile::compile;
 
-    /// Of the spec of six legs, with `given` in place of what it says.
+    /// Factors of the spec of six legs, with `given` in place of its own.
     fn factors(given: &[&str]) -> Factors {
         let spec = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/legs.toml");
         let given: Vec<UserRange> = given.iter().map(|text| UserRange::parse(text).unwrap()).collect();
@@ -140,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_fill_their_ranges_leg_by_leg_and_are_drawn_alone_as_in_a_plan() {
+    fn random_machines_fill_their_ranges_and_can_be_drawn_individually() {
         let factors = factors(&["delay_ticks=2", "gauge_lag=20%"]);
         let plan = Plan::new(&factors, 300, 7);
         let draws: Vec<&Member> = plan.members.iter().filter(|member| member.drawn).collect();
@@ -152,7 +155,7 @@ mod tests {
             let within = |part: f64| low + part * (high - low);
             assert!(values.iter().any(|v| *v < within(0.03)) && values.iter().any(|v| *v > within(0.97)), "{factor}");
             let mean = values.iter().sum::<f64>() / 300.0;
-            // Five deviations of the mean of 300 uniform numbers; a whole number of 0, 1, 2 spreads a little more.
+            // Five standard deviations of the mean of 300 uniform numbers; an integer from 0 to 2 spreads a little more.
             assert!((mean - within(0.5)).abs() < 5.0 * 0.41 / 300_f64.sqrt() * (high - low), "{factor} {mean}");
         };
         fills(Factor::Mass, &|d| d.mass);
@@ -176,12 +179,12 @@ mod tests {
     }
 
     #[test]
-    fn corners_are_the_ends_of_each_factor_and_the_two_at_the_edge() {
+    fn corners_are_the_limits_of_each_factor_and_two_worst_cases() {
         let plan = Plan::new(&factors(&["delay_ticks=0", "creep=1:1", "lag=1.5:1.5"]), 1, 1);
         let names = names(&plan);
         assert_eq!(names[..3], ["nominal", "mass-low", "mass-high"]);
         assert_eq!(names[names.len() - 3..], ["noise-high", "all-soft", "all-stiff"]);
-        // What is nominal anyway has no corner, what is known and differs has one.
+        // A nominal limit has no corner; a known deviation has one.
         assert!(names.contains(&"lag") && !names.iter().any(|name| name.contains("delay") || name.contains("creep")));
         let soft = &plan.members.iter().find(|member| member.name == "all-soft").unwrap().deviation;
         assert_eq!((soft.mass, soft.damping, soft.legs[3].stiffness, soft.legs[3].lag), (1.05, 0.7, 0.95, 1.5));
@@ -189,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn of_few_factors_every_combination_is_a_corner_once() {
+    fn with_few_factors_every_combination_is_a_corner_once() {
         let fixed = ["mass=1:1", "stiffness=1:1", "damping=1:1", "creep=1:1", "lag=1:1", "noise=1:1", "delay_ticks=0"];
         let plan = Plan::new(&factors(&fixed), 1, 1);
         let expected = [

@@ -1,12 +1,12 @@
 //! Quantiles of runs, some of which have no figure because they diverged.
 
-/// The smallest figure that at least `percent` (0 to 100) of all runs do not exceed: nearest rank, so that it is the figure
-/// of a run. A run without one exceeds everything; none if the quantile falls on such a run, or there is no run.
+/// The smallest figure that at least `percent` (0 to 100) of all runs do not exceed: nearest rank, so it is the figure
+/// of an actual run. A diverged run counts as larger than all others. `None` if the quantile is that of a diverged run, or there are no runs.
 #[must_use]
 pub fn quantile(figures: &[Option<f64>], percent: f64) -> Option<f64> {
     let mut sorted: Vec<f64> = figures.iter().map(|figure| figure.unwrap_or(f64::INFINITY)).collect();
     sorted.sort_by(f64::total_cmp);
-    // The slack keeps the rank when the product is whole but for rounding.
+    // The tolerance avoids a higher rank from rounding if the product is an integer.
     let rank = libm::ceil(percent / 100.0 * sorted.len() as f64 - 1e-9);
     let index = if rank > 1.0 { rank as usize - 1 } else { 0 };
     sorted.get(index).copied().filter(|figure| figure.is_finite())

@@ -1,4 +1,4 @@
-//! Runs of a plan, in threads, in the order of the plan.
+//! Runs a plan in parallel; results are in the order of the plan.
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -21,34 +21,34 @@ use specgen_compiler::compile::Compilation;
 
 /// Status bits of legs at a limit of voltage or slew.
 const LIMITS: u32 = 0x3f;
-/// Status bits of gauges or forces that are not believed, and of set-points that are refused or stale.
+/// Status bits of implausible gauges or forces, and of refused or stale set-points.
 const FAULTS: u32 = 0x3f00 | 0x1_0000 | 0x2_0000 | 0x8_0000;
 
-/// What a run that kept its bound did. No figure is below zero; one beyond all numbers is infinite, `null` in JSON.
+/// Figures of a run that stayed within the bound. No figure is negative; an overflow is infinite, `null` in JSON.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Figures {
-    /// Root mean square of the translation's error as a norm, nm; of legs over time and legs.
+    /// Rms translation error as a norm, nm; for legs over time and legs.
     #[serde(deserialize_with = "or_infinite")]
     pub error_nm: f64,
-    /// Largest such error, nm; of legs the largest of one leg.
+    /// Largest such error, nm; for legs the largest of one leg.
     #[serde(deserialize_with = "or_infinite")]
     pub peak_nm: f64,
-    /// Root mean square of the angles' error as a norm, nrad; 0 for legs.
+    /// Rms error of the angles as a norm, nrad; 0 for legs.
     #[serde(deserialize_with = "or_infinite")]
     pub orientation_nrad: f64,
     /// Largest such error, nrad.
     #[serde(deserialize_with = "or_infinite")]
     pub orientation_peak_nrad: f64,
-    /// Part of the ticks with a leg at a limit, %.
+    /// Share of ticks with a leg at a limit, %.
     pub limited_percent: f64,
-    /// Ticks with a bad gauge or force, a set-point refused or stale.
+    /// Ticks with an implausible gauge or force, or a refused or stale set-point.
     pub fault_ticks: u64,
     /// Their status bits.
     pub fault_bits: u32,
-    /// What was measured.
+    /// The measured part of the path.
     #[serde(flatten)]
     pub coverage: Coverage,
-    /// What the machine learned, where it was asked to.
+    /// Result of learning, if requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub learned: Option<LearningFigures>,
 }
@@ -58,25 +58,25 @@ fn or_infinite<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
 }
 
-/// What became of a member.
+/// Outcome of a member.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// It kept the bound.
+    /// It stayed within the bound.
     Ran(Figures),
-    /// It did not, or never came to its bias pose.
+    /// It exceeded the bound, or never reached its bias pose.
     Diverged {
-        /// Since the start of the trajectory, s; none before it.
+        /// Time since the start of the trajectory, s; `None` before it.
         time: Option<f64>,
-        /// In words.
+        /// As text.
         reason: String,
-        /// Part of the ticks before with a leg at a limit, %: a leg short of stroke or voltage leaves the bound as well.
+        /// Share of the ticks before with a leg at a limit, %: insufficient stroke or voltage also exceeds the bound.
         limited_percent: f64,
     },
 }
 
 impl Outcome {
-    /// Of a run that kept the bound.
+    /// The figures of a run that stayed within the bound.
     #[must_use]
     pub fn figures(&self) -> Option<&Figures> {
         match self {
@@ -86,34 +86,34 @@ impl Outcome {
     }
 }
 
-/// Of a machine that never began.
+/// Outcome of a machine that never started.
 fn lost(why: &dyn fmt::Display) -> Outcome {
     Outcome::Diverged { time: None, reason: why.to_string(), limited_percent: 0.0 }
 }
 
-/// What every member is run with.
+/// Common settings of all members.
 pub struct Study<'a> {
     /// The spec.
     pub compiled: &'a Compilation,
     /// Its host library.
     pub controller: &'a Controller,
-    /// Shape of the hysteresis.
+    /// Leg with the shape of the hysteresis.
     pub leg: &'a LegParameters,
-    /// What is followed.
+    /// The trajectory.
     pub trajectory: TrajectoryChoice,
-    /// How the machines learn it, if they do.
+    /// Learning settings, if the machines learn.
     pub learning: Option<Learning>,
     /// Whether there is noise.
     pub noise: bool,
-    /// Error beyond which a run counts as diverged, m; angles count with the radius of the platform joints.
+    /// Error above which a run counts as diverged, m; angles are multiplied by the radius of the platform joints.
     pub bound: f64,
 }
 
 impl Study<'_> {
-    /// Runs one member; the same bits whoever runs it.
+    /// Runs one member; the result is bit-identical on every computer.
     ///
     /// # Errors
-    /// If the run cannot be laid out or the controller refuses its own settings.
+    /// If the run cannot be set up or the controller refuses its own settings.
     pub fn run(&self, member: &Member) -> Result<Outcome, RunError> {
         match self.simulate(member) {
             Err(error @ (RunError::NotReady { .. } | RunError::NotFinite { .. })) => Ok(lost(&error)),
@@ -122,7 +122,7 @@ impl Study<'_> {
         }
     }
 
-    /// With what the machine learns, if it is asked to.
+    /// Adds the result of learning, if requested.
     fn learned(&self, member: &Member, figures: Figures) -> Result<Outcome, RunError> {
         let Some(learning) = &self.learning else { return Ok(Outcome::Ran(figures)) };
         match self.learn(learning, member) {
@@ -133,10 +133,10 @@ impl Study<'_> {
         }
     }
 
-    /// What one machine learns; nothing for six legs.
+    /// Learning result of one machine; `None` for six legs.
     ///
     /// # Errors
-    /// If it does not come to its bias pose, or does not make the motion.
+    /// If it does not reach its bias pose or does not follow the motion.
     fn learn(&self, learning: &Learning, member: &Member) -> Result<Option<LearningFigures>, LearnError> {
         let model = &self.compiled.model;
         let Some(task) = &model.task_space else { return Ok(None) };
@@ -185,7 +185,7 @@ impl Study<'_> {
         let mut figures = Figures::default();
         let mut lost = None;
         figures.coverage = case.observe(&mut case.worker(), &setting, |seen| {
-            // A NaN keeps no bound.
+            // NaN exceeds every bound.
             let kept = seen.largest <= self.bound && seen.orientation * radius <= self.bound;
             ticks += 1;
             limited += u64::from(seen.status & LIMITS != 0);
@@ -218,11 +218,11 @@ impl Study<'_> {
         Ok(Outcome::Ran(figures))
     }
 
-    /// Runs a plan in `threads` threads, until `stop` is set: what was done then, in the order of the plan. `progress` is
-    /// called with how many are done.
+    /// Runs a plan in `threads` threads until `stop` is set. Returns the completed runs in the order of the plan. `progress` is
+    /// called with the number of completed runs.
     ///
     /// # Errors
-    /// As [`Study::run`], the first in the order of the plan.
+    /// As [`Study::run`]; the first error in the order of the plan.
     pub fn run_all(
         &self,
         plan: &Plan,
@@ -242,7 +242,7 @@ impl Study<'_> {
                     while !stop.load(Ordering::Relaxed) {
                         let index = next.fetch_add(1, Ordering::Relaxed);
                         let Some(member) = members.get(index) else { return };
-                        // The receiver lives until every sender is gone.
+                        // The receiver outlives every sender.
                         let _ = sender.send((index, self.run(member)));
                     }
                 });

@@ -1,19 +1,19 @@
-//! A plan in parts that are run anywhere and put together again: no member depends on another.
+//! Splits a plan into parts that can run anywhere, and merges them: members are independent.
 
 use serde::{Deserialize, Serialize};
 
 use super::plan::{Member, Plan};
 use super::run::Outcome;
 
-/// Most parts of a plan.
+/// Largest number of parts.
 const MOST: u32 = 1_000_000;
 
-/// One of `of` parts of a plan: every `of`-th member, so that corners and draws are spread over all parts.
+/// One of `of` parts of a plan: every `of`-th member, so corners and random machines are spread over all parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
-    /// Which, from 1 to `of`.
+    /// Its number, from 1 to `of`.
     pub index: u32,
-    /// How many there are.
+    /// Number of parts.
     pub of: u32,
 }
 
@@ -21,7 +21,7 @@ impl Shard {
     /// Reads `I/N`.
     ///
     /// # Errors
-    /// In words, if I is not from 1 to N.
+    /// A message if I is not from 1 to N.
     pub fn parse(text: &str) -> Result<Self, String> {
         let number = |part: &str| part.trim().parse().ok();
         let read = text.split_once('/').and_then(|(index, of)| Some(Self { index: number(index)?, of: number(of)? }));
@@ -33,7 +33,7 @@ impl Shard {
         1 <= self.index && self.index <= self.of && self.of <= MOST
     }
 
-    /// Its members of a plan, in their order.
+    /// Its members of a plan, in order.
     #[must_use]
     pub fn of(self, plan: &Plan) -> Plan {
         let from = self.index.saturating_sub(1) as usize;
@@ -41,36 +41,36 @@ impl Shard {
     }
 }
 
-/// What was run of a shard, by the name of the file that has it.
+/// The runs of a shard, with the name of their file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
-    /// As a user calls it.
+    /// Name given by the user.
     pub name: String,
-    /// Which.
+    /// The shard.
     pub shard: Shard,
     /// Its members, in the order of the plan.
     pub runs: Vec<(Member, Outcome)>,
 }
 
-/// The runs of a whole plan from its parts, in the order of the plan whatever that of the parts. A part that is there twice
+/// Merges the runs of a plan from its parts, in the order of the plan. A part that is given twice
 /// with the same runs counts once.
 ///
 /// # Errors
-/// In words, which part is of another plan, differs from its second copy, or is missing.
+/// A message that names the part of another plan, the conflicting copy, or the missing part.
 pub fn merged(plan: &Plan, parts: &[Part]) -> Result<Vec<(Member, Outcome)>, String> {
-    let Some(first) = parts.first() else { return Err("there is no part to merge".to_owned()) };
+    let Some(first) = parts.first() else { return Err("no parts to merge".to_owned()) };
     let of = first.shard.of;
     let mut by_index: Vec<Option<&Part>> = vec![None; of.min(MOST) as usize];
     for part in parts {
         let Part { name, shard, runs } = part;
         if shard.of != of || !shard.is_valid() {
             let (index, other) = (shard.index, shard.of);
-            return Err(format!("`{name}` is part {index} of {other}, `{}` one of {of}", first.name));
+            return Err(format!("`{name}` is part {index} of {other}, but `{}` is one of {of}", first.name));
         }
         let expected = shard.of(plan).members;
         if !runs.iter().map(|(member, _)| member).eq(&expected) {
             return Err(format!(
-                "`{name}` has not the {} machines of part {} of {of}: it was written by another version, or changed; run it \
+                "`{name}` does not have the {} machines of part {} of {of}: it was modified or written by another version; run it \
                  again with --shard {}/{of}",
                 expected.len(),
                 shard.index,
@@ -80,8 +80,8 @@ pub fn merged(plan: &Plan, parts: &[Part]) -> Result<Vec<(Member, Outcome)>, Str
         match by_index[shard.index as usize - 1].replace(part) {
             Some(other) if other.runs != *runs => {
                 return Err(format!(
-                    "`{}` and `{name}` are both part {} of {of} and differ; run it again with --shard {}/{of} and merge that \
-                     alone",
+                    "`{}` and `{name}` are both part {} of {of} but differ; run it again with --shard {}/{of} and merge only \
+                     that one",
                     other.name, shard.index, shard.index
                 ));
             }
@@ -98,7 +98,7 @@ pub fn merged(plan: &Plan, parts: &[Part]) -> Result<Vec<(Member, Outcome)>, Str
     }
     let whole: Vec<&Part> = by_index.into_iter().flatten().collect();
     let places = 0..plan.members.len();
-    // Every part has its members, as was looked at above.
+    // The check above ensures that every part is complete.
     Ok(places.filter_map(|place| whole[place % whole.len()].runs.get(place / whole.len()).cloned()).collect())
 }
 
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_in_any_order_are_the_whole_and_infinities_come_back_from_json() {
+    fn parts_merge_in_any_order_and_infinities_survive_json() {
         for count in [0, 1, 6, 7, 120] {
             let plan = plan(count);
             for of in [1, 2, 4, 7, 130] {
@@ -148,23 +148,23 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_or_is_missing_is_named() {
+    fn wrong_and_missing_parts_are_named() {
         let plan = plan(9);
         let refused = |parts: &[Part], says: &str| {
             let error = merged(&plan, parts).unwrap_err();
             assert!(error.contains(says), "{error}");
         };
         let [one, two, three] = [1, 2, 3].map(|index| part(&plan, index, 3));
-        refused(&[], "no part");
+        refused(&[], "no parts");
         refused(std::slice::from_ref(&one), "missing: --shard 2/3, 3/3");
-        refused(&[one.clone(), part(&plan, 2, 4)], "`2.json` is part 2 of 4, `1.json` one of 3");
+        refused(&[one.clone(), part(&plan, 2, 4)], "`2.json` is part 2 of 4, but `1.json` is one of 3");
         let mut other = two.clone();
         other.name = "again.json".to_owned();
         other.runs[0].1 = Outcome::Ran(Figures::default());
         refused(&[one.clone(), two.clone(), other, three], "`2.json` and `again.json` are both part 2 of 3");
         let mut short = two.clone();
         short.runs.pop();
-        refused(&[one.clone(), short], "`2.json` has not the 3 machines");
+        refused(&[one.clone(), short], "`2.json` does not have the 3 machines");
         let mut changed = two;
         changed.runs[1].0.deviation.mass *= 1.0 + f64::EPSILON;
         refused(&[one, changed], "run it again with --shard 2/3");

@@ -1,7 +1,7 @@
 //! CMA-ES (Hansen, "The CMA evolution strategy: a tutorial", 2016) with the settings of its Table 1, minus active update.
 //!
-//! Bounds: numbers outside [0, 1] are drawn again a few times, then put on the bound. Rejected candidates rank last. When the
-//! steps have become small it begins again from the best with twice the population. Own code: the crates there are bring a
+//! Bounds: numbers outside [0, 1] are redrawn a few times, then clipped. Rejected candidates rank last. Once the
+//! steps are small, the search restarts from the best point with twice the population. This is our own code because available crates depend on
 //! linear algebra whose bits depend on the processor, and the result is written into a spec.
 
 use rand_chacha::ChaCha8Rng;
@@ -11,13 +11,13 @@ use super::genetic::unit;
 use super::search::{Optimiser, ranked};
 use specgen_numerics::diagonalize;
 
-/// First step, in parts of the range, and the step at which it begins again.
+/// Initial step, relative to the range, and the step at which the search restarts.
 const STEP: f64 = 0.15;
 const SMALL: f64 = 2e-4;
 const REDRAWS: u32 = 8;
 const STREAM: u64 = 12;
 
-/// See the module.
+/// The optimiser; see the module.
 #[derive(Debug, Clone)]
 pub struct Cma {
     rng: ChaCha8Rng,
@@ -26,9 +26,9 @@ pub struct Cma {
     mean: Vec<f64>,
     step: f64,
     covariance: Vec<Vec<f64>>,
-    /// Columns: eigenvectors times the roots of their eigenvalues.
+    /// Columns: eigenvectors times the square roots of their eigenvalues.
     axes: Vec<Vec<f64>>,
-    /// Columns: eigenvectors over the roots.
+    /// Columns: eigenvectors divided by these square roots.
     inverse_axes: Vec<Vec<f64>>,
     path: Vec<f64>,
     step_path: Vec<f64>,
@@ -138,7 +138,7 @@ impl Optimiser for Cma {
         }
         let scored = costs.iter().filter(|cost| cost.is_some()).count();
         if scored == 0 {
-            // Nothing to learn from: look nearer.
+            // No information in this generation: search closer.
             self.step *= 0.5;
             return;
         }
@@ -228,7 +228,7 @@ impl Optimiser for Cma {
 mod tests {
     use super::*;
 
-    /// Best value after `budget` evaluations from 0.8 in every direction.
+    /// Best value after `budget` evaluations, starting at 0.8 in every dimension.
     fn minimise(dimension: usize, budget: usize, seed: u64, f: impl Fn(&[f64]) -> Option<f64>) -> f64 {
         let mut cma = Cma::new(&vec![0.8; dimension], 12, seed);
         let (mut spent, mut best) = (0, f64::INFINITY);
@@ -245,20 +245,20 @@ mod tests {
 
     #[test]
     fn an_ill_conditioned_ellipsoid_is_minimised() {
-        // Axes from 1 to 1000, turned against the coordinates.
+        // Axes from 1 to 1000, rotated against the coordinates.
         let f = |x: &[f64]| {
             let y: Vec<f64> = (0..5).map(|i| (x[i] - 0.4) + 0.5 * (x[(i + 1) % 5] - 0.4)).collect();
             Some(y.iter().enumerate().map(|(i, y)| libm::pow(1000.0, i as f64 / 2.0) * y * y).sum())
         };
-        // From some 1e5; the search does not refine below steps of 2e-4, which leaves their square on the flattest axis.
+        // Starts at about 1e5. The search does not refine below steps of 2e-4, whose square remains on the flattest axis.
         let best = minimise(5, 4000, 1, f);
         assert!(best < 1e-6, "{best:e}");
     }
 
     #[test]
-    fn a_minimum_on_the_border_of_what_is_rejected_is_found() {
+    fn a_minimum_on_the_boundary_of_the_rejected_region_is_found() {
         let f = |x: &[f64]| (x[0] + x[1] > 0.6).then(|| x[0] * x[0] + 2.0 * x[1] * x[1]);
-        // Lagrange: x0 = 0.4, x1 = 0.2.
+        // By Lagrange multipliers: x0 = 0.4, x1 = 0.2.
         let best = minimise(2, 2000, 2, f);
         assert!((best - 0.24).abs() < 1e-3, "{best}");
     }

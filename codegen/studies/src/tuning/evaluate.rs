@@ -1,9 +1,9 @@
-//! One run of the emitted controller on a simulated machine, scored: (spec, machine and noise, trajectory, settings) →
+//! Scores one run of the emitted controller on a simulated machine: (spec, machine and noise, trajectory, settings) →
 //! errors, effort, cost, status.
 //!
 //! Cost (9) of the paper, ∫ (a1 t |h̃| + a2 η²) dt, in one unit: h̃ is the pose error with angles × the radius of the
-//! platform joints, µm; η = k_v ḣ̃ + k_p h̃ + k_I ∫h̃ over the axis stiffness, the motion that feedback asks for, µm. Legs
-//! with their own gauges have no feedback: |h̃| is the root mean square over the legs and η what the estimates change in a
+//! platform joints, µm; η = k_v ḣ̃ + k_p h̃ + k_I ∫h̃ over the axis stiffness, the motion requested by the feedback, µm. Legs
+//! with their own gauges have no feedback: |h̃| is the rms over the legs and η the change of the estimates per
 //! tick, µm rms.
 
 mod observe;
@@ -32,42 +32,42 @@ use specgen_language::model::{Model, TaskSpace};
 
 /// a1 and a2 of (9), Table 3.
 pub const COST_WEIGHTS: [f64; 2] = [0.998, 0.002];
-/// Status bits with which a run does not count: a leg at a limit, a bad gauge, a set-point refused or stale.
+/// Status bits that prevent scoring: a leg at a limit, an implausible gauge, a refused or stale set-point.
 const NOT_SCORED: u32 = 0x3f | 0x3f00 | 0x1_0000 | 0x2_0000;
-/// A leg that is wanted within this part of the stroke of rest stands at the end of its voltage, where noise alone makes it
-/// meet the limit: that is no fault of the settings.
+/// A leg with a set-point within this share of the stroke from rest is at the end of its voltage range, where noise alone
+/// reaches the limit: this does not count against the settings.
 const AT_REST: f64 = 0.02;
-/// Part of stroke and workspace that the multisine uses.
+/// Share of stroke and workspace used by the multisine.
 const REACH: f64 = 0.3;
 
-/// What is followed.
+/// The trajectory to follow.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum TrajectoryChoice {
-    /// Five sines on every coordinate, the fastest of this frequency (Hz), for this long (s), phases from a seed.
+    /// Five sines on every coordinate, the fastest with this frequency (Hz), for this time (s), with phases from a seed.
     Multisine {
         /// Hz.
         frequency: f64,
         /// s.
         seconds: f64,
-        /// Of the phases.
+        /// Seed of the phases.
         seed: u64,
-        /// A zigzag in place of the fastest sine.
+        /// Replace the fastest sine by a zigzag.
         corners: bool,
     },
-    /// The paper's: of section 3 for legs, a path of section 4 for a platform, at an operating frequency (Hz).
+    /// The paper's: that of section 3 for legs, a path of section 4 for a platform, at an operating frequency (Hz).
     Paper {
-        /// For a platform.
+        /// Path of a platform.
         #[serde(skip)]
         path: PaperPath,
         /// Hz.
         frequency: f64,
     },
-    /// A step of a spec.
+    /// A step from the spec.
     Step(Step),
 }
 
 impl TrajectoryChoice {
-    /// For the platform of a spec.
+    /// The trajectory for the platform of a spec.
     #[must_use]
     pub fn of_platform(self, model: &Model, task: &TaskSpace) -> Box<dyn PoseTrajectory> {
         match self {
@@ -81,49 +81,49 @@ impl TrajectoryChoice {
     }
 }
 
-/// Under what a run is made.
+/// Conditions of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Conditions {
-    /// What is followed.
+    /// The trajectory.
     pub trajectory: TrajectoryChoice,
-    /// Seed of the noise; none for none.
+    /// Seed of the noise; `None` for no noise.
     pub noise: Option<u64>,
-    /// Seed of the machine's tolerances; none for a machine as its data sheet. Legs with their own gauges have none.
+    /// Seed of the machine's tolerances; `None` for a nominal machine. Not used for legs with their own gauges.
     pub machine: Option<u64>,
-    /// Control intervals by which voltages come late.
+    /// Delay of the voltages in control intervals.
     pub latency: usize,
-    /// Steps as long as the control interval, as usual, or the small ones that these are held against.
+    /// Integrate in steps of one control interval, as usual, or in the small steps used to verify them.
     pub whole_ticks: bool,
 }
 
 /// A scored run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Score {
-    /// Root mean square of |h̃|, nm: what the front shows.
+    /// Rms |h̃|, nm: the error on the Pareto front.
     pub error_nm: f64,
-    /// Root mean squares of translation (nm) and angles (nrad), as norms; of the legs alone in the first.
+    /// Rms translation (nm) and angles (nrad), as norms; for legs the leg error only.
     pub translation_nm: f64,
     /// See `translation_nm`; 0 for legs.
     pub orientation_nrad: f64,
     /// Largest |h̃|, nm.
     pub peak_nm: f64,
-    /// Root mean square of η, nm.
+    /// Rms η, nm.
     pub effort_nm: f64,
     /// (9), µm s².
     pub cost: f64,
-    /// What was measured.
+    /// The measured part of the path.
     #[serde(flatten)]
     pub coverage: Coverage,
 }
 
-/// What came of one setting.
+/// Result for one setting.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum Evaluation {
-    /// The run went through.
+    /// The run was completed.
     Scored(Score),
-    /// It met a limit at a time (s); the status word says which.
+    /// It reached a limit at a time (s); the status word says which.
     Limited {
-        /// Since the start of the trajectory, s.
+        /// Time since the start of the trajectory, s.
         time: f64,
         /// The controller's status word.
         status: u32,
@@ -131,7 +131,7 @@ pub enum Evaluation {
 }
 
 impl Evaluation {
-    /// The score of a run that went through.
+    /// The score of a completed run.
     #[must_use]
     pub fn score(&self) -> Option<&Score> {
         match self {
@@ -141,14 +141,14 @@ impl Evaluation {
     }
 }
 
-/// A machine, prepared, and a trajectory: what any number of settings are run on, from any number of threads.
+/// A prepared machine and a trajectory, on which any number of settings can run in parallel.
 pub struct Case {
     kind: Kind,
     period: f64,
     stroke: f64,
 }
 
-#[allow(clippy::large_enum_variant)] // One for each case, never in a list.
+#[allow(clippy::large_enum_variant)] // One per case, never in a list.
 enum Kind {
     Platform {
         study: PlatformStudy,
@@ -165,11 +165,11 @@ enum Kind {
 }
 
 impl Case {
-    /// A case of a compiled spec. `controller` is its host library, `leg` gives the shape of the hysteresis; `start` is what
-    /// a platform is armed with.
+    /// A case of a compiled spec. `controller` is its host library, `leg` gives the shape of the hysteresis; a platform starts with
+    /// the setting `start`.
     ///
     /// # Errors
-    /// If the machine does not come to its bias pose, or the trajectory has no tick.
+    /// If the machine does not reach its bias pose, or the trajectory has no ticks.
     pub fn new(
         compiled: &Compilation,
         controller: &Controller,
@@ -187,7 +187,7 @@ impl Case {
         }
     }
 
-    /// A case of six given legs with their own gauges; `conditions.machine` says nothing here.
+    /// A case of six given legs with their own gauges; `conditions.machine` has no effect.
     ///
     /// # Errors
     /// As [`Case::new`].
@@ -217,7 +217,7 @@ impl Case {
         Ok(Self { kind: Kind::Legs { scenario, controller, trajectory, ticks }, period, stroke })
     }
 
-    /// A case of a platform on a given machine, for whoever deviates from the spec on purpose.
+    /// A case of a platform on a given machine, which may deviate from the spec.
     ///
     /// # Errors
     /// As [`Case::new`].
@@ -247,7 +247,7 @@ impl Case {
         })
     }
 
-    /// A controller for [`Case::run`], one for each thread.
+    /// A controller for [`Case::run`], one per thread.
     #[must_use]
     pub fn worker(&self) -> Controller {
         match &self.kind {
@@ -265,10 +265,10 @@ impl Case {
         }
     }
 
-    /// Runs `setting`; the same bits whichever worker of this case does it.
+    /// Runs `setting`; the result is bit-identical for every worker of this case.
     ///
     /// # Errors
-    /// If the controller refuses the settings or gives a voltage that is not finite.
+    /// If the controller refuses the settings or a voltage is not finite.
     pub fn run(&self, worker: &mut Controller, setting: &Setting) -> Result<Evaluation, RunError> {
         match &self.kind {
             Kind::Platform { study, radius, stiffness, alone } => {
@@ -302,7 +302,7 @@ impl Case {
                 limited = Some(Evaluation::Limited { time: moment.time, status: moment.tick.status });
                 return ControlFlow::Break(());
             }
-            // What the controller saw at the beginning of the tick, against what was asked for then.
+            // The error at the start of the tick, relative to the set-point at that time.
             let mut effort = 0.0;
             if let Some(target) = target {
                 for k in 0..6 {
@@ -369,8 +369,8 @@ impl Case {
     }
 }
 
-/// Amplitudes of the multisine of a platform, m and rad: a part of the stroke, of what the workspace leaves beside the
-/// bias, and of the stream's speed.
+/// Amplitudes of the multisine of a platform, m and rad: limited by the stroke, by the workspace left beside the
+/// bias, and by the stream speed.
 fn reach(model: &Model, task: &TaskSpace) -> [f64; 6] {
     let stroke = model.actuator.stroke;
     let radius = model.geometry.joint_radius();
@@ -381,13 +381,13 @@ fn reach(model: &Model, task: &TaskSpace) -> [f64; 6] {
             (model.workspace.rotation[axis - 3], 0.05 * stroke / radius)
         };
         let room = 0.9 * (bound - task.setpoint.bias[axis].abs());
-        // Downward no further than half of the bias in z: a leg cannot be shorter than at rest.
+        // Downwards at most half of the bias in z: a leg cannot be shorter than at rest.
         let down = if axis == 2 && task.setpoint.bias[2] > 0.0 { 0.5 * task.setpoint.bias[2] } else { share };
         REACH_OF_AXIS[axis] * [room, share, down].into_iter().fold(f64::INFINITY, |a, b| if b < a { b } else { a })
     })
 }
 
-/// x and y drive the legs against each other: half of the others.
+/// x and y drive the legs against each other, so they get half.
 const REACH_OF_AXIS: [f64; 6] = [0.5, 0.5, 0.8, 0.6, 0.6, 0.6];
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -402,7 +402,7 @@ struct Sums {
 }
 
 impl Sums {
-    /// Squares of a tick: translation m², angles rad² with their radius (m), effort m².
+    /// Adds the squares of a tick: translation m², angles rad² with their radius (m), effort m².
     fn add(&mut self, time: f64, translation: f64, orientation: f64, radius: f64, effort: f64, period: f64) {
         let square = translation + orientation * radius * radius;
         let norm = square.sqrt();
@@ -418,7 +418,7 @@ impl Sums {
         self.cost += (a1 * time * norm * 1e6 + a2 * effort * 1e12) * period;
     }
 
-    /// Of a run that was made to its end.
+    /// The score of a completed run.
     fn score(&self, coverage: Coverage) -> Score {
         let rms = |sum: f64| libm::sqrt(sum / self.count.max(1) as f64) * 1e9;
         Score {
@@ -437,7 +437,7 @@ impl Sums {
 mod tests {
     use super::*;
 
-    /// (9) by hand: error h̃ = (3, 0, 0) µm and 40 µrad at a radius of 0.1 m, |h̃| = 5 µm, at 0.5 s; effort η = 2 µm.
+    /// (9) computed manually: error h̃ = (3, 0, 0) µm and 40 µrad at a radius of 0.1 m, |h̃| = 5 µm, at 0.5 s; effort η = 2 µm.
     #[test]
     fn the_cost_is_the_time_weighted_error_and_the_square_of_the_effort() {
         let mut sums = Sums::default();

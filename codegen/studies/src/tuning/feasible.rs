@@ -1,4 +1,4 @@
-//! Whether a setting is stable with the margins that are asked for: what is not is never simulated.
+//! Whether a setting is stable with the required margins: others are never simulated.
 
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower::platform;
@@ -10,40 +10,40 @@ use specgen_language::model::{Adaptation, AdaptationMode, ControlMode};
 
 use super::Setting;
 
-/// Values of λ that a candidate is tried at: the ends of the interval, where it is worst. The compiler looks at more when
-/// the result is written.
+/// Number of values of λ per candidate: the limits of the interval, which are the worst cases. The compiler checks more
+/// when the result is written.
 const ENDS: usize = 2;
 
-/// Margins that a candidate must have.
+/// Required stability margins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RequiredMargins {
-    /// Factor on all gains and bandwidths, or weights, at which it is still stable; at least 1.
+    /// Factor on all gains and bandwidths, or weights, for which the loop must be stable; at least 1.
     pub gain: f64,
-    /// Further delay at which it is still stable, ticks. For a platform.
+    /// Additional delay for which the loop must be stable, ticks. For a platform.
     pub delay: f64,
 }
 
-/// Decides for settings of one spec.
+/// Decides on settings of one spec.
 #[derive(Debug, Clone)]
 pub enum Feasibility {
     /// Six legs with their own gauges.
     Legs {
-        /// Of each leg.
+        /// Dynamics of each leg.
         dynamics: LegDynamics,
-        /// The spec's, whose weights a candidate replaces.
+        /// The spec's adaptation, whose weights a candidate replaces.
         adaptation: Adaptation,
-        /// What is asked for.
+        /// The required margins.
         required: RequiredMargins,
     },
     /// A platform.
     Platform {
-        /// Its loop up to the tuning.
+        /// The closed loop without the tuned settings.
         closed_loop: Box<ClosedLoop>,
-        /// Control modes that the tuned numbers work in.
+        /// Control modes that use the tuned parameters.
         laws: Vec<Law>,
-        /// λ.
+        /// Limits of λ.
         ratios: [f64; 2],
-        /// What is asked for.
+        /// The required margins.
         required: RequiredMargins,
     },
 }
@@ -55,13 +55,13 @@ impl Feasibility {
         let model = &compiled.model;
         let legs = || Self::Legs { dynamics: LegDynamics::of(model), adaptation: model.adaptation.clone(), required };
         let Some(task) = &model.task_space else { return legs() };
-        // Compiling found both: neither can be missing here.
+        // Compilation computed both, so neither can be missing.
         let rest = platform(model).map(|platform| RestDynamics::of(&platform));
         let design = compiled.design.as_ref();
         let Some(closed_loop) = rest.ok().and_then(|rest| design?.closed_loop(model, task, &rest)) else {
             return legs();
         };
-        // A running controller may be switched to any of them; the one of the spec is asked first.
+        // A running controller may be switched to any of them; the spec's own is checked first.
         let adapting = match model.adaptation.mode {
             AdaptationMode::Invhys => Estimator::Invhys,
             AdaptationMode::Ewma => Estimator::Ewma,
@@ -111,7 +111,7 @@ fn leg_holds(
 ) -> bool {
     let with_drift = adaptation.mode == AdaptationMode::Pcc;
     let [low, high] = adaptation.gain_ratio;
-    // Scaling the weights is what scales a loop's gain here.
+    // Scaling the weights scales the loop gain.
     let stable = |scale: f64, ratio: f64| {
         let (level, drift) = (level * scale, drift * scale);
         if level > 1.0 || drift > 1.0 {
@@ -120,7 +120,7 @@ fn leg_holds(
         let inside = ratio < ewma_limit(level) && (!with_drift || ratio < pcc_limit(level, drift));
         inside
             && spectral_radius(dynamics, level, with_drift.then_some(drift), ratio) <= LARGEST_RADIUS
-            // The law may be switched to EWMA, whose weight is the same.
+            // The law may be switched to EWMA with the same weight.
             && spectral_radius(dynamics, level, None, ratio) <= LARGEST_RADIUS
     };
     level > 0.0
@@ -148,7 +148,7 @@ fn platform_holds(
         let at = |tuning: &Tuning, conditions: Conditions| {
             closed_loop.spectral_radius(law, tuning, &Conditions { touching, ..conditions }) <= LARGEST_RADIUS
         };
-        // The margins first: they turn most candidates away.
+        // Check the margins first, since most candidates fail there.
         at(&scaled, Conditions::NOMINAL)
             && at(tuning, Conditions { delay: required.delay, ..Conditions::NOMINAL })
             && at(tuning, Conditions { gain_ratio: high, ..Conditions::NOMINAL })

@@ -1,4 +1,4 @@
-//! Error against effort: the candidates that no other beats in both.
+//! Pareto front of error and effort.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use super::Candidate;
 use super::search::Generation;
 use super::space::Space;
 
-/// The Pareto front by rising error, of candidates in any order.
+/// The Pareto front in ascending order of error, from candidates in any order.
 #[must_use]
 pub fn front(candidates: &[Candidate]) -> Vec<Candidate> {
     let mut sorted = candidates.to_vec();
@@ -25,7 +25,7 @@ pub fn front(candidates: &[Candidate]) -> Vec<Candidate> {
     sorted
 }
 
-/// The front as CSV: figures, then the numbers of the space.
+/// The front as CSV: figures, then the tuned parameters.
 #[must_use]
 pub fn to_csv(front: &[Candidate], space: &Space) -> String {
     let mut out = String::from(
@@ -52,7 +52,7 @@ pub fn to_csv(front: &[Candidate], space: &Space) -> String {
     out
 }
 
-/// The costs by generation as CSV.
+/// Costs by generation as CSV.
 #[must_use]
 pub fn history_csv(history: &[Generation]) -> String {
     let mut out = String::from("evaluations,best_cost_um_s2,median_cost_um_s2,unstable,limited\n");
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_on_the_front_is_beaten_and_everything_else_is() {
+    fn the_front_holds_exactly_the_undominated_candidates() {
         let all: Vec<Candidate> = (0..200)
             .map(|k| {
                 let x = f64::from(k * 7919 % 200);

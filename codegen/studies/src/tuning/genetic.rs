@@ -1,7 +1,7 @@
 //! The genetic algorithm of Table 3: bit strings, roulette, two-point crossover, uniform mutation.
 //!
-//! Where the table is silent: 10 bits a number; fitness 1/√rank, so that the wheel does not depend on the unit of the cost;
-//! two elite strings go on as they are; crossover makes its fraction of the other children, mutation the rest.
+//! What the table leaves open: 10 bits per number; fitness 1/√rank, so that selection does not depend on the unit of the cost;
+//! two elite strings are kept unchanged; crossover makes its fraction of the other children, mutation the rest.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -11,11 +11,11 @@ use super::search::Optimiser;
 /// Settings of Table 3.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Strings of a generation.
+    /// Strings per generation.
     pub population: usize,
-    /// Part of the children that crossover makes.
+    /// Share of the children made by crossover.
     pub crossover: f64,
-    /// Probability that a bit of a mutated string is drawn anew.
+    /// Probability that a bit of a mutated string is redrawn.
     pub mutation: f64,
 }
 
@@ -24,13 +24,13 @@ impl Settings {
     pub const PAPER: Self = Self { population: 100, crossover: 0.9, mutation: 0.03 };
 }
 
-/// Bits of one number.
+/// Bits per number.
 const BITS: usize = 10;
-/// Strings that go on as they are.
+/// Strings kept unchanged.
 const ELITE: usize = 2;
 const STREAM: u64 = 11;
 
-/// See the module.
+/// The optimiser; see the module.
 #[derive(Debug, Clone)]
 pub struct Genetic {
     settings: Settings,
@@ -48,7 +48,7 @@ fn below(rng: &mut ChaCha8Rng, count: usize) -> usize {
 }
 
 impl Genetic {
-    /// Random strings, and among them those of `starts` (numbers in [0, 1]).
+    /// Random strings, including those of `starts` (numbers in [0, 1]).
     #[must_use]
     pub fn new(settings: Settings, dimension: usize, starts: &[Vec<f64>], seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -61,7 +61,7 @@ impl Genetic {
         Self { settings, rng, population }
     }
 
-    /// A string with a probability in proportion to its fitness; `wheel` holds running sums.
+    /// Selects a string with probability proportional to its fitness; `wheel` holds cumulative sums.
     fn roulette(&mut self, wheel: &[f64]) -> usize {
         let total = wheel.last().copied().unwrap_or_default();
         let ball = unit(&mut self.rng) * total;
@@ -89,7 +89,7 @@ impl Optimiser for Genetic {
 
     fn tell(&mut self, costs: &[Option<f64>]) {
         let order = super::search::ranked(costs);
-        // What is rejected has no place on the wheel.
+        // Rejected strings have zero fitness.
         let mut fitness = vec![0.0; costs.len()];
         for (rank, &index) in order.iter().enumerate() {
             if costs[index].is_some() {
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn two_point_crossover_takes_one_piece_of_the_other_parent() {
+    fn two_point_crossover_takes_one_segment_of_the_other_parent() {
         let mut genetic = Genetic::new(Settings::PAPER, 4, &[], 3);
         for _ in 0..200 {
             let child = genetic.crossed(&[false; 40], &[true; 40]);
@@ -169,15 +169,15 @@ mod tests {
     }
 
     #[test]
-    fn mutation_draws_three_bits_in_a_hundred_anew() {
+    fn mutation_redraws_three_percent_of_the_bits() {
         let mut genetic = Genetic::new(Settings::PAPER, 4, &[], 5);
         let flips: usize = (0..500).map(|_| genetic.mutated(&[false; 40]).iter().filter(|bit| **bit).count()).sum();
-        // Half of the bits drawn anew change: 20000 × 0.015.
+        // Half of the redrawn bits change: 20000 × 0.015.
         assert!((240..360).contains(&flips), "{flips}");
     }
 
     #[test]
-    fn the_wheel_never_gives_what_was_rejected() {
+    fn roulette_never_selects_a_rejected_string() {
         let mut genetic = Genetic::new(Settings { population: 4, ..Settings::PAPER }, 1, &[], 7);
         genetic.population = vec![vec![true; 10], vec![false; 10], vec![true; 10], vec![true; 10]];
         genetic.settings.mutation = 0.0;

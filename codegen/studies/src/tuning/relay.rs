@@ -1,9 +1,10 @@
-//! Relay feedback test (Åström and Hägglund): ultimate gain and period of each axis, and from them the PI gains of Ziegler
+//! Relay feedback test (Åström and Hägglund): ultimate gain and period of each axis, and PI gains by Ziegler
 //! and Nichols.
 //!
-//! One axis at a time, at the bias pose. The relay stands where k_p would: behind the modal notch, and its force ± d asks the
-//! legs for K⁻¹ d. Active damping, which takes the raw error beside it, is at work. The emitted controller turns that motion into voltages in mode F with the inverse model alone, so that
-//! the hysteresis is compensated as it will be; its lead, which works on set-points and not on feedback, is undone. On the bare loop the test finds the first resonance; with the notch in it
+//! One axis at a time, at the bias pose. The relay replaces k_p: it follows the modal notch, and its force ± d requests the motion K⁻¹ d
+//! from the legs. Active damping, which uses the raw error, is on. The emitted controller turns that motion into voltages in mode F with only
+//! the inverse model, so the hysteresis is compensated as in operation; its lead, which applies to set-points and not to feedback, is undone. On
+//! the bare loop the test finds the first resonance; with the notch it finds the phase lag of amplifier, notch and tick.
 //! finds where the lag of amplifier, notch and tick turn the phase.
 
 use core::f64::consts::PI;
@@ -18,27 +19,27 @@ use serde::Serialize;
 use specgen_compiler::stability::platform::{Biquad, ClosedLoop};
 use specgen_numerics::Matrix6;
 
-/// Word of the mode F with the inverse model alone.
+/// Config word of mode F with only the inverse model.
 const OPEN: f64 = 1.0;
-/// Motion that the relay asks for, m at the joints: a hundred times the noise of a gauge.
+/// Motion requested by the relay, m at the joints: a hundred times the noise of a gauge.
 const AMPLITUDE: f64 = 0.1e-6;
-/// Switches that are left out at first, and those that are measured.
+/// Number of initial switches that are ignored, and number of measured ones.
 const SETTLED: usize = 20;
 const MEASURED: usize = 40;
-/// Ticks after which a relay that does not oscillate is given up.
+/// Number of ticks after which a relay without oscillation is given up.
 const MOST_TICKS: usize = 20_000;
 
-/// What the relay found on an axis.
+/// Relay test result of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Ultimate {
-    /// K_u over the stiffness of the axis.
+    /// K_u divided by the stiffness of the axis.
     pub gain: f64,
     /// T_u, s.
     pub period: f64,
 }
 
 impl Ultimate {
-    /// k_p and k_I of Ziegler and Nichols for PI, over the stiffness of the axis: 0.45 K_u and k_p/(T_u/1.2), the latter
+    /// k_p and k_I by Ziegler and Nichols for PI, divided by the stiffness of the axis: 0.45 K_u and k_p/(T_u/1.2), the latter
     /// in 1/s.
     #[must_use]
     pub fn ziegler_nichols(&self) -> [f64; 2] {
@@ -47,11 +48,11 @@ impl Ultimate {
     }
 }
 
-/// The test on each axis; none where no oscillation came up. `radius` of the platform joints (m), `lead` of the set-point
+/// Runs the test on each axis; `None` if there is no oscillation. `radius` of the platform joints (m), `lead` of the set-point
 /// (ticks).
 ///
 /// # Errors
-/// If the machine does not come to its bias pose.
+/// If the machine does not reach its bias pose.
 pub fn test(
     scenario: &PlatformScenario,
     controller: &Controller,
@@ -70,7 +71,7 @@ pub fn test(
     Ok(out)
 }
 
-/// `unit` turns metres at the joints into the unit of the axis.
+/// `unit` converts metres at the joints to the unit of the axis.
 fn one_axis(
     scenario: &PlatformScenario,
     controller: &mut Controller,
@@ -106,7 +107,7 @@ fn one_axis(
         if let Some((gain, period)) = relay.found {
             return Ok(Some(Ultimate { gain, period: period * options.interval }));
         }
-        // The controller asks for r + lead (r − r_last): this r makes it what relay and damping ask for.
+        // The controller requests r + lead (r − r_last), so choose r to give what relay and damping request.
         for (k, asked) in asked.iter_mut().enumerate() {
             *asked = (motion[k] * output + damped[k] + lead * *asked) / (1.0 + lead);
         }
@@ -115,14 +116,14 @@ fn one_axis(
     Ok(None)
 }
 
-/// Switches on the sign of its input and measures what comes of it.
+/// Switches on the sign of its input and measures the oscillation.
 #[derive(Debug, Clone, Default)]
 struct Relay {
     high: bool,
     last: f64,
-    /// Times of switching up, ticks, by straight line between samples.
+    /// Times of upward switches, ticks, interpolated linearly between samples.
     rises: Vec<f64>,
-    /// Sums of input times cosine and sine cannot be kept before the period is known: the input itself.
+    /// The input itself: sums with cosine and sine are not possible before the period is known.
     inputs: Vec<(f64, f64)>,
     found: Option<(f64, f64)>,
 }
@@ -139,13 +140,13 @@ impl Relay {
                 self.measure();
             }
         }
-        // A relay at rest begins upward.
+        // A relay at rest starts upwards.
         self.high = if input == 0.0 { tick == 0 || self.high } else { input > 0.0 };
         self.last = input;
         if self.high { 1.0 } else { -1.0 }
     }
 
-    /// Describing function: K_u = 4 d / (π a), a the first harmonic of the input, d = 1.
+    /// Describing function: K_u = 4 d / (π a), with a the first harmonic of the input and d = 1.
     fn measure(&mut self) {
         let (first, last) = (self.rises[SETTLED], self.rises[SETTLED + MEASURED]);
         let period = (last - first) / MEASURED as f64;
@@ -163,7 +164,7 @@ impl Relay {
     }
 }
 
-/// Sections of the controller in modal coordinates, in the simulator's own text.
+/// Modal filter sections of the controller, written independently for the simulator.
 struct Sections {
     to_modal: Matrix6,
     from_modal: Matrix6,
@@ -172,7 +173,7 @@ struct Sections {
 }
 
 impl Sections {
-    /// Without sections they pass everything.
+    /// Without sections the filters pass everything.
     fn new(closed_loop: &ClosedLoop, sections: Option<[Biquad; 6]>) -> Self {
         let basis = &closed_loop.basis;
         let sections = sections.unwrap_or([Biquad::IDENTITY; 6]);
@@ -200,8 +201,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_relay_on_an_integrator_with_delay_finds_what_theory_says() {
-        // ẏ = u late by L: K_u = π/(2 L), T_u = 4 L, by the describing function; sampled finely.
+    fn a_relay_on_an_integrator_with_delay_agrees_with_theory() {
+        // ẏ = u delayed by L: K_u = π/(2 L), T_u = 4 L, by the describing function; sampled finely.
         let delay = 50;
         let mut relay = Relay::default();
         let (mut y, mut line) = (0.0, std::collections::VecDeque::from(vec![0.0; delay]));
@@ -213,7 +214,7 @@ mod tests {
             }
         }
         let (gain, period) = relay.found.unwrap();
-        // The sample-and-hold adds half a tick twice over: 4 (L + 1) at most.
+        // Sample-and-hold adds half a tick twice: 4 (L + 1) at most.
         assert!((period / 4.0 / delay as f64 - 1.0).abs() < 0.03, "{period}");
         // The wave is a triangle of height L, whose first harmonic is 8 L/π²; K_u is then π/(2 L).
         assert!((gain * 2.0 * delay as f64 / PI - 1.0).abs() < 0.03, "{gain}");

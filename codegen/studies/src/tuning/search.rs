@@ -1,7 +1,7 @@
-//! The loop of every optimiser: ask, reject, evaluate in parallel, tell; and what is kept of it.
+//! The loop of every optimiser: ask, reject, evaluate in parallel, tell; and its archive.
 //!
-//! Candidates of a generation are independent, and results are taken in the order in which they were asked for: the same
-//! seed gives the same bytes whatever the number of threads. A setting that was seen before is not simulated again.
+//! Candidates of a generation are independent, and results are processed in the order of the requests: the same
+//! seed gives the same bytes for any number of threads. A setting is never simulated twice.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -14,16 +14,16 @@ use serde::Serialize;
 use super::{Case, Evaluation, Score, Setting, Space};
 use crate::tuning::feasible::Feasibility;
 
-/// Something that proposes numbers in [0, 1] and learns from their costs.
+/// Proposes numbers in [0, 1] and learns from their costs.
 pub trait Optimiser {
     /// The next generation.
     fn ask(&mut self) -> Vec<Vec<f64>>;
 
-    /// Costs of that generation in its order; none for what was rejected.
+    /// Costs of that generation in its order; `None` for rejected candidates.
     fn tell(&mut self, costs: &[Option<f64>]);
 }
 
-/// Indices by rising cost, what was rejected last; ties in the order of the list.
+/// Indices in ascending order of cost, rejected ones last; ties keep the order of the list.
 pub(super) fn ranked(costs: &[Option<f64>]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..costs.len()).collect();
     let key = |index: &usize| costs[*index].unwrap_or(f64::INFINITY);
@@ -31,85 +31,85 @@ pub(super) fn ranked(costs: &[Option<f64>]) -> Vec<usize> {
     order
 }
 
-/// How a search is run.
+/// Options of a search.
 pub struct SearchOptions<'a> {
-    /// Candidates that may be asked for.
+    /// Largest number of candidates.
     pub evaluations: usize,
     /// Worker threads, at least 1.
     pub threads: usize,
-    /// Set from outside to end the search with what it has.
+    /// Set by the caller to end the search with its results so far.
     pub stop: &'a AtomicBool,
     /// Called after every generation.
     pub progress: &'a dyn Fn(&Progress),
 }
 
-/// How far a search is.
+/// Progress of a search.
 #[derive(Debug, Clone, Copy)]
 pub struct Progress {
-    /// Candidates so far, and in all.
+    /// Number of candidates so far, and in total.
     pub done: usize,
     /// See `done`.
     pub all: usize,
-    /// Cost of the best.
+    /// Cost of the best candidate.
     pub best: Option<f64>,
     /// Simulated seconds per second.
     pub speed: f64,
-    /// Time left at this rate.
+    /// Estimated time left.
     pub left: Duration,
 }
 
-/// What became of a candidate.
+/// Decision on a candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum Verdict {
-    /// Stability with the margins: not simulated.
+    /// Unstable within the required margins; not simulated.
     Unstable,
     /// Simulated.
     Run(Evaluation),
 }
 
-/// A setting with its score.
+/// A setting and its score.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Candidate {
-    /// Number among all that were asked for.
+    /// Sequence number of the request.
     pub number: usize,
-    /// The numbers.
+    /// The setting.
     pub setting: Setting,
-    /// Their score.
+    /// Its score.
     pub score: Score,
 }
 
 /// Costs of a generation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Generation {
-    /// Candidates asked for so far.
+    /// Number of candidates so far.
     pub evaluations: usize,
     /// Best cost so far.
     pub best: Option<f64>,
     /// Median of the generation's costs.
     pub median: Option<f64>,
-    /// Rejected for stability, and at a limit.
+    /// Number rejected for stability, and number at a limit.
     pub unstable: usize,
     /// See `unstable`.
     pub limited: usize,
 }
 
-/// What a search found.
+/// Result of a search.
 #[derive(Debug, Clone, Default)]
 pub struct Search {
-    /// Every scored candidate, each setting once, in the order asked for.
+    /// Every scored setting once, in the order of the requests.
     pub scored: Vec<Candidate>,
     /// Costs by generation.
     pub history: Vec<Generation>,
-    /// Candidates asked for.
+    /// Number of requested candidates.
     pub evaluations: usize,
-    /// Runs that were simulated.
+    /// Number of simulated runs.
     pub runs: usize,
-    /// Whether it was ended from outside.
+    /// Whether the caller ended it.
     pub interrupted: bool,
 }
 
 impl Search {
-    /// The candidate of least cost, the first of equals.
+    /// The candidate with the lowest cost; the first if there are several.
     #[must_use]
     pub fn best(&self) -> Option<&Candidate> {
         let mut best: Option<&Candidate> = None;
@@ -124,7 +124,7 @@ impl Search {
     /// Runs `optimiser` on a case.
     ///
     /// # Errors
-    /// If a run fails for another reason than a limit: a defect, with the settings that show it.
+    /// If a run fails for another reason than a limit: a bug, reported with its settings.
     pub fn run(
         optimiser: &mut dyn Optimiser,
         space: &Space,
@@ -141,7 +141,7 @@ impl Search {
             asked.truncate(options.evaluations - search.evaluations);
             let settings: Vec<Setting> = asked.iter().map(|genes| space.setting(genes)).collect();
             let keys: Vec<Vec<u64>> = settings.iter().map(|setting| setting.words(&workers[0])).collect();
-            // The first of equal candidates is evaluated, and each only once in all.
+            // Of equal candidates only the first is evaluated, once in the whole search.
             let mut fresh: Vec<usize> = Vec::new();
             for (index, key) in keys.iter().enumerate() {
                 if !seen.contains_key(key) && !fresh.iter().any(|&other| keys[other] == *key) {
@@ -167,7 +167,7 @@ impl Search {
                 seen.insert(keys[index].clone(), verdict);
             }
             if !whole {
-                // A generation that was cut short is not learned from, but what it found is kept.
+                // An incomplete generation is not learned from, but its results are kept.
                 search.interrupted = true;
                 break;
             }
@@ -217,7 +217,7 @@ fn cost(verdict: &Verdict) -> Option<f64> {
 
 type Outcome = Option<Result<Verdict, RunError>>;
 
-/// Verdicts in the order of `settings`; none for what was not begun when `stop` was set.
+/// Decisions in the order of `settings`; `None` for those not started before `stop` was set.
 pub fn evaluate(
     settings: &[&Setting],
     feasibility: &Feasibility,
@@ -269,7 +269,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_rejected_ranks_last_and_ties_keep_their_order() {
+    fn rejected_candidates_rank_last_and_ties_keep_their_order() {
         assert_eq!(ranked(&[Some(2.0), None, Some(1.0), Some(2.0), None]), [2, 0, 3, 1, 4]);
     }
 }

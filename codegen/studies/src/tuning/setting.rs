@@ -1,4 +1,4 @@
-//! One set of numbers that tuning may change, as the controller and the analysis take it.
+//! A set of tunable parameters, for the controller and for the analysis.
 
 use host_sim::controller::{Controller, TickController};
 use serde::Serialize;
@@ -10,9 +10,9 @@ use specgen_language::model::AdaptationMode;
 /// Value of the `setpoint_kind` word for leg displacements.
 const LEG_SETPOINTS: f64 = 1.0;
 
-/// Numbers of a controller of either kind.
+/// Parameters of a controller of either kind.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(clippy::large_enum_variant)] // A box would cost it `Copy`, and there are no more of them than candidates.
+#[allow(clippy::large_enum_variant)] // A box would prevent `Copy`, and there are only as many as candidates.
 pub enum Setting {
     /// Six legs with their own gauges: weights per run.
     Legs {
@@ -21,11 +21,11 @@ pub enum Setting {
         /// ω2.
         drift: f64,
     },
-    /// A platform: gains and bandwidths of P/F (F uses its bandwidths), gains of P alone.
+    /// A platform: gains and bandwidths of P/F (F uses the bandwidths), and gains of P.
     Platform {
-        /// Of P/F and F.
+        /// Used by P/F and F.
         combined: Tuning,
-        /// Of P, which has no feed-forward.
+        /// Used by P, which has no feed-forward.
         position: Tuning,
         /// Control interval, s.
         period: f64,
@@ -33,7 +33,7 @@ pub enum Setting {
 }
 
 impl Setting {
-    /// What the spec gives, or the compiler chose.
+    /// The values from the spec or chosen by the compiler.
     #[must_use]
     pub fn of(compiled: &Compilation) -> Self {
         let model = &compiled.model;
@@ -48,9 +48,9 @@ impl Setting {
         }
     }
 
-    /// Words of `controller` with these numbers and otherwise the spec's.
+    /// The configuration words of `controller` with these parameters, otherwise the spec's.
     ///
-    /// Every name is one that each emitted controller of its kind has; a word that is not there would be left as it is.
+    /// Every emitted controller of its kind has all these names; a missing word would be left unchanged.
     #[must_use]
     pub fn words(&self, controller: &Controller) -> Vec<u64> {
         let mut words = controller.default_config();
@@ -80,7 +80,7 @@ impl Setting {
         words
     }
 
-    /// Gains in force: of P `alone` or of the others. Legs have none.
+    /// The gains in use: those of P if `alone`, else of the other modes. Legs have none.
     #[must_use]
     pub fn tuning(&self, alone: bool) -> Tuning {
         match self {

@@ -1,7 +1,7 @@
-//! What may change, within which bounds: numbers in [0, 1] on a logarithmic scale, to settings and back.
+//! Tunable parameters and their bounds: maps numbers in [0, 1] to settings on a logarithmic scale, and back.
 //!
-//! Gains count against the stiffness of their axis, K_ii = (Jᵀ k_a J)_ii: `kp` and `kv`·rad/s as ratios, `ki` in 1/s. A
-//! setting is rounded to four digits here already, so that what is scored is what is written into the spec.
+//! Gains are relative to the stiffness of their axis, K_ii = (Jᵀ k_a J)_ii: `kp` and `kv`·rad/s as ratios, `ki` in 1/s. A
+//! setting is already rounded to four digits here, so the scored setting is the one written into the spec.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,7 +15,7 @@ use specgen_compiler::stability::platform::RestDynamics;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{AdaptationMode, ControlMode, Model};
 
-/// Which numbers are tuned.
+/// Which parameters to tune.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum TunedNumbers {
     /// Gains of the feedback.
@@ -27,7 +27,7 @@ pub enum TunedNumbers {
 }
 
 impl TunedNumbers {
-    /// As `--what` has it.
+    /// Its name for `--what`.
     fn name(self) -> &'static str {
         match self {
             Self::Gains => "gains",
@@ -37,7 +37,7 @@ impl TunedNumbers {
     }
 }
 
-/// What a parameter is.
+/// Meaning of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Role {
     /// k_p of an axis.
@@ -75,16 +75,16 @@ impl fmt::Display for Role {
     }
 }
 
-/// One number.
+/// One parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Parameter {
-    /// What it is.
+    /// Its meaning.
     pub role: Role,
     /// Smallest and largest value.
     pub bounds: [f64; 2],
 }
 
-/// Bounds that a user gives for a group of parameters: `kp`, `ki`, `kv`, `level`, `drift`.
+/// Bounds given by the user for a group of parameters: `kp`, `ki`, `kv`, `level`, `drift`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GivenBounds {
     /// The group.
@@ -93,14 +93,14 @@ pub struct GivenBounds {
     pub bounds: [f64; 2],
 }
 
-/// Every number that is tuned, and the setting that the others stay at.
+/// All tuned parameters, and the setting for the others.
 #[derive(Debug, Clone)]
 pub struct Space {
-    /// The numbers.
+    /// The parameters.
     pub parameters: Vec<Parameter>,
     /// K_ii; ones for legs.
     stiffness: [f64; 6],
-    /// Whether the gains are those of P alone.
+    /// Whether the gains are those of mode P.
     pub alone: bool,
     base: Setting,
 }
@@ -111,10 +111,10 @@ const DERIVATIVE: [f64; 2] = [1e-6, 1e-3];
 const WEIGHTS: [[f64; 2]; 2] = [[1e-3, 1.0], [1e-4, 1.0]];
 
 impl Space {
-    /// What `what` means for a compiled spec, within the usual bounds or those given.
+    /// The space selected by `what` for a compiled spec, within the default or given bounds.
     ///
     /// # Errors
-    /// If the spec's mode uses nothing of it, or bounds are empty or for nothing that is tuned.
+    /// If the spec's mode uses none of these parameters, or bounds are empty or for a parameter that is not tuned.
     pub fn of(compiled: &Compilation, what: TunedNumbers, given: &[GivenBounds]) -> Result<Self, Vec<Diagnostic>> {
         let model = &compiled.model;
         let mode = model.task_space.as_ref().map(|task| task.mode);
@@ -156,9 +156,9 @@ impl Space {
                 if mode.is_some() { "this mode of the platform controller" } else { "this spec without [control]" };
             return Err(refuse(
                 codes::TUNE_NOTHING,
-                format!("{kind} uses none of the numbers that are asked for (--what {})", what.name()),
+                format!("{kind} uses none of the selected parameters (--what {})", what.name()),
                 "weights need adaptation.mode = \"ewma\" or \"pcc\" and control.mode other than \"p\"; gains need [control] \
-                 with mode = \"p\" or \"p/f\"; or tune what there is, with --what all",
+                 with mode = \"p\" or \"p/f\"; or tune all that are used, with --what all",
             ));
         }
         for GivenBounds { group, bounds } in given {
@@ -166,16 +166,16 @@ impl Space {
             if !(low > 0.0 && high > low && high.is_finite()) {
                 return Err(refuse(
                     codes::TUNE_BOUNDS,
-                    format!("the bounds of {group}, {low} to {high}, hold nothing: expected 0 < low < high"),
-                    "give the smaller one first: --bounds ki=10:1000",
+                    format!("the bounds of {group}, {low} to {high}, are empty: expected 0 < low < high"),
+                    "give the smaller value first: --bounds ki=10:1000",
                 ));
             }
             let found = parameters.iter_mut().filter(|p| p.role.group() == group);
             if found.map(|p| p.bounds = *bounds).count() == 0 {
                 return Err(refuse(
                     codes::TUNE_BOUNDS,
-                    format!("there are bounds for {group}, which is not tuned here"),
-                    "bounds are for kp, ki, kv, level and drift, as far as --what and the spec's mode have them",
+                    format!("bounds were given for {group}, which is not tuned"),
+                    "bounds apply to kp, ki, kv, level and drift, as far as --what and the spec's mode include them",
                 ));
             }
         }
@@ -188,7 +188,7 @@ impl Space {
         self.parameters.len()
     }
 
-    /// The setting of numbers in [0, 1]; what is outside counts as the end.
+    /// The setting for numbers in [0, 1]; others are clipped.
     #[must_use]
     pub fn setting(&self, genes: &[f64]) -> Setting {
         let mut setting = self.base;
@@ -207,21 +207,21 @@ impl Space {
         setting
     }
 
-    /// The setting with these numbers by name, in the unit of the bounds; the others stay as they are in the spec.
+    /// The setting with these parameters by name, in the unit of the bounds; the others keep their values from the spec.
     ///
     /// # Errors
-    /// In words, if a name is not that of a parameter or its number is not within the bounds.
+    /// A message if a name is unknown or a value is outside its bounds.
     pub fn named(&self, values: &BTreeMap<String, f64>) -> Result<Setting, String> {
         let mut setting = self.base;
         for (name, value) in values {
             let Some(parameter) = self.parameters.iter().find(|parameter| parameter.role.to_string() == *name) else {
                 let known: Vec<String> = self.parameters.iter().map(|parameter| parameter.role.to_string()).collect();
-                return Err(format!("nothing that is tuned here is called `{name}`; expected {}", known.join(", ")));
+                return Err(format!("no tuned parameter is called `{name}`; expected {}", known.join(", ")));
             };
             let [low, high] = parameter.bounds;
             if !(low..=high).contains(value) {
                 return Err(format!(
-                    "{name} is {value}, not within its bounds {low:e} to {high:e}; --bounds sets others"
+                    "{name} is {value}, outside its bounds {low:e} to {high:e}; change them with --bounds"
                 ));
             }
             self.put(&mut setting, parameter.role, *value);
@@ -229,7 +229,7 @@ impl Space {
         Ok(setting)
     }
 
-    /// The numbers in [0, 1] that give a setting, or the nearest within bounds.
+    /// The numbers in [0, 1] for a setting, or for the nearest one within bounds.
     #[must_use]
     pub fn genes(&self, setting: &Setting) -> Vec<f64> {
         self.parameters
@@ -249,7 +249,7 @@ impl Space {
             .collect()
     }
 
-    /// What gains count against.
+    /// The stiffness that gains are relative to.
     #[must_use]
     pub fn stiffness(&self) -> &[f64; 6] {
         &self.stiffness
@@ -275,7 +275,7 @@ impl Space {
         }
     }
 
-    /// A number of `setting`: gains over the stiffness of their axis.
+    /// A parameter of `setting`: gains relative to the stiffness of their axis.
     #[must_use]
     pub fn value(&self, setting: &Setting, role: Role) -> f64 {
         match setting {
@@ -298,10 +298,10 @@ impl Space {
     }
 }
 
-/// K_ii = (Jᵀ k_a J)_ii at rest of a model that compiled, N/m and N m/rad.
+/// K_ii = (Jᵀ k_a J)_ii at rest for a compiled model, N/m and N m/rad.
 #[must_use]
 pub fn axis_stiffness(model: &Model) -> [f64; 6] {
-    // Compiling found it: ones are never seen.
+    // Compilation succeeded, so the fallback is never used.
     let Ok(platform) = platform(model) else { return [1.0; 6] };
     let jacobian = RestDynamics::of(&platform).jacobian;
     std::array::from_fn(|axis| {
@@ -309,7 +309,7 @@ pub fn axis_stiffness(model: &Model) -> [f64; 6] {
     })
 }
 
-/// To four significant digits, by way of the decimal text that the spec will show: the double nearest to that text.
+/// Rounds to four significant digits through the decimal text that the spec will contain: the double nearest to that text.
 #[must_use]
 pub fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)

@@ -1,4 +1,4 @@
-//! The tuned numbers as an edit of the spec's text: comments, order and layout of everything else stay.
+//! Writes tuned parameters into the spec's text; comments, order and layout of everything else are preserved.
 
 use diffy::DiffOptions;
 use toml_edit::{Array, DocumentMut, Item, Table, Value};
@@ -15,11 +15,11 @@ const UNITS: [(&str, [&str; 2]); 3] = [
     ("derivative", ["N s/m", "N m s/rad"]),
 ];
 
-/// The text of the spec with `setting`; only what `space` tunes is changed, and is no longer named as assumed. `note` becomes a comment above
-/// a new table.
+/// The text of the spec with `setting`. Only parameters tuned in `space` change; they are removed from `assumed`. `note` becomes a
+/// comment above a new table.
 ///
 /// # Errors
-/// What the editor says of a text that the compiler read, or of a section that is no table.
+/// The editor's error on a text that the compiler accepted, or a section that is not a table.
 pub fn edited(compiled: &Compilation, space: &Space, setting: &Setting, note: &str) -> Result<String, String> {
     // The editor would end every line with `\n`.
     let windows = compiled.source.text.contains("\r\n");
@@ -38,7 +38,7 @@ pub fn edited(compiled: &Compilation, space: &Space, setting: &Setting, note: &s
                 if !tuned {
                     continue;
                 }
-                // Rounded down: at a weight of 1 a bandwidth rounded up would be refused.
+                // Rounded down: for a weight of 1 a bandwidth rounded up would be refused.
                 let (key, value) = if table.contains_key(&bandwidth) {
                     (bandwidth, format!("{:.3e} rad/s", floor4(value / run)).into())
                 } else {
@@ -49,8 +49,8 @@ pub fn edited(compiled: &Compilation, space: &Space, setting: &Setting, note: &s
             }
         }
         Setting::Platform { combined, position, .. } => {
-            // Of P/F the compiler's rule fits what the spec leaves out to what it gives: then both are written, or the
-            // numbers that were scored would not be those that come out.
+            // For P/F the compiler derives missing values from given ones. So both are written; otherwise the
+            // compiled values would differ from the scored ones.
             let (gains_given, bandwidths_given) = compiled
                 .model
                 .task_space
@@ -83,14 +83,14 @@ pub fn edited(compiled: &Compilation, space: &Space, setting: &Setting, note: &s
     Ok(if windows { text.replace("\r\n", "\n").replace('\n', "\r\n") } else { text })
 }
 
-/// Takes keys out of the list of assumed values: they are decided now.
+/// Removes keys from the list of assumed values.
 fn forget(document: &mut DocumentMut, keys: &[String]) {
     if let Some(assumed) = document.get_mut("assumed").and_then(Item::as_array_mut) {
         assumed.retain(|entry| entry.as_str().is_none_or(|path| !keys.iter().any(|key| key == path)));
     }
 }
 
-/// The shortest text that reads back to the value, in the way of specs.
+/// The shortest text that reads back to the same value, in the style of specs.
 fn plain(value: f64) -> String {
     if value == 0.0 || (1e-2..1e5).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
 }
@@ -109,7 +109,7 @@ fn section<'a>(document: &'a mut DocumentMut, name: &str, note: &str) -> Result<
     document[name].as_table_mut().ok_or_else(|| format!("`{name}` is not written as a section [{name}]"))
 }
 
-/// Replaces a value, with what stands around it, or adds one.
+/// Replaces a value but not its surrounding whitespace and comments, or adds it.
 fn set(table: &mut Table, key: &str, mut value: Value) {
     if let Some(old) = table.get(key).and_then(Item::as_value) {
         *value.decor_mut() = old.decor().clone();
@@ -119,7 +119,7 @@ fn set(table: &mut Table, key: &str, mut value: Value) {
     }
 }
 
-/// The change as a patch that `patch -p0` and `git apply -p0` take.
+/// The change as a patch for `patch -p0` and `git apply -p0`.
 #[must_use]
 pub fn patch(name: &str, old: &str, new: &str) -> String {
     let mut options = DiffOptions::new();
@@ -141,14 +141,14 @@ mod tests {
     }
 
     #[test]
-    fn a_new_section_stands_at_the_end_with_its_note() {
+    fn a_new_section_is_added_at_the_end_with_its_note() {
         let mut document: DocumentMut = "a = 1 # one\n\n[[b]]\nc = 2\n".parse().unwrap();
         set(section(&mut document, "gains", "tuned").unwrap(), "k", 1.5.into());
         assert_eq!(document.to_string(), "a = 1 # one\n\n[[b]]\nc = 2\n\n# tuned\n[gains]\nk = 1.5\n");
     }
 
     #[test]
-    fn what_is_tuned_is_no_longer_assumed() {
+    fn tuned_parameters_are_no_longer_assumed() {
         let text = "assumed = [ # why\n    \"gains.integral\", \"sensor.noise\",\n]\n";
         let mut document: DocumentMut = text.parse().unwrap();
         forget(&mut document, &["gains.integral".to_owned(), "gains.derivative".to_owned()]);

@@ -1,4 +1,4 @@
-//! The figures of a spec that compiled, which need no build and no run.
+//! Figures of a compiled spec that need no build and no run.
 
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::requirements;
@@ -16,7 +16,7 @@ fn reach(compiled: &Compilation) -> Vec<Figure> {
         let [low, high] = one.from_middle.map(f64::abs);
         let unit = if axis < 3 { "µm" } else { "µrad" };
         let figure = Figure::new(Subject::Reach, AXES[axis], 1e6 * if low > high { low } else { high }, unit);
-        // Legs with gauges of their own stop one by one at the ends of their strokes: the workspace binds nothing.
+        // Legs with their own gauges stop individually at the ends of their strokes: no workspace limit applies.
         if compiled.design.is_none() {
             return figure;
         }
@@ -88,7 +88,7 @@ fn margins(compiled: &Compilation) -> Vec<Figure> {
     figures
 }
 
-/// A run would have to be made: said in words, and not judged.
+/// Error limits, which need a run: reported as text without an answer.
 fn tracking(compiled: &Compilation) -> Vec<Figure> {
     let limits = compiled.model.requirements.tracking.len();
     let words = match limits {

@@ -10,10 +10,10 @@ use super::SEED;
 use specgen_compiler::ir::{Ir, LEGS, SetpointKind};
 use specgen_language::model::Model;
 
-/// Set-points within the stroke; the gauges read what was requested, with their noise.
+/// Set-points within the stroke; the gauges read the request plus noise.
 ///
 /// # Errors
-/// It lacks a word.
+/// The controller lacks a word.
 pub(super) fn exercise(
     controller: &mut dyn TickController,
     model: &Model,
@@ -59,7 +59,7 @@ fn setpoint(model: &Model, ir: &Ir, time: f64) -> [f64; 6] {
                 let limit = 0.95 * bounds[axis];
                 if value > limit { limit } else { value }
             };
-            // A rise of z lengthens every leg by its vertical share.
+            // A lift along z lengthens every leg by its vertical component.
             let lift = reach * ir.kinematics.rest_length[0] / model.geometry.height;
             let turn = reach / model.geometry.joint_radius();
             [

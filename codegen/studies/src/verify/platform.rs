@@ -1,4 +1,4 @@
-//! The exercise of a controller in task space: closed loop with a simulated machine, on streamed set-points.
+//! The exercise of a task-space controller: closed loop with a simulated machine, on streamed set-points.
 
 use std::f64::consts::TAU;
 
@@ -14,7 +14,7 @@ use super::SEED;
 use crate::machine;
 use specgen_language::model::{Model, TaskSpace};
 
-/// Way to the bias pose, then a streamed motion of all six axes.
+/// Moves to the bias pose, then streams a motion of all six axes.
 pub(super) fn exercise(
     controller: &mut dyn TickController,
     model: &Model,
@@ -38,11 +38,11 @@ pub(super) fn exercise(
     bench.into_trace().ok_or(RunError::Timing { interval: model.timing.period, duration: 0.0 })
 }
 
-/// Share of the room that the workspace leaves which a streamed axis swings by: along z, the others. Little where the legs
-/// could come to their lower end.
+/// Amplitude of a streamed axis as a share of the free workspace: along z, and for the other axes. Small where the legs
+/// could reach their lower end.
 const SWING: [f64; 2] = [0.2, 0.03];
 
-/// A motion from rest with a share of the room that the workspace leaves.
+/// A motion from rest, by a share of the free workspace.
 fn motion(model: &Model, task: &TaskSpace, time: f64) -> PoseTarget {
     let mut target = PoseTarget::default();
     for (axis, bound) in model.workspace.bounds().into_iter().enumerate() {
@@ -56,7 +56,7 @@ fn motion(model: &Model, task: &TaskSpace, time: f64) -> PoseTarget {
     target
 }
 
-/// The machine of the spec, out of its tolerances, pre-cycled and zeroed.
+/// The machine of the spec with tolerances, pre-cycled and zeroed.
 fn rig(model: &Model, task: &TaskSpace) -> PlatformRig {
     let specimen = machine::specimen(model, task, &LegParameters::reference(), Some(SEED));
     machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED).rig().clone()

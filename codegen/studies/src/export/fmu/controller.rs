@@ -1,4 +1,4 @@
-//! The unit of the controller under its supervisor.
+//! The unit of the supervised controller.
 
 use host_sim::controller::{Controller, Supervised, TickController};
 use host_sim::word::WordKind;
@@ -7,14 +7,14 @@ use specgen_compiler::workspace;
 use specgen_language::interrupt::Scratch;
 use specgen_toolchain::host::{build_loadable, build_unit};
 
-use super::{Built, Unit, Variable};
+use super::{PackedUnit, Unit, Variable};
 use crate::export::{fits, header};
 use specgen_language::outcome::{Failure, environment};
 use specgen_language::ui::{ControllerForm, Ui};
 
 const MODEL: &str = include_str!("controller_model.h");
 
-pub(super) fn built(compiled: &Compilation, ui: &Ui) -> Result<Built, Failure> {
+pub(super) fn built(compiled: &Compilation, ui: &Ui) -> Result<PackedUnit, Failure> {
     let scratch = Scratch::new().map_err(environment)?;
     let sources = scratch.path().join("sources");
     let rust = sources.join("rust");
@@ -42,7 +42,7 @@ fn unit<'a>(compiled: &'a Compilation, machine: &Supervised) -> Unit<'a> {
     };
     machine.input_names().into_iter().for_each(|name| add(name.clone(), WordKind::of(&name), "input", 0));
     machine.output_names().into_iter().for_each(|name| add(name.clone(), WordKind::of(&name), "output", 0));
-    // Outputs may have the names of settings.
+    // The prefix avoids clashes with names of outputs.
     let settings = about.config_names.iter().zip(controller.default_config());
     settings.for_each(|(name, word)| add(format!("settings.{name}"), WordKind::of(name), "parameter", word));
     Unit::new(compiled, "", "Supervised controller of", about.scalar, true, variables)

@@ -1,4 +1,4 @@
-//! The unit of the simulated machine: the plant of `specgen sim` with all that it is made of.
+//! The unit of the simulated machine: the plant of `specgen sim` with all its sources.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use specgen_language::interrupt::Scratch;
 use specgen_toolchain::host::build_unit;
 use toml_edit::{Array, DocumentMut};
 
-use super::{Built, Unit, Variable};
+use super::{PackedUnit, Unit, Variable};
 use specgen_language::outcome::{Failure, environment};
 use specgen_language::output::write_scratch;
 use specgen_language::ui::Ui;
@@ -20,12 +20,12 @@ use specgen_language::ui::Ui;
 const MODEL: &str = include_str!("plant_model.h");
 const MANIFEST: &str = include_str!("../../../../../Cargo.toml");
 const LOCK: &str = include_str!("../../../../../Cargo.lock");
-/// The crate that is built, and its folder.
+/// The crate to build, and its folder.
 const PACKAGE: (&str, &str) = ("plant-unit", "unit");
-/// Of the workspace that the sources are.
+/// Members of the workspace of sources.
 const MEMBERS: [&str; 3] = [PACKAGE.1, "host-sim", "firmware/runtime"];
 
-pub(super) fn built(compiled: &Compilation, ui: &Ui) -> Result<Built, Failure> {
+pub(super) fn built(compiled: &Compilation, ui: &Ui) -> Result<PackedUnit, Failure> {
     let description = description(compiled);
     let text = serde_json::to_string(&description).map_err(environment)?;
     let unit = unit(compiled, &description);
@@ -39,14 +39,14 @@ pub(super) fn built(compiled: &Compilation, ui: &Ui) -> Result<Built, Failure> {
         [("model.h", MODEL.to_owned()), ("fmu.h", unit.header(&format!("#define FMU_PLANT {}\n", literal(&text))))];
     let build = ("unit", "libplant_unit.a", "-lm -lpthread -ldl");
     let own = unit.write_sources(&sources, own, build)?;
-    ui.progress("building the simulated machine for this host: a minute the first time, with packages that cargo may have to fetch");
+    ui.progress("building the simulated machine for this host: this takes a minute the first time, and cargo may download packages");
     let binary =
         build_unit(&sources, &sources.join("rust").join(PACKAGE.1), &scratch.path().join("target"), &unit.identifier)?;
     let rust = rust.into_iter().map(|(name, text)| (format!("rust/{name}"), text));
     unit.packed(&binary, own.into_iter().chain(rust))
 }
 
-/// What the machine of `specgen sim` is made of.
+/// Parameters of the machine of `specgen sim`.
 fn description(compiled: &Compilation) -> Description {
     let (model, leg) = (&compiled.model, LegParameters::reference());
     let period = model.timing.period;
@@ -81,12 +81,12 @@ fn unit<'a>(compiled: &'a Compilation, description: &Description) -> Unit<'a> {
     Unit::new(compiled, "_plant", "Simulated machine of", Scalar::F64, false, variables)
 }
 
-/// A workspace of the plant's crates, with the versions and flags of specgen's own.
+/// A workspace of the plant's crates, with specgen's own dependency versions and flags.
 fn rust(compiled: &Compilation) -> Result<BTreeMap<String, String>, Failure> {
     let ours = HOST_SIM.iter().chain(UNIT).map(|(name, text)| ((*name).to_owned(), (*text).to_owned()));
     let mut files: BTreeMap<String, String> = ours.collect();
     if let Some(manifest) = files.get_mut("unit/Cargo.toml") {
-        // Beside the simulator, not in it.
+        // The runtime is a sibling of the simulator here, not its parent.
         *manifest = manifest.replace("path = \"..\"", "path = \"../host-sim\"");
     }
     let runtime = compiled.files.iter().filter(|(name, _)| name.starts_with("runtime/"));
@@ -108,7 +108,7 @@ fn rust(compiled: &Compilation) -> Result<BTreeMap<String, String>, Failure> {
     Ok(files)
 }
 
-/// A lock file with no more than `root` depends on, in cargo's own form.
+/// The lock file reduced to the dependencies of `root`, in cargo's format.
 fn pruned(lock: &str, root: &str) -> String {
     let mut blocks = lock.split("[[package]]\n");
     let head = blocks.next().unwrap_or_default();
@@ -121,7 +121,7 @@ fn pruned(lock: &str, root: &str) -> String {
     let mut kept = vec![false; packages.len()];
     let mut open = vec![root.to_owned()];
     while let Some(wanted) = open.pop() {
-        // `name`, or `name version` where there are several.
+        // `name`, or `name version` if there are several versions.
         let mut words = wanted.split(' ');
         let (name, version) = (words.next().unwrap_or_default(), words.next());
         for (block, kept) in packages.iter().zip(&mut kept) {
@@ -148,12 +148,12 @@ fn pruned(lock: &str, root: &str) -> String {
     text + "\n"
 }
 
-/// What a package of a lock file names below `dependencies`.
+/// The `dependencies` of a package in a lock file.
 fn dependencies(block: &str) -> impl Iterator<Item = &str> {
     block.lines().filter_map(|line| line.strip_prefix(" \"")?.strip_suffix("\","))
 }
 
-/// A string literal of C, in lines that every compiler takes.
+/// A C string literal, in lines short enough for every compiler.
 fn literal(text: &str) -> String {
     let escaped: Vec<String> = text
         .as_bytes()
@@ -162,7 +162,7 @@ fn literal(text: &str) -> String {
             let byte = |byte: &u8| match byte {
                 b'"' => "\\\"".to_owned(),
                 b'\\' => "\\\\".to_owned(),
-                // Three digits, so that no digit that follows belongs to it; `?` could begin a trigraph.
+                // Three digits, so that a following digit is not part of the escape. `?` could start a trigraph.
                 0..=31 | b'?' | 127.. => format!("\\{byte:03o}"),
                 byte => char::from(*byte).to_string(),
             };
@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_lock_file_keeps_what_is_needed_in_the_words_of_cargo() {
+    fn a_lock_file_is_pruned_in_the_format_of_cargo() {
         let lock = "version = 4\n\n[[package]]\nname = \"a\"\nversion = \"1.0.0\"\ndependencies = [\n \"b 2.0.0\",\n]\n\n\
                     [[package]]\nname = \"b\"\nversion = \"1.0.0\"\n\n[[package]]\nname = \"b\"\nversion = \"2.0.0\"\n\n\
                     [[package]]\nname = \"c\"\nversion = \"1.0.0\"\ndependencies = [\n \"a\",\n \"b 1.0.0\",\n]\n";
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn text_within_c_is_the_text() {
+    fn a_c_literal_has_the_value_of_its_text() {
         assert_eq!(literal("a\"b\\\n1?é"), "\\\n    \"a\\\"b\\\\\\0121\\077\\303\\251\"");
         assert_eq!(literal(&"x".repeat(101)), format!("\\\n    \"{}\" \\\n    \"x\"", "x".repeat(100)));
     }

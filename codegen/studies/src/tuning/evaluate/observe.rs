@@ -1,4 +1,4 @@
-//! A run watched to its end, limits and faults included: for who counts them instead of rejecting the run.
+//! Observes a run to its end, for callers that count limits and faults instead of rejecting the run.
 
 use std::ops::ControlFlow;
 
@@ -8,24 +8,24 @@ use host_sim::coverage::Coverage;
 
 use super::{AT_REST, Case, Kind, Setting};
 
-/// The end of one tick.
+/// Errors at the end of a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TickErrors {
-    /// Since the start of the trajectory, s.
+    /// Time since the start of the trajectory, s.
     pub time: f64,
-    /// Error of the translation as a norm, m; of legs the root mean square over them.
+    /// Translation error as a norm, m; for legs the rms over the legs.
     pub translation: f64,
     /// Error of the angles as a norm, rad; 0 for legs.
     pub orientation: f64,
-    /// The largest error of one leg, m; of a platform as `translation`.
+    /// Largest error of one leg, m; for a platform as `translation`.
     pub largest: f64,
-    /// Status word; a leg that is wanted at rest, where noise alone makes it meet the end of its voltage, is not at a limit.
+    /// Status word. A leg with a set-point near rest, where noise alone reaches the voltage limit, does not count as limited.
     pub status: u32,
 }
 
 impl Case {
-    /// Runs `setting` as [`Case::run`] does, but shows `watch` the end of every tick instead of scoring; it may end the run.
-    /// Returns how much of the trajectory it saw.
+    /// Runs `setting` like [`Case::run`], but calls `watch` at the end of every tick instead of scoring; `watch` may end the run.
+    /// Returns the observed part of the trajectory.
     ///
     /// # Errors
     /// As [`Case::run`].

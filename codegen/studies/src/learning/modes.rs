@@ -1,4 +1,4 @@
-//! What a measured response says of each mode, beside the model.
+//! Measured response of each mode, compared with the model.
 
 use std::f64::consts::TAU;
 
@@ -9,23 +9,23 @@ use super::convergence::Learnable;
 use super::matrix::Matrix6c;
 use super::response::Response;
 
-/// What was measured of a mode.
+/// Measured response of a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ModeMeasurement {
-    /// By the model, Hz.
+    /// Natural frequency by the model, Hz.
     pub frequency: f64,
-    /// Where (Hz) its response to its own correction is largest, and how large, between half and one and a half times that frequency.
+    /// Frequency (Hz) and size of the peak in its response to its own correction, between half and one and a half times `frequency`.
     pub largest: [f64; 2],
     /// The same by the model.
     pub modelled: [f64; 2],
-    /// Standard error where it is largest, relative.
+    /// Relative standard error at the peak.
     pub error: f64,
 }
 
 impl Learnable {
-    /// What a response says of each mode.
+    /// The measured response of each mode.
     #[must_use]
-    pub fn heard(&self, response: &Response) -> [ModeMeasurement; 6] {
+    pub fn mode_measurements(&self, response: &Response) -> [ModeMeasurement; 6] {
         let frequencies: Vec<f64> = response.bins.iter().map(|bin| bin.hertz).collect();
         let model = self.nominal(&frequencies);
         std::array::from_fn(|mode| {
