@@ -163,7 +163,7 @@ fn a_record_says_itself_that_it_is_simulated_and_so_does_what_is_made_of_it() {
     );
     let identify = ["identify", "leg.csv", "--drive", "0:100", "--grid", "32", "-o", "table.csv"];
     let run = folder.run(&identify);
-    assert!(run.code == 0 && run.stdout.contains("# simulated, not measured: the spec's `assumed` stays"), "{run:#?}");
+    assert!(run.code == 0 && run.stdout.contains("# simulated, not measured: do not change `assumed`"), "{run:#?}");
     assert!(run.stdout.contains("leg.csv: simulated: "), "{}", run.stdout);
     assert_eq!(json_of(&folder, &identify).1["result"]["measured"], json!([]));
     assert!(simulated("table.csv"));
@@ -175,7 +175,7 @@ fn a_record_says_itself_that_it_is_simulated_and_so_does_what_is_made_of_it() {
     assert!(!simulated("bench.csv"));
     let run = folder.run(&["identify", "bench.csv", "--drive", "0:100", "--grid", "32", "-o", "table.csv"]);
     assert!(
-        run.stdout.contains("take out of the spec's `assumed`") && run.stdout.contains("\"hysteresis.records\""),
+        run.stdout.contains("remove from `assumed` in the spec") && run.stdout.contains("\"hysteresis.records\""),
         "{run:#?}"
     );
     assert!(!simulated("table.csv"));

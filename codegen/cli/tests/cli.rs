@@ -69,7 +69,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         ),
         (
             &["sim", "reference.toml", "--trajectory", "case-1", "--frequency", "2"],
-            "--frequency is for waves and the paper's cases",
+            "--frequency applies to waves and the paper's cases",
         ),
         (&["tune"], "<SPEC>"),
         (&["tune", "legs.toml", "--bounds", "level"], "expected GROUP=LOW:HIGH such as ki=10:1000, found `level`"),

@@ -86,15 +86,15 @@ fn a_run_of_the_machine_gives_the_gain_of_each_leg_and_tables_that_take_its_erro
     folder.run(&["sim", "off.toml", "--record", "short.rec", "--seconds", "0.01"]).says(0, &[]);
     folder
         .run(&["identify", "gains", "short.rec", "--spec", "off.toml"])
-        .says(1, &["record a second or more of a slow wave on all axes"]);
+        .says(1, &["record at least a second of a slow wave on all axes"]);
     folder
         .run(&["identify", "gains", "run.rec", "--spec", "own.toml"])
-        .says(1, &["is of spec digest", "name the spec that the target was built from"]);
+        .says(1, &["was recorded with spec digest", "give the spec that the target was built from"]);
     folder
         .run(&["identify", "gains", "run.rec", "--spec", "off.toml", "-o", "../elsewhere"])
-        .says(2, &["expected a folder in that of the spec, such as `gains`"]);
+        .says(2, &["expected a folder relative to the spec's, such as `gains`"]);
     folder
         .run(&["identify", "gains", "run.rec", "--spec", "legs.toml"])
-        .says(1, &["six legs with their own gauges have a record each", "specgen identify linear"]);
+        .says(1, &["six legs with their own gauges have one record each", "specgen identify linear"]);
     assert!(!folder.path("../elsewhere").exists());
 }

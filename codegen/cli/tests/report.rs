@@ -117,10 +117,10 @@ fn the_report_of_six_legs_is_one_small_page_that_begins_with_the_verdict() {
             "id=\"margins\"",
             "id=\"hysteresis\"",
             "id=\"tables\"",
-            "Everything that check says",
+            "Output of check --details",
         ],
     );
-    assert!(page.contains("Not measured: left out by --no-target"));
+    assert!(page.contains("Not measured: skipped by --no-target"));
     has_numbers(&page);
     is_drawn(&folder, "page.html", &result["figures"]);
     if support::length(false, true) {
@@ -156,8 +156,8 @@ fn the_report_of_a_platform_judges_errors_by_their_limits() {
     );
     let table = page.split("<caption>Errors on trajectories, rms</caption>").nth(1).unwrap();
     for (name, word) in [
-        ("case-1 1 Hz xyz", "holds"),
-        ("case-2 10 Hz x", "beyond its limit"),
+        ("case-1 1 Hz xyz", "within limit"),
+        ("case-2 10 Hz x", "exceeds limit"),
         ("machining 1 Hz", "no limit in the spec"),
     ] {
         let row = table.split(&format!("<td>{name}</td>")).nth(1).unwrap().split("</tr>").next().unwrap();
@@ -176,7 +176,7 @@ fn the_report_of_a_platform_has_every_figure_and_table() {
     assert_eq!(document.code, 0, "{:#}", document.value);
     let page = folder.read("page.html");
     assert!(page.len() < LARGEST, "{} bytes", page.len());
-    assert!(page.contains("No limit in the spec: shown, not judged"));
+    assert!(page.contains("The spec sets no limit"));
     assert!(page.contains("W0458") && page.contains("href=\"page-paper.html\""), "a finding of check, the other page");
     has_numbers(&page);
     is_drawn(&folder, "page.html", &document.value["result"]["figures"]);
@@ -285,7 +285,7 @@ fn a_recorded_run_stands_beside_the_simulation_of_its_commands() {
     in_order(
         &page,
         &[
-            "The run is whole",
+            "The run is complete",
             "the simulation of the same commands gives",
             "late ticks",
             "at a limit",
@@ -301,7 +301,7 @@ fn a_recorded_run_stands_beside_the_simulation_of_its_commands() {
     is_drawn(&folder, "run.html", &document.value["result"]["figures"]);
     // Of another spec.
     let refused = folder.json(&["report", "legs.toml", "--record", "run.rec", "-o", "other.html"]);
-    assert!(refused.code == 1 && refused.error().contains("name the spec that the target was built from"));
+    assert!(refused.code == 1 && refused.error().contains("give the spec that the target was built from"));
     if support::length(true, false) {
         return support::skipped("only in the full run: records of six legs");
     }
@@ -321,7 +321,7 @@ fn a_recorded_run_stands_beside_the_simulation_of_its_commands() {
         };
         let [recorded, simulated] = [number("recorded. Error "), number("the same commands gives ")];
         assert!((0.9..1.1).contains(&(recorded / simulated)), "{record}: {recorded} nm, simulated {simulated} nm");
-        assert_eq!(page.contains("0.20 s of the record are drawn but not counted"), drawn_only, "{record}");
+        assert_eq!(page.contains("0.20 s of the record are drawn but not scored"), drawn_only, "{record}");
     }
 }
 

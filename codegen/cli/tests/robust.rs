@@ -230,7 +230,7 @@ fn parts_that_do_not_fit_are_refused_by_name() {
     };
     let [one, two, three] = [0, 1, 2].map(|index: usize| names[index].as_str());
     refused(&[one, three], 1, "missing: --shard 2/3");
-    refused(&[one, "legs.toml", two], 1, "`legs.toml` is no JSON");
+    refused(&[one, "legs.toml", two], 1, "`legs.toml` is not JSON");
     refused(&[one, "part-4.json", two], 1, "`part-4.json` cannot be read");
     let text = folder.read(two);
     let with = |old: &str, new: &str, says: &str| {
@@ -241,7 +241,7 @@ fn parts_that_do_not_fit_are_refused_by_name() {
     with(
         "\"draws\": 7",
         "\"draws\": 8",
-        "`other.json` and `part-1-3.json` are of different studies: draws is 8 here, 7 there",
+        "`other.json` and `part-1-3.json` belong to different studies: draws is 8 and 7",
     );
     with("\"frequency\": 20.0", "\"frequency\": 21.0", "frequency is 21.0 here");
     with("\"noise\": true", "\"noise\": false", "noise is false here");
@@ -253,8 +253,8 @@ fn parts_that_do_not_fit_are_refused_by_name() {
     with(&version, "\"specgen\": \"0.0.1\"", "`other.json` was written by specgen \"0.0.1\"");
     // What was cut off, or counts in other parts.
     folder.write("other.json", &text[..text.len() / 2]);
-    refused(&[one, "other.json", three], 1, "`other.json` is no JSON");
-    refused(&[one, &part(&folder, 2, 2), three], 1, "is part 2 of 2, `part-1-3.json` one of 3");
+    refused(&[one, "other.json", three], 1, "`other.json` is not JSON");
+    refused(&[one, &part(&folder, 2, 2), three], 1, "is part 2 of 2, but `part-1-3.json` is one of 3");
     // One figure of the copy is another.
     let value: Value = serde_json::from_str(&text).unwrap();
     let mut changed = value.clone();
@@ -309,7 +309,7 @@ fn ctrl_c_keeps_what_was_run_and_says_so() {
         std::thread::sleep(std::time::Duration::from_secs(1));
         crate::support::send(rustix::process::Signal::INT, process);
     });
-    run.says(130, &["interrupted: the figures are of ", "no gate is passed"]);
+    run.says(130, &["interrupted: the figures cover ", "the gate was not passed"]);
     let shown = run.stdout;
     assert!(shown.contains("worst error") && !shown.contains("gate: passed"), "{shown}");
 }
@@ -335,7 +335,7 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
     fixed.iter().for_each(|vary| study.extend(["--vary", vary]));
     let run = |more: &[&str]| folder.run(&[&study[..], more].concat());
     let single = run(&["-o", "single", "--plot", "robust.svg"]);
-    assert!(folder.read("robust.svg").contains("the same, learned"));
+    assert!(folder.read("robust.svg").contains("after learning"));
     assert_eq!(single.code, 1, "{single:#?}");
     assert!(single.stderr.contains("largest rms learned error is"), "{single:#?}");
     assert!(single.stdout.contains("learned, nm rms"));
@@ -344,8 +344,8 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
         let line = single.stdout.lines().find(|one| one.starts_with(line)).unwrap();
         line.split_once("measured over ").unwrap().1.to_owned()
     };
-    assert!(!over("each ").is_empty() && !over("learned from 2 passes on each, ").is_empty(), "{}", single.stdout);
-    assert!(single.stdout.contains(" nm learned in ") && single.stdout.contains(" passes over "), "{}", single.stdout);
+    assert!(!over("each ").is_empty() && !over("learning from 2 passes on each, ").is_empty(), "{}", single.stdout);
+    assert!(single.stdout.contains(" nm after learning from ") && single.stdout.contains(" passes over "), "{}", single.stdout);
     let report: Value = serde_json::from_slice(&std::fs::read(folder.path("single/report.json")).unwrap()).unwrap();
     let table = folder.read("single/runs.csv");
     let (head, rows) = table.split_once('\n').unwrap();

@@ -185,7 +185,7 @@ fn an_edit_made_while_it_is_tuned_is_not_lost() {
     let edited = folder.read("legs.toml") + "# mine\n";
     let prepares = |stderr: &str| stderr.contains("preparing the machine");
     let run = Run::meanwhile(&mut command, prepares, |_| folder.write("legs.toml", &edited));
-    run.says(1, &["`legs.toml` was changed while it was tuned", "nothing was written", "tune again"]);
+    run.says(1, &["`legs.toml` was changed during tuning", "nothing was written", "tune again"]);
     assert!(run.stdout.contains("+++ legs.toml"), "{}", run.stdout);
     assert_eq!(folder.read("legs.toml"), edited);
 }

@@ -1,10 +1,10 @@
-//! The dynamic error budget: what each source adds to the error while the machine moves.
+//! Dynamic error budget: the contribution of each source to the error during motion.
 //!
-//! Every run follows the same path from the same state. The run without noise and with a drive converter as fine as there
-//! is leaves the hysteresis that model and adaptation do not take up, with creep and the corners of the path; a run with
-//! one source less that run is what the source adds. The converter is inside the controller, so the fine one is another
-//! controller, emitted from the spec with `dac.bits = 24`: with the coarse one in every run, noise would move the codes
-//! and every source would bring the converter's steps with it.
+//! Every run follows the same path from the same state. The reference run has no noise and the finest drive converter: it shows the
+//! hysteresis left by model and adaptation, creep, and the corners of the path. A run with
+//! one source, minus the reference run, gives the contribution of the source. The converter is part of the controller, so the fine one
+//! needs another controller, emitted from the spec with `dac.bits = 24`. With the coarse one in every run, noise would shift the codes
+//! and every source would include converter steps.
 
 use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, TickController};
@@ -28,7 +28,7 @@ use specgen_studies::reproduce::write::digits;
 /// Operating frequency of the path of six legs, Hz.
 const FREQUENCY: f64 = 1.0;
 
-/// Name of a source, and the noise that is left when it is alone.
+/// Each source and the noise parameters for it alone.
 fn sources(all: &NoiseParameters) -> [(&'static str, NoiseParameters); 3] {
     let none = NoiseParameters::NONE;
     [
@@ -38,7 +38,7 @@ fn sources(all: &NoiseParameters) -> [(&'static str, NoiseParameters); 3] {
     ]
 }
 
-/// The emitted controller, and one whose drive converter has the steps of [`FINE_BITS`].
+/// The emitted controller, and one with a drive converter of [`FINE_BITS`].
 pub struct Pair<'a> {
     /// The controller of the spec.
     pub own: &'a mut Controller,
@@ -46,20 +46,19 @@ pub struct Pair<'a> {
     pub fine: &'a mut Controller,
 }
 
-/// Bits of the fine converter, the most that a spec may have.
+/// Bits of the fine converter, the largest number that a spec may have.
 pub const FINE_BITS: i64 = 24;
 
 /// Errors by coordinate, then by tick, m and rad.
 type Errors = Vec<Vec<f64>>;
 
-/// A source with what it adds.
+/// A source and its contribution.
 struct ErrorSource {
     name: &'static str,
     errors: Errors,
 }
 
-/// The first trajectory of the spec that was followed, at each of its speeds in `all`; without one, case 1 at 1 Hz. In the
-/// control mode of the spec.
+/// The budget for the first trajectory of the spec in `all`, at each of its speeds, in the control mode of the spec.
 ///
 /// # Errors
 /// As [`host_sim::platform::PlatformScenario::run`].
@@ -76,13 +75,13 @@ pub fn of_platform(
     select(own, mode)?;
     select(fine, mode)?;
     let Some(first) = all.iter().find(|one| one.run.is_some()) else {
-        return Ok(empty().lead("Not made: no trajectory of the spec was followed."));
+        return Ok(empty().lead("Not available: no trajectory of the spec was run."));
     };
     let speeds: Vec<&TrackedPath> = all.iter().filter(|one| one.name == first.name && one.run.is_some()).collect();
     let errors = |run: &PlatformRun| -> Errors {
         (0..6).map(|axis| run.samples.iter().map(|s| s.target[axis] - s.tick.pose[axis]).collect()).collect()
     };
-    // One machine for each noise: preparing it takes longer than a run.
+    // One machine per noise setting: preparing it takes longer than a run.
     let run = |controller: &mut dyn TickController, noise: &Noise| -> Result<Vec<Errors>, RunError> {
         let mut scenario = machine::scenario(model, task, specimen, noise, seed);
         scenario.options = RunOptions { record: Record::Samples, ..scenario.options };
@@ -114,7 +113,7 @@ pub fn of_platform(
     Ok(section)
 }
 
-/// Six legs on the paper's trajectory at 1 Hz with PCC, or what the spec has weights for.
+/// The budget of six legs on the paper's trajectory at 1 Hz with PCC, or the best law with weights in the spec.
 ///
 /// # Errors
 /// As [`LegScenario::run`].
@@ -144,11 +143,11 @@ pub fn of_legs(leg: &LegParameters, mode: usize, controllers: Pair, seed: u64) -
     let what = format!("the leg trajectory at 1 Hz with {}", adapting_name(name));
     let mut section = empty();
     section.parts = parts((&what, coverage), 0, &LEGS, &found, &together, interval);
-    Ok(section.text("Errors are as the gauges read them, their own noise included."))
+    Ok(section.text("Errors are gauge readings and include gauge noise."))
 }
 
-/// What is left without noise, and what each source adds to it; last what the drive converter adds, from the run `silent`
-/// without noise with the converter of the spec.
+/// The residual without noise and the contribution of each source. The last is the drive converter, from the run `silent`
+/// without noise and with the spec's converter.
 fn each(quiet: &Errors, sources: Vec<(&'static str, Errors)>, silent: Errors) -> Vec<ErrorSource> {
     let less = |(name, mut errors): (&'static str, Errors)| {
         for (one, quiet) in errors.iter_mut().flatten().zip(quiet.iter().flatten()) {
@@ -168,19 +167,19 @@ fn empty() -> Section {
     Section::new("error-budget", "Error budget", "")
 }
 
-/// What would make a source smaller.
+/// How to reduce a source.
 fn advice(source: &str) -> &'static str {
     match source {
         "amplifier noise" => "A quieter amplifier helps most.",
         "gauge noise" => "A quieter gauge helps most.",
-        "ADC steps" => "More bits of the gauges help most.",
-        "DAC steps" => "More bits of dac.bits help most.",
-        _ => "A smoother path, a record of each leg or a higher gain helps most.",
+        "ADC steps" => "A higher gauge resolution helps most.",
+        "DAC steps" => "A larger dac.bits helps most.",
+        _ => "A smoother path, a record of each leg, or a higher gain helps most.",
     }
 }
 
-/// Bars of both units, and the cumulative spectrum of the first coordinates together, of `what` was followed and over what it
-/// was measured.
+/// Bars in both units, and the cumulative spectrum of the first coordinates together, for the trajectory `what` and its measured
+/// part.
 fn parts(
     (what, coverage): (&str, Coverage),
     number: usize,
@@ -193,7 +192,7 @@ fn parts(
     let mut values: Vec<(&str, [f64; 6])> =
         added.iter().map(|one| (one.name, core::array::from_fn(|axis| rms(&one.errors[axis])))).collect();
     let all: [f64; 6] = core::array::from_fn(|axis| rms(&together[axis]));
-    // Shares of the whole, so that nanometres and nanoradians count alike.
+    // As shares of the total, so that nanometres and nanoradians count equally.
     let weight = |values: &[f64; 6]| values.iter().zip(&all).map(|(v, whole)| v * v / (whole * whole)).sum::<f64>();
     values.sort_by(|a, b| weight(&b.1).total_cmp(&weight(&a.1)));
 
@@ -209,8 +208,8 @@ fn parts(
         table.push(row(name, values));
     }
     let squares = core::array::from_fn(|axis| values.iter().map(|(_, v)| v[axis] * v[axis]).sum::<f64>());
-    table.push(row("root of the sum of squares", &squares.map(libm::sqrt)));
-    table.push(row("simulated, all together", &all));
+    table.push(row("root sum of squares", &squares.map(libm::sqrt)));
+    table.push(row("simulated, all sources", &all));
 
     let bars = |axes: core::ops::Range<usize>, unit: &str| {
         let largest = axes
@@ -231,7 +230,7 @@ fn parts(
             numbers: if axes.start == 0 {
                 table.clone()
             } else {
-                Grid::new(&format!("Error budget in {unit}: with the one in nm"), &[])
+                Grid::new(&format!("Error budget in {unit}: included in the table in nm"), &[])
             },
         }
     };
@@ -252,11 +251,11 @@ fn parts(
     };
     let mut chart = Chart::new(
         &format!("spectrum-{number}"),
-        &format!("Error up to each frequency, {} together: {what}", if legs { "six legs" } else { "x, y and z" }),
-        Axis::log("up to frequency", "Hz"),
+        &format!("Cumulative error spectrum, {} together: {what}", if legs { "six legs" } else { "x, y and z" }),
+        Axis::log("frequency", "Hz"),
         Axis::linear("error", "nm rms"),
     );
-    let whole = ErrorSource { name: "all together", errors: together.clone() };
+    let whole = ErrorSource { name: "all sources", errors: together.clone() };
     let ordered = values.iter().filter_map(|(name, _)| added.iter().find(|one| one.name == *name));
     for (k, one) in ordered.chain([&whole]).enumerate() {
         let signals: Vec<&[f64]> = one.errors[..if legs { 6 } else { 3 }].iter().map(Vec::as_slice).collect();
@@ -267,12 +266,12 @@ fn parts(
     }
     chart.height = 240;
     let first = values.first().map_or("", |one| one.0);
-    let lead = format!("{} makes most of the error of {what}. {}", capital(first), advice(first));
+    let lead = format!("{} contributes most to the error of {what}. {}", capital(first), advice(first));
     [
         vec![Part::Lead(lead), Part::Html(format!("<p class=\"legend\">{}</p>\n", swatches.join("")))],
         columns,
         vec![
-            Part::Text("The scale is squared: independent sources add along the bar. The black line is the run with all sources together; where it leaves the end of the bar, sources are not independent. The hysteresis residual is what is left without noise and with a drive converter of 24 bits: hysteresis and creep that model and adaptation do not take up, and the corners of the path.".to_owned()),
+            Part::Text("The scale is squared, so independent sources add along the bar. The black line is the run with all sources; if it is off the end of the bar, the sources are not independent. The hysteresis residual is the error without noise and with a 24-bit drive converter: hysteresis and creep not compensated by model and adaptation, and the corners of the path.".to_owned()),
             Part::Chart(chart),
         ],
     ]
@@ -291,7 +290,7 @@ fn bar(name: &str, axis: usize, values: &[(&str, [f64; 6])], all: f64, square: f
     json!({ "name": name, "parts": parts, "total": { "x": all, "text": format!("{} {unit}", digits(all)) } })
 }
 
-/// Four or five round ticks of a squared axis up to `end`.
+/// Four or five round ticks on a squared axis up to `end`.
 fn squared(end: f64) -> Vec<f64> {
     let decade = libm::pow(10.0, libm::floor(libm::log10(end)));
     let step =
@@ -309,7 +308,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_source_is_what_it_adds_to_the_run_without_noise() {
+    fn a_source_is_its_contribution_to_the_run_without_noise() {
         let quiet = 3.0;
         let of = |value: f64| vec![vec![value; 4]; 6];
         let found = each(&of(quiet), vec![("gauge noise", of(quiet + 2.0))], of(3.5));
@@ -319,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn every_source_is_alone() {
+    fn each_source_has_only_its_own_noise() {
         let all = NoiseParameters { sensor_nm_rms: 1.0, adc_lsb_nm: 2.0, dac_lsb_mv: 0.0, amplifier_mv_rms: 3.0 };
         let mut sum = [0.0; 3];
         for (name, noise) in sources(&all) {

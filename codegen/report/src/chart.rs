@@ -1,16 +1,16 @@
-//! What a chart shows. A page's script draws it (`page`), to be zoomed and saved; [`plot`](super::plot) draws it as SVG.
+//! Content of a chart. A page draws it by script (`page`), with zoom and export; [`plot`](super::plot) draws it as SVG.
 
 use serde_json::{Value, json};
 use specgen_studies::reproduce::write::digits;
 
 use super::grid::Grid;
 
-/// Points of a series that is drawn over time.
+/// Largest number of points of a series over time.
 const POINTS: usize = 640;
-/// Largest integer that a value on an even axis is rounded to: what is drawn is finer than a printed page.
+/// Largest integer that values on a linear axis are rounded to: finer than any display.
 const STEPS: f64 = 20_000.0;
 
-/// How a series is drawn.
+/// Style of a series.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Mark {
     /// A line of this width, px.
@@ -21,46 +21,46 @@ pub enum Mark {
     Dots(f64),
 }
 
-/// A line as pages draw it; their script chooses sizes.
+/// A line on a page; its script chooses the width.
 pub const LINE: Mark = Mark::Line(1.3);
-/// What stands behind a dashed line.
+/// A wide line behind a dashed one.
 pub const WIDE: Mark = Mark::Line(3.0);
-/// A dashed line as pages draw it.
+/// A dashed line on a page.
 pub const DASHED: Mark = Mark::Dashed(1.6);
-/// Dots as pages draw them.
+/// Dots on a page.
 pub const DOTS: Mark = Mark::Dots(3.5);
-/// Colour of data on a page; 0 to 3 are the lightnesses of an ordered series, the most important first.
+/// Colour of data on a page; 0 to 3 are lightness levels of an ordered series, the most important first.
 pub const BLUE: usize = 4;
 /// Colour of targets and predictions on a page.
 pub const INK: usize = 5;
-/// Colour of what is above its limit on a page.
+/// Colour of values above their limit on a page.
 pub const ORANGE: usize = 6;
-/// Colour of what was before, on a page.
+/// Colour of earlier values on a page.
 pub const EDGE: usize = 7;
 
-/// What is written into a chart of a page beside its series.
+/// An annotation in a chart on a page.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Note {
-    /// Where values usually are: lowest and highest y, with their texts at the right.
+    /// Usual range of values: lowest and highest y, labelled on the right.
     Band([f64; 2], [String; 2]),
-    /// A limit of y with the band beyond it, upward or downward.
+    /// A limit in y with a band beyond it.
     Beyond {
         /// The limit.
         y: f64,
-        /// Whether it is a largest value.
+        /// Whether it is an upper limit.
         up: bool,
-        /// Its name and value.
+        /// Its label: name and value.
         text: String,
     },
-    /// A time at which something that a finding knows happens.
+    /// The time of an event that a finding describes.
     Cause(f64, String),
-    /// A point worth a look.
+    /// A point of interest.
     Ring([f64; 2], String),
-    /// A margin: x, both ends in y, its value.
+    /// A margin: x, both ends in y, label.
     Segment(f64, [f64; 2], String),
-    /// A value of y that matters.
+    /// A y value of interest.
     Level(f64, String),
-    /// Places of x at the bottom, with their numbers.
+    /// x positions marked at the bottom, with their numbers.
     Modes(Vec<f64>, Vec<String>),
 }
 
@@ -80,18 +80,18 @@ impl Note {
     }
 }
 
-/// Points drawn in one way.
+/// A series of points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// For the legend of a page; in a picture an empty name gives no entry.
+    /// Name in the legend; in a picture an empty name has no entry.
     pub name: String,
-    /// How they are drawn.
+    /// Style.
     pub mark: Mark,
-    /// Number of its colour.
+    /// Colour number.
     pub color: usize,
-    /// x, y in the units of the axes; a NaN breaks a line.
+    /// x, y in the units of the axes; NaN interrupts a line.
     pub points: Vec<[f64; 2]>,
-    /// First x and step of points that are evenly spaced.
+    /// First x and step, if the points are evenly spaced.
     even: Option<[f64; 2]>,
 }
 
@@ -102,35 +102,35 @@ pub struct Patch {
     pub x: [f64; 2],
     /// Lowest and highest y.
     pub y: [f64; 2],
-    /// 0 white to 1 dark; none: hatched.
+    /// From 0 (white) to 1 (dark); `None`: hatched.
     pub shade: Option<f64>,
 }
 
-/// What is counted along an axis, and how.
+/// An axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// What is counted.
+    /// The quantity.
     pub label: String,
-    /// In what unit; may be empty.
+    /// The unit; may be empty.
     pub unit: String,
-    /// In decades; values that are not positive are not drawn.
+    /// Logarithmic; non-positive values are not drawn.
     pub log: bool,
 }
 
 impl Axis {
-    /// An axis with even steps.
+    /// A linear axis.
     #[must_use]
     pub fn linear(label: &str, unit: &str) -> Self {
         Self { label: label.to_owned(), unit: unit.to_owned(), log: false }
     }
 
-    /// An axis in decades.
+    /// A logarithmic axis.
     #[must_use]
     pub fn log(label: &str, unit: &str) -> Self {
         Self { log: true, ..Self::linear(label, unit) }
     }
 
-    /// Label and unit, as they stand beside the axis.
+    /// Label and unit as one text.
     #[must_use]
     pub fn text(&self) -> String {
         if self.unit.is_empty() { self.label.clone() } else { format!("{} ({})", self.label, self.unit) }
@@ -140,7 +140,7 @@ impl Axis {
         json!({ "label": self.label, "unit": self.unit, "log": self.log })
     }
 
-    /// Values with few digits, so that a page stays small: five in decades, `STEPS` over the largest magnitude on an even axis.
+    /// Values with few digits, to keep pages small: five on a logarithmic axis, `STEPS` over the largest magnitude on a linear one.
     fn packed(&self, values: &[f64]) -> Value {
         if self.log {
             return json!(values.iter().map(|v| v.is_finite().then(|| short(*v))).collect::<Vec<_>>());
@@ -156,39 +156,39 @@ fn short(value: f64) -> f64 {
     format!("{value:.4e}").parse().unwrap_or(value)
 }
 
-/// One pair of axes with what is drawn between them.
+/// A chart: one pair of axes and its content.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// For file names and the links of a page; empty in a picture.
+    /// For file names and page links; empty in a picture.
     pub id: String,
-    /// Above it, with the figure of the paper if there is one.
+    /// Title, with the number of the paper's figure if any.
     pub title: String,
-    /// In the corner of its small form on a page.
+    /// Label of its small form on a page.
     pub short: String,
-    /// The axis across.
+    /// The horizontal axis.
     pub x: Axis,
-    /// The axis upward.
+    /// The vertical axis.
     pub y: Axis,
-    /// Later ones on top.
+    /// Later series are drawn on top.
     pub series: Vec<Series>,
     /// Behind the series; in pictures only.
     pub patches: Vec<Patch>,
-    /// Entry of the legend for hatched patches, if there are any.
+    /// Legend entry for hatched patches, if any.
     pub hatched: Option<String>,
-    /// Fixed limits of y, else those of the series.
+    /// Fixed y limits; `None`: from the series.
     pub y_limits: Option<[f64; 2]>,
-    /// On a page: what is written into it.
+    /// On a page: annotations.
     pub notes: Vec<Note>,
-    /// On a page: whether names are keys below it, for curves that close upon themselves, and not at the ends of lines.
+    /// On a page: whether to show a legend below, for closed curves, instead of names at the ends of lines.
     pub keys: bool,
-    /// On a page: whether it stands above another one that has the same x.
+    /// On a page: whether it is above another chart with the same x axis.
     pub bare: bool,
-    /// On a page: height, px; 0: the usual one.
+    /// On a page: height, px; 0 for the default.
     pub height: u32,
 }
 
 impl Chart {
-    /// A chart with nothing in it.
+    /// An empty chart.
     #[must_use]
     pub fn new(id: &str, title: &str, x: Axis, y: Axis) -> Self {
         Self {
@@ -208,14 +208,14 @@ impl Chart {
         }
     }
 
-    /// Adds points, in the next colour.
+    /// Adds a series in the next colour.
     #[must_use]
     pub fn with(mut self, name: &str, mark: Mark, points: Vec<[f64; 2]>) -> Self {
         self.series.push(Series { name: name.to_owned(), mark, color: self.series.len(), points, even: None });
         self
     }
 
-    /// Gives the last series the colour of that number; several may share one.
+    /// Sets the colour of the last series; several may share one.
     #[must_use]
     pub fn colored(mut self, color: usize) -> Self {
         if let Some(last) = self.series.last_mut() {
@@ -224,15 +224,15 @@ impl Chart {
         self
     }
 
-    /// Writes something into it.
+    /// Adds an annotation.
     #[must_use]
     pub fn noted(mut self, note: Note) -> Self {
         self.notes.push(note);
         self
     }
 
-    /// Adds `values` at even times: the first at `start`, `step` apart (s). Long ones are thinned to the lowest and highest
-    /// of each stretch, so that no peak is lost.
+    /// Adds `values` at regular times: the first at `start`, `step` apart (s). Long series are thinned to the minimum and maximum
+    /// of each stretch, so no peak is lost.
     #[must_use]
     pub fn over_time(self, name: &str, mark: Mark, [start, step]: [f64; 2], values: &[f64]) -> Self {
         let (every, thin) = thinned(values);
@@ -244,7 +244,7 @@ impl Chart {
         chart
     }
 
-    /// Adds a line in stretches, each with its start and its values at even times, `step` apart (s).
+    /// Adds a line in stretches, each with its start time and values `step` apart (s).
     #[must_use]
     pub fn in_stretches(self, name: &str, mark: Mark, step: f64, stretches: Vec<(f64, Vec<f64>)>) -> Self {
         if let [(start, values)] = &stretches[..] {
@@ -261,7 +261,7 @@ impl Chart {
         self.with(name, mark, points)
     }
 
-    /// As data of a page's script.
+    /// Data for a page's script.
     #[must_use]
     pub fn data(&self) -> Value {
         let series = |one: &Series| {
@@ -286,7 +286,7 @@ impl Chart {
         })
     }
 
-    /// What a table says of its series: where each begins and ends, its lowest and highest value, its rms.
+    /// Table of its series: first and last value, minimum, maximum, rms.
     #[must_use]
     pub fn numbers(&self) -> Grid {
         let head = ["series", "points", "from", "to", "lowest", "at", "highest", "at", "rms"];
@@ -308,13 +308,13 @@ impl Chart {
     }
 }
 
-/// Points of two lists.
+/// Points from two lists.
 #[must_use]
 pub fn pairs(x: &[f64], y: &[f64]) -> Vec<[f64; 2]> {
     x.iter().zip(y).map(|(x, y)| [*x, *y]).collect()
 }
 
-/// Lowest and highest of stretches, in their order; and how many values one of them stands for.
+/// Minimum and maximum of stretches, in order of time, and the number of values per returned value.
 fn thinned(values: &[f64]) -> (f64, Vec<f64>) {
     let length = 2 * values.len().div_ceil(POINTS);
     if values.len() <= POINTS {
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn short_series_are_as_they_are_and_rounding_is_below_a_pixel() {
+    fn short_series_are_unchanged_and_rounding_is_below_a_pixel() {
         let values: Vec<f64> = (0..POINTS).map(|k| libm::sin(k as f64) * 3e-7).collect();
         assert_eq!(thinned(&values), (1.0, values.clone()));
         let axis = Axis::linear("", "");

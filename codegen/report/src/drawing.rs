@@ -1,4 +1,4 @@
-//! Pictures and folders of results.
+//! Picture files and result folders.
 
 use std::path::{Path, PathBuf};
 
@@ -11,11 +11,11 @@ use specgen_language::ui::Ui;
 use crate::chart::Chart;
 use crate::plot::{figure, html};
 
-/// Where a picture goes, if one is wanted: .svg, or .html for a page.
+/// Destination of a picture, if requested: .svg, or .html for a page.
 #[derive(Debug, Clone)]
 pub struct Plot(pub Option<PathBuf>);
 
-/// Whether it is a page; none for neither.
+/// Whether the file is a page; `None` if it is neither format.
 pub fn is_page(path: &Path) -> Option<bool> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     match extension.as_str() {
@@ -26,16 +26,16 @@ pub fn is_page(path: &Path) -> Option<bool> {
 }
 
 impl Plot {
-    /// Whether there is something to draw for; a place that cannot be is refused before the minutes that the rest takes.
+    /// Whether a picture is requested. Refuses an unusable path before a long run.
     ///
     /// # Errors
-    /// The file cannot be there.
+    /// The file cannot be created.
     pub fn wanted(&self) -> Result<bool, Failure> {
         self.0.as_deref().map_or(Ok(()), check_place)?;
         Ok(self.0.is_some())
     }
 
-    /// Writes charts in two columns, one that is alone in one, if a plot is wanted; then a line about it.
+    /// Writes charts in two columns (a single one in one), if a plot is requested; returns a line about it.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -43,7 +43,7 @@ impl Plot {
         self.write(title, || figure(title, below, charts, charts.len().clamp(1, 2)))
     }
 
-    /// The same with the line as progress.
+    /// Like [`Plot::charts`], with the line as progress message.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -52,7 +52,7 @@ impl Plot {
         Ok(())
     }
 
-    /// Writes what `draw` draws, if a plot is wanted; then a line about it.
+    /// Writes the output of `draw`, if a plot is requested; returns a line about it.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -65,15 +65,15 @@ impl Plot {
     }
 }
 
-/// Name and bytes of a file of results.
+/// Name and content of a result file.
 pub type File = (String, Vec<u8>);
 
-/// A value as JSON.
+/// A value as a JSON file.
 pub fn json(name: &str, value: &impl Serialize) -> File {
     (name.to_owned(), format!("{:#}\n", json!(value)).into_bytes())
 }
 
-/// Writes a folder of results, and says so.
+/// Writes a folder of results and reports it.
 ///
 /// # Errors
 /// The folder cannot be written.
@@ -83,7 +83,7 @@ pub fn write(folder: &Path, files: &[File], ui: &Ui) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The line that says so.
+/// The line that reports a written file.
 pub fn wrote(path: &Path) -> String {
     format!("wrote {}\n", path.display())
 }

@@ -1,4 +1,4 @@
-//! What needs no simulation of a trajectory: findings, modes, rounding errors, time and memory, digests.
+//! Sections that need no simulated trajectory: findings, modes, rounding errors, time and memory, digests.
 
 use core::f64::consts::TAU;
 
@@ -13,12 +13,12 @@ use specgen_studies::reproduce::write::digits;
 use specgen_studies::verdict::{Mark, Subject, Verdict};
 use specgen_studies::verify::Measurement;
 
-/// Findings with their places, and what `specgen check` says of the spec.
+/// The findings and their places, as reported by `specgen check`.
 #[must_use]
 pub fn findings(compiled: &Compilation, command: &str) -> Section {
     let section = Section::new("findings", "Findings", command);
     if compiled.findings.is_empty() {
-        return section.lead("None: no error, no warning, no note.");
+        return section.lead("None: no errors, warnings or notes.");
     }
     let mut table = Grid::new("Findings", &["", "code", "line", "column", "key", "what", "fix"]);
     for finding in to_json(&compiled.findings, &compiled.source).as_array().into_iter().flatten() {
@@ -29,17 +29,17 @@ pub fn findings(compiled: &Compilation, command: &str) -> Section {
         };
         table.push(["severity", "code", "line", "column", "key", "message", "help"].map(text).to_vec());
     }
-    section.lead("Nothing is refused.").table(table)
+    section.lead("No errors.").table(table)
 }
 
 /// Errors on trajectories and their limits.
 #[must_use]
 pub fn tracking(verdict: &Verdict, command: &str) -> Section {
-    let mut table = Grid::new("Errors on trajectories, rms", &["what", "found", "limit", "unit", ""]);
+    let mut table = Grid::new("Errors on trajectories, rms", &["error", "value", "limit", "unit", ""]);
     for figure in verdict.figures.iter().filter(|figure| figure.subject == Subject::Tracking) {
         let word = match figure.mark {
-            Mark::Within => "holds",
-            Mark::Beyond => "beyond its limit",
+            Mark::Within => "within limit",
+            Mark::Beyond => "exceeds limit",
             Mark::NoLimit => "no limit in the spec",
         };
         let texts = [&figure.name, &digits(figure.value), &figure.limit_text(), figure.unit, word];
@@ -48,13 +48,21 @@ pub fn tracking(verdict: &Verdict, command: &str) -> Section {
     Section::new("errors", "Errors and their limits", command).table(table)
 }
 
-/// Every control mode that a running controller can be put into.
+/// Table of every control mode that can be selected at run time.
 #[must_use]
 pub fn control_modes(design: &Design) -> Grid {
     let or = |value: Option<f64>, none: &str| value.map_or_else(|| none.to_owned(), digits);
     let mut table = Grid::new(
-        "Every control mode that a running controller can be put into",
-        &["mode", "spectral radius", "λ up to", "gain × up to", "delay up to, ticks", "settles, ms", "least damped"],
+        "All control modes selectable at run time",
+        &[
+            "mode",
+            "spectral radius",
+            "λ limit",
+            "gain margin ×",
+            "delay margin, ticks",
+            "settling time, ms",
+            "least damped mode",
+        ],
     );
     for one in &design.margins {
         let least = one.modes.iter().min_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
@@ -62,7 +70,7 @@ pub fn control_modes(design: &Design) -> Grid {
             one.law.name().to_owned(),
             format!("{:.5}", one.spectral_radius),
             or(one.gain_ratio_limit, "> 10"),
-            or(one.gain_margin, "none met"),
+            or(one.gain_margin, "none found"),
             or(one.delay_margin_ticks, "> 5"),
             or(one.settling.map(|time| time * 1e3), "no feedback"),
             least.map_or_else(String::new, |mode| format!("{:.0} Hz, ζ {:.4}", mode.frequency, mode.damping_ratio)),
@@ -82,14 +90,14 @@ pub fn modes(design: &Design) -> Grid {
     modes
 }
 
-/// What active damping does to each mode; none without it.
+/// Effect of active damping on each mode; `None` without it.
 #[must_use]
 pub fn damping(design: &Design) -> Option<Grid> {
     let damping = design.damping.as_ref()?;
     let at = SLOW.map(|part| format!("|S| at {} Hz", digits(design.modes[0].frequency / TAU / part)));
-    let mut head = vec!["mode", "Hz", "peak of the compliance ×", "largest |S|", "worst |S|"];
+    let mut head = vec!["mode", "Hz", "compliance peak ×", "largest |S|", "worst |S|"];
     head.extend(at.iter().map(String::as_str));
-    let mut table = Grid::new("Active damping in P/F, beside that without it", &head);
+    let mut table = Grid::new("Active damping in P/F (without it in parentheses)", &head);
     for (number, (mode, found)) in design.modes.iter().zip(&damping.modes).enumerate() {
         let mut row = vec![format!("{}", number + 1), digits(mode.frequency / TAU)];
         match found {
@@ -104,12 +112,12 @@ pub fn damping(design: &Design) -> Option<Grid> {
     Some(table)
 }
 
-/// Rounding errors of the scalar, axis by axis.
+/// Rounding errors of the scalar, per axis.
 #[must_use]
 pub fn rounding(rounding: &Precision, scalar: Scalar, command: &str) -> Section {
     let single = rounding.commanded.against_f64.is_some();
-    let mut head = vec!["pose", "axis", "unit", "bound by analysis", "largest found", "bound / found"];
-    head.extend(single.then_some("largest against f64"));
+    let mut head = vec!["pose", "axis", "unit", "analytical bound", "largest found", "bound / found"];
+    head.extend(single.then_some("largest difference to f64"));
     let mut table = Grid::new(&format!("Rounding errors of f{} over the declared workspace", scalar.bits()), &head);
     for row in precision::rows(rounding) {
         let texts = [row.what, row.axis, row.unit].map(str::to_owned);
@@ -119,7 +127,7 @@ pub fn rounding(rounding: &Precision, scalar: Scalar, command: &str) -> Section 
         table.push([texts.to_vec(), numbers].concat());
     }
     Section::new("precision", "Rounding errors", command)
-        .text("What the number format of the controller costs. The bound holds at every pose of the workspace; the largest error found is that of trials against 106 bits.")
+        .text("Errors due to the controller's number format. The bound holds at every pose of the workspace; the largest error found is from trials against 106-bit arithmetic.")
         .table(table)
 }
 
@@ -132,41 +140,41 @@ pub fn budget(target: &Target, measured: Result<&Measurement, &str>, command: &s
         Ok(measurement) => measurement,
         Err(why) => return section.text(&format!("Not measured: {why}")),
     };
-    let mut table = Grid::new(&format!("{}, {}", m.machine, m.compiler), &["what", "used", "declared", "used, %"]);
+    let mut table = Grid::new(&format!("{}, {}", m.machine, m.compiler), &["resource", "used", "budget", "used, %"]);
     let mut row = |what: &str, used: f64, declared: Option<u64>| {
         let share = declared.map_or_else(String::new, |declared| format!("{:.1}", 100.0 * used / declared as f64));
         let declared = declared.map_or_else(String::new, |declared| declared.to_string());
         table.push(vec![what.to_owned(), format!("{used:.0}"), declared, share]);
     };
     row("flash, bytes", m.used.flash as f64, budget.flash);
-    row("of which code a tick can reach, bytes", m.tick_code as f64, None);
+    row("of which code reachable from a tick, bytes", m.tick_code as f64, None);
     if let Some(ram) = m.used.ram {
-        row("RAM, bytes, stack of a tick included", ram as f64, budget.ram);
+        row("RAM including the tick's stack, bytes", ram as f64, budget.ram);
     }
     row("of which State, bytes", m.state as f64, None);
     if let Some(bound) = m.stack_bound {
-        row("stack of a tick, bytes (static bound)", bound as f64, budget.stack);
+        row("tick stack, bytes (static bound)", bound as f64, budget.stack);
     }
-    row("stack of a tick, bytes (seen)", m.stack_painted as f64, budget.stack);
+    row("tick stack, bytes (measured)", m.stack_painted as f64, budget.stack);
     let mut stages = Grid::new(
-        "Instructions of each stage, counted exactly; they are not cycles",
+        "Instructions per stage, counted exactly (not cycles)",
         &["stage", "mean", "fewest", "most", "calls"],
     );
     for stage in &m.stages {
         let whole = stage.name == "step";
         if whole {
-            row("instructions of a tick, mean", stage.mean, budget.instructions);
+            row("instructions per tick, mean", stage.mean, budget.instructions);
         }
         let counts = [stage.min, stage.max, stage.calls].map(|count| count.to_string());
         let name = if whole { "whole tick".to_owned() } else { stage.name.clone() };
         stages.push([vec![name, format!("{:.0}", stage.mean)], counts.to_vec()].concat());
     }
     let budget =
-        "target.budget.instructions is for the mean of a tick; the period has to hold the most expensive one, too.";
+        "target.budget.instructions limits the mean tick; the most expensive tick must fit into the period as well.";
     let section = section.text(budget).table(table).table(stages);
     let Some(time) = &m.time else { return section };
     let heading = format!(
-        "Longest tick on {}, us, by a model of its core at {:.0} MHz: {:.1} of {:.1}",
+        "Longest tick on {}, us, modelled for its core at {:.0} MHz: {:.1} of {:.1}",
         time.board, time.core, time.worst, time.period
     );
     let mut parts = Grid::new(&heading, &["what", "us"]);
@@ -176,7 +184,7 @@ pub fn budget(target: &Target, measured: Result<&Measurement, &str>, command: &s
     section.table(parts)
 }
 
-/// What identifies the bits: digests of the exercise on this host, and whether the emulated machine agrees.
+/// Bit identity: digests of the exercise on this host, and the comparison with the emulated machine.
 pub struct Bits<'a> {
     /// Ticks of the exercise.
     pub ticks: usize,
@@ -184,11 +192,11 @@ pub struct Bits<'a> {
     pub trace: String,
     /// Digest of the state after the last tick.
     pub state: u64,
-    /// The emulated machine's, if there is one, or why not.
+    /// The measurement on the emulated machine, or why there is none.
     pub measured: Result<&'a Measurement, &'a str>,
 }
 
-/// Digests of spec, controller and the runs that were compared by bits.
+/// Digests of spec, controller and the compared runs.
 #[must_use]
 pub fn digests(compiled: &Compilation, bits: &Bits, command: &str) -> Section {
     let mut table = Grid::new("Digests", &["what", "value"]);
@@ -196,20 +204,20 @@ pub fn digests(compiled: &Compilation, bits: &Bits, command: &str) -> Section {
     row("specgen", env!("CARGO_PKG_VERSION").to_owned());
     row("spec and records, SHA-256", compiled.ir.digest.clone());
     row("scalar", format!("f{}", compiled.ir.scalar.bits()));
-    row("ticks of the exercise", bits.ticks.to_string());
+    row("ticks in the exercise", bits.ticks.to_string());
     row("trace of the exercise on this host, SHA-256", bits.trace.clone());
-    row("state after its last tick, on this host", format!("{:016x}", bits.state));
+    row("final state on this host", format!("{:016x}", bits.state));
     match bits.measured {
         Ok(m) => {
             let verdict = m.first_difference.as_ref().map_or_else(
-                || format!("the same bits in every word of {} ticks", m.ticks),
-                |difference| format!("DIFFERS: {difference}"),
+                || format!("identical bits in every word of {} ticks", m.ticks),
+                |difference| format!("DIFFERENT: {difference}"),
             );
-            row(&format!("{} against this host", m.machine), verdict);
+            row(&format!("{} compared with this host", m.machine), verdict);
         }
-        Err(why) => row("emulated machine against this host", format!("not compared: {why}")),
+        Err(why) => row("emulated machine compared with this host", format!("not compared: {why}")),
     }
     Section::new("digests", "Bit identity", command)
-        .text("The same inputs give the same bits on the host and on the emulated microcontroller: outputs and the state's digest are compared word for word.")
+        .text("Host and emulated microcontroller compute the same bits from the same inputs: outputs and state digest are compared word by word.")
         .table(table)
 }

@@ -1,4 +1,4 @@
-//! What a page begins with: verdict, key figures, platform, findings; for a refused spec its source.
+//! First screen of a page: verdict, key figures, platform, findings; for a refused spec its source.
 
 use std::fmt::Write as _;
 
@@ -23,23 +23,23 @@ use super::verdict::{
     Sentence, card, findings, limit_row, mark, rows, share, source, text_row, thin, tightest, value_row,
 };
 
-/// Limits of errors that are seen at once.
+/// Number of error limits shown at once.
 const JUDGED: usize = 3;
-/// What is not computed for a spec that is refused.
+/// Figures that are not computed for a refused spec.
 const LATER: [&str; 7] = ["trajectories", "margins", "instructions", "flash, RAM", "stack", "bits", "error budget"];
 
-/// The errors on trajectories.
+/// Errors on trajectories.
 #[derive(Debug, Clone)]
 pub struct Errors {
-    /// One picture for each unit, by the unit.
+    /// One picture per unit, with its unit.
     pub pictures: Vec<(&'static str, Rows)>,
-    /// In a few words.
-    pub said: String,
-    /// What the figures are.
+    /// Short text.
+    pub text: String,
+    /// Explanation of the figures.
     pub note: String,
 }
 
-/// The first screen of a spec that compiled. `mode`: its control mode, as the word `mode` has it.
+/// The first screen of a compiled spec. `mode`: its control mode, as the value of the word `mode`.
 #[must_use]
 pub fn of(
     compiled: &Compilation,
@@ -52,19 +52,18 @@ pub fn of(
     let mut parts = vec![Part::Html(format!(
         "{}<div class=\"first\">\n{}{}",
         sentence.html(&compiled.findings),
-        tightest(verdict, &errors.said),
+        tightest(verdict, &errors.text),
         reach_card(compiled, verdict)
     ))];
     parts.extend(error_card(verdict, errors));
     parts.extend(platform_card(
         &compiled.model,
         platform::standing(&compiled.model, &compiled.findings),
-        "drag to turn · to scale",
+        "drag to rotate · to scale",
     ));
     let is_error = |finding: &Diagnostic| finding.severity == Severity::Error;
     let missed = compiled.findings.iter().any(is_error);
-    let note =
-        if missed { "a requirement is missed · one row per code" } else { "nothing refused · one row per code" };
+    let note = if missed { "a requirement is not met · one row per code" } else { "no errors · one row per code" };
     parts.push(Part::Html(format!(
         "{}{}{}</div>\n",
         controller_card(compiled, verdict, measured),
@@ -78,7 +77,7 @@ fn reach_card(compiled: &Compilation, verdict: &Verdict) -> String {
     let mut content = rows(verdict, &[Subject::Reach]);
     if let Some(reach) = &compiled.reach {
         content += &text_row(
-            "all at once",
+            "all axes at once",
             &format!(
                 "{:.0}\u{2009}% of the box about {}",
                 100.0 * reach.share,
@@ -89,7 +88,7 @@ fn reach_card(compiled: &Compilation, verdict: &Verdict) -> String {
     }
     let noise = verdict.figures.iter().filter(|figure| figure.subject == Subject::Noise && figure.name == "step");
     content += &noise.map(|figure| limit_row("resolution", figure)).collect::<String>();
-    // Of the axes that have a limit, the one that takes most of it; without limits, x.
+    // The axis closest to its limit; without limits, x.
     let at_rest = verdict
         .figures
         .iter()
@@ -99,7 +98,7 @@ fn reach_card(compiled: &Compilation, verdict: &Verdict) -> String {
     content +=
         &worst.map_or_else(String::new, |figure| limit_row(&format!("noise at rest in {}", figure.name), figure));
     let note =
-        if compiled.design.is_some() { "asked of available, line: limit" } else { "from the middle of the strokes" };
+        if compiled.design.is_some() { "required of available, line: limit" } else { "from the middle of the strokes" };
     card("Reach per axis", note, "", &content)
 }
 
@@ -124,12 +123,12 @@ fn error_card(verdict: &Verdict, errors: Errors) -> Vec<Part> {
     }
     let judged: Vec<&Figure> =
         verdict.figures.iter().filter(|figure| figure.subject == Subject::Tracking && figure.limit.is_some()).collect();
-    // The tightest are seen at once, all stand in the tables.
+    // The tightest limits are shown here, all of them in the tables.
     let mut tight = judged.clone();
     tight.sort_by(|a, b| share(b).unwrap_or_default().total_cmp(&share(a).unwrap_or_default()));
     let mut content: String = tight.iter().take(JUDGED).map(|figure| limit_row(&figure.name, figure)).collect();
     let open = match judged.len() {
-        0 => "No limit in the spec: shown, not judged. ".to_owned(),
+        0 => "The spec sets no limit. ".to_owned(),
         few if few <= JUDGED => "Limits: requirements.tracking. ".to_owned(),
         many => format!("The tightest of {many} limits of requirements.tracking. "),
     };
@@ -147,7 +146,7 @@ fn controller_card(compiled: &Compilation, verdict: &Verdict, measured: Result<&
     let machine = measured.map_or_else(|_| compiled.model.target.mcu.part().emulated.to_owned(), |m| m.machine.clone());
     let mut content = String::new();
     for figure in verdict.figures.iter().filter(|figure| matches!(figure.subject, Subject::Time | Subject::Memory)) {
-        // Said with the period below.
+        // Shown with the period below.
         if figure.name != "longest tick" {
             content += &limit_row(&figure.name, figure);
         }
@@ -157,9 +156,9 @@ fn controller_card(compiled: &Compilation, verdict: &Verdict, measured: Result<&
             let bits = verdict.figures.iter().find(|figure| figure.subject == Subject::Bits);
             let good = bits.is_some_and(|figure| figure.mark == Mark::Within);
             let text = if good {
-                format!("equal to the host over {} ticks", thin(&group(m.ticks)))
+                format!("identical to the host over {} ticks", thin(&group(m.ticks)))
             } else {
-                "DIFFER from the host".to_owned()
+                "DIFFERENT from the host".to_owned()
             };
             content += &text_row("bits", &text, if good { "ok" } else { "error" });
             if let Some(step) = m.stage("step") {
@@ -202,7 +201,7 @@ fn margin_card(compiled: &Compilation, verdict: &Verdict, mode: u32) -> String {
     let Some(design) = &compiled.design else {
         content += &rows(verdict, &[Subject::Margins]);
         slew_row(&mut content);
-        return card("Margins of the adaptation", "asked of stable", "", &content);
+        return card("Margins of the adaptation", "declared of stable", "", &content);
     };
     for figure in verdict.figures.iter().filter(|figure| figure.subject == Subject::Margins) {
         let text = figure.value_text();
@@ -221,7 +220,7 @@ fn margin_card(compiled: &Compilation, verdict: &Verdict, mode: u32) -> String {
             format!("; ζ {:.3} at {:.0}\u{2009}Hz", mode.damping_ratio, mode.frequency)
         });
         let text = format!("{:.0}\u{2009}ms, {}{least}", settling * 1e3, margins::short_name(law));
-        content += &text_row("settles in", &text, "none");
+        content += &text_row("settling time", &text, "none");
     }
     let stable = design.margins.iter().filter(|one| one.spectral_radius < 1.0).count();
     let all = stable == design.margins.len();
@@ -230,17 +229,17 @@ fn margin_card(compiled: &Compilation, verdict: &Verdict, mode: u32) -> String {
         &format!("{stable} of {} stable", design.margins.len()),
         if all { "ok" } else { "error" },
     );
-    card("Loop margins", "worst control mode · asked of stable", "", &content)
+    card("Loop margins", "worst control mode · declared of stable", "", &content)
 }
 
 fn platform_card(model: &Model, view: Part, note: &str) -> Vec<Part> {
-    // Where two poses are drawn, gauges would hide them.
+    // With two poses drawn, gauges would hide them.
     let gauges = if matches!(&view, Part::View(_, data) if data.get("ghost").is_some()) {
         ""
     } else if model.task_space.is_some() {
         "<span><b class=\"blue\">G0–G5</b> gauge, arrow: positive reading</span>"
     } else {
-        "<span>a gauge in each leg, positive when it is longer</span>"
+        "<span>a gauge in each leg, positive for elongation</span>"
     };
     let part = if model.task_space.is_some() { "<span>box: work part</span>" } else { "" };
     let mass = format!("{}", model.platform.mass);
@@ -257,8 +256,8 @@ fn platform_card(model: &Model, view: Part, note: &str) -> Vec<Part> {
     ]
 }
 
-/// The page of a spec that is refused. `model`: as far as it could be read; `accepted`: whether the fix of the first error
-/// was tried and is good.
+/// The page of a refused spec. `model`: as far as it could be read; `accepted`: whether the fix of the first error
+/// was tried and works.
 #[must_use]
 pub fn refused(text: &SpecSource, all: &[Diagnostic], model: Option<&Model>, accepted: bool) -> Vec<Part> {
     let errors: Vec<&Diagnostic> = all.iter().filter(|finding| finding.severity == Severity::Error).collect();
@@ -273,7 +272,7 @@ pub fn refused(text: &SpecSource, all: &[Diagnostic], model: Option<&Model>, acc
         Some((axis, figure)) if first.key.starts_with("workspace") => (
             format!("{} is out of reach", AXES[*axis]),
             format!(
-                "The spec asks for {}\u{2009}{unit} in {}; the legs reach {}\u{2009}{unit}. Nothing was generated.",
+                "The spec requires {}\u{2009}{unit} in {}, but the legs reach only {}\u{2009}{unit}. Nothing was generated.",
                 figure.limit_text(),
                 AXES[*axis],
                 figure.value_text(),
@@ -287,14 +286,14 @@ pub fn refused(text: &SpecSource, all: &[Diagnostic], model: Option<&Model>, acc
     let mut parts = Vec::new();
     if let Some((_, reach)) = &measured {
         let content: String = (0..6).map(|axis| limit_row(AXES[axis], &reach_figure(reach, axis))).collect();
-        html += &card("Reach per axis", "asked of available", "", &content);
+        html += &card("Reach per axis", "required of available", "", &content);
     }
     let later: String = LATER.iter().map(|what| text_row(what, "not computed", "none")).collect();
-    html += &card("Not computed", &format!("waits for {}", first.code), "", &later);
+    html += &card("Not computed", &format!("blocked by {}", first.code), "", &later);
     parts.push(Part::Html(html));
     if let Some(model) = model {
         let mut view = platform::standing(model, all);
-        let mut note = "drag to turn · to scale".to_owned();
+        let mut note = "drag to rotate · to scale".to_owned();
         if let (Part::View(_, data), Some((axis, figure))) = (&mut view, &beyond) {
             let asked = figure.limit.as_ref().map_or(0.0, |limit| limit.value) * 1e-6;
             let has = figure.value * 1e-6;
@@ -307,20 +306,21 @@ pub fn refused(text: &SpecSource, all: &[Diagnostic], model: Option<&Model>, acc
             data["pose"] = json!(pose(has));
             data["ghost"] = json!(pose(asked));
             data["texts"] = json!([
-                format!("{} {}\u{2009}{} asked", AXES[*axis], figure.limit_text(), figure.unit),
+                format!("{} {}\u{2009}{} required", AXES[*axis], figure.limit_text(), figure.unit),
                 format!("{}\u{2009}{} reached", figure.value_text(), figure.unit)
             ]);
-            note = format!("motion drawn {}\u{2009}times larger", thin(&group(larger as u64)));
+            note = format!("motion magnified {}\u{2009}times", thin(&group(larger as u64)));
         }
         parts.extend(platform_card(model, view, &note));
     }
     let other: Vec<Diagnostic> = all.iter().filter(|finding| !core::ptr::eq(*finding, *first)).cloned().collect();
-    let note = if errors.len() > 1 { "errors refuse the spec" } else { "these alone would refuse nothing" };
+    let note =
+        if errors.len() > 1 { "the spec is refused because of errors" } else { "none of these would refuse the spec" };
     parts.push(Part::Html(format!("{}</div>\n", findings("Other findings", note, &other, text))));
     parts
 }
 
-/// What is reached, as far as that can be said of a spec that is refused.
+/// The reach, as far as it can be computed for a refused spec.
 fn measure(model: &Model) -> Option<Reach> {
     let bias = model.task_space.as_ref()?.setpoint.bias;
     let platform = lower::platform(model).ok()?;
@@ -334,7 +334,7 @@ fn reach_figure(reach: &Reach, axis: usize) -> Figure {
         .at_least(1e6 * reach.axes[axis].declared, "workspace")
 }
 
-/// A round factor by which a motion is seen.
+/// A round magnification for displaying a motion.
 fn larger(model: &Model, axis: usize, value: f64) -> f64 {
     let wanted = if axis < 3 { 0.3 * model.geometry.height / value } else { 0.4 / value };
     let decade = libm::pow(10.0, libm::floor(libm::log10(wanted)));

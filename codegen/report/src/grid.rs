@@ -1,13 +1,13 @@
-//! Tables of texts.
+//! Text tables.
 
-/// A table of texts.
+/// A text table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Grid {
-    /// What stands above the table.
+    /// Caption above the table.
     pub caption: String,
     /// Names of the columns.
     pub head: Vec<String>,
-    /// As many texts each as the head.
+    /// Each with as many texts as the head.
     pub rows: Vec<Vec<String>>,
 }
 
@@ -22,7 +22,7 @@ impl Grid {
         }
     }
 
-    /// Adds a row at the end.
+    /// Adds a row.
     pub fn push(&mut self, row: Vec<String>) {
         self.rows.push(row);
     }

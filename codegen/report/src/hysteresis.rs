@@ -1,4 +1,4 @@
-//! Hysteresis of the legs: without a model, behind the inverse model, with feedback.
+//! Hysteresis of the legs: without compensation, with the inverse model, with feedback.
 
 use core::f64::consts::TAU;
 
@@ -20,16 +20,16 @@ use super::chart::{Axis, BLUE, Chart, LINE, Note, pairs};
 use super::section::{Grid, Part, Rows, Section};
 use super::tracking::{AXES, TrackedPath, short};
 
-/// Rates of the loops, Hz, the least important first.
+/// Loop frequencies, Hz, the least important first.
 const FREQUENCIES: [f64; 3] = [0.1, 10.0, 50.0];
-/// Rates of the paper's figure, Hz.
+/// Frequencies of the paper's figure, Hz.
 const PAPER: [f64; 6] = [0.1, 1.0, 10.0, 20.0, 40.0, 50.0];
-/// Held voltages in a period.
+/// Voltage steps per period.
 const SAMPLES: usize = 400;
-/// Points of a curve, at most.
+/// Largest number of points of a curve.
 const POINTS: usize = 400;
 
-/// A leg behind its inverse model on a path: what was asked of it (V, virtual) against what is left (nm), and the line.
+/// A leg with its inverse model on a path: request (V, virtual), residual (nm), and the fitted line.
 struct InverseResidual {
     points: Vec<[f64; 2]>,
     line: Line,
@@ -39,8 +39,8 @@ struct InverseResidual {
 /// Loops of each leg, what the inverse model leaves of them on the trajectory of the spec, and what feedback leaves.
 /// `lowest`: voltage at which legs rest, V.
 ///
-/// # Errors
-/// As [`PlatformScenario::run`].
+/// Loops of each leg, the residual of the inverse model on the trajectory of the spec, and the error with feedback.
+/// `lowest`: voltage at which legs rest, V.
 #[allow(clippy::too_many_arguments)]
 pub fn of_platform(
     machine: &PlatformScenario,
@@ -79,43 +79,44 @@ pub fn of_platform(
             steps.push(("with feedback, worst axis", rms[worst]));
             last = Some((AXES[worst], rms[worst]));
         }
-        let behind_it =
-            behind.get(k).map_or_else(String::new, |one| format!(" becomes {} by the inverse model", length(one.rms)));
+        let behind_it = behind
+            .get(k)
+            .map_or_else(String::new, |one| format!(" is reduced to {} by the inverse model", length(one.rms)));
         let fed = last.map_or_else(String::new, |(axis, rms)| format!(" and {} of {axis} with feedback", length(rms)));
         columns.push(vec![Part::Rows(funnel(k, &steps))]);
-        let lead = format!("A loop of {} at {} Hz{behind_it}{fed}.", length(width * 1e3), FREQUENCIES[2]);
+        let lead = format!("The loop of {} at {} Hz{behind_it}{fed}.", length(width * 1e3), FREQUENCIES[2]);
         section = section.pane(&[&format!("leg {k}")], vec![Part::Lead(lead), Part::Columns(columns)]);
     }
     Ok(section)
 }
 
-/// The loops of six equal legs with their own gauges, as the simulator has them.
+/// The simulated loops of six equal legs with their own gauges.
 #[must_use]
 pub fn of_legs(leg: &LegParameters, lowest: f64, records: &[Option<Report>]) -> Section {
     let (chart, width) = loops(leg, lowest, &FREQUENCIES, "loops-0", "A leg without compensation, by rate");
     let mut steps = vec![("loop, no model", width * 1e3)];
     steps.extend(records.iter().flatten().next().map(|record| ("record fit, whole record", record.fit_rms * 1e9)));
     Section::new("hysteresis", "Hysteresis", "")
-        .lead(&format!("A loop of {} at {} Hz.", length(width * 1e3), FREQUENCIES[2]))
+        .lead(&format!("The loop is {} wide at {} Hz.", length(width * 1e3), FREQUENCIES[2]))
         .part(Part::Columns(vec![vec![Part::Chart(chart)], vec![Part::Rows(funnel(0, &steps))]]))
 }
 
-/// Fig. 3: loops at the paper's rates; `lowest` is the voltage at which the leg rests, V.
+/// Fig. 3: loops at the paper's frequencies; `lowest` is the voltage at which the leg rests, V.
 #[must_use]
 pub fn of_paper(leg: &LegParameters, lowest: f64) -> Section {
     let title = "Fig. 3: displacement over voltage, second period of a sine over the whole range";
     let (chart, _) = loops(leg, lowest, &PAPER, "paper-loops", title);
     Section::new("loops", "Rate-dependent hysteresis", "")
-        .text("The simulated leg, open loop: amplifier lag, plays with rate-dependent thresholds, creep, asymmetry, resonance. It is not of the controller's model class: no Everett table can hold it. The loop becomes rounder and wider with the rate, as in the paper.")
+        .text("The simulated leg in open loop, with amplifier lag, play operators with rate-dependent thresholds, creep, asymmetry and resonance. It is outside the controller's model class: no Everett table can represent it. The loop becomes rounder and wider with the rate, as in the paper.")
         .charts(vec![chart])
 }
 
-/// A length given in nm.
+/// A length in nm as text.
 fn length(nm: f64) -> String {
     if nm >= 1e3 { format!("{}\u{2009}µm", short(nm * 1e-3)) } else { format!("{}\u{2009}nm", short(nm)) }
 }
 
-/// The chart of the loops, and the width of the fastest one, µm.
+/// Chart of the loops, and the width of the fastest one, µm.
 fn loops(leg: &LegParameters, lowest: f64, frequencies: &[f64], id: &str, title: &str) -> (Chart, f64) {
     let mut chart = Chart::new(id, title, Axis::linear("voltage", "V"), Axis::linear("displacement", "µm"));
     let mut widest = 0.0;
@@ -125,7 +126,7 @@ fn loops(leg: &LegParameters, lowest: f64, frequencies: &[f64], id: &str, title:
         widest = displacements[3 * SAMPLES / 4] - displacements[SAMPLES / 4];
         let voltages: Vec<f64> = voltages.iter().map(|v| v + lowest).collect();
         let name = format!("{frequency} Hz: travel {travel:.1} µm, width {:.1} %", 100.0 * widest / travel);
-        // The fastest, which is the widest, is darkest.
+        // The fastest loop, which is the widest, is the darkest.
         let color = (frequencies.len() - 1 - k) * 3 / (frequencies.len() - 1).max(1);
         chart = chart.with(&name, LINE, pairs(&voltages, &displacements)).colored(color);
     }
@@ -156,7 +157,7 @@ fn behind(
     Ok(moved_over_requested(controller, platform, &run)?.into_iter().map_while(of).collect())
 }
 
-/// Of each leg and tick, m: what was requested of its inverse model, and what the leg did, J h of the true pose. Nothing if the
+/// For each leg and tick, m: the request to its inverse model, and the actual extension J h from the true pose. `None` if the
 /// controller refused the path, or no trace was kept.
 pub(crate) fn moved_over_requested(
     controller: &Controller,
@@ -183,7 +184,7 @@ impl InverseResidual {
         let mut chart = Chart::new(
             &format!("behind-{leg}"),
             &format!(
-                "What the inverse model leaves: leg {leg}, {}, {}; λ {}, δ {} nm",
+                "Residual of the inverse model: leg {leg}, {}, {}; λ {}, δ {} nm",
                 own.name,
                 own.speed(),
                 digits(self.line.slope),
@@ -200,9 +201,9 @@ impl InverseResidual {
     }
 }
 
-/// From the loop to the error, nm.
+/// Chart from the loop to the final error, nm.
 fn funnel(leg: usize, steps: &[(&str, f64)]) -> Rows {
-    let mut numbers = Grid::new(&format!("From loop to error, leg {leg}"), &["what", "nm"]);
+    let mut numbers = Grid::new(&format!("From loop to error, leg {leg}"), &["stage", "nm"]);
     let positive = steps.iter().filter(|(_, nm)| *nm > 0.0);
     let (low, high) = positive.clone().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), (_, nm)| {
         (if *nm < low { *nm } else { low }, if *nm > high { *nm } else { high })
@@ -224,8 +225,8 @@ fn funnel(leg: usize, steps: &[(&str, f64)]) -> Rows {
     }
 }
 
-/// Voltages from rest (V) and displacements from the settled leg (µm) over the second period, the start of the third
-/// included.
+/// Voltages relative to rest (V) and displacements relative to the settled leg (µm) over the second period, including the start
+/// of the third.
 fn sine(leg: &LegParameters, frequency: f64) -> (Vec<f64>, Vec<f64>) {
     let mut plant = LegPlant::new(leg);
     let sweep = leg.u_max / leg.forc_rate_v_per_s;

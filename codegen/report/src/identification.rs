@@ -1,4 +1,4 @@
-//! A figure for each kind of identification.
+//! Figures for each kind of identification.
 
 use crate::chart::{Axis, Chart, Mark, Patch};
 use crate::plot::{BLUE, GREY, ORANGE, PURPLE, figure};
@@ -25,8 +25,8 @@ fn residual(title: &str, trace: &Trace) -> Chart {
         .colored(PURPLE)
 }
 
-/// Loops against the model, residual, Preisach plane with what was not excited hatched, and the choice of the grid or the
-/// validation if there is one.
+/// Loops and model, residual, Preisach plane with unexcited cells hatched, and the choice of the grid or the
+/// validation, if any.
 #[must_use]
 pub fn everett(identified: &Identification, choice: Option<&GridChoice>, validation: Option<&Prediction>) -> String {
     let (report, trace) = (&identified.report, &identified.trace);
@@ -60,7 +60,7 @@ pub fn everett(identified: &Identification, choice: Option<&GridChoice>, validat
     figure(&format!("Everett table of {}", shortened(&report.record)), &subtitle, &panels, 2)
 }
 
-/// Measured minus predicted, if the record has the displacement.
+/// Measured minus predicted, if the record contains the displacement.
 fn error(prediction: &Prediction) -> Option<Chart> {
     let (compared, measured) = (prediction.compared.as_ref()?, prediction.measured.as_ref()?);
     let name = format!("Residual of {}: {:.3} % rms", shortened(&prediction.record), compared.rms_percent);
@@ -70,7 +70,7 @@ fn error(prediction: &Prediction) -> Option<Chart> {
     Some(residual(&name, &trace))
 }
 
-/// Loops, the displacement over time, and the error, of what a model predicts for a drive.
+/// Predicted loops, displacement over time, and error for a drive.
 #[must_use]
 pub fn prediction(prediction: &Prediction) -> String {
     let over = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| [*x, y * 1e6]).collect::<Vec<_>>();
@@ -87,11 +87,11 @@ pub fn prediction(prediction: &Prediction) -> String {
     ];
     panels.extend(error(prediction));
     let below =
-        format!("{} samples; {} held at the end of the table", prediction.time.len(), prediction.samples_clipped);
+        format!("{} samples; {} clamped to the table's range", prediction.time.len(), prediction.samples_clipped);
     figure(&format!("Prediction for {}", shortened(&prediction.record)), &below, &panels, 2)
 }
 
-/// Errors of each option over the rates of the records, fitted to all and to the others.
+/// Errors of each option over the rates of the records, fitted to all records and to the others.
 #[must_use]
 pub fn rate(report: &RateReport) -> String {
     let chart = |title: &str, left_out: bool| {
@@ -103,12 +103,12 @@ pub fn rate(report: &RateReport) -> String {
             chart.with(option.option.name(), Mark::Line(1.6), points).colored(k)
         })
     };
-    let panels = [chart("Fitted to all records", false), chart("Each record by the fit to the others", true)];
+    let panels = [chart("Fitted to all records", false), chart("Each record with the fit to the others", true)];
     let names: Vec<&str> = report.records.iter().map(|record| shortened(&record.record)).collect();
     figure("Rate dependence", &format!("N = {}; {}", report.grid, names.join(", ")), &panels, 2)
 }
 
-/// The end of a long path.
+/// The last part of a long path.
 fn shortened(name: &str) -> &str {
     name.rsplit(['/', '\\']).next().unwrap_or(name)
 }
@@ -134,9 +134,9 @@ fn plane(identified: &Identification) -> Chart {
     };
     for up in 1..=table.grid {
         for down in 0..up {
-            // The diagonal holds the reversible part, many times heavier.
+            // The diagonal contains the reversible part, which is many times larger.
             let share = if down + 1 == up || largest <= 0.0 { 1.0 } else { table.weight(up, down) / largest };
-            // A weight of zero may come out of the nodes a rounding below it.
+            // Rounding of the nodes may give a slightly negative weight instead of zero.
             chart.patches.push(cell(up, down, Some(if share > 0.0 { share.sqrt() } else { 0.0 })));
         }
     }
@@ -168,7 +168,7 @@ fn curve(choice: &GridChoice) -> Chart {
         Axis::linear("grid N", ""),
         Axis::linear("held-out error", "nm rms"),
     )
-    .with("standard error to the best", Mark::Line(1.0), bars)
+    .with("standard error of the difference to the best", Mark::Line(1.0), bars)
     .colored(GREY)
     .with("error", Mark::Line(1.5), points)
     .colored(BLUE)
@@ -176,7 +176,7 @@ fn curve(choice: &GridChoice) -> Chart {
     .colored(ORANGE)
 }
 
-/// Loops with their lines, and gain over frequency. `records` in the order in which they were named.
+/// Loops and their lines, and gain over frequency. `records` are in the order given.
 #[must_use]
 pub fn linear(report: &LinearReport, records: &[Record]) -> String {
     let mut loops = panel("Y = ρX + δ", Axis::linear("drive", "V"), Axis::linear("displacement", "µm"));
@@ -248,7 +248,7 @@ pub fn response(report: &ResponseReport) -> String {
     let hatched: Vec<[f64; 2]> = report.left_out.iter().map(|b| [b.low, b.high]).collect();
     let with_gaps = |mut panel: Chart, range: [f64; 2]| {
         panel.patches = hatched.iter().map(|x| Patch { x: *x, y: range, shade: None }).collect();
-        panel.hatched = (!hatched.is_empty()).then(|| "left out".to_owned());
+        panel.hatched = (!hatched.is_empty()).then(|| "excluded".to_owned());
         panel
     };
     let size = |h: [f64; 2]| libm::hypot(h[0], h[1]) * 1e6;
@@ -263,7 +263,7 @@ pub fn response(report: &ResponseReport) -> String {
                 shown.iter().filter(|b| inside(b.frequency)).map(|b| [b.frequency, size(b.h)]).collect(),
             )
             .with("model", Mark::Line(1.6), modelled.iter().map(|m| [m.0, m.1 * 1e6]).collect());
-    // The measured phase is shown on the sheet nearest to the model's, which does not jump.
+    // The measured phase is unwrapped to be close to the model's, which does not jump.
     let turn = |b: &&specgen_identify::response::Bin| {
         let (_, phase) = specgen_identify::response::response(&report.fitted, b.frequency);
         let off = libm::atan2(b.h[1], b.h[0]) - phase;
@@ -318,21 +318,21 @@ pub fn gauge(report: &GaugeReport) -> String {
     let errors: Vec<[f64; 2]> =
         report.held_out_rms.iter().enumerate().map(|(k, e)| [(k + 1) as f64, e * 1e9]).collect();
     let chosen = errors.iter().copied().filter(|p| p[0] == report.degree as f64).collect();
-    let degrees = panel("Points held out", Axis::linear("degree", ""), Axis::log("held-out error", "nm rms"))
+    let degrees = panel("Held-out points", Axis::linear("degree", ""), Axis::log("held-out error", "nm rms"))
         .with("error", Mark::Line(1.5), errors)
         .with("chosen", Mark::Dots(5.0), chosen);
     let subtitle = format!(
-        "degree {}; residual {:.2} nm rms, {:.2} nm at most; hysteresis {}; least slope {:.1} % of the mean",
+        "degree {}; residual {:.2} nm rms, at most {:.2} nm; hysteresis {}; smallest slope {:.1} % of the mean",
         report.degree,
         report.residual_rms * 1e9,
         report.residual_max * 1e9,
-        report.hysteresis.map_or_else(|| "not seen (it never turns back)".to_owned(), |h| format!("{:.2} nm", h * 1e9)),
+        report.hysteresis.map_or_else(|| "unknown (no reversal)".to_owned(), |h| format!("{:.2} nm", h * 1e9)),
         report.least_slope_percent
     );
     figure(&format!("Gauge calibration of {}", shortened(&report.record)), &subtitle, &[calibration, rest, degrees], 2)
 }
 
-/// Force against displacement without creep, and the residual.
+/// Force over displacement without creep, and the residual.
 #[must_use]
 pub fn stiffness(report: &StiffnessReport) -> String {
     let measured = report.points.iter().map(|p| [p[0], p[1] * 1e9]).collect();
@@ -355,7 +355,7 @@ pub fn stiffness(report: &StiffnessReport) -> String {
         report.error * 1e-6,
         report.creep_time.map_or_else(
             || "no creep found".to_owned(),
-            |t| format!("creep {:.1} % with {t:.3} s taken out", report.creep_percent)
+            |t| format!("creep {:.1} % with {t:.3} s removed", report.creep_percent)
         )
     );
     figure(&format!("Stiffness from {}", shortened(&report.record)), &subtitle, &[law, rest], 2)

@@ -1,4 +1,4 @@
-//! Measured records in; tables, lines of a spec, figures and pictures out.
+//! Identification commands: measured records in; tables, spec lines, figures and pictures out.
 
 mod cause;
 pub mod everett;
@@ -17,48 +17,48 @@ use specgen_language::outcome::{Failure, Refusal};
 
 use crate::drawing::Plot;
 
-/// How the files of the bench are read, and where a picture of the result goes.
+/// How record files are read, and the destination of a picture.
 #[derive(Debug)]
 pub struct Bench {
-    /// Where their headers do not say it.
+    /// For files whose headers do not specify it.
     pub reading: Reading,
     /// The picture.
     pub plot: Plot,
 }
 
-/// What was identified, by its report.
+/// An identification result with its report.
 #[derive(Serialize)]
-struct Identified<R> {
-    /// As it was named.
+struct IdentificationResult<R> {
+    /// Name as given.
     #[serde(skip)]
     record: String,
     report: R,
-    /// Keys of a spec whose values are measured now; none where the record is simulated.
-    measured: Measured,
-    /// A line for each file that was written.
+    /// Spec keys whose values are now measured; empty if the record is simulated.
+    measured: MeasuredKeys,
+    /// One line per written file.
     #[serde(skip)]
     files: String,
 }
 
-/// Keys of a spec whose values a record gives.
+/// Spec keys whose values come from a record.
 #[derive(Debug, Clone, Serialize)]
 #[serde(transparent)]
-struct Measured(Vec<String>);
+struct MeasuredKeys(Vec<String>);
 
-impl Measured {
-    /// These; none if the record is `simulated`, which measures nothing.
+impl MeasuredKeys {
+    /// These keys; empty if the record is `simulated`, which measures nothing.
     fn of(keys: &[&str], simulated: bool) -> Self {
         let keys: &[&str] = if simulated { &[] } else { keys };
         Self(keys.iter().map(|key| (*key).to_owned()).collect())
     }
 
-    /// What becomes of the spec's list of assumed values once the lines stand in it: a comment, so that it may be pasted with them.
+    /// A comment about the spec's list `assumed`, which can be pasted with the spec lines.
     fn text(&self) -> String {
         if self.0.is_empty() {
-            return "# simulated, not measured: the spec's `assumed` stays as it is\n".to_owned();
+            return "# simulated, not measured: do not change `assumed` in the spec\n".to_owned();
         }
         let list: Vec<String> = self.0.iter().map(|key| format!("\"{key}\"")).collect();
-        format!("# measured: take out of the spec's `assumed`, where they are in it: {}\n", list.join(", "))
+        format!("# measured: remove from `assumed` in the spec: {}\n", list.join(", "))
     }
 }
 

@@ -1,4 +1,4 @@
-//! How a motion that repeats is learned: up to where every machine converges, and what passes leave of the error.
+//! Learning of a repeated motion: the frequency up to which it converges on every machine, and the error after each pass.
 
 use core::f64::consts::TAU;
 use core::ops::ControlFlow;
@@ -21,17 +21,17 @@ use super::chart::{Axis, BLUE, Chart, DASHED, DOTS, EDGE, LINE, Note};
 use super::section::{Grid, Part, Section};
 use super::tracking::short;
 
-/// Highest frequency to be learned, Hz, as `specgen learn` has it.
+/// Highest frequency to be learned, Hz, as in `specgen learn`.
 pub const BANDWIDTH: f64 = 800.0;
-/// Passes that are learned from.
+/// Number of passes to learn from.
 const PASSES: usize = 5;
 /// Frequency of case 1, Hz.
 const FREQUENCY: f64 = 10.0;
 
-/// The section; none for a controller that takes no correction. `command` learns the same.
+/// The section; `None` for a controller without correction input. `command` runs the same.
 ///
 /// # Errors
-/// If the machine does not come to its bias pose.
+/// If the machine does not reach its bias pose.
 pub fn section(
     compiled: &Compilation,
     task: &TaskSpace,
@@ -44,12 +44,12 @@ pub fn section(
     let factors = Factors::of(&compiled.model, &[]);
     let Some(convergence) = learnable.convergence(&factors, BANDWIDTH) else {
         return Ok(Some(section.lead(
-            "By the model learning converges at no frequency on every machine within the declared intervals: narrow [robust], or measure the response of the machine by specgen learn --excite.",
+            "By the model, learning converges at no frequency on every machine within the declared intervals. Narrow [robust], or measure the response of the machine with specgen learn --excite.",
         )));
     };
     let learned = match passes(compiled, task, scenario, controller, (&learnable, &convergence)) {
         Ok(learned) => learned,
-        // A limit of the spec: what is known of convergence is shown all the same.
+        // A limit of the spec: show the convergence analysis anyway.
         Err(error @ LearnError::Status(_)) => {
             let text = format!("Case 1 at {FREQUENCY:.0}\u{2009}Hz is not learned: {error}.");
             return Ok(Some(section.lead(&text).part(Part::Chart(bound(&learnable, &convergence)))));
@@ -57,10 +57,8 @@ pub fn section(
         Err(error) => return Err(error),
     };
     let lead = lead(&learned, &convergence);
-    let mut table = Grid::new(
-        "Passes of case 1 at 10 Hz",
-        &["pass", "nm rms", "nrad rms", "by the gauges, nm", "over s", "path s"],
-    );
+    let mut table =
+        Grid::new("Passes of case 1 at 10 Hz", &["pass", "nm rms", "nrad rms", "gauges, nm", "measured, s", "path, s"]);
     for (number, pass) in learned.passes.iter().enumerate() {
         let Coverage { seconds, path_seconds } = pass.coverage;
         let values = [pass.translation_nm, pass.orientation_nrad, pass.measured_nm, seconds, path_seconds].map(digits);
@@ -68,22 +66,22 @@ pub fn section(
     }
     let columns = vec![vec![Part::Chart(bound(&learnable, &convergence))], vec![Part::Chart(by_pass(&learned))]];
     Ok(Some(section.lead(&lead).part(Part::Columns(columns)).text(
-        "What is left of the error after a pass is bounded frequency by frequency by the spectral radius of Q (I − T L), over all corners of gain, stiffness over mass, damping, lag and delay. The passes are of the simulated machine with its tolerances, errors those of the true pose.",
+        "At each frequency the remaining error after a pass is bounded by the spectral radius of Q (I − T L), over all corners of gain, stiffness over mass, damping, lag and delay. The passes are those of the simulated machine with its tolerances; errors are of the true pose.",
     ).table(table)))
 }
 
-/// What learning gained, and what it leaves.
+/// Improvement by learning, and remaining error.
 fn lead(learned: &LearningResult, convergence: &Convergence) -> String {
     let [first, best] = [0, learned.best].map(|pass| short(learned.passes[pass].translation_nm));
     let [low, high] = convergence.band.map(hertz);
     let case = format!("case 1 at {FREQUENCY:.0}\u{2009}Hz");
     let gained = match learned.best {
-        0 => format!("Learning gains nothing on {case}, {first}\u{2009}nm, beyond what passes differ by"),
-        1 => format!("1 pass takes {case} from {first} to {best}\u{2009}nm"),
-        many => format!("{many} passes take {case} from {first} to {best}\u{2009}nm"),
+        0 => format!("Learning does not improve {case}, {first}\u{2009}nm, by more than the repeatability"),
+        1 => format!("1 pass reduces the error of {case} from {first} to {best}\u{2009}nm"),
+        many => format!("{many} passes reduce the error of {case} from {first} to {best}\u{2009}nm"),
     };
     format!(
-        "{gained}, measured over {}; from {low} to {high}\u{2009}Hz each leaves {} or less of the error on every machine within the declared intervals.",
+        "{gained}, measured over {}. From {low} to {high}\u{2009}Hz each pass multiplies the error by at most {} on every machine within the declared intervals.",
         learned.passes[learned.best].coverage,
         short(convergence.radius)
     )
@@ -110,7 +108,7 @@ fn passes(
     learn(&mut bench, &motion, Learner::Host(&update), &[], spacing, PASSES, |_, _| ControlFlow::Continue(()))
 }
 
-/// What a pass leaves of the error at most, by frequency.
+/// Bound of the error factor per pass, over frequency.
 fn bound(learnable: &Learnable, convergence: &Convergence) -> Chart {
     let modes: Vec<f64> = learnable.modes().map(|mode| mode / TAU).to_vec();
     let numbers = (1..=6).map(|k| k.to_string()).collect::<Vec<_>>();
@@ -122,9 +120,9 @@ fn bound(learnable: &Learnable, convergence: &Convergence) -> Chart {
     });
     let mut chart = Chart::new(
         "convergence",
-        "What a pass leaves of the error at most",
+        "Bound of the error factor per pass",
         Axis::log("frequency", "Hz"),
-        Axis::linear("error after a pass over before", ""),
+        Axis::linear("error factor per pass", ""),
     )
     .with("without Q", DASHED, unfiltered)
     .colored(EDGE)
@@ -136,7 +134,7 @@ fn bound(learnable: &Learnable, convergence: &Convergence) -> Chart {
         format!("{} at {}\u{2009}Hz", short(convergence.radius), hertz(convergence.at)),
     ))
     .noted(Note::Modes(modes, numbers));
-    // Beyond f_c the bound without Q grows without end, and nothing is learned there.
+    // Above f_c the bound without Q grows without limit, and nothing is learned there.
     chart.y_limits = Some([0.0, 1.3]);
     chart.short = format!("up to {}\u{2009}Hz", hertz(high));
     chart
@@ -159,7 +157,7 @@ fn by_pass(learned: &LearningResult) -> Chart {
     chart
 }
 
-/// Three digits of a frequency, without a fraction from a hundred on.
+/// A frequency with three digits, without a fraction from a hundred on.
 fn hertz(value: f64) -> String {
     if value >= 100.0 { format!("{value:.0}") } else { short(value) }
 }

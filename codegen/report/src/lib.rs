@@ -1,15 +1,15 @@
-//! One self-contained HTML file about one spec: what it promises, and the figures that show it; a refused spec, a recorded run
-//! and the paper's figures have pages of their own, and so has a machine that is operated. Plots of what was identified and tuned.
+//! Self-contained HTML page about a spec: its guarantees and the figures behind them. A refused spec, a recorded run
+//! and the paper's figures have separate pages, as has a machine in operation. Also plots of identification and tuning.
 //!
 //! ```text
 //! compiled + verdict            → first (cards) ──┐
-//! compiled + emitted controller → one module a section → Section (texts, tables, charts as data) → page (HTML, CSS, script)
+//! compiled + emitted controller → one module per section → Section (texts, tables, charts as data) → page (HTML, CSS, script)
 //! identified records, searches  → charts ─→ plot (SVG)
 //! ```
-//! A [`chart`] is data: the page's own script draws it, so that it can be zoomed and saved as CSV, and nothing is there twice;
-//! what is to be a file of its own, [`plot`] draws and [`drawing`] writes.
+//! A [`chart`] is data that the page's script draws, so it can be zoomed and saved as CSV without duplication;
+//! separate picture files are drawn by [`plot`] and written by [`drawing`].
 //!
-//! Jobs of commands that also draw are here, each with its options, tables and texts: [`sim`], [`replay`], [`robust`], [`tune`],
+//! Commands that draw are implemented here, each with its options, tables and texts: [`sim`], [`replay`], [`robust`], [`tune`],
 //! [`identify`], [`reproduce`], [`pages`].
 
 pub mod budget;

@@ -1,4 +1,4 @@
-//! How far the loops are from instability: the open loop of each axis, and every control mode.
+//! Stability margins: the open loop of each axis, and every control mode.
 
 use core::f64::consts::TAU;
 
@@ -18,10 +18,10 @@ use super::tracking::{AXES, short};
 const POINTS: usize = 160;
 /// Lowest frequency of a Bode plot, Hz.
 const LOWEST: f64 = 1.0;
-/// Margins are looked for up to here.
+/// Upper end of the search for margins.
 const LARGEST: f64 = 10.0;
 
-/// A control mode as people write it.
+/// A control mode in full.
 #[must_use]
 pub fn name(law: Law) -> String {
     let name = law.name();
@@ -34,13 +34,13 @@ pub fn name(law: Law) -> String {
     }
 }
 
-/// The same in a narrow place.
+/// A control mode in short.
 #[must_use]
 pub fn short_name(law: Law) -> String {
     law.name().replace("invhys", "Invhys").replace("ewma", "EWMA").replace("pcc", "PCC")
 }
 
-/// A law of adaptation as people write it: `invhys`, `ewma` or `pcc`.
+/// Full name of an adaptation law: `invhys`, `ewma` or `pcc`.
 #[must_use]
 pub fn adapting_name(word: &str) -> &'static str {
     match word {
@@ -50,7 +50,7 @@ pub fn adapting_name(word: &str) -> &'static str {
     }
 }
 
-/// The section. `mode`: the control mode of the spec, as the word `mode` has it.
+/// The section. `mode`: the control mode of the spec, as the value of the word `mode`.
 #[must_use]
 pub fn section(compiled: &Compilation, mode: u32, command: &str) -> Section {
     let section = Section::new("margins", "Margins", command);
@@ -67,15 +67,15 @@ pub fn section(compiled: &Compilation, mode: u32, command: &str) -> Section {
         .iter()
         .filter_map(|one| one.gain_ratio_limit.map(|limit| (one.law, limit)))
         .min_by(|a, b| a.1.total_cmp(&b.1));
-    let worst = worst.map_or_else(String::new, |(law, limit)| format!(", with {} {limit:.2}, the least", name(law)));
+    let worst = worst.map_or_else(String::new, |(law, limit)| format!(" (worst mode: {}, {limit:.2})", name(law)));
     let lead = own.map_or_else(String::new, |own| {
         format!(
-            "With {} the loop takes {} times its gain and legs {} times as strong{worst}. Stable in {stable} of {} modes, {}.",
+            "With {} the loop is stable up to {} times its gain and {} times the leg gain{worst}. {stable} of {} modes are stable, {}.",
             name(law),
-            or(own.gain_margin, "as many as were looked at"),
+            or(own.gain_margin, "any number tested of"),
             or(own.gain_ratio_limit, "more than 10"),
             design.margins.len(),
-            if design.touching { "free and touching the declared work piece" } else { "free of contact" }
+            if design.touching { "free and in contact with the declared work piece" } else { "free of contact" }
         )
     });
     let Some(loops) = bode(compiled, design, task, law) else {
@@ -84,7 +84,7 @@ pub fn section(compiled: &Compilation, mode: u32, command: &str) -> Section {
     let mut section = section;
     for (axis, charts) in loops.into_iter().enumerate() {
         let mut all = all.clone();
-        // The same rows stand in each pane.
+        // Each pane has a copy of the rows.
         all.id = format!("modes-{axis}");
         if axis > 0 {
             all.numbers = Grid::default();
@@ -94,20 +94,20 @@ pub fn section(compiled: &Compilation, mode: u32, command: &str) -> Section {
             .pane(&[AXES[axis]], vec![Part::Lead(lead.clone()), Part::Columns(vec![left, vec![Part::Rows(all)]])]);
     }
     if let Some(damping) = evidence::damping(design) {
-        let said = damped(design);
-        section = section.text(&said).table(damping);
+        let text = damped(design);
+        section = section.text(&text).table(damping);
     }
-    section.text("The open loop is that of the model with the sampled platform, lags of amplifiers and gauges, notch and active damping, opened at the legs, all axes at once: its gain margin is λ = ρ/ρ̂ of the legs. The limits of the control modes are found by eigenvalues of the whole closed loop.")
+    section.text("The open loop is the model's, with the sampled platform, lags of amplifiers and gauges, notch and active damping, opened at the legs for all axes at once, so its gain margin is λ = ρ/ρ̂ of the legs. The limits of the control modes follow from eigenvalues of the complete closed loop.")
 }
 
-/// What active damping brings at its least and costs at its most.
+/// Smallest benefit and largest cost of active damping.
 fn damped(design: &Design) -> String {
     let found: Vec<_> = design.damping.iter().flat_map(|damping| damping.modes.iter().flatten()).collect();
     let largest = |of: &dyn Fn(&DampedMode) -> f64| {
         found.iter().map(|mode| of(mode)).fold(0.0, |most: f64, value| if value > most { value } else { most })
     };
     format!(
-        "Active damping takes the peak of each mode's compliance, from force to pose, to {} or less of that without it; the worst |S| over stiffness, gain, lag and delay is {}.",
+        "Active damping reduces the compliance peak of each mode (force to pose) to at most {} of that without it; the worst |S| over stiffness, gain, lag and delay is {}.",
         short(largest(&|mode| mode.compliance)),
         short(largest(&|mode| mode.sensitivity[1]))
     )
@@ -158,7 +158,7 @@ fn bode(compiled: &Compilation, design: &Design, task: &TaskSpace, law: Law) -> 
                 .map(|k| at(k, values, level, of))
                 .collect()
         };
-        // The least of all crossings of −180° is the margin.
+        // The margin is the smallest one of all crossings of −180°.
         if let Some((hertz, value)) = crossing(&phases, -180.0, &decibels)
             .into_iter()
             .filter(|one| one.1 < 0.0)
@@ -182,7 +182,7 @@ fn bode(compiled: &Compilation, design: &Design, task: &TaskSpace, law: Law) -> 
     Some(found.iter().enumerate().map(of).collect())
 }
 
-/// λ and gain up to which each control mode is stable.
+/// Stability limits of λ and gain for each control mode.
 fn control_modes(compiled: &Compilation, design: &Design, own: Law) -> Rows {
     let [low, high] = compiled.model.adaptation.gain_ratio;
     let mut rows: Vec<Value> = Vec::new();
@@ -207,12 +207,12 @@ fn control_modes(compiled: &Compilation, design: &Design, own: Law) -> Rows {
     let least = if low < 0.85 { low } else { 0.85 };
     Rows {
         id: "modes-0".to_owned(),
-        title: "How far each control mode is from instability".to_owned(),
+        title: "Stability limits of each control mode".to_owned(),
         data: json!({
             "scale": "log", "range": [least, 1.15 * furthest], "prefix": "×", "ticks": [1, 2, 3, 5, 10, 20], "rows": rows, "step": 37, "right": 100, "left": 100,
             "band": { "from": low, "to": high, "text": format!("declared {low}–{high}") },
             "legend": [{ "m": "dot", "text": "λ" }, { "m": "square", "text": "gain" }],
-            "label": "λ and gain up to which each control mode is stable",
+            "label": "Stability limits of λ and gain for each control mode",
         }),
         numbers: evidence::control_modes(design),
     }
@@ -220,37 +220,37 @@ fn control_modes(compiled: &Compilation, design: &Design, own: Law) -> Rows {
 
 fn of_legs(compiled: &Compilation, section: Section) -> Section {
     let Some(margins) = &compiled.margins else {
-        return section.lead("The law does not adapt: there is no loop that could be unstable.");
+        return section.lead("The law does not adapt, so there is no loop that could be unstable.");
     };
     let [low, high] = compiled.model.adaptation.gain_ratio;
     let adapts = "the law does not adapt";
     let or = |value: Option<f64>| value.map_or_else(|| adapts.to_owned(), digits);
-    let mut table = Grid::new("Adaptation of a leg", &["what", "value"]);
+    let mut table = Grid::new("Adaptation of a leg", &["quantity", "value"]);
     for (what, value) in [
         ("level weight of the spec", digits(compiled.model.adaptation.level_weight)),
-        ("largest stable level weight, drift weight in proportion", or(margins.largest_level_weight)),
-        ("spectral radius of the sampled leg over gain_ratio", format!("{:.5}", margins.spectral_radius)),
+        ("largest stable level weight, with proportional drift weight", or(margins.largest_level_weight)),
+        ("largest spectral radius of the sampled leg over gain_ratio", format!("{:.5}", margins.spectral_radius)),
         ("largest λ without leg dynamics (AII.18, AII.19)", or(margins.static_gain_limit)),
     ] {
         table.push(vec![what.to_owned(), value]);
     }
     let Some(limit) = margins.static_gain_limit else {
-        return section.lead("The law does not adapt: there is no loop that could be unstable.").table(table);
+        return section.lead("The law does not adapt, so there is no loop that could be unstable.").table(table);
     };
     let end = if limit > high { limit } else { high };
     let rows = Rows {
         id: "leg-margin".to_owned(),
-        title: "How far the adaptation of a leg is from instability".to_owned(),
+        title: "Stability limit of a leg's adaptation".to_owned(),
         data: json!({
             "scale": "log", "range": [if low < 0.85 { low } else { 0.85 }, 1.3 * end], "prefix": "×", "ticks": [1, 2, 3, 5, 10, 20, 50, 100], "left": 100, "right": 90,
             "rows": [{ "name": "λ", "line": [high, limit], "marks": [{ "m": "dot", "x": limit }], "note": format!("{limit:.2}"), "box": true }],
             "band": { "from": low, "to": high, "text": format!("declared {low}–{high}") },
-            "label": "λ up to which the adaptation of a leg is stable",
+            "label": "Stability limit of λ for a leg's adaptation",
         }),
         numbers: table.clone(),
     };
     section
-        .lead(&format!("Legs {limit:.2} times as strong as declared are still stable, without leg dynamics; the sampled leg has spectral radius {:.4}.", margins.spectral_radius))
+        .lead(&format!("Without leg dynamics the adaptation is stable up to {limit:.2} times the declared leg gain; the spectral radius of the sampled leg is {:.4}.", margins.spectral_radius))
         .part(Part::Rows(rows))
         .table(table)
 }

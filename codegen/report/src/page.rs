@@ -1,4 +1,4 @@
-//! The page: sections to HTML, with style, script and data inside. Nothing is fetched.
+//! The page: turns sections into HTML with embedded style, script and data. It loads nothing.
 
 use std::fmt::Write as _;
 
@@ -16,7 +16,7 @@ const SCRIPT: &str = concat!(
     include_str!("assets/view.js"),
     include_str!("assets/page.js")
 );
-/// The marks, by the shape that tells them apart without colour.
+/// Symbols for marks; distinguishable by shape without colour.
 pub(crate) const MARKS: &str = r##"<svg width="0" height="0" style="position:absolute" aria-hidden="true"><defs>
 <symbol id="m-ok" viewBox="0 0 16 16"><circle cx="8" cy="8" r="7.5" fill="var(--blue)"/><path d="M4.6 8.3l2.4 2.4 4.5-5" fill="none" stroke="var(--on)" stroke-width="1.8" stroke-linecap="round" stroke-linejoin="round"/></symbol>
 <symbol id="m-warning" viewBox="0 0 16 16"><path d="M8 1.6L15 14H1z" fill="none" stroke="var(--orange)" stroke-width="1.5" stroke-linejoin="round"/><path d="M8 6v4M8 11.6v.9" stroke="var(--orange)" stroke-width="1.6" stroke-linecap="round"/></symbol>
@@ -26,27 +26,27 @@ pub(crate) const MARKS: &str = r##"<svg width="0" height="0" style="position:abs
 </defs></svg>
 "##;
 
-/// What stands above the sections.
+/// Header of a page.
 #[derive(Debug, Clone)]
 pub struct Head {
-    /// File of the spec.
+    /// File name of the spec.
     pub file: String,
-    /// What the page is, in the title of its window.
+    /// Window title.
     pub title: String,
-    /// Digest of the spec, hexadecimal.
+    /// Digest of the spec, in hex.
     pub digest: String,
     /// Versions and target.
     pub versions: String,
-    /// The command that makes the page.
+    /// The command that creates the page.
     pub command: String,
     /// Whether the spec is refused.
     pub refused: bool,
-    /// Another page: its file, and what it is.
+    /// Link to another page: its file and title.
     pub other: Option<[String; 2]>,
 }
 
-/// The page: `first`, what is seen first, then the sections; at the end the numbers of every figure and `evidence`, to be
-/// opened. The same arguments give the same bytes.
+/// The page: `first` is the first screen, followed by the sections; at the end the numbers of every figure and `evidence`,
+/// collapsed. The same arguments give the same bytes.
 #[must_use]
 pub fn html(head: &Head, first: &[Part], sections: &[Section], evidence: &[Section]) -> String {
     let mut page = Page { out: String::new(), data: Map::new(), numbers: Vec::new(), figures: 0 };
@@ -72,7 +72,7 @@ pub fn html(head: &Head, first: &[Part], sections: &[Section], evidence: &[Secti
     if let Some([href, text]) = &head.other {
         let _ = write!(page.out, "<a href=\"{}\">{}</a>", escaped(href), escaped(text));
     }
-    page.out.push_str("<a href=\"#tables\">Tables</a></nav><button id=\"theme\" type=\"button\">Light / dark</button></header>\n<noscript><p><strong>The figures are drawn by this page's own script; it is switched off.</strong></p></noscript>\n<main>\n");
+    page.out.push_str("<a href=\"#tables\">Tables</a></nav><button id=\"theme\" type=\"button\">Light / dark</button></header>\n<noscript><p><strong>The figures are drawn by this page's script, but scripts are disabled.</strong></p></noscript>\n<main>\n");
     page.parts(first);
     for section in sections {
         page.section(section);
@@ -80,10 +80,10 @@ pub fn html(head: &Head, first: &[Part], sections: &[Section], evidence: &[Secti
     page.tables(evidence);
     let _ = write!(
         page.out,
-        "</main>\n<footer>Again: <code>{}</code><span class=\"digest\"> · digest {digest}</span></footer>\n",
+        "</main>\n<footer>Command: <code>{}</code><span class=\"digest\"> · digest {digest}</span></footer>\n",
         escaped(&head.command)
     );
-    // `</script>` in a text would end it.
+    // `</script>` in a text would end the script.
     let data = Value::Object(page.data).to_string().replace("</", "<\\/");
     let _ = write!(
         page.out,
@@ -92,7 +92,7 @@ pub fn html(head: &Head, first: &[Part], sections: &[Section], evidence: &[Secti
     page.out
 }
 
-/// Figures that a page of these parts has.
+/// Number of figures on a page with these parts.
 #[must_use]
 pub fn figures(first: &[Part], sections: &[Section]) -> usize {
     let mut page = Page { out: String::new(), data: Map::new(), numbers: Vec::new(), figures: 0 };
@@ -129,7 +129,7 @@ impl Page {
         }
         self.out.push_str("</div></div>\n");
         for (k, pane) in section.panes.iter().enumerate() {
-            // In the names of buttons a space is no break.
+            // Spaces in button names do not separate values.
             let value: Vec<String> = pane.values.iter().map(|value| joined(value)).collect();
             let hidden = if k == 0 { "" } else { " hidden" };
             let _ = writeln!(self.out, "<div class=\"pane\" data-value=\"{}\"{hidden}>", escaped(&value.join(" ")));
@@ -138,7 +138,7 @@ impl Page {
         }
         self.parts(&section.parts);
         if !section.command.is_empty() {
-            let _ = writeln!(self.out, "<p class=\"again\">Again: <code>{}</code></p>", escaped(&section.command));
+            let _ = writeln!(self.out, "<p class=\"again\">Command: <code>{}</code></p>", escaped(&section.command));
         }
         self.out.push_str("</section>\n");
     }
@@ -240,7 +240,7 @@ impl Page {
                 let _ = writeln!(self.out, "<p class=\"caption\">{}</p>", marked(&group.title));
             }
         }
-        // Groups stand in columns: the script finds the figures by their order.
+        // Groups are columns; the script finds the figures by their order.
         for (k, charts) in multiples.items.iter().enumerate() {
             charts.iter().for_each(|chart| self.keep(chart));
             self.figures += 1;
@@ -264,13 +264,13 @@ impl Page {
         self.data.insert(multiples.id.clone(), multiples.data());
     }
 
-    /// The numbers of every figure.
+    /// Tables with the numbers of every figure.
     fn tables(&mut self, evidence: &[Section]) {
         let numbers: Vec<Grid> =
             std::mem::take(&mut self.numbers).into_iter().filter(|grid| !grid.rows.is_empty()).collect();
         let _ = write!(
             self.out,
-            "<section id=\"tables\" class=\"card section\">\n<div class=\"head\"><h2>Tables</h2></div>\n<p class=\"lead\">The numbers of every figure. All points of a chart are in its own CSV.</p>\n<details><summary>Numbers of {} figures</summary>\n",
+            "<section id=\"tables\" class=\"card section\">\n<div class=\"head\"><h2>Tables</h2></div>\n<p class=\"lead\">The numbers of every figure. All points of a chart can be saved as CSV.</p>\n<details><summary>Numbers of {} figures</summary>\n",
             numbers.len()
         );
         for grid in &numbers {
@@ -281,7 +281,8 @@ impl Page {
             let _ = writeln!(self.out, "<details id=\"{}\"><summary>{}</summary>", section.id, escaped(&section.title));
             self.parts(&section.parts);
             if !section.command.is_empty() {
-                let _ = writeln!(self.out, "<p class=\"again\">Again: <code>{}</code></p>", escaped(&section.command));
+                let _ =
+                    writeln!(self.out, "<p class=\"again\">Command: <code>{}</code></p>", escaped(&section.command));
             }
             self.out.push_str("</details>\n");
         }
@@ -293,7 +294,7 @@ fn joined(value: &str) -> String {
     value.replace([' ', '\u{2009}'], "_")
 }
 
-/// Escaped; the axis of an angle stands low.
+/// Escaped text with axis names of angles as subscripts.
 #[must_use]
 pub fn marked(text: &str) -> String {
     let mut out = escaped(text);
@@ -321,7 +322,7 @@ fn write_table(out: &mut String, grid: &Grid) {
     out.push_str("</tbody></table></div>\n");
 }
 
-/// Whether a column holds numbers and is set to the right: most of its texts are numbers, and at least one.
+/// Whether a column is numeric and right-aligned: most of its texts are numbers, and at least one.
 fn numeric(grid: &Grid, column: usize) -> bool {
     let texts = grid.rows.iter().filter_map(|row| row.get(column)).filter(|text| !text.is_empty());
     let (mut numbers, mut all) = (0, 0);
@@ -362,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_stay_texts_and_data_does_not_end_its_script() {
+    fn texts_are_escaped_and_data_does_not_end_its_script() {
         let page = page();
         assert!(page.contains("<h2>A &amp; B</h2>") && page.contains("<td class=\"n\">-1.5</td><td>&lt;b&gt;</td>"));
         assert_eq!(page.matches("</script>").count(), 2, "data and script");
@@ -370,9 +371,9 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_fetched() {
+    fn nothing_is_loaded() {
         let page = page();
-        // The one address is the name of SVG's namespace.
+        // The only address is the name of the SVG namespace.
         let addresses: Vec<_> = page.match_indices("http").map(|(at, _)| &page[at..at + 26]).collect();
         assert!(addresses.iter().all(|address| *address == "http://www.w3.org/2000/svg"), "{addresses:?}");
         for word in ["fetch(", "XMLHttpRequest", "import ", "@import", "url("] {

@@ -1,4 +1,4 @@
-//! One HTML file about a spec, or about a run of its machine.
+//! HTML page about a spec, or about a run of its machine.
 
 mod beside;
 mod paper;
@@ -31,23 +31,23 @@ use specgen_studies::verdict::{Answer, Verdict};
 use specgen_studies::verify::{self, Measurement};
 use specgen_toolchain as target;
 
-/// Seed of machine, noise and strings.
+/// Seed of machine, noise and bit strings.
 const SEED: u64 = 1;
 
-/// What a page is about.
+/// Options of a page.
 #[derive(Debug)]
 pub struct Options {
     /// The spec file.
     pub spec: PathBuf,
-    /// File of the page.
+    /// Output file.
     pub output: Option<PathBuf>,
-    /// With a second page of the paper's figures.
+    /// Add a second page with the paper's figures.
     pub paper: bool,
     /// Generations of the genetic algorithm.
     pub generations: u32,
-    /// A record of a run, instead of the spec alone.
+    /// A record of a run, shown instead of the spec alone.
     pub record: Option<PathBuf>,
-    /// Without the emulated microcontroller.
+    /// Skip the emulated microcontroller.
     pub no_target: bool,
 }
 
@@ -58,7 +58,7 @@ struct Page {
     bytes: usize,
     sections: Vec<&'static str>,
     figures: usize,
-    /// The sentence that the page begins with.
+    /// The first sentence of the page.
     verdict: Option<String>,
     /// The page of the paper's figures.
     paper: Option<Box<Page>>,
@@ -77,8 +77,8 @@ impl Outcome for Page {
     }
 }
 
-/// The emitted controller, built, and what building and exercising it showed.
-struct Built {
+/// The emitted controller, with results of its build and exercise.
+struct Build {
     controller: Controller,
     measured: Result<Measurement, String>,
     ticks: usize,
@@ -86,16 +86,16 @@ struct Built {
     state: u64,
 }
 
-/// Writes the page, and shows the verdict.
+/// Writes the page and shows the verdict.
 ///
 /// # Errors
-/// The spec is refused or not ready, a run fails, or a file cannot be written.
+/// The spec is refused or incomplete, a run fails, or a file cannot be written.
 pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     let mut compiled = match compile::compile(&options.spec) {
         Ok(compiled) => compiled,
         Err(refused) => return self::refused(options, refused, ui),
     };
-    // The page judges: what is missed stands first among its findings.
+    // The page reports unmet requirements first among its findings.
     compiled.findings.splice(0..0, compiled.missed());
     ui.findings(Some(&compiled.source), &compiled.findings);
     let output = place(options, &compiled.ir.name);
@@ -132,19 +132,19 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
         compiled.ir.scalar.bits(),
         compiled.model.target.mcu.part().name
     );
-    head.other = paper.as_deref().map(|path| [file_name(path), "Beside the paper".to_owned()]);
+    head.other = paper.as_deref().map(|path| [file_name(path), "Comparison with the paper".to_owned()]);
     let mut page = write(&output, &head, &first, &sections, &behind)?;
     page.verdict = Some(crate::verdict::Sentence::of(&verdict).verdict);
     if let Some(path) = paper {
         let sections = paper::sections(&compiled, &mut built.controller, options.generations, &name, ui)?;
-        head.title = "beside the paper".to_owned();
+        head.title = "comparison with the paper".to_owned();
         head.other = Some([file_name(&output), "Report".to_owned()]);
         page.paper = Some(Box::new(write(&path, &head, &[], &sections, &[])?));
     }
     ui.judged(&page, (verdict.answer == Answer::NotReady).then(|| verdict.headline()))
 }
 
-/// A run of the machine, as a page.
+/// Page of a run of the machine.
 fn of_record(
     options: &Options,
     record: &Path,
@@ -165,7 +165,7 @@ fn of_record(
     Ok(())
 }
 
-/// Why a spec is refused, as a page.
+/// Page of a refused spec.
 fn refused(options: &Options, refused: Refusal, ui: &mut Ui) -> Result<(), Failure> {
     let Some(source) = &refused.source else { return Err(refused.into()) };
     let (model, _) = spec::load_as_far(source);
@@ -182,10 +182,10 @@ fn refused(options: &Options, refused: Refusal, ui: &mut Ui) -> Result<(), Failu
     let page = write(&output, &head, &first, &[], &[text])?;
     ui.findings(refused.source.as_ref(), &refused.findings);
     ui.progress(page.text().trim_end());
-    Err(Failure::Gate(format!("{} is refused; {} says why", source.display_name, output.display())))
+    Err(Failure::Gate(format!("{} is refused; see {}", source.display_name, output.display())))
 }
 
-/// Whether the spec with the replacement of its first error has one error less.
+/// Whether replacing the first error's text reduces the number of errors by one.
 fn accepted(source: &SpecSource, findings: &[Diagnostic]) -> bool {
     use specgen_language::diagnostic::Place;
     let errors = |findings: &[Diagnostic]| findings.iter().filter(|one| one.severity == Severity::Error).count();
@@ -236,8 +236,8 @@ fn write(
     })
 }
 
-/// What needs no simulation, to be opened at the end.
-fn evidence_of(compiled: &Compilation, built: &Built, name: &str) -> Result<Vec<Section>, Failure> {
+/// Sections without simulation, collapsed at the end.
+fn evidence_of(compiled: &Compilation, built: &Build, name: &str) -> Result<Vec<Section>, Failure> {
     let check = shell::on("specgen check", name, "");
     let main = shell::on("specgen", name, "-o DIR");
     let measured = built.measured.as_ref().map_err(String::as_str);
@@ -248,28 +248,28 @@ fn evidence_of(compiled: &Compilation, built: &Built, name: &str) -> Result<Vec<
     if let Some(design) = &compiled.design {
         let modes = Section::new("modes", "Modes", &check).table(evidence::modes(design));
         sections.push(modes.text(
-            "The sampled closed loop has the platform's modes, lags of amplifiers and gauges, notch and active damping, over the declared gain_ratio.",
+            "Sampled closed loop with the platform's modes, lags of amplifiers and gauges, notch and active damping, over the declared gain_ratio.",
         ));
     }
     sections.extend([
         evidence::rounding(&rounding, compiled.ir.scalar, &check),
         evidence::budget(&compiled.model.target, measured, &main),
         evidence::digests(compiled, &bits, &main),
-        Section::new("text", "Everything that check says", &check).lines(details::of(compiled).trim_end()),
+        Section::new("text", "Output of check --details", &check).lines(details::of(compiled).trim_end()),
     ]);
     Ok(sections)
 }
 
-/// The controller of the spec with a drive converter as fine as there is, for the error budget.
+/// The controller of the spec with the finest drive converter, for the error budget.
 fn fine(compiled: &Compilation) -> Result<Controller, Failure> {
     let lost = |why: String| {
         Failure::Environment(format!(
-            "the spec with dac.bits = {FINE_BITS} does not compile: {why}; report this as a defect of specgen with the spec"
+            "the spec with dac.bits = {FINE_BITS} does not compile: {why}; report this as a specgen bug and attach the spec"
         ))
     };
     let mut document: toml_edit::DocumentMut =
         compiled.source.text.parse().map_err(|error: toml_edit::TomlError| lost(error.to_string()))?;
-    // It compiled, so `dac` is a table; anything else would end here.
+    // The spec compiled, so `dac` is a table.
     document["dac"]["bits"] = toml_edit::value(FINE_BITS);
     let source = SpecSource { text: document.to_string(), ..compiled.source.clone() };
     let fine = compile::compile_source(source).map_err(|refused| {
@@ -282,13 +282,13 @@ fn place(options: &Options, name: &str) -> PathBuf {
     options.output.as_deref().map_or_else(|| PathBuf::from(format!("{name}-report.html")), Path::to_owned)
 }
 
-/// The page of the paper's figures beside a report.
+/// File of the page with the paper's figures.
 fn beside(output: &Path) -> PathBuf {
     let stem = output.file_stem().map_or_else(|| "report".to_owned(), |stem| stem.to_string_lossy().into_owned());
     output.with_file_name(format!("{stem}-paper.html"))
 }
 
-/// The command line with the name of the spec alone: its folder is the user's business.
+/// The command line with only the spec's file name: its folder is private to the user.
 fn again(options: &Options, name: &str) -> shell::Line {
     let mut given = Vec::new();
     if options.paper {
@@ -307,8 +307,8 @@ fn file_name(path: &Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
-/// Host library, image, and the exercise on both; without a target the compiled spec, of which nothing is built.
-fn build(compiled: &Compilation, no_target: bool, ui: &Ui) -> Result<Built, Failure> {
+/// Builds host library and image and runs the exercise on both; without a target, uses the compiled spec and builds nothing.
+fn build(compiled: &Compilation, no_target: bool, ui: &Ui) -> Result<Build, Failure> {
     let scratch = Scratch::new().map_err(environment)?;
     let folder = scratch.path().join("controller");
     let cache = scratch.path().join("target");
@@ -322,7 +322,7 @@ fn build(compiled: &Compilation, no_target: bool, ui: &Ui) -> Result<Built, Fail
     };
     let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, verify::TICKS).map_err(environment)?;
     let measured = if no_target {
-        Err("left out by --no-target".to_owned())
+        Err("skipped by --no-target".to_owned())
     } else {
         let mcu = compiled.model.target.mcu;
         ui.progress(&format!("building and measuring for {}", mcu.part().emulated));
@@ -340,5 +340,5 @@ fn build(compiled: &Compilation, no_target: bool, ui: &Ui) -> Result<Built, Fail
         }
     };
     let state = host.rows().last().and_then(|row| row.last().copied()).unwrap_or_default();
-    Ok(Built { controller, measured, ticks: host.len(), trace: target::sha256(&host.to_bytes()), state })
+    Ok(Build { controller, measured, ticks: host.len(), trace: target::sha256(&host.to_bytes()), state })
 }

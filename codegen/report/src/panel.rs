@@ -1,6 +1,6 @@
-//! The page of a machine that is operated: what the report draws with, and a script that draws what comes over the link.
+//! The operator panel: the report's drawing code, and a script that draws data from the link.
 //!
-//! The page is complete: style, script and marks are in it, and it fetches nothing but the machine's data from where it came from.
+//! The page is self-contained: it includes style, script and marks, and loads only the machine's data from its own server.
 
 use serde_json::{Value, json};
 use specgen_compiler::stability::platform::Design;
@@ -23,7 +23,7 @@ const SCRIPT: &str = concat!(
     include_str!("assets/panel.js")
 );
 
-/// What the page knows of a platform before any data comes: its figure, limits of the legs (V), its modes (Hz).
+/// Static data of a platform for the page: its geometry, limits of the legs (V), its modes (Hz).
 #[must_use]
 pub fn facts(model: &Model, design: Option<&Design>) -> Value {
     let view = match platform::standing(model, &[]) {
@@ -33,7 +33,7 @@ pub fn facts(model: &Model, design: Option<&Design>) -> Value {
     let modes: Vec<f64> = design
         .map(|design| design.modes.iter().map(|mode| mode.frequency / core::f64::consts::TAU).collect())
         .unwrap_or_default();
-    // The margin of the thinnest mode: every mode of the law may be chosen.
+    // The margin of the worst mode, since every mode of the law may be selected.
     let margins = design.map(|design| design.margins.iter().filter_map(|mode| mode.gain_margin));
     let margin = margins.and_then(|margins| margins.reduce(|least, one| if one < least { one } else { least }));
     json!({
@@ -46,10 +46,10 @@ pub fn facts(model: &Model, design: Option<&Design>) -> Value {
     })
 }
 
-/// The page about a device, with `facts` and what else its script is told.
+/// The page of a device, with `facts` for its script.
 #[must_use]
 pub fn html(title: &str, facts: &Value) -> String {
-    // `</script>` in a text would end it.
+    // `</script>` in a text would end the script.
     let facts = facts.to_string().replace("</", "<\\/");
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, \

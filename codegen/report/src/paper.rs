@@ -1,4 +1,4 @@
-//! The paper's figures and tables beside ours: the parts of a page of their own.
+//! The paper's figures and tables compared with ours: parts of a separate page.
 
 pub mod convergence;
 pub mod legs;

@@ -1,4 +1,4 @@
-//! The platform in three dimensions, to turn and to play: data for the page's script.
+//! 3-D view of the platform, with rotation and playback: data for the page's script.
 
 use host_sim::closed_loop::Tracking;
 use host_sim::platform::rig::PlatformRun;
@@ -11,20 +11,20 @@ use specgen_compiler::lower;
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::model::Model;
 
-/// Poses that are played.
+/// Number of poses in a playback.
 const POSES: usize = 400;
 
-/// Some moments of a run.
+/// Moments of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Motion {
-    /// Between two moments, s.
+    /// Time between moments, s.
     step: f64,
-    /// Pose from rest, m and rad, with the extension of each leg, m.
+    /// Pose relative to rest, m and rad, and extension of each leg, m.
     moments: Vec<[[f64; 6]; 2]>,
 }
 
 impl Motion {
-    /// The true pose of a run; leg extensions by J at rest.
+    /// The true poses of a run; leg extensions by J at rest.
     #[must_use]
     pub fn of_platform(platform: &Platform<f64>, run: &PlatformRun, interval: f64) -> Self {
         let jacobian = jacobian(platform, &[0.0; 6]);
@@ -32,7 +32,7 @@ impl Motion {
         Self::thinned(interval, &poses, |pose| [*pose, product(&jacobian, pose)])
     }
 
-    /// What the gauges of six legs read, and the pose that such legs carry, by J⁻¹ at rest. None if they carry none.
+    /// Gauge readings of six legs, and the resulting pose by J⁻¹ at rest. `None` without a platform.
     #[must_use]
     pub fn of_legs(model: &Model, run: &Tracking) -> Option<Self> {
         let inverse = lower::inverse_jacobian(&model.geometry)?;
@@ -50,7 +50,7 @@ fn product(rows: &[[f64; 6]; 6], vector: &[f64; 6]) -> [f64; 6] {
     rows.map(|row| row.iter().zip(vector).fold(0.0, |sum, (a, b)| sum + a * b))
 }
 
-/// Joints, legs, gauges, work part and dimensions of the platform as it stands, with what `findings` are about marked.
+/// Joints, legs, gauges, work part and dimensions of the platform at rest, with the subjects of `findings` marked.
 #[must_use]
 pub fn standing(model: &Model, findings: &[Diagnostic]) -> Part {
     let mut data = geometry(model);
@@ -58,7 +58,7 @@ pub fn standing(model: &Model, findings: &[Diagnostic]) -> Part {
         "The platform of {}: base, six legs, {}, dimensions.",
         model.name,
         if model.task_space.is_some() {
-            "six gauges with the direction of their positive reading"
+            "six gauges with arrows in the direction of positive readings"
         } else {
             "a gauge in each leg"
         }
@@ -84,11 +84,11 @@ pub fn standing(model: &Model, findings: &[Diagnostic]) -> Part {
     Part::View("platform", data)
 }
 
-/// The platform along a motion: bars show each leg in the `travel` that it has, m.
+/// The platform along a motion; bars show each leg within its `travel`, m.
 #[must_use]
 pub fn moving(model: &Model, motion: &Motion, travel: f64) -> Part {
     let mut data = geometry(model);
-    // Whole nanometres and nanoradians.
+    // Integer nanometres and nanoradians.
     let whole = |values: &[f64; 6]| values.map(|v| libm::round(v * 1e9) as i64);
     data["label"] = json!("The platform along its path, with the travel of each leg.");
     data["poses"] = json!(motion.moments.iter().map(|[pose, _]| whole(pose)).collect::<Vec<_>>());

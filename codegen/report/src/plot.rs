@@ -1,4 +1,4 @@
-//! Charts as SVG: side by side, with axes and units, drawn without fonts or other files, the same bytes from two runs.
+//! Draws charts as SVG, side by side, with axes and units. The pictures need no fonts or other files, and two runs give the same bytes.
 
 mod ruler;
 mod svg;
@@ -8,15 +8,15 @@ use ruler::Ruler;
 pub(crate) use svg::escaped;
 use svg::{Canvas, Hatch};
 
-/// Colours by number, dark enough on white and distinct without red and green side by side.
+/// Colours by number: dark enough on white, without adjacent red and green.
 const COLORS: [&str; 4] = ["#1f5fa8", "#d9730d", "#7a3fa0", "#8a8f98"];
-/// Number of a colour.
+/// A colour number.
 pub const BLUE: usize = 0;
-/// Number of a colour.
+/// A colour number.
 pub const ORANGE: usize = 1;
-/// Number of a colour.
+/// A colour number.
 pub const PURPLE: usize = 2;
-/// Number of a colour.
+/// A colour number.
 pub const GREY: usize = 3;
 
 const WIDTH: f64 = 620.0;
@@ -26,12 +26,12 @@ const RIGHT: f64 = 24.0;
 const TOP: f64 = 58.0;
 const BOTTOM: f64 = 56.0;
 const HEAD: f64 = 64.0;
-/// Lines of more points are thinned to this many.
+/// Longer series are thinned to this number of points.
 const POINTS: usize = 5000;
-/// Width of a letter of the legend, px: a generous guess, since no font is measured.
+/// Width of a legend character, px: a generous estimate, since no font is measured.
 const LETTER: f64 = 6.6;
 
-/// The charts in `columns` columns under a title and a line of text.
+/// Charts in `columns` columns under a title and a subtitle.
 #[must_use]
 pub fn figure(title: &str, subtitle: &str, charts: &[Chart], columns: usize) -> String {
     let columns = columns.max(1);
@@ -39,7 +39,7 @@ pub fn figure(title: &str, subtitle: &str, charts: &[Chart], columns: usize) -> 
     let (width, height) = (WIDTH * columns as f64, HEAD + HEIGHT * rows as f64);
     let mut canvas = Canvas::new(width, height);
     canvas.text(LEFT * 0.5, 28.0, 17.0, "start", "#111", title);
-    // A long line is broken at a semicolon: no text runs out of the picture.
+    // Long lines are wrapped at a semicolon, so no text is cut off.
     let letters = ((width - LEFT) / 6.4) as usize;
     for (k, line) in broken(subtitle, letters).iter().take(2).enumerate() {
         canvas.text(LEFT * 0.5, 46.0 + 15.0 * k as f64, 12.0, "start", "#555", line);
@@ -51,7 +51,7 @@ pub fn figure(title: &str, subtitle: &str, charts: &[Chart], columns: usize) -> 
     canvas.finish()
 }
 
-/// The SVG in a page of its own.
+/// An HTML page with the SVG.
 #[must_use]
 pub fn html(title: &str, svg: &str) -> String {
     format!(
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn empty_and_constant_series_have_axes_all_the_same() {
+    fn empty_and_constant_series_have_axes_too() {
         for points in [vec![], vec![[1.0, 5.0]], vec![[1.0, 0.0], [1.0, 0.0]]] {
             let chart =
                 Chart::new("", "p", Axis::linear("x", ""), Axis::linear("y", "")).with("a", Mark::Line(1.0), points);

@@ -1,4 +1,4 @@
-//! A run of a real machine beside the simulation of the same commands.
+//! Page of a run of a real machine, compared with a simulation of the same commands.
 
 use host_sim::coverage::Coverage;
 use serde_json::{Value, json};
@@ -18,54 +18,54 @@ use specgen_compiler::stability::platform::Law;
 use specgen_toolchain::budget::group;
 
 const GAUGES: [&str; 6] = ["gauge 0", "gauge 1", "gauge 2", "gauge 3", "gauge 4", "gauge 5"];
-/// Points of a loop, at most.
+/// Largest number of points of a loop.
 const POINTS: usize = 500;
 const RECORDED: &str = "recorded";
 const SIMULATED: &str = "simulated";
 
-/// A tick, as a controller knows it.
+/// A tick, as seen by a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sample {
-    /// Of the recorder.
+    /// Number of the recorded tick.
     pub tick: u64,
-    /// Whether the law was at work.
+    /// Whether the law was active.
     pub running: bool,
-    /// Whether its error counts: the law was at work, and what stands beside it can be compared.
+    /// Whether its error counts: the law was active, and the tick is comparable.
     pub scored: bool,
     /// Readings of the gauges, m.
     pub gauge: [f64; 6],
-    /// Target, m and rad; of legs, m.
+    /// Target, m and rad; for legs, m.
     pub target: [f64; 6],
-    /// What the gauges say of it.
+    /// The measured value of the target quantity.
     pub measured: [f64; 6],
     /// Displacement of each leg by the gauges, m.
     pub leg: [f64; 6],
-    /// V.
+    /// Voltages, V.
     pub voltage: [f64; 6],
-    /// Event bit of a tick that was late or left out.
+    /// Event bit of a late or skipped tick.
     pub late: bool,
-    /// Whether a leg was at the end of its stroke, voltage or slew rate.
+    /// Whether a leg was at a limit of stroke, voltage or slew rate.
     pub limited: bool,
 }
 
 /// A recorded run.
 #[derive(Debug, Clone)]
 pub struct Run {
-    /// In order of time.
+    /// In chronological order.
     pub recorded: Vec<Sample>,
-    /// The same ticks with a simulated machine; or why there are none.
+    /// The same ticks with a simulated machine, or why there are none.
     pub simulated: Result<Vec<Sample>, String>,
-    /// Control mode, as the word `mode` has it.
+    /// Control mode, as the value of the word `mode`.
     pub mode: u32,
-    /// Whether the record, run again, gives the same bits; or where it does not.
+    /// Number of ticks that replay with identical bits, or where they differ.
     pub bits: Result<u64, String>,
-    /// Ticks that are missing: the first, and the one after the last.
+    /// Missing ticks: the first, and the one after the last.
     pub gaps: Vec<(u64, u64)>,
-    /// Blocks that are not as they were written, in words.
+    /// Damaged blocks, as text.
     pub damaged: Vec<String>,
-    /// Changes of the phase: tick and words.
+    /// Phase changes: tick and text.
     pub phases: Vec<(u64, String)>,
-    /// Faults among them.
+    /// Number of faults among them.
     pub faults: usize,
 }
 
@@ -79,7 +79,7 @@ impl Run {
     }
 }
 
-/// What a page shows of a run: what is seen first, and the sections.
+/// First screen and sections of the page of a run.
 #[must_use]
 pub fn page(compiled: &Compilation, run: &Run) -> (Vec<Part>, Vec<Section>) {
     let model = &compiled.model;
@@ -98,22 +98,22 @@ fn rms(samples: &[Sample], of: impl Fn(&Sample) -> f64) -> f64 {
     libm::sqrt(sum / count.max(1) as f64)
 }
 
-/// An error (nm rms) in words, with the time that it was measured over: the ticks that count, of all that were recorded.
+/// Text of an error (nm rms) and the measured time: the scored share of all recorded ticks.
 fn error_text(run: &Run, nano: f64, period: f64) -> String {
     let scored = run.recorded.iter().filter(|sample| sample.scored).count();
     if scored == 0 {
-        return "unknown: no tick counts".to_owned();
+        return "unknown: no tick is scored".to_owned();
     }
     let coverage = Coverage::new(scored, run.recorded.len(), period);
     format!("{}\u{2009}nm rms by the gauges over {}", short(nano), coverage.brief())
 }
 
-/// rms of the error of each coordinate over the ticks that count, nm and nrad.
+/// Rms error of each coordinate over the scored ticks, nm and nrad.
 fn error_rms(samples: &[Sample]) -> [f64; 6] {
     core::array::from_fn(|k| rms(samples, |sample| (sample.target[k] - sample.measured[k]) * 1e9))
 }
 
-/// White noise of a gauge, nm: of the second difference, which motion hardly reaches.
+/// White noise of a gauge, nm, from the second difference, which motion hardly affects.
 fn white(samples: &[Sample], gauge: usize) -> f64 {
     let (mut sum, mut count) = (0.0, 0usize);
     for window in samples.windows(3) {
@@ -144,17 +144,17 @@ fn first(compiled: &Compilation, run: &Run) -> Vec<Part> {
         libm::sqrt(simulated.iter().map(|v| v * v).sum::<f64>() / 6.0)
     };
     let (verdict, mark) = if run.bits.is_err() {
-        ("The record gives other bits", "error")
+        ("Replaying the record gives different bits", "error")
     } else if run.faults > 0 {
         ("The machine faulted in this run", "error")
     } else if !late.is_empty() || missing > 0 || !run.damaged.is_empty() {
-        ("The run is not whole", "warning")
+        ("The run is incomplete", "warning")
     } else {
-        ("The run is whole", "ok")
+        ("The run is complete", "ok")
     };
     let against = match &run.simulated {
         Ok(_) => format!("; the simulation of the same commands gives {}\u{2009}nm", short(beside)),
-        Err(why) => format!("; no simulation beside it: {why}"),
+        Err(why) => format!("; no simulation for comparison: {why}"),
     };
     let sentence = Sentence {
         verdict: verdict.to_owned(),
@@ -175,16 +175,16 @@ fn first(compiled: &Compilation, run: &Run) -> Vec<Part> {
             text_row(names[k], &format!("{} {unit}", short(found[k])), "none")
         };
     }
-    let errors = card("Error, rms", "recorded of simulated", "", &content);
+    let errors = card("Error, rms", "recorded / simulated", "", &content);
     let mut content = String::new();
     let declared = model.sensor.noise * 1e9;
     for (k, name) in GAUGES.iter().enumerate() {
         let value = white(&run.recorded, k);
-        // A gauge that is noisier than the spec says makes the noise figures of the report wrong.
+        // Gauge noise above the spec's invalidates the noise figures of the report.
         let sign = if value > 1.5 * declared { "warning" } else { "ok" };
         content += &value_row(name, [&short(value), &short(declared), "nm"], value / declared, sign);
     }
-    let gauges = card("Noise of the gauges, rms", "recorded of the spec's", "", &content);
+    let gauges = card("Noise of the gauges, rms", "recorded / spec", "", &content);
     let count = |number: u64| thin(&group(number));
     let mut content = text_row("late ticks", &count(late.len() as u64), if late.is_empty() { "ok" } else { "warning" });
     content += &text_row(
@@ -200,22 +200,22 @@ fn first(compiled: &Compilation, run: &Run) -> Vec<Part> {
     let limited = run.recorded.iter().filter(|sample| sample.limited).count() as u64;
     content += &text_row(
         "at a limit",
-        &format!("{} ticks with a leg at its end", count(limited)),
+        &format!("{} ticks with a leg at a limit", count(limited)),
         if limited == 0 { "ok" } else { "warning" },
     );
     content += &text_row("faults", &run.faults.to_string(), if run.faults == 0 { "ok" } else { "error" });
     content += &match &run.bits {
-        Ok(ticks) => text_row("bits", &format!("equal over {} ticks", count(*ticks)), "ok"),
+        Ok(ticks) => text_row("bits", &format!("identical over {} ticks", count(*ticks)), "ok"),
         Err(why) => text_row("bits", why, "error"),
     };
-    let whole = card("Is the run whole?", "", "", &content);
+    let whole = card("Completeness of the run", "", "", &content);
     vec![Part::Html(format!(
         "{}<div class=\"first\">\n{errors}{gauges}{whole}</div>\n",
         sentence.html(&compiled.findings).replacen("<h1>", &format!("<h1 title=\"{}\">", marked(&model.name)), 1)
     ))]
 }
 
-/// Adds a line over time; a gap breaks it.
+/// Adds a line over time, interrupted at gaps.
 fn over_time(
     chart: Chart,
     name: &str,
@@ -246,7 +246,7 @@ fn errors(model: &Model, run: &Run) -> Section {
             peaks[k] = run.recorded.iter().map(|s| error(s).abs()).fold(0.0, |peak, v| if v > peak { v } else { peak });
             let chart = Chart::new(
                 &format!("record-error-{k}"),
-                &format!("Error of {name} by the gauges, while the law is at work"),
+                &format!("Measured error of {name} while the law is active"),
                 Axis::linear("time", "s"),
                 Axis::linear(&format!("error of {name}"), unit),
             );
@@ -292,10 +292,10 @@ fn errors(model: &Model, run: &Run) -> Section {
         section
     } else {
         section.text(&format!(
-            "{} s of the record are drawn but not counted. Where it begins in the middle of a run, or goes on behind a gap, the \
-             controller is that of its snapshot, and the simulated machine was led to the voltages of the first tick with its gauges \
-             set to the readings of that tick: how the machine came there, its creep and its speed are not in a record. From the \
-             time on that it takes to settle the two are compared; where the law is at work in one alone, they are not.",
+            "{} s of the record are drawn but not scored. Where it starts in the middle of a run, or continues after a gap, the \
+             controller starts from its snapshot, and the simulated machine was brought to the voltages of the first tick with its gauges \
+             set to the readings of that tick, since a record contains neither the history of the machine nor its creep and speed. They are \
+             compared once the simulated machine has settled, while the law is active in both.",
             short(left_out as f64 * period)
         ))
     };
@@ -379,9 +379,9 @@ fn noise(model: &Model, run: &Run) -> Section {
         numbers,
     };
     Section::new("noise", "Gauge noise", "")
-        .lead(&format!("{} is the noisiest with {}\u{2009}nm; the spec says {}\u{2009}nm.", GAUGES[worst.0], short(worst.1), short(declared)))
+        .lead(&format!("{} is the noisiest with {}\u{2009}nm; the spec has {}\u{2009}nm.", GAUGES[worst.0], short(worst.1), short(declared)))
         .part(Part::Rows(picture))
-        .text("White noise from the second difference of the readings, which motion hardly reaches; steps of the converter are in it.")
+        .text("White noise from the second difference of the readings, which motion hardly affects; it includes converter steps.")
 }
 
 fn loops(model: &Model, run: &Run) -> Section {
@@ -416,7 +416,7 @@ fn loops(model: &Model, run: &Run) -> Section {
         (ends.3 - ends.2) / (ends.1 - ends.0) / model.actuator.leg_gain()
     };
     let mut table = Grid::new(
-        "Gain of each leg over that of the spec, from lowest to highest voltage",
+        "Gain of each leg relative to the spec, from lowest to highest voltage",
         &["leg", RECORDED, SIMULATED],
     );
     for k in 0..6 {
@@ -428,20 +428,20 @@ fn loops(model: &Model, run: &Run) -> Section {
 
 fn timing(model: &Model, run: &Run) -> Section {
     let second = |tick: u64| format!("{:.4}", tick as f64 * model.timing.period);
-    let mut table = Grid::new("Late and missing ticks, phases", &["tick", "s", "what"]);
+    let mut table = Grid::new("Late and missing ticks, phases", &["tick", "s", "event"]);
     let late = run.late();
     for tick in late.iter().take(100) {
-        table.push(vec![tick.to_string(), second(*tick), "late, or one was left out".to_owned()]);
+        table.push(vec![tick.to_string(), second(*tick), "late or skipped".to_owned()]);
     }
     for (from, to) in &run.gaps {
-        table.push(vec![from.to_string(), second(*from), format!("{} ticks are not in the record", to - from)]);
+        table.push(vec![from.to_string(), second(*from), format!("{} ticks are missing in the record", to - from)]);
     }
     for (tick, what) in run.phases.iter().take(100) {
         table.push(vec![tick.to_string(), second(*tick), what.clone()]);
     }
     table.rows.sort_by_key(|row| row[0].parse::<u64>().unwrap_or_default());
     let mut section = Section::new("timing", "Late ticks", "").lead(&format!(
-        "{} of {} ticks were late or left out by the machine; {} are missing in the record.",
+        "{} of {} ticks were late or skipped on the machine; {} are missing in the record.",
         late.len(),
         thin(&group(run.recorded.len() as u64)),
         run.gaps.iter().map(|(from, to)| to - from).sum::<u64>()

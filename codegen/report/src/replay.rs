@@ -1,4 +1,4 @@
-//! A recording run again on the host, tick by tick, by bits; and its export for other programs.
+//! Replays a recording on the host, tick by tick, and compares the bits; exports it for other programs.
 
 mod export;
 mod mcap;
@@ -29,13 +29,13 @@ use crate::drawing::Plot;
 use export::Exports;
 use signals::{Numbers, Signals};
 
-/// Changes of the phase that are shown.
+/// Number of phase changes shown.
 const SHOWN: usize = 20;
 
-/// Runs a record again with a spec, by the emitted controller if so, or exports it alone, and shows the result.
+/// Replays a record with a spec, optionally with the emitted controller, or only exports it, and shows the result.
 ///
 /// # Errors
-/// The record cannot be read or differs, the spec is another one, or a file cannot be written.
+/// The record cannot be read or differs, the spec does not match, or a file cannot be written.
 pub fn run(
     recording: &Path,
     spec: Option<(&Path, bool)>,
@@ -47,7 +47,7 @@ pub fn run(
     let mut reader = open(recording)?;
     let mut exports = Exports::new(csv, mcap)?;
     if plot.wanted()? && spec.is_none() {
-        return Err(Failure::Usage("--plot is for a recording that is run again: name its --spec".to_owned()));
+        return Err(Failure::Usage("--plot needs a replay: give the --spec of the recording".to_owned()));
     }
     match spec {
         Some(spec) => again(recording, spec, (reader, exports), plot, ui),
@@ -58,7 +58,7 @@ pub fn run(
             let failed = found.damaged.first().map(|(block, reason)| {
                 format!("{shown}: block {block} is damaged: {reason}; its rows are missing. Fetch or copy it again")
             });
-            ui.judged(&Exported { file: shown, rows, ..found }, failed)
+            ui.judged(&ExportReport { file: shown, rows, ..found }, failed)
         }
     }
 }
@@ -73,11 +73,11 @@ fn again(
     let shown = recording.display();
     let drawn = plot.wanted()?;
     let compiled = spec_file::looked_up(spec, ui)?;
-    // Before a library is built: a wrong spec is refused at once.
+    // Before building a library, so that a wrong spec is refused immediately.
     same_build(recording, spec, &reader.header().description, &compiled)?;
     let controller = controllers::chosen(&compiled, emitted, ui)?;
     let mut machine = Supervised::new(controller);
-    ui.progress("running the record again");
+    ui.progress("replaying the record");
     let names = machine.output_names();
     let mut errors = Errors::default();
     let mut trouble = None;
@@ -100,10 +100,10 @@ fn again(
     ui.judged(&Report::of(format!("{shown}: {}", compiled.ir.name), found, reader.header().period), failed)
 }
 
-/// Refuses the record of another spec or of another version of specgen.
+/// Refuses a record of another spec or another version of specgen.
 ///
 /// # Errors
-/// It is one.
+/// The record does not match.
 pub fn same_build(
     recording: &Path,
     spec: &Path,
@@ -115,7 +115,7 @@ pub fn same_build(
         return Ok(());
     }
     Err(Failure::Gate(format!(
-        "{} is of spec digest {}, specgen {}; {} gives {}, specgen {version}: name the spec that the target was built from, and \
+        "{} was recorded with spec digest {}, specgen {}, but {} has {}, specgen {version}: give the spec that the target was built from, and \
          use the specgen that built it",
         recording.display(),
         recorded.digest,
@@ -128,17 +128,17 @@ pub fn same_build(
 /// Opens a record.
 ///
 /// # Errors
-/// It cannot be read, or is no record.
+/// The file cannot be read, or is not a record.
 pub fn open(path: &Path) -> Result<Reader<BufReader<File>>, Failure> {
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{}: {error}", path.display()));
     let file = files::open(path).map_err(|unread| unread_file(path, &unread))?;
     Reader::new(BufReader::with_capacity(1 << 20, file)).map_err(|error| refuse(&error))
 }
 
-/// Why the record fails, if it does. A file that was cut off is whole as far as it goes.
+/// Why the record fails, if it does. A truncated file is valid as far as it goes.
 pub fn verdict(found: &Replay) -> Option<String> {
     if let Some(divergence) = &found.divergence {
-        return Some(format!("the first tick that differs is {divergence}"));
+        return Some(format!("first difference at {divergence}"));
     }
     if let Some((block, reason)) = found.damaged.first() {
         return Some(format!(
@@ -146,12 +146,12 @@ pub fn verdict(found: &Replay) -> Option<String> {
         ));
     }
     if found.ticks == 0 {
-        return Some("there is no tick in it; record again".to_owned());
+        return Some("it contains no ticks; record again".to_owned());
     }
     None
 }
 
-/// A recording that was replayed.
+/// Report of a replay.
 #[derive(Serialize)]
 struct Report {
     #[serde(skip)]
@@ -167,15 +167,15 @@ struct Report {
     first_difference: Option<Difference>,
     phases: Vec<PhaseAt>,
     triggers: Vec<u64>,
-    /// Ticks that are missing: the first, and the one after the last.
+    /// Missing ticks: the first, and the one after the last.
     gaps: Vec<(u64, u64)>,
-    /// Blocks, and why they are not good.
+    /// Damaged blocks, with reasons.
     damaged: Vec<(usize, String)>,
-    /// First tick behind the end of a file that was cut off.
+    /// First lost tick of a truncated file.
     lost_from: Option<u64>,
 }
 
-/// Words as sixteen digits.
+/// Words as sixteen hex digits.
 #[derive(Serialize)]
 struct Difference {
     tick: u64,
@@ -192,7 +192,7 @@ struct PhaseAt {
     phase: u8,
     cause: u8,
     amplifiers_on: bool,
-    /// In words.
+    /// As text.
     stands: String,
 }
 
@@ -244,20 +244,20 @@ impl Outcome for Report {
         let more = self.phases.len().saturating_sub(SHOWN);
         if more > 0 {
             // Writing to a String cannot fail, here and below.
-            let _ = writeln!(out, "  … {more} more changes of the phase");
+            let _ = writeln!(out, "  … {more} more phase changes");
         }
         for tick in &self.triggers {
             event(&mut out, *tick, "trigger");
         }
         for (from, to) in &self.gaps {
             let last = to.saturating_sub(1);
-            let _ = writeln!(out, "  ticks {from} to {last} are missing; the record goes on behind them");
+            let _ = writeln!(out, "  ticks {from} to {last} are missing; the record continues after them");
         }
         for (block, reason) in &self.damaged {
             let _ = writeln!(out, "  block {block} is damaged: {reason}");
         }
         if let Some(tick) = self.lost_from {
-            let _ = writeln!(out, "  the file ends within a block: from tick {tick} on the record is lost");
+            let _ = writeln!(out, "  the file ends within a block: ticks from {tick} on are lost");
         }
         match &self.first_difference {
             None => out.push_str("  bit-equal\n"),
@@ -269,9 +269,9 @@ impl Outcome for Report {
     }
 }
 
-/// A recording that was read for its export alone, and what is wrong with it.
+/// Report of an export without replay, with problems found.
 #[derive(Default, Serialize)]
-struct Exported {
+struct ExportReport {
     #[serde(skip)]
     file: String,
     rows: u64,
@@ -279,16 +279,16 @@ struct Exported {
     cut: bool,
 }
 
-impl Outcome for Exported {
+impl Outcome for ExportReport {
     fn text(&self) -> String {
         let cut = if self.cut { "; the file ends within a block" } else { "" };
         format!("{}: {} rows exported{cut}\n", self.file, self.rows)
     }
 }
 
-fn export(reader: &mut Reader<BufReader<File>>, exports: &mut Exports, shown: &str) -> Result<Exported, Failure> {
+fn export(reader: &mut Reader<BufReader<File>>, exports: &mut Exports, shown: &str) -> Result<ExportReport, Failure> {
     let header = reader.header().clone();
-    let mut found = Exported::default();
+    let mut found = ExportReport::default();
     while let Some(piece) = reader.next_piece().map_err(|error| Failure::Gate(format!("{shown}: {error}")))? {
         match piece {
             FileItem::Block(block) => exports.add(&header, &block, None)?,
@@ -323,7 +323,7 @@ impl Errors {
     }
 
     fn chart(self) -> Chart {
-        let title = if self.platform { "target less measured pose" } else { "demand less gauge" };
+        let title = if self.platform { "target minus measured pose" } else { "demand minus gauge" };
         let chart = Chart::new("", title, Axis::linear("time", "s"), Axis::linear("error", "nm"));
         let name = |k: usize| if self.platform { ["x", "y", "z"][k].to_owned() } else { format!("leg {k}") };
         let lines = self.points.iter().enumerate().filter(|(_, points)| !points.is_empty());

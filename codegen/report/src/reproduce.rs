@@ -1,4 +1,4 @@
-//! The paper's whole list of experiments, ours beside the paper's.
+//! The paper's complete list of experiments, with our results.
 
 use std::path::Path;
 use std::time::Instant;
@@ -22,16 +22,16 @@ use specgen_studies::reproduce::table::{Cell, Row, Table};
 use specgen_studies::reproduce::write::Results;
 use specgen_studies::reproduce::{embedded, legs, platform};
 
-/// Seed of machine, noise and strings.
+/// Seed of machine, noise and bit strings.
 const SEED: u64 = 1;
-/// Rough times of the parts on one machine, s: only their proportion counts, for the time left.
+/// Approximate times of the parts on one machine, s; only their ratios matter, for the remaining time.
 const LEGS: f64 = 2.0;
 const REGION: f64 = 1.0;
 const CASE: f64 = 1.2;
 const MACHINING: f64 = 0.5;
 const GENERATION: f64 = 1.2;
 
-/// What is done and what is left, a line each.
+/// Progress of the parts, one line each.
 struct Steps<'a> {
     ui: &'a Ui,
     begun: Instant,
@@ -41,7 +41,7 @@ struct Steps<'a> {
 }
 
 impl Steps<'_> {
-    /// The part before is done; this one takes about `weight` of the whole.
+    /// Marks the previous part as done and starts one that takes about `weight`.
     fn next(&mut self, what: &str, weight: f64) {
         self.done += self.underway;
         self.underway = weight;
@@ -60,7 +60,7 @@ impl Steps<'_> {
 /// # Errors
 /// A run fails, or a file cannot be written.
 pub fn run(output: &Path, generations: u32, plot: &Plot, ui: &mut Ui) -> Result<(), Failure> {
-    // A folder that cannot be written is refused before the minutes of the rest.
+    // Refuses an unwritable folder before a long run.
     let _claimed = claim(output)?;
     plot.wanted()?;
     let scratch = Scratch::new().map_err(environment)?;
@@ -104,7 +104,7 @@ fn section_3(compiled: &Compilation, steps: &mut Steps) -> Result<Vec<Table>, Fa
     let mut controller = at_run_time(compiled, steps.ui)?;
     let scenario = legs::scenario(SEED);
     let actuator = &compiled.model.actuator;
-    steps.next("Table 1: straight lines at six frequencies", LEGS);
+    steps.next("Table 1: linear fits at six frequencies", LEGS);
     let table_1 = legs::table_1(&scenario, &mut controller, actuator.stack_gain * 1e6, actuator.stacks);
     steps.next("Table 2: three laws at three frequencies", LEGS);
     let table_2 = legs::table_2(&scenario, &mut controller);
@@ -137,11 +137,11 @@ fn section_4(compiled: &Compilation, steps: &mut Steps) -> Result<(Vec<Table>, C
     Ok((tables, controller))
 }
 
-/// The machine of the platform's spec, out of tolerances, with noise.
+/// The machine of the platform's spec with tolerances and noise.
 fn machine_of(compiled: &Compilation) -> Result<PlatformScenario, Failure> {
     let Some(task) = &compiled.model.task_space else {
         return Err(Failure::Environment(
-            "the embedded platform has no [control]; report this as a defect of specgen".to_owned(),
+            "the embedded platform has no [control]; report this as a specgen bug".to_owned(),
         ));
     };
     let specimen = machine::specimen(&compiled.model, task, &LegParameters::reference(), Some(SEED));
@@ -155,7 +155,7 @@ fn converge(
     ui: &Ui,
 ) -> Result<convergence::Convergence, Failure> {
     let progress = |at: &specgen_studies::tuning::search::Progress| {
-        // A run whose output is not looked at gets ten lines.
+        // About ten progress lines without a terminal.
         let tenth = (at.all / 10).max(1);
         if !ui.is_terminal() && !at.done.is_multiple_of(tenth) {
             return;
@@ -182,7 +182,7 @@ fn table_3() -> Table {
     });
     Table {
         id: "table-3",
-        title: "Table 3: the genetic algorithm, its settings and how it converges",
+        title: "Table 3: settings and convergence of the genetic algorithm",
         how: "gains and bandwidths of P/F with PCC, cost (9) on a multisine up to 10 Hz for 2 s; margins as for `specgen tune`".to_owned(),
         command: "specgen tune specs/reference.toml --optimiser genetic",
         rows: rows.collect(),

@@ -1,4 +1,4 @@
-//! A record of reversal curves, written and drawn.
+//! Writes and plots records of reversal curves.
 
 use std::path::Path;
 
@@ -10,17 +10,17 @@ use specgen_language::output::write_file;
 use crate::chart::{Axis, Chart, LINE};
 use crate::drawing::Plot;
 
-/// The record of reversal curves that was written.
+/// A written record of reversal curves.
 #[derive(Serialize)]
 pub struct Curves {
     rows: usize,
     file: String,
-    /// The line about it.
+    /// The line about the plot.
     #[serde(skip)]
     plot: Option<String>,
 }
 
-/// The loops of a record.
+/// Chart of the loops of a record.
 fn chart(record: &ReversalRecord) -> Chart {
     let points = record.rows.iter().map(|row| [row.drive, row.displacement * 1e6]).collect();
     Chart::new("", "hysteresis", Axis::linear("drive", "V"), Axis::linear("displacement", "µm")).with("", LINE, points)
@@ -34,7 +34,7 @@ impl Outcome for Curves {
 }
 
 impl Curves {
-    /// Writes and draws a record.
+    /// Writes and plots a record.
     ///
     /// # Errors
     /// A file cannot be written.
@@ -44,7 +44,7 @@ impl Curves {
         Ok(Self { rows: record.rows.len(), file: output.display().to_string(), plot })
     }
 
-    /// Writes a drive for a generator, which has a line of names.
+    /// Writes a drive signal for a generator; the text starts with a header line.
     ///
     /// # Errors
     /// The file cannot be written.

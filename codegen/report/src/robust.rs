@@ -1,4 +1,5 @@
-//! Corners and random draws of declared uncertainties, quantiles of the error, a gate for builds; in parts on many computers, too.
+//! Robustness study: corners and random machines within declared uncertainties, error quantiles, a gate for builds.
+//! A study can be split over many computers.
 
 mod figures;
 mod work;
@@ -20,54 +21,54 @@ use specgen_studies::trajectory;
 
 use crate::drawing::{self, Plot};
 use crate::learning::BANDWIDTH;
-use work::{Part, Ran, Work};
+use work::{MemberRun, Part, Work};
 
-/// Lines of progress of a run whose output is not looked at.
+/// Number of progress lines without a terminal.
 const LINES: usize = 20;
 
-/// What is tried.
+/// Options of a study.
 #[derive(Debug)]
 pub struct Options {
     /// The spec file.
     pub spec: PathBuf,
-    /// Random machines, besides the corners.
+    /// Number of random machines, in addition to the corners.
     pub draws: u32,
-    /// Ranges in place of those of the spec.
+    /// Ranges that replace those of the spec.
     pub vary: Vec<UserRange>,
-    /// What is followed, by its name.
+    /// Name of the trajectory.
     pub trajectory: Option<String>,
     /// Hz.
     pub frequency: Option<f64>,
-    /// One machine alone: the seed of a draw, or the name of a corner.
+    /// A single machine: the seed of a random machine, or the name of a corner.
     pub replay: Option<String>,
-    /// Gate of the translation, m.
+    /// Gate for the translation, m.
     pub max_error: Option<f64>,
-    /// Gate of the angles, rad.
+    /// Gate for the angles, rad.
     pub max_orientation: Option<f64>,
-    /// Passes from which each machine learns.
+    /// Number of passes from which each machine learns.
     pub learn: Option<u32>,
-    /// Gate of the translation once learned, m.
+    /// Gate for the translation after learning, m.
     pub max_learned: Option<f64>,
-    /// Quantile of the draws that the gate compares, %.
+    /// Quantile of the random machines compared with the gate, %.
     pub quantile: Option<f64>,
-    /// Error of a run that diverged, m.
+    /// Error above which a run has diverged, m.
     pub diverged_above: Option<f64>,
     /// Worker threads.
     pub threads: Option<u32>,
-    /// One part of the study.
+    /// Part of the study to run.
     pub shard: Option<Shard>,
-    /// Folder of the report, or file of a part.
+    /// Report folder, or file of a part.
     pub output: Option<PathBuf>,
-    /// Picture of the errors.
+    /// Plot of the errors.
     pub plot: Plot,
     /// The machine.
     pub plant: PlantOptions,
 }
 
-/// Runs a study, or a part of one, writes what is asked for and shows the result.
+/// Runs a study, or a part of one, writes the requested files and shows the result.
 ///
 /// # Errors
-/// The options do not fit the spec, a run fails, a file cannot be written, or the gate is not passed.
+/// The options do not fit the spec, a run fails, a file cannot be written, or the gate fails.
 pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     let begun = Instant::now();
     let path = &options.spec;
@@ -106,7 +107,7 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
         noise: work.noise,
         bound: work.bound,
     };
-    // The machines that are done make a result.
+    // When interrupted, the completed machines form the result.
     let stop = interrupt::heed();
     let all = plan.members.len();
     let runs = study.run_all(&plan, threads, stop, progress(all, ui));
@@ -114,24 +115,24 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     let runs = runs.map_err(run_failure)?;
     if let (Some(shard), Some(file)) = (options.shard, &options.output) {
         if runs.len() < all {
-            // A part is whole or not there.
+            // A part is complete or not written.
             return Err(Failure::interrupted());
         }
-        Part { shard, planned: whole.members.len(), work, runs: runs.into_iter().map(Ran::from).collect() }
+        Part { shard, planned: whole.members.len(), work, runs: runs.into_iter().map(MemberRun::from).collect() }
             .write(file, ui)?;
-        ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));
+        ui.progress(&format!("{:.1} s in total", begun.elapsed().as_secs_f64()));
         return Ok(());
     }
     let results = Results { output: options.output.as_deref(), plot: &options.plot };
     results.put(&work, options.replay.is_some(), all, &runs, ui, || {
-        ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));
+        ui.progress(&format!("{:.1} s in total", begun.elapsed().as_secs_f64()));
     })
 }
 
-/// Puts the parts of a study together; the report is that of a single run.
+/// Merges the parts of a study into the report of a single run.
 ///
 /// # Errors
-/// The parts are not those of one study, a file cannot be written, or the gate is not passed.
+/// The parts belong to different studies, a file cannot be written, or the gate fails.
 pub fn merge(parts: &[impl AsRef<Path>], output: Option<&Path>, plot: &Plot, ui: &Ui) -> Result<(), Failure> {
     plot.wanted()?;
     let mut read = Vec::new();
@@ -142,34 +143,34 @@ pub fn merge(parts: &[impl AsRef<Path>], output: Option<&Path>, plot: &Plot, ui:
             && let Some((what, here, there)) = part.differs(other)
         {
             return Err(Failure::Gate(format!(
-                "`{name}` and `{first}` are of different studies: {what} is {here} here, {there} there"
+                "`{name}` and `{first}` belong to different studies: {what} is {here} and {there}"
             )));
         }
         read.push((name, part));
     }
     let Some((_, first)) = read.first() else {
-        return Err(Failure::Usage("there is no part to merge".to_owned()));
+        return Err(Failure::Usage("no parts to merge".to_owned()));
     };
     let work = first.work.clone();
     let plan = work.plan();
     let parts: Vec<shard::Part> = read.into_iter().map(|(name, part)| part.named(name)).collect();
     let runs = shard::merged(&plan, &parts).map_err(Failure::Gate)?;
-    // That of the parts: a study has no other.
+    // Parts are always run with this controller.
     ui.runs(ControllerForm::RunTime);
     let _claimed = output.map(claim).transpose()?;
     let results = Results { output, plot };
     results.put(&work, false, plan.members.len(), &runs, ui, || {})
 }
 
-/// Where a report goes.
+/// Destination of a report.
 struct Results<'a> {
     output: Option<&'a Path>,
     plot: &'a Plot,
 }
 
 impl Results<'_> {
-    /// Writes and shows what `runs` of `planned` machines found; `alone` if it was one that was named. `last` is called
-    /// before the report is shown.
+    /// Writes and shows the results of `runs` out of `planned` machines; `alone` for a single named machine. Calls `last`
+    /// before showing the report.
     fn put(
         &self,
         work: &Work,
@@ -181,7 +182,7 @@ impl Results<'_> {
     ) -> Result<(), Failure> {
         let gate = work.gate(alone);
         let reasons = gate.reasons(runs);
-        let found = figures::Found { work, gate: &gate, reasons: &reasons, alone, planned, runs };
+        let found = figures::StudyResult { work, gate: &gate, reasons: &reasons, alone, planned, runs };
         let report = found.report();
         let below = "rms error by share of the machines";
         self.plot.show(&work.name, below, &found.charts(), ui)?;
@@ -191,8 +192,10 @@ impl Results<'_> {
         }
         last();
         if runs.len() < planned {
-            let message =
-                format!("interrupted: the figures are of {} of {planned} machines, and no gate is passed", runs.len());
+            let message = format!(
+                "interrupted: the figures cover {} of {planned} machines, so the gate was not passed",
+                runs.len()
+            );
             return Err(Failure::Interrupted { message, result: ui.shown(&report) });
         }
         ui.judged(&report, (!reasons.is_empty()).then(|| format!("not robust: {}", reasons.join("; "))))
@@ -210,7 +213,7 @@ fn progress(all: usize, ui: &Ui) -> impl FnMut(usize) {
             let elapsed = started.elapsed().as_secs_f64();
             let left = elapsed * (all - done) as f64 / done as f64;
             let rate = done as f64 / elapsed.max(1e-9);
-            ui.rate(&format!("robust: {done} of {all} machines, {rate:.1} a second, {left:.0} s left"));
+            ui.rate(&format!("robust: {done} of {all} machines, {rate:.1} per second, {left:.0} s left"));
         }
     }
 }

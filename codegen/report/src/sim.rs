@@ -1,4 +1,4 @@
-//! A spec's controller on simulated machines that are not of its model class: the motions of the user's own platform, or the
+//! Runs a spec's controller on simulated machines outside its model class: motions of the user's own platform, or the
 //! paper's experiments.
 
 mod legs;
@@ -19,14 +19,14 @@ use crate::drawing::{self, File, Plot};
 pub use legs::chart as chart_of_legs;
 pub use platform::chart as chart_of_platform;
 
-/// What is simulated.
+/// Options of `sim`.
 #[derive(Debug)]
 pub struct Options {
     /// Folder of the tables.
     pub output: Option<PathBuf>,
-    /// With every tick of every run.
+    /// Write every tick of every run.
     pub traces: bool,
-    /// Picture of the errors.
+    /// Plot of the errors.
     pub plot: Plot,
     /// The paper's experiments.
     pub paper: bool,
@@ -34,23 +34,23 @@ pub struct Options {
     pub plant: PlantOptions,
     /// Control ticks per period of a motion of legs.
     pub samples: Option<u32>,
-    /// Of the motions, Hz.
+    /// Frequencies of the motions, Hz.
     pub frequency: Option<Vec<f64>>,
-    /// A trajectory of the spec, alone.
+    /// A single trajectory of the spec.
     pub trajectory: Option<String>,
-    /// Control intervals by which voltages are late.
+    /// Delay of the voltages in control intervals.
     pub latency: u32,
-    /// A machine in steps of 20 µs.
+    /// Simulate the machine in steps of 20 µs.
     pub small_steps: bool,
     /// File of a record, instead of experiments.
     pub record: Option<PathBuf>,
-    /// By the emitted controller.
+    /// Use the emitted controller.
     pub emitted: bool,
     /// Length of the record, s.
     pub seconds: f64,
 }
 
-/// Frequencies of motions, Hz, unless asked otherwise.
+/// Default frequencies of motions, Hz.
 const FREQUENCIES: [f64; 2] = [1.0, 10.0];
 
 impl Options {
@@ -59,7 +59,7 @@ impl Options {
     }
 }
 
-/// Writes tables, and traces if they are asked for, whose size is said before.
+/// Writes tables, and traces if requested; reports the size of the traces first.
 fn write_files(options: &Options, tables: Vec<File>, traces: Vec<File>, ui: &Ui) -> Result<(), Failure> {
     let Some(folder) = &options.output else { return Ok(()) };
     let mut files = tables;
@@ -71,7 +71,7 @@ fn write_files(options: &Options, tables: Vec<File>, traces: Vec<File>, ui: &Ui)
     drawing::write(folder, &files, ui)
 }
 
-/// Simulates a spec, writes what is asked for and shows the result.
+/// Simulates a spec, writes the requested files and shows the result.
 ///
 /// # Errors
 /// The options do not fit the spec, a run fails, or a file cannot be written.
@@ -82,7 +82,7 @@ pub fn run(options: &Options, compiled: &Compilation, ui: &mut Ui) -> Result<(),
         None => legs::check(options, compiled)?,
     }
     options.plot.wanted()?;
-    // A place that cannot be is refused before the minutes of the rest, too.
+    // Refuses an unusable folder before a long run.
     let _claimed = options.output.as_deref().map(claim).transpose()?;
     options.record.as_deref().map_or(Ok(()), check_place)?;
     let controller = controllers::chosen(compiled, options.emitted, ui)?;

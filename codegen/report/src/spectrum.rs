@@ -1,14 +1,14 @@
-//! How an error is spread over frequencies.
+//! Spectra of errors.
 
 use core::f64::consts::TAU;
 
 use specgen_numerics::fft::{Complex64, forward};
 
-/// Points of a spectrum as drawn.
+/// Number of points of a drawn spectrum.
 const POINTS: usize = 160;
 
-/// Root of the power up to each frequency (Hz): frequencies and values, evenly spaced in decades. The last value is the
-/// root mean square of all signals together, about their straight lines. Signals are of one length, sampled every
+/// Cumulative rms up to each frequency (Hz): frequencies and values, logarithmically spaced. The last value is the
+/// rms of all signals together after removing their linear trends. Signals have equal lengths and are sampled every
 /// `interval` (s).
 #[must_use]
 pub fn cumulative(signals: &[&[f64]], interval: f64) -> (Vec<f64>, Vec<f64>) {
@@ -53,8 +53,8 @@ pub fn cumulative(signals: &[&[f64]], interval: f64) -> (Vec<f64>, Vec<f64>) {
     (frequencies, roots)
 }
 
-/// Amplitude spectral density of a signal about its straight line, per root hertz: frequencies (Hz) and values, each the mean
-/// power of a band, evenly spaced in decades.
+/// Amplitude spectral density of a signal without its linear trend, per root hertz: frequencies (Hz) and values, each the mean
+/// power of a band; bands are logarithmically spaced.
 #[must_use]
 pub fn density(signal: &[f64], interval: f64) -> (Vec<f64>, Vec<f64>) {
     let (frequencies, roots) = cumulative(&[signal], interval);

@@ -1,4 +1,4 @@
-//! How the spec's own trajectories are followed.
+//! Tracking of the spec's own trajectories.
 
 mod pane;
 
@@ -23,24 +23,24 @@ pub(crate) use pane::{error_groups, round_up};
 
 /// Names of the coordinates.
 pub const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
-/// Names of the legs, counted as their words are.
+/// Names of the legs, counted from 0 like their words.
 pub const LEGS: [&str; 6] = ["leg 0", "leg 1", "leg 2", "leg 3", "leg 4", "leg 5"];
-/// A trajectory is run at its own frequency and at this many times it.
+/// Factor of the second speed at which each trajectory is run.
 const FAST: f64 = 10.0;
-/// The key of limits.
+/// Spec key of the limits.
 const LIMITS: &str = "requirements.tracking";
 
-/// How a trajectory of the spec is followed.
+/// How a trajectory of the spec is played.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Course {
-    /// As a stream of set-points.
+    /// Streamed as set-points.
     Streamed(PaperPose),
-    /// By the controller, which has it.
+    /// Played by the controller.
     Played(OnBoard),
 }
 
 impl Course {
-    /// Follows it with the controller as configured.
+    /// Runs it with the controller as configured.
     ///
     /// # Errors
     /// As [`PlatformScenario::run`] and [`PlatformScenario::play`].
@@ -56,40 +56,40 @@ impl Course {
     }
 }
 
-/// A trajectory of the spec at a frequency, followed by the simulated machine.
+/// A run of a trajectory of the spec at one frequency on the simulated machine.
 #[derive(Debug, Clone)]
 pub struct TrackedPath {
-    /// Of the trajectory.
+    /// Name of the trajectory.
     pub name: String,
-    /// Operating frequency, Hz; none: a waveform, which has one speed.
+    /// Operating frequency, Hz; `None` for a waveform, which has a fixed speed.
     pub frequency: Option<f64>,
-    /// Whether it is the speed that the spec gives.
+    /// Whether it is the spec's own speed.
     pub own: bool,
-    /// How it was followed.
+    /// How it was played.
     pub course: Course,
-    /// The run; none if the controller refused set-points.
+    /// The run; `None` if the controller refused set-points.
     pub run: Option<PlatformRun>,
 }
 
 impl TrackedPath {
-    /// `1 Hz`, or `as it is` for a waveform.
+    /// `1 Hz`, or `own speed` for a waveform.
     #[must_use]
     pub fn speed(&self) -> String {
-        self.frequency.map_or_else(|| "as it is".to_owned(), |hertz| format!("{hertz}\u{2009}Hz"))
+        self.frequency.map_or_else(|| "own speed".to_owned(), |hertz| format!("{hertz}\u{2009}Hz"))
     }
 
-    /// The same for the verdict.
+    /// Name for the verdict.
     fn named(&self) -> String {
         self.frequency.map_or_else(|| self.name.clone(), |hertz| format!("{} {hertz} Hz", self.name))
     }
 
-    /// rms of the error of each axis, nm and nrad.
+    /// Rms error of each axis, nm and nrad.
     #[must_use]
     pub fn rms(&self) -> Option<[f64; 6]> {
         self.run.as_ref().map(|run| run.errors.rms_nano())
     }
 
-    /// What was measured.
+    /// The measured part of the path.
     #[must_use]
     pub fn coverage(&self) -> Option<Coverage> {
         self.run.as_ref().map(|run| run.errors.coverage())
@@ -103,7 +103,7 @@ pub fn norm(rms: &[f64; 6], turning: bool) -> f64 {
     libm::sqrt(axes.iter().map(|v| v * v).sum())
 }
 
-/// Path of the paper's as the simulator has it.
+/// The simulator's form of a path of the paper.
 #[must_use]
 pub fn path(path: PaperPath) -> trajectory::PaperPath {
     match path {
@@ -113,7 +113,7 @@ pub fn path(path: PaperPath) -> trajectory::PaperPath {
     }
 }
 
-/// The control mode of the spec, as the word `mode` has it.
+/// The control mode of the spec, as the value of the word `mode`.
 #[must_use]
 pub fn mode_of(controller: &Controller) -> u32 {
     let place = controller.description().config_names.iter().position(|name| name == "mode");
@@ -121,7 +121,7 @@ pub fn mode_of(controller: &Controller) -> u32 {
     word.and_then(|word| u32::try_from(word).ok()).unwrap_or_default()
 }
 
-/// Every trajectory of the spec at its own frequency, at ten times it, and where a limit asks for another one, at that.
+/// Runs every trajectory of the spec at its own frequency, at ten times it, and at the frequency of a limit.
 ///
 /// # Errors
 /// As [`Course::run`].
@@ -173,7 +173,7 @@ pub fn follow(
     Ok(all)
 }
 
-/// What the runs say to the limits of the spec, nm and nrad rms; what has no limit is not judged.
+/// Figures of the runs with limits in the spec, nm and nrad rms.
 #[must_use]
 pub fn judged(model: &Model, all: &[TrackedPath]) -> Vec<Figure> {
     let mut figures = Vec::new();
@@ -206,20 +206,20 @@ pub fn judged(model: &Model, all: &[TrackedPath]) -> Vec<Figure> {
     figures
 }
 
-/// A row of the picture of errors.
+/// A row of the error chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// What was followed.
+    /// Name of the trajectory.
     pub name: String,
-    /// Errors: whether it is at the speed that the spec gives, how much, and over what it was measured, if it is of a path.
+    /// Errors: whether at the spec's own speed, value, and measured part if it is for a path.
     pub values: Vec<(bool, f64, Option<Coverage>)>,
-    /// Beside it.
+    /// Note beside it.
     pub note: String,
-    /// Limit of the spec.
+    /// Limit in the spec.
     pub limit: Option<f64>,
 }
 
-/// Lines of the trajectories of a platform, position (nm) or angle (nrad): norm of three axes.
+/// Rows for the trajectories of a platform, position (nm) or angle (nrad): norm of three axes.
 #[must_use]
 pub fn lines(model: &Model, noise: Option<&[f64; 6]>, all: &[TrackedPath], turning: bool) -> Vec<Line> {
     let mut lines = Vec::new();
@@ -256,11 +256,10 @@ fn few(value: f64) -> String {
     if value < 9.95 { format!("{value:.1}") } else { format!("{value:.0}") }
 }
 
-/// Errors in one picture, `unit` rms; `speeds` are what hollow and full dots stand for.
+/// Error chart, `unit` rms; `speeds` are the meanings of hollow and full dots.
 #[must_use]
 pub fn dumbbell(lines: &[Line], speeds: [Option<String>; 2], unit: &str) -> Rows {
-    let mut numbers =
-        Grid::new(&format!("Error on trajectories, {unit} rms"), &["trajectory", "at its speed", "faster"]);
+    let mut numbers = Grid::new(&format!("Error on trajectories, {unit} rms"), &["trajectory", "own speed", "faster"]);
     let mut rows: Vec<Value> = Vec::new();
     let (mut low, mut high) = (f64::INFINITY, 0.0);
     for line in lines {
@@ -295,7 +294,7 @@ pub fn dumbbell(lines: &[Line], speeds: [Option<String>; 2], unit: &str) -> Rows
             "limit": line.limit }));
     }
     let range = if low <= high {
-        // Some room for texts on both sides.
+        // Room for texts on both sides.
         let step = |value: f64| libm::pow(10.0, value);
         [step(libm::floor(3.0 * libm::log10(low / 1.5)) / 3.0), step(libm::ceil(3.0 * libm::log10(high * 1.5)) / 3.0)]
     } else {
@@ -315,11 +314,11 @@ pub fn dumbbell(lines: &[Line], speeds: [Option<String>; 2], unit: &str) -> Rows
     }
 }
 
-/// The section: each trajectory at each speed, axis by axis.
+/// The section: each trajectory at each speed, per axis.
 #[must_use]
 pub fn section(all: &[TrackedPath], law: &str, interval: f64, corners: bool, command: &str) -> Section {
     let mut section = Section::new("tracking", "Tracking", command);
-    // What is hardest to follow is seen first.
+    // The trajectory with the largest error comes first.
     let hardest = |one: &&TrackedPath| one.rms().map_or(-1.0, |rms| norm(&rms, false));
     let first = all.iter().max_by(|a, b| hardest(a).total_cmp(&hardest(b))).map(|one| one.name.clone());
     let mut ordered: Vec<&TrackedPath> = all.iter().collect();
@@ -349,12 +348,11 @@ pub fn section(all: &[TrackedPath], law: &str, interval: f64, corners: bool, com
         section = section.pane(&[&one.name, &speed], pane(&shown));
     }
     if all.is_empty() {
-        section = section
-            .lead("The spec has no trajectory of its own: add [[trajectory]] tables, and their errors stand here.");
+        section = section.lead("The spec has no trajectories. Add [[trajectory]] tables to see their errors here.");
     }
     if !refused.is_empty() {
         section = section.text(&format!(
-            "Ended early, so without a figure: the controller refused set-points that leave the workspace or move faster than control.setpoint.stream_speed: {}.",
+            "Ended early and not scored, because the controller refused set-points outside the workspace or faster than control.setpoint.stream_speed: {}.",
             refused.join(", ")
         ));
     }

@@ -1,4 +1,4 @@
-//! Gains and weights from the simulated loop with the controller of the spec.
+//! Tunes gains and weights by simulating the loop with the controller of the spec.
 
 mod evaluate;
 mod figures;
@@ -33,50 +33,50 @@ use specgen_studies::tuning::{
 
 use crate::drawing::{self, Plot};
 
-/// What is tuned, and how.
+/// Options of `tune`.
 #[derive(Debug)]
 pub struct Options {
     /// The spec file.
     pub spec: PathBuf,
-    /// Numbers that are tuned.
+    /// Parameters to tune.
     pub what: TunedNumbers,
-    /// By the genetic algorithm, instead of CMA-ES.
+    /// Use the genetic algorithm instead of CMA-ES.
     pub genetic: bool,
-    /// By the other one as well.
+    /// Run the other algorithm as well.
     pub compare: bool,
-    /// Candidates in all.
+    /// Total number of candidates.
     pub evaluations: Option<u32>,
-    /// Candidates of a generation.
+    /// Candidates per generation.
     pub population: Option<u32>,
-    /// What is followed, by its name: multisine, zigzag, leg, case-1, case-2 or machining.
+    /// Name of the trajectory: multisine, zigzag, leg, case-1, case-2 or machining.
     pub trajectory: String,
-    /// Highest of a multisine, or of the paper's trajectory, Hz.
+    /// Highest frequency of a multisine, or frequency of the paper's trajectory, Hz.
     pub frequency: f64,
     /// Length of a multisine, s.
     pub seconds: f64,
-    /// Factor on gains and bandwidths at which a candidate is stable.
+    /// Factor on gains and bandwidths for which a candidate must be stable.
     pub gain_margin: f64,
-    /// Ticks of further delay at which it is stable.
+    /// Additional delay for which a candidate must be stable, ticks.
     pub delay_margin: f64,
-    /// Bounds of numbers, by group.
+    /// Bounds of parameters, by group.
     pub bounds: Vec<GivenBounds>,
-    /// Control intervals by which voltages are late.
+    /// Delay of the voltages in control intervals.
     pub latency: u32,
     /// Worker threads.
     pub threads: Option<u32>,
-    /// File of candidates that are scored, without a search.
+    /// File of candidates to score, without a search.
     pub evaluate: Option<PathBuf>,
-    /// Folder of front, history, report and picture.
+    /// Folder for front, history, report and picture.
     pub output: Option<PathBuf>,
     /// Write the result into the spec.
     pub write: bool,
-    /// Picture of the front.
+    /// Plot of the front.
     pub plot: Plot,
     /// The machine.
     pub plant: PlantOptions,
 }
 
-/// Everything that tuning works on.
+/// Inputs of tuning.
 struct Job<'a> {
     options: &'a Options,
     compiled: Compilation,
@@ -87,10 +87,10 @@ struct Job<'a> {
     threads: usize,
 }
 
-/// Tunes a spec, writes what is asked for and shows the result.
+/// Tunes a spec, writes the requested files and shows the result.
 ///
 /// # Errors
-/// The options do not fit the spec, no start holds the margins, a run fails, or a file cannot be written.
+/// The options do not fit the spec, no start meets the margins, a run fails, or a file cannot be written.
 pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     let leg = options.plant.leg()?;
     let compiled = spec_file::compiled(&options.spec, ui)?;
@@ -113,7 +113,7 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     }
 }
 
-/// Arguments that do not go with the kind of the spec.
+/// Refuses options that do not fit the kind of spec.
 fn check(options: &Options, compiled: &Compilation) -> Result<(), Failure> {
     let platform = compiled.model.task_space.is_some();
     let fits = match options.trajectory.as_str() {
@@ -123,12 +123,12 @@ fn check(options: &Options, compiled: &Compilation) -> Result<(), Failure> {
     };
     if !fits {
         return Err(Failure::Usage(
-            "--trajectory leg is for six legs with their own gauges, case-1, case-2 and machining for a spec with [control]"
+            "--trajectory leg needs six legs with their own gauges; case-1, case-2 and machining need a spec with [control]"
                 .to_owned(),
         ));
     }
     if options.latency != 0 && !platform {
-        return Err(Failure::Usage("--latency is for a spec with [control]".to_owned()));
+        return Err(Failure::Usage("--latency needs a spec with [control]".to_owned()));
     }
     Ok(())
 }
@@ -147,7 +147,7 @@ impl Job<'_> {
         let searches = self.search(&case, &starts, ui)?;
         let (best, found) = self.best(&searches, &starts);
 
-        // The patch is what compiles; a result that does not is refused before anything is written.
+        // Compile the patched spec: a result that is refused must not be written.
         let note = format!("Tuned by specgen tune, seed {}.", self.options.plant.seed);
         let source = &self.compiled.source;
         let text = write::edited(&self.compiled, &self.space, &best.setting, &note).map_err(Failure::Gate)?;
@@ -155,7 +155,7 @@ impl Job<'_> {
         let tuned = compile::compile_source(edited).map_err(|refusal| self.not_compiled(&refusal))?;
         let patch = write::patch(&source.display_name, &source.text, &text);
 
-        ui.progress("scoring on what it was not tuned on");
+        ui.progress("scoring on a machine and trajectory not used for tuning");
         let mut rows = starts.rows();
         rows.push(("tuned", best.setting));
         let other = self.case(&own, &self.scored_on())?;
@@ -170,7 +170,7 @@ impl Job<'_> {
             let files = self.files(&searches, &all, self.front(&title, &all, &marks), &report);
             drawing::write(folder, &files, ui)?;
         }
-        // It may have been edited in the minutes since it was read.
+        // The spec may have been edited since it was read.
         let edited =
             self.options.write && SpecSource::read(&self.options.spec).map_or(true, |now| now.text != source.text);
         let written = self.options.write && !edited;
@@ -178,18 +178,18 @@ impl Job<'_> {
             edit_file(&self.options.spec, text.as_bytes())?;
             ui.progress(&format!("wrote the result into {}", self.options.spec.display()));
         }
-        ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));
+        ui.progress(&format!("{:.1} s in total", begun.elapsed().as_secs_f64()));
         report.with_patch = !written;
         if edited {
             let spec = self.options.spec.display();
             let message = format!(
-                "`{spec}` was changed while it was tuned: nothing was written into it. Apply the patch, or tune again"
+                "`{spec}` was changed during tuning, so nothing was written into it. Apply the patch, or tune again"
             );
             return ui.judged(&report, Some(message));
         }
         if found.is_some() {
             let done: usize = searches.iter().map(|(_, search)| search.evaluations).sum();
-            let message = format!("interrupted: this is the best of {done} candidates, not of all that were asked for");
+            let message = format!("interrupted: this is the best of only {done} candidates");
             return Err(Failure::Interrupted { message, result: ui.shown(&report) });
         }
         ui.result(&report);
@@ -224,12 +224,12 @@ impl Job<'_> {
         }
     }
 
-    /// What candidates are run on.
+    /// Conditions used for tuning.
     fn tuned_on(&self) -> Conditions {
         self.conditions(self.trajectories()[0], self.options.plant.seed, true)
     }
 
-    /// Another trajectory, another machine and other noise, in the steps of `specgen sim`.
+    /// Conditions not used for tuning: another trajectory, machine and noise, in the time steps of `specgen sim`.
     fn scored_on(&self) -> Conditions {
         self.conditions(self.trajectories()[1], self.options.plant.seed.wrapping_add(1), false)
     }
@@ -264,7 +264,7 @@ impl Job<'_> {
             let options = SearchOptions {
                 evaluations: self.evaluations(),
                 threads: self.threads,
-                // The best so far is a result.
+                // When interrupted, the best candidate so far is the result.
                 stop: interrupt::heed(),
                 progress: &progress,
             };
@@ -275,7 +275,7 @@ impl Job<'_> {
         Ok(searches)
     }
 
-    /// The best of all, starts included; and whether a search was ended early.
+    /// The best candidate, starts included; and whether a search was interrupted.
     fn best(&self, searches: &[(&'static str, Search)], starts: &start::Starts) -> (Candidate, Option<()>) {
         let mut best = Candidate { number: 0, setting: starts.best, score: starts.score };
         let mut interrupted = None;
@@ -299,16 +299,16 @@ impl Job<'_> {
                 codes::TUNE_REFUSED,
                 "",
                 Place::Whole,
-                format!("the spec with the tuned numbers is refused: {}", why.join("; ")),
-                "ask for larger margins (--gain-margin, --delay-margin); the spec is as it was",
+                format!("the spec with the tuned parameters is refused: {}", why.join("; ")),
+                "require larger margins (--gain-margin, --delay-margin); the spec is unchanged",
             )],
         )
     }
 
-    /// The front as a picture.
+    /// Picture of the front.
     fn front(&self, title: &str, all: &[Candidate], marks: &[(&str, Score)]) -> String {
         let axes = if self.compiled.model.task_space.is_some() {
-            ["effort: motion asked for by feedback", "pose error, angles at the joints' radius"]
+            ["effort: motion requested by feedback", "pose error, angles at the joints' radius"]
         } else {
             ["effort: change of the estimates per tick", "leg error"]
         };

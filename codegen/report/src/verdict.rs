@@ -1,4 +1,4 @@
-//! What is seen first: the verdict, the figures that decide with their limits, the findings.
+//! First screen: the verdict, the deciding figures with their limits, the findings.
 
 use std::fmt::Write as _;
 
@@ -9,20 +9,20 @@ use specgen_studies::verdict::{Answer, Figure, Mark, Subject, Verdict};
 use super::page::marked;
 use super::plot::escaped;
 
-/// Width of a limit bar, px; the limit is a line at four fifths of it.
+/// Width of a limit bar, px; the limit is at four fifths of it.
 const BAR: f64 = 76.0;
 const LIMIT: f64 = 0.8 * BAR;
-/// From here on a figure is near its limit.
+/// From this share on a figure is close to its limit.
 const TIGHT: f64 = 0.9;
-/// Findings that are seen at once; the others are in their section.
+/// Number of findings shown initially; the others are in their section.
 const SEEN: usize = 3;
 
 /// A mark by its name: `ok`, `warning`, `error`, `none`, `note`.
 #[must_use]
 pub fn mark(name: &str) -> String {
     let label = match name {
-        "ok" => "holds",
-        "none" => "not judged",
+        "ok" => "within limit",
+        "none" => "no limit",
         other => other,
     };
     format!("<svg class=\"mark\" role=\"img\" aria-label=\"{label}\"><use href=\"#m-{name}\"/></svg>")
@@ -36,13 +36,13 @@ fn mark_of(figure: &Figure) -> &'static str {
     }
 }
 
-/// A number with thin spaces between thousands and a true minus.
+/// A number with thin spaces as thousands separators and a true minus sign.
 #[must_use]
 pub fn thin(text: &str) -> String {
     text.replace(',', "\u{2009}").replace('-', "\u{2212}")
 }
 
-/// How much of what there is a figure takes: of the limit, or the limit of it where it must be large.
+/// Used share of the limit; for a lower limit, the limit relative to the value.
 #[must_use]
 pub fn share(figure: &Figure) -> Option<f64> {
     let limit = figure.limit.as_ref()?;
@@ -50,7 +50,7 @@ pub fn share(figure: &Figure) -> Option<f64> {
     share.is_finite().then_some(share)
 }
 
-/// A row of a card: label, value against limit, bar, share, mark.
+/// A row of a card: label, value and limit, bar, share, mark.
 #[must_use]
 pub fn limit_row(label: &str, figure: &Figure) -> String {
     let label = &figure.coverage.map_or_else(|| label.to_owned(), |coverage| format!("{label}, {}", coverage.brief()));
@@ -66,7 +66,7 @@ pub fn limit_row(label: &str, figure: &Figure) -> String {
     value_row(label, [&number(asked), &format!("{more}{}", number(has)), unit(figure)], share, mark_of(figure))
 }
 
-/// A row of a card: label, a value of another one in their unit, how much that is, the name of a mark.
+/// A row of a card: label, a value of another with their unit, share, name of a mark.
 #[must_use]
 pub fn value_row(label: &str, [asked, has, unit]: [&str; 3], share: f64, mark_name: &str) -> String {
     let percent = 100.0 * share;
@@ -82,7 +82,7 @@ pub fn value_row(label: &str, [asked, has, unit]: [&str; 3], share: f64, mark_na
     )
 }
 
-/// A row of a card that has a text instead of a bar.
+/// A row of a card with a text instead of a bar.
 #[must_use]
 pub fn text_row(label: &str, text: &str, mark_name: &str) -> String {
     format!(
@@ -93,7 +93,7 @@ pub fn text_row(label: &str, text: &str, mark_name: &str) -> String {
     )
 }
 
-/// The bar of a limit row: what is beyond the limit is hatched.
+/// The bar of a limit row; the part beyond the limit is hatched.
 fn bar(share: f64) -> String {
     let inside = if share < 1.0 { share * LIMIT } else { LIMIT };
     let beyond = if share > 1.0 { (if share < 1.25 { share * LIMIT } else { BAR }) - LIMIT } else { 0.0 };
@@ -137,7 +137,7 @@ fn grouped(value: f64, unit: &str, decimals: usize) -> String {
     if decimals > 0 || text.len() < 4 { text } else { thin(&specgen_toolchain::budget::group(value as u64)) }
 }
 
-/// A card: title, note at its right, rows.
+/// A card: title, note on the right, rows.
 #[must_use]
 pub fn card(title: &str, note: &str, class: &str, content: &str) -> String {
     format!(
@@ -147,7 +147,7 @@ pub fn card(title: &str, note: &str, class: &str, content: &str) -> String {
     )
 }
 
-/// The verdict in words.
+/// The verdict as text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sentence {
     /// At most six words.
@@ -159,7 +159,7 @@ pub struct Sentence {
 }
 
 impl Sentence {
-    /// What a verdict says.
+    /// The sentence for a verdict.
     #[must_use]
     pub fn of(verdict: &Verdict) -> Self {
         let judged: Vec<(&Figure, f64)> =
@@ -167,30 +167,27 @@ impl Sentence {
         let tightest = judged.iter().max_by(|a, b| a.1.total_cmp(&b.1));
         let within = verdict.figures.iter().filter(|figure| figure.mark == Mark::Within).count();
         let tight = tightest.map_or_else(String::new, |(figure, share)| {
-            format!(" Tightest: {}, {:.0}\u{2009}% used.", said(figure), 100.0 * share)
+            format!(" Tightest: {}, {:.0}\u{2009}% used.", label(figure), 100.0 * share)
         });
         let errors = verdict.figures.iter().any(|figure| figure.subject == Subject::Tracking && figure.limit.is_some());
-        let open = if errors { "" } else { " The errors on trajectories have no limit in the spec." };
+        let open = if errors { "" } else { " The spec sets no limit on trajectory errors." };
         let assumed = &verdict.assumed;
         let resting = if assumed.is_empty() {
             String::new()
         } else {
-            format!(
-                " It rests on what nobody measured: {}; a real machine takes it with --assumed-ok only.",
-                assumed.summary()
-            )
+            format!(" Not measured: {}; a real machine accepts it only with --assumed-ok.", assumed.summary())
         };
         let on = if assumed.is_empty() { "" } else { ", on assumptions" };
         match verdict.answer {
             Answer::Ready => Self {
                 verdict: format!("Ready to build{on}"),
-                why: format!("All {within} limits hold.{tight}{open}{resting}"),
+                why: format!("All {within} limits are met.{tight}{open}{resting}"),
                 mark: if assumed.is_empty() { "ok" } else { "warning" },
             },
             Answer::NotMeasured => Self {
                 verdict: format!("Ready, not measured{on}"),
                 why: format!(
-                    "All {within} limits looked at hold.{tight} Time, memory and bits: {}.{resting}",
+                    "All {within} checked limits are met.{tight} Time, memory and bits: {}.{resting}",
                     verdict.unmeasured.as_deref().unwrap_or("not measured")
                 ),
                 mark: "none",
@@ -200,13 +197,13 @@ impl Sentence {
                 let first = beyond.first().map_or_else(String::new, |figure| match figure.subject {
                     Subject::Tracking => "error above its limit".to_owned(),
                     Subject::Time | Subject::Memory => format!("{} over budget", figure.name),
-                    _ => said(figure),
+                    _ => label(figure),
                 });
                 let why = beyond.iter().map(|figure| match (&figure.words, &figure.limit) {
                     (Some(words), _) => format!("{words}."),
                     (None, Some(limit)) => format!(
-                        "{}: {} against {}\u{2009}{} of {}.",
-                        said(figure),
+                        "{}: {} with a limit of {}\u{2009}{} ({}).",
+                        label(figure),
                         thin(&figure.value_text()),
                         thin(&figure.limit_text()),
                         unit(figure),
@@ -223,7 +220,7 @@ impl Sentence {
         }
     }
 
-    /// The card, with how many errors, warnings and notes there are.
+    /// The card, with the numbers of errors, warnings and notes.
     #[must_use]
     pub fn html(&self, findings: &[Diagnostic]) -> String {
         let count = |severity: Severity, name: &str, word: &str| {
@@ -246,7 +243,7 @@ impl Sentence {
     }
 }
 
-fn said(figure: &Figure) -> String {
+fn label(figure: &Figure) -> String {
     match figure.subject {
         Subject::Reach => format!("reach in {}", figure.name),
         Subject::Noise if figure.name != "step" => format!("noise of {}", figure.name),
@@ -264,7 +261,7 @@ pub fn rows(verdict: &Verdict, subjects: &[Subject]) -> String {
     verdict.figures.iter().filter(of).map(|figure| limit_row(&figure.name, figure)).collect()
 }
 
-/// On a phone: the tightest figure of each group.
+/// For phones: the tightest figure of each group.
 #[must_use]
 pub fn tightest(verdict: &Verdict, error: &str) -> String {
     let mut content = String::new();
@@ -282,7 +279,7 @@ pub fn tightest(verdict: &Verdict, error: &str) -> String {
         let good = figure.mark == Mark::Within;
         content += &text_row(
             "bits",
-            if good { "equal on host and microcontroller" } else { "DIFFER from the host" },
+            if good { "identical on host and microcontroller" } else { "DIFFERENT from the host" },
             mark_of(figure),
         );
     }
@@ -296,7 +293,7 @@ pub fn tightest(verdict: &Verdict, error: &str) -> String {
     card("Tightest of each group", "used of limit", "tightest", &content)
 }
 
-/// Findings, one row a code, places listed.
+/// Findings, one row per code with all places.
 #[must_use]
 pub fn findings(title: &str, note: &str, findings: &[Diagnostic], source: &SpecSource) -> String {
     let list = to_json(findings, source);
@@ -343,14 +340,14 @@ pub fn findings(title: &str, note: &str, findings: &[Diagnostic], source: &SpecS
         );
     }
     if codes.is_empty() {
-        content.push_str(&text_row("", "none: no error, no warning, no note", "ok"));
+        content.push_str(&text_row("", "none: no errors, warnings or notes", "ok"));
     }
     let hidden = codes.len().saturating_sub(SEEN);
     let note = if hidden > 0 { format!("{note} · {hidden} more in the section Findings") } else { note.to_owned() };
     card(title, &note, "all", &content)
 }
 
-/// The source of the first error: its line with neighbours, the word underlined, the line that would do.
+/// Source of the first error: its line and neighbours, the word underlined, and a line that fixes it.
 #[must_use]
 pub fn source(findings: &[Diagnostic], source: &SpecSource, accepted: bool) -> String {
     let Some(first) = findings.iter().find(|finding| finding.severity == Severity::Error) else { return String::new() };
@@ -426,7 +423,7 @@ pub fn source(findings: &[Diagnostic], source: &SpecSource, accepted: bool) -> S
     )
 }
 
-/// A message in the letters of the page: its units are typed, its minus is a hyphen.
+/// A message in typographic form: with unit symbols and a true minus sign.
 fn pretty(text: &str) -> String {
     let mut text = text.to_owned();
     for axis in ["x", "y", "z"] {
@@ -439,7 +436,7 @@ fn pretty(text: &str) -> String {
     text
 }
 
-/// A message as a sentence of the page.
+/// A message as a sentence.
 #[must_use]
 pub fn sentence(text: &str) -> String {
     let text = capital(&pretty(text));

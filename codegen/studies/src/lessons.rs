@@ -401,7 +401,7 @@ impl Outcome for Lesson {
             many => format!("{:.1} -> {:.1} nm rms in {many} passes", first.translation_nm, best.translation_nm),
         };
         let mut text = format!("{name}: {motion}, {gained} ({machine})\n");
-        text.push_str(&format!("  measured part of each pass: {}\n", best.coverage));
+        text.push_str(&format!("  each pass measured over {}\n", best.coverage));
         // Writing to a String cannot fail, here and below.
         let _ = writeln!(
             text,

@@ -1,8 +1,8 @@
-//! What the residual of an identified or predicted record comes from, in words.
+//! Text about the causes of the residual of an identified or predicted record.
 
 use specgen_identify::{self as identify, Cause};
 
-/// The main cause, the share of each and the drift.
+/// The main cause, the share of each, and the drift.
 pub(super) fn account(cause: &Cause) -> String {
     let shares: Vec<String> =
         cause.shares.iter().map(|(s, share)| format!("{} {:.0} %", short(*s), share * 100.0)).collect();
@@ -12,7 +12,7 @@ pub(super) fn account(cause: &Cause) -> String {
         _ => String::new(),
     };
     format!(
-        "mainly {}{which} (of its mean square: {}); linear drift taken out: {:.2} nm rms",
+        "mainly {}{which} (shares of the mean square: {}); linear drift removed: {:.2} nm rms",
         cause.main.name(),
         shares.join(", "),
         cause.drift_rms * 1e9

@@ -1,4 +1,4 @@
-//! `specgen identify RECORD`: a reversal-curve record in, an Everett table and its figures out.
+//! `specgen identify RECORD`: a record of reversal curves in, an Everett table and its figures out.
 
 use crate::drawing::wrote;
 use specgen_identify::{self as identify, DeadTime, GridChoice, Prediction, Reading, Report};
@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::cause::account;
-use super::{Bench, Measured, predict, refused};
+use super::{Bench, MeasuredKeys, predict, refused};
 use crate::identification as figure;
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::outcome::{Failure, Outcome};
@@ -16,10 +16,10 @@ use specgen_language::output::write_file;
 use specgen_language::table::{right, row};
 use specgen_language::ui::Ui;
 
-/// Reads, identifies, writes what is asked for and shows the result.
+/// Reads the record, identifies, writes the requested files and shows the result.
 ///
 /// # Errors
-/// A file cannot be read or written, or its data do not do.
+/// A file cannot be read or written, or its data are unsuitable.
 pub fn run(
     path: &Path,
     drive: [f64; 2],
@@ -57,13 +57,13 @@ pub fn run(
         report: &identified.report,
         validation: validation.as_ref(),
         grid_choice: choice.as_ref(),
-        measured: Measured::of(&["hysteresis.grid", "hysteresis.records"], record.simulated),
+        measured: MeasuredKeys::of(&["hysteresis.grid", "hysteresis.records"], record.simulated),
         files: table.into_iter().chain(plot).collect(),
     });
     Ok(())
 }
 
-/// An Everett table that was identified.
+/// An identified Everett table.
 #[derive(Serialize)]
 struct Table<'a> {
     #[serde(skip)]
@@ -73,8 +73,8 @@ struct Table<'a> {
     report: &'a Report,
     validation: Option<&'a Prediction>,
     grid_choice: Option<&'a GridChoice>,
-    measured: Measured,
-    /// A line for each file that was written.
+    measured: MeasuredKeys,
+    /// One line per written file.
     #[serde(skip)]
     files: String,
 }
@@ -109,7 +109,7 @@ fn curve(choice: &GridChoice) -> String {
         choice.levels, choice.folds
     );
     let columns = [4, 14, 5, 11].map(|width| right(width).behind("  "));
-    row(&mut text, &columns, &[&"N", &"held-out error", &"%", &"± std err to the best"]);
+    row(&mut text, &columns, &[&"N", &"held-out error", &"%", &"± std err of difference"]);
     for s in &choice.scores {
         let mark = match (s.grid == choice.chosen, s.grid == choice.best) {
             (true, true) => "  <- chosen and best",
@@ -117,7 +117,7 @@ fn curve(choice: &GridChoice) -> String {
             (false, true) => "  <- best",
             (false, false) => "",
         };
-        // The mark stands behind the columns.
+        // The mark follows the columns.
         let error = format_args!("{:>8.3} nm{mark}", s.standard_error * 1e9);
         let held_out = format_args!("{:.3} nm", s.held_out_rms * 1e9);
         row(&mut text, &columns, &[&s.grid, &held_out, &format_args!("{:.3}", s.held_out_percent), &error]);
@@ -126,20 +126,20 @@ fn curve(choice: &GridChoice) -> String {
     text
 }
 
-/// What the summary has no room for.
+/// Further details.
 fn details(report: &Report, text: &mut String) {
     let _ = writeln!(text, "  residual: {}", account(&report.cause));
     let _ = writeln!(text, "  dead time {}", report.dead_time_basis);
     if report.dead_time > report.held && report.held > 0.0 {
         let _ = writeln!(
             text,
-            "  of it {:.3} ms is the hold of a command, as `drive_V` is taken to be; from the voltage it is {:.3} ms (a measured voltage is named `monitor_V`)",
+            "  of this, {:.3} ms is the hold of a command, since `drive_V` is a command; relative to the voltage it is {:.3} ms (name a measured voltage `monitor_V`)",
             report.held * 1e3,
             (report.dead_time - report.held) * 1e3
         );
     }
     if report.weightless > 0 {
-        let _ = writeln!(text, "  {} samples got no weight (see the warnings)", report.weightless);
+        let _ = writeln!(text, "  {} samples were given no weight (see the warnings)", report.weightless);
     }
     if report.unexcited.is_empty() {
         let _ = writeln!(text, "  every cell of the plane was excited");
@@ -147,7 +147,7 @@ fn details(report: &Report, text: &mut String) {
     for region in report.unexcited.iter().take(5) {
         let _ = writeln!(
             text,
-            "  not excited: {} cells ({:.1} %), up_threshold {:.3} to {:.3} V, down_threshold {:.3} to {:.3} V; the table divides the measured sum evenly there",
+            "  not excited: {} cells ({:.1} %), up_threshold {:.3} to {:.3} V, down_threshold {:.3} to {:.3} V; there the measured sum is distributed evenly",
             region.cells,
             region.share * 100.0,
             region.up[0],

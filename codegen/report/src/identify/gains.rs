@@ -1,4 +1,4 @@
-//! `specgen identify gains`: a recorded run of a platform in; the gain of each leg over its table, and six tables of their own out.
+//! `specgen identify gains`: a recorded run of a platform in; the gain of each leg relative to its table, and six separate tables out.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use host_sim::controller::{MachineWord, Supervised};
 use host_sim::record::{self, Block, Header};
 use serde::Serialize;
 
-use super::{Measured, refused};
+use super::{MeasuredKeys, refused};
 use crate::replay;
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::{lower, spec_file};
@@ -20,17 +20,17 @@ use specgen_language::ui::Ui;
 use specgen_numerics::displacements;
 use specgen_studies::controllers;
 
-/// Phases of the supervisor in which the law moves the legs: running, holding.
+/// Supervisor phases in which the law moves the legs: running, holding.
 const MOVING: [u8; 2] = [2, 3];
-/// Standard error of λ from which on the run is too poor to take tables from.
+/// Largest acceptable standard error of λ.
 const LARGEST_ERROR: f64 = 0.02;
-/// λ outside these is a wrong spec, or a leg that does not follow.
+/// Plausible λ; outside, the spec is wrong or a leg does not follow.
 const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
-/// Reads, identifies, writes what is asked for and shows the result.
+/// Reads the recording, identifies, writes the requested files and shows the result.
 ///
 /// # Errors
-/// A file cannot be read or written, or its data do not do.
+/// A file cannot be read or written, or its data are unsuitable.
 pub fn run(recording: &Path, spec: &Path, output: Option<&str>, ui: &mut Ui) -> Result<(), Failure> {
     let shown = recording.display().to_string();
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{shown}: {error}"));
@@ -39,11 +39,11 @@ pub fn run(recording: &Path, spec: &Path, output: Option<&str>, ui: &mut Ui) -> 
     let compiled = spec_file::looked_up(spec, ui)?;
     let model = &compiled.model;
     if model.task_space.is_none() {
-        return Err(refuse(&"six legs with their own gauges have a record each: use `specgen identify linear`"));
+        return Err(refuse(&"six legs with their own gauges have one record each: use `specgen identify linear`"));
     }
     if matches!(model.hysteresis.rate, RateDependence::DynamicPreisach(_)) {
         return Err(refuse(
-            &"the second weight of (6) has a gain of its own: identify each leg with `specgen identify rate`",
+            &"the second weight of (6) has a separate gain: identify each leg with `specgen identify rate`",
         ));
     }
     replay::same_build(recording, spec, &reader.header().description, &compiled)?;
@@ -52,7 +52,7 @@ pub fn run(recording: &Path, spec: &Path, output: Option<&str>, ui: &mut Ui) -> 
     let tables = declared::records(model, dir).map_err(refused)?;
 
     let mut machine = Supervised::new(controllers::at_run_time(&compiled, ui)?);
-    ui.progress("running the record again");
+    ui.progress("replaying the record");
     let names = machine.output_names();
     let mut moves = Moves::new(&compiled, &names)?;
     let found = record::replay(&mut reader, &mut machine, |header, block, rows| moves.add(header, block, rows));
@@ -75,7 +75,7 @@ pub fn run(recording: &Path, spec: &Path, output: Option<&str>, ui: &mut Ui) -> 
     if let Some(folder) = &folder {
         let tables = legs.iter().enumerate().map(|(leg, (table, found))| {
             let text = write_table_csv(&gains::scaled(table, found.gain));
-            // The shape is that of the spec's record.
+            // The shape comes from the spec's record, which may be simulated.
             let text = if simulated { marked_as_simulated(&text) } else { text };
             (format!("leg{}.csv", leg + 1), text.into_bytes())
         });
@@ -84,42 +84,42 @@ pub fn run(recording: &Path, spec: &Path, output: Option<&str>, ui: &mut Ui) -> 
     }
     let legs = legs.into_iter().map(|(_, found)| found).collect();
     let records = output.map(line).unwrap_or_default();
-    let measured = Measured::of(&["hysteresis.records"], simulated);
+    let measured = MeasuredKeys::of(&["hysteresis.records"], simulated);
     ui.result(&Gains { recording: shown, seconds: moves.seconds(), legs, measured, records, files });
     Ok(())
 }
 
-/// What is wrong with a run, and what a better one is.
+/// Why a run is unsuitable, and how to record a better one.
 fn poor(leg: usize, found: Option<LegGain>) -> String {
     let what = found.map_or_else(
-        || "does not move enough for a gain".to_owned(),
+        || "does not move enough to determine a gain".to_owned(),
         |found| format!("has the gain {:.3} ± {:.3}", found.gain, found.error),
     );
     format!(
-        "leg {} {what}: record a second or more of a slow wave on all axes, as large as the workspace allows, in closed loop \
+        "leg {} {what}: record at least a second of a slow wave on all axes, as large as the workspace permits, in closed loop \
          and without contact",
         leg + 1
     )
 }
 
-/// The folder `name` in that of `spec`.
+/// The folder `name` beside `spec`.
 fn folder(spec: &Path, name: &str) -> Result<PathBuf, Failure> {
     let within = Path::new(name).components().all(|part| matches!(part, std::path::Component::Normal(_)));
     if name.is_empty() || !within || name.contains('\\') {
         let message =
-            format!("-o `{name}`: expected a folder in that of the spec, such as `gains`, with forward slashes");
+            format!("-o `{name}`: expected a folder relative to the spec's, such as `gains`, with forward slashes");
         return Err(Failure::Usage(message));
     }
     Ok(spec.parent().unwrap_or(Path::new("")).join(name))
 }
 
-/// The line of the spec that names the tables.
+/// The spec line with the tables.
 fn line(folder: &str) -> String {
     let names: Vec<String> = (1..=6).map(|leg| format!("\"{}/leg{leg}.csv\"", folder.trim_end_matches('/'))).collect();
     format!("records = [{}]", names.join(", "))
 }
 
-/// What the legs did while the law moved them.
+/// Motion of the legs while the law moved them.
 struct Moves {
     platform: specgen_runtime::Platform<f64>,
     voltage: usize,
@@ -148,8 +148,8 @@ impl Moves {
         })
     }
 
-    /// The rows of a block in which the law moves the legs. One that does not follow the last begins anew: the memory of the legs
-    /// is not known there.
+    /// Adds the rows of a block in which the law moves the legs. A row after a gap starts over, because the memory of the legs
+    /// is unknown there.
     fn add(&mut self, header: &Header, block: &Block, rows: &[Vec<u64>]) {
         let scalar = header.description.scalar;
         for (row, given) in block.rows.iter().zip(rows) {
@@ -177,16 +177,16 @@ impl Moves {
     }
 }
 
-/// Gains that were found.
+/// Identified gains.
 #[derive(Serialize)]
 struct Gains {
     #[serde(skip)]
     recording: String,
-    /// Of the run in which the law moved the legs, s.
+    /// Duration in which the law moved the legs, s.
     seconds: f64,
-    /// In the order of the legs.
+    /// In leg order.
     legs: Vec<LegGain>,
-    measured: Measured,
+    measured: MeasuredKeys,
     #[serde(skip)]
     records: String,
     #[serde(skip)]
@@ -195,9 +195,10 @@ struct Gains {
 
 impl Outcome for Gains {
     fn text(&self) -> String {
-        let mut text = format!("{}: gain of each leg over its table, from {:.3} s\n", self.recording, self.seconds);
+        let mut text =
+            format!("{}: gain of each leg relative to its table, from {:.3} s\n", self.recording, self.seconds);
         let columns = [5, 9, 11, 11, 13, 15].map(|width| right(width).behind(" "));
-        row(&mut text, &columns, &[&"leg", &"lambda", &"± std err", &"travel µm", &"left nm rms", &"with 1 nm rms"]);
+        row(&mut text, &columns, &[&"leg", &"lambda", &"± std err", &"travel µm", &"error nm rms", &"with λ = 1"]);
         for (leg, found) in self.legs.iter().enumerate() {
             row(
                 &mut text,

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{Bench, Measured, refused};
+use super::{Bench, MeasuredKeys, refused};
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::write_file;
 use specgen_language::ui::Ui;
@@ -14,10 +14,10 @@ use specgen_language::ui::Ui;
 use crate::identification as figure;
 use specgen_identify::gauge::{self, GaugeReport};
 
-/// Reads, identifies, writes what is asked for and shows the result.
+/// Reads the record, identifies, writes the requested files and shows the result.
 ///
 /// # Errors
-/// A file cannot be read or written, or its data do not do.
+/// A file cannot be read or written, or its data are unsuitable.
 pub fn run(record: &Path, degree: Option<u8>, table: Option<&Path>, bench: &Bench, ui: &mut Ui) -> Result<(), Failure> {
     let shown = record.display().to_string();
     let report = gauge::calibrate(record, &shown, degree.map(usize::from), &bench.reading).map_err(refused)?;
@@ -34,23 +34,23 @@ pub fn run(record: &Path, degree: Option<u8>, table: Option<&Path>, bench: &Benc
     }
     files.extend(bench.plot.write("Gauge calibration", || figure::gauge(&report))?);
     let (calibration, is_given) = (gauge::spec_line(&report), degree.is_some());
-    let measured = Measured::of(&["sensor.calibration"], report.simulated);
+    let measured = MeasuredKeys::of(&["sensor.calibration"], report.simulated);
     ui.result(&Calibration { record: shown, is_given, report, calibration, measured, files });
     Ok(())
 }
 
-/// A gauge that was calibrated.
+/// Calibration of a gauge.
 #[derive(Serialize)]
 struct Calibration {
     #[serde(skip)]
     record: String,
-    /// The degree was not chosen.
+    /// The degree was given by the user.
     #[serde(skip)]
     is_given: bool,
     report: GaugeReport,
     calibration: String,
-    measured: Measured,
-    /// A line for each file that was written.
+    measured: MeasuredKeys,
+    /// One line per written file.
     #[serde(skip)]
     files: String,
 }
@@ -60,15 +60,15 @@ impl Outcome for Calibration {
         let report = &self.report;
         let errors: Vec<String> =
             report.held_out_rms.iter().enumerate().map(|(k, e)| format!("{}: {:.3} nm", k + 1, e * 1e9)).collect();
-        let chosen = if self.is_given { "as given" } else { report.rule };
+        let chosen = if self.is_given { "given" } else { report.rule };
         let hysteresis = report.hysteresis.map_or_else(
-            || "not known: the reference never turns back".to_owned(),
-            |h| format!("{:.3} nm between the ways up and down", h * 1e9),
+            || "unknown: the reference has no reversal".to_owned(),
+            |h| format!("{:.3} nm between the rising and falling branches", h * 1e9),
         );
         format!(
             "{}: {} samples, {:.4} V to {:.4} V, {:.4} µm to {:.4} µm\n  held-out error by degree: {}\n  degree {} ({chosen})\n  \
-             residual {:.3} nm rms, {:.3} nm at most (at {})\n  hysteresis {hysteresis}\n  monotonic over these voltages: least slope {:.1} % \
-             of the mean slope\nlines for the spec, in [sensor] for all gauges or in [[gauge]] for this one:\n{}\n{}{}",
+             residual {:.3} nm rms, at most {:.3} nm (at {})\n  hysteresis {hysteresis}\n  monotonic over these voltages: smallest slope {:.1} % \
+             of the mean slope\nspec lines, in [sensor] for all gauges or in [[gauge]] for this one:\n{}\n{}{}",
             self.record,
             report.samples,
             report.volts[0],

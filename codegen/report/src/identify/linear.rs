@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{Bench, Measured, refused};
+use super::{Bench, MeasuredKeys, refused};
 use crate::identification as figure;
 use specgen_compiler::compile;
 use specgen_compiler::stability::Margins;
@@ -18,13 +18,13 @@ use specgen_language::spec::{self, SpecSource};
 use specgen_language::table::{left, right, row};
 use specgen_language::ui::Ui;
 
-/// Weights per run that the paper prints.
+/// Weights per run printed in the paper.
 const PAPER: [f64; 2] = [0.252, 0.011];
 
-/// Reads, identifies, writes what is asked for and shows the result.
+/// Reads the records, identifies, writes the requested files and shows the result.
 ///
 /// # Errors
-/// A file cannot be read or written, or its data do not do.
+/// A file cannot be read or written, or its data are unsuitable.
 pub fn run(
     records: &[impl AsRef<Path>],
     frequencies: &[f64],
@@ -35,7 +35,7 @@ pub fn run(
 ) -> Result<(), Failure> {
     if !frequencies.is_empty() && frequencies.len() != records.len() {
         return Err(Failure::Usage(format!(
-            "--frequency names {} frequencies for {} records",
+            "--frequency gives {} frequencies for {} records",
             frequencies.len(),
             records.len()
         )));
@@ -65,25 +65,25 @@ pub fn run(
     let spec = spec.map(|path| judge(path, &report)).transpose()?;
     let plot = bench.plot.write("Linear relation", || figure::linear(&report, &read))?.unwrap_or_default();
     let simulated = report.relations.iter().any(|relation| relation.simulated);
-    let measured = Measured::of(&["actuator.stack_gain", "adaptation.gain_ratio"], simulated);
-    ui.result(&Related { gain_ratio: report.gain_ratio_for_spec(), report, measured, spec, plot });
+    let measured = MeasuredKeys::of(&["actuator.stack_gain", "adaptation.gain_ratio"], simulated);
+    ui.result(&LinearRelation { gain_ratio: report.gain_ratio_for_spec(), report, measured, spec, plot });
     Ok(())
 }
 
-/// A linear relation that was found.
+/// An identified linear relation.
 #[derive(Serialize)]
-struct Related {
+struct LinearRelation {
     report: LinearReport,
     gain_ratio: [f64; 2],
-    measured: Measured,
-    spec: Option<Judged>,
+    measured: MeasuredKeys,
+    spec: Option<WeightCheck>,
     #[serde(skip)]
     plot: String,
 }
 
-/// What the sampled loop of a spec makes of the relation.
+/// Stability check of a spec's sampled loop over the identified λ.
 #[derive(Serialize)]
-struct Judged {
+struct WeightCheck {
     stacks: f64,
     verdict: Verdict,
     #[serde(skip)]
@@ -106,7 +106,7 @@ struct Reason {
     help: String,
 }
 
-impl Outcome for Related {
+impl Outcome for LinearRelation {
     fn text(&self) -> String {
         let mut text = table(&self.report);
         match &self.spec {
@@ -147,7 +147,7 @@ fn table(report: &LinearReport) -> String {
     // Writing to a String cannot fail, here and below.
     let _ = writeln!(
         text,
-        "reference: ρ̂ = {:.6} µm/V, at {:.4} Hz; λ = ρ/ρ̂ from {:.4} to {:.4} (two standard errors included)",
+        "reference: ρ̂ = {:.6} µm/V, at {:.4} Hz; λ = ρ/ρ̂ from {:.4} to {:.4} (including two standard errors)",
         report.reference_gain * 1e6,
         report.reference_frequency,
         report.gain_ratio[0],
@@ -160,7 +160,7 @@ fn static_verdict(report: &LinearReport, text: &mut String) {
     let yes = |stable: bool| if stable { "stable" } else { "not stable" };
     let _ = writeln!(
         text,
-        "on a leg without dynamics: EWMA (AII.18, corrected to 0 < λω < 2) up to ω = {:.4}, ω = {} is {}; \
+        "for a leg without dynamics: EWMA (AII.18, corrected to 0 < λω < 2) up to ω = {:.4}, ω = {} is {}; \
          PCC (AII.19) up to ω1 = {:.4} with ω2 = {:.4} ω1, ω1 = {}, ω2 = {} is {}",
         report.largest_ewma_weight,
         PAPER[0],
@@ -172,12 +172,12 @@ fn static_verdict(report: &LinearReport, text: &mut String) {
         yes(report.pcc_is_stable(PAPER[0], PAPER[1]))
     );
     text.push_str(
-        "the resonance and lag of the leg lower these limits: --spec judges the sampled loop of a platform\n",
+        "resonance and lag of the leg lower these limits: use --spec to check the sampled loop of a platform\n",
     );
 }
 
-/// Stability of the spec's own weights over the λ found.
-fn judge(path: &Path, report: &LinearReport) -> Result<Judged, Failure> {
+/// Stability of the spec's own weights over the identified λ.
+fn judge(path: &Path, report: &LinearReport) -> Result<WeightCheck, Failure> {
     let source = SpecSource::read(path).map_err(|finding| refused(vec![finding]))?;
     let (model, findings) = spec::load(&source);
     let Some(mut model) = model else {
@@ -192,10 +192,10 @@ fn judge(path: &Path, report: &LinearReport) -> Result<Judged, Failure> {
         }
     };
     let stacks = f64::from(model.actuator.stacks);
-    Ok(Judged { stacks, verdict, name: path.display().to_string(), adaptation: model.adaptation })
+    Ok(WeightCheck { stacks, verdict, name: path.display().to_string(), adaptation: model.adaptation })
 }
 
-impl Judged {
+impl WeightCheck {
     fn write(&self, text: &mut String) {
         let Self { name, adaptation, .. } = self;
         let _ = match &self.verdict {
@@ -205,13 +205,13 @@ impl Judged {
                     .map_or_else(String::new, |w| format!("; stable up to level weight {w:.4}"));
                 writeln!(
                     text,
-                    "{name}: its weights (level {}, drift {}) are stable over this λ; spectral radius {:.4}{largest}",
+                    "{name}: the weights (level {}, drift {}) are stable over this range of λ; spectral radius {:.4}{largest}",
                     adaptation.level_weight, adaptation.drift_weight, margins.spectral_radius
                 )
             }
-            Verdict::Stable { .. } => writeln!(text, "{name}: its adaptation is stable over this λ"),
+            Verdict::Stable { .. } => writeln!(text, "{name}: the adaptation is stable over this range of λ"),
             Verdict::Unstable { findings, .. } => {
-                let _ = writeln!(text, "{name}: its weights are NOT stable over this λ");
+                let _ = writeln!(text, "{name}: the weights are NOT stable over this range of λ");
                 findings.iter().try_for_each(|f| writeln!(text, "  {}: {}\n    help: {}", f.code, f.message, f.help))
             }
         };
@@ -222,12 +222,12 @@ fn lines(report: &LinearReport, stacks: Option<f64>, text: &mut String) {
     let [low, high] = report.gain_ratio_for_spec();
     let gain = report.reference_gain * 1e6 / stacks.unwrap_or(1.0);
     let note = match stacks {
-        Some(n) if n > 1.0 => format!("of one stack: the record's, divided by {n}"),
-        Some(_) => "of one stack".to_owned(),
-        None => "if the record is of one stack; divide by actuator.stacks if it is of a leg".to_owned(),
+        Some(n) if n > 1.0 => format!("for one stack: the record's gain divided by {n}"),
+        Some(_) => "for one stack".to_owned(),
+        None => "if the record is of one stack; for a leg divide by actuator.stacks".to_owned(),
     };
     let _ = write!(
         text,
-        "lines for the spec:\n[actuator]\nstack_gain = \"{gain:.6} um/V\"  # {note}\n[adaptation]\ngain_ratio = [{low:.3}, {high:.3}]\n"
+        "spec lines:\n[actuator]\nstack_gain = \"{gain:.6} um/V\"  # {note}\n[adaptation]\ngain_ratio = [{low:.3}, {high:.3}]\n"
     );
 }

@@ -1,11 +1,11 @@
-//! `specgen identify predict`: a table or a spec and a drive in, the displacement out, beside the measured one where there is one.
+//! `specgen identify predict`: predicts the displacement for a drive from a table or a spec, and compares it with a measured one if available.
 
 use crate::drawing::wrote;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::cause::account;
-use super::{Bench, Identified, Measured, refused};
+use super::{Bench, IdentificationResult, MeasuredKeys, refused};
 use crate::identification as figure;
 use specgen_compiler::spec_file;
 use specgen_identify::mode::{self, Mode};
@@ -15,24 +15,24 @@ use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::write_file;
 use specgen_language::ui::Ui;
 
-/// What is read and written.
+/// Options of `predict`.
 #[derive(Debug)]
 pub struct Options {
     /// A table or a spec.
     pub model: PathBuf,
-    /// The drive, and what was measured.
+    /// The drive, and the measured displacement if any.
     pub drive: PathBuf,
     /// Leg of the spec.
     pub leg: u8,
     /// Lag of the displacement, s.
     pub dead_time: Option<f64>,
-    /// The mode behind the model, or that there is none.
+    /// The mode to add to the model, or `Some(None)` for no mode.
     pub mode: Option<Option<Mode>>,
-    /// File of the prediction.
+    /// Output file of the prediction.
     pub output: Option<PathBuf>,
 }
 
-/// What a mode adds: that given, else that of the model, else that of a ring in the record.
+/// The contribution of a mode: the given one, else the model's, else one fitted to ringing in the record.
 fn inertia(options: &Options, model: &RateModel, drive: &Drive) -> Option<Inertia> {
     let ring = || mode::ring(&drive.time, &drive.drive, drive.displacement.as_ref()?).map(|ring| ring.mode);
     let found = match (options.mode, model.inertia) {
@@ -43,15 +43,15 @@ fn inertia(options: &Options, model: &RateModel, drive: &Drive) -> Option<Inerti
     found.map(|mode| Inertia { mode, gain: model.still.mean_gain() })
 }
 
-/// Reads, identifies, writes what is asked for and shows the result.
+/// Reads the files, predicts, writes the requested files and shows the result.
 ///
 /// # Errors
-/// A file cannot be read or written, or its data do not do.
+/// A file cannot be read or written, or its data are unsuitable.
 pub fn run(options: &Options, bench: &Bench, ui: &mut Ui) -> Result<(), Failure> {
     let shown = options.drive.display().to_string();
     let drive = read_drive(&options.drive, &shown, &bench.reading).map_err(refused)?;
     let mut model = model(&options.model, usize::from(options.leg), ui)?;
-    // In a spec it counts from the voltage; a command is held on its way there.
+    // A spec's dead time counts from the voltage; a command is held before that.
     model.dead_time = options.dead_time.unwrap_or(model.dead_time) + drive.held;
     model.inertia = inertia(options, &model, &drive);
     let prediction = predict(&model, &drive).map_err(refused)?;
@@ -60,7 +60,12 @@ pub fn run(options: &Options, bench: &Bench, ui: &mut Ui) -> Result<(), Failure>
     }
     let plot = bench.plot.write("Prediction", || figure::prediction(&prediction))?;
     let files = options.output.as_ref().map(|path| wrote(path)).into_iter().chain(plot).collect();
-    ui.result(&Identified { record: shown, report: prediction, measured: Measured::of(&[], false), files });
+    ui.result(&IdentificationResult {
+        record: shown,
+        report: prediction,
+        measured: MeasuredKeys::of(&[], false),
+        files,
+    });
     Ok(())
 }
 
@@ -72,14 +77,14 @@ fn model(path: &Path, leg: usize, ui: &mut Ui) -> Result<RateModel, Failure> {
         ui.findings(None, &declared.warnings);
         return declared
             .leg(&model, leg)
-            .ok_or_else(|| Failure::Usage(format!("`{}` names no record in hysteresis.records", path.display())));
+            .ok_or_else(|| Failure::Usage(format!("`{}` has no records in hysteresis.records", path.display())));
     }
     let shown = path.display().to_string();
     let text = read_file(path, &shown).map_err(refused)?;
     Ok(RateModel::of_table(read_table_csv(&text, &shown).map_err(refused)?, 0.0))
 }
 
-/// Numbers are the shortest that read back.
+/// Numbers have the shortest form that reads back exactly.
 fn csv(prediction: &Prediction) -> String {
     let measured = prediction.measured.as_ref();
     let mut text = String::from("time_s,drive_V,displacement_um");
@@ -95,18 +100,21 @@ fn csv(prediction: &Prediction) -> String {
     text
 }
 
-/// What stands behind the name of the record: how well it was predicted.
+/// Text after the name of the record: quality of the prediction.
 pub fn summary(prediction: &Prediction) -> String {
     let start = format!("start: {:.0} % of the open weight on", prediction.start_on * 100.0);
     let Some(compared) = &prediction.compared else {
-        return format!("{} samples predicted; the file has no displacement_um to compare with", prediction.time.len());
+        return format!(
+            "{} samples predicted; the file has no displacement_um for a comparison",
+            prediction.time.len()
+        );
     };
     let clipped = match prediction.samples_clipped {
         0 => String::new(),
-        clipped => format!("; {clipped} samples outside the table's range are held at its end"),
+        clipped => format!("; {clipped} samples clamped to the table's range"),
     };
     format!(
-        "predicted to {:.3} % rms, {:.3} % at worst, of {:.3} µm ({start}{clipped})\n  this residual: {}",
+        "prediction error {:.3} % rms, at most {:.3} %, of {:.3} µm ({start}{clipped})\n  residual: {}",
         compared.rms_percent,
         compared.max_percent,
         compared.range * 1e6,
@@ -114,13 +122,13 @@ pub fn summary(prediction: &Prediction) -> String {
     )
 }
 
-impl Outcome for Identified<Prediction> {
+impl Outcome for IdentificationResult<Prediction> {
     fn text(&self) -> String {
         let report = &self.report;
         let mut text = format!("{}: {}\n", self.record, summary(report));
         let _ = write!(
             text,
-            "  displacement {:.3} ms behind the drive column; {} samples before the drive moves are left out",
+            "  displacement delayed by {:.3} ms relative to the drive column; {} samples before the drive moves are ignored",
             report.dead_time * 1e3,
             report.samples_skipped
         );
@@ -129,7 +137,7 @@ impl Outcome for Identified<Prediction> {
                 write!(text, "\n  mode at {:.1} Hz, damping ratio {:.4}", inertia.mode.frequency, inertia.mode.damping);
         }
         if report.compared.is_none() && report.samples_clipped > 0 {
-            let _ = write!(text, "; {} samples outside the table's range are held at its end", report.samples_clipped);
+            let _ = write!(text, "; {} samples clamped to the table's range", report.samples_clipped);
         }
         text + "\n" + &self.files
     }

@@ -1,10 +1,10 @@
-//! `specgen identify rate`: records at several rates in, a comparison of rate-dependent models and spec lines out.
+//! `specgen identify rate`: records at several rates in; a comparison of rate-dependent models and spec lines out.
 
 use crate::drawing::wrote;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::{Bench, Identified, Measured, refused};
+use super::{Bench, IdentificationResult, MeasuredKeys, refused};
 use crate::identification as figure;
 use specgen_identify::rate::{RateIdentification, RateOption, RateReport, identify_rate, spec_lines, write_rate_csv};
 use specgen_identify::{marked_as_simulated, read_record, write_table_csv};
@@ -13,10 +13,10 @@ use specgen_language::output::write_folder;
 use specgen_language::table::{left, right, row};
 use specgen_language::ui::Ui;
 
-/// Reads, identifies, writes what is asked for and shows the result.
+/// Reads the records, identifies, writes the requested files and shows the result.
 ///
 /// # Errors
-/// A file cannot be read or written, or its data do not do.
+/// A file cannot be read or written, or its data are unsuitable.
 pub fn run(
     paths: &[impl AsRef<Path>],
     drive: [f64; 2],
@@ -53,40 +53,40 @@ pub fn run(
     let plot = bench.plot.write("Rate dependence", || figure::rate(&identified.report))?;
     let files = files.iter().map(|path| wrote(path)).chain(plot).collect();
     let keys = keys(&identified.report);
-    let measured = Measured::of(&keys, is_simulated(&identified.report));
-    ui.result(&Identified { record: String::new(), report: identified.report, measured, files });
+    let measured = MeasuredKeys::of(&keys, is_simulated(&identified.report));
+    ui.result(&IdentificationResult { record: String::new(), report: identified.report, measured, files });
     Ok(())
 }
 
-impl Outcome for Identified<RateReport> {
+impl Outcome for IdentificationResult<RateReport> {
     fn text(&self) -> String {
         table(&self.report) + &self.files
     }
 }
 
-/// Whether any of the records is simulated: what is fitted to all of them is then no measurement.
+/// Whether any record is simulated; the fit is then no measurement.
 fn is_simulated(report: &RateReport) -> bool {
     report.records.iter().any(|record| record.simulated)
 }
 
-/// What the lines of the best option give.
+/// The spec keys of the best option.
 fn keys(report: &RateReport) -> Vec<&'static str> {
     let of_mode = ["actuator.resonance", "actuator.damping_ratio"];
     let own = ["hysteresis.grid", "hysteresis.records", "hysteresis.rate", "hysteresis.dead_time"];
     own.into_iter().chain(report.mode.iter().flat_map(|_| of_mode)).collect()
 }
 
-/// Tables first, then the lines that name them.
+/// Writes the tables, then the spec lines that refer to them.
 fn write(output: &Path, identified: &RateIdentification) -> Result<Vec<PathBuf>, Failure> {
     let name = output.file_name().map(|name| name.to_string_lossy().into_owned()).ok_or_else(|| {
-        Failure::Usage(format!("`{}` names no file: give a name such as models/leg1", output.display()))
+        Failure::Usage(format!("`{}` is not a file name: give a name such as models/leg1", output.display()))
     })?;
     let best = identified.report.verdict.best;
     let simulated = is_simulated(&identified.report);
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
     let mut lines = format!(
-        "# Rate dependence of the leg, from `specgen identify rate`. The option in force has the lowest error on rates that it was\n\
-         # not fitted on. Tables are named relative to the spec.\n[hysteresis]\n# {}\n",
+        "# Rate dependence of the leg, from `specgen identify rate`. The active option has the lowest error at rates that it was\n\
+         # not fitted to. Table paths are relative to the spec.\n[hysteresis]\n# {}\n",
         identified.report.verdict.text.replace('\n', "\n# ")
     );
     for (option, model) in &identified.models {
@@ -109,14 +109,14 @@ fn write(output: &Path, identified: &RateIdentification) -> Result<Vec<PathBuf>,
         let only = if option.runs() {
             ""
         } else {
-            ": for `specgen identify predict`; the controller does not take the mode out"
+            ": for `specgen identify predict`; the controller does not compensate the mode"
         };
         let _ = writeln!(lines, "\n# {}{only}", option.name());
         for line in block.lines() {
             let _ = writeln!(lines, "{prefix}{line}");
         }
     }
-    lines += &format!("\n{}", Measured::of(&keys(&identified.report), simulated).text());
+    lines += &format!("\n{}", MeasuredKeys::of(&keys(&identified.report), simulated).text());
     files.push((format!("{name}.toml"), lines.into_bytes()));
     let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     write_folder(folder, &files)?;
@@ -139,14 +139,14 @@ fn table(report: &RateReport) -> String {
         );
     }
     if let Some(held) = &report.hold_out {
-        let _ = writeln!(text, "{}: held out of every fit", held.record);
+        let _ = writeln!(text, "{}: held out of all fits", held.record);
     }
     let _ = writeln!(text, "\nrms error in % of the range, grid {}", report.grid);
-    // Nine characters for each record, twice; the last column is there where a record was held out.
+    // Nine characters per record, twice; the last column exists only if a record was held out.
     let width = 9 * report.records.len();
     let held = if report.hold_out.is_some() { "  held out" } else { "" };
     let heads = [left(20), right(width), right(width).behind("   "), left(0)];
-    row(&mut text, &heads, &[&"", &"fitted on all", &"fitted on the others", &held]);
+    row(&mut text, &heads, &[&"", &"fitted to all", &"fitted to the others", &held]);
     let frequencies: String = report.records.iter().map(|record| format!("{:>9}", record.frequency_text())).collect();
     row(&mut text, &heads, &[&"model", &frequencies, &frequencies, &""]);
     for option in &report.options {
@@ -159,7 +159,9 @@ fn table(report: &RateReport) -> String {
         let creep: Vec<String> =
             option.creep.iter().map(|c| format!("{:.4} at {:.4} s", c.weight, c.time_constant)).collect();
         let creep = match option.option {
-            _ if option.creep.is_empty() && option.option >= RateOption::Creep => "; no creep weight helps".to_owned(),
+            _ if option.creep.is_empty() && option.option >= RateOption::Creep => {
+                "; no creep term improves the fit".to_owned()
+            }
             _ if creep.is_empty() => String::new(),
             RateOption::EvenCreep => format!(
                 "; creep {:.4} at each of {} time constants from {:.4} to {:.4} s",
@@ -174,10 +176,10 @@ fn table(report: &RateReport) -> String {
     }
     for (option, period) in report.options.iter().filter_map(|o| Some((o.option, o.period?))) {
         let when = match period > 0.0 {
-            true => format!("at periods of {:.3} ms and longer; at shorter ones check refuses it", period * 1e3),
+            true => format!("at periods of {:.3} ms or longer; `specgen check` refuses shorter ones", period * 1e3),
             false => "at any period".to_owned(),
         };
-        let _ = writeln!(text, "{}: a controller inverts it {when}", option.name());
+        let _ = writeln!(text, "{}: invertible by a controller {when}", option.name());
     }
     if let Some(mode) = report.mode {
         let _ = writeln!(text, "mode: {:.1} Hz, damping ratio {:.4}", mode.frequency, mode.damping);
@@ -185,11 +187,11 @@ fn table(report: &RateReport) -> String {
     if report.held > 0.0 {
         let _ = writeln!(
             text,
-            "of each dead time {:.3} ms is the hold of the commands; the lines of the spec have the rest",
+            "{:.3} ms of each dead time is the hold of the commands; the spec lines contain the rest",
             report.held * 1e3
         );
     }
     let _ = writeln!(text, "{}", report.verdict.text);
-    let _ = writeln!(text, "lowest error on rates not fitted on: {}", report.verdict.best.name());
+    let _ = writeln!(text, "lowest error at rates not fitted to: {}", report.verdict.best.name());
     text
 }

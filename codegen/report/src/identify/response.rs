@@ -3,29 +3,29 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::{Bench, Identified, Measured, refused};
+use super::{Bench, IdentificationResult, MeasuredKeys, refused};
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::ui::Ui;
 
 use crate::identification as figure;
 use specgen_identify::response::{self, Estimate, ResponseReport};
 
-/// Reads, identifies, writes what is asked for and shows the result.
+/// Reads the record, identifies, writes the requested files and shows the result.
 ///
 /// # Errors
-/// A file cannot be read or written, or its data do not do.
+/// A file cannot be read or written, or its data are unsuitable.
 pub fn run(record: &Path, segment: Option<usize>, bench: &Bench, ui: &mut Ui) -> Result<(), Failure> {
     let shown = record.display().to_string();
     let report = response::respond(record, &shown, segment, &bench.reading).map_err(refused)?;
     ui.findings(None, &report.warnings);
     let files = bench.plot.write("Frequency response", || figure::response(&report))?.unwrap_or_default();
     let keys = ["actuator.resonance", "actuator.damping_ratio", "amplifier.lag"];
-    let measured = Measured::of(&keys, report.simulated);
-    ui.result(&Identified { record: shown, report, measured, files });
+    let measured = MeasuredKeys::of(&keys, report.simulated);
+    ui.result(&IdentificationResult { record: shown, report, measured, files });
     Ok(())
 }
 
-impl Outcome for Identified<ResponseReport> {
+impl Outcome for IdentificationResult<ResponseReport> {
     fn text(&self) -> String {
         let Self { record, report, measured, files } = self;
         let f = &report.fitted;
@@ -44,7 +44,7 @@ impl Outcome for Identified<ResponseReport> {
         // Writing to a String cannot fail.
         let _ = write!(
             text,
-            "  resonance     {} Hz\n  damping ratio {}\n  lag           {} ms\n  dead time     {} ms (the hold of the converter, half a period, is in it)\n  lag + dead    {} ms (errors of the two correlated by {:.2})\n  static gain   {:.6} ± {:.1e} µm/V\n",
+            "  resonance     {} Hz\n  damping ratio {}\n  lag           {} ms\n  dead time     {} ms (including half a period of converter hold)\n  lag + dead    {} ms (correlation of the two errors {:.2})\n  static gain   {:.6} ± {:.1e} µm/V\n",
             shown_in(f.resonance, 1.0),
             shown_in(f.damping_ratio, 1.0),
             shown_in(f.lag, 1e3),
@@ -56,7 +56,7 @@ impl Outcome for Identified<ResponseReport> {
         );
         let _ = write!(
             text,
-            "lines for the spec:\n[actuator]\nresonance = \"{:.1} Hz\"  # static gain here: {:.5} um/V for small amplitude, below that of a large loop\ndamping_ratio = {:.4}\n[amplifier]\nlag = \"{:.4} ms\"\n{}{files}",
+            "spec lines:\n[actuator]\nresonance = \"{:.1} Hz\"  # static gain here: {:.5} um/V for small amplitude, below that of a large loop\ndamping_ratio = {:.4}\n[amplifier]\nlag = \"{:.4} ms\"\n{}{files}",
             f.resonance.value,
             f.gain.value * 1e6,
             f.damping_ratio.value,

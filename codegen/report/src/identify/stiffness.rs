@@ -1,6 +1,6 @@
 //! `specgen identify stiffness`.
 
-use super::{Bench, Identified, Measured, refused};
+use super::{Bench, IdentificationResult, MeasuredKeys, refused};
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::ui::Ui;
 use std::path::Path;
@@ -8,30 +8,30 @@ use std::path::Path;
 use crate::identification as figure;
 use specgen_identify::stiffness::{self, StiffnessReport};
 
-/// Reads, identifies, writes what is asked for and shows the result.
+/// Reads the record, identifies, writes the requested files and shows the result.
 ///
 /// # Errors
-/// A file cannot be read or written, or its data do not do.
+/// A file cannot be read or written, or its data are unsuitable.
 pub fn run(record: &Path, bench: &Bench, ui: &mut Ui) -> Result<(), Failure> {
     let shown = record.display().to_string();
     let report = stiffness::measure(record, &shown, &bench.reading).map_err(refused)?;
     ui.findings(None, &report.warnings);
     let files = bench.plot.write("Stiffness", || figure::stiffness(&report))?.unwrap_or_default();
-    let measured = Measured::of(&["actuator.axial_stiffness"], report.simulated);
-    ui.result(&Identified { record: shown, report, measured, files });
+    let measured = MeasuredKeys::of(&["actuator.axial_stiffness"], report.simulated);
+    ui.result(&IdentificationResult { record: shown, report, measured, files });
     Ok(())
 }
 
-impl Outcome for Identified<StiffnessReport> {
+impl Outcome for IdentificationResult<StiffnessReport> {
     fn text(&self) -> String {
         let report = &self.report;
         let creep = report.creep_time.map_or_else(
             || "no creep found".to_owned(),
-            |t| format!("creep of {:.2} % with {t:.3} s taken out", report.creep_percent),
+            |t| format!("creep of {:.2} % with {t:.3} s removed", report.creep_percent),
         );
         format!(
             "{}: k = {:.4} ± {:.4} N/µm (standard error); {creep}, drift {:.3} nm/s; without these corrections {:.4} N/µm\n  \
-             {} samples ({:.0} independent), force {:.3} N to {:.3} N, residual {:.3} nm rms\nlines for the spec:\n[actuator]\n\
+             {} samples ({:.0} independent), force {:.3} N to {:.3} N, residual {:.3} nm rms\nspec lines:\n[actuator]\n\
              axial_stiffness = \"{:.4e} N/m\"\n{}{}",
             self.record,
             report.stiffness * 1e-6,

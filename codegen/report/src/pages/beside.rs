@@ -1,4 +1,4 @@
-//! The commands of a record with a simulated machine in the place of the one that was recorded.
+//! Replays the commands of a record with a simulated machine instead of the recorded one.
 
 use crate::record::Sample;
 use host_sim::closed_loop::Rig;
@@ -15,21 +15,21 @@ use super::SEED;
 use super::words::Words;
 use specgen_studies::machine;
 
-/// How long a machine takes that is led to where a record goes on, and until what that set swinging is over, s.
+/// Time to bring a machine to the state where a record continues, and for the resulting oscillation to decay, s.
 const SETTLE: f64 = 0.2;
-/// Steps in which it is led.
+/// Number of steps to that state.
 const STEPS: u32 = 50;
-/// Halvings of the room in which a peak is sought: to 6 mV of 100 V.
+/// Number of bisections for a peak: to 6 mV of 100 V.
 const HALVINGS: u32 = 14;
 
-/// The simulated machine of a spec, as a controller sees it.
+/// The simulated machine of a spec, as seen by a controller.
 #[derive(Clone)]
-enum Simulated {
+enum SimulatedMachine {
     Platform(Box<PlatformRig>),
     Legs(Box<Rig<LegPlant>>),
 }
 
-impl Simulated {
+impl SimulatedMachine {
     /// Prepared: pre-cycled, at rest, gauges zeroed.
     fn of(model: &Model) -> Self {
         let leg = LegParameters::reference();
@@ -54,7 +54,7 @@ impl Simulated {
         }
     }
 
-    /// Of the force sensor; legs have none.
+    /// Reading of the force sensor; none for legs.
     fn wrench(&mut self) -> [f64; 6] {
         match self {
             Self::Platform(rig) => rig.read_wrench(),
@@ -69,8 +69,8 @@ impl Simulated {
         }
     }
 
-    /// This one, at rest, led to the voltages of a tick, where the gauges read `reading`. A leg goes there through a peak that
-    /// makes its gauge read so; which one it was, nobody knows. Each gauge of a platform sees all legs, which go there straight.
+    /// This machine, at rest, brought to the voltages of a tick, with the gauges reading `reading`. A leg passes through a peak that
+    /// results in its reading; the actual peak is unknown. The gauges of a platform see all legs, so its legs move there directly.
     fn led(&self, model: &Model, voltages: &[f64; 6], reading: &[f64; 6]) -> Self {
         let rest = [model.rest_voltage(); 6];
         let through = |peaks: &[f64; 6]| {
@@ -91,7 +91,7 @@ impl Simulated {
                 let middle: [f64; 6] = std::array::from_fn(|leg| 0.5 * (low[leg] + high[leg]));
                 let found = through(&middle).read();
                 for leg in 0..6 {
-                    // The higher the peak, the longer the leg behind it.
+                    // The higher the peak, the longer the leg after it.
                     if found[leg] < reading[leg] {
                         low[leg] = middle[leg];
                     } else {
@@ -104,15 +104,15 @@ impl Simulated {
     }
 }
 
-/// Runs the commands of `blocks` with a simulated machine. `recorded` are the same ticks as they were; in both only those stay
-/// scored that can be compared: the law is at work in both, and the simulated machine has settled.
+/// Runs the commands of `blocks` with a simulated machine. `recorded` are the same ticks as recorded; in both, only comparable ticks
+/// remain scored: the law is active in both, and the simulated machine has settled.
 ///
-/// At power-up both begin alike. Where a record begins in the middle of a run, or goes on behind a gap, the controller is that of
-/// the record's snapshot, and the simulated machine is led to the voltages of the first tick, with its gauges set to the readings
-/// of that tick: what led to them is not in the record, so the offset of the hysteresis, creep and speed are not known.
+/// At power-up both start in the same state. Where a record starts in the middle of a run, or continues after a gap, the controller starts from
+/// the record's snapshot, and the simulated machine is brought to the voltages of the first tick, with its gauges set to the readings
+/// of that tick. The history is not in the record, so the offset of the hysteresis, creep and speed are unknown.
 ///
 /// # Errors
-/// Why there is nothing to compare.
+/// Why a comparison is impossible.
 pub(super) fn simulate(
     controller: &mut Supervised,
     blocks: &[Block],
@@ -124,16 +124,16 @@ pub(super) fn simulate(
     let settle = (SETTLE / period) as u64;
     controller.reset();
     let power_up = controller.save();
-    let prepared = Simulated::of(&compiled.model);
+    let prepared = SimulatedMachine::of(&compiled.model);
     let (mut machine, mut offset) = (prepared.clone(), [0.0; 6]);
     let mut output = vec![0; controller.output_names().len()];
     let mut samples: Vec<Sample> = Vec::with_capacity(recorded.len());
-    // Tick that follows the last one; the first that is scored.
+    // Expected next tick; first scored tick.
     let (mut next, mut settled) = (None, 0);
     for block in blocks {
         controller.configure(&block.config).map_err(|error| error.to_string())?;
         if next != Some(block.first) || block.reason == Reason::Started {
-            controller.load(&block.state).map_err(|_| "a snapshot in the record does not fit".to_owned())?;
+            controller.load(&block.state).map_err(|_| "a snapshot in the record does not match".to_owned())?;
             (machine, offset) = (prepared.clone(), [0.0; 6]);
             if let (true, Some(first), Some(row)) =
                 (block.state != power_up, recorded.get(samples.len()), block.rows.first())
@@ -153,7 +153,7 @@ pub(super) fn simulate(
             for (place, value) in words.wrench.iter().flatten().zip(machine.wrench()) {
                 input[*place] = words.scalar.encode(value);
             }
-            // What was late at the machine is not late here.
+            // A tick that was late on the machine is not late here.
             input[words.events] &= !u64::from(MISSED_TICK);
             let word = controller.step(&input, &mut output);
             let mut sample = words.sample(row.tick, word, &input, &output);
@@ -172,9 +172,9 @@ pub(super) fn simulate(
     recorded.iter_mut().for_each(|sample| sample.scored = sample.running);
     Err(if recorded.iter().any(|sample| sample.running) {
         format!(
-            "the record does not begin at power-up and has no {SETTLE} s in one piece, which the simulated machine takes to settle"
+            "the record does not start at power-up and has no continuous {SETTLE} s, which the simulated machine needs to settle"
         )
     } else {
-        "the law was never at work".to_owned()
+        "the law was never active".to_owned()
     })
 }

@@ -1,4 +1,4 @@
-//! The page of the paper's figures and tables beside ours.
+//! The page that compares the paper's figures and tables with ours.
 
 use crate::hysteresis;
 use crate::paper::{legs, linear, machining, motion, region};
@@ -44,7 +44,7 @@ fn of_platform(
     let model = &compiled.model;
     let specimen = machine::specimen(model, task, &LegParameters::reference(), Some(SEED));
     let platform = lower::platform(model).map_err(|_| {
-        Failure::Environment("the model of the platform was lost; report this as a defect of specgen".to_owned())
+        Failure::Environment("the model of the platform was lost; report this as a specgen bug".to_owned())
     })?;
     let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED);
     let sim = shell::on("specgen sim", name, "--frequency 0.1,1,10 -o DIR");
@@ -68,10 +68,10 @@ fn of_legs(compiled: &Compilation, controller: &mut Controller, name: &str, ui: 
     let adaptation = &model.adaptation;
     let mode = usize::from(adaptation.level_weight > 0.0) + usize::from(adaptation.drift_weight > 0.0);
     let mut tracking = legs::section(&scenario, controller, &sim).map_err(run_failure)?;
-    // A law without its weight is the one before it.
+    // A law with a zero weight equals the simpler law.
     let same = [
-        "The spec gives no weights: EWMA and PCC are here the inverse model alone, and no reproduction of the paper's.",
-        "The spec gives no drift weight: PCC is here EWMA, and no reproduction of the paper's.",
+        "The spec gives no weights, so EWMA and PCC equal the inverse model alone and do not reproduce the paper's.",
+        "The spec gives no drift weight, so PCC equals EWMA and does not reproduce the paper's.",
     ];
     if let Some(text) = same.get(mode) {
         tracking = tracking.text(text);
@@ -81,7 +81,7 @@ fn of_legs(compiled: &Compilation, controller: &mut Controller, name: &str, ui: 
     Ok(vec![tracking, hysteresis::of_paper(&leg, model.actuator.voltage[0]), lines, region])
 }
 
-/// The genetic algorithm, or why it was not run: left out, or the spec's mode has nothing to tune.
+/// The genetic algorithm, or why it was not run: skipped, or nothing to tune in the spec's mode.
 fn converge(
     compiled: &Compilation,
     controller: &Controller,
@@ -91,7 +91,7 @@ fn converge(
 ) -> Result<Section, Failure> {
     let absent = |why: &str| Section::new("convergence", "Genetic algorithm", "").text(&format!("Not run: {why}"));
     if generations == 0 {
-        return Ok(absent("left out by --generations 0."));
+        return Ok(absent("skipped by --generations 0."));
     }
     ui.progress(&format!("the genetic algorithm, {generations} generations"));
     let leg = LegParameters::reference();

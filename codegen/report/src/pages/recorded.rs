@@ -1,4 +1,4 @@
-//! `specgen report --record`: a run of a machine, run again by bits, and with a simulated machine in its place.
+//! `specgen report --record`: a run of a machine, replayed and compared bit by bit, and repeated with a simulated machine.
 
 use std::path::Path;
 
@@ -18,25 +18,25 @@ use specgen_studies::controllers::at_run_time;
 /// Phase of the supervisor.
 const FAULTED: u8 = 5;
 
-/// Reads a record and runs its ticks again, with its own readings and with those of a simulated machine.
+/// Reads a record and replays its ticks, with its own readings and with those of a simulated machine.
 pub fn read(path: &Path, compiled: &Compilation, ui: &Ui) -> Result<Run, Failure> {
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{}: {error}", path.display()));
     let mut reader = replay::open(path)?;
     let recorded = &reader.header().description;
     if recorded.digest != compiled.ir.digest {
         return Err(refuse(&format_args!(
-            "it is of spec digest {}, {} gives {}; name the spec that the target was built from",
+            "it was recorded with spec digest {}, but {} has {}; give the spec that the target was built from",
             recorded.digest, compiled.source.display_name, compiled.ir.digest
         )));
     }
     let mut machine = Supervised::new(at_run_time(compiled, ui)?);
-    ui.progress("running the record again");
+    ui.progress("replaying the record");
     let mut blocks: Vec<Block> = Vec::new();
     let header = reader.header().clone();
     let found = record::replay(&mut reader, &mut machine, |_, block, _| blocks.push(block.clone()))
         .map_err(|error| refuse(&error))?;
     if found.ticks == 0 {
-        return Err(refuse(&"there is no tick in it; record again"));
+        return Err(refuse(&"it contains no ticks; record again"));
     }
     let words = Words::of(&header, &machine, compiled)?;
     let mut run = Run {
@@ -45,7 +45,7 @@ pub fn read(path: &Path, compiled: &Compilation, ui: &Ui) -> Result<Run, Failure
         mode: words.mode(&header, &blocks),
         bits: match &found.divergence {
             None => Ok(found.ticks),
-            Some(divergence) => Err(format!("DIFFER: {divergence}")),
+            Some(divergence) => Err(format!("DIFFERENT: {divergence}")),
         },
         gaps: found.gaps.clone(),
         damaged: found.damaged.iter().map(|(block, reason)| format!("Block {block} is damaged: {reason}.")).collect(),
@@ -58,12 +58,12 @@ pub fn read(path: &Path, compiled: &Compilation, ui: &Ui) -> Result<Run, Failure
         run.phases.push((change.tick, format!("{word}, amplifiers {}", if word.amplifier_on { "on" } else { "off" })));
     }
     run.recorded = again(&mut machine, &blocks, &words)?;
-    ui.progress("the same commands with a simulated machine");
+    ui.progress("running the same commands with a simulated machine");
     run.simulated = beside::simulate(&mut machine, &blocks, &words, compiled, &mut run.recorded);
     Ok(run)
 }
 
-/// The record once more, for the outputs that it does not hold.
+/// Replays the record for outputs that it does not contain.
 fn again(machine: &mut Supervised, blocks: &[Block], words: &Words) -> Result<Vec<Sample>, Failure> {
     let mut output = vec![0; machine.output_names().len()];
     let mut samples = Vec::new();
@@ -73,7 +73,7 @@ fn again(machine: &mut Supervised, blocks: &[Block], words: &Words) -> Result<Ve
         if next != Some(block.first) || block.reason == Reason::Started {
             machine
                 .load(&block.state)
-                .map_err(|_| environment("the record's state does not fit; run specgen replay"))?;
+                .map_err(|_| environment("the record's state does not match; run specgen replay"))?;
         }
         for row in &block.rows {
             let word = machine.step(&row.input, &mut output);

@@ -1,4 +1,4 @@
-//! What the page shows of simulated runs: the spec's own trajectories, their error budget, hysteresis.
+//! Sections from simulated runs: the spec's own trajectories, their error budget, hysteresis.
 
 use crate::budget::{self, Pair};
 use crate::first::Errors;
@@ -25,14 +25,14 @@ use specgen_language::outcome::{Failure, environment};
 use specgen_language::ui::Ui;
 use specgen_studies::{machine, reproduce};
 
-/// Frequencies at which six legs are tried, Hz: that of the budget first.
+/// Frequencies for six legs, Hz; the first is that of the budget.
 const LEG_FREQUENCIES: [f64; 2] = [1.0, 10.0];
 
-/// What runs gave.
-pub struct Simulated {
+/// Results of the simulated runs.
+pub struct SimulatedRuns {
     pub sections: Vec<Section>,
     pub errors: Errors,
-    /// Figures of the verdict.
+    /// Figures for the verdict.
     pub judged: Vec<Figure>,
 }
 
@@ -41,7 +41,7 @@ pub fn of(
     controllers: [&mut Controller; 2],
     name: &str,
     ui: &Ui,
-) -> Result<Simulated, Failure> {
+) -> Result<SimulatedRuns, Failure> {
     match &compiled.model.task_space {
         Some(task) => of_platform(compiled, task, controllers, name, ui),
         None => of_legs(compiled, controllers, name, ui),
@@ -54,11 +54,11 @@ fn of_platform(
     [controller, fine]: [&mut Controller; 2],
     name: &str,
     ui: &Ui,
-) -> Result<Simulated, Failure> {
+) -> Result<SimulatedRuns, Failure> {
     let model = &compiled.model;
     let specimen = machine::specimen(model, task, &LegParameters::reference(), Some(SEED));
     let platform = lower::platform(model).map_err(|_| {
-        Failure::Environment("the model of the platform was lost; report this as a defect of specgen".to_owned())
+        Failure::Environment("the model of the platform was lost; report this as a specgen bug".to_owned())
     })?;
     ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
     let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED);
@@ -76,7 +76,7 @@ fn of_platform(
         sections.push(
             Section::new("motion", "Motion", "")
                 .lead(&format!(
-                    "The true pose along {} at {}; the bars are the legs in the travel that they have.",
+                    "The true pose along {} at {}; bars show each leg within its travel.",
                     one.name,
                     one.speed()
                 ))
@@ -104,7 +104,7 @@ fn of_platform(
         (unit, tracking::dumbbell(&lines, [speed(true), speed(false)], unit))
     };
     let first = all.iter().find(|one| one.run.is_some());
-    let said = first.map(|first| {
+    let text = first.map(|first| {
         let of = all.iter().filter(|one| one.name == first.name);
         let each = of.filter_map(|one| {
             let (rms, coverage) = (one.rms()?, one.coverage()?);
@@ -114,10 +114,10 @@ fn of_platform(
     });
     let errors = Errors {
         pictures: vec![picture(false, "nm"), picture(true, "nrad")],
-        said: said.unwrap_or_else(|| "no trajectory in the spec".to_owned()),
-        note: format!("{law}, norm of three axes, rms, simulated."),
+        text: text.unwrap_or_else(|| "no trajectory in the spec".to_owned()),
+        note: format!("{law}, rms norm of three axes, simulated."),
     };
-    Ok(Simulated { sections, errors, judged: tracking::judged(model, &all) })
+    Ok(SimulatedRuns { sections, errors, judged: tracking::judged(model, &all) })
 }
 
 fn of_legs(
@@ -125,7 +125,7 @@ fn of_legs(
     [controller, fine]: [&mut Controller; 2],
     name: &str,
     ui: &Ui,
-) -> Result<Simulated, Failure> {
+) -> Result<SimulatedRuns, Failure> {
     let model = &compiled.model;
     let leg = LegParameters::reference();
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
@@ -163,7 +163,7 @@ fn of_legs(
     if let Some(motion) = motion {
         sections.push(
             Section::new("motion", "Motion", "")
-                .lead("The legs as their gauges read them, and the pose that such legs give the platform, which no gauge of this spec sees.")
+                .lead("Gauge readings of the legs, and the resulting pose of the platform, which no gauge of this spec measures.")
                 .part(platform::moving(model, &motion, model.actuator.stroke)),
         );
     }
@@ -171,19 +171,19 @@ fn of_legs(
     sections.push(budget::of_legs(&leg, mode, Pair { own: &mut *controller, fine }, SEED).map_err(run_failure)?);
     sections.push(margins::section(compiled, mode as u32, &shell::on("specgen check", name, "")));
     sections.push(hysteresis::of_legs(&leg, model.actuator.voltage[0], &compiled.records));
-    let said = values.iter().zip(LEG_FREQUENCIES).map(|((_, nm, coverage), hertz)| {
+    let text = values.iter().zip(LEG_FREQUENCIES).map(|((_, nm, coverage), hertz)| {
         let over = coverage.map_or_else(String::new, |coverage| format!(" over {coverage}"));
         format!("{}\u{2009}nm at {hertz}\u{2009}Hz{over}", short(*nm))
     });
-    let said = said.collect::<Vec<_>>().join(", ");
+    let text = text.collect::<Vec<_>>().join(", ");
     let line = Line { name: "leg trajectory".to_owned(), values, note: String::new(), limit: None };
     let speeds = LEG_FREQUENCIES.map(|hertz| Some(format!("{hertz}\u{2009}Hz")));
     let errors = Errors {
         pictures: vec![("nm", tracking::dumbbell(&[line], speeds, "nm"))],
-        said,
+        text,
         note: format!(
-            "{law}, rms of six legs as their gauges read them, simulated. The spec has no [control]: nothing here is about position control of the platform."
+            "{law}, rms gauge error of six legs, simulated. The spec has no [control], so there is no position control of the platform."
         ),
     };
-    Ok(Simulated { sections, errors, judged: Vec::new() })
+    Ok(SimulatedRuns { sections, errors, judged: Vec::new() })
 }

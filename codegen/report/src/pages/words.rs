@@ -1,4 +1,4 @@
-//! Where a record and its controller hold what a page shows.
+//! Positions of the words that a page shows, in a record and its controller.
 
 use crate::record::Sample;
 use host_sim::controller::{MachineWord, Supervised, TickController};
@@ -15,7 +15,7 @@ use specgen_studies::runs::LEG_LIMITED;
 /// Phase of the supervisor.
 const RUNNING: u8 = 2;
 
-/// Where the words are that a page needs.
+/// Positions of words.
 pub(super) struct Words {
     pub(super) scalar: Scalar,
     pub(super) gauge: [usize; 6],
@@ -23,12 +23,12 @@ pub(super) struct Words {
     pub(super) events: usize,
     voltage: [usize; 6],
     status: usize,
-    /// Among the outputs, or among the inputs.
+    /// Position among the outputs, or among the inputs.
     target: Result<[usize; 6], [usize; 6]>,
     measured: Result<[usize; 6], [usize; 6]>,
-    /// From a pose to the legs; none for legs with gauges of their own.
+    /// Jacobian from pose to legs; `None` for legs with their own gauges.
     jacobian: Option<[[f64; 6]; 6]>,
-    /// Reading of each gauge in V to m, lowest power first.
+    /// Calibration of each gauge, V to m, lowest power first.
     calibration: Option<[Vec<f64>; 6]>,
 }
 
@@ -41,7 +41,7 @@ impl Words {
                 (0..6).map_while(|k| names.iter().position(|name| *name == format!("{stem}[{k}]"))).collect();
             places.try_into().ok()
         };
-        let lacking = || environment("the controller lacks words of its gauges; report this as a defect of specgen");
+        let lacking = || environment("the controller lacks words of its gauges; report this as a specgen bug");
         let gauge = inputs("gauge").or_else(|| inputs("displacement")).ok_or_else(lacking)?;
         let setpoint = inputs("setpoint").ok_or_else(lacking)?;
         let either = |output: &str, input: [usize; 6]| description.outputs(output).map_err(|_| input);
@@ -63,7 +63,7 @@ impl Words {
         })
     }
 
-    /// The control mode in force while most of it was recorded: of the last block.
+    /// The control mode of the last block, which is that of most of the record.
     pub(super) fn mode(&self, header: &Header, blocks: &[Block]) -> u32 {
         let place = header.description.config_names.iter().position(|name| name == "mode");
         let word = blocks.last().zip(place).and_then(|(block, place)| block.config.get(place));

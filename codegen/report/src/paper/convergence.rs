@@ -1,4 +1,4 @@
-//! How the genetic algorithm of Table 3 converges on this spec.
+//! Convergence of the genetic algorithm of Table 3 on this spec.
 
 use crate::chart::{Axis, Chart, DASHED, LINE, pairs};
 use crate::section::{Grid, Section};
@@ -6,18 +6,18 @@ use specgen_studies::paper::convergence::Convergence;
 use specgen_studies::paper::printed::TABLE_3;
 use specgen_studies::reproduce::write::fell;
 
-/// The section of a search; `command` makes its content again.
+/// The section of a search; `command` reproduces it.
 #[must_use]
 pub fn section(found: &Convergence, command: &str) -> Section {
     let found_any = found.history.iter().any(|generation| generation.best.is_some());
     let charts = if found_any { vec![chart(found)] } else { Vec::new() };
-    let mut table = Grid::new("Table 3: settings", &["what", "paper", "here"]);
+    let mut table = Grid::new("Table 3: settings", &["setting", "paper", "here"]);
     for row in TABLE_3 {
         table.push(row.map(str::to_owned).to_vec());
     }
     Section::new("convergence", "Genetic algorithm", command)
         .text(&fell(found))
-        .text("The spec keeps its own numbers: specgen tune writes better ones into it, by this algorithm or CMA-ES.")
+        .text("The spec is not changed; specgen tune writes better parameters into it, using this algorithm or CMA-ES.")
         .charts(charts)
         .table(table)
 }

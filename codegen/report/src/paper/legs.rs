@@ -41,7 +41,7 @@ pub fn section(
             let of = |pick: fn([f64; 2]) -> f64| values(&tracking, pick);
             path = path.over_time(mode, LINE, times, &of(|[_, y]| y * 1e6));
             error = error.over_time(mode, LINE, times, &of(|[t, y]| (t - y) * 1e9));
-            // On top, for the laws lie on it.
+            // On top, since the curves of the laws coincide with it.
             if mode == "pcc" {
                 path = path.over_time("target T", DASHED, times, &of(|[t, _]| t * 1e6)).colored(TARGETS);
             }
@@ -49,7 +49,7 @@ pub fn section(
         charts.extend([path, error]);
     }
     Ok(Section::new("leg-tracking", "Leg tracking", command)
-        .text("Each leg follows the paper's trajectory with the emitted controller, on its own gauge: target T, reading Y. invhys is the inverse model alone, ewma and pcc adapt it. The jump of 112 nm at the end of the ramp is the paper's.")
+        .text("Each leg follows the paper's trajectory with the emitted controller and its own gauge: target T, reading Y. invhys is the inverse model alone; ewma and pcc adapt it. The jump of 112 nm at the end of the ramp is the paper's.")
         .charts(charts)
         .comparison(&table))
 }

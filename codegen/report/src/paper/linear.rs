@@ -1,4 +1,4 @@
-//! Fig. 4 and Table 1: what is left of hysteresis when the inverse model is in front.
+//! Fig. 4 and Table 1: residual hysteresis with the inverse model.
 
 use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, TickController};
@@ -18,9 +18,9 @@ use specgen_language::model::Actuator;
 use specgen_studies::reproduce;
 use specgen_studies::reproduce::write::digits;
 
-/// Frequencies at which a platform is tried, Hz.
+/// Frequencies for a platform, Hz.
 const PLATFORM_FREQUENCIES: [f64; 2] = [1.0, 10.0];
-/// Points of a line on a chart, at most.
+/// Largest number of points of a line on a chart.
 const POINTS: usize = 500;
 
 fn chart(title: &str) -> Chart {
@@ -49,13 +49,13 @@ pub fn of_legs(
         let y: Vec<f64> = last.iter().map(|sample| sample.measured[0] * 1e6).collect();
         lines = lines.with(&format!("{frequency} Hz"), LINE, pairs(&x, &y));
     }
-    Ok(Section::new("linear", "Linear relation behind the inverse model", command)
-        .text("Y against X: a straight line would be a perfect inverse. Its slope over ρ̂ is the λ that the adaptation must stand.")
+    Ok(Section::new("linear", "Linear relation with the inverse model", command)
+        .text("Y over X: a perfect inverse would give a straight line. Its slope divided by ρ̂ is the λ that the adaptation must tolerate.")
         .charts(vec![lines])
         .comparison(&table))
 }
 
-/// A platform: what its legs really do in case 1 with F and the inverse model alone, against what was requested.
+/// A platform: actual leg extensions in case 1 with F and the inverse model alone, over the requested ones.
 ///
 /// # Errors
 /// As [`PlatformScenario::run`].
@@ -70,7 +70,7 @@ pub fn of_platform(
     traced.options = RunOptions { record: Record::Trace, ..machine.options.clone() };
     let mut lines = chart("Fig. 4: legs 0 and 3 in case 1, F with the inverse model alone");
     let mut table = Grid::new(
-        "Straight line through the points of each leg, Y = λ q̂ + δ",
+        "Linear fit for each leg, Y = λ q̂ + δ",
         &["leg", "Hz", "λ = ρ/ρ̂", "δ, nm", "deviation from the line, nm rms"],
     );
     select(controller, PLATFORM_MODES[1].1)?;
@@ -97,12 +97,12 @@ pub fn of_platform(
             }
         }
     }
-    let section = Section::new("linear", "Linear relation behind the inverse model", command);
+    let section = Section::new("linear", "Linear relation with the inverse model", command);
     if lines.series.is_empty() {
-        return Ok(section.text(&format!("Not made: case 1 is not followed. {REFUSED_PATH}")));
+        return Ok(section.text(&format!("Not available: case 1 was refused. {REFUSED_PATH}")));
     }
     Ok(section
-        .text("What a leg really does, J h of the true pose, against what the inverse model was asked for. The legs are out of tolerance, each in its own way, and share one record if the spec names one: λ is how far off. Table 1 of the paper is with six legs on their own gauges: specgen report specs/legs.toml.")
+        .text("Actual extension of a leg, J h of the true pose, over the request to the inverse model. The legs deviate individually within their tolerances and share one record if the spec has one; λ is the deviation. Table 1 of the paper is for six legs with their own gauges: specgen report specs/legs.toml.")
         .charts(vec![lines])
         .table(table))
 }

@@ -14,7 +14,7 @@ use crate::section::Section;
 use crate::tracking::AXES;
 use specgen_studies::reproduce::platform::{MACHINING_FREQUENCY, parts, table_9};
 
-/// Both work parts.
+/// The section for both work parts.
 ///
 /// # Errors
 /// As [`PlatformScenario::against`].
@@ -28,7 +28,7 @@ pub fn section(
     let trajectory =
         PaperPose { path: PaperPath::Machining, reading: Reading::Corrected, frequency: MACHINING_FREQUENCY };
     let mut section = Section::new("machining", "Machining, P against P/F", command)
-        .text("The tip presses into a linear work part from the start of the path. Forces and torques are those of the part on the platform, about P_C in base axes.");
+        .text("The tip presses into a linear work part from the start of the path. Forces and torques act from the part on the platform, about P_C in base axes.");
     let mut table = MachiningTable::default();
     let mut refused = Vec::new();
     for (number, (name, part)) in [23, 26].into_iter().zip(parts()) {

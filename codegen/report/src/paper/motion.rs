@@ -19,7 +19,7 @@ pub(super) const TARGETS: usize = INK;
 /// Why a run is not scored.
 pub(super) const REFUSED_PATH: &str = "The controller refused set-points: the path leaves the workspace of the spec, or moves faster than its control.setpoint.stream_speed.";
 
-/// What a sample shows of one coordinate.
+/// Selects a value of one coordinate from a sample.
 type Pick = fn(&PoseSample, usize) -> f64;
 
 /// The sections of both cases.
@@ -38,10 +38,10 @@ pub fn sections(
     for (case, (name, path)) in CASES.into_iter().enumerate() {
         let mut section = Section::new(
             ["case-1", "case-2"][case],
-            ["Free motion, case 1: along x, y and z", "Free motion, case 2: along z, turning about x and y"][case],
+            ["Free motion, case 1: along x, y and z", "Free motion, case 2: along z, rotation about x and y"][case],
             command,
         )
-        .text("P/F with each law of adaptation; target and true pose of the platform, both from rest, the bias included. Errors are target less true pose.");
+        .text("P/F with each adaptation law; target and true pose of the platform, both relative to rest, including the bias. Errors are target minus true pose.");
         let mut table = PoseTable::default();
         let mut refused = Vec::new();
         for (place, frequency) in FREQUENCIES.into_iter().enumerate() {
@@ -73,7 +73,7 @@ pub fn sections(
     Ok(sections)
 }
 
-/// The charts of one case at one frequency.
+/// Charts of one case at one frequency.
 struct Figures {
     interval: f64,
     paths: [Chart; 2],
@@ -136,12 +136,12 @@ impl Figures {
     }
 }
 
-/// Target less true pose, nm or nrad.
+/// Target minus true pose, nm or nrad.
 pub(super) fn error(sample: &PoseSample, axis: usize) -> f64 {
     (sample.target[axis] - sample.tick.pose[axis]) * 1e9
 }
 
-/// Charts are built by value.
+/// Applies a builder method that takes the chart by value.
 pub(super) fn change(chart: &mut Chart, with: impl FnOnce(Chart) -> Chart) {
     *chart = with(chart.clone());
 }

@@ -13,7 +13,7 @@ const DRIFTS: [Option<f64>; 5] = [None, Some(0.011), Some(0.1), Some(0.4), Some(
 /// Points of a curve.
 const POINTS: usize = 120;
 
-/// Curves of (AII.18) and (AII.19) and, for six legs with their own gauges, what their emitted controller really stands.
+/// Curves of (AII.18) and (AII.19) and, for six legs with their own gauges, the actual limits of their emitted controller.
 ///
 /// # Errors
 /// As [`limits`].
@@ -42,7 +42,7 @@ pub fn section(
     let highest = adaptation.gain_ratio[1];
     chart = chart.with("this spec: weight and upper end of gain_ratio", DOTS, vec![[weights[0], highest]]);
     let mut section = Section::new("region", "Stability region of the adaptation", "")
-        .text("Below a curve the run-to-run law is stable on a leg that answers at once. With amplifier lag and modes the limit is lower: that is what the compiler checks, see margins.");
+        .text("Below a curve the run-to-run law is stable on a leg without dynamics. With amplifier lag and modes the limit is lower; the compiler checks that limit, see the margins.");
     let mut table = None;
     if let Some(controller) = controller {
         let found = limits(controller, adaptation.run_interval)?;
@@ -53,7 +53,7 @@ pub fn section(
                 "ω2",
                 "λ as printed",
                 "λ by (AII.19), corrected (AII.18)",
-                "λ up to which the emitted controller settles",
+                "largest λ at which the emitted controller settles",
                 "emitted / formula",
             ],
         );

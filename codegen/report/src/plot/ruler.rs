@@ -1,4 +1,4 @@
-//! Linear and logarithmic rulers with round ticks.
+//! Linear and logarithmic scales with round ticks.
 
 pub(super) struct Ruler {
     log: bool,
@@ -13,7 +13,7 @@ pub(super) struct Tick {
 }
 
 impl Ruler {
-    /// Over all finite `values`, with a little room, or over `limits`.
+    /// A scale over all finite `values`, with a small margin, or over `limits`.
     pub(super) fn over(
         values: impl Iterator<Item = f64>,
         log: bool,
@@ -41,7 +41,7 @@ impl Ruler {
         Self { log, low: low - room, high: high + room, pixels }
     }
 
-    /// Pixel of `value`; NaN for what cannot be drawn.
+    /// Pixel position of `value`; NaN if it cannot be drawn.
     pub(super) fn at(&self, value: f64) -> f64 {
         let value = match self.log {
             false => value,
@@ -99,7 +99,7 @@ fn logarithmic(low: f64, high: f64) -> Vec<Tick> {
             }
         }
     }
-    // Less than a factor two between the ends: even steps show more.
+    // Less than a factor of two between the ends: linear ticks show more.
     if ticks.len() < 2 {
         ticks = linear(libm::exp10(low), libm::exp10(high));
     }

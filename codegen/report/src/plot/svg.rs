@@ -1,4 +1,4 @@
-//! The text of an SVG picture.
+//! Writes SVG text.
 
 use std::fmt::Write as _;
 
@@ -6,11 +6,11 @@ use std::fmt::Write as _;
 #[derive(Clone, Copy)]
 pub(super) enum Hatch {
     Lines,
-    /// 0 white to 1 dark.
+    /// From 0 (white) to 1 (dark).
     Shade(f64),
 }
 
-/// A picture in the making. Writing to a String cannot fail, so results of `write!` are dropped.
+/// A picture being written. Writing to a String cannot fail, so results of `write!` are ignored.
 pub(super) struct Canvas {
     text: String,
 }
@@ -38,7 +38,7 @@ impl Canvas {
         );
     }
 
-    /// Text that reads upwards, centred on its place.
+    /// Vertical text, centred at its position.
     pub(super) fn upright(&mut self, x: f64, y: f64, size: f64, text: &str) {
         let _ = writeln!(
             self.text,
@@ -69,7 +69,7 @@ impl Canvas {
         );
     }
 
-    /// A line of the grid.
+    /// A grid line.
     pub(super) fn rule(&mut self, a: [f64; 2], b: [f64; 2]) {
         let _ = writeln!(
             self.text,
@@ -78,7 +78,7 @@ impl Canvas {
         );
     }
 
-    /// A line through points; one that is not finite breaks it.
+    /// A polyline; non-finite points interrupt it.
     pub(super) fn line(&mut self, points: &[[f64; 2]], color: &str, width: f64, dashed: bool) {
         let mut path = String::new();
         let mut pen = 'M';
@@ -103,7 +103,7 @@ impl Canvas {
     pub(super) fn dots(&mut self, points: &[[f64; 2]], color: &str, radius: f64) {
         let mut path = String::new();
         for p in points.iter().filter(|p| p[0].is_finite() && p[1].is_finite()) {
-            // A line of no length with round ends is a dot; thousands of them are one element.
+            // A zero-length line with round ends is a dot; thousands of them form one element.
             let _ = write!(path, "M{:.1} {:.1}h0", p[0], p[1]);
         }
         if !path.is_empty() {
@@ -133,7 +133,7 @@ impl Canvas {
     }
 }
 
-/// With the four characters that mean something in XML and HTML replaced.
+/// Escapes the four special characters of XML and HTML.
 pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

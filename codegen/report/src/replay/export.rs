@@ -1,4 +1,4 @@
-//! A record for other programs, written block by block while it is read.
+//! Exports a record to other formats, block by block while it is read.
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use super::messages::Messages;
 use specgen_language::outcome::Failure;
 use specgen_language::output::{PendingFile, unwritten};
 
-/// Files on their way.
+/// Files being written.
 #[derive(Default)]
 pub struct Exports {
     csv: Option<Csv>,
@@ -33,7 +33,7 @@ impl Exports {
         Ok(())
     }
 
-    /// Puts them in their places; how many rows there were.
+    /// Renames the files to their final names; returns the number of rows.
     pub fn finish(self) -> Result<u64, Failure> {
         self.csv.map(Csv::finish).transpose()?;
         self.mcap.map(Messages::finish).transpose()?;
@@ -43,7 +43,7 @@ impl Exports {
 
 struct Csv {
     file: BufWriter<PendingFile>,
-    /// As its user named it.
+    /// Name given by the user.
     path: PathBuf,
 }
 

@@ -1,11 +1,11 @@
-//! The container of MCAP (mcap.dev/spec, version 0): chunks with an index, so that a viewer finds a time without reading the whole file.
-//! Nothing is compressed and no checksum given, both of which the format leaves free.
+//! Writer for MCAP containers (mcap.dev/spec, version 0): chunks with an index, so a viewer finds a time without reading the whole file.
+//! No compression and no checksums; both are optional in the format.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// A chunk ends behind the message that makes it so long, bytes.
+/// A chunk ends after the message that makes it exceed this length, bytes.
 const CHUNK: usize = 1 << 20;
 
 const HEADER: u8 = 0x01;
@@ -21,20 +21,20 @@ const METADATA: u8 = 0x0c;
 const METADATA_INDEX: u8 = 0x0d;
 const DATA_END: u8 = 0x0f;
 
-/// A file that is being written; every message is of a channel with JSON and its schema.
+/// A file being written; every message belongs to a JSON channel with a schema.
 pub struct Writer<W> {
     sink: W,
-    /// Bytes that went there.
+    /// Bytes written so far.
     at: u64,
     chunk: Vec<u8>,
-    /// Of the chunk: first and last time, and of each channel times and places of its messages.
+    /// Current chunk: first and last time, and for each channel times and offsets of its messages.
     bounds: Option<[u64; 2]>,
     index: BTreeMap<u16, Fields>,
-    /// What the end of the file repeats: schemas and channels, and where chunks and metadata are.
+    /// Repeated at the end of the file: schemas and channels, and offsets of chunks and metadata.
     declared: Vec<u8>,
     chunks: Vec<u8>,
     metadata: Vec<u8>,
-    /// How many chunks and metadata there were; messages by channel; first and last time.
+    /// Number of chunks and of metadata records; messages per channel; first and last time.
     counts: [u32; 2],
     messages: BTreeMap<u16, u64>,
     all: Option<[u64; 2]>,
@@ -42,7 +42,7 @@ pub struct Writer<W> {
 
 impl<W: Write> Writer<W> {
     /// # Errors
-    /// The sink does not take it; here and below.
+    /// Writing to the sink fails; likewise below.
     pub fn new(sink: W, library: &str) -> io::Result<Self> {
         let mut this = Self {
             sink,
@@ -62,7 +62,7 @@ impl<W: Write> Writer<W> {
         Ok(this)
     }
 
-    /// Makes a channel of JSON messages; its number.
+    /// Adds a channel of JSON messages and returns its number.
     pub fn channel(&mut self, topic: &str, name: &str, schema: &str) -> io::Result<u16> {
         let number = self.messages.len() as u16 + 1;
         self.messages.insert(number, 0);
@@ -74,7 +74,7 @@ impl<W: Write> Writer<W> {
         Ok(number)
     }
 
-    /// What is known of the whole.
+    /// Adds metadata of the file.
     pub fn metadata(&mut self, name: &str, values: &[(&str, &str)]) -> io::Result<()> {
         let values = values.iter().fold(Fields::default(), |fields, (key, value)| fields.text(key).text(value));
         let bytes = record(METADATA, Fields::default().text(name).part(values));
@@ -84,7 +84,7 @@ impl<W: Write> Writer<W> {
         self.put(&bytes)
     }
 
-    /// A message of a channel, at a time in ns.
+    /// Adds a message to a channel, at a time in ns.
     pub fn message(&mut self, channel: u16, time: u64, sequence: u32, data: &[u8]) -> io::Result<()> {
         let place = self.chunk.len() as u64;
         let message = Fields::default().u16(channel).u32(sequence).u64(time).u64(time).raw(data);
@@ -117,7 +117,7 @@ impl<W: Write> Writer<W> {
         Ok(())
     }
 
-    /// Writes the index behind the data; the sink.
+    /// Writes the index after the data and returns the sink.
     pub fn finish(mut self) -> io::Result<W> {
         self.end_chunk()?;
         self.put(&record(DATA_END, Fields::default().u32(0)))?;
@@ -154,7 +154,7 @@ fn record(kind: u8, Fields(content): Fields) -> Vec<u8> {
     [&[kind][..], &(content.len() as u64).to_le_bytes(), &content].concat()
 }
 
-/// Fields of a record, one behind the other: numbers are little endian, what is of any length has it in front.
+/// Consecutive fields of a record: numbers are little endian, variable-length data are preceded by their length.
 #[derive(Default)]
 struct Fields(Vec<u8>);
 
@@ -180,7 +180,7 @@ impl Fields {
         self.u32(text.len() as u32).raw(text.as_bytes())
     }
 
-    /// Fields of their own: a map or an array.
+    /// Nested fields: a map or an array.
     fn part(self, Fields(part): Fields) -> Self {
         self.u32(part.len() as u32).raw(&part)
     }

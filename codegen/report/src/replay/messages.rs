@@ -1,4 +1,4 @@
-//! A record as messages of MCAP, JSON with schemas: what viewers of robots' logs read. Time begins with the record's tick 0.
+//! Exports a record as MCAP messages, JSON with schemas, for robotics log viewers. Time zero is the record's tick 0.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter};
@@ -14,15 +14,15 @@ use super::signals::{LEG_KEYS, Numbers, Of, Signals};
 use specgen_language::outcome::Failure;
 use specgen_language::output::{PendingFile, unwritten};
 
-/// A file on its way.
+/// A file being written.
 pub struct Messages {
     writer: Writer<BufWriter<PendingFile>>,
-    /// As its user named it.
+    /// Name given by the user.
     path: PathBuf,
-    /// Numbers of the channels, by name, once the header of the record is known.
+    /// Channel numbers by name, once the record's header is known.
     channels: BTreeMap<&'static str, u16>,
-    /// Status and supervisor that were written last.
-    said: Option<(u32, u32)>,
+    /// Last written status and supervisor words.
+    last: Option<(u32, u32)>,
     text: String,
 }
 
@@ -31,14 +31,14 @@ impl Messages {
         let file = BufWriter::new(PendingFile::create(path)?);
         let library = concat!("specgen ", env!("CARGO_PKG_VERSION"));
         let writer = Writer::new(file, library).map_err(|error| unwritten(path, &error))?;
-        Ok(Self { writer, path: path.to_owned(), channels: BTreeMap::new(), said: None, text: String::new() })
+        Ok(Self { writer, path: path.to_owned(), channels: BTreeMap::new(), last: None, text: String::new() })
     }
 
     pub fn add(&mut self, header: &Header, block: &Block, again: Option<ReplayedRows>) -> Result<(), Failure> {
         self.put(header, block, again).map_err(|error| unwritten(&self.path, &error))
     }
 
-    /// Writes the index, and puts the file in its place.
+    /// Writes the index and renames the file to its final name.
     pub fn finish(self) -> Result<(), Failure> {
         let file = self.writer.finish().map_err(|error| unwritten(&self.path, &error))?;
         file.into_inner().map_err(|error| unwritten(&self.path, &error))?.keep()
@@ -59,8 +59,8 @@ impl Messages {
         });
         self.text = Value::Object(settings.collect()).to_string();
         self.send("settings", block.first, header.period)?;
-        // Of each block, so that one can be read without those before it.
-        self.said = None;
+        // Repeated in each block, so a block can be read without earlier ones.
+        self.last = None;
         for (index, row) in block.rows.iter().enumerate() {
             self.tick(row, &signals, again.and_then(|again| again.rows.get(index)), header)?;
         }
@@ -70,7 +70,7 @@ impl Messages {
     fn tick(&mut self, row: &Row, signals: &Signals, given: Option<&Vec<u64>>, header: &Header) -> io::Result<()> {
         let (scalar, period) = (header.description.scalar, header.period);
         for (name, of) in &signals.0 {
-            // Where a record was not run to its end there is nothing more.
+            // There are no outputs beyond the end of the replay.
             let Some(numbers) = of.numbers(scalar, row, given) else { continue };
             self.text.clear();
             numbers.write(signals.keys(name), &mut self.text);
@@ -80,17 +80,17 @@ impl Messages {
         Numbers::Codes(row.codes).write(LEG_KEYS, &mut self.text);
         self.send("codes", row.tick, period)?;
         let now = (row.status, row.supervisor);
-        if self.said.is_none_or(|said| said.0 != now.0) {
+        if self.last.is_none_or(|last| last.0 != now.0) {
             self.text = json!({ "status": row.status, "text": status_words(row.status) }).to_string();
             self.send("status", row.tick, period)?;
         }
-        if self.said.is_none_or(|said| said.1 != now.1) {
+        if self.last.is_none_or(|last| last.1 != now.1) {
             let [phase, cause, on, _] = row.supervisor.to_le_bytes();
             let text = MachineWord::of(u64::from(row.supervisor)).to_string();
             self.text = json!({ "phase": phase, "cause": cause, "amplifiers_on": on == 1, "text": text }).to_string();
             self.send("phase", row.tick, period)?;
         }
-        self.said = Some(now);
+        self.last = Some(now);
         Ok(())
     }
 
@@ -118,7 +118,7 @@ impl Messages {
             Value::Object(keys.into_iter().map(property).collect())
         };
         for (name, of) in &signals.0 {
-            // A gauge gives V or m, as the spec calibrates it.
+            // A gauge gives V or m, depending on its calibration.
             let unit = match (of, *name) {
                 (Of::Input(_), _) => "V, or m from rest",
                 (_, "volts") => "V",

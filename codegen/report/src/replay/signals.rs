@@ -1,4 +1,4 @@
-//! What a record has of each tick, by name.
+//! Signals of each tick of a record, by name.
 
 use std::fmt::Write as _;
 
@@ -6,27 +6,27 @@ use host_sim::platform::table::AXES;
 use host_sim::record::{Header, ReplayedRows, Row};
 use host_sim::word::Scalar;
 
-/// Channels whose numbers are those of a pose, where there is one.
+/// Channels with pose values, if there is a pose.
 const POSES: [&str; 3] = ["pose", "target", "error"];
 
 pub const LEG_KEYS: [&str; 6] = ["leg0", "leg1", "leg2", "leg3", "leg4", "leg5"];
 const GAUGE_KEYS: [&str; 6] = ["gauge0", "gauge1", "gauge2", "gauge3", "gauge4", "gauge5"];
 
-/// Six numbers, and where a tick has them.
+/// Source of six numbers in a tick.
 #[derive(Clone, Copy)]
 pub enum Of {
-    /// From this input word on.
+    /// Input words from this one on.
     Input(usize),
-    /// From this output word of what was run again on.
+    /// Replayed output words from this one on.
     Output(usize),
-    /// Output words less others: target less pose.
+    /// Difference of output words: target minus pose.
     Difference(usize, usize),
-    /// Output words less input words: demand of the legs less their gauges.
+    /// Output words minus input words: demand of the legs minus their gauges.
     FromInput(usize, usize),
 }
 
 impl Of {
-    /// The numbers of a tick; none where the record was not run again so far.
+    /// The numbers of a tick; `None` if the record was not replayed that far.
     pub fn numbers(self, scalar: Scalar, row: &Row, given: Option<&Vec<u64>>) -> Option<Numbers> {
         let six = |words: &[u64], first: usize| words.get(first..).and_then(|words| words.first_chunk::<6>()).copied();
         match self {
@@ -46,7 +46,7 @@ impl Of {
     }
 }
 
-/// What every tick has, by name; whether there is a pose.
+/// Signals by name; whether there is a pose.
 pub struct Signals(pub Vec<(&'static str, Of)>, pub bool);
 
 impl Signals {
@@ -88,7 +88,7 @@ pub enum Numbers {
 }
 
 impl Numbers {
-    /// As a JSON object; shortest decimals that give the same bits. JSON has no NaN: a gauge that was not read is null.
+    /// Writes a JSON object with the shortest decimals that give the same bits. JSON has no NaN: a gauge without a reading is null.
     pub fn write(&self, keys: [&str; 6], text: &mut String) {
         text.push('{');
         for (k, key) in keys.into_iter().enumerate() {

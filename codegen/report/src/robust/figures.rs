@@ -1,4 +1,4 @@
-//! What came out, as text, JSON and CSV.
+//! Results of a study as text, JSON and CSV.
 
 use std::fmt::Write as _;
 
@@ -13,7 +13,7 @@ use specgen_language::table::{left, right, row};
 use specgen_studies::robust::quantiles::quantile;
 use specgen_studies::robust::{Deviation, Factor, Factors, Figures, Gate, LearningFigures, Member, Outcome};
 
-/// Quantiles of the draws that are shown, %; 100 is the largest.
+/// Quantiles of the random machines shown, %; 100 is the largest.
 const QUANTILES: [f64; 4] = [5.0, 50.0, 95.0, 100.0];
 
 /// One figure of a run.
@@ -23,7 +23,7 @@ struct Row {
     of: fn(&Figures) -> f64,
     /// Whether a study has it.
     shown: fn(&Work) -> bool,
-    /// Whether its worst run is shown.
+    /// Whether to show its worst run.
     judged: bool,
 }
 
@@ -47,24 +47,24 @@ const ROWS: [Row; 7] = [
     figure("angles, nrad rms", "orientation_nrad", |f| f.orientation_nrad, PLATFORM, true),
     figure("angles, nrad peak", "orientation_peak_nrad", |f| f.orientation_peak_nrad, PLATFORM, false),
     figure("at a limit, % of ticks", "limited_percent", |f| f.limited_percent, ALWAYS, false),
-    figure("with a fault, ticks", "fault_ticks", |f| f.fault_ticks as f64, ALWAYS, false),
+    figure("ticks with a fault", "fault_ticks", |f| f.fault_ticks as f64, ALWAYS, false),
     figure("learned, nm rms", "learned_nm", learned_nm, LEARNED, true),
 ];
 
-/// Of a machine that learned.
+/// Error after learning.
 fn learned_nm(figures: &Figures) -> f64 {
     figures.learned.map_or(f64::INFINITY, |learned| learned.error_nm)
 }
 
-/// What a study worked on, and what its machines did.
+/// A study and its results.
 #[derive(Clone, Copy)]
-pub struct Found<'a> {
+pub struct StudyResult<'a> {
     pub work: &'a Work,
     pub gate: &'a Gate,
     pub reasons: &'a [String],
-    /// Whether it is one machine that was named.
+    /// Whether it is a single named machine.
     pub alone: bool,
-    /// Machines that were asked for.
+    /// Number of requested machines.
     pub planned: usize,
     pub runs: &'a [(Member, Outcome)],
 }
@@ -81,17 +81,17 @@ pub struct Report<'a> {
     factors: &'a Factors,
     planned: usize,
     diverged: usize,
-    /// Of the machines that kept the bound, all of which follow the same path.
+    /// The measured part of the path, which is the same for all machines within the bound.
     #[serde(flatten)]
     coverage: Option<Coverage>,
     table: Vec<Line<'a>>,
     gate: Judgement<'a>,
     runs: Vec<Run<'a>>,
     #[serde(skip)]
-    found: Found<'a>,
+    found: StudyResult<'a>,
 }
 
-/// A figure over all machines; none where one of them diverged, or there are none.
+/// A figure over all machines; `None` if one of them diverged, or there are none.
 #[derive(Serialize)]
 struct Line<'a> {
     figure: &'static str,
@@ -101,7 +101,7 @@ struct Line<'a> {
     worst: Option<Worst<'a>>,
     #[serde(skip)]
     row: &'static Row,
-    /// Machines behind nominal, drawn and corners.
+    /// Machines behind the columns: nominal, random, corners.
     #[serde(skip)]
     counts: [usize; 3],
 }
@@ -134,7 +134,7 @@ struct Run<'a> {
     outcome: &'a Outcome,
 }
 
-impl<'a> Found<'a> {
+impl<'a> StudyResult<'a> {
     pub fn report(self) -> Report<'a> {
         Report {
             name: &self.work.name,
@@ -155,12 +155,12 @@ impl<'a> Found<'a> {
         }
     }
 
-    /// Errors of the draws in their order, and of the corners, and what is left where they learned; diverged ones are left out.
+    /// Errors of the random machines in ascending order, of the corners, and errors after learning; without diverged runs.
     pub fn charts(&self) -> Vec<Chart> {
         let mut charts = vec![self.chart("error of each machine", |figures| Some(figures.error_nm))];
         if self.work.learning.is_some() {
             let learned = |figures: &Figures| figures.learned.map(|learned| learned.error_nm);
-            charts.push(self.chart("the same, learned", learned));
+            charts.push(self.chart("after learning", learned));
         }
         charts
     }
@@ -204,7 +204,7 @@ impl<'a> Found<'a> {
         }
     }
 
-    /// The run with the largest figure, diverged ones before all, the first of equals.
+    /// The run with the largest figure: a diverged one, if any; else the first of the largest.
     fn worst(&self, row: &Row) -> Option<&'a (Member, Outcome)> {
         let key = |run: &(Member, Outcome)| run.1.figures().map_or(f64::INFINITY, row.of);
         let mut worst: Option<&(Member, Outcome)> = None;
@@ -216,7 +216,7 @@ impl<'a> Found<'a> {
         worst
     }
 
-    /// The command that runs one member alone.
+    /// The command that runs a single member.
     fn replay(&self, member: &Member) -> String {
         let Work { spec, options, .. } = self.work;
         shell::line("specgen robust").path(spec).words("--replay").word(&member.name).words(options.trim_start()).into()
@@ -232,8 +232,9 @@ impl<'a> Found<'a> {
                 }
                 let _ = write!(out, ", over {}", f.coverage.brief());
                 if let Some(LearningFigures { error_nm, passes, grew, coverage }) = f.learned {
-                    let _ = write!(out, ", {error_nm:.2} nm learned in {passes} passes over {}", coverage.brief());
-                    out.push_str(if grew { ", then it grew" } else { "" });
+                    let _ =
+                        write!(out, ", {error_nm:.2} nm after learning from {passes} passes over {}", coverage.brief());
+                    out.push_str(if grew { ", then diverged" } else { "" });
                 }
                 if f.limited_percent > 0.0 {
                     let _ = write!(out, ", {:.2} % of ticks at a limit", f.limited_percent);
@@ -249,14 +250,14 @@ impl<'a> Found<'a> {
                     let _ = write!(out, " after {time:.4} s");
                 }
                 if *limited_percent > 0.0 {
-                    let _ = write!(out, ", a leg at its limit in {limited_percent:.1} % of the ticks before");
+                    let _ = write!(out, ", a leg at its limit in {limited_percent:.1} % of the preceding ticks");
                 }
                 out
             }
         }
     }
 
-    /// What the gate asks for.
+    /// Conditions of the gate.
     fn asked(&self) -> String {
         let mut parts = vec!["none diverged".to_owned()];
         let which = self.gate.quantile.map_or("largest".to_owned(), |percent| format!("{percent} % quantile of the"));
@@ -272,7 +273,7 @@ impl<'a> Found<'a> {
         parts.join(", ")
     }
 
-    /// One line per run: every figure and every factor in full digits.
+    /// One line per run: every figure and every factor with full precision.
     pub fn csv(&self) -> String {
         let mut out = "name,seed,drawn,diverged,diverged_at_s".to_owned();
         for row in self.rows() {
@@ -322,7 +323,7 @@ impl<'a> Found<'a> {
         out
     }
 
-    /// What was measured of the motion where machines learned: of the first that did, for all follow the same path.
+    /// The measured part of the motion on learning machines; that of the first, since all follow the same path.
     fn learned_over(&self) -> String {
         let learned = self.runs.iter().find_map(|(_, outcome)| outcome.figures()?.learned);
         learned.map_or_else(String::new, |learned| format!(", measured over {}", learned.coverage))
@@ -336,7 +337,7 @@ impl CommandOutcome for Report<'_> {
         // Writing to a String cannot fail, here and below.
         let _ = writeln!(
             out,
-            "{}: {} at {} Hz on {} machines, {drawn} of them drawn (seed {}){}",
+            "{}: {} at {} Hz on {} machines, {drawn} of them random (seed {}){}",
             self.name,
             self.trajectory,
             self.frequency,
@@ -345,16 +346,16 @@ impl CommandOutcome for Report<'_> {
             if self.noise { "" } else { ", without noise" },
         );
         if let Some(coverage) = &self.coverage {
-            let _ = writeln!(out, "each measured over {coverage}");
+            let _ = writeln!(out, "each run measured over {coverage}");
         }
         if let Some(Lessons { passes, band: [low, high] }) = found.work.learning {
             let over = found.learned_over();
-            let _ = writeln!(out, "learned from {passes} passes on each, {low:.1} to {high:.0} Hz{over}");
+            let _ = writeln!(out, "learning from {passes} passes on each, {low:.1} to {high:.0} Hz{over}");
         }
-        out.push_str("varied, as factors on the spec:\n");
+        out.push_str("varied, as factors on spec values:\n");
         for one in self.factors.iter() {
             let [low, high] = one.range;
-            let each = if one.factor.of_each_leg() { ", each leg on its own in a draw" } else { "" };
+            let each = if one.factor.of_each_leg() { ", independent for each leg of a random machine" } else { "" };
             let _ = writeln!(out, "  {:<12}{low:>7.3} to {high:<7.3}({}{each})", one.factor.name(), one.origin);
         }
         match found.runs {
@@ -364,7 +365,7 @@ impl CommandOutcome for Report<'_> {
             _ => self.figures(&mut out),
         }
         let bound = self.diverged_above_nm;
-        let _ = writeln!(out, "diverged, an error beyond {bound:.0} nm: {} of {}", self.diverged, self.runs.len());
+        let _ = writeln!(out, "diverged (error above {bound:.0} nm): {} of {}", self.diverged, self.runs.len());
         if self.gate.complete {
             if self.gate.reasons.is_empty() {
                 let _ = writeln!(out, "gate: passed ({})", found.asked());
@@ -381,7 +382,7 @@ impl Report<'_> {
     fn figures(&self, out: &mut String) {
         let columns =
             [left(24), right(10), right(11).behind(" |"), right(11), right(11), right(11), right(12).behind(" |")];
-        row(out, &columns, &[&"", &"nominal", &"5 %", &"50 %", &"95 %", &"max drawn", &"max corners"]);
+        row(out, &columns, &[&"", &"nominal", &"5 %", &"50 %", &"95 %", &"max random", &"max corners"]);
         for line in &self.table {
             let cell = |figure: Option<f64>, count: usize| match figure {
                 Some(figure) => format!("{figure:.2}"),
@@ -393,7 +394,7 @@ impl Report<'_> {
             let (nominal, corners) = (cell(line.nominal, nominal), cell(line.largest_of_corners, corners));
             row(out, &columns, &[&line.row.name, &nominal, &a, &b, &c, &d, &corners]);
         }
-        out.push_str("corners, all six legs alike:\n");
+        out.push_str("corners, with six equal legs:\n");
         // Writing to a String cannot fail, here and below.
         for run in self.runs.iter().filter(|run| !run.member.drawn) {
             let _ = writeln!(out, "  {:<18}{}", run.member.name, self.found.figures(run.outcome));
@@ -421,7 +422,7 @@ fn each(deviation: &Deviation, factor: Factor) -> [f64; 6] {
     })
 }
 
-/// The factors of a machine.
+/// Text of the factors of a machine.
 fn described(d: &Deviation) -> String {
     let mut out =
         format!("  mass {:.3}, damping {:.3}, noise {:.3}, delay {} ticks", d.mass, d.damping, d.noise, d.delay_ticks);

@@ -1,4 +1,4 @@
-//! What a study was asked to do, and a part of what it did, as a file.
+//! Definition of a study, and the file of a part of its results.
 
 use std::path::Path;
 
@@ -13,25 +13,25 @@ use specgen_language::output::write_file;
 use specgen_language::shell;
 use specgen_language::ui::Ui;
 use specgen_studies::robust::{Factors, Gate, Learning, Member, Outcome, Plan, Shard, shard};
-use specgen_studies::trajectory::Followed;
+use specgen_studies::trajectory::NamedTrajectory;
 use specgen_toolchain::sha256;
 
-/// Part of the stroke beyond which an error counts as diverged, unless asked otherwise.
+/// Default error above which a run has diverged, relative to the stroke.
 const BOUND: f64 = 0.05;
-/// What the file of a part says that it is.
+/// Format name in the file of a part.
 const FORMAT: &str = "specgen robust part";
 
-/// All that the report of a study depends on, but for its runs. Parts of one study have the same.
+/// Everything that the report of a study depends on except its runs. Parts of one study have the same.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Work {
     /// Version of specgen that ran it.
     pub(super) specgen: String,
-    /// The spec's file, as it was named.
+    /// The spec file, as given.
     pub(super) spec: String,
     /// Name of the platform.
     pub(super) name: String,
-    /// Of the spec and its records.
+    /// Digest of the spec and its records.
     pub(super) digest: String,
     /// Whether it has `[control]`.
     pub(super) platform: bool,
@@ -43,26 +43,26 @@ pub(super) struct Work {
     pub(super) noise: bool,
     /// SHA-256 of the parameters of the simulated leg.
     pub(super) plant: String,
-    /// Error beyond which a run has diverged, m.
+    /// Error above which a run has diverged, m.
     pub(super) bound: f64,
     pub(super) factors: Factors,
-    /// Of the gate, m.
+    /// Limit of the gate, m.
     pub(super) max_error: Option<f64>,
-    /// Of the gate, rad.
+    /// Limit of the gate, rad.
     pub(super) max_orientation: Option<f64>,
-    /// Of the gate, %.
+    /// Quantile of the gate, %.
     pub(super) quantile: Option<f64>,
-    /// How the machines learn, if they do.
+    /// Learning settings, if the machines learn.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) learning: Option<Lessons>,
-    /// Of the gate, m.
+    /// Limit of the gate after learning, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) max_learned: Option<f64>,
-    /// Options that were given and decide what a member is, each with a space before it.
+    /// Given options that affect a member, each preceded by a space.
     pub(super) options: String,
 }
 
-/// How machines learn.
+/// Learning settings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Lessons {
     pub(super) passes: u32,
@@ -71,12 +71,12 @@ pub(super) struct Lessons {
 }
 
 impl Work {
-    /// Of the options, else of the spec.
+    /// From the options, else from the spec.
     pub(super) fn of(
         options: &Options,
         path: &Path,
         compiled: &Compilation,
-        followed: &Followed,
+        followed: &NamedTrajectory,
         leg: &LegParameters,
         learning: Option<&Learning>,
     ) -> Result<Self, Failure> {
@@ -84,7 +84,7 @@ impl Work {
         let platform = compiled.model.task_space.is_some();
         if options.max_orientation.is_some() && !platform {
             return Err(Failure::Usage(
-                "--max-orientation is for a spec with [control]; legs with their own gauges have --max-error"
+                "--max-orientation needs a spec with [control]; use --max-error for legs with their own gauges"
                     .to_owned(),
             ));
         }
@@ -99,7 +99,7 @@ impl Work {
             seed: options.plant.seed,
             draws: options.draws,
             noise: !options.plant.no_noise,
-            // Numbers are printed so that they read back to the same bits.
+            // The printed numbers read back to the same bits.
             plant: sha256(format!("{leg:?}").as_bytes()),
             bound: options.diverged_above.unwrap_or(BOUND * compiled.model.actuator.stroke),
             factors: Factors::of(&compiled.model, &options.vary),
@@ -118,7 +118,7 @@ impl Work {
         Plan::new(&self.factors, self.draws, self.seed)
     }
 
-    /// What must not be exceeded. Of one machine alone there is one figure.
+    /// The limits. A single machine has only one figure.
     pub(super) fn gate(&self, alone: bool) -> Gate {
         Gate {
             error_nm: self.max_error.map(|error| error * 1e9),
@@ -129,7 +129,7 @@ impl Work {
     }
 }
 
-/// What a replay of a member has to be given as well.
+/// Options needed to replay a member.
 fn replay_options(options: &Options) -> String {
     let Options { vary, trajectory, frequency, plant, diverged_above, learn, .. } = options;
     let mut out = shell::line("");
@@ -160,27 +160,27 @@ fn replay_options(options: &Options) -> String {
     out.into()
 }
 
-/// A member and what became of it.
+/// A member and its outcome.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Ran {
+pub(super) struct MemberRun {
     member: Member,
     outcome: Outcome,
 }
 
-impl From<(Member, Outcome)> for Ran {
+impl From<(Member, Outcome)> for MemberRun {
     fn from((member, outcome): (Member, Outcome)) -> Self {
         Self { member, outcome }
     }
 }
 
-/// What `--shard` writes.
+/// The output of `--shard`.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Part {
     pub(super) shard: Shard,
-    /// Machines of all parts.
+    /// Number of machines in all parts.
     pub(super) planned: usize,
     pub(super) work: Work,
-    pub(super) runs: Vec<Ran>,
+    pub(super) runs: Vec<MemberRun>,
 }
 
 impl Part {
@@ -198,21 +198,21 @@ impl Part {
         Ok(())
     }
 
-    /// Of the text of a file; in words why not.
+    /// Parses the text of a file; returns a message if it is invalid.
     pub(super) fn read(text: &str) -> Result<Self, String> {
-        let document: Value = serde_json::from_str(text).map_err(|error| format!("is no JSON: {error}"))?;
+        let document: Value = serde_json::from_str(text).map_err(|error| format!("is not JSON: {error}"))?;
         if document["format"] != FORMAT {
             return Err("was not written by specgen robust --shard".to_owned());
         }
-        // The version first: another one may have other fields.
+        // Check the version first: another version may have other fields.
         let (version, ours) = (&document["work"]["specgen"], env!("CARGO_PKG_VERSION"));
         if version != ours {
             return Err(format!("was written by specgen {version}, this is {ours}; run all parts with one version"));
         }
-        serde_json::from_value(document).map_err(|error| format!("is not a whole part: {error}"))
+        serde_json::from_value(document).map_err(|error| format!("is not a complete part: {error}"))
     }
 
-    /// The first thing in which this part is of another study than `other`: what it is called, here and there.
+    /// The first difference between the study of this part and that of `other`: name, value here and there.
     pub(super) fn differs(&self, other: &Self) -> Option<(String, Value, Value)> {
         let fields = |part: &Self| match json!(part.work) {
             Value::Object(fields) => fields,
@@ -227,12 +227,12 @@ impl Part {
     }
 
     pub(super) fn named(self, name: String) -> shard::Part {
-        let runs = self.runs.into_iter().map(|Ran { member, outcome }| (member, outcome)).collect();
+        let runs = self.runs.into_iter().map(|MemberRun { member, outcome }| (member, outcome)).collect();
         shard::Part { name, shard: self.shard, runs }
     }
 }
 
-/// A part that was written.
+/// A written part.
 #[derive(Serialize)]
 struct PartFile {
     file: String,

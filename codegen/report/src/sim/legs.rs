@@ -1,4 +1,4 @@
-//! `specgen sim` of a spec without `[control]`: a sweep of its own legs with every law that it gives weights for, or the
+//! `specgen sim` for a spec without `[control]`: a sweep of its own legs with every law that has weights in the spec, or the
 //! paper's leg experiment, Tables 1 and 2.
 
 use std::fmt::Write as _;
@@ -24,16 +24,16 @@ use specgen_studies::machine::{self, run_failure};
 use specgen_studies::paper::printed;
 use specgen_studies::runs::{judge, modes};
 
-/// Control ticks per period of the paper's trajectory, unless asked otherwise.
+/// Default number of control ticks per period of the paper's trajectory.
 const SAMPLES: u32 = 500;
-/// Part of the range of a leg that a sweep leaves free at either end.
+/// Share of a leg's range that a sweep leaves free at each end.
 const ROOM: f64 = 0.1;
 /// Periods of a sweep; the first is not scored.
 const PERIODS: f64 = 3.0;
-/// An error of this part of the range is no tracking any more.
+/// An error above this share of the range counts as not tracking.
 const LOST: f64 = 0.1;
 
-/// Refuses options that are for a platform alone, and an interval at which the laws are unstable.
+/// Refuses options for platforms only, and an interval at which the laws are unstable.
 pub(super) fn check(options: &Options, compiled: &Compilation) -> Result<(), Failure> {
     if options.trajectory.is_some()
         || options.latency != 0
@@ -41,7 +41,7 @@ pub(super) fn check(options: &Options, compiled: &Compilation) -> Result<(), Fai
         || (options.paper && options.frequency.is_some())
     {
         return Err(Failure::Usage(
-            "--trajectory, --latency, --small-steps and the paper's --frequency are for a platform that six gauges see; this spec has no [control]".to_owned(),
+            "--trajectory, --latency, --small-steps and the paper's --frequency need a platform with pose gauges; this spec has no [control]".to_owned(),
         ));
     }
     if options.record.is_some() {
@@ -55,7 +55,7 @@ pub(super) fn check(options: &Options, compiled: &Compilation) -> Result<(), Fai
     options.frequencies().iter().try_for_each(|hertz| judge(compiled, *hertz, samples))
 }
 
-/// What a sweep goes over: nearly all that the stack moves and the gauge sees, m.
+/// Range of a sweep, m: nearly the full range of stack and gauge.
 fn range(model: &Model) -> [f64; 2] {
     let [sees_low, sees_high] = model.sensor.range;
     let low = if sees_low > 0.0 { sees_low } else { 0.0 };
@@ -64,7 +64,7 @@ fn range(model: &Model) -> [f64; 2] {
     [low + room, high - room]
 }
 
-/// Tracking of the spec's own legs: the shape of their hysteresis is that of the plant file, all else the spec's.
+/// Tracking of the spec's own legs; the shape of their hysteresis comes from the plant file, everything else from the spec.
 fn own(
     options: &Options,
     compiled: &Compilation,
@@ -103,7 +103,7 @@ fn own(
     ];
     write_files(options, files, traces, ui)?;
     let range = range(model);
-    let below = format!("a sweep from {:.1} to {:.1} µm, target less gauge", range[0] * 1e6, range[1] * 1e6);
+    let below = format!("a sweep from {:.1} to {:.1} µm, target minus gauge", range[0] * 1e6, range[1] * 1e6);
     let plot = options.plot.charts(&compiled.ir.name, &below, &charts)?;
     ui.result(&Own { name: &compiled.ir.name, digest: &compiled.ir.digest, range, tracking: table, plot });
     Ok(())
@@ -115,7 +115,7 @@ pub fn chart(tracking: &Tracking, title: &str) -> Chart {
     for leg in 0..6 {
         let errors: Vec<f64> =
             tracking.samples.iter().map(|sample| 1e9 * (sample.target[leg] - sample.measured[leg])).collect();
-        // There are four colours.
+        // There are only four colours.
         let mark = if leg < 4 { LINE } else { DASHED };
         chart = chart.over_time(&format!("leg {leg}"), mark, [tracking.interval; 2], &errors);
     }
@@ -128,10 +128,10 @@ struct Own<'a> {
     #[serde(skip)]
     name: &'a str,
     digest: &'a str,
-    /// Of the sweep, m.
+    /// Range of the sweep, m.
     range: [f64; 2],
     tracking: TrackingTable,
-    /// The line about it.
+    /// The line about the plot.
     #[serde(skip)]
     plot: Option<String>,
 }
@@ -140,12 +140,13 @@ impl Outcome for Own<'_> {
     fn text(&self) -> String {
         let [low, high] = self.range.map(|metres| metres * 1e6);
         let name = self.name;
-        let mut out = format!("{name}: six legs of the spec, swept from {low:.1} to {high:.1} µm, target less gauge\n");
+        let mut out =
+            format!("{name}: six legs of the spec, swept from {low:.1} to {high:.1} µm, target minus gauge\n");
         out += &self.tracking.to_text();
         for row in &self.tracking.rows {
             if row.rmse_nm > LOST * 1e3 * (high - low) {
                 let (mode, hertz) = (&row.mode, row.frequency_hz);
-                out += &format!("{mode} at {hertz} Hz does not follow: {:.1} µm rms\n", row.rmse_nm / 1e3);
+                out += &format!("{mode} at {hertz} Hz does not track: {:.1} µm rms\n", row.rmse_nm / 1e3);
             }
         }
         out + self.plot.as_deref().unwrap_or_default()
@@ -167,7 +168,7 @@ pub(super) fn run(
     let samples = options.samples.unwrap_or(SAMPLES);
     let scenario = machine::legs(&compiled.model, &legs, &noise, options.plant.seed, samples);
     let modes = modes(&compiled.model.adaptation);
-    ui.progress("Table 2: every law that the spec gives weights for, at three frequencies");
+    ui.progress("Table 2: every law with weights in the spec, at three frequencies");
     let tracking = scenario.tracking(controller, &modes, &TRACKING_FREQUENCIES).map_err(run_failure)?;
     ui.progress("Table 1: inverse model alone at six frequencies");
     let linearity = scenario.linearity(controller, &LINEARITY_FREQUENCIES).map_err(run_failure)?;
@@ -196,7 +197,7 @@ pub(super) fn run(
     Ok(())
 }
 
-/// Errors over the frequency, ours and the paper's.
+/// Errors over frequency, ours and the paper's.
 fn paper_chart(tracking: &TrackingTable) -> Chart {
     let mut chart = Chart::new("", "Table 2", Axis::log("frequency", "Hz"), Axis::log("error", "nm rms"));
     for (color, (mode, paper)) in printed::TABLE_2.into_iter().enumerate() {
@@ -216,7 +217,7 @@ struct Tables<'a> {
     digest: &'a str,
     tracking: TrackingTable,
     linearity: LinearityTable,
-    /// The line about it.
+    /// The line about the plot.
     #[serde(skip)]
     plot: Option<String>,
 }
@@ -234,14 +235,14 @@ impl Outcome for Tables<'_> {
             });
             row(&mut out, &columns, &[&mode, &a, &b, &c]);
         }
-        // The same of every law.
+        // The measured part is the same for every law.
         let [a, b, c] = TRACKING_FREQUENCIES.map(|hertz| {
             let made = self.tracking.rows.iter().find(|row| row.frequency_hz == hertz);
             made.map_or("-".to_owned(), |row| row.coverage.brief())
         });
         row(&mut out, &columns, &[&"over", &a, &b, &c]);
         // Writing to a String cannot fail, here and below.
-        let _ = writeln!(out, "{name}: slope of Y on q̂, as a ratio to that at 0.1 Hz (paper's Table 1)");
+        let _ = writeln!(out, "{name}: slope of Y over q̂, relative to 0.1 Hz (paper's Table 1)");
         for (index, row) in self.linearity.rows.iter().enumerate() {
             let paper = printed::slope_ratio(index);
             let _ = writeln!(

@@ -1,8 +1,8 @@
-//! `specgen sim` of a spec with `[control]`, on the machine that it describes: at rest, waves of all axes, the spec's own
+//! `specgen sim` for a spec with `[control]`, on the machine that it describes: at rest, waves of all axes, the spec's own
 //! trajectories played on board; or the paper's Tables 5 to 9.
 //!
-//! The machine's legs are out of tolerance, each in its own way; the controller has the records that the spec names. With
-//! one nominal record for six legs the inverse model is then off by as much as the legs, and adaptation takes it up.
+//! The machine's legs deviate individually within their tolerances; the controller has the records named in the spec. With
+//! one nominal record for six legs the inverse model has the error of the legs, which adaptation compensates.
 
 use std::cell::RefCell;
 use std::fmt::Write as _;
@@ -27,14 +27,14 @@ use specgen_language::outcome::{Failure, Outcome, environment};
 use specgen_language::table::{left, right, row};
 use specgen_language::ui::Ui;
 use specgen_studies::machine::{self, run_failure};
-use specgen_studies::runs::{LEG_LIMITED, Played, selector};
+use specgen_studies::runs::{LEG_LIMITED, TrajectoryErrors, selector};
 
-/// How long the platform is looked at while it rests, s.
+/// Observation time at rest, s.
 const REST: f64 = 1.0;
-/// Periods of a wave, start and end included; no wave is shorter than so many seconds.
+/// Periods of a wave, including start and end, and its shortest duration, s.
 const PERIODS: f64 = 4.0;
 const SHORTEST: f64 = 0.2;
-/// Part of what all axes reach at once that a wave takes.
+/// Amplitude of a wave relative to the simultaneous reach of all axes.
 const WAVE: f64 = 0.9;
 /// The paper's free motions.
 const CASES: [(&str, PaperPath); 2] = [("case-1", PaperPath::Case1), ("case-2", PaperPath::Case2)];
@@ -42,17 +42,18 @@ const CASES: [(&str, PaperPath); 2] = [("case-1", PaperPath::Case1), ("case-2", 
 const MACHINING: [(&str, u32); 3] = [PLATFORM_MODES[0], PLATFORM_MODES[3], PLATFORM_MODES[6]];
 /// Frequency of the machining path, Hz.
 const MACHINING_FREQUENCY: f64 = 1.0;
-/// Refuses options that are for legs alone, and a trajectory that the spec does not have.
+/// Refuses options for legs only, and a trajectory that the spec does not have.
 pub(super) fn check(options: &Options, task: &TaskSpace) -> Result<(), Failure> {
     if options.samples.is_some() {
         return Err(Failure::Usage(
-            "--samples is for legs with their own gauges; a spec with [control] runs at its timing.period".to_owned(),
+            "--samples applies only to legs with their own gauges; a spec with [control] runs at its timing.period"
+                .to_owned(),
         ));
     }
     let Some(name) = &options.trajectory else { return Ok(()) };
     if options.frequency.is_some() {
         return Err(Failure::Usage(
-            "--frequency is for waves and the paper's cases; the spec gives the frequency of its own trajectories"
+            "--frequency applies to waves and the paper's cases; the spec's own trajectories have their own frequency"
                 .to_owned(),
         ));
     }
@@ -96,7 +97,7 @@ pub(super) fn run(
         None => experiment.motions(compiled, task, options.frequencies())?,
     };
     let Experiment { mut tables, traces, charts, refused, ended, limited, .. } = experiment;
-    let plot = options.plot.charts(&compiled.ir.name, "target less true pose", &charts)?;
+    let plot = options.plot.charts(&compiled.ir.name, "target minus true pose", &charts)?;
     let report = Report {
         name: &compiled.ir.name,
         mode: mode_name(task, compiled.model.adaptation.mode),
@@ -117,66 +118,66 @@ pub(super) fn run(
     ui.scored(&report, &ended)
 }
 
-/// The machine, and what was found on it.
+/// The machine and the results.
 #[derive(Serialize)]
 struct Report<'a> {
     #[serde(skip)]
     name: &'a str,
-    /// Of the spec, in words.
+    /// Mode of the spec, as text.
     #[serde(skip)]
     mode: String,
-    /// The line about it.
+    /// The line about the plot.
     #[serde(skip)]
     plot: Option<String>,
     digest: &'a str,
     seed: u64,
     noise: bool,
     latency_ticks: u32,
-    /// Records of reversal curves that the controller has.
+    /// Number of reversal-curve records of the controller.
     records: usize,
     #[serde(rename = "axial_stiffness_N_per_m")]
     axial_stiffness: [f64; 6],
     #[serde(rename = "leg_gain_um_per_V")]
     leg_gain: [f64; 6],
-    /// Runs whose set-points the controller refused, in words.
+    /// Runs with refused set-points, as text.
     refused: Vec<String>,
-    /// Runs in which a leg came to a limit, in words.
+    /// Runs in which a leg reached a limit, as text.
     limited: Vec<String>,
     #[serde(flatten)]
-    found: Found,
+    found: Results,
 }
 
 #[derive(Serialize)]
 #[serde(untagged)]
-enum Found {
+enum Results {
     Tables {
         free_motion: Vec<PoseRow>,
         machining: Vec<MachiningRow>,
         #[serde(skip)]
         text: String,
     },
-    /// The true pose against the target, a row a motion.
+    /// Errors of the true pose, one row per motion.
     Motions {
         motions: Vec<Motion>,
     },
-    Trajectory(Played),
+    Trajectory(TrajectoryErrors),
     /// The only run ended early.
     Nothing {},
 }
 
-/// A run of the platform's own motions.
+/// A run of a motion of the platform.
 #[derive(Serialize)]
 struct Motion {
     name: String,
     #[serde(flatten)]
     coverage: Coverage,
-    /// Root mean square error of x, y, z (nm) and of the angles (nrad).
+    /// Rms error of x, y, z (nm) and of the angles (nrad).
     rms_nano: [f64; 6],
-    /// Norm of those of x, y and z, nm.
+    /// Norm of the rms errors of x, y and z, nm.
     translation_nm: f64,
     /// Largest error of P_C, nm.
     peak_nm: f64,
-    /// Of z in a wave, m.
+    /// Amplitude of z in a wave, m.
     amplitude: Option<f64>,
 }
 
@@ -187,13 +188,14 @@ impl Outcome for Report<'_> {
             many => format!("{many} hysteresis records"),
         };
         let Self { name, mode, seed, .. } = self;
-        let mut out = format!("{name}, {mode}: a machine with legs ±10 %, stiffness ±5 % off (seed {seed});\n");
+        let mut out =
+            format!("{name}, {mode}: simulated machine with tolerances, legs ±10 %, stiffness ±5 % (seed {seed});\n");
         let _ = writeln!(out, "the controller has {records}");
         match &self.found {
-            Found::Tables { text, .. } => out += text,
-            Found::Motions { motions } => out += &table(motions),
-            Found::Trajectory(played) => out += &played.text(),
-            Found::Nothing {} => {}
+            Results::Tables { text, .. } => out += text,
+            Results::Motions { motions } => out += &table(motions),
+            Results::Trajectory(played) => out += &played.text(),
+            Results::Nothing {} => {}
         }
         for line in self.refused.iter().chain(&self.limited) {
             let _ = writeln!(out, "{line}");
@@ -202,12 +204,12 @@ impl Outcome for Report<'_> {
     }
 }
 
-/// A row a motion.
+/// One row per motion.
 fn table(motions: &[Motion]) -> String {
-    let mut out = "rms of target less true pose, nm and nrad; norm and peak of x, y, z\n".to_owned();
+    let mut out = "rms of target minus true pose, nm and nrad; norm and peak of x, y, z\n".to_owned();
     let mut columns = vec![left(16)];
     columns.resize(11, right(8));
-    row(&mut out, &columns, &[&"", &"x", &"y", &"z", &"norm", &"peak", &"θx", &"θy", &"θz", &"over s", &"path s"]);
+    row(&mut out, &columns, &[&"", &"x", &"y", &"z", &"norm", &"peak", &"θx", &"θy", &"θz", &"meas. s", &"path s"]);
     for Motion { name, coverage, rms_nano, translation_nm, peak_nm, .. } in motions {
         let [x, y, z, a, b, c] = rms_nano.map(short);
         let [over, path] = [coverage.seconds, coverage.path_seconds].map(|seconds| format!("{seconds:.3}"));
@@ -224,12 +226,12 @@ fn table(motions: &[Motion]) -> String {
     out
 }
 
-/// At most seven letters up to a metre.
+/// At most seven characters up to a metre.
 fn short(nano: f64) -> String {
     if nano < 999.0 { format!("{nano:.2}") } else { format!("{nano:.0}") }
 }
 
-/// The mode of the spec, such as `P/F pcc`.
+/// Name of the spec's mode, such as `P/F pcc`.
 fn mode_name(task: &TaskSpace, adaptation: AdaptationMode) -> String {
     let adaptation = match adaptation {
         AdaptationMode::Invhys => "invhys",
@@ -243,7 +245,7 @@ fn mode_name(task: &TaskSpace, adaptation: AdaptationMode) -> String {
     }
 }
 
-/// The platform at its zero.
+/// The platform at its zero pose.
 struct Rest;
 
 impl PoseTrajectory for Rest {
@@ -266,14 +268,14 @@ struct Experiment<'a> {
     traces: Vec<File>,
     charts: Vec<Chart>,
     refused: Vec<String>,
-    /// Names of runs that did not come to the end of their path.
+    /// Names of runs that did not complete their path.
     ended: Vec<String>,
     limited: Vec<String>,
 }
 
 impl Experiment<'_> {
     /// Tables 5 to 9.
-    fn tables(&mut self, frequencies: &[f64]) -> Result<Found, Failure> {
+    fn tables(&mut self, frequencies: &[f64]) -> Result<Results, Failure> {
         let mut free = PoseTable::default();
         for (name, path) in CASES {
             for &frequency in frequencies {
@@ -303,21 +305,21 @@ impl Experiment<'_> {
         self.tables.push(("free-motion.csv".to_owned(), free.to_csv().into_bytes()));
         self.tables.push(("machining.csv".to_owned(), machining.to_csv().into_bytes()));
         let text = format!(
-            "Tables 5 to 8, beside the paper's (its angles read as µrad)\n{}Table 9, machining at {MACHINING_FREQUENCY} Hz\n{}",
+            "Tables 5 to 8, with the paper's values (its angles interpreted as µrad)\n{}Table 9, machining at {MACHINING_FREQUENCY} Hz\n{}",
             free.to_text(),
             machining.to_text()
         );
-        Ok(Found::Tables { free_motion: free.rows, machining: machining.rows, text })
+        Ok(Results::Tables { free_motion: free.rows, machining: machining.rows, text })
     }
 
-    /// At rest, waves at `frequencies` (Hz), every trajectory of the spec; in the mode of the spec.
-    fn motions(&mut self, compiled: &Compilation, task: &TaskSpace, frequencies: &[f64]) -> Result<Found, Failure> {
+    /// At rest, waves at `frequencies` (Hz), and every trajectory of the spec, in the mode of the spec.
+    fn motions(&mut self, compiled: &Compilation, task: &TaskSpace, frequencies: &[f64]) -> Result<Results, Failure> {
         let mut motions = Vec::new();
         self.ui.progress("at rest");
         let run = self.scenario.run(self.controller, &Rest);
         motions.extend(self.keep("at rest", run)?.map(|run| motion("at rest", &run, None)));
         let period = compiled.model.timing.period;
-        // All axes at once, and every leg within its stroke.
+        // All axes at once, with every leg within its stroke.
         let share = WAVE * compiled.reach.as_ref().map_or(0.0, |reach| reach.share);
         for &frequency in frequencies {
             let name = format!("wave {frequency} Hz");
@@ -344,19 +346,19 @@ impl Experiment<'_> {
             motions.extend(self.keep(name, run)?.map(|run| motion(name, &run, None)));
         }
         self.tables.push(("motions.csv".to_owned(), csv(&motions).into_bytes()));
-        Ok(Found::Motions { motions })
+        Ok(Results::Motions { motions })
     }
 
     /// A trajectory of the spec, in the mode of the spec.
-    fn own(&mut self, name: &str, compiled: &Compilation, selector: u32) -> Result<Found, Failure> {
+    fn own(&mut self, name: &str, compiled: &Compilation, selector: u32) -> Result<Results, Failure> {
         self.ui.progress(&format!("playing {name} on board"));
-        let Some(path) = machine::on_board(compiled, selector) else { return Ok(Found::Nothing {}) };
+        let Some(path) = machine::on_board(compiled, selector) else { return Ok(Results::Nothing {}) };
         let run = self.scenario.play(self.controller, &path, None);
         let run = self.keep(&format!("trajectory-{name}"), run)?;
-        Ok(run.map_or(Found::Nothing {}, |run| Found::Trajectory(Played::of(name, &run.errors))))
+        Ok(run.map_or(Results::Nothing {}, |run| Results::Trajectory(TrajectoryErrors::of(name, &run.errors))))
     }
 
-    /// Samples of a run for its file; none, and a line about it, if it did not come to the end of its path.
+    /// Keeps the samples of a run for its file; `None`, with a note, if it did not complete its path.
     fn keep(&mut self, name: &str, run: Result<PlatformRun, RunError>) -> Result<Option<PlatformRun>, Failure> {
         let run = match run {
             Err(error @ (RunError::EndedEarly { .. } | RunError::NotEnded { .. })) => {
@@ -375,13 +377,13 @@ impl Experiment<'_> {
         let seen = status_words(run.status);
         if run.is_followed() {
             if run.status & LEG_LIMITED != 0 {
-                self.limited.push(format!("{name}: {seen}: at an end of stroke, voltage or slew rate"));
+                self.limited.push(format!("{name}: {seen}: at a limit of stroke, voltage or slew rate"));
             }
             return Ok(Some(run));
         }
         self.ended.push(name.to_owned());
         self.refused.push(format!(
-            "{name}: not scored: {seen}; the path leaves the workspace,\n  or moves faster than control.setpoint.stream_speed"
+            "{name}: not scored: {seen}; the path leaves the workspace\n  or exceeds control.setpoint.stream_speed"
         ));
         Ok(None)
     }
@@ -409,7 +411,7 @@ pub fn chart(name: &str, interval: f64, run: &PlatformRun) -> Chart {
     chart
 }
 
-/// A line a motion.
+/// One line per motion.
 fn csv(motions: &[Motion]) -> String {
     let mut out = String::from("motion,seconds,path_seconds,x_nm,y_nm,z_nm,rx_nrad,ry_nrad,rz_nrad,norm_nm,peak_nm\n");
     for Motion { name, coverage, rms_nano, translation_nm, peak_nm, .. } in motions {

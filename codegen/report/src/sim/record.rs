@@ -1,5 +1,5 @@
-//! `specgen sim --record`: a run under the supervisor with every tick recorded. The set-points come from the wave generator
-//! that the targets have.
+//! `specgen sim --record`: records every tick of a supervised run. The set-points come from the wave generator
+//! of the targets.
 
 use std::cell::RefCell;
 use std::io::BufWriter;
@@ -26,17 +26,17 @@ use specgen_language::output::{PendingFile, unwritten};
 use specgen_language::ui::Ui;
 use specgen_studies::machine;
 
-/// Blocks of the recorder, and words of each: a tenth of a second at 10 kHz.
+/// Number of blocks of the recorder, and words per block: a tenth of a second at 10 kHz.
 const BLOCKS: usize = 2;
 const BLOCK: usize = 1 << 15;
-/// Frequencies of the axes, Hz: none is a multiple of another.
+/// Frequencies of the axes, Hz; none is a multiple of another.
 const FREQUENCIES: [f64; 6] = [1.0, 1.3, 1.7, 2.1, 2.3, 2.9];
-/// Share of the room that an axis swings by: the third axis (z, or a leg), the others. The legs share their stroke.
+/// Amplitude of an axis relative to its free range: the third axis (z, or a leg), and the others. The legs share their stroke.
 const SHARES: [f64; 2] = [0.2, 0.03];
-/// Way to the bias pose, at most, s.
+/// Longest time to reach the bias pose, s.
 const ARMING: f64 = 60.0;
 
-/// A recording that was written.
+/// A written recording.
 #[derive(Serialize)]
 struct RecordFile {
     ticks: u64,
@@ -51,7 +51,7 @@ impl Outcome for RecordFile {
     fn text(&self) -> String {
         let (bytes, ticks) = (self.bytes as f64, self.ticks as f64);
         format!(
-            "wrote {ticks} ticks, {:.3} s, to {}: {:.1} MB, {:.0} bytes a tick\n",
+            "wrote {ticks} ticks, {:.3} s, to {}: {:.1} MB, {:.0} bytes per tick\n",
             self.seconds,
             self.file,
             bytes / 1e6,
@@ -72,7 +72,7 @@ pub(super) fn run(
     let ticks = (seconds / period).round();
     if !(1.0..1e9).contains(&ticks) {
         return Err(Failure::Usage(format!(
-            "--seconds {seconds} is {ticks} ticks of {period} s; expected 1 to 10^9 ticks"
+            "--seconds {seconds} gives {ticks} ticks of {period} s; expected 1 to 10^9 ticks"
         )));
     }
     let text = controller.text().to_owned();
@@ -82,7 +82,7 @@ pub(super) fn run(
         input: machine.input_names().len(),
         state: machine.state_words(),
     };
-    // A machine of long memory needs longer blocks.
+    // A machine with a large state needs longer blocks.
     let block = if BLOCK < 2 * layout.preamble() { 2 * layout.preamble() } else { BLOCK };
     let mut memory = vec![0; BLOCKS * block];
     let mut recorder = Recorder::new(&mut memory, BLOCKS, layout)
@@ -99,7 +99,7 @@ pub(super) fn run(
         None => legs(options, compiled, &mut recorded, wave, seconds),
     };
     let ended = match (recorded.ended().is_some(), ran) {
-        // It ended the run by itself, and says why.
+        // If the recorder ended the run itself, it reports why.
         (true, _) | (false, Ok(())) => recorded.finish(),
         (false, Err(error)) => return Err(environment(error)),
     };
@@ -107,7 +107,7 @@ pub(super) fn run(
         RecordingEnd::Io(error) => unwritten(path, &error),
         RecordingEnd::Controller(error) => environment(error),
         RecordingEnd::Supervisor { tick, word } => {
-            Failure::Gate(format!("tick {tick}: instead of running the machine is {word}; nothing was written"))
+            Failure::Gate(format!("tick {tick}: the machine is {word} instead of running; nothing was written"))
         }
     })?;
     let file = writer.finish().map_err(|error| unwritten(path, &error))?;
@@ -119,8 +119,8 @@ pub(super) fn run(
     Ok(())
 }
 
-/// A wave of all axes, each at its frequency (Hz), within the limits of the spec; smaller where it would be too fast. `shares`:
-/// of the room, of the third axis and of the others. With the amplitude of the third axis, m.
+/// A wave of all axes, each at its own frequency (Hz), within the limits of the spec; reduced where it would be too fast. `shares`:
+/// amplitudes relative to the free range, for the third axis and for the others. Also returns the amplitude of the third axis, m.
 pub(super) fn wave(
     compiled: &Compilation,
     ticks: i32,
@@ -143,10 +143,10 @@ pub(super) fn wave(
             }
         }
         None => {
-            // Where the gauge sees the leg and the stack moves it; the bounds of set-points are wider than both.
+            // Limited by gauge and stack; the bounds of set-points are wider than both.
             let high = compiled.model.actuator.stroke.min(ir.bounds.sensor[1]).min(ir.bounds.leg[1]);
             let low = ir.bounds.sensor[0].max(ir.bounds.leg[0]);
-            // A leg follows no faster than its amplifier lets it; what accelerates it is not limited by the spec.
+            // The amplifier limits the speed of a leg; the spec does not limit its acceleration.
             let rate = compiled.model.actuator.slew_rate * compiled.model.actuator.leg_gain();
             Limits {
                 low: [low; 6],
@@ -182,7 +182,7 @@ pub(super) fn wave(
         share /= 2.0;
     }
     Err(Failure::Gate(
-        "no wave fits between the bias pose and the limits of the workspace and of streams; widen control.setpoint.stream_speed".to_owned(),
+        "no wave fits within the limits of workspace and stream speed around the bias pose; increase control.setpoint.stream_speed".to_owned(),
     ))
 }
 
@@ -228,7 +228,7 @@ fn legs(
         .map(|_| ())
 }
 
-/// A wave as a trajectory that is asked once a tick.
+/// A wave as a trajectory, evaluated once per tick.
 pub(super) struct WavePath {
     pub(super) wave: RefCell<Wave<f64>>,
     pub(super) seconds: f64,

@@ -1,35 +1,35 @@
-//! A run as it is drawn: path and error of each coordinate, and where its corners are.
+//! Plots of a run: path and error of each coordinate, and the corners of the path.
 
 use host_sim::coverage::Coverage;
 
 use crate::chart::{Axis, BLUE, Chart, DASHED, INK, LINE, Note, WIDE};
 use crate::section::{Group, Multiples, Part};
 
-/// A run as it is drawn: axis by axis, or leg by leg.
+/// A run to plot, per axis or per leg.
 #[derive(Debug, Clone)]
 pub struct PlottedRun<'a> {
-    /// Name on the page.
+    /// Identifier on the page.
     pub id: String,
-    /// What was followed, and how fast.
+    /// Trajectory and speed.
     pub what: String,
     /// Control mode.
     pub law: &'a str,
-    /// Of the coordinates.
+    /// Names of the coordinates.
     pub names: [&'a str; 6],
-    /// How many of them are lengths; the others are angles.
+    /// Number of coordinates that are lengths; the others are angles.
     pub lengths: usize,
     /// Control interval, s.
     pub interval: f64,
-    /// How much of the path the samples are.
+    /// The measured part of the path.
     pub coverage: Coverage,
-    /// Target and what was reached, m and rad, tick by tick.
+    /// Target and actual value, m and rad, tick by tick.
     pub samples: Vec<[[f64; 6]; 2]>,
-    /// What a corner of the path is called.
+    /// Label for a corner of the path.
     pub corner: &'a str,
 }
 
 impl PlottedRun<'_> {
-    /// rms of the error over all coordinates and ticks, nm.
+    /// Rms error over all coordinates and ticks, nm.
     #[must_use]
     pub fn rms_nano(&self) -> f64 {
         let square =
@@ -38,7 +38,7 @@ impl PlottedRun<'_> {
     }
 }
 
-/// What a section shows of a run.
+/// Content of a section about a run.
 #[must_use]
 pub fn pane(run: &PlottedRun) -> Vec<Part> {
     let of = |axis: usize| -> Vec<f64> {
@@ -117,10 +117,10 @@ pub fn pane(run: &PlottedRun) -> Vec<Part> {
         Some([-round, round])
     };
     let groups = error_groups(run.lengths == 3, range);
-    let follows = if at_corner { "; the peak follows a corner of the path" } else { "" };
+    let follows = if at_corner { "; the peak is after a corner of the path" } else { "" };
     vec![
         Part::Lead(format!(
-            "With {} {} stays within {}\u{2009}nm of {what}, {}\u{2009}nm rms over {}{follows}.",
+            "With {}, {} stays within {}\u{2009}nm of {what}, {}\u{2009}nm rms over {}{follows}.",
             run.law,
             run.names[worst],
             short(peak[worst]),
@@ -131,7 +131,7 @@ pub fn pane(run: &PlottedRun) -> Vec<Part> {
     ]
 }
 
-/// Three digits.
+/// Formats with three digits.
 #[must_use]
 pub fn short(value: f64) -> String {
     let size = value.abs();
@@ -144,7 +144,7 @@ pub fn short(value: f64) -> String {
     }
 }
 
-/// The next of 1, 2, 3, 4, 6, 8 times a power of ten.
+/// Rounds up to 1, 2, 3, 4, 6 or 8 times a power of ten.
 #[must_use]
 pub(crate) fn round_up(value: f64) -> f64 {
     if value <= 0.0 || !value.is_finite() {
@@ -154,7 +154,7 @@ pub(crate) fn round_up(value: f64) -> f64 {
     [1.0, 1.2, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0].iter().map(|k| k * decade).find(|v| *v >= value).unwrap_or(10.0 * decade)
 }
 
-/// Times at which the path turns at once, s: its second difference is far above what is usual. The three sharpest.
+/// Times of the three sharpest corners of the path, s, where its second difference is far above the usual.
 fn bends(samples: &[[[f64; 6]; 2]], interval: f64) -> Vec<f64> {
     let mut found: Vec<(f64, f64)> = Vec::new();
     for axis in 0..6 {
@@ -185,7 +185,7 @@ fn bends(samples: &[[[f64; 6]; 2]], interval: f64) -> Vec<f64> {
     times
 }
 
-/// Small multiples of errors: of a pose (`axes`), lengths apart from angles, or of six legs. `range`: that of some of them.
+/// Groups of small error charts, for a pose (`axes`) with lengths and angles separate, or for six legs. `range`: that of some of them.
 pub(crate) fn error_groups(axes: bool, range: impl Fn(core::ops::Range<usize>) -> Option<[f64; 2]>) -> Vec<Group> {
     let group = |title: &str, items: Vec<usize>, of| Group { title: title.to_owned(), items, range: range(of) };
     if axes {
@@ -203,7 +203,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn scales_are_round_and_hold_their_values() {
+    fn scales_are_round_and_contain_their_values() {
         for value in [0.3, 1.0, 1.21, 172.0, 610.0, 9.9] {
             assert!(round_up(value) >= value && round_up(value) <= 1.7 * value, "{value}");
         }

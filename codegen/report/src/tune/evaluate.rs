@@ -1,4 +1,4 @@
-//! `specgen tune --evaluate`: scores of candidates that someone else proposes.
+//! `specgen tune --evaluate`: scores candidates proposed by another program.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -16,7 +16,7 @@ use specgen_studies::machine::run_failure;
 use specgen_studies::tuning::search::{Verdict, evaluate};
 use specgen_studies::tuning::{self, Evaluation, Setting, Space};
 
-/// The candidates of a file; every name and number is looked at before any is run.
+/// The candidates in a file; all names and numbers are checked before any is run.
 pub(super) fn read(file: &Path, space: &Space) -> Result<Vec<Setting>, Failure> {
     let shown = file.display();
     let text = read_text(file)?;
@@ -29,26 +29,26 @@ pub(super) fn read(file: &Path, space: &Space) -> Result<Vec<Setting>, Failure> 
     asked.iter().enumerate().map(one).collect()
 }
 
-/// A number that candidates may have.
+/// A parameter of candidates.
 #[derive(Serialize)]
 struct Parameter {
     name: String,
     bounds: [f64; 2],
-    /// As in the spec.
+    /// Value in the spec.
     spec: f64,
 }
 
-/// A candidate as it was run: rounded to the digits that a spec would have.
+/// A candidate as run: rounded to the digits of a spec.
 #[derive(Serialize)]
 struct Candidate {
     values: BTreeMap<String, f64>,
-    /// What a search makes least, µm s²; none for what is rejected.
+    /// Cost minimised by a search, µm s²; `None` for a rejected candidate.
     cost: Option<f64>,
     verdict: Verdict,
 }
 
 #[derive(Serialize)]
-struct Evaluated<'a> {
+struct EvaluationReport<'a> {
     name: &'a str,
     digest: &'a str,
     seed: u64,
@@ -72,7 +72,7 @@ pub(super) fn run(job: &Job, asked: &[Setting], ui: &Ui) -> Result<(), Failure> 
         let settings: Vec<&Setting> = asked.iter().collect();
         let verdicts = evaluate(&settings, &job.feasibility, &case, &mut workers, interrupt::heed());
         for (setting, verdict) in asked.iter().zip(verdicts) {
-            // A list that lacks some is not what was asked for.
+            // An incomplete list is not a valid result.
             let Some(verdict) = verdict else { return Err(Failure::interrupted()) };
             let verdict = verdict.map_err(run_failure)?;
             let cost = match verdict {
@@ -87,7 +87,7 @@ pub(super) fn run(job: &Job, asked: &[Setting], ui: &Ui) -> Result<(), Failure> 
         bounds: one.bounds,
         spec: job.space.value(&own, one.role),
     });
-    ui.result(&Evaluated {
+    ui.result(&EvaluationReport {
         name: &job.compiled.ir.name,
         digest: &job.compiled.ir.digest,
         seed: job.options.plant.seed,
@@ -98,7 +98,7 @@ pub(super) fn run(job: &Job, asked: &[Setting], ui: &Ui) -> Result<(), Failure> 
     Ok(())
 }
 
-impl Outcome for Evaluated<'_> {
+impl Outcome for EvaluationReport<'_> {
     fn text(&self) -> String {
         let mut text = String::new();
         // Writing to a String cannot fail, here and below.
@@ -106,8 +106,8 @@ impl Outcome for Evaluated<'_> {
             let _ = writeln!(text, "{name:<8} {low:.3e} to {high:.3e}, {spec:.3e} in the spec");
         }
         for (index, Candidate { verdict, .. }) in self.candidates.iter().enumerate() {
-            let said = match verdict {
-                Verdict::Unstable => "unstable, or without the margins".to_owned(),
+            let score = match verdict {
+                Verdict::Unstable => "unstable, or margins not met".to_owned(),
                 Verdict::Run(Evaluation::Limited { time, .. }) => format!("at a limit after {time:.4} s"),
                 Verdict::Run(Evaluation::Scored(score)) => format!(
                     "cost {:.5} µm s², {:.2} nm rms, {:.2} nrad rms, effort {:.2} nm over {}",
@@ -118,7 +118,7 @@ impl Outcome for Evaluated<'_> {
                     score.coverage.brief()
                 ),
             };
-            let _ = writeln!(text, "candidate {index}: {said}");
+            let _ = writeln!(text, "candidate {index}: {score}");
         }
         text
     }

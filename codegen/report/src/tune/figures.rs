@@ -1,4 +1,4 @@
-//! What tuning found, as text and as JSON.
+//! Results of tuning as text and as JSON.
 
 use std::fmt::Write as _;
 
@@ -21,12 +21,12 @@ use specgen_studies::tuning::{self, Candidate, Case, Evaluation, Score, Search, 
 /// Axes in messages.
 const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
 
-/// One setting with what it does on both cases.
+/// A setting and its results on both conditions.
 #[derive(Serialize)]
 struct Row {
     name: &'static str,
     setting: Setting,
-    /// Whether it has the margins that are asked for.
+    /// Whether it meets the required margins.
     holds_margins: bool,
     tuned_on: Evaluation,
     scored_on: Evaluation,
@@ -43,13 +43,13 @@ struct Margins {
 struct Parameter {
     name: String,
     bounds: [f64; 2],
-    /// Of the result, in the unit of the bounds.
+    /// Value in the result, in the unit of the bounds.
     #[serde(skip)]
     value: Option<f64>,
 }
 
 #[derive(Serialize)]
-struct Searched<'a> {
+struct SearchReport<'a> {
     optimiser: &'static str,
     evaluations: usize,
     runs: usize,
@@ -68,21 +68,21 @@ pub(super) struct Report<'a> {
     relay: &'a Option<[Option<Ultimate>; 6]>,
     settings: Vec<Row>,
     margins: Margins,
-    searches: Vec<Searched<'a>>,
+    searches: Vec<SearchReport<'a>>,
     patch: &'a str,
-    /// It has task space.
+    /// Whether the spec has task space.
     #[serde(skip)]
     is_platform: bool,
-    /// Of a simulated run, s.
+    /// Duration of a simulated run, s.
     #[serde(skip)]
     seconds: f64,
-    /// The patch is not in the spec: it is shown.
+    /// The patch is shown because it was not written into the spec.
     #[serde(skip)]
     pub(super) with_patch: bool,
 }
 
 impl<'a> Report<'a> {
-    #[expect(clippy::too_many_arguments, reason = "everything that was found, once")]
+    #[expect(clippy::too_many_arguments, reason = "called once with all results")]
     pub(super) fn of(
         job: &'a Job,
         case: &Case,
@@ -110,7 +110,7 @@ impl<'a> Report<'a> {
             bounds: p.bounds,
             value: result.map(|setting| job.space.value(&setting, p.role)),
         };
-        let searched = |(optimiser, search): &'a (&'static str, Search)| Searched {
+        let searched = |(optimiser, search): &'a (&'static str, Search)| SearchReport {
             optimiser,
             evaluations: search.evaluations,
             runs: search.runs,
@@ -135,12 +135,12 @@ impl<'a> Report<'a> {
         })
     }
 
-    /// Scores on what was tuned on, by name.
+    /// Scores on the tuning conditions, by name.
     pub(super) fn marks(&self) -> Vec<(&str, Score)> {
         self.settings.iter().filter_map(|row| Some((row.name, *row.tuned_on.score()?))).collect()
     }
 
-    /// How the searches went, and what the relay found.
+    /// Results of the searches and of the relay test.
     fn head(&self, text: &mut String) {
         for search in &self.searches {
             let (unstable, limited) =
@@ -148,7 +148,7 @@ impl<'a> Report<'a> {
             // Writing to a String cannot fail, here and below.
             let _ = writeln!(
                 text,
-                "{}: {} candidates, {} simulated ({:.0} s of machine time), {unstable} unstable or without the margins, {limited} at a limit; best cost {}",
+                "{}: {} candidates, {} simulated ({:.0} s of machine time), {unstable} unstable or below the margins, {limited} at a limit; best cost {}",
                 search.optimiser,
                 search.evaluations,
                 search.runs,
@@ -157,7 +157,7 @@ impl<'a> Report<'a> {
             );
         }
         if let Some(ultimate) = self.relay {
-            text.push_str("relay with the notch in:");
+            text.push_str("relay test with notch:");
             for (axis, found) in AXES.iter().zip(ultimate) {
                 let _ = match found {
                     Some(u) => write!(text, "  {axis} {:.2} K at {:.0} Hz", u.gain, 1.0 / u.period),
@@ -176,7 +176,7 @@ impl<'a> Report<'a> {
         };
         let (tuned, other) = (over(|row| &row.tuned_on), over(|row| &row.scored_on));
         row(text, &two, &[&"rms", &format_args!("tuned on{tuned}"), &format_args!("not tuned on{other}")]);
-        // The columns of a score, and the first three of them again.
+        // Columns of a score; its first three columns again.
         let tuned = format!("{:>9}{:>9}{:>9}{:>9}{:>8}", "nm", "nrad", "peak nm", "effort", "cost");
         let other = format!("{:>9}{:>9}{:>9}{:>7}", "nm", "nrad", "peak nm", "");
         row(text, &two, &[&"", &tuned, &other]);
@@ -200,16 +200,16 @@ impl<'a> Report<'a> {
             row(text, &two, &[&format_args!("{}{mark}", one.name), &tuned, &other]);
         }
         if self.settings.iter().any(|one| !one.holds_margins) {
-            text.push_str("* without the margins that are asked for\n");
+            text.push_str("* does not meet the required margins\n");
         }
     }
 
-    /// Margins and numbers of the result.
+    /// Margins and parameters of the result.
     fn tail(&self, text: &mut String) {
         let or = |value: Option<f64>, none: &str| value.map_or(none.to_owned(), |value| format!("{value:.2}"));
         let Margins { gain, phase_degrees, delay_ticks } = self.margins;
         let delay =
-            if self.is_platform { format!("{} ticks", or(delay_ticks, "> 5")) } else { "not looked at".to_owned() };
+            if self.is_platform { format!("{} ticks", or(delay_ticks, "> 5")) } else { "not checked".to_owned() };
         let _ = writeln!(
             text,
             "margins of the result: gain × {}, phase {}°, delay {delay}",
@@ -223,7 +223,7 @@ impl<'a> Report<'a> {
         }
         text.push('\n');
         if self.is_platform {
-            text.push_str("(kp, ki, kv over the stiffness of their axis)\n");
+            text.push_str("(kp, ki, kv relative to the stiffness of their axis)\n");
         }
     }
 }
@@ -242,7 +242,7 @@ impl Outcome for Report<'_> {
     }
 }
 
-/// Margins of the spec's own mode.
+/// Margins in the spec's own mode.
 fn margins_of(job: &Job, tuned: &Compilation) -> Margins {
     let model = &tuned.model;
     let adapting = match model.adaptation.mode {

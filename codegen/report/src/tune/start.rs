@@ -1,4 +1,4 @@
-//! Where a search begins: the spec's own numbers, and those of Ziegler and Nichols after a relay test.
+//! Starting points of a search: the spec's own parameters, and those of Ziegler and Nichols from a relay test.
 
 use host_sim::platform::rig::Noise;
 
@@ -13,33 +13,33 @@ use specgen_studies::tuning::relay::{self, Ultimate};
 use specgen_studies::tuning::space::{Role, rounded};
 use specgen_studies::tuning::{Case, Evaluation, Score, Setting};
 
-/// One step of making a start smaller until it holds, and how many there are.
+/// Factor per reduction of a start until it meets the margins, and the largest number of reductions.
 const SHRINK: f64 = 0.85;
 const SHRINKS: u32 = 40;
 
-/// What the search begins with.
+/// Starting points.
 pub(super) struct Starts {
-    /// What the spec gives, or the compiler chose.
+    /// The values from the spec or chosen by the compiler.
     own: Setting,
-    /// Ziegler and Nichols as found, and what became of it.
+    /// Ziegler and Nichols, before any reduction.
     ziegler_nichols: Option<Setting>,
     /// K_u and T_u by axis.
     pub(super) ultimate: Option<[Option<Ultimate>; 6]>,
-    /// Starts made smaller until they hold, with their scores.
+    /// Starts reduced until they meet the margins, with scores.
     scored: Vec<(Setting, Score)>,
     pub(super) best: Setting,
     pub(super) score: Score,
 }
 
 impl Starts {
-    /// Settings for the report, by name: as they are, even where they do not hold the margins.
+    /// Settings for the report, by name: unreduced, even if they do not meet the margins.
     pub(super) fn rows(&self) -> Vec<(&'static str, Setting)> {
         let mut rows = vec![("spec", self.own)];
         rows.extend(self.ziegler_nichols.map(|setting| ("Ziegler-Nichols", setting)));
         rows
     }
 
-    /// Settings that hold the margins.
+    /// Settings that meet the margins.
     pub(super) fn feasible(&self) -> impl Iterator<Item = &Setting> {
         self.scored.iter().map(|(setting, _)| setting)
     }
@@ -69,7 +69,7 @@ pub(super) fn starts(job: &Job, case: &Case, own: Setting, ui: &Ui) -> Result<St
     Ok(Starts { own, ziegler_nichols, ultimate, scored, best, score })
 }
 
-/// The start with its tuned numbers made smaller until it holds, within the bounds.
+/// The start with its tuned parameters reduced, within the bounds, until it meets the margins.
 fn shrunk(job: &Job, start: Setting) -> Option<Setting> {
     let mut setting = job.space.setting(&job.space.genes(&start));
     for _ in 0..=SHRINKS {
@@ -94,7 +94,7 @@ fn relay_test(job: &Job, ui: &Ui) -> Result<Option<[Option<Ultimate>; 6]>, Failu
     else {
         return Ok(None);
     };
-    ui.progress("relay feedback test, axis by axis, with the notch in");
+    ui.progress("relay feedback test of each axis, with the notch");
     let model = &job.compiled.model;
     let seed = job.options.plant.seed;
     let specimen = machine::specimen(model, task, &job.leg, Some(seed));
@@ -102,13 +102,13 @@ fn relay_test(job: &Job, ui: &Ui) -> Result<Option<[Option<Ultimate>; 6]>, Failu
     scenario.options.latency = job.options.latency as usize;
     let radius = model.geometry.joint_radius();
     let lead = job.compiled.design.as_ref().map_or(0.0, |design| design.lead) / model.timing.period;
-    // Active damping is P/F's.
+    // Only P/F has active damping.
     let active_damping = closed_loop.active_damping.filter(|_| !job.space.alone);
     let closed_loop = ClosedLoop { active_damping, ..closed_loop.as_ref().clone() };
     relay::test(&scenario, &job.controller, &closed_loop, [radius, lead]).map(Some).map_err(run_failure)
 }
 
-/// PI gains of the relay test in place of the spec's; none if an axis did not oscillate.
+/// PI gains of the relay test instead of the spec's; `None` if an axis did not oscillate.
 fn of_relay(job: &Job, own: Setting, found: &[Option<Ultimate>; 6]) -> Option<Setting> {
     let Setting::Platform { combined, position, period } = own else { return None };
     let stiffness = job.space.stiffness();
@@ -134,9 +134,9 @@ fn no_start(job: &Job, limited: Option<(f64, u32)>) -> Failure {
             spans,
             &["actuator.voltage"],
             codes::TUNE_LIMITED,
-            format!("at {time:.4} s of the trajectory the first stable numbers meet a limit (status {status:#x})"),
-            "try another --trajectory or a lower --frequency; bits 0 to 5 are legs at a limit, 8 to 13 gauges, 16 and 17 \
-             set-points refused or stale"
+            format!("at {time:.4} s of the trajectory the first stable setting reaches a limit (status {status:#x})"),
+            "try another --trajectory or a lower --frequency; bits 0 to 5 are legs at a limit, 8 to 13 implausible gauges, 16 and 17 \
+             refused or stale set-points"
                 .to_owned(),
         )
     } else {
@@ -146,11 +146,11 @@ fn no_start(job: &Job, limited: Option<(f64, u32)>) -> Failure {
             &keys,
             codes::TUNE_NO_START,
             format!(
-                "no numbers within the bounds were found that are stable with a gain margin of {} and {} ticks of delay",
+                "no setting within the bounds is stable with a gain margin of {} and {} ticks of delay",
                 options.gain_margin, options.delay_margin
             ),
-            "ask for less (--gain-margin 1.5, --delay-margin 0), or let --bounds reach lower; `specgen check` shows the \
-             margins of the spec as it is"
+            "require smaller margins (--gain-margin 1.5, --delay-margin 0) or lower --bounds; `specgen check --details` shows the \
+             margins of the unchanged spec"
                 .to_owned(),
         )
     };
