@@ -38,11 +38,14 @@ const BANNED: [&str; 16] = [
 ];
 
 /// Folders whose Rust sources are free of [`BANNED`] words in comments and in texts.
-const PLAIN: [&str; 11] = [
+const PLAIN: [&str; 14] = [
     "codegen/compiler/src",
     "codegen/identify/src",
     "codegen/language/src",
     "codegen/numerics/src",
+    "codegen/report/src",
+    "codegen/studies/src",
+    "codegen/toolchain/src",
     "firmware/board/src",
     "firmware/law/src",
     "firmware/link/src",
@@ -59,7 +62,7 @@ const BANNED_TYPES: [&str; 40] = [
     "Said", "Seen", "Shown", "Told", "Tried", "Wanted",
 ];
 /// Folders that [`BANNED_TYPES`] does not cover yet: their parts are moving to other crates.
-const MOVING: [&str; 4] = ["codegen/cli", "codegen/operate", "codegen/report", "codegen/studies"];
+const MOVING: [&str; 2] = ["codegen/cli", "codegen/operate"];
 
 /// Texts of the Markdown files below a folder, by path from the repository.
 fn markdown(folder: &Path, found: &mut Vec<(String, String)>) {

@@ -65,7 +65,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["sim", "reference.toml", "--samples", "100"], "runs at its timing.period"),
         (
             &["sim", "reference.toml", "--trajectory", "case-3"],
-            "the spec has case-1, case-2, machining, but not `case-3`",
+            "the spec has no trajectory `case-3`, only case-1, case-2, machining",
         ),
         (
             &["sim", "reference.toml", "--trajectory", "case-1", "--frequency", "2"],
@@ -75,8 +75,8 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["tune", "legs.toml", "--bounds", "level"], "expected GROUP=LOW:HIGH such as ki=10:1000, found `level`"),
         (&["tune", "legs.toml", "--gain-margin", "0.5"], "expected a factor from 1 to 20, found `0.5`"),
         (&["tune", "legs.toml", "--seconds", "nan"], "expected a time from 0.01 to 1000 s, found `nan`"),
-        (&["tune", "legs.toml", "--trajectory", "case-1"], "--trajectory leg is for six legs"),
-        (&["tune", "legs.toml", "--latency", "1"], "--latency is for a spec with [control]"),
+        (&["tune", "legs.toml", "--trajectory", "case-1"], "--trajectory leg needs six legs"),
+        (&["tune", "legs.toml", "--latency", "1"], "--latency needs a spec with [control]"),
         (&["pil"], "<SPEC>"),
         (&["pil", "legs.toml", "--scenario", "case-1"], "its one scenario is the leg trajectory"),
         (&["pil", "legs.toml", "--mode", "pf-pcc"], "expected one of invhys, ewma, pcc"),

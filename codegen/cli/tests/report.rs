@@ -289,7 +289,7 @@ fn a_recorded_run_stands_beside_the_simulation_of_its_commands() {
             "the simulation of the same commands gives",
             "late ticks",
             "at a limit",
-            "equal over",
+            "identical over",
             "id=\"errors\"",
             "id=\"spectra\"",
             "id=\"noise\"",

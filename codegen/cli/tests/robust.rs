@@ -154,7 +154,7 @@ fn what_cannot_be_run_is_refused_with_a_fix_and_nothing_is_written() {
         ("legs.toml", &["--vary", "colour=5%"], "expected one of mass"),
         ("legs.toml", &["--max-error", "-1 nm"], "in the form \"<number> nm\""),
         ("legs.toml", &["--max-error", "1 urad"], "in the form \"<number> nm\""),
-        ("legs.toml", &["--max-orientation", "1 urad"], "is for a spec with [control]"),
+        ("legs.toml", &["--max-orientation", "1 urad"], "needs a spec with [control]"),
         ("legs.toml", &["--quantile", "101"], "up to 100"),
         ("legs.toml", &["--trajectory", "case-1"], "choose one of leg, multisine"),
         ("reference.toml", &["--trajectory", "leg"], "choose one of case-1, case-2, machining, multisine"),
@@ -241,7 +241,7 @@ fn parts_that_do_not_fit_are_refused_by_name() {
     with(
         "\"draws\": 7",
         "\"draws\": 8",
-        "`other.json` and `part-1-3.json` belong to different studies: draws is 8 and 7",
+        "`other.json` and `part-1-3.json` belong to different studies: draws is 8 here, 7 there",
     );
     with("\"frequency\": 20.0", "\"frequency\": 21.0", "frequency is 21.0 here");
     with("\"noise\": true", "\"noise\": false", "noise is false here");
@@ -261,7 +261,7 @@ fn parts_that_do_not_fit_are_refused_by_name() {
     let error = value["runs"][0]["outcome"]["ran"]["error_nm"].as_f64().unwrap();
     changed["runs"][0]["outcome"]["ran"]["error_nm"] = Value::from(error.next_up());
     folder.write("other.json", changed.to_string());
-    refused(&[one, two, "other.json", three], 1, "are both part 2 of 3 and differ");
+    refused(&[one, two, "other.json", three], 1, "are both part 2 of 3 but differ");
     changed = value;
     changed["runs"].as_array_mut().unwrap().pop();
     folder.write("other.json", changed.to_string());

@@ -41,7 +41,7 @@ const NO_LINES: [&str; 10] = [
     "rt-pc {version}, controller of `{name}`, digest {digest}\\n",
     "apt-get cannot be run: {error}",
     "apt-get would have to remove {}",
-    "apt-get refuses: {}",
+    "apt-get failed: {}",
     "cargo install probe-rs-tools --locked",
 ];
 /// Lines with a constant of the program, not of the user, in braces.

@@ -36,11 +36,11 @@ struct InverseResidual {
     rms: f64,
 }
 
-/// Loops of each leg, what the inverse model leaves of them on the trajectory of the spec, and what feedback leaves.
-/// `lowest`: voltage at which legs rest, V.
-///
 /// Loops of each leg, the residual of the inverse model on the trajectory of the spec, and the error with feedback.
 /// `lowest`: voltage at which legs rest, V.
+///
+/// # Errors
+/// As [`PlatformScenario::run`].
 #[allow(clippy::too_many_arguments)]
 pub fn of_platform(
     machine: &PlatformScenario,

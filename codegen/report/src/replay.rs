@@ -237,9 +237,9 @@ impl Outcome for Report {
         let event = |out: &mut String, tick: u64, what: &str| {
             row(out, &columns, &[&tick, &format_args!("{:.4}", tick as f64 * self.period), &what]);
         };
-        for PhaseAt { tick, amplifiers_on, stands, .. } in self.phases.iter().take(SHOWN) {
+        for PhaseAt { tick, amplifiers_on, stands: phase, .. } in self.phases.iter().take(SHOWN) {
             let on = if *amplifiers_on { "on" } else { "off" };
-            event(&mut out, *tick, &format!("{stands}, amplifiers {on}"));
+            event(&mut out, *tick, &format!("{phase}, amplifiers {on}"));
         }
         let more = self.phases.len().saturating_sub(SHOWN);
         if more > 0 {

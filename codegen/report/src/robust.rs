@@ -143,7 +143,7 @@ pub fn merge(parts: &[impl AsRef<Path>], output: Option<&Path>, plot: &Plot, ui:
             && let Some((what, here, there)) = part.differs(other)
         {
             return Err(Failure::Gate(format!(
-                "`{name}` and `{first}` belong to different studies: {what} is {here} and {there}"
+                "`{name}` and `{first}` belong to different studies: {what} is {here} here, {there} there"
             )));
         }
         read.push((name, part));

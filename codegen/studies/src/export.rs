@@ -228,23 +228,23 @@ fn identifier(name: &str) -> String {
 const DECLARATIONS: &str = "\
 /* Interface version of the library; must equal SPECGEN_ABI_VERSION. */
 uint32_t specgen_abi_version(void);
-/* Lines `key=value` in UTF-8 about the library, not ended by a zero. */
+/* Description of the library: UTF-8 lines `key=value`, not zero-terminated. */
 void specgen_describe(const uint8_t **text, size_t *length);
 size_t specgen_machine_bytes(void);
 
-/* Settings of the spec: SPECGEN_CONFIG_WORDS words. */
+/* The spec's settings: SPECGEN_CONFIG_WORDS words. */
 void specgen_config_default(uint64_t *words);
-/* 0, or one more than the index of the first word that is out of range; `config` is then as it was. */
+/* Returns 0, or 1 plus the index of the first word out of range; then `config` is unchanged. */
 int32_t specgen_config_check(const uint64_t *words);
 int32_t specgen_config_load(specgen_config *config, const uint64_t *words);
 
-/* A tick under the supervisor, which decides about amplifiers and codes: SPECGEN_MACHINE_INPUT_WORDS words in,
-   SPECGEN_MACHINE_OUTPUT_WORDS out. A request is taken when it begins to be given. One machine is stepped by one thread at a time. */
+/* A supervised tick; the supervisor controls amplifiers and codes: SPECGEN_MACHINE_INPUT_WORDS words in,
+   SPECGEN_MACHINE_OUTPUT_WORDS out. Requests are edge-triggered. Only one thread at a time may step a machine. */
 void specgen_machine_reset(specgen_machine *machine);
 void specgen_machine_step(const specgen_config *config, specgen_machine *machine, const uint64_t *input, uint64_t *output);
 uint64_t specgen_machine_digest(const specgen_machine *machine);
 
-/* The law alone, for simulators: SPECGEN_INPUT_WORDS in, SPECGEN_OUTPUT_WORDS out. Nothing watches over it. */
+/* The law alone, without supervision, for simulators: SPECGEN_INPUT_WORDS in, SPECGEN_OUTPUT_WORDS out. */
 void specgen_state_reset(specgen_state *state);
 void specgen_step(const specgen_config *config, specgen_state *state, const uint64_t *input, uint64_t *output);
 uint64_t specgen_state_digest(const specgen_state *state);

@@ -1,9 +1,9 @@
-// What is pressed. A control that cannot be used says why; what moves the machine from rest is pressed for a second.
+// Controls. A disabled control shows why; controls that move the machine from rest must be held for a second.
 const HELD = 1000;
 
 const by = id => document.getElementById(id);
 
-// Pressed for a second, by pointer or by key.
+// Held for a second, by pointer or key.
 function slow(button, act) {
   let since = null, frame = 0;
   const stop = () => { since = null; cancelAnimationFrame(frame); button.style.setProperty("--pressed", "0%"); };
@@ -20,7 +20,7 @@ function slow(button, act) {
   button.addEventListener("keyup", stop);
 }
 
-// Enabled, or not and why.
+// Enables a control, or disables it with a reason.
 function allow(button, why, text) {
   button.disabled = why !== "";
   button.title = why;
@@ -39,7 +39,7 @@ function choose(box, act) {
 
 const JOGS = [["+y", 2, 1, "y", 1], ["−x", 1, 2, "x", -1], ["+x", 3, 2, "x", 1], ["−y", 2, 3, "y", -1], ["+z", 5, 1, "z", 1], ["−z", 5, 3, "z", -1], ["−", 7, 1, "rx", -1], ["+", 9, 1, "rx", 1], ["−", 7, 2, "ry", -1], ["+", 9, 2, "ry", 1], ["−", 7, 3, "rz", -1], ["+", 9, 3, "rz", 1]];
 
-// One press, one step: of nm, or of the nrad that move the edge as far as is usual, ten a nm.
+// One step per press: in nm, or in nrad for an equal motion of the edge, ten per nm.
 function jog(box, act) {
   const buttons = JOGS.map(([text, column, row, axis, sign]) => {
     const button = html("button", box, text);
@@ -56,7 +56,7 @@ function jog(box, act) {
   return buttons;
 }
 
-// A factor from ×0.25 to ×8 on a log scale, the unstable part as a limit.
+// A factor from ×0.25 to ×8 on a log scale; the unstable part is marked as a limit.
 class Gain {
   constructor(svg, margin) {
     [this.svg, this.margin, this.factor] = [svg, margin, 1];

@@ -1,5 +1,5 @@
 "use strict";
-// What every figure is drawn with. No library.
+// Shared drawing code. No library.
 const SVG = "http://www.w3.org/2000/svg";
 
 function element(name, attributes, parent, text) {
@@ -18,7 +18,7 @@ function html(name, parent, text, kind) {
   return made;
 }
 
-// True minus, thin spaces between thousands.
+// True minus sign, thin spaces as thousands separators.
 function shown(text) {
   const [whole, part] = String(text).split(".");
   const size = whole.replace("-", "");
@@ -26,7 +26,7 @@ function shown(text) {
   return (whole.startsWith("-") ? "\u2212" : "") + grouped + (part === undefined ? "" : "." + part);
 }
 
-// With so many digits behind the point; nothing is never less than nothing.
+// With a fixed number of decimals; zero has no minus sign.
 function fixed(v, digits) { const text = v.toFixed(digits); return shown(Number(text) === 0 ? text.replace("-", "") : text); }
 
 function number(v) {
@@ -36,14 +36,14 @@ function number(v) {
   return shown(Number(v.toPrecision(4)));
 }
 
-// Values as they were written: even, scaled integers, or plain.
+// Decodes values: evenly spaced, scaled integers, or plain.
 function values(packed) {
   if (Array.isArray(packed)) return packed.map(v => (v === null ? NaN : v));
   if (packed.v) return packed.v.map(v => (v === null ? NaN : v * packed.k));
   return Array.from({ length: packed.n }, (_, k) => packed.a + packed.d * k);
 }
 
-// Places and texts on round numbers; on a log axis places are decades.
+// Ticks and labels at round numbers; on a log axis positions are decades.
 function ticks(low, high, log, wanted) {
   const list = [];
   if (log) {
@@ -70,7 +70,7 @@ function ticks(low, high, log, wanted) {
 
 function axisText(axis) { return axis.unit ? axis.label + ", " + axis.unit : axis.label; }
 
-// Places labels of a column so that none covers another; each is [y, text, class].
+// Places the labels of a column without overlap; each is [y, text, class].
 function apart(labels, step, low, high) {
   const sorted = labels.map(l => [...l]).sort((a, b) => a[0] - b[0]);
   for (let k = 1; k < sorted.length; k++) sorted[k][0] = Math.max(sorted[k][0], sorted[k - 1][0] + step);
@@ -81,7 +81,7 @@ function apart(labels, step, low, high) {
 
 function quoted(text) { return /[",\n]/.test(text) ? '"' + text.replace(/"/g, '""') + '"' : text; }
 
-// Light or dark, as the system has it until somebody chooses; gives what applies it anew.
+// Light or dark theme, as in the system until the user chooses; returns a function that applies it again.
 function themed(button) {
   const root = document.documentElement, dark = window.matchMedia("(prefers-color-scheme: dark)");
   let chosen = null;
@@ -92,7 +92,7 @@ function themed(button) {
   return apply;
 }
 
-// Says in the page how many errors there were: a page that hides one is worse than none.
+// Counts script errors in the page, so that tests can detect them.
 function counted() {
   const root = document.documentElement;
   let failed = 0;

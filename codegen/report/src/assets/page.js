@@ -10,7 +10,7 @@
   for (const figure of document.querySelectorAll("figure[data-view]")) add(View, figure, data[figure.dataset.view]);
   for (const place of document.querySelectorAll("[data-multiples]")) multiples(place, data[place.dataset.multiples]);
 
-  // Small figures of one scale; the chosen one is the large figure.
+  // Small charts with a common scale; the selected one is also shown large.
   function multiples(place, items) {
     const figures = [...place.querySelectorAll(".large figure")], small = [...place.querySelectorAll(".small figure")];
     let shown = [];
@@ -36,14 +36,14 @@
 
   const redraw = () => { for (const one of drawn) { delete one.figure.dataset.points; one.draw(); } };
 
-  // Segmented choices: each picks one value of a key; a pane is shown where all its keys are picked.
+  // Segmented choices: each selects a value of a key; a pane is visible if all its keys are selected.
   for (const box of document.querySelectorAll("[data-choices]")) {
     const groups = [...box.querySelectorAll(".choice[data-axis]")];
     const panes = [...box.querySelectorAll(".pane")].filter(pane => pane.closest("[data-choices]") === box);
     const set = () => {
       const wanted = groups.map(group => group.querySelector(".on").dataset.value);
       const exact = panes.find(pane => pane.dataset.value === wanted.join(" "));
-      // A combination that was not run: the first of the same group.
+      // If a combination was not run, use the first one of the same group.
       const pane = exact || panes.find(pane => pane.dataset.value.split(" ")[0] === wanted[0]);
       panes.forEach(one => { one.hidden = one !== pane; });
       pane.dataset.value.split(" ").forEach((value, k) => [...groups[k].children].forEach(button => {
@@ -73,7 +73,7 @@
     button.addEventListener("click", () => download(name + ".csv", [...table.rows].map(row => [...row.cells].map(cell => quoted(cell.textContent)).join(",")).join("\n") + "\n"));
   }
 
-  // The section that is read is marked above.
+  // Mark the current section in the header.
   const links = [...document.querySelectorAll(".top nav a")];
   const here = () => {
     let last = links[0];
@@ -85,12 +85,12 @@
   };
   window.addEventListener("scroll", here, { passive: true });
   here();
-  // What a phone would have to be moved sideways for, px.
+  // Horizontal overflow of the page, px.
   root.dataset.overflow = String(root.scrollWidth - root.clientWidth);
 
   let width = window.innerWidth;
   window.addEventListener("resize", () => { if (window.innerWidth !== width) { width = window.innerWidth; redraw(); } });
-  // Paper is white, and its figures are drawn at its width.
+  // Print on white, with figures drawn at the paper's width.
   window.addEventListener("beforeprint", () => { root.classList.remove("dark"); root.classList.add("print"); redraw(); });
   window.addEventListener("afterprint", () => { root.classList.remove("print"); apply(); redraw(); });
 })();

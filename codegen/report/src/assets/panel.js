@@ -1,4 +1,4 @@
-// The page: data from the socket to what draws it, buttons to commands. A number is never older than it looks.
+// The panel page: draws data from the socket and turns buttons into commands. A displayed number is never stale.
 (function () {
   counted();
   const root = document.documentElement, facts = JSON.parse(by("facts").textContent);
@@ -9,10 +9,10 @@
   let socket = null, state = null, left = null, ended = "", you = "", row = null, standing = null, arrived = -Infinity, measured = -Infinity, stated = -Infinity, sent = 0, asked = 0, answers = {};
   let wave = null, pending = null, gapped = 0, lastEvent = 0, pose = null, delay = 500;
 
-  // Platform: live, its motion drawn larger by a round factor.
+  // Live platform view, with motion magnified by a round factor.
   const reach = Math.max(...facts.view.base.map(p => Math.hypot(p[0], p[1])));
   facts.view.live = 0.12 * facts.view.height;
-  facts.view.label = "The platform of " + facts.name + " as it stands, its motion drawn larger.";
+  facts.view.label = "The platform of " + facts.name + ", live, with magnified motion.";
   const view = new View(by("view"), facts.view);
   const larger = 1000;
   by("larger").textContent = "×" + number(larger);
@@ -20,7 +20,7 @@
   by("device").textContent = facts.device;
   by("leg-note").textContent = "30\u2009s · limits " + number(facts.volts[0]) + " and " + number(facts.volts[1]) + "\u2009V";
 
-  // Rows of the readout.
+  // Rows of the readout table.
   const cells = NAMES.map((name, k) => {
     const tr = html("tr", document.querySelector("#readout tbody"));
     html("td", tr).innerHTML = k < 3 ? name : "θ<sub>" + name[1] + "</sub>";
@@ -44,7 +44,7 @@
 
   function say(what) { if (socket && socket.readyState === 1) socket.send(JSON.stringify(what)); else note("error", "Not sent: no link to the panel."); }
 
-  // A command with an answer; a refusal is an event of this page.
+  // A command with a reply; a refusal becomes an event on this page.
   function command(what, then) {
     const id = ++asked;
     answers[id] = then || (() => {});
@@ -85,7 +85,7 @@
       place += 24;
       for (let r = 0; r < rows; r++) {
         const values = new Float32Array(buffer, place + 8, 48), phase = at.getUint32(place + 4, true), status = at.getUint32(place, true);
-        // Where a gauge was not read or not believed the pose is an old one, and there is no error.
+        // If a gauge has no valid reading, the pose is an old one and there is no error.
         const read = !(status & GAUGES), law = phase === 2 && read, gap = samples.add(tick + r * every, every, law, values, 12);
         spectrum.add(every, gap || !law, values, 12);
         if (gap) missing(gap);
@@ -101,12 +101,12 @@
     wake();
   }
 
-  // A gap of this page is told apart from one of the machine: that is the panel's to say.
+  // A gap in this page's data, as opposed to the machine's: the panel reports which.
   function missing(ticks) {
     gapped += ticks;
     root.dataset.gaps = String((Number(root.dataset.gaps) || 0) + 1);
     if (missing.timer) return;
-    missing.timer = setTimeout(() => { missing.timer = null; note("note", "No data on this page for " + duration(gapped * facts.period) + ". The machine went on."); gapped = 0; }, 300);
+    missing.timer = setTimeout(() => { missing.timer = null; note("note", "No data on this page for " + duration(gapped * facts.period) + ". The machine kept running."); gapped = 0; }, 300);
   }
 
   // ── Events ──
@@ -126,7 +126,7 @@
     if (Date.now() - e.t < 2000 && !/late tick|No data/.test(e.text)) samples.mark(e.text.length > 28 ? e.text.slice(0, 27) + "…" : e.text, e.kind === "error");
   }
 
-  // ── Drawing: on what comes, at the display's next picture ──
+  // ── Drawing: on new data, in the next animation frame ──
   let woken = false;
   function wake() { if (!woken) { woken = true; requestAnimationFrame(() => { woken = false; draw(); }); } }
 
@@ -134,12 +134,12 @@
   function draw() {
     const now = performance.now(), live = row && now - arrived < STALE && !left;
     const bad = row ? row.status & GAUGES : GAUGES, read = live && !bad;
-    // What no gauge is read of is not known, whether outputs follow included.
+    // Without a gauge reading, pose and output tracking are unknown.
     const error = read ? NAMES.map((_, k) => row.values[13 + 3 * k]) : null, volts = live && bad !== GAUGES ? NAMES.map((_, k) => row.values[31 + 3 * k]) : null;
     root.dataset.measured = String(Boolean(read));
     by("view").classList.toggle("old", !read);
     by("pose-age").textContent = read ? "" : "not measured" + (isFinite(measured) ? " for " + duration((now - measured) / 1000) : "");
-    // First, for it asks how wide it is, which is known as long as nothing else has changed.
+    // First, because it reads the width, which must happen before other changes to the layout.
     if (standing && read && standing.every(isFinite)) {
       facts.view.pose = standing.map(v => v * larger);
       view.draw();
@@ -150,7 +150,7 @@
       heading(now);
     }
     strips.draw(NAMES, shown5.error);
-    // Over 30 s a pixel is longer than that.
+    // For 30 s and more, a pixel is longer than that.
     if (now - shown5.at >= DIGITS || !live) {
       Object.assign(shown5, { at: now, error, volts });
       legs.draw(volts);
@@ -175,7 +175,7 @@
   }
   const shown5 = { at: 0, error: null, volts: null };
 
-  // Digits stop at the noise.
+  // Show no digits below the noise.
   function shownDigits(error) {
     cells.forEach((cell, k) => {
       const law = row && row.phase === 2, places = k < 3 ? 4 : 3;
@@ -202,28 +202,28 @@
     chip.className = "chip" + (!known ? " none" : state.phase === "faulted" ? " bad" : "");
     chip.textContent = known ? state.phase : "–";
     if (!link) blank();
-    if (ended) put("error", "The panel has ended.", ended);
+    if (ended) put("error", "The panel was stopped.", ended);
     else if (!link) put("error", "No link to the panel.", "Use the hardware stop if the machine must stop.", state ? "" : "connecting");
-    else if (left) put("warning", "The page in control is gone.", "The machine holds" + (left.left > 0 ? ", and ramps down in " + left.left.toFixed(0) + "\u2009s" : " or is at rest") + ". Hold, Ramp down and Request control work from here.");
-    else if (age > STALE) put("error", "No data for " + (isFinite(age) ? duration(age / 1000) : "any time") + ".", "Readouts are blank until it comes.");
+    else if (left) put("warning", "The controlling page was closed.", "The machine holds" + (left.left > 0 ? ", and ramps down in " + left.left.toFixed(0) + "\u2009s" : " or is at rest") + ". Hold, Ramp down and Request control work from here.");
+    else if (age > STALE) put("error", "No data for " + (isFinite(age) ? duration(age / 1000) : "any time") + ".", "Readouts are blank until data arrive.");
     else if (state) {
       const said = state.said, watch = !state.mine && state.holder;
       let more = said.do;
-      if (state.phase === "running" && wave && state.wave) more = "Wave " + state.wave.name + " has the set-point.";
+      if (state.phase === "running" && wave && state.wave) more = "Wave " + state.wave.name + " controls the set-point.";
       else if (watch && said.kind !== "error") more = state.holder + " is in control. Hold and Ramp down work from here, too.";
       else if (!state.holder && said.kind !== "error") more = (more ? more + " " : "") + "Request control first.";
       if (state.asked && state.mine) put("warning", state.asked.by + " requests control.", "Hand over or keep control: " + state.asked.left.toFixed(0) + "\u2009s left.", said.code || events);
-      else put(said.kind, watch && said.kind === "ok" ? "You watch." : said.what, more, [row && row.status & GAUGES ? by("pose-age").textContent : "", said.code, events].filter(Boolean).join(" · ") || "no condition present");
+      else put(said.kind, watch && said.kind === "ok" ? "You are watching." : said.what, more, [row && row.status & GAUGES ? by("pose-age").textContent : "", said.code, events].filter(Boolean).join(" · ") || "no condition present");
     }
     const down = by("down").querySelector("span"), volts = shown5.volts ? Math.max(...shown5.volts.map(Math.abs)) : NaN;
     const time = facts.ramp && isFinite(volts) ? (volts / facts.ramp).toFixed(1) + "\u2009s to 0\u2009V" : "";
-    down.textContent = !link ? "No link: use the hardware stop" : state && !state.status.amplifiers_on && !left ? "at rest already" : (state && state.phase === "ramping down" ? "ramping down, " : "") + (time ? time + " · " : "") + "key Esc";
+    down.textContent = !link ? "No link: use the hardware stop" : state && !state.status.amplifiers_on && !left ? "already at rest" : (state && state.phase === "ramping down" ? "ramping down, " : "") + (time ? time + " · " : "") + "key Esc";
   }
 
-  // What the machine said last is of now.
+  // The last message of the machine is still current.
   const ticks = status => status && status.age !== null && status.age * 1000 < STALE;
 
-  // Without a link nothing is known of the machine: no figure of then stays.
+  // Without a link the state of the machine is unknown: clear all readouts.
   function blank() {
     for (const id of ["amplifiers", "mode", "holder", "pages", "link", "late", "record-note"]) by(id).textContent = "–";
     for (const id of ["reach", "record-room"]) by(id).textContent = "";
@@ -250,7 +250,7 @@
     const steps = ["disarmed", "arming", "holding", "running"], step = steps.indexOf(phase);
     [...by("steps").children].forEach((span, k) => { span.className = k === step ? "on" : k < step ? "past" : ""; });
     const held = ["running", "arming", "holding"].includes(phase);
-    allow(by("hold"), held ? "" : "not armed", "acts at once · key H");
+    allow(by("hold"), held ? "" : "not armed", "immediate · key H");
     allow(by("arm"), phase === "faulted" ? "acknowledge first" : phase !== "disarmed" ? "armed" : control, "press 1\u2009s");
     allow(by("run"), phase === "running" ? "running" : phase !== "holding" && phase !== "arming" ? "not armed" : control, "press 1\u2009s");
     allow(by("acknowledge"), phase !== "faulted" && status.cause !== 16 ? "no fault" : control, "press 1\u2009s");
@@ -258,36 +258,36 @@
     const events = known.standing && known.standing.health ? known.standing.health.events_in_words : null;
     by("stop").textContent = "Hardware stop: " + (events ? (events.includes("emergency stop") ? "pressed" : "not pressed") : "–") + ".";
     const busy = row && (row.status & 1 << 18), waving = wave && state.wave;
-    const move = phase !== "running" ? "not running" : control || (waving ? "the wave moves it" : "");
+    const move = phase !== "running" ? "not running" : control || (waving ? "moved by the wave" : "");
     by("move-note").textContent = move || "press, or arrow keys";
     moves.forEach(one => { one.disabled = move !== ""; one.title = move; });
-    by("bias").textContent = waving ? "Take from wave" : "Go to bias";
+    by("bias").textContent = waving ? "Stop wave" : "Go to bias";
     allow(by("bias"), phase !== "running" ? "not running" : control);
-    if (known.reach) by("reach").innerHTML = "Reach left, each alone, µm, µrad:<br>" + known.reach.limits.map(([low, high], k) => (k < 3 ? NAMES[k] : "θ<sub>" + NAMES[k][1] + "</sub>") + "\u2009" + number(Number(Math.max(0, Math.min(high - known.reach.from[k], known.reach.from[k] - low)).toPrecision(2)))).join(", ");
-    // Wave: what the panel started, and for how long it goes.
+    if (known.reach) by("reach").innerHTML = "Remaining reach of each axis alone, µm, µrad:<br>" + known.reach.limits.map(([low, high], k) => (k < 3 ? NAMES[k] : "θ<sub>" + NAMES[k][1] + "</sub>") + "\u2009" + number(Number(Math.max(0, Math.min(high - known.reach.from[k], known.reach.from[k] - low)).toPrecision(2)))).join(", ");
+    // The wave started by the panel, and its remaining time.
     if (!state.wave) wave = wave && wave.trajectory && busy ? wave : null;
     by("wave-name").textContent = chosen ? chosen.name : "";
-    by("wave-note").textContent = wave ? (wave.trajectory ? "playing" : "under way") : "not playing";
+    by("wave-note").textContent = wave ? (wave.trajectory ? "playing" : "running") : "not playing";
     const played = wave && wave.seconds && state.wave ? (samples.last - state.wave.tick) * facts.period / wave.seconds : 0;
     if (wave && wave.seconds && played >= 1) wave = null;
     by("wave-bar").style.width = Math.min(100, 100 * played) + "%";
     if (wave && wave.seconds) by("wave-note").textContent = (played * wave.seconds).toFixed(1) + " of " + number(wave.seconds) + "\u2009s";
     by("play").textContent = wave ? "Stop" : "Play";
-    allow(by("play"), control || (wave ? (wave.trajectory ? "a trajectory ends by itself; Hold stops it" : "") : phase !== "running" ? "not running" : chosen ? "" : "choose one first"));
+    allow(by("play"), control || (wave ? (wave.trajectory ? "the trajectory ends by itself; Hold stops it" : "") : phase !== "running" ? "not running" : chosen ? "" : "choose one first"));
     allow(by("choose"), "");
     // Recorder.
     const recorder = known.recorder;
     if (recorder) {
       by("record-room").textContent = shown(recorder.capacity) + " ticks";
       by("record-bar").style.width = Math.min(100, 100 * recorder.ticks / recorder.capacity) + "%";
-      by("record-note").textContent = recorder.running ? (recorder.triggered ? "after the trigger" : "waits for a fault") : recorder.triggered ? "complete: holds the trigger" : "stopped";
+      by("record-note").textContent = recorder.running ? (recorder.triggered ? "recording after the trigger" : "waiting for a fault") : recorder.triggered ? "complete, with trigger" : "stopped";
       by("record").textContent = recorder.running ? "Stop" : "Record";
     }
     allow(by("record"), recorder ? control : "no recorder");
-    allow(by("download"), !recorder ? "no recorder" : recorder.running ? "it records: stop it first" : control);
+    allow(by("download"), !recorder ? "no recorder" : recorder.running ? "recording: stop it first" : control);
     // Gain.
-    by("gain-note").textContent = "all axes; computed margin " + (facts.gain_margin ? "×" + number(Number(facts.gain_margin.toPrecision(3))) : "beyond what is looked at");
-    allow(by("apply"), control || (facts.gain_margin && gain.factor >= facts.gain_margin ? "unstable: beyond the computed margin" : state.busy ? "a command is under way" : ""));
+    by("gain-note").textContent = "all axes; computed margin " + (facts.gain_margin ? "×" + number(Number(facts.gain_margin.toPrecision(3))) : "above the searched range");
+    allow(by("apply"), control || (facts.gain_margin && gain.factor >= facts.gain_margin ? "unstable: above the computed margin" : state.busy ? "a command is running" : ""));
     checked(state.check, phase, control);
   }
 
@@ -296,8 +296,8 @@
     const runs = check && check.runs;
     by("check-bar").style.width = (check ? (check.runs ? 100 * check.done / 6 : check.verdict ? 100 : 0) : 0) + "%";
     by("check-note").textContent = runs ? "leg " + Math.min(check.done, 5) + " moves" : "";
-    allow(by("check-begin"), runs ? "under way" : phase !== "disarmed" ? "ramp down first" : control, "press 1\u2009s");
-    allow(by("check-end"), runs ? control : "not under way");
+    allow(by("check-begin"), runs ? "running" : phase !== "disarmed" ? "ramp down first" : control, "press 1\u2009s");
+    allow(by("check-end"), runs ? control : "not running");
     const verdict = check && check.verdict, text = JSON.stringify(verdict || null);
     if (checked.shown === text) return;
     checked.shown = text;
@@ -309,7 +309,7 @@
     html("span", line, verdict.what.charAt(0).toUpperCase() + verdict.what.slice(1) + (verdict.advice ? " Do: " + verdict.advice : ""));
   }
 
-  // ── What is pressed ──
+  // ── Buttons and keys ──
   const urgent = what => say({ do: what });
   by("down").addEventListener("click", () => urgent("ramp-down"));
   by("hold").addEventListener("click", () => urgent("hold"));
@@ -318,7 +318,7 @@
     if (e.ctrlKey || e.metaKey || e.altKey || e.repeat) return;
     if (e.key === "h" || e.key === "H") { urgent("hold"); return; }
     const arrow = { ArrowRight: ["x", 1], ArrowLeft: ["x", -1], ArrowUp: ["y", 1], ArrowDown: ["y", -1], PageUp: ["z", 1], PageDown: ["z", -1] }[e.key];
-    // In a figure that has the focus they turn it.
+    // In a focused figure the arrow keys rotate it.
     if (arrow && !moves[0].disabled && !e.target.closest("svg, input, dialog")) { e.preventDefault(); step(...arrow); }
   });
   let size = 100;
@@ -328,7 +328,7 @@
   choose(by("unit"), value => { strips.first = Number(value); strips.bound = 0; wake(); });
   choose(by("span"), value => { strips.span = Number(value); strips.bound = 0; spanNote(); wake(); });
   choose(axisBox, value => { spectrum.choose(Number(value)); spectra = 0; wake(); });
-  const spanNote = () => { by("strip-note").textContent = "line: mean, band: least and largest of " + duration(SPANS[strips.span] / BINS); };
+  const spanNote = () => { by("strip-note").textContent = "line: mean, band: minimum and maximum of " + duration(SPANS[strips.span] / BINS); };
   spanNote();
   for (const request of ["arm", "run", "acknowledge"]) slow(by(request), () => command({ do: "begin", request }));
   by("control").addEventListener("click", () => { if (!state) return; say({ do: state.mine ? (state.asked ? "grant-control" : "offer-control") : "request-control" }); });
@@ -340,7 +340,7 @@
   gain.changed = controls;
   by("apply").addEventListener("click", () => command({ do: "gain", factor: gain.factor }));
 
-  // What is played: a trajectory of the spec, or a wave from a file of this computer.
+  // Selection: a trajectory of the spec, or a wave from a local file.
   let chosen = null;
   const pick = what => { chosen = what; by("panel-choose").close(); controls(); };
   const list = by("choices");
@@ -369,7 +369,7 @@
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
   window.addEventListener("resize", again);
   again();
-  // What is stale must not wait for something to come.
+  // Stale data must be detected even if no more data arrive.
   setInterval(() => { if (performance.now() - arrived > STALE) draw(); }, 100);
   connect();
 })();

@@ -1,4 +1,4 @@
-// One pair of axes: drawn at the width that it has, zoomed by dragging, read by hovering, saved as CSV.
+// A chart with one pair of axes: drawn at its available width, zoomed by dragging, read by hovering, saved as CSV.
 const COLORS = ["--s1", "--s2", "--s3", "--s4", "--blue", "--ink", "--orange", "--edge"];
 
 class Plot {
@@ -17,7 +17,7 @@ class Plot {
       this.reset = html("button", tools, "Whole");
       this.reset.addEventListener("click", () => this.zoom(null));
       const csv = html("button", tools, "CSV", "csv");
-      csv.title = "the points of this figure";
+      csv.title = "points of this figure";
       csv.addEventListener("click", () => download(data.id + ".csv", this.csv()));
       if (!this.ends && named.length > 1) {
         this.bar = html("div", figure, "", "bar");
@@ -44,7 +44,7 @@ class Plot {
   seen() { return this.series.filter(s => !s.off); }
   place(v, axis) { return axis.log ? (v > 0 ? Math.log10(v) : NaN) : v; }
 
-  // Limits of x and y; without a window those of everything that is seen.
+  // Limits of x and y; without zoom, those of all visible data.
   limits() {
     const { x, y, y_limits } = this.data;
     const of = pick => {
@@ -122,12 +122,12 @@ class Plot {
   defs(x0, x1, y0, y1) {
     this.clip = "clip-" + this.data.id + (this.small ? "-s" : "-l") + (this.options.tag || "");
     const clip = element("clipPath", { id: this.clip }, this.svg);
-    // A dot at the edge is a whole one.
+    // Dots at the edge are not clipped.
     const room = this.data.series.every(s => s.style === "dots") ? 4 : 0;
     element("rect", { x: x0 - room, y: y1 - 1 - room, width: Math.max(x1 - x0, 1) + 2 * room, height: y0 - y1 + 2 + 2 * room }, clip);
   }
 
-  // Bands: what is usual, and what lies beyond a limit.
+  // Bands: the usual range, and the range beyond a limit.
   behind(notes, x0, x1, y0, y1) {
     for (const n of notes) {
       if (n.k === "band") {
@@ -143,7 +143,7 @@ class Plot {
     }
   }
 
-  // Causes, rings, segments and the labels on the right.
+  // Events, rings, segments and the labels on the right.
   before(notes, x0, x1, y0, y1) {
     const { svg, small } = this, labels = [];
     for (const n of notes) {
@@ -196,7 +196,7 @@ class Plot {
     if (small && this.data.short) element("text", { x: x1, y: 12, "text-anchor": "end", class: "strong halo" }, svg, this.data.short);
   }
 
-  // Length of a curve up and down, px: noise fills a band.
+  // Vertical length of a curve, px: noise fills a band.
   travel(s) {
     if (s.style !== "line") return 0;
     let sum = 0, last = NaN;
@@ -223,7 +223,7 @@ class Plot {
     return drawn;
   }
 
-  // Where bands overlap each is two lines, its lowest and its highest, so that all are seen.
+  // Where bands overlap, each is drawn as two lines, minimum and maximum, so that all are visible.
   outline(s, parent) {
     const step = Math.max(2, Math.ceil(s.x.length / (this.size[0] / 4)));
     let low = "", high = "", drawn = 0;
@@ -238,7 +238,7 @@ class Plot {
     return drawn;
   }
 
-  // Place of the pointer in the picture, held to the frame.
+  // Pointer position in the picture, clipped to the frame.
   at(event) {
     const box = this.svg.getBoundingClientRect(), [x0, x1] = this.span(0), [y0, y1] = this.span(1);
     const x = (event.clientX - box.left) / box.width * this.size[0], y = (event.clientY - box.top) / box.height * this.size[1];
@@ -262,7 +262,7 @@ class Plot {
       const size = [0, 1].map(k => Math.abs(to[k] - from[k]));
       if (size[0] < 6 && size[1] < 6) return;
       const sorted = (a, b) => (a < b ? [a, b] : [b, a]);
-      // A flat or a narrow box zooms the one axis that it marks.
+      // A narrow box zooms only along its long axis.
       this.zoom([0, 1].map(k => (size[k] < 6 ? this.range[k] : sorted(this.from(k, from[k]), this.from(k, to[k])))));
     });
     this.svg.addEventListener("pointercancel", () => { start = null; this.over.replaceChildren(); });

@@ -1,4 +1,4 @@
-// Rows on one axis: dots with a line, or bars that add up on a squared axis.
+// Rows on a common axis: dots with a line, or bars that add up on a squared axis.
 class Rows {
   constructor(figure, data) {
     this.figure = figure;

@@ -1,7 +1,7 @@
-// The spectrum of an error from the rows that came without a gap: Hann window, mean power in bands that are even in decades.
+// Spectrum of an error from consecutive rows: Hann window, mean power in logarithmic bands.
 const LENGTH = 4096, KEPT = 60;
 
-// In place; lengths are powers of two.
+// In-place FFT; lengths are powers of two.
 function transform(re, im) {
   const n = re.length;
   for (let i = 1, j = 0; i < n; i++) {
@@ -33,7 +33,7 @@ class Spectrum {
     this.power = this.window.reduce((sum, w) => sum + w * w, 0);
   }
 
-  // A row of `every` ticks, behind a gap of so many.
+  // Adds a row of `every` ticks after a gap of the given length.
   add(every, gap, values, at) {
     if (gap || every !== this.every) [this.whole, this.every, this.bands] = [0, every, every === this.every ? this.bands : null];
     for (let axis = 0; axis < 6; axis++) this.rows[axis * LENGTH + this.at] = values[at + 3 * axis + 1];
@@ -48,7 +48,7 @@ class Spectrum {
     this.plot = null;
   }
 
-  // Of the chosen axis; none as long as there are not enough rows.
+  // Spectrum of the selected axis; none until there are enough rows.
   density() {
     if (this.whole < LENGTH) return null;
     let mean = 0;
@@ -74,7 +74,7 @@ class Spectrum {
     }) };
   }
 
-  // The largest of each band in a minute.
+  // Maximum of each band in the last minute.
   largest(y, now) {
     const second = Math.floor(now / 1000), at = (second % KEPT) * y.length;
     if (second !== this.second) { this.second = second; this.kept.fill(0, at, at + y.length); }
@@ -86,7 +86,7 @@ class Spectrum {
     });
   }
 
-  // Two and a half decades.
+  // Range: two and a half decades.
   limits(most) { const top = Math.ceil(Math.log10(Math.max(...most, 1e-9)) * 2) / 2; return [Math.pow(10, top - 2.5), Math.pow(10, top)]; }
 
   draw(name, now) {
@@ -97,7 +97,7 @@ class Spectrum {
       const unit = this.axis < 3 ? "nm/√Hz" : "nrad/√Hz", top = found.x[found.x.length - 1], seen = this.modes.map((f, k) => [f, k + 1]).filter(([f]) => f < top);
       this.plot = new Plot(this.figure, { id: "spectrum", title: "error of " + name, label: "Spectrum of the error of " + name, x: { label: "frequency", unit: "Hz", log: true }, y: { label: "error of " + name, unit, log: true }, keys: false, height: Math.max(140, this.figure.clientHeight - 4),
         y_limits: this.limits(most), notes: [{ k: "modes", x: seen.map(([f]) => f), text: seen.map(([, k]) => String(k)) }],
-        series: [{ name: "60\u2009s most", style: "line", color: 7, x: found.x, y: most }, { name: "live", style: "line", color: 4, x: found.x, y: found.y }] });
+        series: [{ name: "60\u2009s maximum", style: "line", color: 7, x: found.x, y: most }, { name: "live", style: "line", color: 4, x: found.x, y: found.y }] });
     } else {
       [this.plot.series[0].y, this.plot.series[1].y] = [most, found.y];
       delete this.figure.dataset.points;

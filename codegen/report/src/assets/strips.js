@@ -1,4 +1,4 @@
-// What came over the link, kept as least, mean and largest of every pixel: a fixed amount of memory, however long it runs.
+// Data from the link, stored as minimum, mean and maximum per pixel in a fixed amount of memory.
 const SPANS = [5, 30, 300], BINS = 600, CHANNELS = 12;
 
 class Ring {
@@ -6,12 +6,12 @@ class Ring {
     this.seconds = seconds;
     this.ticks = Math.max(1, seconds / BINS / period);
     this.id = new Float64Array(BINS).fill(-1);
-    // Ticks of which there are voltages, and errors: where the law does not run there is none.
+    // Number of ticks with voltages, and with errors: without the law there are no errors.
     this.counts = [new Float32Array(BINS), new Float32Array(BINS)];
     [this.least, this.sum, this.most, this.square] = [0, 1, 2, 3].map(() => new Float32Array(BINS * CHANNELS));
   }
 
-  // The place of a tick's pixel, emptied if it held an older one.
+  // The slot of a tick's pixel, cleared if it held an older one.
   place(tick) {
     const id = Math.floor(tick / this.ticks), at = id % BINS;
     if (this.id[at] !== id) {
@@ -26,7 +26,7 @@ class Ring {
     return at;
   }
 
-  // A row: `values` from `at` on are least, mean, most of each channel, errors first; it stands for so many ticks.
+  // Adds a row: `values` from `at` on are minimum, mean, maximum of each channel, errors first; it covers the given number of ticks.
   add(tick, every, law, values, at) {
     const bin = this.place(tick), weight = every;
     this.counts[0][bin] += weight;
@@ -40,7 +40,7 @@ class Ring {
     }
   }
 
-  // For each pixel up to `last` that has data, from the oldest: its first tick, least, mean, largest of a channel.
+  // For each pixel with data up to `last`, oldest first: its first tick, and minimum, mean, maximum of a channel.
   each(channel, last, seconds, period, see) {
     const counts = this.counts[channel < 6 ? 1 : 0], end = Math.floor(last / this.ticks), count = Math.min(BINS - 1, Math.round(seconds / period / this.ticks));
     for (let id = Math.max(0, end - count); id <= end; id++) {
@@ -69,13 +69,13 @@ class Samples {
     this.rings = SPANS.map(seconds => new Ring(seconds, period));
     this.last = -1;
     this.rows = 0;
-    // Ticks that never came to this page: first, behind the last.
+    // Ticks that never reached this page: first, and one after the last.
     this.gaps = [];
-    // Ticks at which something happened, with words.
+    // Ticks with events, and their texts.
     this.marks = [];
   }
 
-  // Takes a row; the length of the gap before it, ticks.
+  // Adds a row; returns the length of the gap before it, in ticks.
   add(tick, every, law, values, at) {
     if (tick < this.last) this.restart();
     const gap = this.last < 0 ? 0 : tick - this.last;
@@ -90,7 +90,7 @@ class Samples {
     return gap;
   }
 
-  // The device began to count anew.
+  // The device restarted its tick count.
   restart() {
     this.rings = SPANS.map(seconds => new Ring(seconds, this.period));
     [this.last, this.gaps, this.marks] = [-1, [], []];
@@ -99,20 +99,20 @@ class Samples {
   mark(text, bad) { if (this.last >= 0) { this.marks.push([this.last, text, bad]); if (this.marks.length > 200) this.marks.shift(); } }
 }
 
-// Colours of the theme, read when it changes.
+// Theme colours, read when the theme changes.
 let inks = {};
 function readInks() {
   const style = getComputedStyle(document.documentElement);
   for (const name of ["page", "card", "ink", "ink2", "edge", "line", "track", "blue", "blue2", "orange", "orange2", "s3"]) inks[name] = style.getPropertyValue("--" + name).trim();
 }
 
-// The next larger 1, 2 or 5 of a decade.
+// Rounds up to 1, 2 or 5 times a power of ten.
 function round125(v) {
   const decade = Math.pow(10, Math.floor(Math.log10(Math.max(v, 1e-12))));
   return [1, 2, 5, 10].find(f => f * decade >= v * 0.999) * decade;
 }
 
-// Sizes are told, not asked for: asking lays the page out anew at every picture.
+// Sizes are passed in, since reading them would force a layout in every frame.
 const sizes = new Map(), resized = new ResizeObserver(entries => { for (const { target, contentRect } of entries) sizes.set(target, [contentRect.width, contentRect.height]); });
 
 function sized(canvas) {
@@ -138,7 +138,7 @@ function written(to, text, x, y, size, color, align, weight) {
   to.fillText(text, x, y);
 }
 
-// Gaps as a lane shows them, from the oldest: those that are a pixel wide or touch, as boxes; shorter ones as marks at its edge, which hide nothing.
+// Gaps as drawn in a lane, oldest first: boxes if at least a pixel wide or touching; otherwise marks at the edge, which hide no data.
 function gapsIn(samples, seconds, left, wide) {
   const { last, period } = samples, x = tick => left + wide * (1 - (last - tick) * period / seconds), boxes = [], marks = [];
   for (const [from, to] of samples.gaps) {
@@ -152,7 +152,7 @@ function gapsIn(samples, seconds, left, wide) {
   return { boxes, marks };
 }
 
-// A lane: band from least to largest, mean as a line, gaps hatched and never crossed.
+// A lane: band from minimum to maximum, mean as a line, gaps hatched and never bridged.
 function lane(to, samples, ring, channel, box, seconds, scale) {
   const [left, top, wide, tall] = box, { last, period } = samples;
   const x = tick => left + wide * (1 - (last - tick) * period / seconds), y = v => top + tall * (1 - (v - scale[0]) / (scale[1] - scale[0]));
@@ -188,7 +188,7 @@ function lane(to, samples, ring, channel, box, seconds, scale) {
       if (tick < gaps[gap][1]) break;
       gap++;
     }
-    // Where there is nothing to be shown between two pixels, no line is.
+    // No line across pixels without data.
     if (part.length && tick > before + Math.max(1.5 * ring.ticks, samples.every)) flush();
     before = tick;
     part.push([x(tick + ring.ticks / 2), least, mean, most]);
@@ -219,7 +219,7 @@ function lane(to, samples, ring, channel, box, seconds, scale) {
 
 function duration(seconds) { return seconds < 0.0995 ? shown((seconds * 1e3).toPrecision(2)) + "\u2009ms" : shown(seconds.toFixed(seconds < 9.95 ? 1 : 0)) + "\u2009s"; }
 
-// The error of three axes.
+// Error of three axes.
 class Strips {
   constructor(canvas, samples) {
     [this.canvas, this.samples] = [canvas, samples];
@@ -260,7 +260,7 @@ class Strips {
       written(to, "rms " + (live && isFinite(stats[k].rms) ? fixed(stats[k].rms * 1e9, this.first ? 0 : 1) : "–"), wide, top + box[3] / 2 + 14, 12, inks.ink2, "right");
     }
     const x = tick => left + inner * (1 - (samples.last - tick) * samples.period / seconds);
-    // Gaps whose labels would touch have one, of how many they are and how long together.
+    // Gaps with touching labels share one, with their number and total duration.
     let group = null;
     const label = () => {
       if (!group) return;
@@ -279,7 +279,7 @@ class Strips {
       group = { from: at, count: 1, ticks: behind - from };
     }
     label();
-    // From the newest on; a label that would stand on another is left out.
+    // Newest first; overlapping labels are omitted.
     let edge = Infinity;
     for (const [tick, text, bad] of [...samples.marks].reverse()) {
       const at = x(tick), room = 6.2 * text.length;
@@ -299,7 +299,7 @@ class Strips {
   }
 }
 
-// The voltage of every leg between its limits.
+// Voltage of each leg between its limits.
 class Legs {
   constructor(canvas, samples, limits) { [this.canvas, this.samples, this.limits] = [canvas, samples, limits]; }
 
@@ -332,7 +332,7 @@ class Legs {
   }
 }
 
-// Least and largest of the last ten seconds about zero, and where it is now.
+// Minimum and maximum of the last ten seconds around zero, and the current value.
 function bar(canvas, samples, axis, value) {
   const [to, wide] = sized(canvas), { low, high } = samples.rings[1].range(axis, samples.last, 10, samples.period);
   const bound = round125(Math.max(Math.abs(low), Math.abs(high), 1e-9) * (isFinite(low) ? 1 : 0) || 1e-8);

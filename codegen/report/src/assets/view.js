@@ -1,4 +1,4 @@
-// The platform in parallel projection, to turn, to zoom and, with a motion, to play; live, as somebody else moves it.
+// The platform in parallel projection, with rotation, zoom and playback of a motion; or live.
 const VIEWS = { "3-D": [-0.62, 0.42], top: [0, Math.PI / 2], front: [0, 0], side: [-Math.PI / 2, 0] };
 
 class View {
@@ -9,7 +9,7 @@ class View {
     this.frame = 0;
     this.playing = false;
     this.bars = this.poses.length > 1;
-    this.svg = element("svg", { role: "img", tabindex: 0, "aria-label": data.label + " Arrow keys turn it, plus and minus zoom, 0 resets" + (this.bars ? ", space plays." : ".") }, figure);
+    this.svg = element("svg", { role: "img", tabindex: 0, "aria-label": data.label + " Arrow keys rotate, plus and minus zoom, 0 resets" + (this.bars ? ", space plays." : ".") }, figure);
     const bar = html("div", figure, "", "bar");
     const choice = html("span", bar, "", "choice");
     this.buttons = Object.keys(VIEWS).map(name => {
@@ -18,7 +18,7 @@ class View {
       return [name, button];
     });
     const near = html("span", bar);
-    for (const [text, title, act] of [["\u2212", "smaller", () => this.nearer(1 / 1.25)], ["+", "larger", () => this.nearer(1.25)], ["Reset", "as at the beginning", () => this.start()]]) {
+    for (const [text, title, act] of [["\u2212", "zoom out", () => this.nearer(1 / 1.25)], ["+", "zoom in", () => this.nearer(1.25)], ["Reset", "reset view", () => this.start()]]) {
       const button = html("button", near, text);
       button.title = title;
       button.addEventListener("click", act);
@@ -30,14 +30,14 @@ class View {
       this.button.addEventListener("click", () => this.play(!this.playing));
       this.time = this.slider(controls, " time", 0, this.poses.length - 1, 0, 1, v => { this.play(false); this.frame = v; });
       this.by = Math.log10(this.largest());
-      this.slider(controls, " motion larger", 0, 4.3, this.by, 0.02, v => { this.by = v; });
+      this.slider(controls, " magnification", 0, 4.3, this.by, 0.02, v => { this.by = v; });
       this.read = html("div", bar, "", "read");
     }
     this.events();
     this.start();
   }
 
-  // A round factor that makes the longest way a fifth of the height.
+  // A round factor that magnifies the largest motion to a fifth of the height.
   largest() {
     const far = Math.max(1, ...this.poses.flatMap(p => p.slice(0, 3).map(Math.abs))) * 1e-9;
     const factor = this.data.height / 5 / far, decade = Math.pow(10, Math.floor(Math.log10(factor)));
@@ -70,7 +70,7 @@ class View {
     const next = now => {
       if (!this.playing) return;
       if (last !== null) {
-        // The whole path in five seconds at least.
+        // Play the whole path in at least five seconds.
         this.frame += (now - last) / 1000 / this.data.step / Math.max(1, 5 / (this.data.step * this.poses.length));
         if (this.frame >= this.poses.length) this.frame = 0;
         this.time.value = Math.floor(this.frame);
@@ -104,7 +104,7 @@ class View {
     });
   }
 
-  // R = Rz Ry Rx of the angles as drawn, about the origin of the platform.
+  // R = Rz Ry Rx of the magnified angles, about the origin of the platform.
   moved(p, pose) {
     const [a, b, c] = pose.slice(3);
     let [x, y, z] = p;
@@ -114,7 +114,7 @@ class View {
     return [x + pose[0], y + pose[1], z + pose[2] + this.data.height];
   }
 
-  // Right, down and depth.
+  // Right, down, depth.
   project([x, y, z]) {
     const [turn, tilt] = this.turn;
     const u = x * Math.cos(turn) - y * Math.sin(turn), v = x * Math.sin(turn) + y * Math.cos(turn), w = z - this.data.height / 2;
@@ -123,7 +123,7 @@ class View {
 
   path(points) { return "M" + points.map(p => p[0].toFixed(1) + " " + p[1].toFixed(1)).join("L") + "Z"; }
 
-  // A round plate: the outline of both its faces, then the upper face.
+  // A round plate: the outline of both faces, then the upper face.
   plate(place, radius, thick, style) {
     const ring = dz => Array.from({ length: 72 }, (_, k) => this.project(place([radius * Math.cos(k * Math.PI / 36), radius * Math.sin(k * Math.PI / 36), dz])));
     const top = ring(0), bottom = ring(-thick);
@@ -150,7 +150,7 @@ class View {
     svg.setAttribute("viewBox", "0 0 " + wide + " " + (tall + (this.bars && !aside ? 170 : 0)));
     svg.replaceChildren();
     const rb = radius(data.base), rp = radius(data.platform), reach = Math.max(rb, rp);
-    // Room above for a pose that is drawn larger.
+    // Leave room above for a magnified pose.
     const rise = Math.max(0, data.ghost ? data.ghost[2] : 0, data.live || 0);
     this.scale = this.zoom * Math.min((wide - aside - 96) / (2 * reach), (tall - 96) / (data.height + rise + 0.9 * rb + 0.1 * rp));
     this.center = [(wide - aside) / 2 - 14, tall / 2 + 6 * this.zoom + rise * this.scale / 2];
@@ -186,7 +186,7 @@ class View {
       const legsAt = aside ? [wide - aside + 50, 60, aside - 110] : [40, tall + 10, wide - 110];
       this.strokes(data.legs[frame], ...legsAt, aside ? 40 : 24);
       const at = k => pose.slice(k, k + 3).map(v => number(v / 1000)).join(", ");
-      this.read.textContent = "t = " + (frame * data.step).toFixed(3) + " s: x, y, z = " + at(0) + " µm; θx, θy, θz = " + at(3) + " µrad. Motion drawn " + number(factor) + " times larger.";
+      this.read.textContent = "t = " + (frame * data.step).toFixed(3) + " s: x, y, z = " + at(0) + " µm; θx, θy, θz = " + at(3) + " µrad. Motion magnified " + number(factor) + " times.";
     } else if (!data.live) this.dimensions(rb, rp, on);
     for (const [k, text] of (data.texts || []).entries()) this.text(8, 16 + 17 * k, text, "orange halo", "start");
     for (const [name, button] of this.buttons) button.classList.toggle("on", VIEWS[name].every((v, k) => Math.abs(v - this.turn[k]) < 1e-9));
@@ -211,13 +211,13 @@ class View {
       element("circle", { cx: a[0], cy: a[1], r: 4, fill: color }, this.svg);
       this.arrow(a, b, color, 2);
       const size = Math.hypot(b[0] - a[0], b[1] - a[1]), [u, v] = size > 6 ? [(b[0] - a[0]) / size, (b[1] - a[1]) / size] : [0.7, -0.7];
-      // At the tail of one that points away, so that it is not on another's.
+      // At the tail of an arrow that points away, so that labels do not overlap.
       const [x, y] = b[2] > a[2] + 1e-6 && Math.abs(gauge.d[2]) < 0.7 ? [a[0] - u * 14, a[1] - v * 14] : [b[0] + u * 13, b[1] + v * 13];
       this.text(x, y + 4, "G" + k, (bad.includes(k) ? "orange" : "blue") + " halo");
     });
   }
 
-  // The work part: the faces that are seen.
+  // The work part: visible faces.
   box(on, [cx, cy, cz], size) {
     const corner = (i, j, k) => this.project(on([cx + (i - 0.5) * size, cy + (j - 0.5) * size, cz + k * size]));
     const faces = [[[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], [[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]], [[1, 0, 0], [1, 1, 0], [1, 1, 1], [1, 0, 1]], [[1, 1, 0], [0, 1, 0], [0, 1, 1], [1, 1, 1]], [[0, 1, 0], [0, 0, 0], [0, 0, 1], [0, 1, 1]], [[0, 1, 0], [1, 1, 0], [1, 0, 0], [0, 0, 0]]];
@@ -250,7 +250,7 @@ class View {
     measure([right, upper[1]], [right, level], millimetres(data.height), right - 6, (upper[1] + level) / 2, true);
   }
 
-  // Way of the platform's origin so far and to come.
+  // Path of the platform's origin: past and future.
   way(frame, factor) {
     const points = this.poses.map(p => this.project([p[0] * 1e-9 * factor, p[1] * 1e-9 * factor, p[2] * 1e-9 * factor + this.data.height]));
     const line = (list, width, color) => list.length > 1 && element("path", { d: this.path(list).slice(0, -1), fill: "none", stroke: color, "stroke-width": width }, this.svg);
@@ -259,7 +259,7 @@ class View {
     element("circle", { cx: points[frame][0], cy: points[frame][1], r: 4, fill: "var(--ink)" }, this.svg);
   }
 
-  // Where each leg stands in the travel that it has.
+  // Position of each leg within its travel.
   strokes(legs, left, top, wide, step) {
     const travel = this.data.travel * 1e9;
     this.text(left, top - 12, "legs, µm of " + number(Number((travel / 1000).toPrecision(3))) + " µm of travel", "strong", "start");

@@ -1,12 +1,12 @@
-"""The controller of a spec in any Python from 3.8 on, by the standard library alone: the library beside this file, tick by tick.
+"""The controller of a spec for Python 3.8 or later, using only the standard library and the shared library beside this file.
 
     law = Controller()
-    row = law.step(request=1, gauge=[0.0] * 6)    # fields that are not given keep their values
+    row = law.step(request=1, gauge=[0.0] * 6)    # omitted fields keep their values
     print(row["supervisor"] & 255, row["voltage"])    # phase: 0 disarmed, 1 arming, ...
 
-Units: m, rad, N, V, s. A tick is that of the whole machine with its supervisor; with ``supervised=False`` the law alone, which nothing
-watches over. Reals are rounded to the scalar of the controller. Words that come in sixes are lists.
-The package `specgen` has the same on numpy arrays, a million ticks at a time.
+Units: m, rad, N, V, s. A tick includes the supervisor; with ``supervised=False`` only the law runs, without supervision.
+Reals are rounded to the scalar type of the controller. Groups of six words are lists.
+The package `specgen` does the same with numpy arrays, a million ticks at a time.
 """
 
 import ctypes
@@ -17,22 +17,22 @@ import struct
 LIBRARY = "@library@"
 DIGEST = "@digest@"
 ABI_VERSION = @abi@
-# Words of a supervised tick behind those of the law; fields that are whole numbers, of 32 bits.
+# Additional words of a supervised tick, after those of the law; fields that are 32-bit integers.
 SUPERVISED = @supervised@
 WHOLE = @whole@
 
 
 class Controller:
-    """Settings and state of one controller. One thread at a time steps it; others are independent of it."""
+    """Settings and state of one controller. Only one thread may use it at a time; instances are independent."""
 
     def __init__(self, library=None, supervised=True):
         path = pathlib.Path(library) if library is not None else pathlib.Path(__file__).with_name(LIBRARY)
         self._library = ctypes.CDLL(str(path.resolve()))
-        # Without it ctypes would hand digests over as signed numbers of 32 bits.
+        # Otherwise ctypes would return digests as signed 32-bit numbers.
         for digest in (self._library.specgen_state_digest, self._library.specgen_machine_digest):
             digest.restype = ctypes.c_uint64
         if self._library.specgen_abi_version() != ABI_VERSION:
-            raise RuntimeError(f"{path} and this file do not belong together: export both again")
+            raise RuntimeError(f"{path} and this file do not match: export both again")
         about = self._about()
         if about["digest"] != DIGEST:
             raise RuntimeError(f"{path} is the controller of another spec: export both again")
@@ -47,9 +47,9 @@ class Controller:
             names = [law + more for law, more in zip(names, SUPERVISED)]
         self._input, self._output = ((ctypes.c_uint64 * len(of))() for of in names)
         self.inputs, self.outputs = (_fields(of) for of in names)
-        """Places of the words of each field."""
+        """Positions of the words of each field."""
         self.settings = _fields(about["config_names"].split(","))
-        # Words of 64 bits, so that the memory is aligned.
+        # 64-bit words, for alignment.
         self._state = (ctypes.c_uint64 * -(-int(about[f"{kind}_bytes"]) // 8))()
         self._config = (ctypes.c_uint64 * -(-int(about["config_bytes"]) // 8))()
         self._words = (ctypes.c_uint64 * len(about["config_names"].split(",")))()
@@ -58,14 +58,14 @@ class Controller:
         self.reset()
 
     def step(self, **fields):
-        """One tick: takes the fields that are given, and returns those that come out."""
+        """One tick: sets the given input fields and returns the output fields."""
         for name, values in fields.items():
             self._put(self._input, self.inputs, name, values)
         self._step(self._config, self._state, self._input, self._output)
         return {name: self._take(self._output, name, places) for name, places in self.outputs.items()}
 
     def configure(self, **settings):
-        """Takes settings, the others staying; ValueError where one is out of its range, and all stay."""
+        """Changes settings; raises ValueError and changes nothing if one is out of its range."""
         words = type(self._words)(*self._words)
         for name, values in settings.items():
             self._put(words, self.settings, name, values)
@@ -76,12 +76,12 @@ class Controller:
         self._words = words
 
     def reset(self):
-        """The state as at power-up; settings stay."""
+        """Resets the state to that at power-up; settings are kept."""
         self._reset(self._state)
 
     @property
     def state_digest(self):
-        """Digest of all that a tick hands to the next."""
+        """Digest of the complete state."""
         return self._digest(self._state)
 
     def _about(self):
@@ -114,7 +114,7 @@ class Controller:
 
 
 def _fields(names):
-    """Places of words by the name without its index."""
+    """Positions of words by name without index."""
     fields = {}
     for place, name in enumerate(names):
         fields.setdefault(re.sub(r"\[\d+\]$", "", name), []).append(place)

@@ -1,4 +1,4 @@
-/* A program that runs tick.c: gauges that say nothing but small numbers, ticks, and what came of them.
+/* Runs tick.c with small dummy gauge readings, and prints the result of the last tick.
      cc -std=c11 -Wall example.c tick.c -L. -lcontroller -Wl,-rpath,'$ORIGIN' -o example && ./example 1000 */
 #include <inttypes.h>
 #include <stdio.h>
@@ -36,7 +36,7 @@ int main(int count, char **arguments) {
     uint32_t supervisor = 0;
     int failed = control_begin();
     if (failed != 0) {
-        fprintf(stderr, "controller.h and the library do not belong together (%d)\n", failed);
+        fprintf(stderr, "controller.h and the library do not match (%d)\n", failed);
         return 1;
     }
     for (tick = 0; tick < ticks; tick++) {

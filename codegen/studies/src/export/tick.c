@@ -1,16 +1,16 @@
-/* The supervised controller in a program in C: static memory, one function that a timer's interrupt or a task calls once a period.
-   What a board has to bring stands at the end of it: gauges, codes, amplifiers. */
+/* The supervised controller in a C program: static memory, and one function to be called once per period by a timer interrupt or a task.
+   The board provides three functions: gauges, codes, amplifiers. */
 #include "controller.h"
 
 static specgen_config config;
 static specgen_machine machine;
 
-/* Of the board. Gauges in m, one a leg; codes of the converter, one a leg; whether the amplifiers are to be on. */
+/* Provided by the board: gauge readings in m, one per leg; converter codes, one per leg; amplifier enable. */
 extern void board_read_gauges(double gauges[6]);
 extern void board_write_codes(const int32_t codes[6]);
 extern void board_enable_amplifiers(int on);
 
-/* Once, before the first tick: 0, or the library is not the one that the header was written for, or a setting is out of range. */
+/* Call once before the first tick. Returns 0, or 1 if library and header do not match, or 2 if a setting is out of range. */
 int control_begin(void) {
     uint64_t settings[SPECGEN_CONFIG_WORDS];
     if (specgen_check() != 0) {
@@ -24,7 +24,7 @@ int control_begin(void) {
     return 0;
 }
 
-/* Each period: a request of the operator (SPECGEN_REQUEST_…) and what happened (0, or SPECGEN_EVENT_…). Returns the supervisor's word. */
+/* Call once per period with an operator request (SPECGEN_REQUEST_…) and events (0, or SPECGEN_EVENT_…). Returns the supervisor word. */
 uint32_t control_tick(uint32_t request, uint32_t events) {
     uint64_t input[SPECGEN_MACHINE_INPUT_WORDS] = {0};
     uint64_t output[SPECGEN_MACHINE_OUTPUT_WORDS];
@@ -48,7 +48,7 @@ uint32_t control_tick(uint32_t request, uint32_t events) {
     return supervisor;
 }
 
-/* What two runs are compared by. */
+/* Digest of the state, for comparing two runs. */
 uint64_t control_digest(void) {
     return specgen_machine_digest(&machine);
 }

@@ -208,7 +208,7 @@ pub fn a_browser_draws_it(panel: &Panel) {
     }
     let mut other = Window::open(&panel.url(), false).unwrap();
     other.wait(&chip("running"));
-    other.wait("document.getElementById('message').textContent.includes('You watch')");
+    other.wait("document.getElementById('message').textContent.includes('You are watching')");
     other.wait("document.getElementById('arm').disabled && !document.getElementById('hold').disabled");
     other.wait("Number(document.documentElement.dataset.shown) > 40");
     other.picture("watching-light");

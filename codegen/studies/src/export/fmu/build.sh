@@ -1,6 +1,6 @@
 #!/bin/sh
-# Builds the unit's library from these sources, with cargo and a C compiler. For another computer: TARGET is the name that rustc has for it,
-# CC a compiler for it, LIBRARIES what it links.
+# Builds the unit's library from these sources, with cargo and a C compiler. For another computer: set TARGET to its rustc target,
+# CC to a compiler for it, and LIBRARIES to the libraries to link.
 set -eu
 cd "$(dirname "$0")"
 cargo rustc --release --lib --crate-type staticlib --manifest-path rust/{PACKAGE}/Cargo.toml --target-dir target ${TARGET:+--target "$TARGET"}

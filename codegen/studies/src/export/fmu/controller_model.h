@@ -1,4 +1,4 @@
-/* What the unit steps: the controller under its supervisor, over controller.h. */
+/* Model of the unit: the supervised controller, through controller.h. */
 #ifndef MODEL_H
 #define MODEL_H
 
@@ -9,7 +9,7 @@ typedef struct {
     specgen_machine machine;
 } Model;
 
-/* Words of reals. */
+/* Conversions between words and reals. */
 static uint64_t model_of_real(double value) {
     return specgen_of_real((specgen_real)value);
 }
@@ -18,7 +18,7 @@ static double model_to_real(uint64_t word) {
     return specgen_to_real(word);
 }
 
-/* In memory that is zero. 0 if there is one. */
+/* Memory must be zeroed. Returns 0 on success. */
 static int model_create(Model *model) {
     if (specgen_check() != 0) {
         return 1;
@@ -31,17 +31,17 @@ static void model_destroy(Model *model) {
     (void)model;
 }
 
-/* Into a model that was created. */
+/* The target must have been created. */
 static void model_copy(Model *to, const Model *from) {
     *to = *from;
 }
 
-/* Settings act together: single ones may be out of range until the last of them is set. NULL, or what is wrong. */
+/* Settings are checked together, so they may be out of range while being set one by one. Returns NULL, or an error message. */
 static const char *model_settings(Model *model, const uint64_t *settings, uint64_t *outputs) {
     (void)outputs;
     return specgen_config_load(&model->config, settings) == 0
                ? NULL
-               : "a setting is out of its range: docs/settings.md of specgen has them";
+               : "a setting is out of its range: see docs/settings.md of specgen";
 }
 
 static const char *model_step(Model *model, const uint64_t *inputs, uint64_t *outputs) {

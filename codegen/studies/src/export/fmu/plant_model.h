@@ -1,4 +1,4 @@
-/* What the unit steps: the simulated machine, over the Rust sources beside this file (rust/host-sim/unit). */
+/* Model of the unit: the simulated machine, through the Rust sources beside this file (rust/host-sim/unit). */
 #ifndef MODEL_H
 #define MODEL_H
 
@@ -20,7 +20,7 @@ typedef struct {
     specgen_plant *plant;
 } Model;
 
-/* Words of reals. */
+/* Conversions between words and reals. */
 static uint64_t model_of_real(double value) {
     uint64_t word;
     memcpy(&word, &value, sizeof word);
@@ -33,7 +33,7 @@ static double model_to_real(uint64_t word) {
     return value;
 }
 
-/* In memory that is zero. 0 if there is one. */
+/* Memory must be zeroed. Returns 0 on success. */
 static int model_create(Model *model) {
     model->plant = specgen_plant_new((const uint8_t *)FMU_PLANT, sizeof FMU_PLANT - 1);
     return model->plant == NULL;
@@ -44,14 +44,14 @@ static void model_destroy(Model *model) {
     model->plant = NULL;
 }
 
-/* Into a model that was created. */
+/* The target must have been created. */
 static void model_copy(Model *to, const Model *from) {
     specgen_plant *copy = specgen_plant_copy(from->plant);
     specgen_plant_free(to->plant);
     to->plant = copy;
 }
 
-/* Prepares the machine, which the outputs then are of. NULL, or what is wrong. */
+/* Prepares the machine and sets its outputs. Returns NULL, or an error message. */
 static const char *model_settings(Model *model, const uint64_t *settings, uint64_t *outputs) {
     return specgen_plant_prepare(model->plant, settings, outputs, FMU_OUTPUTS);
 }

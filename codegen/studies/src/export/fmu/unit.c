@@ -1,6 +1,6 @@
-/* FMI 2.0 co-simulation of what model.h has, the controller or the plant. Variables are the words of a tick: inputs, outputs, settings, in
-   this order; fmu.h has their kinds. A step from t to t + h runs the ticks k with t <= k*period < t + h, t counted from the start of
-   the experiment, all of them with the inputs as they are: with h = period it is one tick. */
+/* FMI 2.0 co-simulation of the model in model.h, the controller or the plant. Variables are the words of a tick: inputs, outputs, settings, in
+   this order; their kinds are in fmu.h. A step from t to t + h runs the ticks k with t <= k*period < t + h, t counted from the start of
+   the experiment, all with the same inputs: with h = period it is one tick. */
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
@@ -39,14 +39,14 @@ typedef struct {
 
 enum { FIRST_OUTPUT = FMU_INPUTS, FIRST_SETTING = FIRST_OUTPUT + FMU_OUTPUTS, VARIABLES = FIRST_SETTING + FMU_SETTINGS };
 
-/* What a step changes: this is the state of the FMU. */
+/* The FMU state: everything that a step changes. */
 typedef struct {
     Model model;
     uint64_t words[VARIABLES];
     double start;
     uint64_t ticks;
     int settings_changed;
-    /* After the initialization mode. */
+    /* True after initialization mode. */
     int running;
 } Content;
 
@@ -64,7 +64,7 @@ static fmi2Status refuse(const Instance *instance, const char *message) {
     return fmi2Error;
 }
 
-/* In memory that is zero. */
+/* Memory must be zeroed. */
 static int create(Content *content) {
     memcpy(content->words, FMU_STARTS, sizeof content->words);
     content->settings_changed = 1;
@@ -165,19 +165,19 @@ FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c) {
     Instance *instance = (Instance *)c;
     model_destroy(&instance->content.model);
     memset(&instance->content, 0, sizeof instance->content);
-    return create(&instance->content) == 0 ? fmi2OK : refuse(instance, "there is no memory for the model");
+    return create(&instance->content) == 0 ? fmi2OK : refuse(instance, "out of memory for the model");
 }
 
 static int is_a(fmi2ValueReference variable, char kind) {
     return variable < VARIABLES && FMU_KINDS[variable] == kind;
 }
 
-/* Inputs and settings; of the settings of a plant, which is prepared by them, only before it runs. */
+/* Inputs and settings; a plant's settings only before it runs, because they determine its preparation. */
 static int is_settable(const Instance *instance, fmi2ValueReference variable) {
     return variable < FIRST_OUTPUT || (variable >= FIRST_SETTING && (FMU_TUNABLE || !instance->content.running));
 }
 
-/* Outputs in the initialization mode are those of the settings as they are. */
+/* In initialization mode outputs reflect the current settings. */
 static fmi2Status up_to_date(Instance *instance) {
     return instance->content.running || FMU_TUNABLE ? fmi2OK : take_settings(instance);
 }
@@ -205,7 +205,7 @@ FMI2_EXPORT fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference 
     }
     for (k = 0; k < count; k++) {
         if (!is_a(variables[k], 'i')) {
-            return refuse(instance, "fmi2GetInteger: a variable is not whole");
+            return refuse(instance, "fmi2GetInteger: a variable is not an integer");
         }
         values[k] = (fmi2Integer)(uint32_t)instance->content.words[variables[k]];
     }
@@ -214,7 +214,7 @@ FMI2_EXPORT fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference 
 
 static fmi2Status set(Instance *instance, fmi2ValueReference variable, char kind, uint64_t word) {
     if (!is_a(variable, kind) || !is_settable(instance, variable)) {
-        return refuse(instance, "a variable is of another type, or cannot be set, or no more");
+        return refuse(instance, "a variable has another type, cannot be set, or can no longer be set");
     }
     instance->content.words[variable] = word;
     instance->content.settings_changed |= variable >= FIRST_SETTING;
@@ -240,9 +240,9 @@ FMI2_EXPORT fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference 
     return status;
 }
 
-/* There are no variables of other types. */
+/* No other variable types exist. */
 static fmi2Status none(fmi2Component c, size_t count) {
-    return count == 0 ? fmi2OK : refuse((const Instance *)c, "there is no variable of this type");
+    return count == 0 ? fmi2OK : refuse((const Instance *)c, "there are no variables of this type");
 }
 
 FMI2_EXPORT fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference v[], size_t count, fmi2Boolean values[]) {
@@ -271,7 +271,7 @@ FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
         Content *content = (Content *)instance->callbacks->allocateMemory(1, sizeof(Content));
         if (content == NULL || create(content) != 0) {
             instance->callbacks->freeMemory(content);
-            return refuse(instance, "there is no memory for a state");
+            return refuse(instance, "out of memory for a state");
         }
         *state = content;
     }
@@ -295,50 +295,50 @@ FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
 
 FMI2_EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
     (void)state, (void)size;
-    return refuse((const Instance *)c, "a state is not serialised");
+    return refuse((const Instance *)c, "state serialization is not supported");
 }
 
 FMI2_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
     (void)state, (void)bytes, (void)size;
-    return refuse((const Instance *)c, "a state is not serialised");
+    return refuse((const Instance *)c, "state serialization is not supported");
 }
 
 FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state) {
     (void)bytes, (void)size, (void)state;
-    return refuse((const Instance *)c, "a state is not serialised");
+    return refuse((const Instance *)c, "state serialization is not supported");
 }
 
 FMI2_EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t unknowns,
                                                     const fmi2ValueReference known[], size_t knowns, const fmi2Real dk[],
                                                     fmi2Real du[]) {
     (void)unknown, (void)unknowns, (void)known, (void)knowns, (void)dk, (void)du;
-    return refuse((const Instance *)c, "there are no directional derivatives");
+    return refuse((const Instance *)c, "directional derivatives are not supported");
 }
 
 FMI2_EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference v[], size_t count,
                                                    const fmi2Integer order[], const fmi2Real values[]) {
     (void)v, (void)count, (void)order, (void)values;
-    return refuse((const Instance *)c, "inputs are held, not extrapolated");
+    return refuse((const Instance *)c, "input derivatives are not supported: inputs are held");
 }
 
 FMI2_EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference v[], size_t count,
                                                     const fmi2Integer order[], fmi2Real values[]) {
     (void)v, (void)count, (void)order, (void)values;
-    return refuse((const Instance *)c, "outputs have no derivatives");
+    return refuse((const Instance *)c, "output derivatives are not supported");
 }
 
 FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real from, fmi2Real step, fmi2Boolean no_way_back) {
     Instance *instance = (Instance *)c;
     Content *content = &instance->content;
-    /* A millionth of a period: times of importers are sums of rounded steps. */
+    /* Tolerance of a millionth of a period, since importers sum rounded steps. */
     const double end = (from - content->start + step) / FMU_PERIOD - 1e-6;
     (void)no_way_back;
     if (take_settings(instance) != fmi2OK) {
         return fmi2Error;
     }
-    /* Not for a time that is no number, or farther than ticks are counted. */
+    /* Refuse NaN, and times beyond the range of the tick counter. */
     if (!(end < 9e15)) {
-        return refuse(instance, "the end of a step is not a time");
+        return refuse(instance, "the end of the step is not a valid time");
     }
     while ((double)content->ticks < end) {
         const char *wrong = model_step(&content->model, content->words, content->words + FIRST_OUTPUT);
@@ -351,7 +351,7 @@ FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real from, fmi2Real step,
 }
 
 FMI2_EXPORT fmi2Status fmi2CancelStep(fmi2Component c) {
-    return refuse((const Instance *)c, "a step is over when it returns");
+    return refuse((const Instance *)c, "steps are synchronous");
 }
 
 FMI2_EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {
