@@ -2,7 +2,7 @@
 //!
 //! Exit codes: 0 good; 1 the spec, a record or a budget fails, or an input cannot be read; 2 usage, or an output is an input;
 //! 3 environment (a missing tool, a full disk, a file that cannot be written); 4 a simulated run ended before the end of its
-//! path; 130 ended by Ctrl-C, with the best so far where a part of the work is a result.
+//! path; 130 interrupted by Ctrl-C, with the best result so far if there is one.
 
 mod build;
 mod cache;
@@ -85,63 +85,63 @@ struct Common {
     no_cache: bool,
 }
 
-/// How findings are taken.
+/// Treatment of warnings.
 #[derive(Args, Debug, Clone, Copy)]
 struct Strictness {
-    /// Refuse a spec with warnings, as one with errors. A key that is meant is named in `[lint] allow`, with the reason.
+    /// Treat warnings as errors. `[lint] allow` exempts a key, with a reason.
     #[arg(long)]
     deny_warnings: bool,
 }
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Start a project: a folder with a commented spec of your platform and a simulated record of its legs, from about fifteen answers.
+    /// Start a project from about fifteen answers: a folder with a commented spec of your platform and a simulated record of its legs.
     New(new::Arguments),
     /// Report every finding about a spec; write nothing.
     Check(check::Arguments),
-    /// Explain a finding by its code: what is checked, why it matters, a spec that shows it, the fix.
+    /// Explain a finding by its code: what is checked, why it matters, an example, the fix.
     Explain(explain::Arguments),
-    /// Build for one target, check the image, compare it with the budget.
+    /// Build for one target, check the image and compare it with the budget.
     Build(firmware::Arguments),
-    /// Show what uses the memory of an image, and what its tick reaches.
+    /// Show what uses the memory of an image, and which functions a tick can call.
     Size(firmware::SizeArguments),
-    /// Build, check, and write the image to a board by probe-rs.
+    /// Build and check an image, and flash it to a board with probe-rs.
     Flash(firmware::FlashArguments),
-    /// Simulate the controller of a spec on its simulated machine; with --paper the paper's experiments.
+    /// Run the controller of a spec on a simulated machine; with --paper, the paper's experiments.
     Sim(sim::Arguments),
     /// Tune gains and weights on the simulated loop.
     Tune(tune::Arguments),
-    /// Learn a repeated motion, simulated or on a machine: measure passes, and compute the correction that cancels their error.
+    /// Learn a repeated motion, simulated or on a machine: measure passes and compute the correction that cancels their error.
     Learn(learn::Arguments),
-    /// Try the closed loop on corners and random draws of declared uncertainties; a gate for builds.
+    /// Test the closed loop on corners and random draws of the declared uncertainties, for instance as a build gate.
     Robust(robust::Arguments),
-    /// Write one HTML page about a spec: a verdict, tracking, error budget, margins, hysteresis, findings; or about a run.
+    /// Write an HTML report about a spec (verdict, tracking, error budget, margins, hysteresis, findings) or about a run.
     Report(report::Arguments),
-    /// Run the paper's whole list of experiments, from specs in the binary: ours beside the paper's, with remarks.
+    /// Run all of the paper's experiments with built-in specs, and compare the results with the paper's.
     Reproduce(reproduce::Arguments),
-    /// Close the loop of a simulated machine with the program of a microcontroller, emulated or at a serial port.
+    /// Processor in the loop: control a simulated machine with a microcontroller, emulated or at a serial port.
     Pil(pil::Arguments),
     /// Operate a machine over the link: arm, run, set-points, settings, waves, records; from a script or line by line.
     Operate(operate::Arguments),
-    /// Show a machine on one page in the browser, and operate it there: pose, strips, spectrum, events; one page is in control.
+    /// Show and operate a machine in the browser: pose, strip charts, spectrum, events. One page is in control at a time.
     Panel(panel::Arguments),
-    /// Let programs that speak the General Command Set 2.0 of piezo stages and hexapods move a machine: a bridge on the link.
+    /// Bridge to the General Command Set (GCS) 2.0 of piezo stages and hexapods: let its clients move a machine.
     Gcs(gcs::Arguments),
-    /// Run a recording of a target again on the host and compare every tick by bits; export it as CSV.
+    /// Replay a recording of a target on the host and compare every tick bit for bit; or export it as CSV or MCAP.
     Replay(replay::Arguments),
-    /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
+    /// Compute M, C, G, J and leg forces at given states, with the controller's model.
     Dynamics(dynamics::Arguments),
     /// Export the controller as a C library, a Python module or an FMU.
     Export(export::Arguments),
-    /// Identify from measured records: the Everett table, or linear, response, gauge, stiffness.
+    /// Identify an Everett table, or another property such as response or stiffness, from measured records.
     Identify(identify::Arguments),
     /// Simulate the reversal-curve experiment that `identify` needs, on a leg of a spec or the reference leg.
     Forc(forc::Arguments),
     /// Serve the simulated machine of a spec to a real-time controller on this computer.
     Plant(plant::Arguments),
-    /// Measure how well this computer keeps time, and say what to change for real time.
+    /// Check whether this computer can run a controller in real time, and show what to change.
     Doctor(doctor::Arguments),
-    /// Serve an editor by the Language Server Protocol: findings as you type, meanings of keys, completion, fixes.
+    /// Language server for editors: findings as you type, documentation of keys, completion, fixes.
     Lsp(lsp::Arguments),
     /// Print the intermediate representation of a spec: every constant of its controller.
     #[command(after_help = examples::DUMP_IR)]
@@ -151,7 +151,7 @@ enum Command {
     },
     /// Show the size of the build cache, or clear it.
     Cache(cache::Arguments),
-    /// Print a script that completes commands, options and files in a shell.
+    /// Print a completion script for a shell.
     Completions(completions::Arguments),
 }
 
@@ -164,7 +164,7 @@ pub fn command() -> clap::Command {
 /// Runs the command that the process was started with.
 #[must_use]
 pub fn run() -> ExitCode {
-    // A file that grows beyond the limit is an error to report, not the end of the process.
+    // Report a file that exceeds the size limit as an error: the signal would end the process.
     specgen_rt::signals::ignore_file_size();
     let (cli, matches) = match parsed(std::env::args_os()) {
         Ok(parsed) => parsed,
@@ -179,7 +179,7 @@ pub fn run() -> ExitCode {
     if done.is_err() {
         interrupt::settle();
     }
-    // What is said from here on is the last word.
+    // From here on an interrupt must not cut the final output short.
     interrupt::heed();
     if let Some(trouble) = target::cache::trouble() {
         ui.progress(&format!("warning: {trouble}"));
@@ -188,9 +188,9 @@ pub fn run() -> ExitCode {
     ExitCode::from(ui.not_all_out().unwrap_or(code))
 }
 
-/// Performs one command as a function of this program: `arguments` are those behind `specgen`, what `--json` prints comes back,
-/// and `listener` gets the progress. After `stop` is set, the command ends with what there is of a result, or at the next tick
-/// of a simulation or line of progress. `lines` are the commands of a session that reads any: `operate` without commands.
+/// Runs one command inside this process and returns its JSON document. `arguments` are those after `specgen`, and `listener`
+/// gets the progress. Once `stop` is set, the command ends with its result so far, or at the next simulated tick or line of
+/// progress. `lines` are the commands of an interactive session: `operate` without commands.
 #[must_use]
 pub fn call(
     arguments: impl IntoIterator<Item = OsString>,
@@ -205,7 +205,7 @@ pub fn call(
     };
     let mut ui = Ui::called(listener, lines);
     let done = match parsed(std::iter::once("specgen".into()).chain(arguments)) {
-        // What it has not shown when it unwinds is not looked at.
+        // Nothing of the command is used after it unwinds.
         Ok((cli, matches)) => {
             catch_unwind(AssertUnwindSafe(|| perform(&cli, &matches, &mut ui))).unwrap_or_else(|cause| {
                 if cause.is::<interrupt::Interruption>() { Err(Failure::interrupted()) } else { resume_unwind(cause) }
@@ -222,7 +222,7 @@ pub fn call(
     ui.into_document()
 }
 
-/// The arguments, as values and by their names.
+/// The arguments, as a struct and by their names.
 fn parsed(arguments: impl IntoIterator<Item = OsString>) -> Result<(Cli, ArgMatches), clap::Error> {
     let mut command = command();
     let matches = command.try_get_matches_from_mut(arguments)?;
@@ -230,7 +230,7 @@ fn parsed(arguments: impl IntoIterator<Item = OsString>) -> Result<(Cli, ArgMatc
     Ok((cli, matches))
 }
 
-/// What was asked for.
+/// Runs the requested command.
 fn perform(cli: &Cli, matches: &ArgMatches, ui: &mut Ui) -> Result<(), Failure> {
     files::forget_inputs();
     named::check(matches)?;
@@ -272,10 +272,10 @@ fn perform(cli: &Cli, matches: &ArgMatches, ui: &mut Ui) -> Result<(), Failure> 
     }
 }
 
-/// Help and version, or why the arguments make no sense.
+/// Prints help or version, or reports invalid arguments.
 fn refuse_arguments(error: clap::Error) -> ExitCode {
     let error = match error.kind() {
-        // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
+        // `specgen chek platform.toml`: clap would complain about a subcommand `platform.toml`.
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => {
             let mut command = command();
             let names: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
@@ -284,14 +284,14 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
             let message = match meant {
                 Some(meant) => format!("there is no command `{written}`; did you mean `specgen {meant}`?"),
                 None => {
-                    format!("one spec file is expected, or a command ({}) with its own arguments", names.join(", "))
+                    format!("expected one spec file, or a command ({}) with its arguments", names.join(", "))
                 }
             };
             command.error(ErrorKind::ArgumentConflict, message)
         }
         _ => error,
     };
-    // Nothing was parsed, so the arguments are asked themselves.
+    // Parsing failed, so look for the option in the raw arguments.
     if error.use_stderr() && std::env::args_os().any(|argument| argument == "--json") {
         let text = error.render().to_string();
         let message = text.trim().trim_start_matches("error: ").to_owned();
@@ -300,13 +300,13 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
     if error.use_stderr() {
         error.exit()
     }
-    // Help and version are results: that they are whole is known.
+    // Help and version are results: report incomplete output.
     let ui = Ui::new(false);
     ui.styled(&error.render().ansi().to_string());
     ExitCode::from(ui.not_all_out().unwrap_or(0))
 }
 
-/// `specgen chek`: a spec that is not there, under the name of a command or nearly so.
+/// `specgen chek`: a missing spec whose name resembles a command.
 fn misspelt(spec: Option<&std::path::Path>) -> Option<Failure> {
     let spec = spec.filter(|spec| !spec.exists())?;
     let (written, command) = (spec.to_str()?, command());

@@ -1,9 +1,9 @@
-//! The `specgen` command, and the crates that it is made of under one name.
+//! The `specgen` command, and re-exports of the crates that it consists of.
 //!
 //! ```text
 //! spec (TOML) → model (SI, checked) → tables (identified) → ir (every constant) → emitted crate (text) → built image
 //! ```
-//! Data flows one way, and a crate sees only crates on lower floors; ARCHITECTURE.md has them.
+//! Data flows one way, and a crate depends only on crates of lower layers: see ARCHITECTURE.md.
 
 pub mod cli;
 

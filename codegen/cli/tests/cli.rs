@@ -42,7 +42,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "--bogus"], "--bogus"),
         (&["legs.toml", "-o"], "--output"),
         (&["legs.toml", "-o", ""], "--output"),
-        (&["legs.toml", "minimal.toml"], "one spec file is expected"),
+        (&["legs.toml", "minimal.toml"], "expected one spec file"),
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
         (&["chek", "legs.toml"], "did you mean `specgen check`?"),
         (&["chek"], "did you mean `specgen check`?"),

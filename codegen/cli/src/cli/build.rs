@@ -1,4 +1,4 @@
-//! The main job: spec to a workspace, built and checked, and measured where the tools for it are there.
+//! The main job: compiles a spec to a workspace, builds and checks it, and measures it if the tools are installed.
 
 use clap::Args;
 use specgen_language::outcome::Failure;
@@ -16,14 +16,14 @@ pub struct Arguments {
     /// Output folder; `<name>-controller` if not given. Must be new, empty, or an unchanged earlier output.
     #[arg(short, long, value_name = "DIR")]
     output: Option<OutputFolder>,
-    /// Write the source only.
+    /// Write the source, and build nothing.
     #[arg(long)]
     no_build: bool,
     /// Also write the crates for your own board: `hal`, `board`, `link`. See docs/porting.md.
     #[arg(long)]
     board: bool,
-    /// First install what is missing for the microcontroller (cross compiler, emulator): by rustup or apt, or into the user's
-    /// cache. If that fails, the job continues without it.
+    /// First install a missing cross compiler or emulator, with rustup or apt, or into the user's cache. If that fails, the job
+    /// continues without it.
     #[arg(long, conflicts_with = "no_build")]
     setup: bool,
     /// Print all findings and measurements below the verdict.
@@ -38,7 +38,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let Some(spec) = arguments.spec.as_deref() else {
-        // clap demands it unless there is a subcommand.
+        // clap requires it unless there is a subcommand.
         return Err(Failure::Usage("name a spec file".to_owned()));
     };
     let options = Options {

@@ -1,4 +1,4 @@
-//! `specgen cache`: what is kept of earlier builds.
+//! `specgen cache`: the cache of earlier builds.
 
 use clap::Args;
 use serde::Serialize;
@@ -13,20 +13,20 @@ use specgen_toolchain::user_cache::VARIABLE;
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::CACHE)]
 pub struct Arguments {
-    /// Remove every build that is kept.
+    /// Remove all cached builds.
     #[arg(long)]
     clear: bool,
 }
 
 #[derive(Serialize)]
 struct CacheSize {
-    /// None if nothing is kept for this user.
+    /// None if the cache is off.
     folder: Option<String>,
     builds: usize,
     bytes: u64,
     limit: u64,
     removed: usize,
-    /// Their bytes, where they were to be removed.
+    /// Bytes removed, if removal was requested.
     #[serde(skip)]
     cleared: Option<u64>,
 }
@@ -40,7 +40,7 @@ impl Outcome for CacheSize {
                 format!("removed {}, {} bytes, from {folder}\n", builds(self.removed), group(bytes))
             }
             (Some(folder), None) => format!(
-                "{folder}: {}, {} of at most {} bytes; what was used longest ago goes first\n",
+                "{folder}: {}, {} of at most {} bytes; least recently used builds are removed first\n",
                 builds(self.builds),
                 group(self.bytes),
                 group(self.limit)

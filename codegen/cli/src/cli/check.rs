@@ -1,4 +1,4 @@
-//! `specgen check`: every finding about a spec, nothing written.
+//! `specgen check`: reports every finding about a spec, and writes nothing.
 
 use clap::Args;
 use specgen_language::outcome::Failure;
@@ -13,7 +13,7 @@ use super::named::InputFile;
 pub struct Arguments {
     /// The spec file.
     spec: InputFile,
-    /// Everything that was found, below the verdict.
+    /// Print all findings below the verdict.
     #[arg(long)]
     details: bool,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! `specgen completions`: a script that completes commands, options, their values and files in a shell.
+//! `specgen completions`: a shell completion script for commands, options, their values and files.
 
 use clap::Args;
 use clap_complete::Shell;
@@ -11,7 +11,7 @@ use specgen_language::ui::Ui;
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::COMPLETIONS)]
 pub struct Arguments {
-    /// The shell that the script is for.
+    /// The shell.
     #[arg(value_enum)]
     shell: Shell,
 }

@@ -17,9 +17,9 @@ const PERIOD: u64 = 100_000;
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::DOCTOR)]
 pub struct Arguments {
-    /// A spec, whose period the computer is judged by; 100 µs without one.
+    /// A spec whose control period the computer must keep. The default period is 100 µs.
     spec: Option<InputFile>,
-    /// How long wake-ups are measured, s.
+    /// Duration of the wake-up measurement, s.
     #[arg(long, value_name = "S", default_value_t = 3.0, value_parser = seconds, allow_negative_numbers = true)]
     seconds: f64,
     /// Measure on this processor.
@@ -51,7 +51,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     if let Some(line) = arguments.plot.place().charts("wake-ups of this computer", &report.verdict.text, &[chart])? {
         ui.progress(line.trim_end());
     }
-    // Without a spec nothing is asked for that could be refused.
+    // Without a spec there is no requirement to fail.
     let failed = (report.verdict.grade == Grade::Bad && arguments.spec.is_some()).then(|| report.verdict.text.clone());
     ui.judged(&report, failed)
 }

@@ -1,4 +1,4 @@
-//! `specgen dynamics`: M, C ḣ, G, J and leg forces of a platform at given states, by the model that its controller uses.
+//! `specgen dynamics`: M, C ḣ, G, J and leg forces of a platform at given states, with the controller's model.
 
 use clap::Args;
 use specgen_language::outcome::Failure;
@@ -13,14 +13,14 @@ use super::named::{InputFile, OutputFile};
 pub struct Arguments {
     /// The spec file.
     spec: InputFile,
-    /// States: JSON (a list, or an object with a list `vectors`, of objects with `h`, `hd`, `hdd`), or CSV with a line of
-    /// names and 18 columns (pose, rate, acceleration). m, rad, s.
+    /// States, in m, rad and s: JSON (a list of objects with `h`, `hd`, `hdd`, or an object with such a list as `vectors`), or
+    /// CSV with a header line and 18 columns (pose, rate, acceleration).
     #[arg(long, value_name = "FILE")]
     states: InputFile,
-    /// Poses are from rest; without it their z counts from the base frame.
+    /// Poses are relative to the rest pose. Without this option, z is measured from the base frame.
     #[arg(long)]
     from_rest: bool,
-    /// Compute in the scalar of the controller, with its constants, instead of with its model at full precision.
+    /// Compute with the scalar type and constants of the controller, instead of its model at full precision.
     #[arg(long)]
     generated: bool,
     /// Write the result (JSON) here instead of printing it.

@@ -1,45 +1,45 @@
 //! Examples below the help of each command.
 //!
-//! Each line is a command as typed and, behind `#` or in a line below, what it does. No line is longer than 80 letters. `codegen/cli/tests/examples.rs` runs them as they stand here, in a
-//! folder that has the files they name; lines with one of the marks that [`MAIN`] explains are only parsed.
+//! Each example is a command line and what it does, after `#` or on the next line. `codegen/cli/tests/examples.rs` runs them
+//! unchanged, in a folder with the files that they name; it only parses lines with one of the marks explained in [`MAIN`].
 
 pub const MAIN: &str = "\
 Examples:
   specgen platform.toml --no-build         # compile, write Rust source
   specgen platform.toml -o controller  # (minutes)
-      built, measured, bits compared
-  specgen platform.toml --setup            # (minutes) brings the tools first
-  specgen check platform.toml              # every finding, nothing written
+      compile, build, measure, compare bits
+  specgen platform.toml --setup            # (minutes) install tools first
+  specgen check platform.toml              # report findings, write nothing
   specgen sim platform.toml --frequency 10
-      the emitted controller on its machine
+      the controller on a simulated machine
   specgen tune platform.toml --write  # (minutes)
-      gains from the simulated loop, into the spec
+      tune gains on the simulated loop, write them into the spec
   specgen identify record.csv --drive 0:100
   specgen flash platform.toml         # (board) build, check, write to the board
 
-docs/guide.md leads from the bench to running firmware. Every command has
-examples of its own: `specgen check --help`. (minutes) takes several minutes;
-(board) needs a board, a second program, or an idle computer.
+docs/guide.md leads from measurements to running firmware. Every command has its
+own examples: `specgen check --help`. (minutes): takes several minutes. (board):
+needs a board, a second program, or an idle computer.
 
-Exit codes: 0 good; 1 spec, record or budget refused, or an input that cannot be
-read; 2 usage, or an output that is an input; 3 environment; 4 a simulated run
-ended before the end of its path; 130 interrupted.";
+Exit codes: 0 good; 1 spec, record or budget refused, or an unreadable input;
+2 usage, or an output that is an input; 3 environment; 4 a simulated run ended
+before the end of its path; 130 interrupted.";
 
 pub const NEW: &str = "\
 Examples:
-  specgen new bench --like reference   # asks nothing: a platform as the paper's
+  specgen new bench --like reference   # no questions: a platform like the paper's
   specgen new mine --like reference --r_B \"200 mm\" --stroke \"100 um\"
   specgen new six --like legs --stroke \"30 um\"
-      six legs with gauges of their own
+      six legs, each with its own gauge
 
-Without --like it asks; an empty line takes the value in brackets. The paper's
-symbols are options, too: --r_B, --r_P, --alpha_B, --alpha_P, --m, --k_a, --T_s.";
+Without --like it asks; an empty line accepts the value in brackets. The paper's
+symbols are also options: --r_B, --r_P, --alpha_B, --alpha_P, --m, --k_a, --T_s.";
 
 pub const LSP: &str = "\
 Examples:
-  specgen lsp                     # (board) an editor starts it, and talks to it
+  specgen lsp                     # (board) started by an editor
 
-docs/editors.md has the lines for VS Code, Helix and Neovim.";
+docs/editors.md shows the settings for VS Code, Helix and Neovim.";
 
 pub const CHECK: &str = "\
 Examples:
@@ -49,77 +49,78 @@ Examples:
 
 pub const EXPLAIN: &str = "\
 Examples:
-  specgen explain E0441                    # a code that `specgen check` printed: why it matters, an example, the fix
+  specgen explain E0441     # a code printed by `specgen check`
 
-docs/diagnostics.md has the pages of all codes.";
+docs/diagnostics.md lists all codes.";
 
 pub const BUILD: &str = "\
 Examples:
   specgen build legs.toml --target host -o legs-host
       a shared library for this computer
   specgen build platform.toml --target stm32h743 -o controller  # (minutes)
-      an image of the NUCLEO-H743ZI2; with --assumed-ok while values of the spec are assumed
+      an image for the NUCLEO-H743ZI2
+      (with --assumed-ok if values of the spec are still assumed)
   specgen build platform.toml --target rt-pc -o controller  # (minutes)
       the program of a real-time PC
   specgen build platform.toml --target qemu --no-measure  # (minutes)
-      emulated Cortex-M, nothing counted";
+      emulated Cortex-M, without instruction counts";
 
 pub const SIZE: &str = "\
 Examples:
-  specgen size platform.toml        # (minutes) builds for the spec's target.mcu
+  specgen size platform.toml        # (minutes) for the spec's target.mcu
   specgen size platform.toml --target stm32h743 --no-measure  # (minutes)
   specgen size controller/target/stm32h743.elf  # (minutes)
-      what `build` left there";
+      an image that `build` made";
 
 pub const FLASH: &str = "\
 Examples:
-  specgen flash platform.toml          # (board) build, check, write by probe-rs
+  specgen flash platform.toml          # (board) build, check, flash
   specgen flash controller/target/stm32h743.elf  # (board)
-      an image that is there
+      an existing image
   specgen flash platform.toml --speed 500 --connect-under-reset  # (board)
-      a long cable, a part that does not answer";
+      for a long cable, or a part that does not answer";
 
 pub const SIM: &str = "\
 Examples:
-  specgen sim legs.toml                       # a sweep of its legs, every law
-  specgen sim platform.toml --frequency 10   # at rest, a wave, its trajectories
+  specgen sim legs.toml                       # a sweep of the legs, all modes
+  specgen sim platform.toml --frequency 10   # rest, a wave, the trajectories
   specgen sim platform.toml --trajectory case-2 --plot case-2.svg
-  specgen sim legs.toml --paper -o tables   # Tables 1 and 2, beside the paper's
+  specgen sim legs.toml --paper -o tables   # the paper's Tables 1 and 2
   specgen sim platform.toml --record run.rec   # for `replay`";
 
 pub const TUNE: &str = "\
 Examples:
   specgen tune legs.toml --evaluations 100 -o tuning
-      weights as a patch; front, history and plot in tuning
+      print weights as a patch; write front, history and plot to tuning
   specgen tune platform.toml --write  # (minutes)
-      gains and bandwidths into the spec
+      write gains and bandwidths into the spec
   specgen tune platform.toml --what gains --bounds ki=10:1000  # (minutes)
   specgen tune legs.toml --evaluate candidates.json --json
-      scores for a search of your own";
+      scores for your own optimiser";
 
 pub const LEARN: &str = "\
 Examples:
   specgen learn learning.toml -o case-1.json
-      its [control] has correction = \"2 um\"; case 1 at 10 Hz, 5 passes
+      a spec with control.correction = \"2 um\"; case 1 at 10 Hz, 5 passes
   specgen learn learning.toml --from case-1.json --passes 1
-      continues from that correction
+      continue from that correction
   specgen learn learning.toml --prepare --passes 0 -o prepared.json
-      the correction that the model predicts, without a pass
+      only the correction that the model predicts
   specgen learn learning.toml --excite response.json
-      measures the response of the running loop
+      measure the response of the running loop
   specgen learn learning.toml --response response.json
-      learns with that response, so the stiffness of the spec does not matter
+      learn with that response, independent of the spec's stiffness
   specgen learn learning.toml --trajectory case-1 --socket link --machine stage-7  # (board)
-      on a machine: armed first, ramped down afterwards";
+      on a machine, which is armed first and ramped down afterwards";
 
 pub const ROBUST: &str = "\
 Examples:
   specgen robust legs.toml --draws 10      # ten random machines and the corners
-  specgen robust legs.toml --replay gain-low     # one of them alone, to the bit
+  specgen robust legs.toml --replay gain-low     # one of them, bit for bit
   specgen robust platform.toml --max-error \"60 nm\"  # (minutes)
-      a gate for builds
+      as a build gate
   specgen robust legs.toml --draws 9 --shard 1/2 -o part-1.json
-      half of the machines; the other half on another computer
+      one half of the machines; run the other half on another computer
   specgen robust legs.toml --draws 9 --shard 2/2 -o part-2.json";
 
 pub const MERGE: &str = "\
@@ -130,19 +131,19 @@ Examples:
 pub const REPORT: &str = "\
 Examples:
   specgen report legs.toml -o legs.html --no-target   # simulated runs, findings
-  specgen report platform.toml   # (minutes) with time, memory, bits
-  specgen report platform.toml --paper --no-target  # (minutes) 2nd page";
+  specgen report platform.toml   # (minutes) also time, memory, bits
+  specgen report platform.toml --paper --no-target  # (minutes) paper's figures";
 
 pub const REPRODUCE: &str = "\
 Examples:
-  specgen reproduce                    # (minutes) everything, into reproduction
+  specgen reproduce                    # (minutes) results in reproduction/
   specgen reproduce --generations 1 -o quick  # (minutes)
-      with hardly any genetic algorithm";
+      with a shortened genetic algorithm";
 
 pub const PIL: &str = "\
 Examples:
   specgen pil legs.toml --seconds 0.05  # (minutes)
-      the image in QEMU against the host
+      an image in QEMU, compared with the host
   specgen pil platform.toml --mode pf-pcc                  # (minutes)
   specgen pil platform.toml --port /dev/ttyACM0  # (board)
       a board instead of QEMU";
@@ -150,21 +151,22 @@ Examples:
 pub const PREDICT: &str = "\
 Examples:
   specgen identify predict table.csv 10hz.csv
-      how far off the table is on a record it was not fitted to
+      error of the table on a record that was not used in its fit
   specgen identify predict legs.toml 10hz.csv -o predicted.csv --plot predicted.svg
       the model of leg 0 of the spec, with its creep and dead time
 
-A drive without displacement_um is predicted above negative saturation.";
+Without displacement_um, displacement is predicted relative to negative
+saturation.";
 
 pub const OPERATE: &str = "\
 Examples:
   specgen operate --port /dev/ttyACM0 platform.toml status  # (board)
       phase, cause, late ticks
   specgen operate --port /dev/ttyACM0 platform.toml  # (board)
-      line by line from the keyboard
+      interactive
   specgen operate --port /dev/ttyACM0 arm \"wait arming\" run  # (board)
   specgen operate --socket rt.sock platform.toml --script run.txt  # (board)
-      a real-time PC, from a file
+      a real-time PC, with commands from a file
 
 Commands: status, arm, run, hold, ramp-down, acknowledge, none,
   set NAME=VALUE…, move|jog AXIS=QUANTITY… (z=1um rx=2urad), where, limits,
@@ -176,40 +178,40 @@ Commands: status, arm, run, hold, ramp-down, acknowledge, none,
   on-edge [drop | move … | jog … | goto … | play … | wave FILE],
   watch [EVERY [SECONDS [FILE]]], stop (ends the program at a socket)
 
-The link lives as long as this command does; without it the machine holds after
-0.1 s. Ctrl-C ramps down first.";
+The link ends with this command; the machine then holds after 0.1 s. Ctrl-C
+ramps down first.";
 
 pub const PANEL: &str = "\
 Examples:
   specgen panel platform.toml --socket rt.sock         # (board) at 127.0.0.1:8020
   specgen panel platform.toml --port /dev/ttyACM0      # (board)
   specgen panel platform.toml --socket rt.sock --listen 0.0.0.0:8020  # (board)
-      for others on the network who know the token
+      also for others on the network who know the token
 
-The printed address contains the token: whoever has it can watch and take control.
-One page is in control at a time; hold and ramp down work from every page. If the
-page in control closes, the machine treats the host as lost: it holds, then ramps
-down. Ctrl-C ramps down first. See docs/panel.md.";
+The printed address contains the token. Anyone with the token can watch and take
+control. One page is in control at a time; hold and ramp down work from every
+page. If the page in control closes, the machine treats the host as lost: it
+holds, then ramps down. Ctrl-C ramps down first. See docs/panel.md.";
 
 pub const GCS: &str = "\
 Examples:
   specgen gcs --socket rt.sock                       # (board) at 127.0.0.1:50000
-  specgen gcs --port /dev/ttyACM0 platform.toml      # (board) only its controller
+  specgen gcs --port /dev/ttyACM0 platform.toml      # (board) check the spec
   specgen gcs --socket rt.sock --axis 1=Z            # (board)
-      for a client that knows one axis, called 1
+      for a client with a single axis named 1
 
-Axes X Y Z in um, U V W in urad. docs/gcs.md has the commands. The machine has
-this program as its host: Ctrl-C ramps down first.";
+Axes X Y Z in um, U V W in urad. docs/gcs.md lists the commands. This program is
+the machine's host: Ctrl-C ramps down first.";
 
 pub const REPLAY: &str = "\
 Examples:
   specgen replay run.rec --spec platform.toml
       bit-equal, or the first tick that differs
   specgen replay run.rec --spec platform.toml --emitted  # (minutes)
-      the same on the emitted controller, which is built
-  specgen replay run.rec --csv run.csv  # time, inputs with units, what came out
+      the same with the emitted controller, which is built first
+  specgen replay run.rec --csv run.csv  # time, inputs and outputs, with units
   specgen replay run.rec --spec platform.toml --mcap run.mcap
-      for viewers of logs";
+      for log viewers";
 
 pub const DYNAMICS: &str = "\
 Examples:
@@ -225,13 +227,13 @@ Examples:
   specgen identify record.csv --drive 0:100 --grid 16 --plot table.svg
   specgen identify record.csv --drive 0:100 --grid 16 -o table.csv
   specgen identify record.csv --drive 0:100 --columns drive_V=2 --rate 51.2
-      the drive by its column, times counted
-  specgen identify linear 1hz.csv 10hz.csv       # records of one frequency each";
+      drive in column 2, time from the sampling rate
+  specgen identify linear 1hz.csv 10hz.csv       # one frequency per record";
 
 pub const LINEAR: &str = "\
 Examples:
   specgen identify linear 1hz.csv 10hz.csv
-      gain, λ, and the weights that are stable over it
+      gain, λ, and the weights that are stable over λ
   specgen identify linear 1hz.csv 10hz.csv --frequency 1,10 --spec platform.toml";
 
 pub const RESPONSE: &str = "\
@@ -239,7 +241,7 @@ Examples:
   specgen identify response sweep.csv --plot response.svg
       resonance, damping, lag, dead time
 
-The response of a platform whose loop runs: specgen learn SPEC --excite FILE.";
+For the response of a running closed loop: specgen learn SPEC --excite FILE.";
 
 pub const GAUGE: &str = "\
 Examples:
@@ -251,7 +253,7 @@ Examples:
 
 pub const EXPORT: &str = "\
 Examples:
-  specgen export c platform.toml -o c      # prints the line that compiles it";
+  specgen export c platform.toml -o c      # prints the compile command";
 
 pub const EXPORT_PYTHON: &str = "\
 Examples:
@@ -265,12 +267,12 @@ Examples:
 pub const GAINS: &str = "\
 Examples:
   specgen identify gains run.rec --spec platform.toml -o gains
-      six tables in gains/, and the line of the spec that names them";
+      writes six tables to gains/, prints the line of the spec to use them";
 
 pub const RATE: &str = "\
 Examples:
   specgen identify rate record.csv fast.csv --drive 0:100 --grid 16 -o leg
-      leg.toml has the lines for [hysteresis]";
+      writes the lines for [hysteresis] to leg.toml";
 
 pub const FORC: &str = "\
 Examples:
@@ -279,20 +281,20 @@ Examples:
   specgen forc -o fast.csv --rate 2000 --grid 16
       a second rate, for `identify rate`
   specgen forc --drive-only --drive -90:90 --sampling 1000 -o drive.csv
-      what a generator plays on the bench";
+      the drive signal for a waveform generator";
 
 pub const PLANT: &str = "\
 Examples:
   specgen plant platform.toml  # (board)
-      until Ctrl-C; rt-pc --sim plant joins in
+      until Ctrl-C; connect with rt-pc --sim plant
   specgen plant platform.toml --name bench --cpu 1 &  # (board)
-      beside the controller's processor";
+      on a processor that the controller does not use";
 
 pub const DOCTOR: &str = "\
 Examples:
   specgen doctor --seconds 0.5           # wake-ups every 100 us, what to change
   specgen doctor platform.toml --cpu 1  # (board)
-      exit code 1 if the spec's period is not kept";
+      exit code 1 if the computer does not keep the spec's period";
 
 pub const DUMP_IR: &str = "\
 Examples:
@@ -301,20 +303,20 @@ Examples:
 
 pub const CACHE: &str = "\
 Examples:
-  specgen cache                         # its folder, how many builds, how large
+  specgen cache                         # folder, number of builds, size
 
-With --clear it is emptied, which is safe at any time. SPECGEN_CACHE=DIR names
-another folder, SPECGEN_CACHE= keeps nothing; --no-cache does neither take nor
-keep for one command.";
+--clear empties the cache, which is safe at any time. SPECGEN_CACHE=DIR selects
+another folder, an empty SPECGEN_CACHE switches the cache off, and --no-cache
+does so for one command.";
 
 pub const COMPLETIONS: &str = "\
 Examples:
   specgen completions bash > specgen.bash
       for one session: source specgen.bash
 
-Install, once, into the file that your shell reads:
+To install, write the script to the file that your shell reads:
   bash        ~/.local/share/bash-completion/completions/specgen
   zsh         ~/.zfunc/_specgen, and in ~/.zshrc:
               fpath+=~/.zfunc; autoload -U compinit; compinit
   fish        ~/.config/fish/completions/specgen.fish
-  PowerShell  behind what $PROFILE has";
+  PowerShell  append it to $PROFILE";

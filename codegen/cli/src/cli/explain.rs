@@ -12,11 +12,11 @@ use specgen_studies::verdict::WIDTH;
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::EXPLAIN)]
 pub struct Arguments {
-    /// A code such as E0441, as it stands in brackets behind `error`, `warning` or `note`.
+    /// A code such as E0441, shown in brackets after `error`, `warning` or `note`.
     code: String,
 }
 
-/// What is known of a code.
+/// The documentation of a code.
 #[derive(Serialize)]
 struct Explanation {
     code: &'static str,
@@ -28,7 +28,7 @@ struct Explanation {
 pub fn run(arguments: &Arguments, ui: &Ui) -> Result<(), Failure> {
     let asked = arguments.code.to_uppercase();
     let Some(code) = findings::find(&asked) else {
-        // The letter may be mistaken, or left out.
+        // The letter may be wrong or missing.
         let same = findings::all().into_iter().find(|code| asked.get(1..) == code.id.get(1..) || asked == code.id[1..]);
         let help = same.map_or_else(
             || "docs/diagnostics.md lists them".to_owned(),
@@ -41,7 +41,7 @@ pub fn run(arguments: &Arguments, ui: &Ui) -> Result<(), Failure> {
 }
 
 impl Outcome for Explanation {
-    /// The page without its marks, code indented.
+    /// The page without its Markdown, code indented.
     fn text(&self) -> String {
         let mut text = String::new();
         let mut code = None;
@@ -69,8 +69,8 @@ impl Outcome for Explanation {
 /// Before a line of code.
 const INDENT: &str = "    ";
 
-/// A line of code as lines that fit on a terminal and say the same: a list goes on in the next line, with the mark of a change
-/// before it; a command goes on behind a backslash.
+/// Wraps a line of code to the width of a terminal: a list after a comma, with the mark of a diff repeated; a command after a
+/// backslash.
 fn wrapped(line: &str, language: &str) -> Vec<String> {
     let width = WIDTH - INDENT.len();
     let shell = language == "sh";
@@ -81,7 +81,7 @@ fn wrapped(line: &str, language: &str) -> Vec<String> {
     let mut rest = line.to_owned();
     while rest.chars().count() > width {
         let fits = rest.char_indices().nth(width - end.len()).map_or(rest.len(), |(place, _)| place);
-        // Not within the beginning, which would never come to an end.
+        // A break within the indentation would loop forever.
         let Some(place) = rest[..fits].rfind(space).filter(|place| *place > begin.len()) else { break };
         lines.push(format!("{}{end}", &rest[..place]));
         rest = format!("{begin}{}", &rest[place + space.len()..]);

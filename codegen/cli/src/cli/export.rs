@@ -17,13 +17,13 @@ pub struct Arguments {
 
 #[derive(Subcommand, Debug)]
 enum Kind {
-    /// A C header, the library for this host, and two sources that use them: `tick.c` for firmware, `example.c` that runs it.
+    /// A C header, the library for this host, and two example sources: `tick.c` for firmware, and `example.c`, which calls it.
     #[command(after_help = super::examples::EXPORT)]
     C(Folder),
-    /// The library for this host, and a module that steps it in any Python, without the package `specgen` or numpy.
+    /// The library for this host, and a Python module that steps it. It needs neither the package `specgen` nor numpy.
     #[command(after_help = super::examples::EXPORT_PYTHON)]
     Python(Folder),
-    /// FMI 2.0 co-simulation units of the controller under its supervisor and of the simulated machine, sources included.
+    /// FMI 2.0 co-simulation units (FMUs) of the supervised controller and of the simulated machine, with their sources.
     Fmu(FmuArguments),
 }
 
@@ -32,7 +32,7 @@ enum Kind {
 struct Folder {
     /// The spec file.
     spec: InputFile,
-    /// Folder for the library and what uses it.
+    /// Folder for the library and its sources.
     #[arg(short, long, value_name = "DIR")]
     output: OutputFolder,
 }
@@ -43,10 +43,10 @@ struct Folder {
 struct FmuArguments {
     /// The spec file.
     spec: InputFile,
-    /// Folder for the units, which are called after the platform.
+    /// Folder for the FMUs, which are named after the platform.
     #[arg(short, long, value_name = "DIR")]
     output: OutputFolder,
-    /// Write the simulated machine of `specgen sim`, too, as NAME_plant.fmu.
+    /// Also write the simulated machine of `specgen sim`, as NAME_plant.fmu.
     #[arg(long)]
     plant: bool,
 }

@@ -1,4 +1,4 @@
-//! `build --target`, `size` and `flash`: a workspace with one target, built, checked, and held against its budget.
+//! `build --target`, `size` and `flash`: build a workspace with one target, check it, and compare it with its budget.
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
@@ -9,26 +9,26 @@ use specgen_toolchain::targets::NAMES;
 
 use super::named::{InputFile, OutputFolder};
 
-/// What every command here takes of a spec.
+/// Arguments common to these commands.
 #[derive(Args, Debug)]
 struct Common {
-    /// What to build for; the spec's `target.mcu` decides if not given.
+    /// Target to build for; that of the spec's `target.mcu` if not given.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(NAMES))]
     target: Option<String>,
     /// Output folder; `<name>-controller` if not given. Must be new, empty, or an unchanged earlier output.
     #[arg(short, long, value_name = "DIR")]
     output: Option<OutputFolder>,
-    /// Where cargo builds for microcontrollers; `target` in the output folder if not given. Share it between outputs to
-    /// build less.
+    /// Cargo's target folder for microcontrollers; `target` in the output folder if not given. Share it between outputs to
+    /// compile less.
     #[arg(long, value_name = "DIR")]
     target_dir: Option<OutputFolder>,
-    /// Include lock-step for `specgen pil --port`: the host may step a board that is at rest. For boards.
+    /// For boards: include lock-step for `specgen pil --port`, which lets the host step a board at rest.
     #[arg(long)]
     lockstep: bool,
-    /// Do not run the emulator: no instruction counts, no comparison of bits.
+    /// Do not run the emulator: no instruction counts and no bit comparison.
     #[arg(long)]
     no_measure: bool,
-    /// Allow an image for a real board although values of the spec are assumed or records simulated.
+    /// Allow an image for a real board even if values of the spec are assumed or its records are simulated.
     #[arg(long)]
     assumed_ok: bool,
     #[command(flatten)]
@@ -68,10 +68,10 @@ pub struct SizeArguments {
     file: InputFile,
     #[command(flatten)]
     common: Common,
-    /// Function of the image that is one tick; found by itself in images of specgen.
+    /// The function that computes one tick; found automatically in images of specgen.
     #[arg(long, value_name = "SYMBOL")]
     tick: Option<String>,
-    /// The core of the image has no double-precision FPU: its tick must not compute f64.
+    /// The core has no double-precision FPU: a tick must not use f64.
     #[arg(long)]
     single: bool,
 }
@@ -85,16 +85,16 @@ pub struct FlashArguments {
     file: InputFile,
     #[command(flatten)]
     common: Common,
-    /// The amplifiers are off: do not ask.
+    /// Confirm that the amplifiers are off, without being asked.
     #[arg(long)]
     yes: bool,
-    /// Which debug probe, as `probe-rs list` names it, if several are connected.
+    /// Debug probe to use, as named by `probe-rs list`, if several are connected.
     #[arg(long, value_name = "VID:PID:SERIAL")]
     probe: Option<String>,
-    /// Clock of the probe, kHz: a slower one for a long cable.
+    /// Clock of the probe, kHz; use a slower one for a long cable.
     #[arg(long, value_name = "KHZ", value_parser = clap::value_parser!(u32).range(1..))]
     speed: Option<u32>,
-    /// Hold the part in reset until the probe has it: for a program that hangs, or resets the part over and over.
+    /// Hold the part in reset until the probe is attached, if its program hangs or keeps resetting it.
     #[arg(long)]
     connect_under_reset: bool,
 }

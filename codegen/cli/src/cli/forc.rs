@@ -1,5 +1,5 @@
-//! `specgen forc`: the experiment that records reversal curves, on a simulated leg that is not of the controller's model class;
-//! or its drive alone, for a generator.
+//! `specgen forc`: simulates the reversal-curve experiment on a leg outside the controller's model class, or writes only its
+//! drive signal for a waveform generator.
 
 use clap::Args;
 use specgen_language::outcome::Failure;
@@ -17,26 +17,26 @@ use super::sim::PlantArguments;
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::FORC)]
 pub struct Arguments {
-    /// Simulate a leg of this spec: its stroke, voltages, amplifier and gauge noise. Without it, the reference leg. The records
-    /// that the spec names need not be there.
+    /// Simulate a leg of this spec, with its stroke, voltages, amplifier and gauge noise; the reference leg if not given. The
+    /// records named by the spec need not exist.
     spec: Option<InputFile>,
-    /// File to write: CSV with time_s, drive_V, displacement_um; without displacement for --drive-only.
+    /// Output file: CSV with time_s, drive_V, displacement_um; no displacement with --drive-only.
     #[arg(short, long, value_name = "FILE")]
     output: OutputFile,
-    /// Reversal curves, and cells per axis of the grid that they identify; 32, or the grid of the spec.
+    /// Number of reversal curves, and of cells per axis of the grid to identify; that of the spec, or 32, if not given.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=256))]
     grid: Option<u32>,
-    /// Slope of the drive, V/s; a fifth of the voltage range if not given. Records at several rates are what `identify rate`
-    /// needs.
+    /// Slope of the drive, V/s; a fifth of the voltage range per second if not given. `identify rate` needs records at several
+    /// rates.
     #[arg(long, value_name = "V/S", allow_negative_numbers = true, value_parser = number("", "a slope from 0.1 to 100000 V/s", 0.1..=1e5))]
     rate: Option<f64>,
-    /// Write the drive alone, for a generator: from 0 V to the lowest voltage, a second there, then the curves.
+    /// Write only the drive signal, for a waveform generator: 0 V to the lowest voltage, one second there, then the curves.
     #[arg(long, conflicts_with_all = ["plot", "seed", "no_noise"])]
     drive_only: bool,
-    /// Voltages of --drive-only, such as -90:90; those of the spec, or 0:100, if not given.
+    /// Voltage range of --drive-only, such as -90:90; that of the spec, or 0:100, if not given.
     #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true, requires = "drive_only")]
     drive: Option<[f64; 2]>,
-    /// Samples per second of --drive-only, Hz.
+    /// Sampling rate of --drive-only, Hz.
     #[arg(long, value_name = "HZ", requires = "drive_only", default_value_t = 10_000.0, value_parser = number("", "1 to 1000000 samples per second", 1.0..=1e6), allow_negative_numbers = true)]
     sampling: f64,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! `specgen gcs`: programs that speak the General Command Set move a machine over the link.
+//! `specgen gcs`: clients of the General Command Set move a machine over the link.
 
 use std::net::SocketAddr;
 
@@ -16,16 +16,16 @@ use super::named::InputFile;
 #[derive(Args, Debug)]
 #[command(group(ArgGroup::new("line").required(true).args(["port", "socket"])), after_help = super::examples::GCS)]
 pub struct Arguments {
-    /// The spec that the device was built from; another controller is then refused.
+    /// The spec that the device was built from. A device with another controller is refused.
     #[arg(value_name = "SPEC")]
     spec: Option<InputFile>,
     #[command(flatten)]
     line: Line,
-    /// Where clients connect. Whoever can reach it can move the machine: the command set knows no password.
+    /// Address for clients. Anyone who can reach it can move the machine: the command set has no password.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:50000")]
     listen: SocketAddr,
-    /// Show this axis (X Y Z U V W) under another name and no axis that is not named; for clients that know one axis. Repeat for
-    /// more.
+    /// Show only the axes (X Y Z U V W) given with this option, each under a name, for clients that support fewer axes. Can be
+    /// repeated.
     #[arg(long = "axis", value_name = "NAME=AXIS")]
     axes: Vec<String>,
 }

@@ -1,7 +1,7 @@
-//! `specgen identify`: measured records in, tables, spec lines, figures and plots out.
+//! `specgen identify`: turns measured records into tables, lines of a spec, figures and plots.
 //!
-//! `specgen identify RECORD` identifies the Everett table; other kinds have a command of their own. A record that has the
-//! name of such a command is given as `./linear`.
+//! `specgen identify RECORD` identifies the Everett table; the other kinds are subcommands. A record with the name of a
+//! subcommand is given as `./linear`.
 
 use clap::{Args, Subcommand};
 use specgen_identify::Reading;
@@ -31,15 +31,15 @@ pub struct Arguments {
 
 #[derive(Subcommand, Debug)]
 enum Kind {
-    /// The linear relation Y = ρX + δ of records at several frequencies, λ and the weights that are stable over it.
+    /// Linear relation Y = ρX + δ of records at several frequencies, λ, and the weights that are stable over λ.
     Linear(LinearArguments),
     /// Frequency response from a swept sine, multisine or noise: resonance, damping, lag, dead time.
     Response(ResponseArguments),
-    /// Gain of each leg of a platform over its table, from a recorded run; writes the six tables.
+    /// Gain of each leg of a platform relative to its table, from a recorded run; writes the six tables.
     Gains(GainsArguments),
     /// Calibration of a gauge from its voltage and a reference.
     Gauge(GaugeArguments),
-    /// Displacement that a table or a spec predicts for a drive, beside the measured one.
+    /// Displacement that a table or a spec predicts for a drive, compared with the measured one.
     Predict(PredictArguments),
     /// Axial stiffness from force and displacement at constant drive.
     Stiffness(StiffnessArguments),
@@ -59,10 +59,10 @@ struct EverettArguments {
     /// Cells per axis of the Preisach grid; chosen by cross-validation over whole curves if not given.
     #[arg(long, value_name = "N", value_parser = grid, allow_negative_numbers = true)]
     grid: Option<usize>,
-    /// A second record of the leg, not used for the fit, to judge the table by.
+    /// A second record of the leg, not used in the fit, to validate the table.
     #[arg(long, value_name = "RECORD")]
     validate: Option<InputFile>,
-    /// Write the table (CSV: up_V, down_V, everett_um) here.
+    /// Write the table to this file (CSV: up_V, down_V, everett_um).
     #[arg(short, long, value_name = "FILE")]
     output: Option<OutputFile>,
     #[command(flatten)]
@@ -73,17 +73,17 @@ struct EverettArguments {
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::LINEAR)]
 struct LinearArguments {
-    /// Records at one frequency each: CSV with columns time_s, drive_V, displacement_um. The drive may be that of an
+    /// Records at one frequency each: CSV with columns time_s, drive_V, displacement_um. The drive may be the output of an
     /// inverse hysteresis model, as in the paper.
     #[arg(required = true)]
     records: Vec<InputFile>,
-    /// Frequencies of the records, Hz, in their order; found in the records if not given.
+    /// Frequencies of the records, Hz, in the same order; estimated from the records if not given.
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = number("Hz", "a frequency in Hz above zero", 1e-6..=1e6))]
     frequency: Vec<f64>,
-    /// Frequency at which the model's gain ρ̂ is taken, Hz; the lowest one if not given.
+    /// Frequency of the model's gain ρ̂, Hz; the lowest one if not given.
     #[arg(long, value_name = "HZ", value_parser = number("Hz", "a frequency in Hz above zero", 1e-6..=1e6))]
     reference: Option<f64>,
-    /// Judge the weights of this spec, on its sampled loop, over the λ found.
+    /// Check the weights of this spec, on its sampled loop, over the identified λ.
     #[arg(long, value_name = "SPEC")]
     spec: Option<InputFile>,
     #[command(flatten)]
@@ -96,7 +96,7 @@ struct LinearArguments {
 struct ResponseArguments {
     /// Swept sine, multisine or noise: CSV with columns time_s, drive_V, displacement_um, evenly sampled.
     record: InputFile,
-    /// Samples in a segment; a power of two near an eighth of the record if not given.
+    /// Samples per segment; a power of two near an eighth of the record if not given.
     #[arg(long, value_name = "N")]
     segment: Option<usize>,
     #[command(flatten)]
@@ -107,12 +107,12 @@ struct ResponseArguments {
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::GAINS)]
 struct GainsArguments {
-    /// The recording of a run in which every leg moves slowly by a good part of its stroke: a wave on all axes.
+    /// Recording of a run in which every leg moves slowly over much of its stroke, such as a wave on all axes.
     recording: InputFile,
     /// The spec that the target was built from.
     #[arg(long, value_name = "SPEC")]
     spec: InputFile,
-    /// Folder for the six tables, leg1.csv to leg6.csv, in that of the spec.
+    /// Folder for the six tables, leg1.csv to leg6.csv, relative to that of the spec.
     #[arg(short, long, value_name = "DIR")]
     output: Option<String>,
 }
@@ -121,12 +121,12 @@ struct GainsArguments {
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::GAUGE)]
 struct GaugeArguments {
-    /// CSV with columns gauge_V and reference_um, and time_s if there is one.
+    /// CSV with columns gauge_V and reference_um, and optionally time_s.
     record: InputFile,
     /// Degree of the polynomial, 1 to 5; chosen by cross-validation if not given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=5))]
     degree: Option<u8>,
-    /// Write the calibration as a table (CSV: gauge_V, reference_um, means over even steps) here, for other programs.
+    /// Write the calibration table to this file, for other programs (CSV: gauge_V, reference_um, means over even steps).
     #[arg(long, value_name = "FILE")]
     table: Option<OutputFile>,
     #[command(flatten)]
@@ -137,23 +137,23 @@ struct GaugeArguments {
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::PREDICT)]
 struct PredictArguments {
-    /// A table as `specgen identify -o` writes it, or a spec (.toml): the tables of its records, with its creep, second weight and
-    /// dead time.
+    /// A table written by `specgen identify -o`, or a spec (.toml), whose tables, creep, second weight and dead time are used.
     #[arg(value_name = "TABLE|SPEC")]
     model: InputFile,
-    /// Drive: CSV with time_s, drive_V (the command) or monitor_V (the measured voltage); compared if it has displacement_um.
+    /// Drive: CSV with time_s and drive_V (the command) or monitor_V (the measured voltage). With displacement_um, the
+    /// prediction is compared with it.
     drive: InputFile,
     /// Leg of the spec, 0 to 5.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=5), allow_negative_numbers = true)]
     leg: u8,
-    /// Time by which the displacement lags the voltage, ms; that of the spec, or none, if not given.
+    /// Dead time from voltage to displacement, ms; that of the spec, or 0, if not given.
     #[arg(long, value_name = "MS", value_parser = number("", "milliseconds from 0 to 10", 0.0..=10.0), allow_negative_numbers = true)]
     dead_time: Option<f64>,
-    /// Resonance behind the model, frequency in Hz and damping ratio, such as 735:0.015, or `none`; if not given that of the
-    /// spec, or with a table that of a ring in the record.
+    /// Resonance in series with the model, as frequency in Hz and damping ratio, such as 735:0.015, or `none`. If not given, that
+    /// of the spec; with a table, that of ringing in the record.
     #[arg(long, value_name = "HZ:ZETA", value_parser = mode)]
     mode: Option<ModeArgument>,
-    /// Write time_s, drive_V, displacement_um (predicted) and, where it was measured, measured_um and error_um here.
+    /// Write time_s, drive_V, displacement_um (predicted) and, if measured, measured_um and error_um to this file.
     #[arg(short, long, value_name = "FILE")]
     output: Option<OutputFile>,
     #[command(flatten)]
@@ -164,8 +164,8 @@ struct PredictArguments {
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::STIFFNESS)]
 struct StiffnessArguments {
-    /// CSV with columns time_s, force_N (positive where it pushes the displacement up), displacement_um, and drive_V if
-    /// there is one, which must be constant.
+    /// CSV with columns time_s, force_N (positive if it increases the displacement), displacement_um, and optionally drive_V,
+    /// which must be constant.
     record: InputFile,
     #[command(flatten)]
     bench: BenchArguments,
@@ -175,7 +175,7 @@ struct StiffnessArguments {
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::RATE)]
 struct RateArguments {
-    /// Records of one leg at different rates, at least two: CSV with columns time_s, drive_V, displacement_um.
+    /// At least two records of one leg at different rates: CSV with columns time_s, drive_V, displacement_um.
     #[arg(required = true, value_name = "RECORD")]
     records: Vec<InputFile>,
     /// Voltage range of the tables, V, such as 0:100 or -90:90.
@@ -184,10 +184,10 @@ struct RateArguments {
     /// Cells per axis of the Preisach grid.
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = grid, allow_negative_numbers = true)]
     grid: usize,
-    /// A further record, in no fit, to judge the options by.
+    /// Another record, not used in any fit, to compare the options.
     #[arg(long, value_name = "RECORD")]
     hold_out: Option<InputFile>,
-    /// Write NAME.toml (lines of a spec) and the tables NAME-static.csv, NAME-mu0.csv and so on beside it.
+    /// Write NAME.toml (lines of a spec) and the tables NAME-static.csv, NAME-mu0.csv and so on.
     #[arg(short, long, value_name = "NAME")]
     output: Option<OutputFolder>,
     #[command(flatten)]
@@ -197,11 +197,11 @@ struct RateArguments {
 /// Arguments of every kind of record.
 #[derive(Args, Debug)]
 struct BenchArguments {
-    /// Columns by their headers or numbers (from 1), named with their units: drive_mV=Voltage,time_s=1. Without it, by their
-    /// headers.
+    /// Map columns, given by header or number (from 1), to names with units, such as drive_mV=Voltage,time_s=1. If not given,
+    /// columns are found by their headers.
     #[arg(long, value_name = "NAME=COLUMN,…", value_delimiter = ',')]
     columns: Vec<String>,
-    /// Samples per second, Hz: counts the time from sample numbers, or from the rows of a file.
+    /// Sampling rate, Hz: time is computed from sample numbers, or from row numbers.
     #[arg(long, value_name = "HZ", value_parser = number("Hz", "samples per second above zero", 1e-3..=1e9), allow_negative_numbers = true)]
     rate: Option<f64>,
     #[command(flatten)]
@@ -216,7 +216,7 @@ impl BenchArguments {
     }
 }
 
-/// Voltages that make sense; `actuator.voltage` of a spec has the same range.
+/// Plausible voltages; `actuator.voltage` of a spec has the same range.
 const VOLTS: std::ops::RangeInclusive<f64> = -1e4..=1e4;
 
 pub(super) fn range(text: &str) -> Result<[f64; 2], String> {
@@ -233,12 +233,12 @@ pub(super) fn range(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-/// Any whole number: which sizes can be identified is for identification to say.
+/// Any whole number: identification checks which sizes are possible.
 fn grid(text: &str) -> Result<usize, String> {
     text.parse().map_err(|_| format!("expected a whole number, found `{text}`"))
 }
 
-/// A mode, or that there is none.
+/// A mode, or none.
 #[derive(Debug, Clone, Copy)]
 struct ModeArgument(Option<Mode>);
 
@@ -288,10 +288,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         }
         None => {
             let EverettArguments { record, drive, grid, validate, output, bench } = &arguments.everett;
-            // Both are required unless a command is named: the option is for clap's sake.
+            // clap requires both unless there is a subcommand.
             let (Some(record), Some(drive)) = (record, drive) else {
                 return Err(Failure::Usage(
-                    "a record and --drive are expected, or one of linear, response, gauge, stiffness".to_owned(),
+                    "expected a record and --drive, or one of linear, response, gains, gauge, predict, stiffness, rate".to_owned(),
                 ));
             };
             everett::run(record, *drive, *grid, validate.as_deref(), output.as_deref(), &bench.bench()?, ui)

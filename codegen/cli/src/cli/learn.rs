@@ -1,4 +1,4 @@
-//! `specgen learn`: a motion that repeats, learned between passes, on the simulated machine of a spec or over the link on a real one.
+//! `specgen learn`: learns a repeated motion between passes, on the simulated machine of a spec or on a real one over the link.
 
 use std::path::Path;
 
@@ -21,46 +21,47 @@ use super::sim::{PlantArguments, frequency};
 pub struct Arguments {
     /// The spec file, with `control.correction`.
     spec: InputFile,
-    /// What is learned: case-1, case-2, machining or multisine, or a trajectory of the spec by its name; case-1 if not given. A machine
-    /// at the end of a link learns the trajectories that it has.
+    /// Motion to learn: case-1, case-2, machining, multisine or the name of a trajectory of the spec; case-1 if not given. A
+    /// machine over the link learns only trajectories of its spec.
     #[arg(long, value_name = "NAME")]
     trajectory: Option<String>,
     /// Its operating frequency, Hz; 10, or that of the spec, if not given.
     #[arg(long, value_name = "HZ", value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<f64>,
-    /// Largest number of learning passes; one more pass measures the result. Learning ends early once a pass gains no more than its noise.
+    /// Largest number of learning passes; one more pass measures the result. Learning ends early when the gain of a pass is within its noise.
     #[arg(long, value_name = "N", default_value_t = 5, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=1000))]
     passes: u32,
-    /// Highest frequency to be learned, Hz; lowered to where every machine within [robust] converges.
+    /// Highest frequency to learn, Hz; lowered until every machine within [robust] converges.
     #[arg(long, value_name = "HZ", value_parser = frequency, allow_negative_numbers = true, default_value_t = BANDWIDTH)]
     bandwidth: f64,
-    /// Range of an uncertainty, in place of that of [robust] or the default: `stiffness=2%`, `gain=0.9:1.1`, `delay_ticks=0`.
+    /// Range of an uncertainty, instead of that of [robust] or the default: `stiffness=2%`, `gain=0.9:1.1`, `delay_ticks=0`.
     #[arg(long, value_name = "NAME=RANGE", value_parser = UserRange::parse)]
     vary: Vec<UserRange>,
-    /// Begin with the correction that the model predicts for lag and modes.
+    /// Start from the correction that the model predicts for lag and modes.
     #[arg(long, conflicts_with = "from")]
     prepare: bool,
-    /// Begin with this correction, of the same spec, machine and motion.
+    /// Start from this correction, of the same spec, machine and motion.
     #[arg(long, value_name = "FILE")]
     from: Option<InputFile>,
-    /// Learn nothing: measure the response of the running loop to a correction, by sweeps within passes of the motion, and write it here (JSON).
+    /// Learn nothing. Measure the response of the running loop to a correction, with sweeps during passes of the motion, and
+    /// write it to this file (JSON).
     #[arg(long, value_name = "FILE", conflicts_with_all = ["passes", "vary", "prepare", "from", "output", "response"])]
     excite: Option<OutputFile>,
-    /// Learn with the response that --excite measured on this machine, not with the model's and the intervals of [robust].
+    /// Learn with the response that --excite measured on this machine, instead of the model's with the intervals of [robust].
     #[arg(long, value_name = "FILE", conflicts_with = "vary")]
     response: Option<InputFile>,
-    /// Let the device compute each correction in its background, with storage for N knots per pass: 4096 (default) on an STM32H743,
-    /// 768 on an STM32F446, 65536 on a PC.
+    /// Let the device compute each correction in its idle time, with storage for KNOTS knots per pass: an STM32H743 has 4096
+    /// (default), an STM32F446 768, a PC 65536.
     #[arg(long, value_name = "KNOTS", num_args = 0..=1, default_missing_value = "4096", conflicts_with_all = ["excite", "response"],
           value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     on_device: Option<u32>,
-    /// Write the resulting correction to this file (JSON): that of the last pass that gained more than its noise.
+    /// Write the resulting correction to this file (JSON): that of the last pass whose gain exceeded its noise.
     #[arg(short, long, value_name = "FILE")]
     output: Option<OutputFile>,
     /// Learn on this machine: it is armed first and ramped down afterwards.
     #[command(flatten)]
     line: Line,
-    /// What the machine at the end of the link is called; a correction is played on no other.
+    /// Name of the machine on the link. A correction is played only on the machine that it was learned on.
     #[arg(long, value_name = "NAME")]
     machine: Option<String>,
     #[command(flatten)]
@@ -70,12 +71,13 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let named = arguments.line.is_named();
     if named != arguments.machine.is_some() {
-        let missing = if named { "--machine NAME: a correction is played on no other" } else { "--port or --socket" };
+        let missing =
+            if named { "--machine NAME: a correction is played only on its machine" } else { "--port or --socket" };
         return Err(Failure::Usage(format!("learning on a machine also needs {missing}")));
     }
     if named && (arguments.plant.plant.is_some() || arguments.plant.no_noise || arguments.frequency.is_some()) {
-        let text = "--plant, --no-noise and --frequency are for the simulated machine; a real one is as it is, and plays the \
-                    trajectories of its spec";
+        let text = "--plant, --no-noise and --frequency are only for the simulated machine; a real machine plays the trajectories \
+                    of its spec";
         return Err(Failure::Usage(text.to_owned()));
     }
     let options = Options {

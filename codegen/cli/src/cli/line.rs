@@ -1,4 +1,4 @@
-//! Where the device of a command is.
+//! Connection options of commands that need a device.
 
 use clap::Args;
 use specgen_language::outcome::Failure;
@@ -11,13 +11,13 @@ use super::named::Endpoint;
 /// A serial port or a socket.
 #[derive(Args, Debug)]
 pub struct Line {
-    /// A board at this serial port.
+    /// Serial port of a board.
     #[arg(long, value_name = "DEVICE")]
     pub port: Option<Endpoint>,
-    /// Its rate, baud.
+    /// Baud rate of the serial port.
     #[arg(long, default_value_t = BAUD, requires = "port", conflicts_with = "socket", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
     baud: u32,
-    /// A program that serves the link at this Unix socket.
+    /// Unix socket of a program that serves the link.
     #[arg(long, value_name = "PATH")]
     socket: Option<Endpoint>,
 }
@@ -28,7 +28,7 @@ impl Line {
         self.port.is_some() || self.socket.is_some()
     }
 
-    /// The end of the link that the device is at.
+    /// The line to the device.
     pub fn end(&self) -> Result<specgen_operate::Line<'_>, Failure> {
         match (&self.port, &self.socket) {
             (Some(path), _) => Ok(specgen_operate::Line::Serial(path, self.baud)),

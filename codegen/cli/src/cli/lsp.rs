@@ -1,5 +1,5 @@
-//! `specgen lsp`: findings, meanings and completions of a spec in an editor, by the Language Server Protocol on standard input and
-//! output. What it says comes from the compiler and the key table, as what `specgen check` says does.
+//! `specgen lsp`: a language server for specs, on standard input and output. Its findings, documentation and completions come
+//! from the compiler and the key table, like those of `specgen check`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use specgen_language::spec::{SpecSource, key_markdown};
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::LSP)]
 pub struct Arguments {
-    /// As editors pass it; there is no other way.
+    /// The only transport; editors pass it.
     #[arg(long, hide = true)]
     stdio: bool,
 }
@@ -47,9 +47,9 @@ fn capabilities() -> Value {
 struct Open {
     uri: String,
     text: String,
-    /// What was found when it was last looked at.
+    /// Findings of the last check.
     findings: Vec<Diagnostic>,
-    /// Whether it has changed since.
+    /// Whether it has changed since then.
     changed: bool,
 }
 
@@ -61,10 +61,10 @@ struct Server<'a> {
 
 type Served = Result<(), Box<dyn std::error::Error + Sync + Send>>;
 
-/// What is answered; nothing if there is nothing to say.
+/// The result of a request, if there is one.
 type Answer = serde_json::Result<Option<Value>>;
 
-/// Where a message names its document.
+/// JSON pointer to the document of a message.
 const URI: &str = "/textDocument/uri";
 
 impl Server<'_> {
@@ -73,7 +73,7 @@ impl Server<'_> {
             if self.take(message)? {
                 return Ok(());
             }
-            // Who types fast is answered once for all that has come.
+            // Check once for all changes that are waiting.
             while let Ok(message) = self.connection.receiver.try_recv() {
                 if self.take(message)? {
                     return Ok(());
@@ -84,11 +84,11 @@ impl Server<'_> {
         Ok(())
     }
 
-    /// Whether the editor has ended.
+    /// Handles a message; whether the editor has shut down.
     fn take(&mut self, message: Message) -> Result<bool, Box<dyn std::error::Error + Sync + Send>> {
         match message {
             Message::Request(request) => {
-                // What is answered is of the text as it is now.
+                // The answer must be about the current text.
                 self.check()?;
                 if self.connection.handle_shutdown(&request)? {
                     return Ok(true);
@@ -110,7 +110,7 @@ impl Server<'_> {
                     self.put(of(&params, URI)?, of(last, "/text")?);
                 }
             }
-            // The records of a spec may have changed, too.
+            // The records of a spec may also have changed.
             "textDocument/didSave" => self.open.values_mut().for_each(|open| open.changed = true),
             "textDocument/didClose" => {
                 let uri: String = of(&params, URI)?;
@@ -126,7 +126,7 @@ impl Server<'_> {
         self.open.insert(uri.clone(), Open { uri, text, findings: Vec::new(), changed: true });
     }
 
-    /// Compiles what has changed and shows what was found.
+    /// Compiles changed documents and publishes their findings.
     fn check(&mut self) -> Served {
         let mut shown = Vec::new();
         for open in self.open.values_mut().filter(|open| open.changed) {
@@ -151,7 +151,7 @@ impl Server<'_> {
             "textDocument/completion" => self.completions(&params),
             "textDocument/codeAction" => self.actions(&params),
             _ => {
-                let message = format!("`{method}` is not offered");
+                let message = format!("`{method}` is not supported");
                 return Response::new_err(id, ErrorCode::MethodNotFound as i32, message);
             }
         };
@@ -161,12 +161,12 @@ impl Server<'_> {
         }
     }
 
-    /// The open spec that is asked about.
+    /// The open spec of a request.
     fn spec(&self, params: &Value) -> serde_json::Result<Option<&Open>> {
         Ok(self.open.get(&of::<String>(params, URI)?).filter(|open| is_spec(&open.text)))
     }
 
-    /// The same, and what stands at the place that is asked about.
+    /// The open spec of a request, and the element at its position.
     fn spot(&self, params: &Value) -> serde_json::Result<Option<(&Open, Spot)>> {
         let position = of(params, "/position")?;
         let at = |open: &Open| Spot::at(&open.text, Lines::new(&open.text).offset(position));
@@ -188,7 +188,7 @@ impl Server<'_> {
         Ok(self.spot(params)?.map(offered))
     }
 
-    /// The fixes that are as simple as another text in the place of a finding.
+    /// Fixes that replace the text at a finding.
     fn actions(&self, params: &Value) -> Answer {
         let asked: Part = of(params, "/range")?;
         let Some(open) = self.spec(params)? else { return Ok(None) };
@@ -200,7 +200,7 @@ impl Server<'_> {
                 return None;
             }
             Some(json!({
-                "title": format!("Replace by {text}"),
+                "title": format!("Replace with {text}"),
                 "kind": "quickfix",
                 "diagnostics": [show(found, &lines)],
                 "edit": { "changes": { &open.uri: [{ "range": range, "newText": text }] } },
@@ -216,7 +216,7 @@ fn of<T: DeserializeOwned>(params: &Value, pointer: &str) -> serde_json::Result<
     serde_json::from_value(params.pointer(pointer).cloned().unwrap_or_default())
 }
 
-/// Whether a TOML file is a spec: an editor opens others, too.
+/// Whether a TOML file is a spec; an editor may open others.
 fn is_spec(text: &str) -> bool {
     let line = |line: &str| line.starts_with("#:schema") && line.contains("platform.schema.json");
     text.lines().any(|found| line(found) || found.split('=').next().is_some_and(|name| name.trim() == "schema"))
@@ -228,7 +228,7 @@ fn folder(uri: &str) -> PathBuf {
     Path::new(&path).parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf)
 }
 
-/// What `specgen check` finds in the text as it stands in the editor.
+/// Findings of `specgen check` about the text in the editor.
 fn findings(open: &Open) -> Vec<Diagnostic> {
     if !is_spec(&open.text) {
         return Vec::new();
@@ -240,7 +240,7 @@ fn findings(open: &Open) -> Vec<Diagnostic> {
     }
 }
 
-/// A finding as an editor shows it. One about a record stands at the key that names it.
+/// A finding in the protocol's form. A finding about a record is placed at the key that names the record.
 fn show(found: &Diagnostic, lines: &Lines<'_>) -> Value {
     let (range, file) = match &found.place {
         Place::Spec(span) => (lines.part(span), String::new()),

@@ -1,5 +1,5 @@
-//! Files and folders that arguments name. What each is for is its type, so that one look at the arguments serves every command: no
-//! output is an input, and no two outputs are one file.
+//! Types of path arguments: input, output, folder, device. From these types one check of all commands ensures that no output is
+//! an input and that no two outputs are the same file.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -56,15 +56,15 @@ macro_rules! named {
 named! {
     /// A file that the command reads.
     InputFile
-    /// A file that the command writes, whole.
+    /// A file that the command writes.
     OutputFile
-    /// A folder that the command writes files into, or the beginning of their names.
+    /// A folder that the command writes files into, or a prefix of their names.
     OutputFolder
-    /// What is no file of data: a device, a socket.
+    /// A device or a socket.
     Endpoint
 }
 
-/// Refuses arguments of which one would replace what another names, and outputs that cannot be written, before anything is read.
+/// Refuses outputs that would replace an input or another output, and outputs that cannot be written, before anything is read.
 pub fn check(matches: &ArgMatches) -> Result<(), Failure> {
     let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
     collect(matches, &mut inputs, &mut outputs);
@@ -80,7 +80,7 @@ pub fn check(matches: &ArgMatches) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The same name for the same file, which need not be there.
+/// A canonical path of a file that need not exist.
 fn whole(target: &Path) -> PathBuf {
     let absolute = std::path::absolute(target).unwrap_or_else(|_| target.to_owned());
     let folder = absolute.parent().and_then(|folder| folder.canonicalize().ok());
@@ -101,7 +101,7 @@ fn collect(matches: &ArgMatches, inputs: &mut Vec<PathBuf>, outputs: &mut Vec<Pa
     }
 }
 
-/// What an argument names; none for one that names no file.
+/// Role of a path argument; none for other arguments.
 pub fn role(argument: &clap::Arg) -> Option<Role> {
     use clap::builder::ValueParser;
     let is = |parser: ValueParser| argument.get_value_parser().type_id() == parser.type_id();
@@ -115,7 +115,7 @@ pub fn role(argument: &clap::Arg) -> Option<Role> {
     roles.into_iter().find(|(parser, _)| is(parser.clone())).map(|(_, role)| role)
 }
 
-/// What an argument that names a path is for.
+/// Role of a path argument.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// It is read.
@@ -126,11 +126,11 @@ pub enum Role {
     Folder,
     /// A device or a socket.
     Endpoint,
-    /// Its type does not say: no argument may be so.
+    /// A plain path, which no argument may be.
     Unknown,
 }
 
-/// Shells complete the names of files.
+/// Adds hints, so that shells complete file names.
 pub fn with_hints(command: clap::Command) -> clap::Command {
     let command = command.mut_args(|argument| match role(&argument) {
         Some(_) => argument.value_hint(ValueHint::AnyPath),

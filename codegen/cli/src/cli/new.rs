@@ -1,4 +1,4 @@
-//! `specgen new`: a folder with a commented spec of the user's own platform and a simulated record of its legs, from some
+//! `specgen new`: creates a folder with a commented spec of the user's platform and a simulated record of its legs, from about
 //! fifteen answers.
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, ValueEnum};
@@ -13,25 +13,25 @@ use super::named::OutputFolder;
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::NEW)]
 pub struct Arguments {
-    /// Name of the platform, and of the folder that is made; a path makes it elsewhere.
+    /// Name of the platform and of the new folder; a path creates the folder elsewhere.
     name: OutputFolder,
-    /// Ask nothing: what is not given is as in this spec.
+    /// Ask nothing; take values that are not given from this spec.
     #[arg(long, value_enum)]
     like: Option<Like>,
     #[command(flatten)]
     answers: AnswerArguments,
 }
 
-/// What a new spec begins as.
+/// The template of a new spec.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Like {
-    /// Six gauges see the platform; position feedback and feed-forward in task space.
+    /// Six gauges measure the platform's pose; feedback and feed-forward in task space.
     Reference,
-    /// Each leg has a gauge of its own, and feed-forward alone.
+    /// Each leg has its own gauge; feed-forward only.
     Legs,
 }
 
-/// What was given on the command line, by option.
+/// Answers given on the command line, by option.
 #[derive(Debug, Clone, Default)]
 struct AnswerArguments(Answers);
 

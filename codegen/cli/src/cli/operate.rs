@@ -1,4 +1,4 @@
-//! `specgen operate`: one session with a machine over the link, from the command line, a script, or line by line.
+//! `specgen operate`: a session with a machine over the link, from the command line, a script, or line by line.
 
 use clap::{ArgGroup, Args};
 use specgen_compiler::spec_file;
@@ -21,11 +21,11 @@ use super::named::InputFile;
 pub struct Arguments {
     #[command(flatten)]
     line: Line,
-    /// Commands from this file, one a line; `#` begins a comment.
+    /// Read commands from this file, one per line; `#` starts a comment.
     #[arg(long, value_name = "FILE")]
     script: Option<InputFile>,
-    /// The spec that the device was built from (a name that ends in .toml), then commands, each one argument. Without any,
-    /// commands come from standard input.
+    /// The spec that the device was built from (ending in .toml), then commands, each as one argument. Without commands, they
+    /// are read from standard input.
     #[arg(value_name = "SPEC] [COMMAND")]
     words: Vec<String>,
 }
@@ -38,7 +38,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let source = Source::parse(commands, arguments.script.as_deref())?;
     let compiled = spec.map(|spec| spec_file::looked_up(spec.as_ref(), ui)).transpose()?;
     source.check_specs()?;
-    // The machine must not be left alone.
+    // An interrupt must ramp down first.
     interrupt::heed();
     let digest = compiled.as_ref().map(|compiled| compiled.ir.digest.as_str());
     let (session, name) = arguments.line.open(digest)?;

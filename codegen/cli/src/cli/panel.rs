@@ -1,4 +1,4 @@
-//! `specgen panel`: a machine on one page in the browser.
+//! `specgen panel`: shows and operates a machine in the browser.
 
 use std::net::SocketAddr;
 
@@ -17,12 +17,12 @@ use super::named::InputFile;
 #[derive(Args, Debug)]
 #[command(group(ArgGroup::new("line").required(true).args(["port", "socket"])), after_help = super::examples::PANEL)]
 pub struct Arguments {
-    /// The spec that the device was built from: for the figure of the platform, and for the margins of gains.
+    /// The spec that the device was built from. It provides the drawing of the platform and the margins of gains.
     #[arg(value_name = "SPEC")]
     spec: InputFile,
     #[command(flatten)]
     line: Line,
-    /// Where browsers connect. Any address but one of this computer itself lets others on the network who know the token move the
+    /// Address for browsers. Unless it is local to this computer, anyone on the network who knows the token can move the
     /// machine.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8020")]
     listen: SocketAddr,

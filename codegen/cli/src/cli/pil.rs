@@ -1,5 +1,5 @@
-//! `specgen pil`: processor in the loop. A simulated machine closes the loop with the image of a microcontroller in QEMU, or with
-//! a board at a serial port; the host library computes every tick beside it, and every bit is compared.
+//! `specgen pil`: processor in the loop. A microcontroller image in QEMU, or a board at a serial port, controls a simulated
+//! machine. The host library computes the same ticks, and every bit is compared.
 
 use clap::Args;
 use specgen_compiler::spec_file;
@@ -18,37 +18,37 @@ use super::sim::{PlantArguments, frequency};
 pub struct Arguments {
     /// The spec file.
     spec: InputFile,
-    /// Workspace to write and build in, kept for the next run; NAME-controller if not given, as without a command.
+    /// Workspace to write and build, kept for the next run; NAME-controller if not given.
     #[arg(short, long, value_name = "DIR")]
     output: Option<OutputFolder>,
     /// With [control]: case-1, case-2, glass or aluminium of the paper; case-1 if not given.
     #[arg(long, value_name = "NAME")]
     scenario: Option<String>,
-    /// With [control]: play this trajectory of the spec on board instead.
+    /// With [control]: play this trajectory of the spec, generated on the device, instead.
     #[arg(long, value_name = "NAME", conflicts_with = "scenario")]
     trajectory: Option<String>,
-    /// This law alone, as `sim` names them: invhys, ewma, pcc; with [control] p, f-pcc, pf-pcc and others. All that `sim` runs
-    /// if not given.
+    /// Run only this control mode, named as in `sim`: invhys, ewma, pcc; with [control] p, f-pcc, pf-pcc and others. All modes of
+    /// `sim` if not given.
     #[arg(long, value_name = "NAME")]
     mode: Option<String>,
     /// Operating frequency of the scenario, Hz; 10 if not given, 1 for glass and aluminium.
     #[arg(long, value_name = "HZ", value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<f64>,
-    /// Without [control]: control ticks per period of the trajectory, 500 if not given.
+    /// Without [control]: control ticks per period of the trajectory; 500 if not given.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     samples: Option<u32>,
-    /// Only so much of the trajectory, s.
+    /// Run only this much of the trajectory, s.
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     seconds: Option<f64>,
     #[command(flatten)]
     plant: PlantArguments,
-    /// A board at this serial port, instead of QEMU.
+    /// Use a board at this serial port instead of QEMU.
     #[arg(long, value_name = "DEVICE", conflicts_with = "elf")]
     port: Option<Endpoint>,
-    /// Its rate, baud.
+    /// Baud rate of the serial port.
     #[arg(long, default_value_t = BAUD, requires = "port", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
     baud: u32,
-    /// Run this image in QEMU, instead of building one.
+    /// Run this image in QEMU instead of building one.
     #[arg(long, value_name = "FILE")]
     elf: Option<InputFile>,
     #[command(flatten)]
@@ -62,7 +62,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let plant = arguments.plant.options();
-    // A bad leg or a place that cannot be written is reported before the minutes of the rest.
+    // Report a bad leg file or an unwritable plot before the long part of the work.
     plant.leg()?;
     arguments.plot.place().wanted()?;
     let compiled = spec_file::compiled(&arguments.spec, ui)?;
@@ -86,7 +86,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         });
     };
     let mut report = pil::run(&options, &compiled, &mut draw, ui)?;
-    let below = if compiled.model.task_space.is_some() { "target less true pose" } else { "target less gauge" };
+    let below = if compiled.model.task_space.is_some() { "target minus true pose" } else { "target minus gauge" };
     report.plot = arguments.plot.place().charts(&report.name, below, &charts)?;
     ui.scored(&report, &report.ended_early)
 }

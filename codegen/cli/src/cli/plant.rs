@@ -1,4 +1,4 @@
-//! `specgen plant`: the simulated machine of a spec in shared memory, for the real-time target on the same computer.
+//! `specgen plant`: serves the simulated machine of a spec in shared memory to the real-time target on the same computer.
 
 use clap::Args;
 use specgen_compiler::{lower, spec_file};
@@ -14,7 +14,7 @@ use specgen_operate::served::{Options, Plant, serve};
 use specgen_runtime::supervisor::Finding;
 use specgen_studies::machine;
 
-/// Samples per period of the paper's trajectory, which is not run here.
+/// Samples per period of the paper's trajectory; not used here.
 const NO_TRAJECTORY: u32 = 1;
 
 /// Arguments of `plant`.
@@ -23,27 +23,27 @@ const NO_TRAJECTORY: u32 = 1;
 pub struct Arguments {
     /// The spec file.
     spec: InputFile,
-    /// Name under which a controller finds the machine.
+    /// Name of the machine, for the controller's `--sim`.
     #[arg(long, default_value = "plant")]
     name: String,
-    /// End after this time, s; at Ctrl-C if not given.
+    /// Stop after this time, s; run until Ctrl-C if not given.
     #[arg(long, value_name = "S", value_parser = number("", "a time from 0.01 to 10000000 s", 0.01..=1e7), allow_negative_numbers = true)]
     seconds: Option<f64>,
-    /// Keep it on this processor: another one than the controller's.
+    /// Run on this processor; it must not be the controller's.
     #[arg(long, value_name = "N")]
     cpu: Option<usize>,
-    /// SCHED_FIFO priority, below the controller's; an ordinary process if not given.
+    /// SCHED_FIFO priority, below the controller's; normal scheduling if not given.
     #[arg(long, value_name = "P", allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(1..=98))]
     priority: Option<u8>,
-    /// A fault of its wiring, such as "gauge 3 inverted", "leg 1 swapped with leg 4", "leg 2 dead", "gauge 0 gain x 0.50". Each is
-    /// there for one time that the amplifiers are on, one after the other; "all" are all single faults.
+    /// A wiring fault, such as "gauge 3 inverted", "leg 1 swapped with leg 4", "leg 2 dead", "gauge 0 gain x 0.50", or "all" single
+    /// faults. Several faults are applied in turn, a new one each time the amplifiers are switched on.
     #[arg(long, value_name = "FAULT", value_parser = faults)]
     wrong: Vec<Faults>,
     #[command(flatten)]
     plant: PlantArguments,
 }
 
-/// Faults that one argument names.
+/// Faults of one argument.
 #[derive(Debug, Clone)]
 struct Faults(Vec<Finding>);
 

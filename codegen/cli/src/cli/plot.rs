@@ -1,4 +1,4 @@
-//! `--plot FILE`: the result of a command, as a picture.
+//! `--plot FILE`: plots the result of a command.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use super::named::OutputFile;
 
 #[derive(Args, Debug)]
 pub struct Plot {
-    /// Draw the result here: .svg, or .html for a page.
+    /// Plot the result to this file, .svg or .html.
     #[arg(long, value_name = "FILE", value_parser = drawable)]
     plot: Option<OutputFile>,
 }

@@ -1,4 +1,4 @@
-//! `specgen replay`: a recording run again on the host, tick by tick, by bits.
+//! `specgen replay`: replays a recording on the host and compares every tick bit for bit.
 
 use clap::Args;
 use specgen_language::outcome::Failure;
@@ -12,23 +12,23 @@ use super::plot::Plot;
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::REPLAY)]
 pub struct Arguments {
-    /// The recording: from a target, from `specgen sim --record` or from `rt-pc --record`.
+    /// A recording, from a target, `specgen sim --record` or `rt-pc --record`.
     recording: InputFile,
-    /// The spec that the target was built from. Without it the recording can only be exported.
+    /// The spec that the target was built from. Without it, the recording can only be exported.
     #[arg(long, value_name = "SPEC", required_unless_present_any = ["csv", "mcap"])]
     spec: Option<InputFile>,
-    /// Write the recording as CSV, with time and units; with --spec also volts, and of a platform pose, target and error.
+    /// Export the recording as CSV, with time and units; with --spec also voltages and, for a platform, pose, target and error.
     #[arg(long, value_name = "FILE")]
     csv: Option<OutputFile>,
-    /// Write the recording as MCAP, a channel a signal, JSON with schemas: gauges, codes, status, phase, settings; with --spec
-    /// also what --csv has.
+    /// Export the recording as MCAP, with one JSON channel and schema per signal: gauges, codes, status, phase, settings; with
+    /// --spec also the signals of --csv.
     #[arg(long, value_name = "FILE")]
     mcap: Option<OutputFile>,
-    /// With --spec: build the emitted controller and replay on that, which needs Rust. Without it the same law runs on the constants
-    /// of the compiled spec, with the same bits.
+    /// With --spec: build the emitted controller and replay on it, which needs Rust. Without it, the same law runs with the
+    /// constants of the compiled spec, and gives the same bits.
     #[arg(long, requires = "spec")]
     emitted: bool,
-    /// With --spec: target less pose, or demand less gauge of the legs.
+    /// With --spec: plot target minus pose, or demand minus gauge of the legs.
     #[command(flatten)]
     plot: Plot,
 }

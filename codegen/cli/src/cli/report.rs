@@ -1,4 +1,4 @@
-//! `specgen report`: one HTML file about a spec, or about a run of its machine.
+//! `specgen report`: writes an HTML report about a spec, or about a run of its machine.
 
 use clap::Args;
 use specgen_language::outcome::Failure;
@@ -13,19 +13,19 @@ use super::named::{InputFile, OutputFile};
 pub struct Arguments {
     /// The spec file.
     spec: InputFile,
-    /// File to write; `<name>-report.html` if not given.
+    /// Output file; `<name>-report.html` if not given.
     #[arg(short, long, value_name = "FILE")]
     output: Option<OutputFile>,
-    /// A second page beside it, `<output>-paper.html`: the paper's figures and tables.
+    /// Also write `<output>-paper.html`, with the paper's figures and tables.
     #[arg(long)]
     paper: bool,
-    /// With --paper: generations of the genetic algorithm, 100 strings each; 0 leaves it out.
+    /// With --paper: generations of the genetic algorithm, 100 strings each; 0 to skip it.
     #[arg(long, default_value_t = 10, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     generations: u32,
-    /// A page about this run of the machine instead: beside the simulation of the same commands.
+    /// Report about this recorded run instead, compared with a simulation of the same commands.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["paper", "no_target"])]
     record: Option<InputFile>,
-    /// Without the emulated microcontroller: no time, memory and comparison of bits, and nothing is built.
+    /// Build nothing and skip the emulated microcontroller: no time, memory or bit comparison.
     #[arg(long)]
     no_target: bool,
 }

@@ -1,4 +1,4 @@
-//! `specgen reproduce`: the paper's whole list of experiments, ours beside the paper's.
+//! `specgen reproduce`: runs all of the paper's experiments and compares the results with the paper's.
 
 use clap::Args;
 use specgen_language::outcome::Failure;
@@ -18,7 +18,7 @@ pub struct Arguments {
     /// Generations of the genetic algorithm of Table 3, 100 strings each.
     #[arg(long, default_value_t = 50, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     generations: u32,
-    /// The genetic algorithm: cost by generation.
+    /// Plot the cost of the genetic algorithm by generation.
     #[command(flatten)]
     plot: Plot,
 }

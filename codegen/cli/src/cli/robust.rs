@@ -1,5 +1,5 @@
-//! `specgen robust`: corners and random draws of declared uncertainties, quantiles of the error, a gate for builds; in parts on
-//! many computers, which `specgen robust merge` puts together.
+//! `specgen robust`: runs corners and random draws of the declared uncertainties, and checks quantiles of the error against
+//! gates. A study can be split over computers; `specgen robust merge` combines the parts.
 
 use clap::{Args, Subcommand};
 use specgen_language::outcome::Failure;
@@ -31,7 +31,7 @@ pub struct Arguments {
 
 #[derive(Subcommand, Debug)]
 enum Kind {
-    /// Put the parts of a study together that were run with --shard; the report is that of a single run, byte for byte.
+    /// Merge the parts of a study that were run with --shard. The report equals that of a single run, byte for byte.
     Merge(MergeArguments),
 }
 
@@ -39,66 +39,67 @@ enum Kind {
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::MERGE)]
 struct MergeArguments {
-    /// Files that --shard wrote, all of one study, in any order.
+    /// Files written with --shard, all of one study, in any order.
     #[arg(value_name = "PART", required = true)]
     parts: Vec<InputFile>,
-    /// Write runs (CSV) and report (JSON) here.
+    /// Folder for the runs (CSV) and the report (JSON).
     #[arg(short, long, value_name = "DIR")]
     output: Option<OutputFolder>,
     #[command(flatten)]
     plot: Plot,
 }
 
-/// Arguments of a study, or of a part of one.
+/// Arguments of a study or one of its parts.
 #[derive(Args, Debug)]
 struct StudyArguments {
     /// The spec file.
     #[arg(required = true)]
     spec: Option<InputFile>,
-    /// Random machines, besides the corners.
+    /// Number of random machines, in addition to the corners.
     #[arg(long = "draws", value_name = "N", alias = "samples", default_value_t = 100, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     draws: u32,
-    /// Range of an uncertainty, in place of that of [robust] or the default: `mass=5%`, `gain=0.9:1.1`, `delay_ticks=1`.
-    /// Of mass, stiffness, damping, gain, hysteresis, creep, lag, noise (factors) and delay_ticks.
+    /// Range of an uncertainty, instead of that of [robust] or the default: `mass=5%`, `gain=0.9:1.1`, `delay_ticks=1`.
+    /// Names: mass, stiffness, damping, gain, hysteresis, creep, lag, noise (factors) and delay_ticks.
     #[arg(long, value_name = "NAME=RANGE", value_parser = UserRange::parse)]
     vary: Vec<UserRange>,
-    /// The trajectory: case-1, case-2, machining or multisine, or a trajectory of the spec by its name; without
-    /// [control] leg or multisine. The first of them if not given.
+    /// Trajectory: case-1 (default), case-2, machining, multisine or the name of a trajectory of the spec; without [control],
+    /// leg (default) or multisine.
     #[arg(long, value_name = "NAME")]
     trajectory: Option<String>,
-    /// Operating frequency of the paper's trajectory or highest of the multisine, Hz; 10 if not given. A trajectory of the
-    /// spec has its own.
+    /// Operating frequency of the paper's trajectory, or highest frequency of the multisine, Hz; 10 if not given. A trajectory
+    /// of the spec has its own.
     #[arg(long, value_name = "HZ", value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<f64>,
-    /// Run one machine alone: the seed of a draw, or the name of a corner.
+    /// Run only one machine, given by the seed of a draw or the name of a corner.
     #[arg(long, value_name = "SEED|NAME")]
     replay: Option<String>,
-    /// Gate: largest rms error of the translation, or of legs, such as "30 nm"; that of [robust] if not given.
+    /// Gate: largest rms error of the translation, or of the legs, such as "30 nm"; that of [robust] if not given.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     max_error: Option<f64>,
     /// Gate: largest rms error of the angles, such as "100 nrad"; for a spec with [control].
     #[arg(long, value_name = "ANGLE", value_parser = angle, allow_hyphen_values = true)]
     max_orientation: Option<f64>,
-    /// Learn the motion on each machine, from so many passes, and show what is left; for a spec with control.correction.
+    /// Learn the motion on each machine with this many passes, and show the remaining error; for a spec with control.correction.
     #[arg(long, value_name = "PASSES", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1000))]
     learn: Option<u32>,
-    /// Gate: largest rms error of the translation once learned, such as "6 nm", that of [robust] if not given. It also fails if the error grows from pass to pass on any machine.
+    /// Gate: largest rms error of the translation after learning, such as "6 nm"; that of [robust] if not given. It also fails if
+    /// the error grows from pass to pass on any machine.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true, requires = "learn")]
     max_learned: Option<f64>,
-    /// Quantile of the draws that the gate compares, %; the largest of draws and corners if not given.
+    /// Quantile of the draws that the gates check, %; the maximum of draws and corners if not given.
     #[arg(long, value_name = "PERCENT", value_parser = number("%", "a percentage above 0, up to 100", f64::MIN_POSITIVE..=100.0), allow_negative_numbers = true)]
     quantile: Option<f64>,
-    /// Error beyond which a run counts as diverged; 5 % of the stroke if not given.
+    /// Error above which a run counts as diverged; 5 % of the stroke if not given.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     diverged_above: Option<f64>,
-    /// Worker threads; as many as the machine has if not given. The result does not depend on it.
+    /// Number of worker threads; one per processor if not given. The result does not depend on it.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1024))]
     threads: Option<u32>,
-    /// Run one part of N alone, I from 1 to N, and write it into the file of -o, for `specgen robust merge`. No gate is
-    /// judged.
+    /// Run only part I of N (I from 1 to N), and write it to the file of -o, for `specgen robust merge`. Gates are not
+    /// checked.
     #[arg(long, value_name = "I/N", value_parser = Shard::parse, requires = "output", conflicts_with_all = ["replay", "plot"])]
     shard: Option<Shard>,
-    /// Write runs (CSV) and report (JSON) here; with --shard the name of one file.
+    /// Folder for the runs (CSV) and the report (JSON); with --shard, the output file.
     #[arg(short, long, value_name = "DIR")]
     output: Option<OutputFolder>,
     #[command(flatten)]
@@ -130,7 +131,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         }
     };
     let Some(spec) = arguments.spec.as_deref() else {
-        return Err(Failure::Usage("a spec file is expected, or merge".to_owned()));
+        return Err(Failure::Usage("expected a spec file, or merge".to_owned()));
     };
     let options = Options {
         spec: spec.to_owned(),

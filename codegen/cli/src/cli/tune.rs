@@ -1,4 +1,4 @@
-//! `specgen tune`: gains and weights from the simulated loop with the controller of the spec.
+//! `specgen tune`: tunes gains and weights on the simulated loop with the controller of the spec.
 
 use clap::{Args, ValueEnum};
 use specgen_language::outcome::Failure;
@@ -18,22 +18,23 @@ use super::sim::{PlantArguments, frequency};
 pub struct Arguments {
     /// The spec file.
     spec: InputFile,
-    /// What is tuned: as far as the spec's mode uses it.
+    /// What to tune, as far as the spec's mode uses it.
     #[arg(long, value_enum, default_value = "all")]
     what: WhatArgument,
-    /// How it is searched for.
+    /// Optimiser.
     #[arg(long, value_enum, default_value = "cma")]
     optimiser: OptimiserArgument,
-    /// Run the genetic algorithm as well, on as many candidates, and keep the better result.
+    /// Also run the genetic algorithm with as many candidates, and keep the better result.
     #[arg(long)]
     compare: bool,
-    /// Candidates in all; 5000 for a platform (50 generations of 100), 1000 for legs if not given.
+    /// Total number of candidates; 5000 for a platform (50 generations of 100) or 1000 for legs if not given.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     evaluations: Option<u32>,
-    /// Candidates of a generation; 100 (Table 3) for the genetic algorithm, 20 for CMA-ES if not given.
+    /// Candidates per generation; 100 (Table 3) for the genetic algorithm or 20 for CMA-ES if not given.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(4..=100_000))]
     population: Option<u32>,
-    /// What is followed while tuning. The result is scored on another: case 1 or the leg's, or the multisine for these.
+    /// Trajectory used for tuning. The result is scored on another one: case 1 or that of the leg; on the multisine if tuned
+    /// on one of these.
     #[arg(long, value_enum, default_value = "multisine")]
     trajectory: TrajectoryArgument,
     /// Highest frequency of the multisine, or operating frequency of the paper's trajectory, Hz.
@@ -45,27 +46,27 @@ pub struct Arguments {
     /// Factor on all gains and bandwidths at which a candidate must still be stable.
     #[arg(long, default_value = "2", value_parser = number("", "a factor from 1 to 20", 1.0..=20.0), allow_negative_numbers = true)]
     gain_margin: f64,
-    /// Ticks of further delay at which it must still be stable; for a spec with [control].
+    /// Additional delay, in ticks, at which a candidate must still be stable; for a spec with [control].
     #[arg(long, default_value = "0.5", value_parser = number("", "a number of ticks from 0 to 5", 0.0..=5.0), allow_negative_numbers = true)]
     delay_margin: f64,
-    /// Bounds of a group of numbers, such as `ki=10:1000`: kp and kv over the stiffness of the axis, ki likewise in 1/s;
-    /// level and drift in rad/s with [control], as weights without.
+    /// Bounds of a parameter group, such as `ki=10:1000`: kp, ki (1/s) and kv relative to the stiffness of the axis; level and
+    /// drift in rad/s with [control], as weights without.
     #[arg(long, value_name = "GROUP=LOW:HIGH", value_parser = bounds)]
     bounds: Vec<GivenBounds>,
-    /// Control intervals by which voltages reach the amplifiers late; with [control].
+    /// With [control]: extra delay from controller to amplifiers, in control intervals.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=100))]
     latency: u32,
-    /// Worker threads; as many as the machine has if not given. The result does not depend on it.
+    /// Number of worker threads; one per processor if not given. The result does not depend on it.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1024))]
     threads: Option<u32>,
-    /// Search nothing: score the candidates of this file, for a search of your own. A JSON array of objects with numbers by the
-    /// names of parameters, in the unit of --bounds; one that is left out stays as in the spec. `[]` shows names and bounds.
+    /// Only score the candidates in this file, for your own optimiser: a JSON array of objects that map parameter names to
+    /// numbers, in the units of --bounds. Omitted parameters keep the spec's value. `[]` prints names and bounds.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["optimiser", "compare", "evaluations", "population", "output", "write", "plot"])]
     evaluate: Option<InputFile>,
-    /// Write front, history, report and plot here.
+    /// Folder for front, history, report and plot.
     #[arg(short, long, value_name = "DIR")]
     output: Option<OutputFolder>,
-    /// Write the result into the spec; without it the change is printed as a patch.
+    /// Write the result into the spec. Without it, the change is printed as a patch.
     #[arg(long)]
     write: bool,
     #[command(flatten)]
@@ -91,9 +92,9 @@ enum OptimiserArgument {
 
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 enum TrajectoryArgument {
-    /// Smooth.
+    /// Smooth motion.
     Multisine,
-    /// The multisine with a zigzag in place of its fastest sine: corners, where the platform rings.
+    /// The multisine with a zigzag instead of its fastest sine; its corners make the platform ring.
     Zigzag,
     Leg,
     #[value(name = "case-1")]
