@@ -78,7 +78,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["tune", "legs.toml", "--trajectory", "case-1"], "--trajectory leg needs six legs"),
         (&["tune", "legs.toml", "--latency", "1"], "--latency needs a spec with [control]"),
         (&["pil"], "<SPEC>"),
-        (&["pil", "legs.toml", "--scenario", "case-1"], "its one scenario is the leg trajectory"),
+        (&["pil", "legs.toml", "--scenario", "case-1"], "the leg trajectory is the only scenario"),
         (&["pil", "legs.toml", "--mode", "pf-pcc"], "expected one of invhys, ewma, pcc"),
         (&["pil", "legs.toml", "--seconds", "0"], "expected a time from 0.001 to 1000 s, found `0`"),
         (&["pil", "legs.toml", "--baud", "9600"], "--port"),
@@ -91,9 +91,9 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["gcs", "--socket", "y", "--listen", "here"], "invalid value"),
         (&["operate", "--port", "x", "--socket", "y"], "cannot be used with"),
         (&["operate", "--socket", "y", "--baud", "9600"], "cannot be used with"),
-        (&["operate", "--socket", "y", "legs.toml", "go"], "`go` is none of: status, arm"),
-        (&["operate", "--socket", "y", "stop", "arm"], "`stop` ends the session: nothing comes after it"),
-        (&["operate", "--socket", "y", "--script", "none.txt", "arm"], "exclude each other"),
+        (&["operate", "--socket", "y", "legs.toml", "go"], "invalid command `go`; expected one of: status, arm"),
+        (&["operate", "--socket", "y", "stop", "arm"], "`stop` ends the session: it must be the last command"),
+        (&["operate", "--socket", "y", "--script", "none.txt", "arm"], "not both"),
         (&["forc"], "--output"),
         (&["forc", "-o", "x.csv", "--grid", "1"], "--grid"),
         (&["plant"], "<SPEC>"),
@@ -474,5 +474,5 @@ fn a_computer_is_judged_by_the_period_of_a_spec() {
     assert_eq!(judged.code, i32::from(bad));
     assert_eq!(bad, result["latency"]["skipped"] != 0);
     let text = folder.run(&["doctor", "--seconds", "0.1"]);
-    assert!(text.stdout.contains("wake-ups, from the planned time to running") && text.stdout.contains("10000 Hz: "));
+    assert!(text.stdout.contains("wake-up delays, from the planned time to running") && text.stdout.contains("10000 Hz: "));
 }

@@ -113,7 +113,7 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     );
     let run = Run::of(&mut board.operate(&folder, &["reference.toml", "--script", "run.txt"]));
     run.says(0, &[]);
-    for text in ["the recorder records, waits for its trigger", "fit whatever changes", "wrote "] {
+    for text in ["the recorder is running and waits for its trigger", "its capacity is at least", "wrote "] {
         assert!(run.stdout.contains(text), "{run:?}");
     }
     assert!(board.is(Phase::Disarmed));
@@ -130,11 +130,11 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     assert_eq!(document["result"]["status"]["stands"], "disarmed", "{document:#}");
     assert_eq!(document["result"]["answers"][1]["answer"]["mode"], 6, "{document:#}");
     let run = Run::of(&mut board.operate(&folder, &["wave fast.toml"]));
-    run.says(1, &["not compared with a spec", "fast.toml: axis z (leg 2) would be faster"]);
+    run.says(1, &["not checked against a spec", "fast.toml: axis z (leg 2) would be faster"]);
     let run = Run::of(&mut board.operate(&folder, &["wave wave.toml"]));
     run.says(1, &["wave.toml: not now; the machine must be running"]);
     let run = Run::of(&mut board.operate(&folder, &["stop"]));
-    run.says(1, &["a board does not end; `ramp-down` switches its amplifiers off"]);
+    run.says(1, &["a board cannot be stopped; `ramp-down` switches its amplifiers off"]);
     let run = Run::of(&mut board.operate(&folder, &["set gauge[0]=1"]));
     run.says(2, &["`gauge[0]` cannot be set; these can: command, selector"]);
     // A mistake in the last line is found before the first is carried out.
@@ -142,7 +142,7 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
         (
             "set command=x",
             2,
-            "`command`: expected hold, stream, move, trajectory, found `x`; nothing was asked of the machine",
+            "`command`: expected hold, stream, move, trajectory, found `x`; nothing was sent to the machine",
         ),
         ("wave none.toml", 1, "`none.toml` cannot be read: there is no such file"),
         ("play case-1 correction=none.json machine=m", 1, "`none.json` cannot be read: there is no such file"),
@@ -185,8 +185,8 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
     };
     // What makes no sense is refused before anything is asked.
     for (script, text) in [
-        (&[MOVE, "jog z=1"][..], "z wants a unit of"),
-        (&["goto there"], "there is no pose `there`: `mark there` first; there are zero"),
+        (&[MOVE, "jog z=1"][..], "z needs a unit of"),
+        (&["goto there"], "there is no pose `there`: `mark there` first; known poses: zero"),
         (&["play case-9"], "no trajectory `case-9`; it has case-1, case-2, machining"),
         (&["gains kd=1"], "there is no gain `kd`"),
         (&["mode p-pcc"], "expected p, f or pf"),
@@ -196,7 +196,7 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
         assert!(board.is(Phase::Disarmed), "{script:?}");
     }
     operate(&["gains ki=1"]).says(2, &["name the spec"]);
-    operate(&["reference.toml", MOVE]).says(1, &["disarmed: it moves when it runs"]);
+    operate(&["reference.toml", MOVE]).says(1, &["disarmed: it moves only while running"]);
     operate(&["on-edge"]).says(1, &["no input line; declare one in its spec: [[trigger]] with name = \"start\""]);
 
     let script = format!(
@@ -258,14 +258,14 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
 
     // Beyond the workspace nothing moves, and while a motion is under way nothing is promised.
     let run = operate(&[&UP[..], &["wait arrived 20", MOVE, "wait arrived 20", "jog z=100um"]].concat());
-    run.says(1, &["it cannot go to x 0.000 um, y 0.000 um, z 102.000 um", "nothing moves"]);
+    run.says(1, &["cannot move to x 0.000 um, y 0.000 um, z 102.000 um", "no motion was started"]);
     recover();
 
     // On the way to the bias, 0.1 s, a command is not looked at yet. A computer that is busy may come after it.
     let is_early = (0..5).any(|_| {
         let run = operate(&[&UP[..], &[MOVE]].concat());
         recover();
-        run.code == 1 && run.stderr.contains("a motion is under way; `wait arrived` first")
+        run.code == 1 && run.stderr.contains("a motion is in progress; `wait arrived` first")
     });
     assert!(is_early);
 }
@@ -287,7 +287,7 @@ fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
     let output = lines.wait_with_output().unwrap();
     let printed = String::from_utf8_lossy(&output.stdout);
     for text in [
-        "`go` is none of",
+        "invalid command `go`",
         "expected a finite number, found `x`",
         "expected hold, stream, move, trajectory, found `mov`",
     ] {
@@ -306,10 +306,11 @@ fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
     let script = ["reference.toml", "acknowledge", "wait disarmed 20", "wait 0.2", "status", "status"];
     let run = Run::of(&mut board.operate(&folder, &script));
     run.says(0, &[]);
-    let (first, second) = run.stdout.split_once("events since asked last: ").unwrap().1.split_once("tick ").unwrap();
+    let (first, second) =
+        run.stdout.split_once("events since the last status request: ").unwrap().1.split_once("tick ").unwrap();
     assert!(first.starts_with("link lost, converter\n") || first.starts_with("converter\n"), "{first}");
     assert!(first.contains("converter: all bits of the ADC's frame are the same"), "{first}");
-    assert!(second.contains("events since asked last: none"), "{second}");
+    assert!(second.contains("events since the last status request: none"), "{second}");
 }
 
 #[test]

@@ -306,7 +306,7 @@ fn a_board_at_a_serial_port_is_stepped_like_the_emulator() {
 fn what_is_no_board_is_refused_before_anything_is_built() {
     let nothing = tempfile::tempdir().unwrap();
     let folder = nothing.path().join("out");
-    for (port, words) in [("/no/such/device", "is the board plugged in?"), ("/dev/null", "is no serial device")] {
+    for (port, words) in [("/no/such/device", "is the board plugged in?"), ("/dev/null", "is not a serial device")] {
         let value = document(&mut pil(&spec("legs.toml"), &folder, &["--port", port]), 3);
         assert!(value["error"].as_str().unwrap().contains(words), "{value:#}");
     }

@@ -582,7 +582,7 @@ fn legs_are_moved_by_operate_and_a_machine_that_is_killed_is_a_converter_that_do
     let operated = operate.wait();
     let text = String::from_utf8_lossy(&operated.stdout);
     assert!(operated.status.code() == Some(3) && text.contains("`request` cannot be set"), "{operated:?}");
-    assert!(text.contains("`fly` is none of"), "{text}");
+    assert!(text.contains("invalid command `fly`"), "{text}");
     let (summary, record) = bench.check(&output, "legs.rec");
     assert!(summary["device_faults"].as_u64().unwrap() > 0, "{summary}");
     assert!(output.status.code() == Some(1) && summary["failure"].as_str().unwrap().contains("converter"), "{summary}");

@@ -1,4 +1,4 @@
-//! Commands as an operator types them.
+//! Commands as the operator types them.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -10,15 +10,15 @@ use specgen_runtime::trigger::MOST;
 
 use crate::place::{AxisValues, Pace, named, pace};
 
-/// How long something is waited for if nothing else is said.
+/// Default timeout of `wait`.
 const TIMEOUT: Duration = Duration::from_secs(60);
-/// Longest time that can be asked for, s.
+/// Longest time of a command, s.
 const LONGEST: f64 = 86_400.0;
-/// How long is watched if nothing else is said, s.
+/// Default duration of `watch`, s.
 const WATCHED: f64 = 10.0;
-/// Rows after a trigger, if nothing else is said.
+/// Default number of ticks that are recorded after the trigger.
 const AFTER: u32 = 1000;
-/// What an edge of the input line may start.
+/// Commands that an edge of the input line can start.
 const EDGE_STARTS: &str = "move, jog, goto, play without a correction, or wave FILE";
 const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, \
                         move|jog AXIS=QUANTITY…, where, limits, can-i-go AXIS=QUANTITY… [speed=QUANTITY], frame [none | work|tool AXIS=QUANTITY…], mark NAME, goto NAME, \
@@ -29,96 +29,96 @@ const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, se
 /// One command.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Command {
-    /// Say how the machine stands and what it noticed of itself.
+    /// Show state and health of the machine.
     Status,
-    /// Ask the supervisor.
+    /// Send a request to the supervisor.
     Ask(Request),
-    /// Set input words that are no measurements.
+    /// Set input words other than measurements.
     Set(Vec<(String, String)>),
-    /// Go to a pose, or by a step from the one commanded last.
+    /// Move to a pose, or by a step from the set-point.
     Move {
-        /// By a step.
+        /// Whether values are steps.
         relative: bool,
-        /// What is said of each axis.
+        /// Value of each named axis.
         axes: AxisValues,
     },
-    /// Say where the platform is.
+    /// Show the pose of the platform.
     Where,
-    /// Say what each axis can still do from there.
+    /// Show the range of each axis at the current set-point.
     Limits,
-    /// Say whether it can go to a pose, or what binds.
+    /// Check whether a pose can be reached; otherwise show the limit that is exceeded.
     CanIGo {
-        /// What is said of each axis.
+        /// Value of each named axis.
         axes: AxisValues,
-        /// At this speed at least, m/s, and rad/s.
+        /// Required speed, m/s and rad/s.
         speed: Pace,
     },
-    /// Show the frame that poses are said in, or say them in another: work frame, tool point. Of an axis that is not named: zero.
+    /// Show or set the frame of poses: work frame, tool point. Axes that are not named are zero.
     Frame(Option<FrameRequest>),
-    /// Give the set-point of now a name.
+    /// Save the current set-point under a name.
     Mark(String),
-    /// Go to a pose that has a name.
+    /// Move to a saved pose.
     Goto(String),
-    /// Play a trajectory of the spec; under a correction that was learned for it on a machine, if one is named.
+    /// Play a trajectory of the spec, optionally with a correction that was learned on this machine.
     Play {
         /// Its name.
         name: String,
         /// File of the correction, and the machine's name.
         correction: Option<(PathBuf, String)>,
     },
-    /// Other terms of the law, as `mode` of the settings: 0 P, 1 to 3 F, 4 to 6 P/F.
+    /// Set the control mode, the setting `mode`: 0 P, 1 to 3 F, 4 to 6 P/F.
     Mode(ModeRequest),
-    /// Show the gains, or set these.
+    /// Show or set gains.
     Gains(Vec<(String, f64)>),
-    /// Let an output line show something else.
+    /// Change the settings of a trigger output.
     Trigger {
         /// Its number.
         line: usize,
-        /// Settings of a line, `trigger_` left out, in SI; kind, axis and direction by their words.
+        /// Settings without the prefix `trigger_`, in SI; choices by their index.
         settings: Vec<(String, f64)>,
     },
-    /// Go on when something is so.
+    /// Wait for a condition.
     Wait {
-        /// What.
+        /// The condition.
         until: WaitCondition,
-        /// At most so long.
+        /// The timeout.
         limit: Duration,
     },
     /// Show the settings in force.
     Config,
-    /// Take the settings of a spec.
+    /// Write the settings of a spec to the device.
     WriteConfig(PathBuf),
-    /// Something of the recorder.
+    /// A recorder action.
     Record(RecorderAction),
-    /// Fetch the record into a file.
+    /// Download the record to a file.
     Download(PathBuf),
-    /// Start the wave of a file.
+    /// Start the wave in a file.
     Wave(PathBuf),
-    /// End the wave under way.
+    /// Stop the running wave.
     StopWave,
-    /// Say how it stands with the input line, and with what waits for its edge.
+    /// Show the state of the input line and of the command that waits for its edge.
     Edge,
-    /// Let nothing wait for the edge any more.
+    /// Cancel the command that waits for the edge.
     DropEdge,
-    /// Begin this at the next rising edge of the input line: a move, a trajectory, or a wave.
+    /// Start a move, a trajectory or a wave at the next rising edge of the input line.
     OnEdge(Box<Command>),
     /// Show samples of the running machine, or write them to a file.
     Watch {
-        /// Ticks of a row; those of 0.1 s if it is not said.
+        /// Ticks per row; by default those of 0.1 s.
         every: Option<u32>,
-        /// For so long, s.
+        /// Duration, s.
         seconds: f64,
-        /// CSV, or JSON lines where the name ends in `.jsonl`.
+        /// CSV file, or JSON Lines if the name ends in `.jsonl`.
         file: Option<PathBuf>,
     },
     /// Ramp down and end the program that serves the link.
     Stop,
 }
 
-/// A requested frame of a session.
+/// The requested frame of a session.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FrameRequest {
-    /// Those of the controller.
+    /// The controller's coordinates.
     None,
     /// This work frame, m and rad.
     Work([f64; 6]),
@@ -129,9 +129,9 @@ pub enum FrameRequest {
 /// A requested mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ModeRequest {
-    /// Whether the pose error is fed back, and whether the hysteresis is inverted.
+    /// Whether the mode has pose feedback, and whether it inverts the hysteresis.
     pub terms: [bool; 2],
-    /// Number of the run-to-run law; the one in force if none is named.
+    /// Number of the run-to-run law; the current one if none is given.
     pub law: Option<u64>,
 }
 
@@ -152,38 +152,38 @@ impl ModeRequest {
             (Some(terms), None) => Ok(Self { terms, law: None }),
             (Some(terms @ [_, true]), Some(Some(law))) => Ok(Self { terms, law: Some(law) }),
             _ => Err(format!(
-                "expected p, f or pf, the last two with -{} if another law is meant; found `{text}`",
+                "expected p, f or pf, the last two optionally with a law, -{}; found `{text}`",
                 LAWS.join(", -")
             )),
         }
     }
 
-    /// The word of the mode, where `now` is the one in force.
+    /// The word of the mode; `now` is the current one.
     ///
     /// # Errors
-    /// No law is named, and none is in force.
+    /// No law is given, and none is active.
     pub fn word(self, now: u64) -> Result<u64, String> {
         match (self.terms, self.law.or(now.checked_sub(1).map(|now| now % LAWS.len() as u64))) {
             ([_, false], _) => Ok(0),
             ([feeds_back, true], Some(law)) => Ok(1 + law + if feeds_back { LAWS.len() as u64 } else { 0 }),
-            (_, None) => Err(format!("in mode P no run-to-run law is in force: name one, such as pf-{}", LAWS[2])),
+            (_, None) => Err(format!("mode P has no run-to-run law to keep: name one, such as pf-{}", LAWS[2])),
         }
     }
 }
 
-/// What is waited for.
+/// The condition of `wait`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WaitCondition {
     /// The machine is in this phase.
     Phase(Phase),
-    /// It runs, and no way to the bias, move, trajectory or stop is under way.
+    /// It is running, and no motion is in progress: approach to the bias, move, trajectory or stop.
     Arrived,
-    /// So long has passed.
+    /// This time has passed.
     Passed(Duration),
 }
 
 impl Command {
-    /// Whether it moves the machine, or lets it move.
+    /// Whether it moves the machine or enables motion.
     #[must_use]
     pub fn moves(&self) -> bool {
         matches!(
@@ -208,10 +208,10 @@ impl Command {
         }
     }
 
-    /// Of a line; none if there is nothing in it but blanks and a comment (`# …`).
+    /// Parses a line; none if it has only blanks or a comment (`# …`).
     ///
     /// # Errors
-    /// What is wrong with it, and what is expected.
+    /// The line is invalid; the text says what is expected.
     pub fn parse(line: &str) -> Result<Option<Self>, String> {
         let line = line.split('#').next().unwrap_or_default().trim();
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -244,7 +244,7 @@ impl Command {
                 [x, y, z, None, None, None] => {
                     Self::Frame(Some(FrameRequest::Tool([x, y, z].map(Option::unwrap_or_default))))
                 }
-                _ => return Err(format!("`{line}`: a tool point has x, y and z")),
+                _ => return Err(format!("`{line}`: a tool point has only x, y and z")),
             },
             ["mark", name] => Self::Mark(name.to_owned()),
             ["goto", name] => Self::Goto(name.to_owned()),
@@ -254,7 +254,7 @@ impl Command {
                 let correction = of(correction, "correction=").zip(of(machine, "machine="));
                 let (file, machine) = correction.ok_or_else(|| {
                     format!(
-                        "`{line}`: expected play TRAJECTORY correction=FILE machine=NAME, as `specgen learn` wrote it"
+                        "`{line}`: expected play TRAJECTORY correction=FILE machine=NAME, with a file of `specgen learn`"
                     )
                 })?;
                 Self::Play { name: name.to_owned(), correction: Some((file.into(), machine)) }
@@ -263,7 +263,7 @@ impl Command {
             ["gains", ref rest @ ..] => Self::Gains(rest.iter().map(|text| gain(text)).collect::<Result<_, _>>()?),
             ["trigger", line, first, ref rest @ ..] => {
                 let line = line.parse().ok().filter(|line| *line < MOST);
-                let line = line.ok_or_else(|| format!("expected the number of a trigger, 0 to {}", MOST - 1))?;
+                let line = line.ok_or_else(|| format!("expected a trigger number, 0 to {}", MOST - 1))?;
                 let settings = std::iter::once(&first).chain(rest).map(|text| of_trigger(text));
                 Self::Trigger { line, settings: settings.collect::<Result<_, _>>()? }
             }
@@ -289,11 +289,11 @@ impl Command {
                 Some(
                     command @ (Self::Move { .. } | Self::Goto(_) | Self::Play { correction: None, .. } | Self::Wave(_)),
                 ) => Self::OnEdge(Box::new(command)),
-                _ => return Err(format!("`{line}`: an edge starts {EDGE_STARTS}")),
+                _ => return Err(format!("`{line}`: an edge can start {EDGE_STARTS}")),
             },
             ["watch", ref rest @ ..] if rest.len() <= 3 => Self::watch(rest)?,
             ["stop"] => Self::Stop,
-            _ => return Err(format!("`{line}` is none of: {COMMANDS}")),
+            _ => return Err(format!("invalid command `{line}`; expected one of: {COMMANDS}")),
         };
         Ok(Some(command))
     }
@@ -301,7 +301,7 @@ impl Command {
     fn watch(words: &[&str]) -> Result<Self, String> {
         let every = words.first().map(|text| {
             let every = text.parse().ok().filter(|every| (1..=MOST_EVERY).contains(every));
-            every.ok_or_else(|| format!("`watch {text}`: expected ticks of a row, 1 to {MOST_EVERY}"))
+            every.ok_or_else(|| format!("`watch {text}`: expected ticks per row, 1 to {MOST_EVERY}"))
         });
         let time = words.get(1).map(|text| {
             let time = text.parse().ok().filter(|time| *time > 0.0 && *time <= LONGEST);
@@ -345,7 +345,7 @@ fn gain(text: &str) -> Result<(String, f64), String> {
     Ok((name, value))
 }
 
-/// Words of the settings that are choices, by number.
+/// Settings that are choices, with the words of their values.
 const CHOICES: [(&str, &[&str]); 3] = [
     ("kind", &["off", "position", "level", "motion", "points", "ticks"]),
     ("axis", &["x", "y", "z", "theta_x", "theta_y", "theta_z"]),
@@ -369,7 +369,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_orders() {
+    fn lines_are_parsed() {
         let time = Duration::from_secs_f64;
         let cases = [
             ("", None),
@@ -420,38 +420,38 @@ mod tests {
     }
 
     #[test]
-    fn what_is_none_is_refused_with_what_is_expected() {
+    fn invalid_lines_are_refused_with_the_expected_form() {
         for (line, expected) in [
-            ("go", "`go` is none of: status, arm"),
-            ("set", "is none of"),
+            ("go", "invalid command `go`; expected one of: status, arm"),
+            ("set", "invalid command"),
             ("set a", "expected NAME=VALUE"),
-            ("wait", "is none of"),
-            ("move", "is none of"),
-            ("move z=1", "z wants a unit of"),
+            ("wait", "invalid command"),
+            ("move", "invalid command"),
+            ("move z=1", "z needs a unit of"),
             ("wait nan", "expected a phase (disarmed, arming, running"),
             ("wait -1", "found `-1`"),
             ("wait running soon", "found `soon`"),
-            ("frame tool rx=1urad", "a tool point has x, y and z"),
+            ("frame tool rx=1urad", "a tool point has only x, y and z"),
             ("mode p-pcc", "expected p, f or pf"),
             ("mode fast", "expected p, f or pf"),
             ("gains ki=-1", "expected a gain such as"),
             ("gains ki", "expected a gain such as"),
             ("can-i-go x=1um speed=2um", "expected a speed such as"),
-            ("can-i-go", "is none of"),
+            ("can-i-go", "invalid command"),
             ("record arm 0", "1 or more"),
             ("record arm -1", "1 or more"),
-            ("config write", "is none of"),
+            ("config write", "invalid command"),
             ("trigger 4 step=1e-6", "0 to 3"),
             ("trigger 0 kind=hold", "expected off, position"),
             ("trigger 0 step=1um", "expected a number in SI, found `1um`"),
-            ("arm now", "is none of"),
-            ("on-edge arm", "`on-edge arm`: an edge starts move, jog"),
-            ("on-edge wave stop", "an edge starts move, jog"),
-            ("on-edge on-edge goto zero", "an edge starts move, jog"),
-            ("on-edge move z=1", "z wants a unit of"),
-            ("watch 0", "`watch 0`: expected ticks of a row, 1 to 1000000"),
+            ("arm now", "invalid command"),
+            ("on-edge arm", "`on-edge arm`: an edge can start move, jog"),
+            ("on-edge wave stop", "an edge can start move, jog"),
+            ("on-edge on-edge goto zero", "an edge can start move, jog"),
+            ("on-edge move z=1", "z needs a unit of"),
+            ("watch 0", "`watch 0`: expected ticks per row, 1 to 1000000"),
             ("watch 1 0", "expected a time of more than 0"),
-            ("watch 1 1 a b", "is none of"),
+            ("watch 1 1 a b", "invalid command"),
         ] {
             let error = Command::parse(line).unwrap_err();
             assert!(error.contains(expected), "{line}: {error}");

@@ -1,4 +1,4 @@
-//! Commands to a machine: from the command line, a script, or line by line.
+//! Runs commands on a machine, from the command line, a script, or line by line.
 
 mod answer;
 mod error;
@@ -27,21 +27,22 @@ use specgen_runtime::supervisor::Request;
 
 use crate::command::Command;
 use crate::session::{ALIVE, Session};
+pub(crate) use answer::MachineStatus;
 use answer::{CommandError, Report};
 pub(crate) use error::SessionError;
 pub(crate) use operator::{Operator, Pulse};
 pub(crate) use passes::motion_name;
 pub(crate) use platform::is_gain;
 
-/// Where commands come from.
+/// Source of commands.
 pub enum Source {
-    /// All of them are known.
+    /// A list that is known in advance.
     List(Vec<Command>),
-    /// Lines as they come, from a person or program that sees what happens.
+    /// Lines of an interactive session.
     Lines,
 }
 
-/// The result of a server that clients connected to.
+/// The result of a server for clients.
 #[derive(Serialize)]
 pub struct Service {
     /// The device that was served.
@@ -72,9 +73,7 @@ impl Source {
             return Self::list(parsed.map_err(Failure::Usage)?.into_iter().flatten().collect());
         };
         if !commands.is_empty() {
-            return Err(Failure::Usage(
-                "commands as arguments and --script exclude each other: put all of them into the script".to_owned(),
-            ));
+            return Err(Failure::Usage("give commands either as arguments or with --script, not both".to_owned()));
         }
         let mut list = Vec::new();
         for (index, line) in read_text(script)?.lines().enumerate() {
@@ -86,12 +85,12 @@ impl Source {
 
     fn list(commands: Vec<Command>) -> Result<Self, Failure> {
         if commands.iter().rev().skip(1).any(|command| *command == Command::Stop) {
-            return Err(Failure::Usage("`stop` ends the session: nothing comes after it".to_owned()));
+            return Err(Failure::Usage("`stop` ends the session: it must be the last command".to_owned()));
         }
         Ok(Self::List(commands))
     }
 
-    /// Compiles the specs whose settings are to be written.
+    /// Compiles the specs of `config write` commands.
     ///
     /// # Errors
     /// One of them is refused.
@@ -106,7 +105,7 @@ impl Source {
     }
 }
 
-/// Carries out commands in a session with the device of this name. `is_only_host`: the link has no other end, so that this host is in
+/// Executes commands in a session with the device of this name. `is_only_host`: the link admits no other host, so this one is in
 /// control.
 ///
 /// # Errors
@@ -120,7 +119,7 @@ pub fn run(
     ui: &mut Ui,
 ) -> Result<(), Failure> {
     if compiled.is_none() {
-        let text = format!("{name}: not compared with a spec; name it to be sure that the device runs its controller");
+        let text = format!("{name}: the controller was not checked against a spec; name the spec to check it");
         ui.progress(&text);
     }
     let mut operator = Operator::new(session, interrupt::heed());
@@ -131,7 +130,7 @@ pub fn run(
     operator.in_control = is_only_host;
     let ending = match source {
         Source::List(commands) => {
-            // An error in the last of them would leave the machine alone in the middle.
+            // Check all of them first: an error halfway would end the session with the machine in motion.
             operator.check(&commands)?;
             list(&commands, &mut operator, ui)
         }
@@ -140,10 +139,10 @@ pub fn run(
     finish(ending, &mut operator, name, ui)
 }
 
-/// The failure of a link that broke.
+/// The failure of a broken link.
 pub(crate) fn lost_link(name: &str, error: &ClientError) -> Failure {
     Failure::Environment(format!(
-        "{name}: {error}; a machine that lost its host holds, then ramps down (supervisor.host_lost)"
+        "{name}: {error}; without its host the machine holds, then ramps down (supervisor.host_lost)"
     ))
 }
 
@@ -151,11 +150,12 @@ fn list(commands: &[Command], operator: &mut Operator<impl Port>, ui: &mut Ui) -
     for command in commands {
         operator.execute(command, ui)?;
     }
-    // A tick has to see the last request before the link goes silent.
+    // The last request must reach a tick before the link goes silent.
     operator.look()
 }
 
-/// Lines from standard input or the program that called, the machine looked at meanwhile. What is wrong with a line ends nothing.
+/// Executes lines from standard input or the calling program, and polls the machine meanwhile. A failed command does not end the
+/// session.
 fn lines(operator: &mut Operator<impl Port + 'static>, ui: &mut Ui) -> Result<(), SessionError> {
     operator.attended = true;
     let (urgent, stops) = channel();
@@ -181,7 +181,7 @@ fn lines(operator: &mut Operator<impl Port + 'static>, ui: &mut Ui) -> Result<()
             Ok(text) => {
                 line(&text, operator, ui)?;
                 if std::mem::take(&mut operator.was_stopped) {
-                    // What was sent before is not to move it.
+                    // Lines sent before the stop must not move it.
                     for text in lines.try_iter() {
                         late(&text, operator, ui)?;
                     }
@@ -197,17 +197,17 @@ fn lines(operator: &mut Operator<impl Port + 'static>, ui: &mut Ui) -> Result<()
     }
 }
 
-/// Carries a line out that was sent before the machine was stopped, unless it would move.
+/// Executes a line that was sent before the machine was stopped, unless it would cause motion.
 fn late(text: &str, operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(), SessionError> {
     if !matches!(Command::parse(text), Ok(Some(command)) if command.moves()) {
         return line(text, operator, ui);
     }
-    operator.note(text, &CommandError { error: "the machine was stopped: not done".to_owned() }, ui);
+    operator.note(text, &CommandError { error: "the machine was stopped: command skipped".to_owned() }, ui);
     ui.answered(&mut operator.answers);
     Ok(())
 }
 
-/// Carries one line out, and answers it.
+/// Executes one line and answers it.
 fn line(line: &str, operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(), SessionError> {
     let done = match Command::parse(line) {
         Ok(None) => Ok(()),
@@ -221,7 +221,7 @@ fn line(line: &str, operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(
     Ok(())
 }
 
-/// The reason why a command failed, if the session goes on.
+/// The reason of a failure that does not end the session.
 pub(crate) fn recoverable(done: Result<(), SessionError>, ui: &mut Ui) -> Result<Option<String>, SessionError> {
     match done {
         Ok(()) => Ok(None),
@@ -237,7 +237,7 @@ pub(crate) fn recoverable(done: Result<(), SessionError>, ui: &mut Ui) -> Result
     }
 }
 
-/// A thread that waits for lines, so that the link does not. A stop from a terminal does not wait for what was typed before.
+/// Reads lines in a thread, so that the link stays alive. A stop typed at a terminal overtakes earlier lines.
 fn reader(urgent: Sender<Request>) -> Receiver<String> {
     let (sender, receiver) = channel();
     let is_typed = std::io::stdin().is_terminal();
@@ -258,7 +258,7 @@ fn reader(urgent: Sender<Request>) -> Receiver<String> {
     receiver
 }
 
-/// Says how it ended. Ctrl-C brings the machine down first.
+/// Reports the end of a session. After Ctrl-C it first ramps the machine down.
 fn finish(
     ending: Result<(), SessionError>,
     operator: &mut Operator<impl Port>,
@@ -269,7 +269,7 @@ fn finish(
     let report = Report { device: name, answers: std::mem::take(&mut operator.answers), status: operator.status() };
     match ending {
         Ok(()) | Err(SessionError::Stopped) => {
-            // A machine that another host commands does not miss one that only looked.
+            // If another host is in control, the machine does not depend on this one.
             if open && operator.in_control && operator.is_powered() {
                 let text =
                     "the amplifiers are on; without its host the machine holds, then ramps down (supervisor.host_lost)";

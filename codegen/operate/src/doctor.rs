@@ -1,6 +1,6 @@
-//! Whether this computer can run a controller in real time, and what to change where it cannot.
+//! Checks whether this computer can run a controller in real time, and suggests changes.
 //!
-//! [`system`] and [`equipment`] look at files under a root, so that tests can show them any computer; [`latency`] measures this one.
+//! [`system`] and [`equipment`] read files below a root, which tests can replace; [`latency`] measures this computer.
 
 pub mod equipment;
 pub mod latency;
@@ -13,30 +13,30 @@ use serde::Serialize;
 
 pub use report::{Report, Verdict, examine};
 
-/// How a finding bears on real time.
+/// Grade of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Grade {
-    /// As it should be.
+    /// No problem.
     Good,
-    /// Cannot be seen from here: a container, a virtual machine, a missing right.
+    /// Not visible from here: a container, a virtual machine, a missing privilege.
     Unknown,
-    /// Costs latency, or something optional is missing.
+    /// Adds latency, or something optional is missing.
     Warning,
-    /// In the way.
+    /// Prevents real-time operation.
     Bad,
 }
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// What was looked at.
+    /// What was checked.
     pub subject: &'static str,
-    /// How it is.
+    /// The grade.
     pub grade: Grade,
-    /// What was found.
+    /// The result.
     pub found: String,
-    /// What to change; none where nothing is to be.
+    /// What to change, if anything.
     pub fix: Option<String>,
 }
 
@@ -57,13 +57,13 @@ pub struct Files {
 }
 
 impl Files {
-    /// Those of this computer.
+    /// The files of this computer.
     #[must_use]
     pub fn of_this_computer() -> Self {
         Self::below(Path::new("/"))
     }
 
-    /// Those below a folder.
+    /// The files below a folder.
     #[must_use]
     pub fn below(root: &Path) -> Self {
         Self { root: root.to_owned() }
@@ -73,12 +73,12 @@ impl Files {
         self.root.join(path.trim_start_matches('/'))
     }
 
-    /// Text of a file without the blanks around it; none if it cannot be read.
+    /// Trimmed text of a file; none if it cannot be read.
     fn text(&self, path: &str) -> Option<String> {
         std::fs::read_to_string(self.path(path)).ok().map(|text| text.trim().to_owned())
     }
 
-    /// Names in a folder that begin so, in order.
+    /// Sorted names in a folder with this prefix.
     fn names(&self, folder: &str, beginning: &str) -> Vec<String> {
         let Ok(entries) = std::fs::read_dir(self.path(folder)) else { return Vec::new() };
         let names = entries.filter_map(Result::ok).map(|entry| entry.file_name().to_string_lossy().into_owned());

@@ -1,19 +1,19 @@
-//! Coordinates of a host's own, about those that the controller takes: a work frame and a tool point, as `control.frames` has them.
-//! They are turned into the controller's before anything is sent, so that they may change while the machine runs.
+//! A host's own work frame and tool point, like those of `control.frames`. The host converts poses to the controller's
+//! coordinates before it sends them, so the frame can change while the machine runs.
 
 use specgen_runtime::setpoint::{Frames, Target, Work};
 
 use crate::motion::{inverse, rotation};
 
-/// Largest angle between the frames, and of a pose in them: beyond it the kernel's series are not made for it, rad.
+/// Largest angle between the frames, and of a pose in them, rad: the range of the kernel's series.
 const LARGEST: f64 = core::f64::consts::PI / 12.0;
 
-/// A frame, from the controller's coordinates.
+/// A frame, relative to the controller's coordinates.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame {
-    /// Place of the work frame, m, and its angles, rad.
+    /// Position of the work frame, m, and its angles, rad.
     work: [f64; 6],
-    /// Point that poses place and turn about, from the controller's tool point, m.
+    /// Reference point and centre of rotation of poses, relative to the controller's tool point, m.
     tool: [f64; 3],
     frames: Option<Work<f64>>,
 }
@@ -25,7 +25,7 @@ impl Default for Frame {
 }
 
 impl Frame {
-    /// Of a work frame's place and angles (R = Rz Ry Rx), and a tool point; m and rad.
+    /// From position and angles of a work frame (R = Rz Ry Rx) and a tool point; m and rad.
     #[must_use]
     pub fn new(work: [f64; 6], tool: [f64; 3]) -> Self {
         let [_, _, _, rx, ry, rz] = work;
@@ -34,7 +34,7 @@ impl Frame {
         Self { work, tool, frames }
     }
 
-    /// Place and angles of the work frame, m and rad.
+    /// Position and angles of the work frame, m and rad.
     #[must_use]
     pub fn work(&self) -> &[f64; 6] {
         &self.work
@@ -46,7 +46,7 @@ impl Frame {
         &self.tool
     }
 
-    /// The controller's coordinates of a pose in the frame, m and rad; none if an angle is beyond what is meant.
+    /// The controller's coordinates of a pose in the frame, m and rad; none if an angle is too large.
     #[must_use]
     pub fn user(&self, pose: &[f64; 6]) -> Option<[f64; 6]> {
         let Some(frames) = &self.frames else { return Some(*pose) };
@@ -57,7 +57,7 @@ impl Frame {
         Some(user)
     }
 
-    /// The pose in the frame of one in the controller's coordinates, m and rad; none if an angle is beyond what is meant.
+    /// Converts a pose from the controller's coordinates to the frame, m and rad; none if an angle is too large.
     #[must_use]
     pub fn pose(&self, user: &[f64; 6]) -> Option<[f64; 6]> {
         let Some(frames) = &self.frames else { return Some(*user) };

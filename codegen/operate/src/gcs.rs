@@ -1,10 +1,10 @@
-//! The General Command Set 2.0, which programs for piezo stages and hexapods speak, over TCP: a bridge on the link.
+//! A bridge from the General Command Set 2.0 of piezo stages and hexapods, over TCP, to the link.
 //!
 //! ```text
 //! clients ─ TCP ─► Input ─ lines, single bytes ─► commands ─► Stage ─ Session ─ link ─► device
-//!                                                              └─ asked at least every 20 ms, whatever clients do
+//!                                                              └─ polled at least every 20 ms, whatever clients do
 //! ```
-//! What is understood, and how it differs, is in `docs/gcs.md`. One client is in control; every client may watch, and stop.
+//! `docs/gcs.md` lists the supported commands and the differences. One client is in control; every client may query and stop.
 
 mod axes;
 mod code;
@@ -28,10 +28,11 @@ pub use axes::Axes;
 use server::Bridge;
 use stage::Stage;
 
-/// Serves clients at an address until Ctrl-C, then ramps down. `alike` are the sets of faults that look alike to the wiring check.
+/// Serves clients at an address until Ctrl-C, then ramps down. `alike` are sets of faults that the wiring check cannot
+/// distinguish.
 ///
 /// # Errors
-/// The device is no platform, the address is not free, or the link broke.
+/// The device is not a platform, the address is in use, or the link broke.
 pub fn serve<P: Port>(
     session: Session<P>,
     name: &str,
@@ -47,12 +48,12 @@ pub fn serve<P: Port>(
     let stop = interrupt::heed();
     let mut bridge = Bridge::new(stage, axes, listener).map_err(refused)?;
     if !address.ip().is_loopback() {
-        ui.progress("warning: whoever reaches this address can move the machine");
+        ui.progress("warning: anyone who can reach this address can move the machine");
     }
-    ui.progress(&format!("{name}: GCS at {address}; Ctrl-C ramps down and ends"));
+    ui.progress(&format!("{name}: GCS at {address}; Ctrl-C ramps down and exits"));
     let mut shown = String::new();
     let ending = bridge.run(stop, |session| {
-        let state = session.stands(&alike);
+        let state = session.state(&alike);
         if state != shown {
             ui.progress(&format!("tick {}: {state}", session.status().tick));
             shown = state;

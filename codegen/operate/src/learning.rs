@@ -1,4 +1,4 @@
-//! Learning on a machine at the end of a link.
+//! Learning on a machine over the link.
 
 mod machine;
 
@@ -16,7 +16,7 @@ use crate::commands::{Operator, SessionError, lost_link, motion_name};
 use crate::line::Line;
 use machine::{LinkedMachine, OwnTrajectory};
 
-/// Learns a trajectory of the spec on the machine that `line` leads to. `spec` is the file of the spec, for messages.
+/// Learns a trajectory of the spec on the machine at `line`. `spec` is the file of the spec, for messages.
 ///
 /// # Errors
 /// The machine has no such trajectory, or the session or learning fails.
@@ -25,10 +25,10 @@ pub fn run(line: Line<'_>, spec: &Path, options: &Options, compiled: Compilation
     lessons::run(options, compiled, &mut OnLine { line, spec, own }, ui)
 }
 
-/// A machine at the end of a link.
+/// A machine at a line.
 struct OnLine<'a> {
     line: Line<'a>,
-    /// Of the command, for a message.
+    /// File of the spec, for a message.
     spec: &'a Path,
     own: OwnTrajectory,
 }
@@ -55,7 +55,7 @@ impl MachineSource for OnLine<'_> {
         let mut operator = Operator::new(session, interrupt::heed());
         if !operator.is_set_to(&ir.integrity.settings).map_err(|error| lost_link(&name, &error))? {
             return Err(Failure::Gate(format!(
-                "{name}: its settings are not those of the spec, for which learning is proven to converge; `config write {}` in \
+                "{name}: its settings differ from those of the spec, for which learning is proven to converge; `config write {}` in \
                  specgen operate restores them",
                 self.spec.display()
             )));
@@ -74,7 +74,7 @@ impl MachineSource for OnLine<'_> {
             _ if operator.is_powered() => operator.ramp_down(ui).map_err(|error| lost_link(&name, &error)),
             _ => Ok(format!("the machine is {}, amplifiers off", operator.state())),
         };
-        // What was found is kept, however the machine ended.
+        // Keep the result, even if the machine faulted.
         let found = match done {
             Ok(done) => Some(keep(done, ui)?),
             Err(LearnError::Ended) => None,

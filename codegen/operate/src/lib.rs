@@ -1,12 +1,13 @@
-//! A host that operates a machine over the link: commands in, requests out, and the link kept alive in between.
+//! A host that operates a machine over the link. It turns commands into requests, and keeps the link alive.
 //!
 //! ```text
 //! line ─► Command ─► Operator ─► Session ─ link ─► device (a board at a serial port, a program at a socket)
 //!                                    └─ status, every 20 ms: after 0.1 s of silence a device holds
 //! ```
-//! [`commands`] carries out the commands of `specgen operate`, [`panel`] those of a page in the browser. [`pil`] runs host library and device in lock-step. [`gcs`] serves the General Command Set: `input` (bytes to commands), `commands`,
-//! `stage` (servo, target, limits), `server` (clients, one of which is in control). [`served`] is the simulated machine behind converters,
-//! and [`doctor`] checks a PC for real time.
+//! [`commands`] executes the commands of `specgen operate`, [`panel`] those of a page in the browser. [`pil`] runs the host library
+//! and a device in lock-step. [`gcs`] serves the General Command Set: `input` (bytes to commands), `commands`, `stage` (servo,
+//! target, limits), `server` (clients, one of which is in control). [`served`] is the simulated machine with converters, and
+//! [`doctor`] checks a PC for real-time operation.
 
 mod command;
 pub mod commands;

@@ -1,17 +1,17 @@
-//! Where a platform may go, how fast, and in which coordinates, as its controller says it of itself.
+//! Workspace, speed and coordinates of a platform, from its controller's description.
 
 use specgen_runtime::setpoint::{Frames, Target, Tool, Work};
 
-/// A leg closer to either end than this part of its stroke has no room for corrections: `specgen check` warns of a bias there.
+/// Share of the stroke at either end that is kept free for corrections; `specgen check` warns of a bias there.
 const ROOM: f64 = 0.01;
-/// As part of the stroke.
+/// Tolerance for rounding, as a share of the stroke.
 const SLACK: f64 = 1e-9;
-/// Passes of the way back to the user's coordinates; each leaves less than the angles (0.3 rad at most) of what the last one left.
+/// Iterations of the inverse coordinates. Each reduces the residual by at least a factor of the angles, at most 0.3 rad.
 const PASSES: u32 = 60;
-/// Steps that find the end of a way: each halves what is left of it.
+/// Bisection steps for the end of a range.
 const HALVINGS: u32 = 60;
 
-/// Poses of the user, m and rad, and those of the platform. What the device does decides: its numbers may be of 32 bits.
+/// Conversion between poses of the user and of the platform, m and rad, and limits. The device decides: it may compute in f32.
 #[derive(Debug, Clone)]
 pub struct Motion {
     /// Pose of the platform, from rest, at the user's zero.
@@ -19,9 +19,9 @@ pub struct Motion {
     /// Largest |component| of a pose of the platform.
     bound: [f64; 6],
     speed: [f64; 6],
-    /// What every leg can do, m.
+    /// Stroke of every leg, m.
     stroke: f64,
-    /// Of that, what is kept free at either end for corrections, m.
+    /// Part of the stroke at either end that is kept free for corrections, m.
     room: f64,
     /// Each leg at rest in the base frame, and its joint in the platform's, m.
     legs: [Leg; 6],
@@ -35,25 +35,25 @@ struct Leg {
     joint: [f64; 3],
 }
 
-/// What keeps a platform from standing somewhere.
+/// The limit that a pose exceeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Binding {
-    /// It would be beyond the workspace.
+    /// The workspace.
     Axis {
-        /// Its place in a pose.
+        /// Index of the axis in a pose.
         axis: usize,
-        /// Where it would be, from rest and with the bias, m or rad.
+        /// Position relative to rest, including the bias, m or rad.
         at: f64,
         /// Its bound, m or rad.
         bound: f64,
     },
-    /// A leg would have less room than it needs for corrections, or none.
+    /// The stroke of a leg, less the room for corrections.
     Leg {
         /// Its number.
         leg: usize,
         /// Its displacement, m.
         at: f64,
-        /// From where to where it may be, m.
+        /// Permitted range, m.
         range: [f64; 2],
     },
 }
@@ -66,10 +66,10 @@ enum Coordinates {
 }
 
 impl Motion {
-    /// Of a controller's description; none of six legs, which have no pose.
+    /// Parses a controller's description; none for six legs, which have no pose.
     ///
     /// # Errors
-    /// A platform's description without these lines, or with others.
+    /// The description of a platform lacks a line, or it is invalid.
     pub fn parse(text: &str) -> Result<Option<Self>, String> {
         let line = |key: &str| text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix('='));
         if line("kind") != Some("platform") {
@@ -99,7 +99,7 @@ impl Motion {
         let [origin, bound, speed] = [six("origin")?, six("bound")?, six("speed")?];
         let mut motion = Self { origin, bound, speed, stroke, room: ROOM * stroke, legs, frames, trajectories };
         if !motion.admits(&[0.0; 6]) {
-            // A spec that was made without room has poses all the same; only rounding is not to refuse them.
+            // The spec leaves no room at the bias: permit the whole stroke, with a tolerance for rounding.
             motion.room = -SLACK * stroke;
         }
         Ok(Some(motion))
@@ -111,13 +111,13 @@ impl Motion {
         &self.speed
     }
 
-    /// Trajectories that the controller can play, by the word `selector`.
+    /// Trajectories of the controller, by the value of the word `selector`.
     #[must_use]
     pub fn trajectories(&self) -> &[String] {
         &self.trajectories
     }
 
-    /// Pose of the platform from rest, in or out of its workspace; none if an angle is beyond what is meant.
+    /// Converts to a pose of the platform relative to rest, which may be outside its workspace; none if an angle is too large.
     #[must_use]
     pub fn platform(&self, user: &[f64; 6]) -> Option<[f64; 6]> {
         let target = Target::at(*user);
@@ -133,7 +133,7 @@ impl Motion {
         Some(pose)
     }
 
-    /// The user's coordinates of a pose of the platform, m and rad.
+    /// Converts a pose of the platform to the user's coordinates, m and rad.
     #[must_use]
     pub fn user(&self, pose: &[f64; 6]) -> Option<[f64; 6]> {
         let axes = match &self.frames {
@@ -143,7 +143,7 @@ impl Motion {
         inverse(|user| self.platform(user), axes, pose)
     }
 
-    /// How far each leg is from rest at a pose of the platform, m.
+    /// Displacement of each leg from rest at a pose of the platform, m.
     fn displacements(&self, pose: &[f64; 6]) -> [f64; 6] {
         let [x, y, z, tilt_x, tilt_y, tilt_z] = *pose;
         let turn = rotation([tilt_x, tilt_y, tilt_z]);
@@ -157,17 +157,17 @@ impl Motion {
         })
     }
 
-    /// Whether the platform can stand there: within its workspace, and with room for every leg.
+    /// Whether the platform can reach a pose: within its workspace, and with room for every leg.
     #[must_use]
     pub fn admits(&self, user: &[f64; 6]) -> bool {
         self.binding(user).is_none()
     }
 
-    /// What keeps the platform from standing there most; none if it can.
+    /// The limit that a pose exceeds most; none if it can be reached.
     #[must_use]
     pub fn binding(&self, user: &[f64; 6]) -> Option<Binding> {
         let pose = self.platform(user).unwrap_or(*user);
-        // What is no number is beyond everything.
+        // A value that is not finite exceeds every limit.
         let excess = |value: f64, bound: f64| if value.is_finite() { value.abs() / bound } else { f64::INFINITY };
         let axes = (0..6).map(|axis| {
             (excess(pose[axis], self.bound[axis]), Binding::Axis { axis, at: pose[axis], bound: self.bound[axis] })
@@ -184,7 +184,7 @@ impl Motion {
     }
 }
 
-/// The least and the largest value of one axis that `admits` says yes to, the others as in `pose`.
+/// Least and largest value of one axis that `admits`, with the others as in `pose`.
 #[must_use]
 pub fn limits(admits: impl Fn(&[f64; 6]) -> bool, pose: &[f64; 6], axis: usize) -> [f64; 2] {
     let way = |sign: f64| core::array::from_fn(|other| if other == axis { sign } else { 0.0 });
@@ -201,7 +201,7 @@ pub(crate) fn rotation(angles: [f64; 3]) -> [[f64; 3]; 3] {
     ]
 }
 
-/// The pose that `forward` leads to `wanted`, where its columns are nearly those of `axes` (of the identity without them).
+/// The pose that `forward` maps to `wanted`. Its Jacobian must be near `axes`, or near the identity without them.
 pub(crate) fn inverse(
     forward: impl Fn(&[f64; 6]) -> Option<[f64; 6]>,
     axes: Option<&[[f64; 3]; 3]>,
@@ -222,13 +222,13 @@ pub(crate) fn inverse(
     Some(pose)
 }
 
-/// How far it is from `start` along `way` until `admits` says no, as a multiple of `way`, not below 0.
+/// Distance from `start` along `way` up to which `admits` holds, as a multiple of `way`; 0 if `start` is not admitted.
 pub(crate) fn reach(admits: impl Fn(&[f64; 6]) -> bool, start: &[f64; 6], way: &[f64; 6]) -> f64 {
     let at = |far: f64| -> [f64; 6] { core::array::from_fn(|axis| start[axis] + far * way[axis]) };
     if !admits(start) || way.iter().all(|value| *value == 0.0) {
         return 0.0;
     }
-    // A way of any unit: from less than can be seen up to further than anything goes.
+    // Any unit: the bracket grows from far below the resolution to far beyond any range.
     let (mut inside, mut outside) = (0.0, 1e-12);
     while admits(&at(outside)) && outside < 1e12 {
         (inside, outside) = (outside, 2.0 * outside);
@@ -254,7 +254,7 @@ fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
 mod tests {
     use super::*;
 
-    /// Upright legs, so that each does what its joint does in z.
+    /// Upright legs: the displacement of each is that of its joint in z.
     fn described(origin_z: f64, more: &str) -> String {
         let joints = "0.1,0,0,0.05,0.08,0,-0.05,0.08,0,-0.1,0,0,-0.05,-0.08,0,0.05,-0.08,0";
         let rest = ["0,0,0.2"; 6].join(",");
@@ -278,7 +278,7 @@ mod tests {
         let close = |found: [f64; 2], expected: [f64; 2]| {
             assert!(found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-13), "{found:?}");
         };
-        // Upwards the workspace ends, downwards the strokes do, a hundredth before their end.
+        // Upwards the workspace limits z, downwards the stroke of the legs less a hundredth.
         close(limits(|pose| motion.admits(pose), &[0.0; 6], 2), [-9.3e-6, 4.2e-5]);
         close(limits(|pose| motion.admits(pose), &[4e-5, 0.0, 0.0, 0.0, 0.0, 0.0], 0), [-5e-5, 5e-5]);
         assert!(motion.admits(&[0.0, 0.0, 4.199e-5, 0.0, 0.0, 0.0]) && !motion.admits(&[f64::NAN; 6]));
@@ -292,10 +292,10 @@ mod tests {
             panic!("{:?}", motion.binding(&[0.0, 0.0, 0.0, 0.0, 2e-4, 0.0]))
         };
         assert!((at + 1e-5).abs() < 1e-8 && (range[0] - 7e-7).abs() < 1e-18, "{at} {range:?}");
-        // Without room at the user's zero none is asked for.
+        // If the user's zero leaves no room, none is required.
         let bare = Motion::parse(&described(0.0, "")).unwrap().unwrap();
         close(limits(|pose| bare.admits(pose), &[0.0; 6], 2), [0.0, 5.2e-5]);
-        // From outside there is no way.
+        // From outside the reach is zero.
         assert_eq!(reach(|pose| motion.admits(pose), &[1.0; 6], &[-1.0; 6]).to_bits(), 0);
     }
 

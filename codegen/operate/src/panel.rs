@@ -1,11 +1,11 @@
-//! A machine on one page in the browser.
+//! Shows and operates a machine on a page in the browser.
 //!
 //! ```text
 //! browsers ─ HTTP, WebSocket ─► a thread each ─ ClientEvent ─► this thread: Operator ─ link ─► machine
-//!            page, samples ◄────────────────── Outbox ◄─┘ at every look: samples, state, hold and ramp down
+//!            page, samples ◄────────────────── Outbox ◄─┘ at every poll: samples, state, hold and ramp down
 //! ```
-//! One thread has the machine. While a command waits, the machine is looked at all the same; at every look the pages get their samples,
-//! and *hold* and *ramp down* are carried out. A browser that is slow, or fails, delays nothing.
+//! One thread operates the machine. It polls the machine even while a command waits. At every poll it sends samples to the pages,
+//! and executes *hold* and *ramp down*. A slow or failing browser delays nothing.
 
 mod browser;
 mod clients;
@@ -23,6 +23,7 @@ use std::rc::Rc;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
 use serde_json::{Value, json};
 use specgen_compiler::compile::Compilation;
 use specgen_language::interrupt;
@@ -32,25 +33,26 @@ use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
 use specgen_runtime::supervisor::{Phase, Request};
 
-use crate::commands::{Operator, Pulse, Service, SessionError, is_gain, lost_link, recoverable};
+use crate::commands::{MachineStatus, Operator, Pulse, Service, SessionError, is_gain, lost_link, recoverable};
 use crate::samples::Block;
 use crate::session::Session;
 use clients::{Clients, now};
 use control::{carry_out, queries};
+use status::StatusMessage;
 
-/// Between two messages with samples.
+/// Interval of messages with samples.
 const FRAME: Duration = Duration::from_millis(25);
-/// Between two looks at the samples that wait.
+/// Interval of fetching samples.
 const LOOK: Duration = Duration::from_millis(10);
-/// Between two messages with the state of the machine.
+/// Interval of messages with the state of the machine.
 const STATE: Duration = Duration::from_millis(200);
-/// Between two queries that need more than a look: health, reach, recorder, gains.
+/// Interval of longer queries: health, reach, recorder, gains.
 const QUERY: Duration = Duration::from_secs(1);
-/// Between two messages about late ticks.
+/// Least interval of messages about late ticks.
 const LATE: Duration = Duration::from_secs(60);
-/// Rows a second that are asked for, at most.
+/// Largest number of rows per second.
 const ROWS: f64 = 2000.0;
-/// Longer than any ramp after a host was gone, s.
+/// Upper bound of the duration of a ramp-down, s.
 const RAMPED: f64 = 5.0;
 
 /// State of the panel.
@@ -58,17 +60,17 @@ struct Panel {
     clients: Clients,
     compiled: Compilation,
     blocks: Vec<Block>,
-    /// Number of the next block, and its first tick.
+    /// Expected number of the next block, and its first tick.
     next: Option<(u32, u64)>,
-    /// Ticks whose samples were lost since the last message about that, and its time.
+    /// Ticks whose samples were lost since the last message about them, and the time of that message.
     lost: (u64, Instant),
     framed: Instant,
     stated: Instant,
-    /// Phase, cause and finding that were published last; late ticks.
+    /// Last published phase, cause and finding; late ticks.
     published: Option<((u8, u8, u16), u32)>,
-    /// Late ticks since the last message about them, and its time.
+    /// Late ticks since the last message about them, and the time of that message.
     late: (u32, Option<Instant>),
-    /// A command is under way: a stop ends it with an error.
+    /// A command is in progress; a stop ends it with an error.
     is_busy: bool,
     /// Results of the queries.
     known: Value,
@@ -76,7 +78,23 @@ struct Panel {
     wave: Value,
 }
 
-/// What the page of a device shows beside its spec: the name, the rate of a ramp (V/s), the trajectories.
+/// State of machine and panel, for pages.
+#[derive(Serialize)]
+struct State<'a> {
+    /// Kind of the message.
+    k: &'static str,
+    /// ms since 1970.
+    t: f64,
+    status: MachineStatus,
+    phase: Option<&'static str>,
+    said: StatusMessage,
+    known: &'a Value,
+    check: &'a Value,
+    wave: &'a Value,
+    busy: bool,
+}
+
+/// Facts about the device for the page: its name, the rate of a ramp-down (V/s), the trajectories.
 ///
 /// # Errors
 /// The device controls six legs.
@@ -86,7 +104,7 @@ pub fn device_facts(
     compiled: &Compilation,
 ) -> Result<[(&'static str, Value); 3], Failure> {
     let Some(motion) = session.motion() else {
-        return Err(Failure::Gate(format!("{name}: the device controls six legs: the panel shows a platform")));
+        return Err(Failure::Gate(format!("{name}: the device controls six legs; the panel needs a platform")));
     };
     let (rules, volts) = (&compiled.ir.supervision, compiled.ir.actuation.volts_per_code);
     let ramp = f64::from(rules.ramp_step) * volts / (f64::from(rules.ramp_every) * session.period());
@@ -96,7 +114,7 @@ pub fn device_facts(
 /// Serves `page` at an address until Ctrl-C, and operates the machine as the pages request; then ramps down.
 ///
 /// # Errors
-/// The address is not free, the device sends no samples, or the link broke.
+/// The address is in use, the device sends no samples, or the link broke.
 pub fn serve<P: Port + 'static>(
     session: Session<P>,
     name: &str,
@@ -134,27 +152,27 @@ pub fn serve<P: Port + 'static>(
         _ if operator.is_powered() => operator.ramp_down(ui).map_err(|error| lost_link(name, &error)),
         _ => Ok(operator.state()),
     };
-    let why = if left.is_ok() { "The panel was ended." } else { "The link to the machine broke." };
+    let why = if left.is_ok() { "The panel was closed." } else { "The link to the machine broke." };
     panel.borrow_mut().clients.publish(&json!({ "k": "end", "why": why }));
-    // The threads of the pages send it.
+    // Gives the threads of the pages time to send it.
     std::thread::sleep(FRAME);
     Ok(Service { device: name.to_owned(), listened: address.to_string(), stands: left? })
 }
 
-/// Shows where the page is.
+/// Prints the address of the page.
 fn announce(name: &str, address: SocketAddr, token: &str, ui: &Ui) {
-    // A server at all addresses is reached at this one.
+    // A server at all addresses can be reached at the loopback address.
     let shown = match address.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => SocketAddr::from(([127, 0, 0, 1], address.port())),
         _ => address,
     };
     if !address.ip().is_loopback() {
         ui.progress(
-            "warning: whoever reaches this address and knows the token can move the machine; nothing is encrypted",
+            "warning: anyone who can reach this address and knows the token can move the machine; nothing is encrypted",
         );
     }
     ui.progress(&format!("{name}: panel at http://{shown}/?token={token}"));
-    ui.progress("Ctrl-C ramps down and ends");
+    ui.progress("Ctrl-C ramps down and exits");
 }
 
 /// Operates the machine until an error or Ctrl-C.
@@ -165,7 +183,7 @@ fn operate<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Pan
     loop {
         if let Err(error) = round(operator, panel, &mut quiet, &mut queried) {
             match recoverable(Err(error), &mut quiet) {
-                // It ended a command at most.
+                // It only ended a command.
                 Ok(_) => {}
                 Err(error) => return error,
             }
@@ -174,7 +192,7 @@ fn operate<P: Port + 'static>(operator: &mut Operator<P>, panel: &Rc<RefCell<Pan
     }
 }
 
-/// One round: handles pages, looks at the machine, executes one command or the queries that are due.
+/// One round: handles pages, polls the machine, executes one command or the queries that are due.
 fn round<P: Port + 'static>(
     operator: &mut Operator<P>,
     panel: &Rc<RefCell<Panel>>,
@@ -217,7 +235,7 @@ fn round<P: Port + 'static>(
     Ok(())
 }
 
-/// What is done at every look.
+/// The work at every poll.
 fn pulse<P: Port + 'static>(panel: Rc<RefCell<Panel>>) -> Pulse<P> {
     Box::new(move |operator| panel.borrow_mut().pulse(operator))
 }
@@ -242,7 +260,7 @@ impl Panel {
         }
     }
 
-    /// Asks for samples, as many as are of use and there is room for.
+    /// Starts the stream of samples, at the highest useful rate that the line permits.
     fn begin(&mut self, session: &mut Session<impl Port>) -> Result<(), ClientError> {
         let mut every = (1.0 / (ROWS * session.period())).ceil() as u32;
         loop {
@@ -272,7 +290,7 @@ impl Panel {
         Ok(())
     }
 
-    /// Whether the machine gets no heartbeat: the page in control is gone, so that the machine acts as without a host.
+    /// Whether to send the machine no heartbeat: the page in control is gone, so the machine must act as without a host.
     fn leaves_alone<P: Port>(&mut self, operator: &Operator<P>) -> bool {
         let rules = &self.compiled.ir.supervision;
         let gone = f64::from(*rules.timeout.last().unwrap_or(&0)) * operator.session.period();
@@ -305,12 +323,7 @@ impl Panel {
         if self.lost.0 > 0 && self.lost.1.elapsed() >= QUERY {
             let seconds = self.lost.0 as f64 * session.period();
             self.lost = (0, Instant::now());
-            self.clients.note(
-                "warning",
-                &format!("{seconds:.3} s of samples were lost on the way from the machine."),
-                "",
-                None,
-            );
+            self.clients.note("warning", &format!("{seconds:.3} s of samples from the machine were lost."), "", None);
         }
         if self.framed.elapsed() >= FRAME && !self.blocks.is_empty() {
             self.framed = Instant::now();
@@ -322,7 +335,7 @@ impl Panel {
         Ok(())
     }
 
-    /// Publishes the state of the machine, and what is new.
+    /// Publishes the state of the machine and its changes.
     fn publish<P: Port>(&mut self, operator: &Operator<P>) {
         let status = operator.session.status();
         let current = ((status.phase, status.cause, status.finding), status.late);
@@ -345,9 +358,9 @@ impl Panel {
                 let again = self.late.1.replace(Instant::now()).is_some();
                 let s = if late == 1 { "" } else { "s" };
                 let advice = if again {
-                    "Look at the load of the controller's computer."
+                    "Check the load of the controller's computer."
                 } else {
-                    "Nothing, unless it comes back."
+                    "No action needed, unless it happens again."
                 };
                 self.clients.note("warning", &format!("{late} late tick{s}."), advice, None);
             }
@@ -356,24 +369,23 @@ impl Panel {
             return;
         }
         self.stated = Instant::now();
-        let state = json!({
-            "k": "state",
-            "t": now(),
-            "status": operator.status(),
-            "phase": Phase::from_word(u64::from(status.phase)).map(Phase::name),
-            "said": { "kind": message.kind, "what": message.what, "do": message.advice, "code": message.code },
-            "known": self.known,
-            "check": self.check,
-            "wave": self.wave,
-            "busy": self.is_busy,
-        });
-        self.clients.publish(&state);
+        self.clients.publish(&json!(State {
+            k: "state",
+            t: now(),
+            status: operator.status(),
+            phase: Phase::from_word(u64::from(status.phase)).map(Phase::name),
+            said: message,
+            known: &self.known,
+            check: &self.check,
+            wave: &self.wave,
+            busy: self.is_busy,
+        }));
     }
 
-    /// All gains as the spec has them, by this factor.
+    /// All gains of the spec, multiplied by a factor.
     fn gains<P: Port>(&self, operator: &Operator<P>, factor: f64) -> Result<Vec<(String, f64)>, String> {
         if !(factor.is_finite() && factor > 0.0) {
-            return Err(format!("expected a factor on the gains above 0, found {factor}"));
+            return Err(format!("expected a gain factor above 0, found {factor}"));
         }
         let description = operator.session.description();
         let words = description.config_names.iter().zip(&self.compiled.ir.integrity.settings);

@@ -1,5 +1,5 @@
-//! Processor in the loop: a simulated machine closes the loop with the very program that a microcontroller runs, and the host
-//! library runs the same inputs beside it, compared by bits in every tick.
+//! Processor in the loop: the program of a microcontroller controls a simulated machine. The host library gets the same inputs,
+//! and the outputs are compared bit for bit in every tick.
 //!
 //! ```text
 //! scenario ─► Lockstep ─┬─ host library ────────────────────────────────┐

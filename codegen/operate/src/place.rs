@@ -1,17 +1,17 @@
-//! Where a platform is to go, in words: `z=1um rx=-2urad`.
+//! Parses and prints poses of the operator, such as `z=1um rx=-2urad`.
 
 use specgen_language::quantity::{self, Dimension};
 
 /// Names of the axes of a pose.
 pub const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
-/// What is said of each axis, m and rad; none of one that is not named.
+/// Value of each axis, m and rad; none if it is not named.
 pub type AxisValues = [Option<f64>; 6];
 
-/// Reads `AXIS=QUANTITY` words, each axis at most once.
+/// Parses `AXIS=QUANTITY` words, each axis at most once.
 ///
 /// # Errors
-/// The first word that is wrong, and what is expected.
+/// A word is invalid; the text says what is expected.
 pub(crate) fn named(words: &[&str]) -> Result<AxisValues, String> {
     let mut axes = [None; 6];
     for word in words {
@@ -22,10 +22,10 @@ pub(crate) fn named(words: &[&str]) -> Result<AxisValues, String> {
         let slot = axes.get_mut(axis).ok_or_else(expected)?;
         let read = quantity::parse(text).map_err(|_| expected())?;
         let (dimension, unit) = if axis < 3 { (Dimension::LENGTH, "um") } else { (Dimension::ANGLE, "urad") };
-        // Nothing is nothing in any unit.
+        // Zero needs no unit.
         let is_zero = read.dimension == Dimension::NONE && read.value == 0.0;
         if read.dimension != dimension && !is_zero {
-            return Err(format!("`{word}`: {name} wants a unit of {}, such as {unit}", dimension.describe()));
+            return Err(format!("`{word}`: {name} needs a unit of {}, such as {unit}", dimension.describe()));
         }
         if slot.replace(read.value).is_some() {
             return Err(format!("`{word}`: {name} is named twice"));
@@ -34,13 +34,13 @@ pub(crate) fn named(words: &[&str]) -> Result<AxisValues, String> {
     Ok(axes)
 }
 
-/// A speed of translations, m/s, and one of rotations, rad/s; none of one that is not asked for.
+/// Speed of translations, m/s, and of rotations, rad/s; none if not given.
 pub type Pace = [Option<f64>; 2];
 
-/// Reads `speed=QUANTITY` words, one of each dimension at most.
+/// Parses `speed=QUANTITY` words, at most one of each dimension.
 ///
 /// # Errors
-/// The first word that is wrong, and what is expected.
+/// A word is invalid; the text says what is expected.
 pub(crate) fn pace(words: &[&str]) -> Result<Pace, String> {
     let mut pace = [None; 2];
     for word in words {
@@ -55,7 +55,7 @@ pub(crate) fn pace(words: &[&str]) -> Result<Pace, String> {
     Ok(pace)
 }
 
-/// The pose that is meant, from the set-point: axes that are not named stay as they are.
+/// The destination of a move from the set-point: axes that are not named keep their values.
 #[must_use]
 pub fn meant(from: &[f64; 6], relative: bool, axes: &AxisValues) -> [f64; 6] {
     core::array::from_fn(|axis| match axes[axis] {
@@ -65,13 +65,13 @@ pub fn meant(from: &[f64; 6], relative: bool, axes: &AxisValues) -> [f64; 6] {
     })
 }
 
-/// Millionths with their unit, of an axis.
+/// A value of an axis in µm or µrad, with the unit.
 #[must_use]
 pub fn amount(axis: usize, value: f64) -> String {
     format!("{:.3} {}", value * 1e6, if axis < 3 { "um" } else { "urad" })
 }
 
-/// A pose as people say it, µm and µrad.
+/// A pose as text, µm and µrad.
 #[must_use]
 pub fn in_words(pose: &[f64; 6]) -> String {
     let axes = AXES.iter().zip(pose).enumerate();
@@ -87,7 +87,7 @@ mod tests {
         assert_eq!(named(&["rx=-2urad", "z=1um"]), Ok([None, None, Some(1e-6), Some(-2e-6), None, None]));
         assert_eq!(named(&["x=0"]), Ok([Some(0.0), None, None, None, None, None]));
         for (words, text) in [
-            (&["z=1"][..], "z wants a unit of"),
+            (&["z=1"][..], "z needs a unit of"),
             (&["z=1urad"], "such as um"),
             (&["rx=1um"], "such as urad"),
             (&["w=1um"], "the axes are x, y, z, rx, ry, rz"),
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_named_stays() {
+    fn axes_that_are_not_named_keep_their_values() {
         let z = [None, None, Some(1e-6), None, None, None];
         let from = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
         assert_eq!(meant(&from, false, &z), [1.0, 2.0, 1e-6, 4.0, 5.0, 6.0]);

@@ -1,11 +1,11 @@
-//! Samples of a running machine: what it did in every tick, reduced by the device to rows of so many ticks.
+//! Samples of a running machine. The device reduces a number of ticks to a row.
 //!
 //! ```text
 //! device: every tick → rows → numbered blocks, which wait in a ring ─ Session::take_blocks, every few ms ─► Vec<Block>
 //! ```
-//! The device makes blocks at its own pace and waits for nobody: what is not fetched in time is given up, and the numbers of the
-//! blocks say so. A look takes the whole blocks that wait, else the rows of the one that is being filled: a row is here as soon as
-//! it is whole and asked for.
+//! The device does not wait for the host: it overwrites blocks that are not fetched in time, and gaps in the numbers of the blocks
+//! show that. A call takes all complete blocks, or otherwise the complete rows of the current block, so a row is available
+//! immediately.
 
 use serde::Serialize;
 use specgen_link::client::{ClientError, Port};
@@ -17,41 +17,42 @@ use crate::session::GAUGES;
 
 pub use specgen_link::samples::Spread;
 
-/// Blocks that one look takes at most: the caller has other things to do, too.
+/// Largest number of blocks per call, which limits its duration.
 const LOOK: usize = 256;
 
-/// Some ticks of a machine, one behind the other.
+/// Consecutive ticks of a machine, reduced to one row.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Row {
-    /// Every bit that the controller's status word had in any of them.
+    /// Union of the controller's status words.
     pub status: u32,
-    /// Number of `supervisor::Phase` in the last one.
+    /// Number of `supervisor::Phase` in the last tick.
     pub phase: u8,
-    /// Pose measured in the last one, in the user's coordinates, m and rad; none if gauges were not read or not believed in any of them.
+    /// Pose measured in the last tick, in the user's coordinates, m and rad; none if a gauge was not read or implausible in any tick.
     pub pose: Option<[f64; 6]>,
-    /// Set-point of the last one, in the user's coordinates, m and rad.
+    /// Set-point of the last tick, in the user's coordinates, m and rad.
     pub target: [f64; 6],
-    /// Set-point less pose over all of them, m and rad, none without a pose; along the platform's own axes, which a work frame of the spec turns.
+    /// Set-point minus pose over all ticks, m and rad; none without a pose. It is along the platform's axes, without the rotation of
+    /// a work frame.
     pub error: Option<[Spread; 6]>,
-    /// Voltage of each leg over all of them, V.
+    /// Voltage of each leg over all ticks, V.
     pub volts: [Spread; 6],
 }
 
-/// Rows, one behind the other.
+/// Consecutive rows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Block {
-    /// Counts the blocks that the device made, from 0 at the beginning of the stream: one that is missing was lost.
+    /// Number of the block in the stream, from 0; a missing number is a lost block.
     pub number: u32,
     /// First tick of the first row.
     pub tick: u64,
-    /// Ticks of each row: those that were asked for, or fewer in a block of one row that a gap ends.
+    /// Ticks per row: the requested number, or fewer in a block of one row before a gap.
     pub every: u32,
     /// The rows.
     pub rows: Vec<Row>,
 }
 
 impl Block {
-    /// The tick behind its last one.
+    /// The tick after its last one.
     #[must_use]
     pub fn end(&self) -> u64 {
         self.tick.saturating_add(u64::from(self.every) * self.rows.len() as u64)
@@ -59,18 +60,18 @@ impl Block {
 }
 
 impl<P: Port> Session<P> {
-    /// Streams samples from the next tick on, in rows of `every` ticks, 1 or more; 0 ends it. Blocks that wait are given up, and
-    /// numbers begin at 0 again. A session that ends takes its stream with it; other sessions have streams of their own.
+    /// Starts a stream of samples from the next tick, in rows of `every` ticks; 0 ends it. Waiting blocks are discarded, and numbers
+    /// restart at 0. Each session has its own stream, which ends with it.
     ///
     /// # Errors
-    /// `Refused` with [`Refusal::Rate`](specgen_link::Refusal::Rate), which has the smallest `every` that the device's line has room
-    /// for; with `Unsupported` by six legs without a platform. Else as [`Client::ask`](specgen_link::client::Client::ask).
+    /// `Refused` with [`Refusal::Rate`](specgen_link::Refusal::Rate), which has the smallest `every` for the bandwidth of the line, or
+    /// with `Unsupported` by six legs without a platform. Otherwise as [`Client::ask`](specgen_link::client::Client::ask).
     pub fn stream(&mut self, every: u32) -> Result<(), ClientError> {
         self.done(&Request::Stream { every })
     }
 
-    /// Takes the blocks that were made since the last call, the oldest first; none without a stream. Keeps the link alive as
-    /// [`Session::poll`] does, and asks at least once.
+    /// Takes the blocks since the last call, oldest first; none without a stream. It sends at least one request, which keeps the
+    /// link alive.
     ///
     /// # Errors
     /// As [`Client::ask`](specgen_link::client::Client::ask).

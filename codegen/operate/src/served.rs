@@ -1,9 +1,9 @@
-//! The simulated machine of a spec behind converters, as a controller in another process moves it: see `specgen_rt::exchange`.
+//! The simulated machine of a spec with converters, for a controller in another process: see `specgen_rt::exchange`.
 //!
-//! It may be wired wrongly: with a list of faults each is there for one time that the amplifiers are on, after the last none.
+//! Its wiring can have faults: those of a list apply in turn, one each time the amplifiers are switched on; after the last there
+//! is none.
 //!
-//! Time is the controller's ticks. What the machine does while no controller speaks is left out; what it does while a
-//! controller skips ticks is not.
+//! Time advances with the controller's ticks. Time without a controller is not simulated; ticks that a controller skips are.
 
 mod serve;
 
@@ -18,10 +18,10 @@ use specgen_language::model::Model;
 
 pub use serve::{Options, Summary, serve};
 
-/// Ticks that are simulated at once at most: of a controller that was away for longer the rest is left out.
+/// Largest number of ticks simulated at once; after a longer pause of the controller the rest is omitted.
 const MOST_TICKS: u64 = 200_000;
 
-/// Each signal where it belongs.
+/// Correct wiring.
 const IDENTITY: [[f64; CHANNELS]; CHANNELS] = {
     let mut rows = [[0.0; CHANNELS]; CHANNELS];
     let mut channel = 0;
@@ -34,7 +34,7 @@ const IDENTITY: [[f64; CHANNELS]; CHANNELS] = {
 
 /// A prepared plant.
 pub enum Plant {
-    /// Six gauges see a platform.
+    /// A platform measured by six gauges.
     Platform(Box<PlatformRig>),
     /// Six legs, each with its own gauge.
     Legs(Box<Rig<LegPlant>>),
@@ -48,7 +48,7 @@ impl Plant {
         }
     }
 
-    /// Gauges in the unit that their converters take, and the wrench, N and N m.
+    /// Readings of the gauges in the unit of their converters, and the wrench, N and N m.
     fn read(&mut self) -> ([f64; CHANNELS], [f64; CHANNELS]) {
         match self {
             Self::Platform(rig) => (rig.read_gauges(), rig.read_wrench()),
@@ -57,7 +57,7 @@ impl Plant {
     }
 }
 
-/// The plant with its converters and its place in time.
+/// The plant with its converters and its time.
 pub struct PlantServer {
     plant: Plant,
     gauges: ir::GaugeConverter,
@@ -70,15 +70,15 @@ pub struct PlantServer {
     session: u64,
     tick: u64,
     held: [f64; CHANNELS],
-    /// Faults of its wiring still to come, the last one first, and what is wrong now.
+    /// Remaining wiring faults, last one first, and the current one.
     faults: Vec<Finding>,
     wired: Finding,
     enabled: bool,
-    /// The last reading, which is not drawn anew.
+    /// The last reading; its noise is not drawn again.
     last: Option<Sensing>,
-    /// Ticks simulated.
+    /// Simulated ticks.
     pub ticks: u64,
-    /// Controllers that came.
+    /// Number of controllers so far.
     pub sessions: u64,
 }
 
@@ -108,7 +108,7 @@ impl PlantServer {
         }
     }
 
-    /// The same with these faults of its wiring, one after the other.
+    /// Adds wiring faults, which apply in turn.
     #[must_use]
     pub fn with_faults(mut self, faults: Vec<Finding>) -> Self {
         self.faults = faults;
@@ -116,7 +116,7 @@ impl PlantServer {
         self
     }
 
-    /// Takes the latest actuation, goes on to what the controller waits for, and reads.
+    /// Applies the latest actuation, simulates up to the tick that the controller waits for, and reads the gauges.
     pub fn answer(&mut self, actuation: &Actuation, wanted: [u64; 2]) -> Sensing {
         let [session, wanted] = wanted;
         if session != self.session {
@@ -130,7 +130,7 @@ impl PlantServer {
             self.held = self.voltages(actuation);
             self.go_on_to(actuation.tick.saturating_add(1));
         } else if actuation.session == self.session && actuation.tick.saturating_add(1) == self.tick {
-            // The same tick once more: amplifiers switched after the codes were given out. It counts from the next tick on.
+            // The same tick again: the amplifiers were switched after the codes were output. It applies from the next tick on.
             self.held = self.voltages(actuation);
         }
         self.go_on_to(wanted);
@@ -157,7 +157,7 @@ impl PlantServer {
         self.tick += count;
     }
 
-    /// What amplifiers make of codes. They take no code beyond those whose voltages the spec permits.
+    /// Voltages of the amplifiers. Codes are limited to those that the spec permits.
     fn voltages(&mut self, actuation: &Actuation) -> [f64; CHANNELS] {
         if actuation.enable && !self.enabled {
             self.wired = self.faults.pop().unwrap_or(Finding::None);
@@ -171,7 +171,7 @@ impl PlantServer {
         if matches!(self.wired, Finding::Leg(..)) { self.mixed(&volts, self.rest) } else { volts }
     }
 
-    /// Six signals, counted from `zero`, as their wiring makes them.
+    /// Six signals, relative to `zero`, after the wiring.
     fn mixed(&self, signals: &[f64; CHANNELS], zero: f64) -> [f64; CHANNELS] {
         with(&IDENTITY, self.wired).map(|row| {
             zero + row
@@ -182,10 +182,10 @@ impl PlantServer {
         })
     }
 
-    /// Code of a gauge.
+    /// Converter code of a gauge.
     fn code(&self, value: f64) -> i32 {
         let code = libm::round((value - self.gauges.at_zero) / self.gauges.per_code);
-        // Saturates; a NaN gives 0, which is an end of the range and a fault there.
+        // Saturates; NaN gives 0, an end of the range, which the controller treats as a fault.
         (code as i32).clamp(0, self.gauges.highest)
     }
 }

@@ -1,4 +1,4 @@
-//! A session with a device: what it runs, how it stands, and what is asked of it.
+//! A session with a device: its description, its state, and requests to it.
 
 use std::time::{Duration, Instant};
 
@@ -15,24 +15,24 @@ use specgen_runtime::supervisor;
 use crate::motion::Motion;
 use crate::pil::{self, OpenError, OpenSession};
 
-/// How often a device gets a request, at least: five times before it takes the link for lost.
+/// Interval of requests to a device. It treats the link as lost after five times this interval.
 pub const ALIVE: Duration = Duration::from_millis(20);
-/// What a board may take to write the end of a record.
+/// How long a board may take to write the end of a record.
 const RECORD_END: Duration = Duration::from_secs(5);
 
-/// What is older than this is not said to be so now.
+/// Largest age of a current state.
 pub const FRESH: Duration = Duration::from_millis(300);
 
-/// Status bits of gauges that were not read or not believed.
+/// Status bits of gauges that were not read, or implausible.
 pub const GAUGES: u32 = 0x3f00;
 
-/// Names of the word `command` of a platform, by its value.
+/// Names of the values of a platform's word `command`.
 const COMMANDS: [&str; 4] = ["hold", "stream", "move", "trajectory"];
 
 /// Words of a pose.
 const POSE: usize = 6;
 
-/// Where a platform is, m and rad.
+/// Place of a platform, m and rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// Ticks since power-up.
@@ -41,18 +41,18 @@ pub struct Place {
     pub phase: u8,
     /// The controller's status word.
     pub status: u32,
-    /// Pose measured, in the user's coordinates; see [`Place::measured`].
+    /// Last measured pose, in the user's coordinates; see [`Place::measured`].
     pub pose: [f64; 6],
-    /// Since that pose was measured; none if none ever was, and the pose says nothing.
+    /// Age of that pose; none if no pose was ever measured, and `pose` is meaningless.
     pub measured: Option<Duration>,
-    /// Set-point, in the user's coordinates: where the platform is to be now, not where a motion ends.
+    /// Current set-point, in the user's coordinates; not the destination of a motion.
     pub target: [f64; 6],
     /// Voltage of each leg, V.
     pub voltage: [f64; 6],
 }
 
 impl Place {
-    /// Whether the pose is that of now: the gauges were read and believed in the last tick, and that was not long ago.
+    /// Whether the pose is current: the gauges were read and plausible in the last tick, which is recent.
     #[must_use]
     pub fn is_measured(&self) -> bool {
         self.status & GAUGES == 0 && self.measured.is_some_and(|age| age < FRESH)
@@ -65,16 +65,16 @@ pub struct Session<P> {
     identity: Identity,
     description: Description,
     period: f64,
-    /// Of a platform.
+    /// Only of a platform.
     motion: Option<Motion>,
-    /// Input words that are no measurements, as they were sent last.
+    /// The last sent input words, without measurements.
     command: Vec<u64>,
     asked: Instant,
     status: Status,
 }
 
 impl<P: Port> Session<P> {
-    /// Opens a session and asks who is there. With a `digest` only the controller of that spec will do.
+    /// Opens a session and reads the device's description. With a `digest`, the device must run the controller of that spec.
     ///
     /// # Errors
     /// No answer, or another controller.
@@ -121,7 +121,7 @@ impl<P: Port> Session<P> {
         Ok(session)
     }
 
-    /// What the controller says of itself.
+    /// The controller's description.
     pub fn description(&self) -> &Description {
         &self.description
     }
@@ -131,35 +131,35 @@ impl<P: Port> Session<P> {
         self.period
     }
 
-    /// Where the platform may go, by its controller; none of six legs.
+    /// Workspace and coordinates of the platform; none for six legs.
     pub fn motion(&self) -> Option<&Motion> {
         self.motion.as_ref()
     }
 
-    /// Whether two numbers are the same to the controller, whose numbers may be of 32 bits.
+    /// Whether two numbers are equal in the scalar type of the controller.
     pub fn is_same(&self, a: f64, b: f64) -> bool {
         let scalar = self.description.scalar;
         scalar.decode(scalar.encode(a)) == scalar.decode(scalar.encode(b))
     }
 
-    /// What it said last.
+    /// The last status.
     pub fn status(&self) -> &Status {
         &self.status
     }
 
-    /// Phase and cause, with what looks like the finding of a wiring check on a geometry with these sets of faults.
+    /// Phase and cause as text. `alike` are sets of faults that the wiring check cannot distinguish on this geometry.
     #[must_use]
-    pub fn stands(&self, alike: &[Vec<u32>]) -> String {
+    pub fn state(&self, alike: &[Vec<u32>]) -> String {
         let Status { phase, cause, finding, amplifier_on, .. } = self.status;
         MachineWord { phase, cause, amplifier_on, finding: u32::from(finding) }.among(alike)
     }
 
-    /// Frames from the device that came damaged.
+    /// Number of damaged frames from the device.
     pub fn damaged(&self) -> u32 {
         self.client.damaged()
     }
 
-    /// How it stands, and that the host is there. Events stay until [`Session::health`] is asked for.
+    /// Updates the status; a heartbeat. Events stay until [`Session::health`] is called.
     ///
     /// # Errors
     /// As [`Client::ask`], here and below.
@@ -175,7 +175,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Where the platform is, and that the host is there; none of six legs.
+    /// Place of the platform; none for six legs. A heartbeat.
     pub fn place(&mut self) -> Result<Option<Place>, ClientError> {
         let Some(motion) = &self.motion else { return Ok(None) };
         let Reply::Place { tick, phase, status, measured, words } = self.client.ask(&Request::Place)? else {
@@ -195,14 +195,14 @@ impl<P: Port> Session<P> {
         Ok(Some(Place { tick, phase, status, pose, measured, target, voltage: six(3 * POSE) }))
     }
 
-    /// A machine that does not run has forgotten what it was commanded.
+    /// Resets the command words: a machine that is not running has discarded its command.
     fn forget(&mut self, phase: u8) {
         if u64::from(phase) != supervisor::Phase::Running.word() {
             self.command.fill(0);
         }
     }
 
-    /// What the device noticed of itself; its events are forgotten with that.
+    /// Health of the device; this clears its events.
     pub fn health(&mut self) -> Result<Health, ClientError> {
         match self.client.ask(&Request::Health)? {
             Reply::Health(health) => Ok(health),
@@ -210,17 +210,17 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Time since the device was asked last.
+    /// Time since the last request.
     pub fn silence(&self) -> Duration {
         self.asked.elapsed()
     }
 
-    /// Time until the device must get the next request.
+    /// Time until the next request is due.
     pub fn due(&self) -> Duration {
         ALIVE.saturating_sub(self.asked.elapsed())
     }
 
-    /// Asks for a block of samples, and that the host is there.
+    /// Requests a block of samples; a heartbeat.
     pub(crate) fn ask_for_samples(&mut self) -> Result<(Option<&Motion>, Reply<'_>), ClientError> {
         self.asked = Instant::now();
         Ok((self.motion.as_ref(), self.client.ask(&Request::Samples)?))
@@ -233,25 +233,25 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Asks the supervisor; the request holds until the next one.
+    /// Sends a request to the supervisor; it stays in effect until the next one.
     pub fn supervise(&mut self, request: supervisor::Request) -> Result<(), ClientError> {
         self.done(&Request::Supervise { request: request.word() as u8 })
     }
 
-    /// Asks the program that serves the link to ramp down and end. Until it does, it goes on answering.
+    /// Asks the program that serves the link to ramp down and exit. Until then it continues to answer.
     pub fn stop(&mut self) -> Result<(), ClientError> {
         self.done(&Request::Stop)
     }
 
-    /// Input words that are no measurements, by their names.
+    /// Names of input words other than measurements.
     pub fn free_names(&self) -> &[String] {
         self.description.input_names.get(..self.command.len()).unwrap_or_default()
     }
 
-    /// Words for assignments, all of them or none.
+    /// Command words after these assignments.
     ///
     /// # Errors
-    /// A name that cannot be set, or a value that its word cannot hold, in words.
+    /// A name cannot be set, or its word cannot hold the value.
     pub fn assign(&self, assignments: &[(String, String)]) -> Result<Vec<u64>, String> {
         let mut words = self.command.clone();
         for (name, value) in assignments {
@@ -280,14 +280,14 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Has a command wait for the rising edge of the input line.
+    /// Queues a command for the next rising edge of the input line.
     pub fn command_on_edge(&mut self, words: &[u64]) -> Result<(), ClientError> {
         let mut bytes = [0; WORDS * size_of::<u64>()];
         let words = put_words(words, &mut bytes).ok_or(ClientError::TooLong)?;
         self.done(&Request::SetpointOnEdge { words })
     }
 
-    /// How it stands with the input line; what waits for its edge is dropped first, if that is asked for.
+    /// State of the input line. With `drop`, the waiting command is cancelled first.
     pub fn edge(&mut self, drop: bool) -> Result<EdgeStatus, ClientError> {
         match self.client.ask(&Request::Edge { drop })? {
             Reply::Edge(status) => Ok(status),
@@ -298,14 +298,14 @@ impl<P: Port> Session<P> {
     /// Words of a move to `pose`, m and rad.
     ///
     /// # Errors
-    /// As [`Session::assign`]: a controller of six legs knows no moves.
+    /// As [`Session::assign`]: a controller of six legs has no moves.
     pub fn move_words(&self, pose: &[f64; 6]) -> Result<Vec<u64>, String> {
         let axes = pose.iter().enumerate().map(|(axis, value)| (format!("setpoint[{axis}]"), format!("{value:?}")));
         let command = ("command".to_owned(), "move".to_owned());
         self.assign(&std::iter::once(command).chain(axes).collect::<Vec<_>>())
     }
 
-    /// Settings in force.
+    /// The settings in force.
     pub fn config(&mut self) -> Result<Vec<u64>, ClientError> {
         let count = usize::from(self.identity.config_words);
         match self.client.ask(&Request::ReadConfig)? {
@@ -314,15 +314,15 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Other settings, all at once.
+    /// Replaces all settings at once.
     pub fn write_config(&mut self, words: &[u64]) -> Result<(), ClientError> {
         let mut bytes = [0; WORDS * size_of::<u64>()];
         let words = put_words(words, &mut bytes).ok_or(ClientError::TooLong)?;
         self.done(&Request::WriteConfig { words })
     }
 
-    /// Something of the recorder; how it stands then. A board writes the end of a record in its background: after a stop, how it
-    /// stands when that is done.
+    /// Performs a recorder action and returns the state after it. A board writes the end of a record in its idle time; after a stop
+    /// this waits until that is done.
     pub fn recorder(&mut self, action: RecorderAction) -> Result<RecorderStatus, ClientError> {
         let start = Instant::now();
         let mut status = self.recorder_status(action)?;
@@ -341,14 +341,14 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// The next piece of the record, behind what there is of its file; whether it is whole. Every piece keeps the link alive.
+    /// Appends the next piece of the record; true if it is complete. A heartbeat.
     pub fn download_on(&mut self, whole: &mut Vec<u8>) -> Result<bool, ClientError> {
         let complete = self.client.fetch_on(|offset| Request::Download { offset }, whole)?;
         self.asked = Instant::now();
         Ok(complete)
     }
 
-    /// Sends knots of the correction of passes, or rows of a plan behind them, from the `first` on.
+    /// Sends knots of the correction, or rows of a learning plan after them, starting at index `first`.
     pub fn put_knots(&mut self, first: usize, knots: &[Knot]) -> Result<(), ClientError> {
         let mut buffer = [0; KNOTS * KNOT];
         for (index, part) in knots.chunks(KNOTS).enumerate() {
@@ -359,7 +359,7 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Something of the player of passes; how it stands then.
+    /// Performs an action of the pass player and returns the state after it.
     pub fn pass(&mut self, action: PassAction) -> Result<PassStatus, ClientError> {
         match self.client.ask(&Request::Pass { action })? {
             Reply::Pass(status) => Ok(status),
@@ -367,20 +367,19 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// What the last pass kept of the error.
+    /// The error recorded by the last pass.
     pub fn errors(&mut self) -> Result<Vec<Knot>, ClientError> {
         let bytes = self.client.fetch(|offset| Request::Errors { offset })?;
         Ok(specgen_link::Bytes(&bytes).knots().ok_or(ClientError::Unexpected)?.collect())
     }
 
-    /// The correction that the next pass plays.
+    /// The correction of the next pass.
     pub fn correction(&mut self) -> Result<Vec<Knot>, ClientError> {
         let bytes = self.client.fetch(|offset| Request::Correction { offset })?;
         Ok(specgen_link::Bytes(&bytes).knots().ok_or(ClientError::Unexpected)?.collect())
     }
 
-    /// Starts the wave of these words, at once or at the rising edge of the input line. Where it ends, at its center, is what is commanded from
-    /// then on.
+    /// Starts a wave, at once or at the next rising edge of the input line. Its center, where it ends, becomes the set-point.
     pub fn start_wave(&mut self, words: &[u64], center: &[u64; 6], on_edge: bool) -> Result<(), ClientError> {
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         let action = if on_edge { WaveAction::StartOnEdge } else { WaveAction::Start };
@@ -392,7 +391,7 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Ends the wave under way, smoothly.
+    /// Ends the running wave smoothly.
     pub fn stop_wave(&mut self) -> Result<(), ClientError> {
         self.done(&Request::Wave { action: WaveAction::Stop, words: specgen_link::Bytes(&[]) })
     }

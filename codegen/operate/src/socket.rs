@@ -1,4 +1,4 @@
-//! A device at a Unix stream socket, which carries the same frames as a serial line.
+//! A device at a Unix stream socket, with the same frames as on a serial line.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
@@ -10,7 +10,7 @@ use specgen_link::client::Port;
 
 use crate::pil::wait::ready;
 
-/// Longest wait for room to send.
+/// Timeout of sending.
 const SEND: Duration = Duration::from_secs(2);
 
 /// A connection.
@@ -22,13 +22,13 @@ impl SocketLine {
     /// Connects.
     ///
     /// # Errors
-    /// In words: nobody listens there, no permission.
+    /// No program listens there, or no permission.
     pub fn open(path: &Path) -> Result<Self, String> {
         let advice = |error: io::Error| {
             let name = path.display();
             match error.kind() {
                 ErrorKind::NotFound => format!("there is no socket `{name}`; is the program that serves it running?"),
-                ErrorKind::ConnectionRefused => format!("nobody listens at `{name}`; start the program that serves it"),
+                ErrorKind::ConnectionRefused => format!("no program listens at `{name}`; start the one that serves it"),
                 _ => format!("cannot connect to `{name}`: {error}"),
             }
         };

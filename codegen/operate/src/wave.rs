@@ -1,9 +1,9 @@
-//! A wave in a TOML file, as the words of a device's generator.
+//! Reads a wave from a TOML file into the words of a device's generator.
 //!
 //! ```toml
-//! center  = [0.0, 0.0, 1e-6, 0.0, 0.0, 0.0]   # where it begins and ends, m and rad (legs: m); zeros if not given
+//! center  = [0.0, 0.0, 1e-6, 0.0, 0.0, 0.0]   # start and end, m and rad (legs: m); zeros if not given
 //! ramp    = 0.5                                # smooth start and end, s
-//! seconds = 10.0                               # until it ends by itself; until `wave stop` if not given
+//! seconds = 10.0                               # duration; until `wave stop` if not given
 //!
 //! [[axis]]
 //! axis  = "z"                                  # x y z rx ry rz, or leg 0 to 5 as a number
@@ -17,7 +17,7 @@ use specgen_runtime::wave::{AxisWave, Refusal, Settings, Shape, TONES, Tone, WOR
 
 use crate::place::AXES;
 
-/// Ticks of anything, at most.
+/// Largest number of ticks.
 const MOST_TICKS: f64 = (1_u64 << 30) as f64;
 
 #[derive(Deserialize)]
@@ -89,10 +89,10 @@ struct ToneEntry {
     phase: f64,
 }
 
-/// Words of the wave in a file's text, and those of its center, for a controller of this period (s) and scalar.
+/// Words of a wave from the text of its file, and those of its center, for a controller with this period (s) and scalar.
 ///
 /// # Errors
-/// What is wrong, with line and column where the text is no such file.
+/// The wave is invalid; syntax errors have line and column.
 pub fn read_wave(text: &str, period: f64, single: bool) -> Result<(Vec<u64>, [u64; 6]), String> {
     let file: File = toml::from_str(text).map_err(|error| error.to_string())?;
     if single { words::<f32>(&file, period) } else { words::<f64>(&file, period) }
@@ -115,19 +115,19 @@ fn words<T: Real>(file: &File, period: f64) -> Result<(Vec<u64>, [u64; 6]), Stri
         };
         let place = place.ok_or_else(|| format!("axis: expected one of {}, or a leg 0 to 5", AXES.join(", ")))?;
         if std::mem::replace(&mut seen[place], true) {
-            return Err(format!("axis {} is there twice; give each axis one shape", AXES[place]));
+            return Err(format!("axis {} is given twice; give each axis one shape", AXES[place]));
         }
         let shape = reader.shape(&axis.shape, &mut settings.tones, &mut tones);
         let shape = shape.map_err(|error| format!("axis {}: {error}", AXES[place]))?;
         settings.axes[place] = AxisWave { offset: reader.number("offset", axis.offset)?, shape };
     }
     let words = settings.to_words();
-    // What a device would refuse whatever its limits are.
+    // Errors that every device would refuse.
     match Settings::<T>::from_words(&words) {
         Ok(_) => Ok((words.to_vec(), settings.center.map(Real::to_word))),
         Err(refused) => Err(match refused {
             Refusal::Word(word) => format!(
-                "{} cannot be so: amplitudes must not be negative (ramp and reversals: may be), chirps must stay between 0 Hz and \
+                "{} is invalid: amplitudes must not be negative (except of ramp and reversals), chirps must stay between 0 Hz and \
                  half the control rate",
                 place_of(word)
             ),
@@ -136,7 +136,7 @@ fn words<T: Real>(file: &File, period: f64) -> Result<(Vec<u64>, [u64; 6]), Stri
     }
 }
 
-/// The part of a wave that a word belongs to.
+/// Name of the part of a wave that has this word.
 fn place_of(word: usize) -> String {
     let per_axis = (WORDS - 6 - 3 * TONES - 2) / 6;
     match word.checked_sub(6).map(|word| word / per_axis) {
@@ -145,25 +145,25 @@ fn place_of(word: usize) -> String {
     }
 }
 
-/// Why a device refused a wave, from the word that it named.
+/// Why a device refused a wave, from the word in its refusal.
 #[must_use]
 pub fn refused_wave(word: u16) -> String {
     let name = |axis: usize| AXES.get(axis).map_or_else(|| axis.to_string(), |name| format!("{name} (leg {axis})"));
     match Refusal::of_word(usize::from(word)) {
-        Refusal::Range(axis) => format!("axis {} would leave its range: less amplitude or offset", name(axis)),
+        Refusal::Range(axis) => format!("axis {} would leave its range: reduce amplitude or offset", name(axis)),
         Refusal::Rate(axis) => {
             format!(
-                "axis {} would be faster than its stream may be: less amplitude or frequency, or a longer ramp",
+                "axis {} would exceed the speed of a stream: reduce amplitude or frequency, or use a longer ramp",
                 name(axis)
             )
         }
         Refusal::Acceleration(axis) => {
             format!(
-                "axis {} would accelerate more than its stream may: less amplitude or frequency, or a longer ramp",
+                "axis {} would exceed the acceleration of a stream: reduce amplitude or frequency, or use a longer ramp",
                 name(axis)
             )
         }
-        Refusal::Word(_) | Refusal::Busy => format!("{} cannot be so", place_of(usize::from(word))),
+        Refusal::Word(_) | Refusal::Busy => format!("{} is invalid", place_of(usize::from(word))),
     }
 }
 
@@ -192,7 +192,7 @@ impl Reading {
         }
     }
 
-    /// Step of a phase in a tick.
+    /// Phase increment per tick.
     fn step(&self, what: &str, frequency: f64) -> Result<u64, String> {
         if frequency >= 0.0 && frequency < 0.5 / self.period {
             Ok(step_of(frequency, self.period))
@@ -280,15 +280,15 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_wave_is_refused_with_its_place() {
+    fn an_invalid_wave_is_refused_with_its_place() {
         for (from, to, expected) in [
             ("ramp = 0.1", "rampe = 0.1", "unknown field `rampe`"),
             ("ramp = 0.1", "ramp = 1e-9", "at least one control period"),
             ("axis = \"z\"", "axis = \"w\"", "expected one of x, y, z, rx, ry, rz"),
-            ("axis = 4", "axis = 2", "axis z is there twice"),
+            ("axis = 4", "axis = 2", "axis z is given twice"),
             ("frequency = 5.0", "frequency = 5000.0", "half the control rate, 5000"),
             ("phase = 0.25", "phase = 1.0", "turns from 0 to 1"),
-            ("amplitude = 2e-6, frequency = 5.0", "amplitude = -2e-6, frequency = 5.0", "axis z cannot be so"),
+            ("amplitude = 2e-6, frequency = 5.0", "amplitude = -2e-6, frequency = 5.0", "axis z is invalid"),
             ("amplitude = 2e-6, frequency = 5.0", "amplitude = nan, frequency = 5.0", "expected m or rad, found NaN"),
             ("\"sine\"", "\"square\"", "unknown variant `square`"),
         ] {

@@ -56,9 +56,9 @@ def test_a_machine_is_operated(link: Path, tmp_path: Path) -> None:
         specgen.Machine(socket=link, spec=LEGS)
     with specgen.Machine(socket=link, spec=REFERENCE) as machine:
         assert machine.status()["stands"] == "disarmed"
-        with pytest.raises(specgen.Error, match="moves when it runs"):
+        with pytest.raises(specgen.Error, match="moves only while running"):
             machine.move(z=1e-6)
-        with pytest.raises(specgen.Error, match="none of"):
+        with pytest.raises(specgen.Error, match="invalid command"):
             machine.order("dance")
         machine.record()
         machine.arm()
@@ -73,7 +73,7 @@ def test_a_machine_is_operated(link: Path, tmp_path: Path) -> None:
         assert machine.status()["stands"] == "running"
         assert machine.jog(z="1 um", rx=1e-6)[2] == pytest.approx(6e-6)
         machine.wait("arrived", 60)
-        with pytest.raises(specgen.Error, match="nothing moves"):
+        with pytest.raises(specgen.Error, match="no motion was started"):
             machine.move(z=1e-3)
         assert machine.where()["target"][2] == pytest.approx(6.0)
         assert machine.can_go(z=1e-6) is None and "leg" in (machine.can_go(z="1 mm") or "")

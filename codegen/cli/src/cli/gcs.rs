@@ -31,7 +31,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let axes = Axes::named(&arguments.axes).map_err(|error| Failure::Usage(format!("--axis: {error}")))?;
+    let axes = Axes::parse(&arguments.axes).map_err(|error| Failure::Usage(format!("--axis: {error}")))?;
     let compiled = arguments.spec.as_deref().map(|spec| spec_file::looked_up(spec, ui)).transpose()?;
     let digest = compiled.as_ref().map(|compiled| compiled.ir.digest.as_str());
     interrupt::heed();

@@ -78,7 +78,7 @@ fn an_edge_of_the_input_line_starts_what_waits_for_it_in_the_next_tick() {
     for text in ["no command for the edge; ", "dropped before the edge; ", "begun at the edge of tick "] {
         assert!(said.contains(text), "{text}: {said}");
     }
-    assert!(said.contains("it moves when it runs"), "{said}");
+    assert!(said.contains("it moves only while running"), "{said}");
 
     // The machine's line rises every 4000 ticks, and no row of the record is without its edge.
     let (_, record) = bench.check(&running.end(Signal::INT), "edge.rec");

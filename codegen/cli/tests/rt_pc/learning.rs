@@ -68,7 +68,7 @@ fn a_motion_is_learned_over_the_link_and_played_under_what_was_learned() {
     };
     let other = operate(&["play case-1 correction=t.json machine=stage-8"]);
     let said = String::from_utf8_lossy(&other.stderr);
-    assert!(!other.status.success() && said.contains("stage-7") && said.contains("nothing was asked"), "{said}");
+    assert!(!other.status.success() && said.contains("stage-7") && said.contains("nothing was sent"), "{said}");
     let played = operate(&["play case-1 correction=t.json machine=stage-7"]);
     let text = String::from_utf8_lossy(&played.stdout);
     assert!(played.status.success(), "{text}{}", String::from_utf8_lossy(&played.stderr));

@@ -267,7 +267,7 @@ fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_th
     while first.command(json!({ "do": "wave", "name": "small.toml", "text": wave }))["ok"] == false {
         assert!(start.elapsed() < LONG, "no wave: {:#}", first.state);
     }
-    first.refused(json!({ "do": "command", "line": "jog z=100nm" }), "under way");
+    first.refused(json!({ "do": "command", "line": "jog z=100nm" }), "in progress");
     first.done(json!({ "do": "command", "line": "wave stop" }));
     first.done(json!({ "do": "command", "line": "record stop" }));
     first.say(&json!({ "do": "download", "id": 999 }));
@@ -303,7 +303,7 @@ fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_th
     first.phase("running");
     let mut third = panel.page();
     std::thread::sleep(Duration::from_millis(100));
-    third.wait("a page that is silent", |state| state["k"] == "left");
+    third.wait("a page that stopped responding", |state| state["k"] == "left");
     watcher.wait("the second loss", is_lost);
     drop(watcher);
     third.say(&json!({ "do": "ramp-down" }));

@@ -271,7 +271,7 @@ fn scripts(bench: &Bench, link: &Path, look: &mut Look) {
     drop(input);
     let output = session.wait();
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(text.contains("the machine was stopped: not done") && text.contains("tick"), "{text}");
+    assert!(text.contains("the machine was stopped: command skipped") && text.contains("tick"), "{text}");
 
     // From a terminal a stop does not wait for what waits.
     let mut command = Command::new("script");

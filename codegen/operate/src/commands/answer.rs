@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::location::ago;
 use specgen_language::outcome::Outcome;
 
-/// A session: every command with its answer, and the final state of the machine. Answers were shown as they came.
+/// Result of a session: all commands with their answers, and the final state of the machine. The text was printed earlier.
 #[derive(Serialize)]
 pub struct Report<'a> {
     pub device: &'a str,
@@ -64,7 +64,7 @@ pub struct MachineStatus {
     pub status_in_words: String,
     pub events: u32,
     pub late: u32,
-    /// Since the tick that all of this is of, s; none before the first.
+    /// Age of this state, s; none before the first tick.
     pub age: Option<f64>,
     pub link_errors: u32,
     pub damaged_frames: u32,
@@ -77,8 +77,8 @@ impl Outcome for MachineStatus {
     fn text(&self) -> String {
         let on = if self.amplifiers_on { "on" } else { "off" };
         let age = match self.age.map(Duration::from_secs_f64) {
-            None => "  there was no tick yet: all of this is as at the start\n".to_owned(),
-            Some(age) if age >= FRESH => format!("  the machine makes no ticks: this is its state {} ago\n", ago(age)),
+            None => "  no tick yet: these are initial values\n".to_owned(),
+            Some(age) if age >= FRESH => format!("  the machine is not ticking: this is its state {} ago\n", ago(age)),
             Some(_) => String::new(),
         };
         format!(
@@ -155,13 +155,13 @@ pub struct RecorderState {
 impl Outcome for RecorderState {
     fn text(&self) -> String {
         let does = match (self.running, self.triggered) {
-            (true, false) => "records, waits for its trigger",
-            (true, true) => "records what comes after the trigger",
+            (true, false) => "is running and waits for its trigger",
+            (true, true) => "is running after its trigger",
             (false, true) => "is complete",
             (false, false) => "is stopped",
         };
         format!(
-            "the recorder {does}; it holds {} ticks, {:.4} s; {} fit whatever changes\n",
+            "the recorder {does}; it holds {} ticks, {:.4} s; its capacity is at least {} ticks\n",
             self.ticks,
             f64::from(self.ticks) * self.period,
             self.capacity

@@ -1,16 +1,16 @@
-//! Errors of a session, and the meaning of refusals of the device.
+//! Errors of a session, and messages for refusals of the device.
 
 use specgen_link::Refusal;
 use specgen_link::client::ClientError;
 
 use specgen_language::outcome::Failure;
 
-/// Reasons why a session ends before its commands do.
+/// Why a session or a command fails.
 #[derive(Debug)]
 pub enum SessionError {
-    /// A command is not possible here, or the device refuses it.
+    /// A command is not possible, or the device refuses it.
     Refused(String),
-    /// The machine faulted, or did not do in time what a command waits for.
+    /// The machine faulted, or a wait timed out.
     Fault(String),
     /// A failure of the command line, such as a file that cannot be written.
     Failed(Failure),
@@ -31,17 +31,17 @@ impl From<ClientError> for SessionError {
     }
 }
 
-/// A board cannot be stopped.
+/// The error of `stop`: a board cannot be stopped.
 pub(super) fn unsupported(error: ClientError) -> SessionError {
     match error {
         ClientError::Refused(Refusal::Unsupported) => {
-            SessionError::Refused("a board does not end; `ramp-down` switches its amplifiers off".to_owned())
+            SessionError::Refused("a board cannot be stopped; `ramp-down` switches its amplifiers off".to_owned())
         }
         other => other.into(),
     }
 }
 
-/// A machine without an input line.
+/// The error of a machine without an input line.
 pub(super) fn no_input() -> SessionError {
     SessionError::Refused(
         "the machine has no input line; declare one in its spec: [[trigger]] with name = \"start\" and kind = \"input\""
@@ -49,11 +49,11 @@ pub(super) fn no_input() -> SessionError {
     )
 }
 
-/// Set-points are refused while a wave makes them.
+/// The error of a set-point: a running wave excludes others.
 pub(super) fn waving(error: ClientError) -> SessionError {
     match error {
         ClientError::Refused(Refusal::State) => SessionError::Refused(
-            "set-points are taken while the machine runs, and not while a wave is under way or a host steps it"
+            "set-points are accepted only while the machine is running, with no wave and no lock-step in progress"
                 .to_owned(),
         ),
         other => other.into(),

@@ -16,9 +16,9 @@ use specgen_language::outcome::Outcome;
 pub struct StatusReport {
     #[serde(flatten)]
     pub status: MachineStatus,
-    /// Of a platform.
+    /// Only of a platform.
     pub place: Option<Location>,
-    /// What to do, where something is to be done.
+    /// Suggested next step, if there is one.
     pub advice: Option<String>,
     pub health: HealthReport,
 }
@@ -36,7 +36,7 @@ impl Outcome for StatusReport {
     }
 }
 
-/// [`Health`] with units. Times are the last and the longest, µs; none where nothing is measured.
+/// [`Health`] with units. Times are the last and the longest, µs; none if they are not measured.
 #[derive(Serialize)]
 pub struct HealthReport {
     events: u32,
@@ -48,9 +48,9 @@ pub struct HealthReport {
     tick_us: Option<[f64; 2]>,
     gauges_to_outputs_us: Option<[f64; 2]>,
     latest_us: Option<f64>,
-    /// Most in use, and what there is.
+    /// Peak use and size.
     stack_bytes: Option<[u32; 2]>,
-    /// Why its program began; empty where that is not known.
+    /// Cause of the last reset; empty if unknown.
     reset_cause: Vec<&'static str>,
 }
 
@@ -81,17 +81,17 @@ impl From<Health> for HealthReport {
 impl HealthReport {
     fn text(&self, period: f64) -> String {
         let events = if self.events == 0 { "none".to_owned() } else { self.events_in_words.join(", ") };
-        let mut text = format!("  events since asked last: {events}\n");
+        let mut text = format!("  events since the last status request: {events}\n");
         let late = self.latest_us.map_or_else(
-            || "when it begins is not measured: time waits for it".to_owned(),
-            |late| format!("begun at most {late:.1} us late"),
+            || "start delay not measured: time waits for the tick".to_owned(),
+            |late| format!("started at most {late:.1} us late"),
         );
         // Writing to a String cannot fail, here and below.
         let _ = match self.tick_us {
             Some([tick, longest]) => {
-                writeln!(text, "  a tick {tick:.1} us, longest {longest:.1} us of {} us, {late}", period * 1e6)
+                writeln!(text, "  tick time {tick:.1} us, longest {longest:.1} us of {} us, {late}", period * 1e6)
             }
-            None => writeln!(text, "  times of a tick: not measured"),
+            None => writeln!(text, "  tick time: not measured"),
         };
         if let Some([output, most]) = self.gauges_to_outputs_us {
             let _ = writeln!(text, "  from gauges to outputs {output:.1} us, longest {most:.1} us");
@@ -100,14 +100,14 @@ impl HealthReport {
             self.overruns.map_or_else(|| "overruns not measured".to_owned(), |count| format!("{count} overruns"));
         let _ = writeln!(
             text,
-            "  since power-up: {overruns}, {} converter faults, {} ticks with a gauge not believed",
+            "  since power-up: {overruns}, {} converter faults, {} ticks with an implausible gauge",
             self.converter_faults, self.gauge_faults
         );
         for kind in &self.converter_faults_in_words {
             let _ = writeln!(text, "    converter: {kind}");
         }
-        if let Some([used, there]) = self.stack_bytes {
-            let _ = writeln!(text, "  stack: at most {used} of {there} bytes in use");
+        if let Some([used, total]) = self.stack_bytes {
+            let _ = writeln!(text, "  stack: peak {used} of {total} bytes");
         }
         if !self.reset_cause.is_empty() {
             let _ = writeln!(text, "  reset cause: {}", self.reset_cause.join(", "));
@@ -124,7 +124,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_board_noticed_is_said_with_its_units_and_what_is_not_measured_is_left_out() {
+    fn health_has_units_and_omits_what_is_not_measured() {
         let health = Health {
             events: MISSED_TICK | CONVERTER | STALLED | EDGE | AMPLIFIER,
             converter_faults: 3,
@@ -140,7 +140,7 @@ mod tests {
         };
         let text = HealthReport::from(health).text(1e-4);
         for part in [
-            "asked last: missed tick, converter, stalled, amplifier fault\n",
+            "status request: missed tick, converter, stalled, amplifier fault\n",
             "50.0 us, longest 100.0 us of 100 us",
             "1.5 us late",
             "25.0 us",
@@ -153,10 +153,10 @@ mod tests {
         }
         let bare = HealthReport::from(Health::default()).text(1e-4);
         assert!(!bare.contains("stack") && !bare.contains("reset") && bare.contains("none"), "{bare}");
-        // A zero that nothing counted is no figure, and neither is the end of a word.
-        assert!(bare.contains("times of a tick: not measured") && bare.contains("overruns not measured"), "{bare}");
+        // A zero that nothing counted is not a measurement, and neither is a saturated counter.
+        assert!(bare.contains("tick time: not measured") && bare.contains("overruns not measured"), "{bare}");
         let waits = Health { clock: 1_000_000_000, tick: Some([12_300, 6_000_000_000]), ..Health::default() };
         let text = HealthReport::from(waits).text(1e-4);
-        assert!(text.contains("longest 6000000.0 us of 100 us, when it begins is not measured"), "{text}");
+        assert!(text.contains("longest 6000000.0 us of 100 us, start delay not measured"), "{text}");
     }
 }

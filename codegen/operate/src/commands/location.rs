@@ -14,58 +14,58 @@ use super::pose::unit;
 use specgen_language::outcome::Outcome;
 use specgen_language::table::{left, right, row};
 
-/// Where a platform is: µm and µrad, V.
+/// Location of a platform: µm and µrad, V.
 #[derive(Debug, Serialize)]
 pub struct Location {
     tick: u64,
-    /// Measured now; none if it is not.
+    /// None if it is not currently measured.
     pose: Option<[f64; 6]>,
     target: [f64; 6],
-    /// Set-point less pose.
+    /// Set-point minus pose.
     error: Option<[f64; 6]>,
-    /// Commanded; none if no tick came lately, or no gauge is read: whether outputs follow is not known then.
+    /// Commanded; none without recent ticks or without gauges, because the outputs are then unknown.
     voltage: Option<[f64; 6]>,
     moves: bool,
     /// Why the pose is not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     why: Option<String>,
-    /// Where the gauges were read last.
+    /// The last measured pose.
     #[serde(skip_serializing_if = "Option::is_none")]
-    last: Option<Last>,
+    last: Option<LastPose>,
 }
 
-/// A pose that was measured.
+/// A pose that was measured earlier.
 #[derive(Debug, Serialize)]
-struct Last {
+struct LastPose {
     pose: [f64; 6],
     /// s.
     age: f64,
 }
 
-/// Text of how long ago something was.
+/// An age as text.
 pub fn ago(age: Duration) -> String {
     let seconds = age.as_secs_f64();
     if seconds < 100.0 { format!("{seconds:.1} s") } else { format!("{seconds:.0} s") }
 }
 
-/// Whether the last tick was not long ago.
+/// Whether the last tick is recent.
 pub fn ticks(status: &Status) -> bool {
     status.age.is_some_and(|age| Duration::from_micros(age) < FRESH)
 }
 
-/// Why no pose is measured; none if one is.
+/// Why the pose is not measured; none if it is.
 fn why(place: &Place, status: &Status) -> Option<String> {
     let bad = (place.status & GAUGES) >> GAUGES.trailing_zeros();
     let all = GAUGES >> GAUGES.trailing_zeros();
     match status.age.map(Duration::from_micros) {
-        None => Some("there was no tick yet".to_owned()),
-        Some(age) if age >= FRESH => Some(format!("the machine has made no tick for {}", ago(age))),
+        None => Some("no tick yet".to_owned()),
+        Some(age) if age >= FRESH => Some(format!("no tick for {}", ago(age))),
         Some(_) if bad == all => Some("the gauges are not read".to_owned()),
         Some(_) if bad != 0 => {
             let numbers: Vec<String> =
                 (0..6).filter(|gauge| bad >> gauge & 1 == 1).map(|gauge| gauge.to_string()).collect();
             let [gauges, are] = if numbers.len() == 1 { ["gauge", "is"] } else { ["gauges", "are"] };
-            Some(format!("{gauges} {} {are} not believed", numbers.join(", ")))
+            Some(format!("{gauges} {} {are} implausible", numbers.join(", ")))
         }
         Some(_) if !place.is_measured() => Some("the gauges are not read".to_owned()),
         Some(_) => None,
@@ -73,14 +73,14 @@ fn why(place: &Place, status: &Status) -> Option<String> {
 }
 
 impl Location {
-    /// Of a place and the status beside it, poses as `seen`.
+    /// From a place and the status read with it; `seen` converts poses to the session's frame.
     pub fn of(place: &Place, status: &Status, seen: impl Fn(&[f64; 6]) -> [f64; 6]) -> Self {
         let millionths = |values: [f64; 6]| values.map(|value| value * 1e6);
         let (pose, target) = (millionths(seen(&place.pose)), millionths(seen(&place.target)));
         let why = why(place, status);
         let is_measured = why.is_none();
         let answers = ticks(status) && place.status & GAUGES != GAUGES;
-        let last = place.measured.filter(|_| !is_measured).map(|age| Last { pose, age: age.as_secs_f64() });
+        let last = place.measured.filter(|_| !is_measured).map(|age| LastPose { pose, age: age.as_secs_f64() });
         Self {
             tick: place.tick,
             pose: is_measured.then_some(pose),
@@ -120,7 +120,7 @@ impl Outcome for Location {
                 let volts: Vec<String> = voltage.iter().map(|voltage| format!("{voltage:.2}")).collect();
                 writeln!(text, "  legs 0 to 5: {} V commanded{moving}", volts.join(", "))
             }
-            None => writeln!(text, "  legs 0 to 5: voltages not known now"),
+            None => writeln!(text, "  legs 0 to 5: voltages unknown"),
         };
         text
     }
@@ -164,15 +164,15 @@ mod tests {
         let now = location(0, Some(0), Some(0));
         assert!(now.pose.is_some() && now.error.is_some() && now.voltage.is_some() && now.last.is_none(), "{now:?}");
         assert!(now.text().contains("1.0000") && now.text().contains("34.25"), "{}", now.text());
-        // Status bits, ms since the gauges were read, µs since a tick; what it says, whether voltages are known.
+        // Status bits, ms since the gauges were read, µs since a tick; expected text, whether voltages are known.
         for (bits, measured, age, words, volts) in [
             (GAUGES, Some(3200), Some(0), &["the gauges are not read", "3.2 s ago", "1.0000"][..], false),
             (GAUGES, None, Some(0), &["the gauges are not read"], false),
-            (0x200, Some(5), Some(0), &["gauge 1 is not believed", "0.0 s ago"], true),
-            (0x2100, Some(150_000), Some(0), &["gauges 0, 5 are not believed", "150 s ago"], true),
-            (0, Some(2000), Some(2_000_000), &["the machine has made no tick for 2.0 s", "2.0 s ago"], false),
+            (0x200, Some(5), Some(0), &["gauge 1 is implausible", "0.0 s ago"], true),
+            (0x2100, Some(150_000), Some(0), &["gauges 0, 5 are implausible", "150 s ago"], true),
+            (0, Some(2000), Some(2_000_000), &["no tick for 2.0 s", "2.0 s ago"], false),
             (0, Some(2000), Some(0), &["the gauges are not read", "2.0 s ago"], true),
-            (0, None, None, &["there was no tick yet"], false),
+            (0, None, None, &["no tick yet"], false),
         ] {
             let found = location(bits, measured, age);
             let text = found.text();

@@ -1,4 +1,4 @@
-//! The operator of a session: executes commands one after the other, notices faults, keeps the link alive.
+//! The operator of a session: executes commands one after the other, detects faults, keeps the link alive.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -25,39 +25,39 @@ use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::{check_input, check_place, write_file};
 use specgen_language::ui::Ui;
 
-/// How long ramping down may take.
+/// Timeout of a ramp-down.
 const DOWN: Duration = Duration::from_secs(60);
-/// After so many ticks the status says what became of a command.
+/// Ticks after which the status shows the effect of a command.
 const SEEN: u64 = 10;
-/// How long these may take.
+/// Timeout of these ticks.
 const ANSWERED: Duration = Duration::from_secs(2);
 
-/// Called whenever a machine is looked at. An error ends the command under way.
+/// Called at every poll of the machine. An error ends the current command.
 pub type Pulse<P> = Box<dyn FnMut(&mut Operator<P>) -> Result<(), SessionError>>;
 
 /// One host that operates a machine.
 pub struct Operator<P> {
     pub(crate) session: Session<P>,
-    /// What the device was built from, where that is known.
+    /// The model that the device was built from, if known.
     pub model: Option<Model>,
-    /// Sets of faults that look alike to its wiring check.
+    /// Sets of faults that its wiring check cannot distinguish.
     pub alike: Vec<Vec<u32>>,
-    /// Poses by the names that this session gave them.
+    /// Saved poses by name.
     pub(super) marks: BTreeMap<String, [f64; 6]>,
     /// The frame of poses in this session.
     pub(super) frame: Frame,
-    /// Whether this host is in control: the machine misses it when it leaves.
+    /// Whether this host is in control: the machine holds if it disconnects.
     pub in_control: bool,
     /// This host has requested a stop.
     is_stopping: bool,
-    /// It ran, and another host, a fault or the emergency contact stopped it.
+    /// The machine was running, and another host, a fault or the emergency stop stopped it.
     pub(super) was_stopped: bool,
     interrupted: &'static AtomicBool,
-    /// Phase, cause and finding that were shown last.
+    /// The last phase, cause and finding shown.
     shown: (u8, u8, u16),
-    /// A person looks at it: a fault is shown, and ends nothing.
+    /// An interactive session: a fault is shown and does not end it.
     pub attended: bool,
-    /// Called at every look, however long a command takes.
+    /// Called at every poll, even during a long command.
     pub(crate) pulse: Option<Pulse<P>>,
     /// Answers to the commands so far, for the JSON document.
     pub answers: Vec<Answer>,
@@ -86,7 +86,7 @@ impl<P: Port> Operator<P> {
 
     /// Phase and cause in words.
     pub fn state(&self) -> String {
-        self.session.stands(&self.alike)
+        self.session.state(&self.alike)
     }
 
     /// Number of the phase.
@@ -94,7 +94,7 @@ impl<P: Port> Operator<P> {
         self.session.status().phase
     }
 
-    /// Whether the settings in force are these.
+    /// Whether these settings are in force.
     pub fn is_set_to(&mut self, settings: &[u64]) -> Result<bool, ClientError> {
         Ok(self.session.config()? == settings)
     }
@@ -104,7 +104,7 @@ impl<P: Port> Operator<P> {
         self.session.status().amplifier_on
     }
 
-    /// State of the machine at the last look.
+    /// State of the machine at the last poll.
     pub fn status(&self) -> MachineStatus {
         let status = *self.session.status();
         MachineStatus {
@@ -124,12 +124,12 @@ impl<P: Port> Operator<P> {
         }
     }
 
-    /// Whether the user ends the session.
+    /// Whether the user has interrupted the session.
     pub(crate) fn is_interrupted(&self) -> bool {
         self.interrupted.load(Ordering::Relaxed)
     }
 
-    /// Asks how it stands. A fault that is new ends what is not attended.
+    /// Polls the machine. A new fault ends a session that is not attended.
     pub fn look(&mut self) -> Result<(), SessionError> {
         if self.is_interrupted() {
             return Err(SessionError::Interrupted);
@@ -142,15 +142,15 @@ impl<P: Port> Operator<P> {
             return Err(SessionError::Fault(format!("the machine is {}, at tick {}", self.state(), status.tick)));
         }
         if before == running && status.phase != running && !std::mem::take(&mut self.is_stopping) {
-            // What was to come was meant for a machine that runs.
+            // The commands that follow assume a running machine.
             self.was_stopped = true;
-            // One that ramps down for a cause is faulted soon, and that is the better message.
+            // If it ramps down for a cause, it soon faults, which gives the better message.
             let faults = u64::from(status.phase) == Phase::RampingDown.word() && status.cause != 0;
             if !self.attended && !faults {
                 return Err(self.stopped_by_others());
             }
         }
-        // It may look itself.
+        // The pulse itself may poll.
         let Some(mut pulse) = self.pulse.take() else { return Ok(()) };
         let done = pulse(self);
         self.pulse = Some(pulse);
@@ -161,13 +161,13 @@ impl<P: Port> Operator<P> {
         SessionError::Fault(format!("the machine was stopped, and is {}, at tick {}", self.state(), self.status().tick))
     }
 
-    /// Asks for a stop in the midst of a command, which ends with that, and all that waits.
+    /// Requests a stop during a command. It also ends the command and cancels those that wait.
     pub(super) fn stop_by_hand(&mut self, request: Request) -> Result<(), ClientError> {
         (self.in_control, self.is_stopping, self.was_stopped) = (true, true, true);
         self.session.supervise(request)
     }
 
-    /// Shows a phase that is new.
+    /// Shows a change of phase.
     pub fn show(&mut self, ui: &Ui) {
         let status = self.session.status();
         let now = (status.phase, status.cause, status.finding);
@@ -177,7 +177,7 @@ impl<P: Port> Operator<P> {
         }
     }
 
-    /// Shows the answer to a line, or keeps it for the document.
+    /// Records the answer to a command for the JSON document, or shows it.
     pub fn note(&mut self, command: &str, answer: &impl Outcome, ui: &Ui) {
         self.answers.push(Answer { command: command.to_owned(), answer: json!(answer) });
         if !ui.is_json() {
@@ -185,11 +185,11 @@ impl<P: Port> Operator<P> {
         }
     }
 
-    /// Refuses `commands` if one of them makes no sense whatever the device does: names, numbers, waves, files that cannot be.
+    /// Refuses `commands` if one of them cannot be valid: unknown names, bad numbers, waves or files.
     pub fn check(&self, commands: &[Command]) -> Result<(), Failure> {
-        let nonsense = |text: String| Failure::Usage(format!("{text}; nothing was asked of the machine"));
+        let nonsense = |text: String| Failure::Usage(format!("{text}; nothing was sent to the machine"));
         let mut marks: Vec<&str> = self.marks.keys().map(String::as_str).collect();
-        // A download may stand above the command that reads its file.
+        // A download may precede the command that reads its file.
         commands.iter().filter_map(Command::input).for_each(files::note_input);
         commands.iter().try_for_each(|command| match command {
             Command::Set(assignments) => self.session.assign(assignments).map(|_| ()).map_err(nonsense),
@@ -226,7 +226,7 @@ impl<P: Port> Operator<P> {
         })
     }
 
-    /// Executes a command, and notes its answer.
+    /// Executes a command and records its answer.
     ///
     /// # Errors
     /// The command failed, or the session ends.
@@ -293,7 +293,7 @@ impl<P: Port> Operator<P> {
         Ok(())
     }
 
-    /// Commands without an answer of their own.
+    /// Executes a command that has no answer of its own.
     fn ask(&mut self, command: &Command) -> Result<(), SessionError> {
         self.in_control = true;
         match command {
@@ -313,31 +313,31 @@ impl<P: Port> Operator<P> {
                 self.is_stopping = true;
                 self.session.stop().map_err(unsupported)?;
             }
-            // The others have an answer of their own.
+            // The other commands have their own answers.
             _ => {}
         }
         Ok(())
     }
 
-    /// Words of a move to `pose`, in the controller's coordinates, that the machine can make from rest.
+    /// Words of a move from rest to `pose`, in the controller's coordinates; an error if the machine cannot make it.
     pub(super) fn words_of_move(&self, pose: &[f64; 6]) -> Result<Vec<u64>, SessionError> {
         let status = self.session.status();
         if u64::from(status.phase) != Phase::Running.word() {
-            return Err(SessionError::Refused(format!("the machine is {}: it moves when it runs", self.state())));
+            return Err(SessionError::Refused(format!("the machine is {}: it moves only while running", self.state())));
         }
         if status.status & BUSY != 0 {
-            return Err(SessionError::Refused("a motion is under way; `wait arrived` first".to_owned()));
+            return Err(SessionError::Refused("a motion is in progress; `wait arrived` first".to_owned()));
         }
         if let Some(binding) = self.motion().map_err(SessionError::Refused)?.binding(pose) {
             let to = self.seen(pose);
             let (to, binds) = (crate::place::in_words(&to), in_words(&binding));
-            return Err(SessionError::Refused(format!("it cannot go to {to}: {binds}; nothing moves")));
+            return Err(SessionError::Refused(format!("cannot move to {to}: {binds}; no motion was started")));
         }
         self.session.move_words(pose).map_err(SessionError::Refused)
     }
 
-    /// Sends a move, and waits until the machine has taken or refused it. Where a motion is under way a machine looks at a
-    /// command only after it, so that nothing could be said of this one.
+    /// Sends a move, and waits until the machine has accepted or refused it. It must be at rest: during a motion a machine does
+    /// not look at the next command.
     pub(super) fn go(&mut self, pose: [f64; 6]) -> Result<(), SessionError> {
         let words = self.words_of_move(&pose)?;
         self.send_and_see(words)?;
@@ -347,20 +347,20 @@ impl<P: Port> Operator<P> {
         }
         if status.status & REFUSED != 0 {
             return Err(SessionError::Refused(format!(
-                "the machine refuses to move to {}: outside the workspace; it stands where it stood",
+                "the machine refused to move to {}: outside the workspace; it did not move",
                 crate::place::in_words(&pose)
             )));
         }
         Ok(())
     }
 
-    /// Sends a command, and waits until the status says what became of it.
+    /// Sends a command, and waits until the status shows its effect.
     pub(super) fn send_and_see(&mut self, words: Vec<u64>) -> Result<(), SessionError> {
         self.send(words)?;
         let (sent, start) = (self.session.status().tick, Instant::now());
         while self.session.status().tick < sent + SEEN {
             if start.elapsed() >= ANSWERED {
-                return Err(SessionError::Fault(format!("the machine makes no ticks, and is {}", self.state())));
+                return Err(SessionError::Fault(format!("the machine is {}, but not ticking", self.state())));
             }
             std::thread::sleep(Duration::from_millis(1));
             self.look()?;
@@ -368,7 +368,7 @@ impl<P: Port> Operator<P> {
         Ok(())
     }
 
-    /// Sends a command, and looks at the machine.
+    /// Sends a command, and polls the machine.
     pub(super) fn send(&mut self, words: Vec<u64>) -> Result<(), SessionError> {
         self.in_control = true;
         self.session.command(words).map_err(waving)?;
@@ -377,7 +377,7 @@ impl<P: Port> Operator<P> {
 
     pub(super) fn wait(&mut self, until: WaitCondition, limit: Duration, ui: &Ui) -> Result<(), SessionError> {
         let start = Instant::now();
-        // Whoever waits for another phase expects it.
+        // Waiting for another phase means that a stop is expected.
         self.is_stopping |= matches!(until, WaitCondition::Phase(phase) if phase != Phase::Running);
         self.was_stopped = false;
         loop {
@@ -390,7 +390,9 @@ impl<P: Port> Operator<P> {
                     let Status { phase, status, .. } = *self.session.status();
                     let runs = u64::from(phase) == Phase::Running.word();
                     if runs && status & REFUSED != 0 {
-                        return Err(SessionError::Refused("the machine refuses its command, and stands".to_owned()));
+                        return Err(SessionError::Refused(
+                            "the machine refused the command and did not move".to_owned(),
+                        ));
                     }
                     runs && status & BUSY == 0
                 }
@@ -430,7 +432,7 @@ impl<P: Port> Operator<P> {
             std::thread::sleep(self.session.due());
         }
         Err(SessionError::Fault(format!(
-            "it has not ended after {} s, the machine is {}",
+            "the program has not ended after {} s; the machine is {}",
             DOWN.as_secs(),
             self.state()
         )))
@@ -447,7 +449,7 @@ impl<P: Port> Operator<P> {
         Ok(Settings(names.zip(words).map(|(name, word)| (name.clone(), value(name, word))).collect()))
     }
 
-    /// Does what takes its time, in which the link is not to be lost.
+    /// Runs `work` in a thread, and keeps the link alive meanwhile.
     pub(super) fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, SessionError> {
         std::thread::scope(|scope| {
             let work = scope.spawn(work);
@@ -455,13 +457,12 @@ impl<P: Port> Operator<P> {
                 self.look()?;
                 std::thread::sleep(self.session.due());
             }
-            // The hook has said where.
-            work.join()
-                .map_err(|_| SessionError::Failed(Failure::Environment("the compiler of specs failed".to_owned())))
+            // The panic hook has reported where.
+            work.join().map_err(|_| SessionError::Failed(Failure::Environment("the spec compiler crashed".to_owned())))
         })
     }
 
-    /// The settings of a spec; its tables stay in the spec.
+    /// Writes the settings of a spec to the device, without its tables.
     fn write_config(&mut self, path: &Path) -> Result<(), SessionError> {
         let compiled =
             self.meanwhile(|| compile::compile(path))?.map_err(|refused| SessionError::Failed(refused.into()))?;
@@ -469,7 +470,7 @@ impl<P: Port> Operator<P> {
         let words = &compiled.ir.integrity.settings;
         if ours.scalar.bits() != theirs.scalar.bits() || words.len() != theirs.config_names.len() {
             return Err(SessionError::Refused(format!(
-                "{} has {} settings in f{}, the device {} in f{}: write the settings of a spec of the same kind and scalar",
+                "{} has {} settings in f{}, the device has {} in f{}: the spec must have the same kind and scalar as the device's",
                 path.display(),
                 words.len(),
                 ours.scalar.bits(),
@@ -482,22 +483,19 @@ impl<P: Port> Operator<P> {
             ClientError::Refused(Refusal::Word { index }) => {
                 let names = &self.session.description().config_names;
                 let name = names.get(usize::from(index)).map_or("?", String::as_str);
-                SessionError::Refused(format!(
-                    "the device refuses `{name}` of {}: out of its range there",
-                    path.display()
-                ))
+                SessionError::Refused(format!("the device refused `{name}` of {}: out of its range", path.display()))
             }
             other => other.into(),
         })
     }
 
-    /// The whole record, as the bytes of its file.
+    /// Downloads the record, as the bytes of its file.
     pub(crate) fn record(&mut self) -> Result<Vec<u8>, SessionError> {
         let (mut whole, mut looked) = (Vec::new(), Instant::now());
         loop {
             let complete = self.session.download_on(&mut whole).map_err(|error| match error {
                 ClientError::Refused(Refusal::State) => {
-                    SessionError::Refused("it still records; `record stop` first, or wait for the trigger".to_owned())
+                    SessionError::Refused("the recorder is running; `record stop`, or wait for its trigger".to_owned())
                 }
                 other => other.into(),
             })?;
@@ -517,7 +515,7 @@ impl<P: Port> Operator<P> {
         Ok(DownloadReport { file: path.display().to_string(), bytes: bytes.len() })
     }
 
-    /// Ramps down and waits until the amplifiers are off; what came of it.
+    /// Ramps down and waits until the amplifiers are off; returns the resulting state as text.
     pub fn ramp_down(&mut self, ui: &Ui) -> Result<String, ClientError> {
         ui.progress("ramping down");
         self.session.supervise(Request::RampDown)?;

@@ -1,4 +1,4 @@
-//! Passes: a trajectory of the device played under a correction, and what it keeps of the error.
+//! Passes: the device plays a trajectory with a correction, and keeps its error.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -22,28 +22,27 @@ use super::operator::Operator;
 use specgen_language::outcome::Outcome;
 use specgen_language::ui::Ui;
 
-/// Rest before a pass, s: what rings after the way to its start has died away.
+/// Rest before a pass, s: ringing after the approach dies away.
 const REST: f64 = 0.1;
-/// How often a pass is looked at.
+/// Polling interval during a pass.
 const LOOK: Duration = Duration::from_millis(5);
-/// How much longer than its ticks a pass may take, and how long learning, s: by the ticks of the device, which on an emulated one take longer.
+/// Extra time of a pass, and timeout of learning, s. It is counted in ticks of the device, because an emulated one is slower.
 const LATER: f64 = 10.0;
 
 /// Result of a pass.
 pub struct PassResult {
-    /// Means of the error from knot to knot.
+    /// Mean error from knot to knot.
     pub errors: Vec<Knot>,
     /// Status bits seen.
     pub status: u32,
 }
 
-/// Answer to `play` under a correction.
+/// Answer to `play` with a correction.
 #[derive(Serialize)]
 pub struct PassReport {
     correction: String,
-    /// Root mean square of the translation's error as the gauges show it, over the motion and the rest after it, nm.
+    /// Rms error of the translation by the gauges, over the motion and the rest after it, nm.
     error_nm: f64,
-    /// Over both.
     #[serde(flatten)]
     coverage: Coverage,
     status: u32,
@@ -52,7 +51,7 @@ pub struct PassReport {
 impl Outcome for PassReport {
     fn text(&self) -> String {
         let Self { correction, error_nm, coverage, .. } = self;
-        let mut text = format!("played under {correction}: {error_nm:.1} nm rms by its gauges over {coverage}");
+        let mut text = format!("played with {correction}: {error_nm:.1} nm rms by its gauges over {coverage}");
         let words = status_words(self.status & !BUSY);
         if !words.is_empty() {
             // Writing to a String cannot fail.
@@ -63,10 +62,10 @@ impl Outcome for PassReport {
 }
 
 impl<P: Port> Operator<P> {
-    /// A trajectory by its name: its number, and the table of its correction.
+    /// Number of a trajectory, and the table of its correction.
     ///
     /// # Errors
-    /// There is no such trajectory; the file is no correction for it on this machine.
+    /// There is no such trajectory, or the file is not a correction for it on this machine.
     pub(super) fn playable(
         &self,
         name: &str,
@@ -80,7 +79,7 @@ impl<P: Port> Operator<P> {
         Ok((number, Some(table)))
     }
 
-    /// Plays a trajectory; under a correction from its start, which it is brought to first.
+    /// Plays a trajectory. With a correction, the machine first moves to its start.
     pub(super) fn play(
         &mut self,
         name: &str,
@@ -105,7 +104,7 @@ impl<P: Port> Operator<P> {
         let ticks = spacing as usize;
         let coverage = Coverage::new(seen * ticks, whole * ticks, self.session.period());
         if !coverage.is_whole() {
-            return Err(SessionError::Fault(format!("the pass ended early, after {coverage}: there is no figure")));
+            return Err(SessionError::Fault(format!("the pass ended early, after {coverage}: its error is unknown")));
         }
         let error_nm = translation_nm(motion);
         self.note(line, &PassReport { correction: shown(path), error_nm, coverage, status: passed.status }, ui);
@@ -119,20 +118,20 @@ impl<P: Port> Operator<P> {
         self.session.assign(&command).map_err(SessionError::Refused)
     }
 
-    /// Knots that the device has room for in a pass.
+    /// Largest number of knots of a pass on the device.
     pub fn pass_capacity(&mut self) -> Result<u32, SessionError> {
         self.session.pass(PassAction::Look).map(|status| status.capacity).map_err(refused)
     }
 
-    /// Sends the correction of passes of a course, zeros behind its knots.
+    /// Sends the correction of a course, padded with zeros.
     pub fn correct(&mut self, knots: &[Knot], course: Course) -> Result<(), SessionError> {
         let mut whole = knots.to_vec();
         whole.resize(course.knots() as usize, [0; 6]);
         self.session.put_knots(0, &whole).map_err(refused)
     }
 
-    /// Goes to `start` (the controller's coordinates, m and rad), rests there, and makes a pass under the correction of these knots, or of those that
-    /// the device has.
+    /// Moves to `start` (the controller's coordinates, m and rad), rests there, and makes a pass with these knots as correction, or
+    /// those already on the device.
     pub fn pass(
         &mut self,
         start: &[f64; 6],
@@ -143,8 +142,8 @@ impl<P: Port> Operator<P> {
         let capacity = self.pass_capacity()?;
         if course.knots() > capacity {
             return Err(SessionError::Refused(format!(
-                "a pass of {} knots is more than the {capacity} that the device has room for; learn with a lower --bandwidth, which \
-                 needs fewer, or a shorter trajectory",
+                "a pass of {} knots exceeds the device's capacity of {capacity}; learn with a lower --bandwidth, which needs fewer, \
+                 or a shorter trajectory",
                 course.knots()
             )));
         }
@@ -176,9 +175,8 @@ impl<P: Port> Operator<P> {
             }
         };
         if Stage::from_word(status.stage) != Some(Stage::Complete) {
-            return Err(SessionError::Fault(format!("the pass was ended; the machine is {}", self.state())));
+            return Err(SessionError::Fault(format!("the pass was aborted; the machine is {}", self.state())));
         }
-        // What it began is what is commanded.
         let errors = self.session.errors().map_err(refused)?;
         Ok(PassResult { errors, status: status.status })
     }
@@ -186,23 +184,23 @@ impl<P: Port> Operator<P> {
 
 /// Learning in the device.
 impl<P: Port> Operator<P> {
-    /// Ticks of the device after which something takes too long.
+    /// [`LATER`] in ticks of the device.
     fn later(&self) -> u64 {
         (LATER / self.session.period()) as u64
     }
 
-    /// Sends what the device learns with, behind the knots of its passes.
+    /// Sends the rows of a learning plan, which are stored after the knots of the passes.
     pub fn plan(&mut self, knots: usize, rows: &[Knot]) -> Result<(), SessionError> {
         self.session.put_knots(knots, rows).map_err(refused)
     }
 
-    /// Lets the device make the correction of the next pass; it then has the knots that this gives.
+    /// Lets the device compute the correction of the next pass, and returns its knots.
     pub fn learn(&mut self, Settings { reach, fade }: Settings, ui: &Ui) -> Result<Vec<Knot>, SessionError> {
         let mut status = self.session.pass(PassAction::Learn { reach, fade }).map_err(refused)?;
         let limit = self.session.status().tick + self.later();
         while Stage::from_word(status.stage) == Some(Stage::Learning) {
             if self.session.status().tick > limit {
-                return Err(SessionError::Fault("the device does not come to an end of learning".to_owned()));
+                return Err(SessionError::Fault("the device does not finish learning".to_owned()));
             }
             std::thread::sleep(LOOK);
             self.look()?;
@@ -225,11 +223,11 @@ fn shown(path: &Path) -> String {
 fn refused(error: ClientError) -> SessionError {
     match error {
         ClientError::Refused(Refusal::Unsupported) => SessionError::Refused(
-            "the device takes no correction; write correction = \"<number> um\" in [control] of its spec, then build it anew"
+            "the device takes no correction; write correction = \"<number> um\" in [control] of its spec, then build and flash it"
                 .to_owned(),
         ),
         ClientError::Refused(Refusal::State) => SessionError::Refused(
-            "not now: a pass begins with a machine that runs and rests, with no wave or other pass under way"
+            "not now: a pass needs a running machine at rest, with no wave or other pass in progress"
                 .to_owned(),
         ),
         other => other.into(),

@@ -1,4 +1,4 @@
-//! Commands about where a platform is and may go, and about the terms of its law.
+//! Commands for the pose of a platform, its limits, and the mode and gains of its control law.
 
 use std::fmt::Write as _;
 
@@ -25,14 +25,14 @@ use specgen_language::outcome::Outcome;
 use specgen_language::table::{left, right, row};
 use specgen_language::ui::Ui;
 
-/// Gains of each kind, in the order of the settings; those of P alone have `position_` before them.
+/// Gains of each kind, in the order of the settings; those of P alone have the prefix `position_`.
 const GAINS: [&str; 3] = ["kp", "ki", "kv"];
 /// Why a frame has no such pose.
-const BEYOND: &str = "an angle is beyond what a frame is meant for, 15 deg";
+const BEYOND: &str = "rotation exceeds the 15 deg limit for frames";
 /// Modes by the word `mode`.
 const MODES: [&str; 7] = ["p", "f-invhys", "f-ewma", "f-pcc", "pf-invhys", "pf-ewma", "pf-pcc"];
 
-/// What poses of this session are said in: µm and µrad.
+/// The frame of poses in this session: µm and µrad.
 #[derive(Serialize)]
 struct FrameInForce {
     work: [f64; 6],
@@ -49,7 +49,7 @@ impl Outcome for FrameInForce {
     }
 }
 
-/// What each axis can still do: least and largest value, µm and µrad, the others staying where they are.
+/// Range of each axis with the others unchanged: least and largest value, µm and µrad.
 #[derive(Serialize)]
 struct Limits {
     from: [f64; 6],
@@ -70,15 +70,15 @@ impl Outcome for Limits {
     }
 }
 
-/// Whether it can go somewhere.
+/// Whether a pose can be reached.
 #[derive(Serialize)]
-struct CanGo {
+struct Reachability {
     can: bool,
-    /// What keeps it from it.
+    /// The limit that is exceeded.
     binds: Option<String>,
 }
 
-impl Outcome for CanGo {
+impl Outcome for Reachability {
     fn text(&self) -> String {
         self.binds.as_ref().map_or_else(|| "yes\n".to_owned(), |binds| format!("no: {binds}\n"))
     }
@@ -90,7 +90,7 @@ struct GainsInForce {
     mode: &'static str,
     gains: [[f64; 6]; 3],
     position_gains: [[f64; 6]; 3],
-    /// Where they were just set: λ up to which every mode of the law is stable with them, by the compiler.
+    /// After setting them: λ up to which every mode is stable with these gains, by the compiler's check.
     #[serde(skip_serializing_if = "Option::is_none")]
     gain_ratio_limit: Option<f64>,
 }
@@ -121,12 +121,12 @@ pub(crate) fn is_gain(name: &str) -> bool {
 
 impl<P: Port> Operator<P> {
     pub(super) fn motion(&self) -> Result<&Motion, String> {
-        self.session.motion().ok_or_else(|| "the device controls six legs: it knows of no pose".to_owned())
+        self.session.motion().ok_or_else(|| "the device controls six legs and has no pose".to_owned())
     }
 
     pub(super) fn place(&mut self) -> Result<Place, SessionError> {
         let place = self.session.place()?;
-        place.ok_or_else(|| SessionError::Refused("the device controls six legs: it knows of no pose".to_owned()))
+        place.ok_or_else(|| SessionError::Refused("the device controls six legs and has no pose".to_owned()))
     }
 
     /// The set-point, in the session's frame.
@@ -135,17 +135,17 @@ impl<P: Port> Operator<P> {
         Ok(self.seen(&target))
     }
 
-    /// A pose of the controller as the session says it.
+    /// A pose of the controller in the session's frame.
     pub(super) fn seen(&self, user: &[f64; 6]) -> [f64; 6] {
         self.frame.pose(user).unwrap_or(*user)
     }
 
     /// The controller's coordinates of a pose in the session's frame.
     pub(super) fn user(&self, pose: &[f64; 6]) -> Result<[f64; 6], SessionError> {
-        self.frame.user(pose).ok_or_else(|| SessionError::Refused(format!("it cannot go there: {BEYOND}")))
+        self.frame.user(pose).ok_or_else(|| SessionError::Refused(format!("cannot move there: {BEYOND}")))
     }
 
-    /// Where a move, a step or a way to a name goes, in the controller's coordinates.
+    /// Destination of a `move`, `jog` or `goto`, in the controller's coordinates.
     pub(super) fn user_of(&mut self, command: &Command) -> Result<[f64; 6], SessionError> {
         match command {
             Command::Goto(name) if name == ZERO => Ok([0.0; 6]),
@@ -156,18 +156,18 @@ impl<P: Port> Operator<P> {
                 let from = self.target()?;
                 self.user(&meant(&from, *relative, axes))
             }
-            _ => Err(SessionError::Refused("it goes nowhere".to_owned())),
+            _ => Err(SessionError::Refused("the command is not a move".to_owned())),
         }
     }
 
-    /// Where it is, in the session's frame.
+    /// Location in the session's frame.
     pub(super) fn located(&self, place: &Place) -> Location {
         Location::of(place, self.session.status(), |user| self.seen(user))
     }
 
     pub(super) fn no_mark(&self, name: &str) -> String {
         let known: Vec<&str> = std::iter::once(ZERO).chain(self.marks.keys().map(String::as_str)).collect();
-        format!("there is no pose `{name}`: `mark {name}` first; there are {}", known.join(", "))
+        format!("there is no pose `{name}`: `mark {name}` first; known poses: {}", known.join(", "))
     }
 
     pub(super) fn trajectory(&self, name: &str) -> Result<usize, String> {
@@ -180,11 +180,11 @@ impl<P: Port> Operator<P> {
         })
     }
 
-    /// Places of the settings that these gains are, and their values.
+    /// Indices of these gains in the settings, and their values.
     pub(super) fn gains_of(&self, gains: &[(String, f64)]) -> Result<Vec<(usize, f64)>, String> {
         self.motion()?;
         if !gains.is_empty() && self.model.is_none() {
-            return Err("gains are held against the margins of the spec before they are sent: name the spec".to_owned());
+            return Err("gains are checked for stability with the spec before they are sent: name the spec".to_owned());
         }
         let names = &self.session.description().config_names;
         let mut places = Vec::new();
@@ -197,14 +197,14 @@ impl<P: Port> Operator<P> {
             places.extend(found.map(|(place, _)| (place, *value)));
             if places.len() == before {
                 return Err(format!(
-                    "there is no gain `{name}`; there are kp, ki, kv, and position_kp, position_ki, position_kv of P alone, each of all axes or with an axis, as in ki[2]"
+                    "there is no gain `{name}`; expected kp, ki, kv or, for P alone, position_kp, position_ki, position_kv, each for all axes or for one, as in ki[2]"
                 ));
             }
         }
         Ok(places)
     }
 
-    /// Carries out what is about a platform.
+    /// Executes a command that needs a platform.
     pub(super) fn of_platform(&mut self, command: &Command, line: &str, ui: &Ui) -> Result<(), SessionError> {
         match command {
             Command::Where => {
@@ -222,7 +222,7 @@ impl<P: Port> Operator<P> {
             Command::CanIGo { axes, speed } => {
                 let target = self.target()?;
                 let binds = self.binds(&target, axes, speed).map_err(SessionError::Refused)?;
-                self.note(line, &CanGo { can: binds.is_none(), binds }, ui);
+                self.note(line, &Reachability { can: binds.is_none(), binds }, ui);
             }
             Command::Frame(frame) => {
                 self.frame = match frame {
@@ -254,13 +254,13 @@ impl<P: Port> Operator<P> {
                 let limit = if gains.is_empty() { None } else { self.set_gains(gains)? };
                 self.show_gains(limit, line, ui)?;
             }
-            // The others know of no platform.
+            // The other commands do not need a platform.
             _ => {}
         }
         Ok(())
     }
 
-    /// What keeps it from going there so fast; none if it can.
+    /// The limit that prevents a move at this speed; none if it is possible.
     fn binds(&self, from: &[f64; 6], axes: &AxisValues, [along, about]: &Pace) -> Result<Option<String>, String> {
         let (motion, to) = (self.motion()?, meant(from, false, axes));
         let Some(user) = self.frame.user(&to) else { return Ok(Some(BEYOND.to_owned())) };
@@ -269,10 +269,10 @@ impl<P: Port> Operator<P> {
         }
         let start = self.frame.user(from);
         let slow = (0..6).find_map(|axis| {
-            // The controller's axes have the speeds.
+            // Speed limits are along the controller's axes.
             let (asked, speed) = (if axis < 3 { along } else { about }, motion.speed()[axis]);
             let moves = start.is_none_or(|start| (user[axis] - start[axis]).abs() > 0.0);
-            // As many digits as the spec has them in.
+            // Tolerates the rounding of the spec's decimals.
             asked.filter(|asked| moves && *asked > speed * (1.0 + 1e-9)).map(|_| (axis, speed))
         });
         Ok(slow.map(|(axis, speed)| {
@@ -301,7 +301,7 @@ impl<P: Port> Operator<P> {
         Ok(())
     }
 
-    /// Every mode of the law is stable with the spec's gains, or the spec was refused.
+    /// Sets the mode. It needs no stability check: the compiler accepts a spec only if all modes are stable.
     fn set_mode(&mut self, wanted: ModeRequest) -> Result<(), SessionError> {
         let mut words = self.session.config()?;
         let now = self.word_of(&words, "mode").unwrap_or_default();
@@ -313,7 +313,7 @@ impl<P: Port> Operator<P> {
         self.configure(&words)
     }
 
-    /// Holds the gains against the margins of the spec, then sends them: λ up to which they are stable in every mode.
+    /// Checks the stability margins of the gains, then sends them. Returns λ up to which every mode is stable.
     fn set_gains(&mut self, gains: &[(String, f64)]) -> Result<Option<f64>, SessionError> {
         let places = self.gains_of(gains).map_err(SessionError::Refused)?;
         let mut words = self.session.config()?;
@@ -346,38 +346,38 @@ impl<P: Port> Operator<P> {
             ClientError::Refused(Refusal::Word { index }) => {
                 let names = &self.session.description().config_names;
                 let name = names.get(usize::from(index)).map_or("?", String::as_str);
-                SessionError::Refused(format!("the device refuses `{name}`: out of its range there"))
+                SessionError::Refused(format!("the device refused `{name}`: out of its range"))
             }
             other => other.into(),
         })
     }
 
-    /// What is to be done now, by phase, cause and status.
+    /// Suggested next step, by phase, cause and status.
     pub(super) fn advice(&self) -> Option<String> {
         let status = self.session.status();
         let phase = Phase::from_word(u64::from(status.phase))?;
         let cause = Cause::from_word(u64::from(status.cause)).unwrap_or(Cause::None);
         let text = match (phase, cause) {
             (Phase::Disarmed, _) => "`arm`, then `run`".to_owned(),
-            (Phase::Arming, _) => "`run` may be asked for now".to_owned(),
-            (Phase::Holding, Cause::None) => "`run` goes on, `ramp-down` switches off".to_owned(),
+            (Phase::Arming, _) => "`run` can be requested now".to_owned(),
+            (Phase::Holding, Cause::None) => "`run` to continue, `ramp-down` to switch off".to_owned(),
             (Phase::Holding, cause) => {
-                format!("it holds because of {}: when that is mended, `none`, then `run`", cause.name())
+                format!("holding because of {}: when that is fixed, `none`, then `run`", cause.name())
             }
             (Phase::RampingDown, _) => "`wait disarmed`, or faulted".to_owned(),
             (Phase::Faulted, cause) => format!("fix the cause ({}), then `none`, `acknowledge`, `arm`", cause.name()),
             (Phase::Running, Cause::Oscillation) => {
-                "it oscillated, and the law has fallen back: when that is mended, `none`, then `acknowledge`".to_owned()
+                "it oscillated, and the law has fallen back: when that is fixed, `none`, then `acknowledge`".to_owned()
             }
             (Phase::Running, _) if status.status & STALE != 0 => {
                 "the stream has stopped: send set-points, or move".to_owned()
             }
             (Phase::Running, _) if status.status & REFUSED != 0 => {
-                "the command is refused: `limits` says how far it can go; `set command=hold` ends it".to_owned()
+                "the command was refused: `limits` shows the range; `set command=hold` cancels the command".to_owned()
             }
             (Phase::Running, _) => {
                 let limited = status.status & !(REFUSED | STALE | BUSY);
-                return (limited != 0).then(|| format!("look into: {}", status_words(limited).replace('+', ", ")));
+                return (limited != 0).then(|| format!("check: {}", status_words(limited).replace('+', ", ")));
             }
         };
         Some(text)

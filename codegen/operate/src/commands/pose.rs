@@ -1,12 +1,12 @@
-//! Poses in words: their units, and what keeps a platform from going somewhere.
+//! Texts about poses: units, and the limits that a pose exceeds.
 
 use crate::motion::Binding;
 use crate::place::{AXES, amount};
 
-/// The name that the user's zero always has.
+/// Name of the user's zero pose.
 pub const ZERO: &str = "zero";
 
-/// What binds, in words.
+/// The exceeded limit as text.
 pub fn in_words(binding: &Binding) -> String {
     match *binding {
         Binding::Axis { axis, at, bound } => format!(
@@ -16,7 +16,7 @@ pub fn in_words(binding: &Binding) -> String {
             amount(axis, bound)
         ),
         Binding::Leg { leg, at, range: [low, high] } => format!(
-            "leg {leg} would be {} from rest, beyond what it can do, {} to {}",
+            "leg {leg} would be {} from rest, outside its range of {} to {}",
             amount(0, at),
             amount(0, low),
             amount(0, high)

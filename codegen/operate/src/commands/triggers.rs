@@ -1,4 +1,4 @@
-//! Digital lines: other settings of outputs while the machine runs, and what waits for the edge of the input.
+//! Digital lines: trigger settings of outputs, and commands that wait for an edge of the input.
 
 use crate::command::Command;
 use host_sim::word::WordKind;
@@ -19,7 +19,7 @@ pub struct EdgeState {
     stands: &'static str,
     /// Rising edges since power-up.
     edges: u32,
-    /// Tick of the edge at which that command began or was refused.
+    /// Tick of the edge at which that command started or was refused.
     tick: Option<u64>,
 }
 
@@ -35,7 +35,7 @@ impl Outcome for EdgeState {
 }
 
 impl<P: Port> Operator<P> {
-    /// Places and words of settings of a trigger.
+    /// Indices and words of a trigger's settings.
     pub(super) fn places_of(&self, line: usize, settings: &[(String, f64)]) -> Result<Vec<(usize, u64)>, String> {
         let description = self.session.description();
         let place = |name: &str| {
@@ -47,9 +47,9 @@ impl<P: Port> Operator<P> {
                 let names = names.filter_map(|name| name.strip_prefix("trigger_")?.strip_suffix(&suffix));
                 match names.collect::<Vec<_>>().join(", ") {
                     none if none.is_empty() => {
-                        format!("the controller has {} triggers, from 0 on", description.lines())
+                        format!("the controller has {} triggers, numbered from 0", description.lines())
                     }
-                    names => format!("a trigger has no `{name}`: {names}"),
+                    names => format!("a trigger has no `{name}`; it has {names}"),
                 }
             })
         };
@@ -64,7 +64,7 @@ impl<P: Port> Operator<P> {
         settings.iter().map(word).collect()
     }
 
-    /// Other settings of a trigger. Each is in force with the next tick, where the line begins anew.
+    /// Changes settings of a trigger. They take effect at the next tick, which restarts the line.
     pub(super) fn set_trigger(&mut self, line: usize, settings: &[(String, f64)]) -> Result<(), SessionError> {
         let places = self.places_of(line, settings).map_err(SessionError::Refused)?;
         let mut words = self.session.config()?;
@@ -78,14 +78,14 @@ impl<P: Port> Operator<P> {
                 let names = &self.session.description().config_names;
                 let name = names.get(usize::from(index)).map_or("?", String::as_str);
                 Err(SessionError::Refused(format!(
-                    "`{name}` is out of its range (docs/triggers.md); the settings stay"
+                    "`{name}` is out of its range (docs/triggers.md); the settings are unchanged"
                 )))
             }
             other => Ok(other?),
         }
     }
 
-    /// Has a move, a trajectory or a wave wait for the edge of the input line.
+    /// Queues a move, a trajectory or a wave for the next edge of the input line.
     pub(super) fn on_edge(&mut self, command: &Command) -> Result<(), SessionError> {
         let words = match command {
             Command::Wave(path) => return self.wave(path, true),
@@ -102,13 +102,13 @@ impl<P: Port> Operator<P> {
         self.session.command_on_edge(&words).map_err(|error| match error {
             ClientError::Refused(Refusal::Unsupported) => no_input(),
             ClientError::Refused(Refusal::State) => {
-                SessionError::Refused(format!("not now; the machine must run, at rest: {}", self.state()))
+                SessionError::Refused(format!("not now; the machine must be running and at rest: {}", self.state()))
             }
             other => other.into(),
         })
     }
 
-    /// How it stands with the input line; what waits is dropped first, if that is asked for.
+    /// State of the input line. With `drop`, the waiting command is cancelled first.
     pub(super) fn edge(&mut self, drop: bool) -> Result<EdgeState, SessionError> {
         self.in_control |= drop;
         let EdgeStatus { stage, edges, tick } = self.session.edge(drop).map_err(|error| match error {

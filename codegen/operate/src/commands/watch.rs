@@ -1,4 +1,4 @@
-//! `watch`: samples of the running machine, shown, written to a file, or kept for the document.
+//! `watch`: shows samples of the running machine, writes them to a file, or keeps them for the JSON document.
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -17,41 +17,41 @@ use specgen_language::output::{PendingFile, unwritten};
 use specgen_language::table::{Column, right, row};
 use specgen_language::ui::Ui;
 
-/// Time of a row, if nothing else is said, s.
+/// Default duration of a row, s.
 const ROW: f64 = 0.1;
-/// Between two looks.
+/// Polling interval.
 const LOOK: Duration = Duration::from_millis(10);
-/// So long without a sample, and the machine makes no ticks.
+/// After this time without a sample the machine is not ticking.
 const SILENT: Duration = Duration::from_secs(2);
 
-/// What was watched.
+/// Answer to `watch`.
 #[derive(Serialize)]
 struct WatchReport {
-    /// Ticks of a row.
+    /// Ticks per row.
     every: u32,
     rows: u64,
     gaps: Vec<Gap>,
     #[serde(skip_serializing_if = "Option::is_none")]
     file: Option<String>,
-    /// Where they were not written to a file; SI.
+    /// Rows that were not written to a file; SI.
     #[serde(rename = "samples", skip_serializing_if = "Vec::is_empty")]
     kept: Vec<Sample>,
 }
 
-/// Ticks of which there are no samples.
+/// Ticks without samples.
 #[derive(Serialize)]
 struct Gap {
     from: u64,
-    /// The first one behind it.
+    /// The first tick after the gap.
     to: u64,
-    /// Blocks that were made and not fetched in time.
+    /// Blocks that were not fetched in time.
     blocks: u32,
 }
 
-/// A row with its place in time.
+/// A row with its time.
 #[derive(Serialize)]
 struct Sample {
-    /// The first of its ticks.
+    /// Its first tick.
     tick: u64,
     time: f64,
     ticks: u32,
@@ -69,12 +69,12 @@ impl Outcome for WatchReport {
         let missing: u64 = self.gaps.iter().map(|gap| gap.to.saturating_sub(gap.from)).fold(0, u64::saturating_add);
         text + &match self.gaps.len() {
             0 => ", without a gap\n".to_owned(),
-            gaps => format!(", {gaps} gaps of {missing} ticks in all\n"),
+            gaps => format!(", {gaps} gaps with {missing} ticks in total\n"),
         }
     }
 }
 
-/// Where rows go.
+/// Destination of rows.
 enum Sink {
     Shown,
     Kept,
@@ -123,7 +123,7 @@ impl Sink {
         Ok(())
     }
 
-    /// A pipe has a reader who looks on, too.
+    /// Lets the reader of a pipe follow.
     fn flush(&mut self) -> Result<(), SessionError> {
         match self {
             Self::File { file, path, .. } => {
@@ -160,7 +160,7 @@ fn line(Sample { tick, row: given, .. }: &Sample) -> String {
     text
 }
 
-/// Names of the columns, with units as in the CSV of a record.
+/// Column names, with units as in the CSV of a record.
 fn titles() -> String {
     let mut titles = "tick,time_s,ticks,status,phase".to_owned();
     let unit = |axis: usize| if axis < 3 { "m" } else { "rad" };
@@ -176,7 +176,7 @@ fn titles() -> String {
     titles
 }
 
-/// Numbers as the shortest decimals that give the same bits; `nan` where nothing was measured.
+/// Numbers as the shortest decimals that give the same bits; `nan` if not measured.
 fn values(Sample { tick, time, ticks, row }: &Sample) -> String {
     let mut values = format!("{tick},{time:.9},{ticks},{},{}", row.status, row.phase);
     let place = |place: Option<f64>| place.map_or_else(|| ",nan".to_owned(), |value| format!(",{value:e}"));
@@ -191,7 +191,7 @@ fn values(Sample { tick, time, ticks, row }: &Sample) -> String {
 }
 
 impl<P: Port> Operator<P> {
-    /// Rows of `every` ticks for so many seconds of the machine's time.
+    /// Takes rows of `every` ticks for a duration in the machine's time.
     pub(super) fn watch(
         &mut self,
         every: Option<u32>,
@@ -202,12 +202,11 @@ impl<P: Port> Operator<P> {
     ) -> Result<(), SessionError> {
         self.motion().map_err(SessionError::Refused)?;
         let period = self.session.period();
-        // As much as a message of the link counts to.
         let every = every.unwrap_or((ROW / period).ceil() as u32);
         let mut sink = Sink::new(path, ui)?;
         self.session.stream(every).map_err(|error| match error {
             ClientError::Refused(Refusal::Word { .. }) => SessionError::Refused(format!(
-                "rows of {every} ticks are longer than the device makes them: {} at most",
+                "rows of {every} ticks are too long for the device: at most {}",
                 specgen_link::samples::MOST_EVERY
             )),
             other => other.into(),
@@ -217,7 +216,7 @@ impl<P: Port> Operator<P> {
         sink.begin(ui);
         let ticks = (seconds / period).ceil() as u64;
         let ended = self.take(ticks, &mut watched, &mut sink, ui);
-        // What was seen until then is whole.
+        // Keep the samples so far, even after an error.
         sink.finish()?;
         ended?;
         self.session.stream(0)?;
@@ -252,7 +251,7 @@ impl<P: Port> Operator<P> {
             }
             let most = SILENT + Duration::from_secs_f64(f64::from(watched.every) * self.session.period());
             if heard.elapsed() > most {
-                return Err(SessionError::Fault(format!("the machine makes no ticks, and is {}", self.state())));
+                return Err(SessionError::Fault(format!("the machine is {}, but not ticking", self.state())));
             }
             self.look()?;
             self.show(ui);

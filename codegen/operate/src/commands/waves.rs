@@ -1,4 +1,4 @@
-//! Waves of an operator's files.
+//! Waves from files.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ impl<P: Port> Operator<P> {
         self.wave_of_text(&text).map_err(|error| format!("{name}: {error}"))
     }
 
-    /// Words and center of a wave as its file says it.
+    /// Words and center of a wave from the text of its file.
     pub(crate) fn wave_of_text(&self, text: &str) -> Result<(Vec<u64>, [u64; 6]), String> {
         let single = self.session.description().scalar.bits() == 32;
         read_wave(text, self.session.period(), single).map_err(|error| error.trim_end().to_owned())
@@ -28,7 +28,7 @@ impl<P: Port> Operator<P> {
         self.start_wave(&path.display().to_string(), &words, &center, on_edge)
     }
 
-    /// Starts a wave of this name, at once or at the edge of the input line.
+    /// Starts a wave, at once or at the next edge of the input line. `name` is for messages.
     pub(crate) fn start_wave(
         &mut self,
         name: &str,
@@ -41,7 +41,7 @@ impl<P: Port> Operator<P> {
             ClientError::Refused(Refusal::Unsupported) => no_input(),
             ClientError::Refused(Refusal::Word { index }) => SessionError::Refused(format!("{name}: {}", refused_wave(index))),
             ClientError::Refused(Refusal::State) => SessionError::Refused(format!(
-                "{name}: not now; the machine must be running and stand at the wave's center, with no wave or move under way: {}",
+                "{name}: not now; the machine must be running, at the wave's center, with no wave or move in progress: {}",
                 self.state()
             )),
             other => other.into(),

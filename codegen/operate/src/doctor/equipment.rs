@@ -1,4 +1,4 @@
-//! Devices and tools: what can be reached from here.
+//! Devices and tools that are available.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use super::Grade::Warning;
 use super::{Files, Finding};
 use specgen_toolchain as target;
 
-/// Devices under `/dev` and what they are for: name's beginning, subject, what is missing without them, how to get the right.
+/// Devices in `/dev`: prefix of the name, subject, message if missing, fix if not permitted.
 const DEVICES: [(&str, &str, &str, &str); 3] = [
     (
         "comedi",
@@ -47,11 +47,11 @@ fn device(files: &Files, beginning: &str, subject: &'static str, missing: &str, 
     } else if closed.is_empty() {
         Finding::good(subject, names.join(", "))
     } else {
-        Finding::of(subject, Warning, format!("{} may not be used by this user", closed.join(", ")), right)
+        Finding::of(subject, Warning, format!("this user has no permission for {}", closed.join(", ")), right)
     }
 }
 
-/// Whether a device could be opened for reading and writing.
+/// Whether a device can be opened for reading and writing.
 fn may_use(path: &Path) -> bool {
     std::fs::OpenOptions::new().read(true).write(true).open(path).is_ok()
 }
@@ -64,11 +64,11 @@ pub fn tools() -> Vec<Finding> {
         None => Finding::of(subject, Warning, format!("no {program} on PATH"), fix),
     };
     let compiler = match target::available() {
-        Ok(_) => Finding::good("cross compiler", "and emulator are there"),
+        Ok(_) => Finding::good("cross compiler", "installed, with emulator"),
         Err(error) => Finding::of("cross compiler", Warning, error.to_string(), "specgen SPEC --setup"),
     };
     vec![
-        tool("cargo", "cargo", "install Rust as rustup.rs says"),
+        tool("cargo", "cargo", "install Rust from rustup.rs"),
         compiler,
         tool("probe", "probe-rs", "`cargo install probe-rs-tools`, for flashing boards"),
     ]
@@ -92,7 +92,7 @@ mod tests {
         assert!(found[0].fix.as_deref().unwrap().contains("ni_pcimio"), "{:?}", found[0]);
         fs::write(root.path().join("dev/comedi0"), "").unwrap();
         assert_eq!(devices(&files)[0], Finding::good("acquisition card", "comedi0"));
-        // Root may open anything: closed is then tried with what cannot be opened for writing at all.
+        // Root may open any file, so use a folder, which nobody can open for writing.
         let line = root.path().join("dev/ttyACM0");
         fs::create_dir(&line).unwrap();
         fs::set_permissions(&line, fs::Permissions::from_mode(0o500)).unwrap();

@@ -1,4 +1,4 @@
-//! How late this computer wakes a thread that sleeps to an absolute time, as the control loop does.
+//! Measures the wake-up delay of a thread that sleeps until an absolute time, as the control loop does.
 
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::thread;
@@ -8,23 +8,23 @@ use specgen_rt::clock::{self, SECOND, Usage};
 use specgen_rt::histogram::Histogram;
 use specgen_rt::scheduling::{self, AwakeProcessors, MissingPrivilege};
 
-/// Priority of the measurement, that of rt-pc.
+/// Priority of the measurement, the same as that of rt-pc.
 const PRIORITY: u8 = 80;
 /// From the start to the first tick, ns.
 const LEAD: u64 = 10_000_000;
 
-/// A measurement, with the rights that could be had.
+/// A measurement, with the privileges that were granted.
 #[derive(Debug)]
 pub struct LatencyMeasurement {
     /// From the planned time to running, ns.
     pub delays: Histogram,
-    /// Ticks whose times came.
+    /// Ticks that were due.
     pub planned: u64,
-    /// Whole periods that were slept through.
+    /// Whole periods that were missed.
     pub skipped: u64,
-    /// Times the processor was taken away.
+    /// Involuntary context switches.
     pub preempted: u64,
-    /// System management interrupts meanwhile, where they are counted.
+    /// System management interrupts during the measurement, if they are counted.
     pub management_interrupts: Option<u64>,
     /// Whether SCHED_FIFO was granted.
     pub priority: Result<(), MissingPrivilege>,
@@ -34,31 +34,31 @@ pub struct LatencyMeasurement {
     pub awake: bool,
 }
 
-/// Figures of a measurement for programs, ns.
+/// Figures of a measurement for the JSON document, ns.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Figures {
-    /// Ticks whose times came.
+    /// Ticks that were due.
     pub planned: u64,
-    /// Whole periods that were slept through.
+    /// Whole periods that were missed.
     pub skipped: u64,
-    /// Half of the delays are no longer; none of these if none was measured.
+    /// Median; none if nothing was measured, as below.
     pub p50_ns: Option<u64>,
-    /// 99 % are no longer.
+    /// 99 % quantile.
     pub p99_ns: Option<u64>,
-    /// 99.9 %.
+    /// 99.9 % quantile.
     pub p999_ns: Option<u64>,
-    /// The longest.
+    /// Maximum.
     pub max_ns: Option<u64>,
-    /// Upper ends and counts by doubling.
+    /// Upper limits and counts of octaves.
     pub below_ns: Vec<(u64, u64)>,
 }
 
 /// Sleeps `seconds` in periods of `period` (ns), on processor `cpu` if one is named.
 ///
 /// # Errors
-/// If there is no such processor, or no thread.
+/// There is no such processor, or no thread could be started.
 pub fn measure(period: u64, seconds: f64, cpu: Option<usize>) -> Result<LatencyMeasurement, String> {
-    // Nothing of this process is at stake: what is not granted is part of the result.
+    // Missing privileges are part of the result, not errors.
     let memory = scheduling::lock_memory();
     let awake = AwakeProcessors::request();
     let before = management_interrupts();
@@ -101,7 +101,7 @@ pub fn measure(period: u64, seconds: f64, cpu: Option<usize>) -> Result<LatencyM
 }
 
 impl LatencyMeasurement {
-    /// For programs.
+    /// Figures for the JSON document.
     #[must_use]
     pub fn figures(&self) -> Figures {
         let quantile = |share| self.delays.quantile(share);
@@ -117,7 +117,7 @@ impl LatencyMeasurement {
     }
 }
 
-/// Counter of system management interrupts of Intel processors (register 0x34); none without the right to read it.
+/// Counter of system management interrupts of Intel processors (register 0x34); none without permission to read it.
 fn management_interrupts() -> Option<u64> {
     const REGISTER: u64 = 0x34;
     let mut file = std::fs::File::open("/dev/cpu/0/msr").ok()?;

@@ -1,4 +1,4 @@
-//! The result of a look at this computer: whether it can run a controller in real time.
+//! Report on this computer: whether it can run a controller in real time.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use specgen_rt::histogram::{Histogram, known_text, time_text};
 use super::latency::{self, Figures, LatencyMeasurement};
 use super::{Files, Finding, Grade, equipment, system};
 
-/// Measures wake-ups every `period` ns for so many seconds, on one processor if it is given, and checks the computer.
+/// Measures wake-ups every `period` ns for this time, on one processor if given, and checks the computer.
 ///
 /// # Errors
 /// The system refuses the measurement.
@@ -37,7 +37,7 @@ pub fn examine(period: u64, seconds: f64, processor: Option<usize>, ui: &Ui) -> 
     })
 }
 
-/// State of this computer.
+/// Report on this computer.
 #[derive(Serialize)]
 pub struct Report {
     period_ns: u64,
@@ -72,7 +72,7 @@ impl Outcome for Report {
                 let _ = writeln!(text, "{:27}→ {fix}", "");
             }
         }
-        let _ = writeln!(text, "wake-ups, from the planned time to running");
+        let _ = writeln!(text, "wake-up delays, from the planned time to running");
         let Figures { p50_ns, p99_ns, p999_ns, max_ns, .. } = self.latency;
         let [median, p99, p999, longest] = [p50_ns, p99_ns, p999_ns, max_ns].map(known_text);
         let _ = writeln!(text, "  median {median}, 99 % {p99}, 99.9 % {p999}, longest {longest}");
@@ -88,41 +88,37 @@ fn management(measured: &LatencyMeasurement) -> Finding {
         Some(0) => Finding {
             subject,
             grade: Grade::Good,
-            found: "no system management interrupts meanwhile".to_owned(),
+            found: "no system management interrupts during the measurement".to_owned(),
             fix: None,
         },
         Some(count) => Finding {
             subject,
             grade: Grade::Warning,
-            found: format!("{count} system management interrupts meanwhile"),
-            fix: Some(
-                "switch USB legacy support, sensors and power management off in the firmware's set-up".to_owned(),
-            ),
+            found: format!("{count} system management interrupts during the measurement"),
+            fix: Some("disable USB legacy support, sensors and power management in the firmware set-up".to_owned()),
         },
         None => Finding {
             subject,
             grade: Grade::Unknown,
             found: "system management interrupts are not counted here".to_owned(),
             fix: Some(
-                "`modprobe msr` as root on an Intel processor, then again; `hwlatdetect` finds what is left".to_owned(),
+                "on an Intel processor, run `modprobe msr` as root and repeat; `hwlatdetect` finds other causes"
+                    .to_owned(),
             ),
         },
     }
 }
 
-/// What the measurement means for a loop of this period.
+/// Verdict on a loop of this period.
 fn judge(measured: &LatencyMeasurement, period: u64) -> (Grade, String) {
     let hertz = 1e9 / period as f64;
     let Some(longest) = measured.delays.largest() else {
-        return (Grade::Unknown, format!("{hertz:.0} Hz: no wake-up was measured; measure for longer, --seconds"));
+        return (Grade::Unknown, format!("{hertz:.0} Hz: no wake-up was measured; increase --seconds"));
     };
     let within = format!("{} of {} periods of {}", measured.skipped, measured.planned, time_text(period));
     if measured.skipped > 0 {
         let share = measured.skipped as f64 / measured.planned as f64;
-        return (
-            Grade::Bad,
-            format!("{hertz:.0} Hz: {within} were slept through ({:.2} %): ticks would be missed", share * 100.0),
-        );
+        return (Grade::Bad, format!("{hertz:.0} Hz: {within} were missed ({:.2} %)", share * 100.0));
     }
     if longest * 2 > period {
         let longest = time_text(longest);
@@ -131,10 +127,7 @@ fn judge(measured: &LatencyMeasurement, period: u64) -> (Grade, String) {
             format!("{hertz:.0} Hz: no period was missed, but the longest delay of {longest} makes outputs late"),
         );
     }
-    (
-        Grade::Good,
-        format!("{hertz:.0} Hz: every wake-up within half a period, the longest after {}", time_text(longest)),
-    )
+    (Grade::Good, format!("{hertz:.0} Hz: every wake-up within half a period, longest delay {}", time_text(longest)))
 }
 
 fn mark(grade: Grade) -> &'static str {

@@ -1,4 +1,4 @@
-//! Kernel, processors and rights.
+//! Kernel, processors and privileges.
 
 use specgen_rt::clock;
 use specgen_rt::scheduling::{FIX_MEMORY, FIX_PRIORITY, MissingPrivilege};
@@ -8,7 +8,7 @@ use super::{Files, Finding};
 
 const CPU: &str = "/sys/devices/system/cpu";
 
-/// What the files say.
+/// Findings from system files.
 #[must_use]
 pub fn findings(files: &Files) -> Vec<Finding> {
     vec![
@@ -23,7 +23,7 @@ pub fn findings(files: &Files) -> Vec<Finding> {
     ]
 }
 
-/// What the system answered when it was asked for priority and for locked memory.
+/// Findings about requests for real-time priority and locked memory.
 #[must_use]
 pub fn rights(priority: Result<(), &MissingPrivilege>, memory: Result<(), &MissingPrivilege>) -> Vec<Finding> {
     let of = |subject, answer: Result<(), &MissingPrivilege>, granted: &str, fix: &str| match answer {
@@ -32,15 +32,15 @@ pub fn rights(priority: Result<(), &MissingPrivilege>, memory: Result<(), &Missi
     };
     vec![
         of("priority", priority, "SCHED_FIFO is granted", FIX_PRIORITY),
-        of("memory", memory, "may be locked", FIX_MEMORY),
+        of("memory", memory, "can be locked", FIX_MEMORY),
     ]
 }
 
-/// How fine the timer is.
+/// Finding about the resolution of the timer.
 #[must_use]
 pub fn timer() -> Finding {
     match clock::resolution() {
-        0 => Finding::of("timer", Unknown, "the kernel does not say", "see `cat /proc/timer_list`"),
+        0 => Finding::of("timer", Unknown, "resolution unknown", "see `cat /proc/timer_list`"),
         1 => Finding::good("timer", "1 ns"),
         coarse => Finding::of(
             "timer",
@@ -53,14 +53,14 @@ pub fn timer() -> Finding {
 
 fn kernel(files: &Files) -> Finding {
     const FIX: &str = "install a PREEMPT_RT kernel: `apt-get install linux-image-rt-amd64` (Debian), `pro enable \
-         realtime-kernel` (Ubuntu), kernel-rt (Red Hat); without it the longest delays are not bounded";
+         realtime-kernel` (Ubuntu), kernel-rt (Red Hat); without it delays are not bounded";
     let version = files.text("/proc/sys/kernel/osrelease").unwrap_or_default();
     let build = files.text("/proc/sys/kernel/version").unwrap_or_default();
     if files.text("/sys/kernel/realtime").as_deref() == Some("1") || build.contains("PREEMPT_RT") {
         return Finding::good("kernel", format!("{version}, PREEMPT_RT"));
     }
     if build.is_empty() {
-        return Finding::of("kernel", Unknown, "cannot be seen", FIX);
+        return Finding::of("kernel", Unknown, "not visible", FIX);
     }
     let kind = build.split_whitespace().find(|word| word.starts_with("PREEMPT")).unwrap_or("no preemption");
     Finding::of("kernel", Warning, format!("{version}, {kind}, not PREEMPT_RT"), FIX)
@@ -69,19 +69,19 @@ fn kernel(files: &Files) -> Finding {
 fn clock_source(files: &Files) -> Finding {
     let source = files.text("/sys/devices/system/clocksource/clocksource0/current_clocksource");
     match source.as_deref() {
-        None => Finding::of("clock", Unknown, "source cannot be seen", "see `dmesg | grep clocksource`"),
+        None => Finding::of("clock", Unknown, "source not visible", "see `dmesg | grep clocksource`"),
         Some(slow @ ("hpet" | "acpi_pm" | "jiffies" | "refined-jiffies")) => Finding::of(
             "clock",
             Warning,
             format!("{slow}: a reading costs a microsecond or more"),
-            "see in `dmesg | grep -i tsc` why the time stamp counter is not used; `tsc=reliable` if it is sound",
+            "`dmesg | grep -i tsc` shows why the time stamp counter is not used; boot with `tsc=reliable` if it is sound",
         ),
         Some(source) => Finding::good("clock", source),
     }
 }
 
 fn governor(files: &Files) -> Finding {
-    const FIX: &str = "`cpupower frequency-set -g performance`, at every start";
+    const FIX: &str = "`cpupower frequency-set -g performance`, at every boot";
     let processors = files.names(CPU, "cpu");
     let governors = processors.iter().filter_map(|cpu| files.text(&format!("{CPU}/{cpu}/cpufreq/scaling_governor")));
     let mut governors: Vec<String> = governors.collect();
@@ -99,19 +99,19 @@ fn isolation(files: &Files) -> Finding {
     let list = |name: &str| files.text(&format!("{CPU}/{name}")).filter(|text| !text.is_empty() && text != "(null)");
     match (list("isolated"), list("nohz_full")) {
         (Some(isolated), Some(quiet)) => {
-            Finding::good("isolation", format!("processors {isolated} isolated, {quiet} without ticks"))
+            Finding::good("isolation", format!("processors {isolated} isolated, {quiet} without timer ticks"))
         }
         (Some(isolated), None) => {
-            Finding::of("isolation", Warning, format!("processors {isolated} isolated, none without ticks"), FIX)
+            Finding::of("isolation", Warning, format!("processors {isolated} isolated, none without timer ticks"), FIX)
         }
         (None, _) if files.text(&format!("{CPU}/online")).is_none() => {
-            Finding::of("isolation", Unknown, "cannot be seen", FIX)
+            Finding::of("isolation", Unknown, "not visible", FIX)
         }
-        (None, _) => Finding::of("isolation", Warning, "no processor is kept free of other work", FIX),
+        (None, _) => Finding::of("isolation", Warning, "no processor is isolated from other work", FIX),
     }
 }
 
-/// Wake-up time above which a sleeping processor is in the way, µs.
+/// Exit latency of a sleep state above which it is a problem, µs.
 const SLOW_WAKE: u64 = 10;
 
 fn idle(files: &Files) -> Finding {
@@ -129,13 +129,13 @@ fn idle(files: &Files) -> Finding {
             "sleep states",
             Unknown,
             "no cpuidle here (virtual machine, or `idle=poll`)",
-            "on a virtual machine its host decides; on a real one see /sys/devices/system/cpu/cpuidle",
+            "on a virtual machine the host controls them; otherwise see /sys/devices/system/cpu/cpuidle",
         ),
         Some((latency, name)) if latency > SLOW_WAKE => Finding::of(
             "sleep states",
             Warning,
             format!("{name} takes {latency} µs to wake from"),
-            "rt-pc forbids them by /dev/cpu_dma_latency where it may write it; else boot with `processor.max_cstate=1 intel_idle.max_cstate=0`",
+            "rt-pc disables them through /dev/cpu_dma_latency if it may write it; otherwise boot with `processor.max_cstate=1 intel_idle.max_cstate=0`",
         ),
         Some((latency, name)) => Finding::good("sleep states", format!("{name} at most, {latency} µs")),
     }
@@ -143,27 +143,27 @@ fn idle(files: &Files) -> Finding {
 
 fn virtual_machine(files: &Files) -> Finding {
     let Some(text) = files.text("/proc/cpuinfo") else {
-        return Finding::of("hardware", Unknown, "cannot be seen", "see /proc/cpuinfo");
+        return Finding::of("hardware", Unknown, "not visible", "see /proc/cpuinfo");
     };
     let flags = text.lines().find(|line| line.starts_with("flags"));
     if flags.is_some_and(|flags| flags.split_whitespace().any(|flag| flag == "hypervisor")) {
         return Finding::of(
             "hardware",
             Warning,
-            "a virtual machine: its host stops it whenever it likes",
-            "run on the hardware itself",
+            "a virtual machine: its host can pause it at any time",
+            "run directly on the hardware",
         );
     }
-    Finding::good("hardware", "no hypervisor is seen")
+    Finding::good("hardware", "no hypervisor detected")
 }
 
 fn throttling(files: &Files) -> Finding {
     match files.text("/proc/sys/kernel/sched_rt_runtime_us").and_then(|text| text.parse::<i64>().ok()) {
-        None => Finding::of("throttling", Unknown, "cannot be seen", "see /proc/sys/kernel/sched_rt_runtime_us"),
+        None => Finding::of("throttling", Unknown, "not visible", "see /proc/sys/kernel/sched_rt_runtime_us"),
         Some(-1) => Finding::good("throttling", "off"),
         Some(runtime) => Finding::good(
             "throttling",
-            format!("real-time threads have {runtime} µs of a second's million: enough for a loop that sleeps"),
+            format!("real-time threads may use {runtime} µs per second: enough for a loop that sleeps"),
         ),
     }
 }
@@ -172,12 +172,12 @@ fn load(files: &Files) -> Finding {
     let first = files.text("/proc/loadavg").and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
     let online = files.names(CPU, "cpu").iter().filter(|name| name[3..].parse::<u32>().is_ok()).count();
     match first {
-        None => Finding::of("load", Unknown, "cannot be seen", "see `uptime`"),
+        None => Finding::of("load", Unknown, "not visible", "see `uptime`"),
         Some(load) if online > 0 && load > online as f64 => Finding::of(
             "load",
             Warning,
-            format!("{load:.1} threads want {online} processors"),
-            "end other work before you judge the figures below",
+            format!("{load:.1} runnable threads on {online} processors"),
+            "end other work, or the figures below are too high",
         ),
         Some(load) => Finding::good("load", format!("{load:.1} on {online} processors")),
     }
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn what_costs_latency_is_told_with_what_to_change() {
+    fn what_adds_latency_is_reported_with_a_fix() {
         let found = of(&[
             ("proc/sys/kernel/osrelease", "6.1.0\n"),
             ("proc/sys/kernel/version", "#1 SMP PREEMPT_DYNAMIC Debian\n"),
@@ -258,11 +258,11 @@ mod tests {
             ("6.1.0, PREEMPT_DYNAMIC, not PREEMPT_RT", "linux-image-rt-amd64"),
             ("hpet", "tsc"),
             ("performance, powersave", "cpupower"),
-            ("no processor is kept free", "isolcpus=N"),
+            ("no processor is isolated", "isolcpus=N"),
             ("C10 takes 890 µs", "max_cstate"),
             ("virtual machine", "hardware"),
             ("950000", ""),
-            ("3.5 threads want 2 processors", "other work"),
+            ("3.5 runnable threads on 2 processors", "other work"),
         ];
         for (finding, (text, fix)) in found.iter().zip(words) {
             assert!(finding.found.contains(text), "{finding:?}");

@@ -1,11 +1,11 @@
-//! Names of axes on the wire.
+//! Names of axes in the protocol.
 
-/// Names that every client of a hexapod knows, by the place of the axis in a pose.
+/// Standard names of a hexapod's axes, by the index of the axis in a pose.
 const NAMES: [&str; 6] = ["X", "Y", "Z", "U", "V", "W"];
-/// Millionths: lengths are µm on the wire, angles µrad.
+/// Protocol units per m or rad: µm and µrad.
 const SCALE: f64 = 1e6;
 
-/// Axes that clients see, in the order in which they are answered.
+/// Axes that clients see, in the order of answers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Axes(Vec<(String, usize)>);
 
@@ -16,11 +16,11 @@ impl Default for Axes {
 }
 
 impl Axes {
-    /// Of `NAME=AXIS` such as `1=Z`: these names and no others. All six under their own names if there is none.
+    /// Parses `NAME=AXIS` words such as `1=Z`. Without any, all six axes have their standard names.
     ///
     /// # Errors
-    /// What is wrong, and what is expected.
-    pub fn named(words: &[String]) -> Result<Self, String> {
+    /// A word is invalid; the text says what is expected.
+    pub fn parse(words: &[String]) -> Result<Self, String> {
         if words.is_empty() {
             return Ok(Self::default());
         }
@@ -35,19 +35,19 @@ impl Axes {
                 return Err(format!("`{word}`: a name has one to eight letters and digits"));
             }
             if axes.iter().any(|(known, place)| known == name || *place == axis) {
-                return Err(format!("`{word}`: each name and each axis once"));
+                return Err(format!("`{word}`: each name and each axis can be used only once"));
             }
             axes.push((name.to_owned(), axis));
         }
         Ok(Self(axes))
     }
 
-    /// All of them: name, place in a pose.
+    /// All axes: name, index in a pose.
     pub(super) fn iter(&self) -> impl Iterator<Item = (&str, usize)> {
         self.0.iter().map(|(name, axis)| (name.as_str(), *axis))
     }
 
-    /// The place in a pose.
+    /// The index in a pose.
     pub(super) fn place(&self, name: &str) -> Option<usize> {
         self.0.iter().find(|(known, _)| known == name).map(|(_, axis)| *axis)
     }
@@ -68,8 +68,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_those_of_a_hexapod_or_the_ones_that_are_asked_for() {
-        let words = |words: &[&str]| Axes::named(&words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>());
+    fn names_are_those_of_a_hexapod_or_the_given_ones() {
+        let words = |words: &[&str]| Axes::parse(&words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>());
         assert_eq!(words(&[]).unwrap().iter().map(|(name, _)| name).collect::<String>(), "XYZUVW");
         let one = words(&["1=Z", "B=U"]).unwrap();
         assert_eq!((one.place("1"), one.place("B"), one.place("Z")), (Some(2), Some(3), None));
@@ -78,8 +78,8 @@ mod tests {
             (&["1=z"], "an axis of X Y Z U V W"),
             (&["=X"], "one to eight letters"),
             (&["a b=X"], "one to eight letters"),
-            (&["1=X", "1=Y"], "each name and each axis once"),
-            (&["1=X", "2=X"], "each name and each axis once"),
+            (&["1=X", "1=Y"], "each name and each axis can be used only once"),
+            (&["1=X", "2=X"], "each name and each axis can be used only once"),
         ] {
             let error = words(wrong).unwrap_err();
             assert!(error.contains(text), "{wrong:?}: {error}");

@@ -1,19 +1,19 @@
-//! Error codes, as `ERR?` answers them.
+//! Error codes of `ERR?`.
 
-/// Why a command was not carried out, or that the platform was stopped.
+/// Why a command failed, or that the platform was stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Code {
-    /// The parameters cannot be read.
+    /// A parameter cannot be parsed.
     Syntax = 1,
     UnknownCommand = 2,
     TooLong = 3,
-    /// Servo off, or switched off meanwhile.
+    /// The servo is off.
     ServoOff = 5,
-    /// Beyond what the platform can reach.
+    /// Out of reach of the platform.
     Position = 7,
-    /// Not the speed that the machine has.
+    /// Below the speed of the machine.
     Velocity = 8,
-    /// The pivot point cannot be set while the platform is turned.
+    /// The pivot point cannot be set while the platform is rotated.
     Pivot = 9,
     Stopped = 10,
     Axis = 15,
@@ -24,6 +24,6 @@ pub(super) enum Code {
     NotNow = 89,
     InMotion = 93,
     WaveActive = 73,
-    /// The gauges are not read, or one is not believed: nothing is known of the position.
+    /// A gauge is not read or implausible, so the position is unknown.
     Sensor = 505,
 }

@@ -1,4 +1,4 @@
-//! What commands do, and what is answered.
+//! Executes commands and queries.
 
 use specgen_link::client::Port;
 
@@ -8,40 +8,40 @@ use super::input::{Piece, STOP};
 use super::stage::{Rejection, Stage};
 use crate::motion::{Motion, limits};
 
-/// Bits of the status that `#4` answers.
+/// Bits of the status of `#4`.
 const REFERENCED: u32 = 0x1_0000;
 const ON_TARGET: u32 = 0x8000;
 const IN_MOTION: u32 = 0x2000;
 const SERVO: u32 = 0x1000;
 const ERROR: u32 = 0x100;
 
-/// Parameters that `SPA?` knows: largest speed, unit of an axis.
+/// Parameters of `SPA?`: largest speed, unit of an axis.
 const SPEED: u32 = 0xa;
 const UNIT: u32 = 0x0700_0601;
 
-/// Largest pivot coordinate that is meant, m.
+/// Largest plausible pivot coordinate, m.
 const FARTHEST: f64 = 10.0;
 
-/// Every command, with what `HLP?` says of it.
+/// Every command, with its description in `HLP?`.
 const HELP: &[&str] = &[
     "#3 Real positions",
     "#4 Status",
     "#5 Mask of axes in motion",
     "#7 Ready",
     "#24 Stop all axes",
-    "*IDN? Who is there",
+    "*IDN? Identification",
     "CSV? Version of the command set",
     "ERR? Last error, then cleared",
-    "FRF [axes] Reference: gauges are absolute, nothing moves",
+    "FRF [axes] Reference: no motion, gauges are absolute",
     "FRF? [axes] Whether referenced",
     "HLP? This list",
     "HLT [axes] Stop",
-    "MOV axis value ... Go to",
-    "MOV? [axes] Where to",
-    "MVR axis value ... Go by",
-    "NLM? [axes], TMN? [axes] Least position",
+    "MOV axis value ... Move to a position",
+    "MOV? [axes] Target position",
+    "MVR axis value ... Move by a distance",
+    "NLM? [axes], TMN? [axes] Lowest position",
     "ONT? [axes] Whether on target",
-    "PLM? [axes], TMX? [axes] Largest position",
+    "PLM? [axes], TMX? [axes] Highest position",
     "POS? [axes] Position",
     "PUN? [axes] Unit",
     "SAI? [ALL] Axes",
@@ -51,40 +51,40 @@ const HELP: &[&str] = &[
     "STP Stop all axes",
     "SVO axis state ... Servo of the machine, all axes at once",
     "SVO? [axes] Servo",
-    "TRA? axis direction ... How far along a direction",
-    "VEL axis value ... The speed of the spec, or more",
+    "TRA? axis direction ... Reach along a direction",
+    "VEL axis value ... Speed; only that of the spec, or more",
     "VEL? [axes] Speed",
-    "VLS value The speed of the spec, or more",
+    "VLS value Speed; only that of the spec, or more",
     "VLS? Speed",
-    "VMO? axis value ... Whether it can go there",
+    "VMO? axis value ... Whether a position can be reached",
 ];
 
-/// What one command came to: an answer, if there is one, or why there is none.
+/// Result of one command: its answer, if it has one, or why it failed.
 pub(super) type Outcome = Result<Option<String>, Rejection>;
 
-/// Who asks, as far as commands care.
+/// The client of a command.
 pub(super) struct ClientContext<'a> {
     pub(super) axes: &'a Axes,
-    /// The error that waits to be asked for.
+    /// The pending error of `ERR?`.
     pub(super) error: &'a mut Option<Code>,
-    /// Whether this client may order.
-    pub(super) may_order: bool,
+    /// Whether this client may control the machine.
+    pub(super) may_control: bool,
 }
 
-/// Carries a command out.
+/// Executes a command.
 pub(super) fn execute<P: Port>(stage: &mut Stage<P>, asked: &mut ClientContext<'_>, piece: &Piece) -> Outcome {
     match piece {
         Piece::TooLong => Err(Code::TooLong.into()),
         Piece::Single(byte) => single(stage, asked, *byte),
         Piece::Line(line) => {
-            if piece.is_order() && !asked.may_order {
+            if piece.needs_control() && !asked.may_control {
                 return Err(Code::NotNow.into());
             }
             let words: Vec<&str> = line.split_whitespace().collect();
             let (command, rest) = words.split_first().ok_or(Code::UnknownCommand)?;
             match command.strip_suffix('?') {
                 Some(command) => query(stage, asked, command, rest),
-                None => order(stage, asked, command, rest),
+                None => control(stage, asked, command, rest),
             }
         }
     }
@@ -108,17 +108,17 @@ fn single<P: Port>(stage: &mut Stage<P>, asked: &mut ClientContext<'_>, byte: u8
             ];
             bits.iter().filter(|(_, is)| *is).map(|(bit, _)| bit).sum::<u32>().to_string()
         }
-        // A platform moves as a whole.
+        // All axes of a platform move together.
         5 if stage.moves() => mask(asked.axes.iter().count()),
-        7 => return Ok(Some(char::from(if stage.is_rising() { 0xb0 } else { 0xb1 }).to_string())),
+        7 => return Ok(Some(char::from(if stage.is_starting() { 0xb0 } else { 0xb1 }).to_string())),
         // Nothing in motion, no macro, no wave.
         _ => "0".to_owned(),
     };
     Ok(Some(text))
 }
 
-/// So many lowest bits, as a hexadecimal number. With `0x` where clients that read numbers as C does would stop at a letter, and take
-/// a platform in motion for one at rest.
+/// A mask of the lowest `count` bits, in hexadecimal. Above 9 it has the prefix `0x`: clients that parse it as C does would
+/// otherwise stop at a letter, and take a moving platform for one at rest.
 fn mask(count: usize) -> String {
     let mask = (1_u32 << count) - 1;
     if mask > 9 { format!("{mask:#X}") } else { mask.to_string() }
@@ -129,12 +129,12 @@ fn stop<P: Port>(stage: &mut Stage<P>) -> Outcome {
     Err(Code::Stopped.into())
 }
 
-fn order<P: Port>(stage: &mut Stage<P>, asked: &ClientContext<'_>, command: &str, rest: &[&str]) -> Outcome {
+fn control<P: Port>(stage: &mut Stage<P>, asked: &ClientContext<'_>, command: &str, rest: &[&str]) -> Outcome {
     match command {
         "MOV" | "MVR" => {
             let values = values(asked.axes, rest)?;
             stage.refresh()?;
-            let mut pose = stage.standing()?;
+            let mut pose = stage.start_of_move()?;
             for (axis, value) in values {
                 let value = from_wire(value);
                 pose[axis] = if command == "MVR" { pose[axis] + value } else { value };
@@ -145,7 +145,7 @@ fn order<P: Port>(stage: &mut Stage<P>, asked: &ClientContext<'_>, command: &str
             let values = values(asked.axes, rest)?;
             stage.refresh()?;
             match values.iter().map(|(_, value)| *value).collect::<Vec<_>>()[..] {
-                // The platform's loop is one.
+                // The platform has one loop for all axes.
                 [first, ref others @ ..] if others.iter().any(|other| other != &first) => {
                     return Err(Code::ParameterRange.into());
                 }
@@ -154,7 +154,7 @@ fn order<P: Port>(stage: &mut Stage<P>, asked: &ClientContext<'_>, command: &str
                 _ => return Err(Code::ParameterRange.into()),
             }
         }
-        // Whatever stands behind it.
+        // It stops even if its parameters are invalid.
         "STP" | "HLT" => {
             let stopped = stop(stage);
             return match chosen(asked.axes, rest) {
@@ -197,13 +197,13 @@ fn order<P: Port>(stage: &mut Stage<P>, asked: &ClientContext<'_>, command: &str
     Ok(None)
 }
 
-/// A machine has the speed of its spec. A client that allows more gets it; one that asks for less would not get less.
+/// The machine moves at the speed of its spec: a higher limit is accepted, a lower one refused.
 fn fast_enough(value: f64, speed: f64) -> Result<(), Code> {
-    // As many digits as are answered, so that what was read may be set.
+    // Tolerates the rounding of answers, so that a client may set the speed that it read.
     if value >= speed - 1e-6 { Ok(()) } else { Err(Code::Velocity) }
 }
 
-/// Of the translations together: that of the slowest, µm/s.
+/// Speed of the slowest translation, µm/s.
 fn system_speed(motion: &Motion) -> f64 {
     let [x, y, z, ..] = *motion.speed();
     to_wire([y, z].into_iter().fold(x, |least, speed| if speed < least { speed } else { least }))
@@ -215,15 +215,15 @@ fn query<P: Port>(stage: &mut Stage<P>, asked: &mut ClientContext<'_>, command: 
         "*IDN" => {
             let description = stage.session().description();
             let digest: String = description.digest.chars().take(8).collect();
-            // Clients part fields at commas.
+            // Clients split the answer at commas.
             let name = description.name.replace(',', " ");
             format!("specgen,HEXAPOD {name},{digest},{}", description.version)
         }
         "CSV" => "2.0".to_owned(),
         "ERR" => {
             stage.refresh()?;
-            if asked.may_order {
-                // What becomes of a move is known some ticks after it.
+            if asked.may_control {
+                // The result of a move is known some ticks later.
                 if !stage.is_answered() {
                     return Err(Rejection::Later);
                 }
@@ -284,7 +284,7 @@ fn ends<P: Port>(stage: &Stage<P>, axis: usize) -> [f64; 2] {
     limits(|pose| stage.admitted(pose).is_some(), &[0.0; 6], axis)
 }
 
-/// How far each axis gets from the goal along a direction.
+/// The farthest position of each axis from the goal along a direction.
 fn reach<P: Port>(stage: &Stage<P>, axes: &Axes, rest: &[&str]) -> Result<String, Code> {
     let values = values(axes, rest)?;
     let mut way = [0.0; 6];
@@ -315,7 +315,7 @@ fn unit(axis: usize) -> &'static str {
     if axis < 3 { "um" } else { "urad" }
 }
 
-/// `NAME=…` of the axes that are named, or of all.
+/// `NAME=…` of the given axes, or of all.
 fn per_axis(axes: &Axes, rest: &[&str], of: impl Fn(usize) -> String) -> Result<String, Code> {
     Ok(lines(chosen(axes, rest)?.into_iter().map(|(name, axis)| format!("{name}={}", of(axis)))))
 }
@@ -327,7 +327,7 @@ fn chosen<'a>(axes: &'a Axes, names: &[&'a str]) -> Result<Vec<(&'a str, usize)>
     names.iter().map(|name| axes.place(name).map(|axis| (*name, axis)).ok_or(Code::Axis)).collect()
 }
 
-/// Axis and value of each pair, every axis once.
+/// Axis and value of each pair; an axis may occur once.
 fn values(axes: &Axes, rest: &[&str]) -> Result<Vec<(usize, f64)>, Code> {
     let mut found: Vec<(usize, f64)> = Vec::new();
     for (name, value) in pairs(rest)? {
@@ -356,12 +356,12 @@ fn point(name: &str) -> Result<usize, Code> {
     ["R", "S", "T"].iter().position(|known| *known == name).ok_or(Code::Axis)
 }
 
-/// µm and µrad to a millionth, finer than the ten-thousandths in which a client counts.
+/// Six decimals of µm or µrad; clients use four.
 fn decimal(value: f64) -> String {
     format!("{value:.6}")
 }
 
-/// Lines of an answer; every one but the last ends in a space.
+/// Joins the lines of an answer; each but the last ends with a space.
 fn lines(lines: impl Iterator<Item = String>) -> String {
     lines.collect::<Vec<_>>().join(" \n")
 }

@@ -1,14 +1,15 @@
-//! Bytes of a client as commands: lines that end in LF, and single bytes without one. Stops overtake.
+//! Splits the bytes of a client into commands: lines that end in LF, and single bytes. Stops overtake other commands.
 
 use std::collections::VecDeque;
 
-/// Longest line: six axes with all their digits, many times over.
+/// Longest line; six axes with all digits need much less.
 const LONGEST: usize = 512;
-/// What commands that wait may take, bytes with [`PIECE`] for each; more are dropped, for a stop behind them is to be found.
+/// Largest size of queued commands, bytes with [`PIECE`] for each. Further commands are dropped, so that a stop behind them is
+/// found.
 const ROOM: usize = 1 << 22;
-/// What a command takes beside its letters, bytes.
+/// Size of a command in addition to its letters, bytes.
 const PIECE: usize = 32;
-/// Moves that are passed over at once.
+/// Moves that are skipped in one call.
 const SKIPPED: usize = 1 << 10;
 /// Bytes that are commands by themselves: position, status, motion, ready, macros, wave generator, stop.
 const SINGLE: [u8; 7] = [3, 4, 5, 7, 8, 9, STOP];
@@ -18,11 +19,11 @@ pub(super) const STOP: u8 = 24;
 /// One command.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Piece {
-    /// A byte that needs no line.
+    /// A single-byte command.
     Single(u8),
     /// A line without its end; never empty.
     Line(String),
-    /// A line that was longer than any command, or commands for which there was no room.
+    /// A line that was too long, or commands that were dropped.
     TooLong,
 }
 
@@ -34,12 +35,12 @@ impl Piece {
         }
     }
 
-    /// Whether it needs control: it moves something, or lets it move.
-    pub(super) fn is_order(&self) -> bool {
+    /// Whether its client must be in control: it causes or enables motion.
+    pub(super) fn needs_control(&self) -> bool {
         self.is_move() || matches!(self.words().next(), Some("SVO" | "FRF" | "SPI" | "VEL" | "VLS"))
     }
 
-    /// Whether it stops the platform, whoever sent it.
+    /// Whether it stops the platform; every client may do that.
     pub(super) fn is_stop(&self) -> bool {
         *self == Self::Single(STOP) || matches!(self.words().next(), Some("STP" | "HLT"))
     }
@@ -51,7 +52,7 @@ impl Piece {
         self.words().next() == Some("SVO") && states().next().is_some() && states().all(is_zero)
     }
 
-    /// Whether a stop takes it away: it leads to a motion.
+    /// Whether it leads to a motion, so that a stop discards it.
     fn is_move(&self) -> bool {
         matches!(self.words().next(), Some("MOV" | "MVR")) || self.words().next() == Some("SVO") && !self.is_off()
     }
@@ -61,40 +62,40 @@ impl Piece {
     }
 }
 
-/// What a client sent and nobody looked at yet.
+/// Received commands of a client that were not executed yet.
 #[derive(Debug, Default)]
 pub(super) struct Input {
     line: Vec<u8>,
-    /// Skips to the end of a line that is too long.
+    /// Skipping to the end of a line that is too long.
     skips: bool,
     /// The line began before a stop of another client.
     is_late: bool,
-    /// The last stop, and the last time that the servo was switched off: they come first.
+    /// The last stop and the last servo-off command; they come first.
     stops: Vec<Piece>,
     pieces: VecDeque<Piece>,
-    /// So many of the first pieces were sent before a stop: those of them that would move are taken away when their turn comes.
+    /// Number of pieces at the front that were sent before a stop; moves among them are discarded in turn.
     before_stop: usize,
-    /// Something that would move was taken away.
+    /// A move was discarded.
     has_dropped: bool,
-    /// What the pieces take, as [`ROOM`] counts.
+    /// Size of the pieces, as for [`ROOM`].
     size: usize,
 }
 
 impl Input {
-    /// Takes bytes; whether a stop is among them, or the servo is switched off by one who `may_order`. It then comes first, and what would
-    /// move and was sent before it is taken away.
-    pub(super) fn push(&mut self, bytes: &[u8], may_order: bool) -> bool {
+    /// Adds bytes. Returns whether they contain a stop, or a servo-off command of a client that `may_control`. That command then
+    /// comes first, and moves that were sent before it are discarded.
+    pub(super) fn push(&mut self, bytes: &[u8], may_control: bool) -> bool {
         let mut stops = false;
         for byte in bytes {
             match *byte {
-                b'\n' => stops |= self.end_line(may_order),
+                b'\n' => stops |= self.end_line(may_control),
                 b'\r' => {}
                 STOP => {
                     self.line.clear();
                     self.skips = false;
-                    stops |= self.add(Piece::Single(STOP), may_order);
+                    stops |= self.add(Piece::Single(STOP), may_control);
                 }
-                byte if SINGLE.contains(&byte) => stops |= self.add(Piece::Single(byte), may_order),
+                byte if SINGLE.contains(&byte) => stops |= self.add(Piece::Single(byte), may_control),
                 byte if self.line.len() < LONGEST => self.line.push(byte),
                 _ => self.skips = true,
             }
@@ -102,7 +103,7 @@ impl Input {
         stops
     }
 
-    fn end_line(&mut self, may_order: bool) -> bool {
+    fn end_line(&mut self, may_control: bool) -> bool {
         let text = String::from_utf8_lossy(&self.line).trim().to_owned();
         self.line.clear();
         let is_late = std::mem::take(&mut self.is_late);
@@ -112,11 +113,11 @@ impl Input {
         if is_dropped || piece == Piece::Line(String::new()) {
             return false;
         }
-        self.add(piece, may_order)
+        self.add(piece, may_control)
     }
 
-    fn add(&mut self, piece: Piece, may_order: bool) -> bool {
-        if piece.is_stop() || may_order && piece.is_off() {
+    fn add(&mut self, piece: Piece, may_control: bool) -> bool {
+        if piece.is_stop() || may_control && piece.is_off() {
             self.drop_moves();
             self.stops.retain(|before| before.is_stop() != piece.is_stop());
             self.stops.insert(0, piece);
@@ -132,13 +133,13 @@ impl Input {
         false
     }
 
-    /// Takes away what would move, the line that is coming in, too. However much waits, this takes no time: see [`Input::skip`].
+    /// Discards moves, including the incomplete line. It takes constant time: see [`Input::skip`].
     pub(super) fn drop_moves(&mut self) {
         self.before_stop = self.pieces.len();
         self.is_late = !self.line.is_empty();
     }
 
-    /// Passes over moves that a stop has taken away, so many at once; whether the command whose turn it is may be carried out.
+    /// Skips discarded moves, a limited number per call. Returns whether the next command may be executed.
     pub(super) fn skip(&mut self) -> bool {
         for _ in 0..SKIPPED {
             let is_dropped = self.stops.is_empty() && self.before_stop > 0 && self.first().is_some_and(Piece::is_move);
@@ -151,22 +152,22 @@ impl Input {
         false
     }
 
-    /// Whether a stop waits, or the servo is to be switched off.
+    /// Whether a stop or a servo-off command is waiting.
     pub(super) fn has_stop(&self) -> bool {
         !self.stops.is_empty()
     }
 
-    /// Whether anything was taken away since this was called last.
+    /// Whether a move was discarded since the last call.
     pub(super) fn has_dropped(&mut self) -> bool {
         std::mem::take(&mut self.has_dropped)
     }
 
-    /// The command whose turn it is.
+    /// The next command.
     pub(super) fn first(&self) -> Option<&Piece> {
         self.stops.first().or(self.pieces.front())
     }
 
-    /// It is done with.
+    /// Removes the next command.
     pub(super) fn done(&mut self) {
         if !self.stops.is_empty() {
             self.stops.remove(0);
@@ -214,13 +215,13 @@ mod tests {
             pieces(&[b"POS? X\r\n\n  \n\x05MO", b"V X 1\nPO"]),
             [line("POS? X"), Piece::Single(5), line("MOV X 1")]
         );
-        // In the midst of a line, and with a line end that it does not need.
+        // Within a line, and with an unnecessary line end.
         assert_eq!(pieces(&[b"PO\x05\nS?\n"]), [Piece::Single(5), line("PO"), line("S?")]);
         assert_eq!(pieces(&[&[b'A'; 600], b"\nERR?\n"]), [Piece::TooLong, line("ERR?")]);
     }
 
     #[test]
-    fn a_stop_comes_first_and_takes_away_what_would_move() {
+    fn a_stop_comes_first_and_discards_moves() {
         let stop = || Piece::Single(STOP);
         assert_eq!(pieces(&[b"MOV X 1\nMVR X 2\nSVO X 1\n\x18ERR?\n"]), [stop(), line("ERR?")]);
         assert_eq!(pieces(&[b"MOV X 1\nHLT X\nMOV X 2\n"]), [line("HLT X"), line("MOV X 2")]);
@@ -228,25 +229,25 @@ mod tests {
         assert_eq!(pieces(&[b"POS?\nVLS 1\nMOV X 1\n\x18"]), [stop(), line("POS?"), line("VLS 1")]);
         assert_eq!(pieces(&[b"SVO X 1\nMOV X 1\nSVO X 0 Y 0\n"]), [line("SVO X 0 Y 0")]);
         assert_eq!(pieces(&[b"MOV X 1\nSVO X 0 Y 1\n"]).len(), 2);
-        // Of one who may not switch it off.
+        // From a client that may not switch the servo off.
         let mut input = Input::default();
         assert!(!input.push(b"MOV X 1\nSVO X 0\n", false) && input.push(b"STP\n", false));
         assert_eq!(all(input), [line("STP"), line("SVO X 0")]);
     }
 
     #[test]
-    fn a_stop_of_another_takes_away_a_line_that_is_under_way() {
+    fn a_stop_of_another_client_discards_an_incomplete_line() {
         let mut input = Input::default();
         input.push(b"MOV X", true);
         input.drop_moves();
-        assert!(!input.has_dropped(), "it may be a question yet");
+        assert!(!input.has_dropped(), "it may still be a query");
         input.push(b" 2\nMOV X 3\n", true);
         assert!(input.has_dropped() && !input.has_dropped());
         assert_eq!(all(input), [line("MOV X 3")]);
     }
 
     #[test]
-    fn what_waits_is_bounded_and_a_stop_is_found_behind_it() {
+    fn the_queue_is_bounded_and_a_stop_is_found_behind_it() {
         let mut input = Input::default();
         for _ in 0..100 {
             input.push(&b"MOV X 1\n".repeat(10_000), true);

@@ -1,10 +1,10 @@
-//! Clients over TCP: many may query, one is in control, any may stop the machine, and none keeps it waiting.
+//! Clients over TCP: many may query, one is in control, any may stop the machine, and none can block it.
 //!
 //! ```text
-//! round: look at the machine, if it is due ─► read a part from each client ─► stops ─► commands, one of each client in turn
+//! round: poll the machine, if due ─► read some bytes of each client ─► stops ─► commands, one of each client in turn
 //! ```
-//! A round takes milliseconds, whatever clients send. A stop is carried out in the round in which it is read. An order waits until
-//! everything that its client has sent was read: a stop among it overtakes all of it.
+//! A round takes milliseconds, whatever clients send. A stop is executed in the round in which it is read. A command that needs
+//! control waits until everything sent by its client was read, so that a stop overtakes it.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -24,89 +24,89 @@ use super::input::{Input, Piece};
 use super::stage::{Rejection, Stage};
 use crate::session::Session;
 
-/// Clients at a time that may do everything.
+/// Number of clients with full access.
 const MOST: usize = 16;
-/// Clients beyond that may only stop the machine, until one of the others leaves or has to make room.
+/// Additional clients, which may only stop the machine until one of the others leaves or is disconnected.
 const RESERVED: usize = 4;
-/// Connections that are taken in a round.
+/// Connections accepted per round.
 const TAKEN: usize = 4;
-/// Bytes that are read in a round from all clients together, and from each of them if they are many.
+/// Bytes read per round from all clients together, and at least from each.
 const ROUND: usize = 1 << 15;
 const PART: usize = 1 << 12;
-/// Commands of a client that are carried out in a round, and how long those of all clients may take.
+/// Commands executed per client and round, and the time limit for those of all clients.
 const TURN: usize = 32;
 const SLICE: Duration = Duration::from_millis(2);
-/// So long before it is due the machine is looked at: a round may be under way.
+/// The machine is polled this long before it is due, because a round may be in progress.
 const EARLY: Duration = Duration::from_millis(5);
-/// Bytes that a client may leave unread before its commands wait.
+/// Bytes of answers that a client may leave unread before its commands wait.
 const UNREAD: usize = 1 << 16;
-/// How long a command may wait for a machine that comes up or to rest.
+/// How long a command may wait for a machine that is starting or coming to rest.
 const PATIENCE: Duration = Duration::from_secs(12);
-/// A client in control that has sent no command for so long loses control to the next that sends one.
+/// A client in control loses control to the next client if it has sent no command for this time.
 const IDLE: Duration = Duration::from_secs(60);
-/// A client that has been silent for so long makes room for one for whom there is none.
+/// A client that was silent for this time can be disconnected to make room for another.
 const SILENT: Duration = Duration::from_secs(5);
-/// A connection without a sign of life for so long is looked after, and closed if it stays so for as long again.
+/// Idle time before a keep-alive probe; a connection that does not answer for as long again is closed.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
-/// What comes from a client after a stop of another was sent before it, until the client pauses for so long or has been told, and for so
-/// long at most once everything that it has sent was read.
+/// After a stop by another client, what a client sends counts as sent before the stop, until it pauses for `PAUSE` or has read
+/// the error, and for `LATE` at most once everything that it sent was read.
 const PAUSE: Duration = Duration::from_millis(50);
 const LATE: Duration = Duration::from_secs(1);
-/// How long one that has closed its side may take to read.
+/// How long a client that has closed its side may take to read answers.
 const GOODBYE: Duration = Duration::from_secs(2);
-/// Between two looks while something is under way.
+/// Polling interval during a motion or a wait.
 const SOON: Duration = Duration::from_millis(1);
 
 struct Client {
     number: u64,
     stream: TcpStream,
     input: Input,
-    /// Everything that had come from it was read.
+    /// Everything that it sent was read.
     is_dry: bool,
     unsent: Vec<u8>,
     error: Option<Code>,
     /// When it last sent something.
     heard: Instant,
-    /// Since when another has stopped the machine, while what it sends may have been sent before.
+    /// When another client stopped the machine, while later input may have been sent before that.
     late: Option<Instant>,
-    /// Since when the command whose turn it is waits for the machine.
+    /// Since when its next command waits for the machine.
     waits: Option<Instant>,
-    /// Since when it sends nothing any more.
+    /// When it closed its side.
     left: Option<Instant>,
 }
 
-/// The client in control, and its last command.
+/// The client in control, and the time of its last command.
 struct Owner {
     number: u64,
-    ordered: Instant,
+    last_command: Instant,
 }
 
-/// A machine that GCS clients move.
+/// A server that lets GCS clients move a machine.
 pub struct Bridge<P> {
     stage: Stage<P>,
     axes: Axes,
     listener: TcpListener,
     clients: Vec<Client>,
     owner: Option<Owner>,
-    /// Clients so far.
+    /// Number of clients so far.
     count: u64,
-    /// The client that was served last.
+    /// Index of the client that was served last.
     turn: usize,
-    /// Clients were heard since the last order.
+    /// Clients were read since the last command that needs control.
     has_heard: bool,
 }
 
 impl<P: Port> Bridge<P> {
-    /// Of a machine, for clients of a listener.
+    /// A server of a machine for clients of a listener.
     ///
     /// # Errors
-    /// What the system says.
+    /// The listener cannot be set to non-blocking mode.
     pub fn new(stage: Stage<P>, axes: Axes, listener: TcpListener) -> io::Result<Self> {
         listener.set_nonblocking(true)?;
         Ok(Self { stage, axes, listener, clients: Vec::new(), owner: None, count: 0, turn: 0, has_heard: false })
     }
 
-    /// Serves until `stop`. The machine is looked at in between, and told to `look` at.
+    /// Serves until `stop`, and polls the machine. `look` is called after each poll.
     ///
     /// # Errors
     /// The link to the machine broke.
@@ -123,7 +123,7 @@ impl<P: Port> Bridge<P> {
         Ok(())
     }
 
-    /// Looks at the machine if it is due, or something is under way.
+    /// Polls the machine if it is due, or often during a motion.
     fn look(&mut self, look: &mut impl FnMut(&Session<P>)) -> Result<(), ClientError> {
         if self.due().is_zero() || self.is_pressed() && self.stage.age() >= SOON {
             self.stage.look()?;
@@ -132,22 +132,22 @@ impl<P: Port> Bridge<P> {
         Ok(())
     }
 
-    /// Time until the machine has to be looked at.
+    /// Time until the machine must be polled.
     fn due(&self) -> Duration {
         self.stage.due().saturating_sub(EARLY)
     }
 
-    /// The machine as it is left.
+    /// Returns the session.
     pub fn into_session(self) -> Session<P> {
         self.stage.into_session()
     }
 
-    /// Something is under way that wants the machine looked at often.
+    /// Whether the machine must be polled often: a motion, or a command that waits.
     fn is_pressed(&self) -> bool {
         self.stage.moves() || self.clients.iter().any(|client| client.waits.is_some())
     }
 
-    /// Until a client sends something or takes what it is sent, or the machine has to be looked at.
+    /// Waits until a client sends something or can take an answer, or the machine must be polled.
     fn wait(&self) {
         let is_soon = self.is_pressed() || self.clients.iter().any(|client| !client.is_dry);
         let has_work = self.clients.iter().any(|client| client.waits.is_none() && client.is_ready());
@@ -159,7 +159,7 @@ impl<P: Port> Bridge<P> {
         let mut files = vec![PollFd::new(&self.listener, PollFlags::IN)];
         for client in &self.clients {
             let mut flags = PollFlags::empty();
-            // One that sends more than is read in a round does not hurry the rounds.
+            // A client with unread input must not shorten the wait.
             if client.left.is_none() && client.is_dry {
                 flags |= PollFlags::IN;
             }
@@ -168,14 +168,14 @@ impl<P: Port> Bridge<P> {
             }
             files.push(PollFd::from_borrowed_fd(client.stream.as_fd(), flags));
         }
-        // A signal ends it early, and whatever else it says there is a next round.
+        // A signal ends the wait early. After any other error, the next round tries again.
         match Timespec::try_from(limit).map(|limit| poll(&mut files, Some(&limit))) {
             Ok(Ok(_) | Err(Errno::INTR)) => {}
             _ => std::thread::sleep(SOON),
         }
     }
 
-    /// Takes who came. A client always gets in: in the place of one that has long been silent, or where it may only stop the machine.
+    /// Accepts connections. A client always gets in: it replaces one that has long been silent, or may only stop the machine.
     fn accept(&mut self) -> Result<(), ClientError> {
         for _ in 0..TAKEN {
             let Ok((stream, _)) = self.listener.accept() else { break };
@@ -188,10 +188,10 @@ impl<P: Port> Bridge<P> {
                 self.clients.remove(silent);
             }
             if self.clients.len() >= MOST + RESERVED {
-                // It may have said what it came for.
+                // Its input may contain a stop, so execute it before it is disconnected.
                 self.hear_from(MOST);
                 for _ in 0..TURN {
-                    self.carry_out(MOST)?;
+                    self.execute_next(MOST)?;
                 }
                 self.clients.remove(MOST).write();
             }
@@ -212,19 +212,19 @@ impl<P: Port> Bridge<P> {
         Ok(())
     }
 
-    /// Of those that may do everything, but for the one in control.
+    /// The client with full access that has been silent longest, except the one in control.
     fn longest_silent(&self) -> Option<usize> {
-        let has_orders = |client: &Client| self.owner.as_ref().is_some_and(|owner| owner.number == client.number);
+        let is_owner = |client: &Client| self.owner.as_ref().is_some_and(|owner| owner.number == client.number);
         let silent = self.clients.iter().take(MOST).enumerate();
-        let silent = silent.filter(|(_, client)| !has_orders(client) && client.heard.elapsed() >= SILENT);
+        let silent = silent.filter(|(_, client)| !is_owner(client) && client.heard.elapsed() >= SILENT);
         silent.max_by_key(|(_, client)| client.heard.elapsed()).map(|(index, _)| index)
     }
 
-    fn may_order(&self, number: u64) -> bool {
-        self.owner.as_ref().is_none_or(|owner| owner.number == number || owner.ordered.elapsed() >= IDLE)
+    fn may_control(&self, number: u64) -> bool {
+        self.owner.as_ref().is_none_or(|owner| owner.number == number || owner.last_command.elapsed() >= IDLE)
     }
 
-    /// Takes a part of what each client sent.
+    /// Reads some input of each client.
     fn hear(&mut self) {
         for index in 0..self.clients.len() {
             self.hear_from(index);
@@ -234,16 +234,16 @@ impl<P: Port> Bridge<P> {
 
     fn hear_from(&mut self, index: usize) {
         let number = self.clients[index].number;
-        let may_order = index < MOST && self.may_order(number);
+        let may_control = index < MOST && self.may_control(number);
         let most = (ROUND / self.clients.len()).max(PART);
-        if self.clients[index].read(most, may_order) {
+        if self.clients[index].read(most, may_control) {
             self.stage.must_stop();
             self.drop_moves(Some(number));
         }
     }
 
-    /// What clients sent until now moves nothing any more, in whatever buffer it is; `by` the one who stopped the machine only what it
-    /// sent before that.
+    /// Discards moves that clients have sent so far, even if they are still in a buffer. `by` is the client that stopped the
+    /// machine; its moves before the stop are already discarded.
     fn drop_moves(&mut self, by: Option<u64>) {
         for client in self.clients.iter_mut().filter(|client| Some(client.number) != by) {
             client.input.drop_moves();
@@ -251,7 +251,7 @@ impl<P: Port> Bridge<P> {
         }
     }
 
-    /// Whether another than a client has stopped the machine.
+    /// Whether the machine was stopped, but not by a client.
     fn was_stopped(&mut self) -> bool {
         let was_stopped = self.stage.was_stopped();
         if was_stopped {
@@ -260,19 +260,19 @@ impl<P: Port> Bridge<P> {
         was_stopped
     }
 
-    /// Carries out some of what clients sent: stops, then one command of each client in turn until the time is up.
+    /// Executes stops, then one command of each client in turn until the time is up.
     fn serve(&mut self) -> Result<(), ClientError> {
         let (start, count) = (Instant::now(), self.clients.len());
         self.was_stopped();
         for index in 0..count {
             if self.clients[index].input.has_stop() {
-                self.carry_out(index)?;
+                self.execute_next(index)?;
             }
         }
         let mut idle = 0;
         for _ in 0..TURN * count {
             self.turn = (self.turn + 1) % count;
-            idle = if self.carry_out(self.turn)? { 0 } else { idle + 1 };
+            idle = if self.execute_next(self.turn)? { 0 } else { idle + 1 };
             if idle == count || start.elapsed() >= SLICE {
                 break;
             }
@@ -281,16 +281,16 @@ impl<P: Port> Bridge<P> {
         Ok(())
     }
 
-    /// Carries out the command whose turn it is; whether there was one that does not have to wait.
-    fn carry_out(&mut self, index: usize) -> Result<bool, ClientError> {
+    /// Executes the next command of a client. Returns false if there is none, or it has to wait.
+    fn execute_next(&mut self, index: usize) -> Result<bool, ClientError> {
         if !self.clients[index].skip() {
             return Ok(true);
         }
         let client = &self.clients[index];
         let Some(piece) = client.input.first().filter(|_| client.is_ready()).cloned() else { return Ok(false) };
-        let may_order = self.may_order(client.number);
-        if may_order && piece.is_order() && !client.input.has_stop() {
-            // It may have been overtaken.
+        let may_control = self.may_control(client.number);
+        if may_control && piece.needs_control() && !client.input.has_stop() {
+            // A stop may have overtaken it.
             if !self.has_heard {
                 return Ok(false);
             }
@@ -302,11 +302,11 @@ impl<P: Port> Bridge<P> {
         }
         let client = &mut self.clients[index];
         let is_crowd = index >= MOST && !piece.is_stop() && piece != Piece::Line("ERR?".to_owned());
-        let mut asked = ClientContext { axes: &self.axes, error: &mut client.error, may_order };
+        let mut asked = ClientContext { axes: &self.axes, error: &mut client.error, may_control };
         let done = if is_crowd { Err(Code::NotNow.into()) } else { execute(&mut self.stage, &mut asked, &piece) };
         match done {
             Err(Rejection::Link(error)) => return Err(error),
-            // What it is not there to see is not done later.
+            // If the client has gone, do not execute its command later.
             Err(Rejection::Later) if client.left.is_some() => client.error = Some(Code::NotNow),
             Err(Rejection::Later) if client.waits.get_or_insert_with(Instant::now).elapsed() < PATIENCE => {
                 return Ok(false);
@@ -314,8 +314,8 @@ impl<P: Port> Bridge<P> {
             Err(Rejection::Later) => client.error = Some(Code::NotNow),
             Err(Rejection::Code(code)) => client.error = Some(code),
             Ok(answer) => {
-                if may_order && piece.is_order() {
-                    self.owner = Some(Owner { number: client.number, ordered: Instant::now() });
+                if may_control && piece.needs_control() {
+                    self.owner = Some(Owner { number: client.number, last_command: Instant::now() });
                 }
                 client.say(answer.as_deref());
             }
@@ -328,7 +328,7 @@ impl<P: Port> Bridge<P> {
         Ok(true)
     }
 
-    /// Clients that have gone give up control; what they asked for is done, and the platform stays there.
+    /// Removes clients that have gone; one in control gives it up. Their motions end normally.
     fn part(&mut self) {
         self.clients.retain(Client::is_there);
         let is_there = |owner: &Owner| self.clients.iter().any(|client| client.number == owner.number);
@@ -338,7 +338,7 @@ impl<P: Port> Bridge<P> {
     }
 }
 
-/// As a client is served: without waiting, and its answers, which are short and waited for, at once.
+/// Sets the options of a connection: non-blocking, answers without delay, keep-alive.
 fn prepare(stream: &TcpStream) -> io::Result<()> {
     stream.set_nonblocking(true)?;
     stream.set_nodelay(true)?;
@@ -349,13 +349,13 @@ fn prepare(stream: &TcpStream) -> io::Result<()> {
 }
 
 impl Client {
-    /// Whether a command of it may be carried out: it reads what it is answered, and no stop can be behind an order of it.
+    /// Whether its next command may be executed: it reads its answers, and no unread stop can overtake the command.
     fn is_ready(&self) -> bool {
-        let may = |piece: &Piece| self.unsent.len() < UNREAD && (self.is_dry || !piece.is_order());
+        let may = |piece: &Piece| self.unsent.len() < UNREAD && (self.is_dry || !piece.needs_control());
         self.input.has_stop() || self.input.first().is_some_and(may)
     }
 
-    /// Whether there is anything left to do for it. One that only listens gets its answers.
+    /// Whether it is connected, or still gets answers after it closed its side.
     fn is_there(&self) -> bool {
         let waits = self.input.first().is_some() || !self.unsent.is_empty();
         self.left.is_none_or(|left| waits && left.elapsed() < GOODBYE)
@@ -365,8 +365,8 @@ impl Client {
         self.left.get_or_insert_with(Instant::now);
     }
 
-    /// Takes at most so many bytes of what it sent; whether a stop is among them.
-    fn read(&mut self, most: usize, may_order: bool) -> bool {
+    /// Reads at most `most` bytes. Returns whether they contain a stop.
+    fn read(&mut self, most: usize, may_control: bool) -> bool {
         let (mut bytes, mut taken, mut stops) = ([0; ROUND], 0, false);
         if self.left.is_none() {
             match self.stream.read(&mut bytes[..most]) {
@@ -374,7 +374,7 @@ impl Client {
                 Ok(count) => {
                     taken = count;
                     self.heard = Instant::now();
-                    stops = self.input.push(&bytes[..count], may_order);
+                    stops = self.input.push(&bytes[..count], may_control);
                     self.acknowledge();
                 }
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
@@ -392,7 +392,7 @@ impl Client {
         stops
     }
 
-    /// Passes over what a stop has taken away; false if there is more of it.
+    /// Skips discarded moves; false if there are more.
     fn skip(&mut self) -> bool {
         let is_over = self.input.skip();
         self.tell_dropped();
@@ -405,14 +405,14 @@ impl Client {
         }
     }
 
-    /// Lets the system acknowledge what was read at once. It would wait for an answer to do it with, and a command that has none keeps a
-    /// client without `TCP_NODELAY` from sending its next one for 40 ms.
+    /// Makes the system acknowledge received data immediately. Otherwise it waits for an answer, and a command without one delays
+    /// the next command of a client without `TCP_NODELAY` by 40 ms.
     fn acknowledge(&self) {
         #[cfg(target_os = "linux")]
         let _ = sockopt::set_tcp_quickack(&self.stream, true);
     }
 
-    /// An answer, of bytes as the wire has them.
+    /// Queues an answer, one byte per character.
     fn say(&mut self, answer: Option<&str>) {
         if let Some(text) = answer {
             self.unsent.extend(text.chars().map(|letter| u8::try_from(u32::from(letter)).unwrap_or(b'?')));

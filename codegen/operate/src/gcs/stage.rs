@@ -1,4 +1,4 @@
-//! The machine as GCS sees it: a servo that is on or off, a goal, and whether it is there.
+//! The machine in terms of GCS: servo on or off, goal, on target.
 
 use std::time::{Duration, Instant};
 
@@ -12,18 +12,18 @@ use crate::frame::Frame;
 use crate::motion::{self, Motion};
 use crate::session::{Place, Session};
 
-/// Ticks after which a place shows what became of an order.
+/// Ticks after which a place shows the effect of a command.
 const SEEN: u64 = 10;
-/// A place that is older is asked for anew before it is told.
+/// Largest age of a place for an answer.
 const FRESH: Duration = Duration::from_micros(500);
-/// After so long a machine that makes no ticks is not waited for.
+/// How long to wait for a machine that is not ticking.
 const SILENT: Duration = Duration::from_millis(100);
-/// How long it may take until the machine runs.
+/// Timeout of starting the machine.
 const UP: Duration = Duration::from_secs(10);
-/// A machine that holds for so long after it was asked to run is held by somebody.
+/// If the machine still holds this long after a request to run, another host holds it.
 const HELD: Duration = Duration::from_millis(500);
 
-/// The status is asked for this often at least.
+/// Interval of status requests.
 const POLL: Duration = Duration::from_secs(1);
 
 /// A session with a platform.
@@ -32,25 +32,25 @@ pub struct Stage<P> {
     motion: Motion,
     place: Place,
     seen: Instant,
-    /// When its status was asked for last.
+    /// Time of the last status request.
     polled: Instant,
-    /// Where the last move leads, in the user's coordinates; none if nothing is known of one.
+    /// Destination of the last move, in the user's coordinates; none if unknown.
     goal: Option<[f64; 6]>,
-    /// The last order: a tick from which on the place shows what became of it, and when it was sent.
-    ordered: (u64, Instant),
-    /// On the way to a machine that runs.
-    rising: Option<StartUp>,
-    /// It runs, and goes to its bias pose.
+    /// The last command: the tick from which the place shows its effect, and when it was sent.
+    last_command: (u64, Instant),
+    /// Start-up in progress.
+    starting: Option<StartUp>,
+    /// It is running, and moves to its bias pose.
     to_bias: bool,
-    /// It is to run no more, and that was asked for here.
-    goes_down: bool,
-    /// It runs no more, or comes up no further, and that was not asked for here.
+    /// A stop was requested here.
+    is_stopping: bool,
+    /// The machine, or its start-up, was stopped, but not from here.
     stopped: bool,
-    /// The last stop that clients sent was carried out.
+    /// The last stop of clients was executed.
     has_halted: bool,
-    /// Its tool point is the pivot point of clients: they see it move.
+    /// The frame of clients; its tool point is their pivot point.
     frame: Frame,
-    /// What went wrong after the command that asked for it had been taken.
+    /// Error of a command that had already been accepted.
     mishap: Option<Code>,
 }
 
@@ -60,10 +60,10 @@ struct StartUp {
     asked: Request,
 }
 
-/// Why an order is not carried out.
+/// Why a command is not executed.
 pub(super) enum Rejection {
     Code(Code),
-    /// Not yet: the machine is coming up, or to rest.
+    /// Not yet: the machine is starting, or coming to rest.
     Later,
     Link(ClientError),
 }
@@ -85,15 +85,15 @@ impl From<ClientError> for Rejection {
 }
 
 impl<P: Port> Stage<P> {
-    /// Of a session with a platform.
+    /// From a session with a platform.
     ///
     /// # Errors
-    /// The device has six legs, or does not say where it is.
+    /// The device controls six legs, or does not report its place.
     pub fn new(mut session: Session<P>) -> Result<Self, String> {
         let motion = session.motion().cloned();
         let place = session.place().map_err(|error| error.to_string())?;
         let (Some(motion), Some(place)) = (motion, place) else {
-            return Err("the device controls six legs without a platform: GCS speaks of poses".to_owned());
+            return Err("the device controls six legs without a platform: GCS needs poses".to_owned());
         };
         Ok(Self {
             session,
@@ -102,10 +102,10 @@ impl<P: Port> Stage<P> {
             seen: Instant::now(),
             polled: Instant::now(),
             goal: None,
-            ordered: (0, Instant::now()),
-            rising: None,
+            last_command: (0, Instant::now()),
+            starting: None,
             to_bias: place.status & BUSY != 0,
-            goes_down: false,
+            is_stopping: false,
             stopped: false,
             has_halted: false,
             frame: Frame::default(),
@@ -113,7 +113,7 @@ impl<P: Port> Stage<P> {
         })
     }
 
-    /// The session, for what is not GCS.
+    /// Returns the session.
     pub fn into_session(self) -> Session<P> {
         self.session
     }
@@ -136,44 +136,44 @@ impl<P: Port> Stage<P> {
 
     /// Whether the loop is closed, or is about to be.
     pub(super) fn servo(&self) -> bool {
-        self.runs() || self.rising.is_some()
+        self.runs() || self.starting.is_some()
     }
 
-    pub(super) fn is_rising(&self) -> bool {
-        self.rising.is_some()
+    pub(super) fn is_starting(&self) -> bool {
+        self.starting.is_some()
     }
 
-    /// Whether the goal is what the device stands at or moves to.
+    /// Whether the goal is the set-point of the device.
     fn is_at(&self, goal: &[f64; 6]) -> bool {
         goal.iter().zip(&self.place.target).all(|(goal, target)| self.session.is_same(*goal, *target))
     }
 
-    /// Whether something moves, or is about to.
+    /// Whether a motion is in progress or about to start.
     pub(super) fn moves(&self) -> bool {
-        self.is_rising()
+        self.is_starting()
             || self.runs()
                 && (self.place.status & BUSY != 0
                     || !self.is_answered()
                     || self.goal.is_some_and(|goal| !self.is_at(&goal)))
     }
 
-    /// Whether the place shows what became of the last order.
+    /// Whether the place shows the effect of the last command.
     pub(super) fn is_answered(&self) -> bool {
-        let (tick, sent) = self.ordered;
+        let (tick, sent) = self.last_command;
         self.place.tick >= tick || sent.elapsed() >= SILENT
     }
 
-    /// Whether somebody else stopped it since the last call: another host, a fault, the emergency contact.
+    /// Whether another host, a fault or the emergency stop has stopped it since the last call.
     pub(super) fn was_stopped(&mut self) -> bool {
         std::mem::take(&mut self.stopped)
     }
 
-    /// Takes what went wrong since the last call.
+    /// Takes the error since the last call.
     pub(super) fn mishap(&mut self) -> Option<Code> {
         self.mishap.take()
     }
 
-    /// Asks where it is, unless that was just said.
+    /// Updates the place, unless it is recent.
     pub(super) fn refresh(&mut self) -> Result<(), ClientError> {
         if self.seen.elapsed() < FRESH && self.is_answered() {
             return Ok(());
@@ -181,19 +181,19 @@ impl<P: Port> Stage<P> {
         self.look()
     }
 
-    /// Time since it was asked where it is.
+    /// Age of the place.
     pub(super) fn age(&self) -> Duration {
         self.seen.elapsed()
     }
 
-    /// Asks where it is, and goes on with what is under way. Keeps the link alive.
+    /// Updates the place, and continues a start-up. Keeps the link alive.
     pub(super) fn look(&mut self) -> Result<(), ClientError> {
         let ran = self.runs();
         if let Some(place) = self.session.place()? {
             self.place = place;
         }
         if self.place.phase != self.session.status().phase || self.polled.elapsed() >= POLL {
-            // With its cause, to be shown; what the law has fallen back to is no other phase.
+            // For the cause, and for a fallback of the law, which does not change the phase.
             self.session.poll()?;
             self.polled = Instant::now();
         }
@@ -202,25 +202,25 @@ impl<P: Port> Stage<P> {
             self.to_bias = (self.to_bias || !ran) && self.place.status & BUSY != 0;
         } else {
             self.goal = None;
-            self.stopped |= ran && !self.goes_down;
+            self.stopped |= ran && !self.is_stopping;
         }
         let refused = self.runs() && self.place.status & REFUSED != 0 && self.is_answered();
         if refused && self.place.status & BUSY == 0 && self.goal.is_some_and(|goal| !self.is_at(&goal)) {
             self.goal = None;
             self.mishap = Some(Code::Position);
-            // It is not to be tried again.
+            // The device must not retry the move.
             let halted = self.halt();
             self.granted(halted)?;
         }
-        let risen = self.rise();
-        self.granted(risen)
+        let started = self.continue_start();
+        self.granted(started)
     }
 
-    /// What another host or a wave keeps it from is no broken link: whoever asked for it is told.
+    /// Turns a refusal, because of another host or a wave, into an error for the client. The link is intact.
     fn granted(&mut self, done: Result<(), ClientError>) -> Result<(), ClientError> {
         match done {
             Err(ClientError::Refused(Refusal::Busy | Refusal::State)) => {
-                self.stopped |= self.rising.take().is_some();
+                self.stopped |= self.starting.take().is_some();
                 self.mishap = Some(Code::NotNow);
                 Ok(())
             }
@@ -228,76 +228,76 @@ impl<P: Port> Stage<P> {
         }
     }
 
-    /// When the device must hear of its host again.
+    /// Time until the device must get the next request.
     pub(super) fn due(&self) -> Duration {
         self.session.due()
     }
 
     fn ask(&mut self, request: Request) -> Result<(), ClientError> {
         self.session.supervise(request)?;
-        self.ordered = (self.place.tick + SEEN, Instant::now());
+        self.last_command = (self.place.tick + SEEN, Instant::now());
         Ok(())
     }
 
-    /// The next step towards a machine that runs. Each waits for what the last one did.
-    fn rise(&mut self) -> Result<(), ClientError> {
-        let Some(rising) = self.rising else { return Ok(()) };
+    /// Takes the next step of a start-up. Each step waits for the effect of the last one.
+    fn continue_start(&mut self) -> Result<(), ClientError> {
+        let Some(starting) = self.starting else { return Ok(()) };
         if !self.is_answered() {
             return Ok(());
         }
-        let asked = rising.asked;
+        let asked = starting.asked;
         let came_up = matches!(asked, Request::Arm | Request::Run);
         let next = match self.phase() {
             Some(Phase::Running) => {
-                self.rising = None;
+                self.starting = None;
                 return Ok(());
             }
-            // It faulted on the way, or somebody ramps it down, or holds it.
+            // It faulted, or another host ramps it down or holds it.
             Some(Phase::Faulted | Phase::RampingDown) if came_up => None,
             Some(Phase::Disarmed) if asked == Request::Run => None,
-            Some(Phase::Holding) if asked == Request::Run && self.ordered.1.elapsed() >= HELD => None,
+            Some(Phase::Holding) if asked == Request::Run && self.last_command.1.elapsed() >= HELD => None,
             Some(Phase::Faulted) => Some(Request::Acknowledge),
             Some(Phase::Disarmed) => Some(Request::Arm),
             Some(Phase::Arming | Phase::Holding) => Some(Request::Run),
             Some(Phase::RampingDown) | None => Some(asked),
         };
-        match next.filter(|_| rising.since.elapsed() < UP) {
+        match next.filter(|_| starting.since.elapsed() < UP) {
             Some(next) if next == asked => Ok(()),
             Some(next) => {
-                self.rising = Some(StartUp { asked: next, ..rising });
+                self.starting = Some(StartUp { asked: next, ..starting });
                 self.ask(next)
             }
             None => {
-                (self.rising, self.stopped) = (None, true);
+                (self.starting, self.stopped) = (None, true);
                 self.mishap = Some(Code::ServoOff);
                 self.ask(Request::None)
             }
         }
     }
 
-    /// Servo on: acknowledges a fault, arms and runs.
+    /// Servo on: acknowledges a fault, arms, and runs the machine.
     pub(super) fn start(&mut self) -> Result<(), Rejection> {
         if !self.servo() {
-            // A request counts when it begins to be given.
+            // Requests are edge-triggered.
             self.ask(Request::None)?;
-            self.goes_down = false;
-            self.rising = Some(StartUp { since: Instant::now(), asked: Request::None });
+            self.is_stopping = false;
+            self.starting = Some(StartUp { since: Instant::now(), asked: Request::None });
         }
         Ok(())
     }
 
     /// Servo off: ramps down.
     pub(super) fn shut_down(&mut self) -> Result<(), Rejection> {
-        (self.rising, self.goal, self.goes_down) = (None, None, true);
+        (self.starting, self.goal, self.is_stopping) = (None, None, true);
         Ok(self.ask(Request::RampDown)?)
     }
 
-    /// A client has sent a stop: the next one is carried out.
+    /// A client has sent a stop, so the next call of [`Stage::stop`] must act.
     pub(super) fn must_stop(&mut self) {
         self.has_halted = false;
     }
 
-    /// Stops, once for all stops that had been sent by then, whoever is in control.
+    /// Stops the machine, once for all stops received so far.
     pub(super) fn stop(&mut self) -> Result<(), Rejection> {
         if !self.has_halted {
             self.refresh()?;
@@ -307,58 +307,58 @@ impl<P: Port> Stage<P> {
         Ok(())
     }
 
-    /// Within the limits of stops. A machine that comes up comes no further, and its servo is off then.
+    /// Stops within the limits of acceleration. A start-up is aborted, and the servo is then off.
     fn come_to_rest(&mut self) -> Result<(), Rejection> {
-        let rises = self.rising.take().is_some();
+        let was_starting = self.starting.take().is_some();
         let request = match self.phase() {
             Some(Phase::Running) if !self.to_bias => None,
             Some(Phase::Running) => Some(Request::Hold),
-            Some(Phase::Holding) if rises => Some(Request::Hold),
+            Some(Phase::Holding) if was_starting => Some(Request::Hold),
             Some(Phase::Arming) => Some(Request::RampDown),
-            _ if rises => Some(Request::RampDown),
+            _ if was_starting => Some(Request::RampDown),
             _ => return Ok(()),
         };
         if let Some(request) = request {
-            self.goes_down = true;
+            self.is_stopping = true;
             return Ok(self.ask(request)?);
         }
         self.session.stop_wave().or_else(refused)?;
         match self.halt() {
             Err(ClientError::Refused(_)) => {
-                // Set-points are another's, or a wave's until it is at rest.
-                (self.goal, self.goes_down) = (None, true);
+                // Another host, or a wave until it is at rest, controls the set-point.
+                (self.goal, self.is_stopping) = (None, true);
                 Ok(self.ask(Request::Hold)?)
             }
             other => Ok(other?),
         }
     }
 
-    /// To rest, and to stay.
+    /// Brings the set-point to rest and holds it.
     fn halt(&mut self) -> Result<(), ClientError> {
         let hold = [("command".to_owned(), "hold".to_owned())];
         let words = self.session.assign(&hold).map_err(|_| ClientError::Unexpected)?;
         self.session.command(words)?;
         self.goal = None;
-        self.ordered = (self.place.tick + SEEN, Instant::now());
+        self.last_command = (self.place.tick + SEEN, Instant::now());
         Ok(())
     }
 
-    /// Where it is to be once nothing moves, as clients see it.
+    /// The destination, in the frame of clients.
     pub(super) fn goal(&self) -> [f64; 6] {
         self.seen_from_pivot(&self.goal.unwrap_or(self.place.target))
     }
 
-    /// Where it is, as clients see it, m and rad.
+    /// The measured pose in the frame of clients, m and rad.
     ///
     /// # Errors
-    /// [`Code::Sensor`] if it is not measured now.
+    /// [`Code::Sensor`] if it is not currently measured.
     pub(super) fn pose(&self) -> Result<[f64; 6], Code> {
         if self.place.is_measured() { Ok(self.seen_from_pivot(&self.place.pose)) } else { Err(Code::Sensor) }
     }
 
-    /// The goal that a move changes: only of a machine that runs, and that is going nowhere that is not known.
-    pub(super) fn standing(&self) -> Result<[f64; 6], Rejection> {
-        if self.is_rising() {
+    /// The pose that a move starts from. The machine must be running, with no motion to an unknown goal.
+    pub(super) fn start_of_move(&self) -> Result<[f64; 6], Rejection> {
+        if self.is_starting() {
             return Err(Rejection::Later);
         }
         if !self.runs() {
@@ -370,29 +370,29 @@ impl<P: Port> Stage<P> {
         Ok(self.goal())
     }
 
-    /// Goes to a pose, after the motion under way if there is one; refused before anything moves if it is out of reach.
+    /// Moves to a pose, after the current motion. A pose out of reach is refused.
     pub(super) fn go(&mut self, pose: &[f64; 6]) -> Result<(), Rejection> {
         let user = self.admitted(pose).ok_or(Code::Position)?;
         let words = self.session.move_words(&user).map_err(|_| Code::Position)?;
         match self.session.command(words) {
-            // It runs no more.
+            // It has stopped running.
             Err(ClientError::Refused(Refusal::State)) if self.look().is_ok() && !self.runs() => {
                 return Err(Code::ServoOff.into());
             }
             other => other?,
         }
         self.goal = Some(user);
-        self.ordered = (self.place.tick + SEEN, Instant::now());
+        self.last_command = (self.place.tick + SEEN, Instant::now());
         Ok(())
     }
 
-    /// The user's pose of one as clients see it, if the platform can stand there.
+    /// Converts a pose of clients to the user's coordinates; none if the platform cannot reach it.
     pub(super) fn admitted(&self, pose: &[f64; 6]) -> Option<[f64; 6]> {
         let user = self.frame.user(pose)?;
         self.motion.admits(&user).then_some(user)
     }
 
-    /// How far it is from a pose as clients see it along a way, as a multiple of it.
+    /// Reach from a pose of clients along a direction, as a multiple of it.
     pub(super) fn reach(&self, start: &[f64; 6], way: &[f64; 6]) -> f64 {
         motion::reach(|pose| self.admitted(pose).is_some(), start, way)
     }
@@ -401,12 +401,12 @@ impl<P: Port> Stage<P> {
         self.frame.pose(user).unwrap_or(*user)
     }
 
-    /// m, from the tool point.
+    /// The pivot point, relative to the tool point, m.
     pub(super) fn pivot(&self) -> [f64; 3] {
         *self.frame.tool()
     }
 
-    /// Another pivot point. Only at rest and not turned: no coordinate of a platform that stands still is to change.
+    /// Sets the pivot point. The platform must be at rest and not rotated, so that its coordinates do not change.
     pub(super) fn set_pivot(&mut self, pivot: [f64; 3]) -> Result<(), Rejection> {
         if self.moves() {
             return Err(Code::InMotion.into());
@@ -420,7 +420,7 @@ impl<P: Port> Stage<P> {
     }
 }
 
-/// A wave that there is none of, or that is another's, is no reason not to stop.
+/// Ignores a refusal: without a wave, or with another host's, the stop continues.
 fn refused(error: ClientError) -> Result<(), ClientError> {
     match error {
         ClientError::Refused(_) => Ok(()),

@@ -1,4 +1,4 @@
-//! Clients that send without end, and never read: a stop of another gets in, and the machine is asked as often as ever.
+//! Clients that flood the server and never read: another client can still stop the machine, which is polled as often as ever.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -16,7 +16,7 @@ use specgen_link::{
 use super::{Axes, Bridge, Stage};
 use crate::session::Session;
 
-/// A machine that runs and does what it is told at once, of upright legs.
+/// A running machine with upright legs, which executes commands immediately.
 const DESCRIPTION: &str = "name=made up\ndigest=0123456789\nversion=1\nscalar_bits=64\nconfig_names=\n\
     input_names=command,setpoint[0],setpoint[1],setpoint[2],setpoint[3],setpoint[4],setpoint[5],gauge[0]\noutput_names=\nperiod=1e-4\n\
     kind=platform\norigin=0.0,0.0,1e-5,0.0,0.0,0.0\nbound=5e-5,5e-5,5e-5,4e-4,4e-4,4e-4\nspeed=1e-4,1e-4,1e-4,1e-3,1e-3,1e-3\n\
@@ -26,16 +26,16 @@ const RUNNING: u8 = 2;
 const MOVE: u64 = 2;
 /// Ticks between two requests.
 const TICKS: u64 = 10;
-/// What the link and the machine take to answer.
+/// Time until link and machine answer.
 const ANSWER: Duration = Duration::from_micros(100);
-/// How long a stop may take: half of the stops at most this, for the computer may be loaded.
+/// Limit of the median time of a stop; the computer may be loaded.
 const STOPS: Duration = Duration::from_millis(50);
-/// An interval in which the machine is asked, twice what it should be for the same reason.
+/// Interval in which the machine must be polled, with a factor of two for the same reason.
 const ASKED: Duration = Duration::from_millis(40);
-/// How long a flood lasts before it is stopped.
+/// Duration of a flood before the first stop.
 const FLOOD: Duration = Duration::from_millis(300);
 
-/// What the machine was asked, and when.
+/// A request to the machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Ask {
     Place,
@@ -50,7 +50,7 @@ struct Machine {
     tick: u64,
     target: [u64; 6],
     bytes: [u8; 24 * 8],
-    /// How often the recorder, once stopped, says that it still writes.
+    /// How many more times the stopped recorder reports that it still writes.
     writes: u32,
 }
 
@@ -140,10 +140,10 @@ impl Port for Line {
     }
 }
 
-/// One bench at a time: times are asserted, and each keeps the processors busy.
+/// Runs one bench at a time, because it asserts times and loads all processors.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// A bridge at its work, and clients that send and never read.
+/// A running bridge, and clients that flood it.
 struct Bench {
     _alone: MutexGuard<'static, ()>,
     address: SocketAddr,
@@ -175,7 +175,7 @@ impl Bench {
         Client(BufReader::new(stream))
     }
 
-    /// A client that sends this so often.
+    /// Adds a client that sends `bytes` this many times.
     fn flood(&mut self, bytes: Vec<u8>, times: usize) {
         let stream = TcpStream::connect(self.address).unwrap();
         let mut sends = stream.try_clone().unwrap();
@@ -193,7 +193,7 @@ impl Bench {
         self.asks.lock().unwrap().clone()
     }
 
-    /// While it is flooded: stops of one client get in, and the machine is asked at its interval.
+    /// Asserts that one client can stop the machine during the floods, and that the machine is polled at its interval.
     fn stops_get_in(self, mut who: Client, what: &str) {
         let first = self.asks().len();
         thread::sleep(FLOOD);
@@ -219,7 +219,7 @@ impl Bench {
         let all = start.elapsed().as_nanos() / ASKED.as_nanos();
         intervals.retain(|interval| *interval < all);
         println!(
-            "gcs, {what}: stops answered after {:.1} ms (median of 10), {:.1} ms (longest); machine asked in {} of {all} intervals of {} ms",
+            "gcs, {what}: stops answered after {:.1} ms (median of 10), {:.1} ms (longest); machine polled in {} of {all} intervals of {} ms",
             times[5].as_secs_f64() * 1e3,
             times[9].as_secs_f64() * 1e3,
             intervals.len(),
@@ -251,7 +251,7 @@ fn moves(count: usize) -> Vec<u8> {
 }
 
 #[test]
-fn one_that_sends_without_end() {
+fn one_client_floods() {
     for (what, bytes) in [
         ("questions", b"POS?\n".repeat(500)),
         ("questions that take long", b"TMX?\nTRA? X 1 Y 1\n".repeat(100)),
@@ -269,7 +269,7 @@ fn one_that_sends_without_end() {
 }
 
 #[test]
-fn twenty_five_that_send_without_end() {
+fn twenty_five_clients_flood() {
     for (what, bytes) in [("25 with questions", b"POS?\n".repeat(200)), ("25 with stops", b"STP\n".repeat(200))] {
         let mut bench = Bench::new();
         let who = bench.client();
@@ -278,7 +278,7 @@ fn twenty_five_that_send_without_end() {
     }
 }
 
-/// And none of the moves is made after the stop, wherever they were.
+/// After the stop none of them is executed, even if it was still in a buffer.
 #[test]
 fn a_hundred_thousand_moves_at_once() {
     let mut bench = Bench::new();
@@ -290,10 +290,10 @@ fn a_hundred_thousand_moves_at_once() {
     let stop = asks.iter().position(|(_, ask)| *ask == Ask::Stop).unwrap();
     let moves = |asks: &[(Instant, Ask)]| asks.iter().filter(|(_, ask)| *ask == Ask::Move).count();
     assert_eq!(moves(&asks[stop..]), 0);
-    assert!(moves(&asks[..stop]) > 0, "they are made until then");
+    assert!(moves(&asks[..stop]) > 0, "no move before the stop");
 }
 
-/// The F446 takes some ticks for it, and a script downloads at once.
+/// The F446 takes some ticks to write it, and a script downloads immediately.
 #[test]
 fn a_stop_of_the_recorder_waits_until_the_record_is_written() {
     let mut session = Session::open(Line::new(Asks::default()), Timeout::PIPE, None).unwrap();

@@ -1,4 +1,4 @@
-//! Passes over a machine at the end of a link.
+//! Passes on a machine over the link.
 
 use std::time::{Duration, Instant};
 
@@ -15,35 +15,35 @@ use crate::session::ALIVE;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 
-/// How long arming, and the way to the bias pose, may take.
+/// Timeout of arming, and of the move to the bias pose.
 const ARMING: Duration = Duration::from_secs(120);
 
-/// A trajectory of the spec, as its machine plays it.
+/// A trajectory of the spec that the machine plays.
 pub(super) struct OwnTrajectory {
     /// Its number.
     number: u32,
-    /// Where it begins, as the controller has it, in the user's coordinates, m and rad.
+    /// Its start, in the user's coordinates, m and rad.
     pub start: [f64; 6],
 }
 
 impl OwnTrajectory {
-    /// Of a name.
+    /// The trajectory of this name.
     ///
     /// # Errors
-    /// There is none, or not one with an end.
+    /// There is none, or it is a waveform.
     pub fn named(name: Option<&str>, compiled: &Compilation) -> Result<Self, Failure> {
         let known = compiled.ir.task_space.iter().flat_map(|task| &task.setpoints.trajectories);
         let names: Vec<&str> = known.clone().map(|one| one.name.as_str()).collect();
         let found = known.enumerate().find(|(_, one)| Some(one.name.as_str()) == name);
         match found.map(|(number, one)| (number as u32, &one.path)) {
             Some((number, path @ Poses::Segments { .. })) => Ok(Self { number, start: path.start() }),
-            Some(_) => Err(Failure::Usage("a machine learns trajectories of the paper's kinds, not waveforms".to_owned())),
+            Some(_) => Err(Failure::Usage("a machine can learn trajectories of the paper's kinds, not waveforms".to_owned())),
             None if names.is_empty() => Err(Failure::Usage(
-                "a machine learns the trajectories that it has, and this spec has none: add a [[trajectory]], and build anew"
+                "a machine can learn only trajectories of its spec, and this spec has none: add a [[trajectory]] and rebuild"
                     .to_owned(),
             )),
             None => Err(Failure::Usage(format!(
-                "a machine learns the trajectories that it has: name one of them by --trajectory: {}",
+                "a machine can learn only trajectories of its spec: name one with --trajectory: {}",
                 names.join(", ")
             ))),
         }
@@ -55,33 +55,33 @@ pub(super) struct LinkedMachine<'a, P> {
     pub operator: &'a mut Operator<P>,
     pub ui: &'a Ui,
     pub own: &'a OwnTrajectory,
-    /// The correction that its device has in its memory, once that is known.
+    /// The correction in the memory of the device, if known.
     pub has: Option<Vec<Knot>>,
     /// The error that ended a pass.
     pub error: Option<SessionError>,
 }
 
 impl<P: Port> LinkedMachine<'_, P> {
-    /// Brings it to its bias pose. One that runs already is taken as it is.
+    /// Arms and runs a disarmed machine, and waits until it is at rest.
     pub fn arm(&mut self) -> Result<(), SessionError> {
         let wait = |until| Command::Wait { until, limit: ARMING };
-        let stands = u64::from(self.operator.phase());
-        if stands == Phase::Disarmed.word() {
+        let phase = u64::from(self.operator.phase());
+        if phase == Phase::Disarmed.word() {
             self.operator.execute(&Command::Ask(Request::Arm), self.ui)?;
             let start = Instant::now();
             while u64::from(self.operator.phase()) == Phase::Disarmed.word() {
                 if start.elapsed() > ARMING {
                     return Err(SessionError::Fault(
-                        "the machine does not arm; `specgen operate` with `status` says why".to_owned(),
+                        "the machine does not arm; `status` in `specgen operate` shows why".to_owned(),
                     ));
                 }
                 self.operator.execute(&wait(WaitCondition::Passed(ALIVE)), self.ui)?;
             }
             self.operator.execute(&Command::Ask(Request::Run), self.ui)?;
             self.operator.execute(&wait(WaitCondition::Phase(Phase::Running)), self.ui)?;
-        } else if stands != Phase::Running.word() {
+        } else if phase != Phase::Running.word() {
             return Err(SessionError::Refused(format!(
-                "the machine is {}; learning begins with one that is disarmed or runs",
+                "the machine is {}; learning needs a disarmed or running machine",
                 self.operator.state()
             )));
         }
@@ -92,7 +92,7 @@ impl<P: Port> LinkedMachine<'_, P> {
 impl<P: Port> RepeatableMachine for LinkedMachine<'_, P> {
     fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<PassObservation, LearnError> {
         let course = course(motion, spacing, self.own.number);
-        // What the device has stays there.
+        // Do not resend a correction that the device has.
         let sent = if self.has.as_deref() == Some(knots) { None } else { Some(knots) };
         match self.operator.pass(&self.own.start, course, sent, self.ui) {
             Ok(passed) => {
@@ -107,7 +107,7 @@ impl<P: Port> RepeatableMachine for LinkedMachine<'_, P> {
         }
     }
 
-    /// The device makes it, and the same kernel here finds whether it made it to the bit.
+    /// Lets the device compute the correction, and checks it bit for bit with the same kernel.
     fn next(&mut self, plan: &Plan, played: &[Knot], seen: &PassObservation) -> Result<Vec<Knot>, LearnError> {
         let expected = plan.next(played, &seen.kept).ok_or(LearnError::Refused)?;
         let made =
@@ -125,7 +125,7 @@ impl<P: Port> RepeatableMachine for LinkedMachine<'_, P> {
         }
     }
 
-    /// What is not kept does not stay in the device, either.
+    /// Restores the correction that was kept on the device.
     fn keep(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<(), LearnError> {
         if self.has.as_deref() == Some(knots) {
             return Ok(());

@@ -1,4 +1,4 @@
-//! Browsers: a thread each passes messages to the thread that has the machine, and back. A slow browser is left behind.
+//! Browsers: one thread each exchanges messages with the thread that operates the machine. A slow browser delays no other.
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -15,22 +15,22 @@ use tungstenite::{Error, Message, WebSocket};
 
 use super::http::Guard;
 
-/// Most pages at a time; one more is refused.
+/// Largest number of pages; more are refused.
 const MOST: usize = 32;
-/// Connections at a time that have not shown the token; the oldest makes room for the next.
+/// Largest number of connections without a token; the oldest is closed for the next.
 const STRANGERS: usize = 64;
-/// Messages that wait for a page before more are dropped.
+/// Length of a page's queue of messages; more are dropped.
 const QUEUE: usize = 64;
 /// Largest message of a page, bytes: a wave in its file.
 const LARGEST: usize = 1 << 16;
-/// Messages that are taken from a page in a round.
+/// Messages read from a page per round.
 const ROUND: usize = 32;
-/// How long it sleeps where nothing happens.
+/// Timeout of a wait for events.
 const IDLE: Timespec = Timespec { tv_sec: 1, tv_nsec: 0 };
-/// How long reading waits for the rest of a frame.
+/// Timeout of a read, for the rest of a frame.
 const REST: Duration = Duration::from_millis(1);
 
-/// An event of a page, for the thread that has the machine.
+/// An event of a page, for the thread that operates the machine.
 pub enum ClientEvent {
     Connected { page: u64, to: Outbox },
     Received { page: u64, text: String },
@@ -44,19 +44,19 @@ pub struct Outbox {
 }
 
 impl Outbox {
-    /// Sends without waiting; whether there was room.
+    /// Sends without waiting. Returns whether there was room.
     pub fn send(&self, message: Message) -> bool {
         let sent = !matches!(self.messages.try_send(message), Err(TrySendError::Full(_)));
-        // Full, it wakes anyway.
+        // If the pipe is full, the thread wakes anyway.
         let _ = (&self.wake).write(&[0]);
         sent
     }
 }
 
-/// Connections that have not shown the token, the oldest first, by number.
+/// Connections without a token, by number, oldest first.
 type Strangers = Arc<Mutex<VecDeque<(u64, TcpStream)>>>;
 
-/// Lets browsers in, until the process ends. Each has a thread. One that is slow to say what it wants keeps nobody out.
+/// Accepts browsers until the process ends, each in its own thread, so that a slow handshake does not block others.
 pub fn serve(listener: TcpListener, guard: Guard, page: String, events: SyncSender<ClientEvent>) {
     let (guard, page) = (Arc::new(guard), Arc::<str>::from(page));
     let (there, strangers) = (Arc::new(AtomicUsize::new(0)), Strangers::default());
@@ -81,7 +81,7 @@ pub fn serve(listener: TcpListener, guard: Guard, page: String, events: SyncSend
                 let admitted = guard.admit(stream, &page, || {
                     strangers.lock().unwrap_or_else(PoisonError::into_inner).retain(|(known, _)| *known != number);
                 });
-                // A browser that goes away is no news but to the one who has the machine.
+                // A browser that disconnects is not an error here; the other thread gets the event.
                 if let Ok(Some(stream)) = admitted {
                     if there.fetch_add(1, Ordering::Relaxed) < MOST {
                         let _ = talk(stream, number, &events);
@@ -94,7 +94,7 @@ pub fn serve(listener: TcpListener, guard: Guard, page: String, events: SyncSend
     });
 }
 
-/// Until either side ends it.
+/// Exchanges messages until either side closes the connection.
 fn talk(stream: TcpStream, page: u64, events: &SyncSender<ClientEvent>) -> Result<(), Error> {
     let (woken, wake) = UnixStream::pair()?;
     woken.set_nonblocking(true)?;
@@ -107,7 +107,7 @@ fn talk(stream: TcpStream, page: u64, events: &SyncSender<ClientEvent>) -> Resul
     let mut socket = WebSocket::from_raw_socket(stream, Role::Server, Some(config));
     loop {
         let mut files = [PollFd::new(socket.get_ref(), PollFlags::IN), PollFd::new(&woken, PollFlags::IN)];
-        // A signal ends it early: there is a next round.
+        // A signal ends the wait early; the next round continues.
         let _ = poll(&mut files, Some(&IDLE));
         drain(&woken);
         deliver(&queue, &mut socket)?;

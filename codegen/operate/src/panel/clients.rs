@@ -11,19 +11,20 @@ use tungstenite::Message;
 
 use super::browser::{ClientEvent, Outbox};
 
-/// After this silence the page in control is gone.
+/// The page in control loses control after this silence.
 const SILENCE: Duration = Duration::from_secs(2);
-/// Time that the page in control has to answer a request for it, and that an offer lasts.
+/// Time for the page in control to answer a request for control, and lifetime of an offer.
 const ANSWER: Duration = Duration::from_secs(10);
-/// Messages with samples that a page may have received and not shown, two seconds of them. Then it gets none until it catches up.
+/// Messages with samples that a page may have received but not shown: two seconds. Then it gets none until it catches up.
 const BEHIND: u32 = 40;
-/// Longest time after a stop in which commands of other pages are refused, as they may be older. Samples that are newer end it.
+/// For at most this time after a stop, commands of other pages are refused, until a page has shown newer samples: such a command
+/// may be older than the stop.
 const LATE: Duration = Duration::from_secs(1);
-/// Most commands that wait.
+/// Largest number of waiting commands.
 const WAITING: usize = 16;
-/// Most events of a round.
+/// Largest number of events per round.
 const ROUND: usize = 128;
-/// Log entries that are kept for pages that connect later.
+/// Number of log entries for pages that connect later.
 const LOG: usize = 100;
 
 /// A request of a page.
@@ -41,7 +42,7 @@ pub enum PageRequest {
     /// Answers to a request for control.
     GrantControl,
     KeepControl,
-    /// A line as `specgen operate` takes it.
+    /// A command line of `specgen operate`.
     Command {
         id: u32,
         line: String,
@@ -56,7 +57,7 @@ pub enum PageRequest {
         name: String,
         text: String,
     },
-    /// All gains by this factor of the spec's.
+    /// Sets all gains to those of the spec times this factor.
     Gain {
         id: u32,
         factor: f64,
@@ -83,10 +84,10 @@ struct Page {
     number: u64,
     to: Outbox,
     heartbeat: Instant,
-    /// The last message with samples that it was sent, and the last that it has shown.
+    /// The last message with samples sent to it, and the last that it has shown.
     sent: u32,
     seen: u32,
-    /// Messages with samples that it was not sent since it fell behind.
+    /// Messages with samples that were skipped since it fell behind.
     left_out: u32,
 }
 
@@ -98,16 +99,16 @@ pub struct Clients {
     holder: Option<u64>,
     /// The page that requests control, and since when.
     requested: Option<(u64, Instant)>,
-    /// Since when any page can take control.
+    /// Since when control is offered to any page.
     offered: Option<Instant>,
     waiting: VecDeque<(u64, PageRequest)>,
-    /// Hold or ramp down, and the page that requests it; the later one counts, but a hold does not end a ramp-down.
+    /// A requested hold or ramp-down, and its page. The last request wins, except that a hold does not replace a ramp-down.
     urgent: Option<(u64, Request)>,
-    /// The page that stopped the machine last, when, and the last message with samples before that.
+    /// The page that last stopped the machine, the time, and the last message with samples before that.
     stopped: Option<(u64, Instant, u32)>,
     /// The page in control has gone, and no other has taken control.
     pub is_left: bool,
-    /// The check is to end.
+    /// A page requests the end of the wiring check.
     pub ends: bool,
     number: u32,
     log: VecDeque<Value>,
@@ -140,12 +141,12 @@ impl Clients {
         }
     }
 
-    /// Handles the events of pages, after at most this wait for the first one; then takes control from a page that has gone silent.
+    /// Handles events of pages, waiting at most `limit` for the first one; then takes control from a silent page.
     pub fn listen(&mut self, limit: Duration) {
         match self.events.recv_timeout(limit) {
             Ok(first) => self.handle(first),
             Err(RecvTimeoutError::Timeout) => {}
-            // The listener has ended: no page connects any more.
+            // The listener has ended, so there are no more pages.
             Err(RecvTimeoutError::Disconnected) => std::thread::sleep(limit),
         }
         for _ in 0..ROUND {
@@ -154,7 +155,7 @@ impl Clients {
         }
         let gone = |page: &&Page| Some(page.number) == self.holder && page.heartbeat.elapsed() >= SILENCE;
         if let Some(number) = self.pages.iter().find(gone).map(|page| page.number) {
-            self.lose(number, "is silent");
+            self.lose(number, "stopped responding");
         }
         if self.requested.is_some_and(|(_, since)| since.elapsed() >= ANSWER) {
             self.hand_over();
@@ -181,7 +182,7 @@ impl Clients {
                 }
             }
             ClientEvent::Received { page, text } => {
-                // Text that is not a request is not a heartbeat, either.
+                // An invalid message does not count as a heartbeat.
                 if let Ok(request) = serde_json::from_str(&text) {
                     self.take(page, request);
                 }
@@ -206,7 +207,7 @@ impl Clients {
             PageRequest::RequestControl if is_mine => {}
             PageRequest::RequestControl if self.holder.is_none() || self.offered.is_some() => self.give_to(page),
             PageRequest::RequestControl if self.requested.is_none() => self.requested = Some((page, Instant::now())),
-            PageRequest::RequestControl => self.answer(page, 0, Err("another page has requested control already")),
+            PageRequest::RequestControl => self.answer(page, 0, Err("another page has already requested control")),
             PageRequest::GrantControl if is_mine && self.requested.is_some() => self.hand_over(),
             PageRequest::OfferControl if is_mine => self.offered = Some(Instant::now()),
             PageRequest::KeepControl if is_mine => {
@@ -225,13 +226,13 @@ impl Clients {
             }
             command if is_mine && self.waiting.len() < WAITING => self.waiting.push_back((page, command)),
             command => {
-                let why = if is_mine { "too many commands wait" } else { "this page is not in control" };
+                let why = if is_mine { "too many commands are waiting" } else { "this page is not in control" };
                 self.answer(page, command.id(), Err(why));
             }
         }
     }
 
-    /// Waiting commands are older than a stop: they are refused.
+    /// Requests a stop, and refuses waiting commands, which are older.
     fn stop(&mut self, page: u64, request: Request) {
         for (page, command) in std::mem::take(&mut self.waiting) {
             self.answer(page, command.id(), Err("the machine was stopped"));
@@ -248,7 +249,7 @@ impl Clients {
     fn give_to(&mut self, page: u64) {
         let before = self.holder.replace(page);
         (self.requested, self.offered, self.is_left) = (None, None, false);
-        // Waiting commands are of the page that was in control before.
+        // Waiting commands are from the page that was in control before.
         self.waiting.clear();
         let from = before.map_or(String::new(), |before| format!(", after {}", name(before)));
         self.note("note", &format!("{} is in control{from}.", named(page)), "", None);
@@ -273,7 +274,7 @@ impl Clients {
         self.waiting.pop_front()
     }
 
-    /// A stop that a page requests, and the name of the page.
+    /// Takes a requested stop, and the name of its page.
     pub fn urgent(&mut self) -> Option<(String, Request)> {
         let (page, request) = self.urgent.take()?;
         self.is_left = false;
@@ -358,7 +359,7 @@ impl Clients {
 }
 
 impl PageRequest {
-    /// The number under which it is answered.
+    /// The number of its answer.
     pub fn id(&self) -> u32 {
         match self {
             Self::Command { id, .. }

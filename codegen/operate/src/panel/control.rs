@@ -16,10 +16,10 @@ use super::{Panel, wiring};
 use crate::commands::{Operator, SessionError, recoverable};
 use specgen_language::ui::Ui;
 
-/// Kind of a message with a record.
+/// Type number of a message with a record.
 const RECORD: u32 = 2;
 
-/// Health, reach of each axis, recorder and gains. A part that the device lacks is left out.
+/// Queries health, reach of each axis, recorder and gains. Queries that the device does not support are omitted.
 pub(super) fn queries<P: Port>(operator: &mut Operator<P>, quiet: &mut Ui) -> Result<Value, SessionError> {
     let mut known = json!({});
     let commands = [
@@ -40,7 +40,7 @@ pub(super) fn queries<P: Port>(operator: &mut Operator<P>, quiet: &mut Ui) -> Re
     Ok(known)
 }
 
-/// Carries out a request of a page.
+/// Executes a request of a page.
 pub(super) fn carry_out<P: Port + 'static>(
     operator: &mut Operator<P>,
     panel: &Rc<RefCell<Panel>>,
@@ -51,10 +51,10 @@ pub(super) fn carry_out<P: Port + 'static>(
     match request {
         PageRequest::Command { line, .. } => {
             let command = Command::parse(line).map_err(SessionError::Refused)?;
-            let command = command.ok_or_else(|| SessionError::Refused("a command is expected".to_owned()))?;
+            let command = command.ok_or_else(|| SessionError::Refused("expected a command".to_owned()))?;
             if !is_for_pages(&command) {
                 return Err(SessionError::Refused(format!(
-                    "`{line}` is not for a page: it reads or writes files, waits, or ends the program"
+                    "`{line}` is not available on a page: it uses files, waits, or ends the program"
                 )));
             }
             if matches!(command, Command::StopWave) {
@@ -102,7 +102,7 @@ pub(super) fn carry_out<P: Port + 'static>(
             Ok(json!(record.len()))
         }
         PageRequest::Check { .. } => {
-            panel.borrow_mut().clients.note("note", &format!("Page {page} began the wiring check."), "", None);
+            panel.borrow_mut().clients.note("note", &format!("Page {page} started the wiring check."), "", None);
             let checked = wiring::check(operator, panel);
             panel.borrow_mut().check["runs"] = json!(false);
             checked

@@ -6,16 +6,16 @@ use std::time::{Duration, Instant};
 
 use tungstenite::handshake::derive_accept_key;
 
-/// Longest head of a request, bytes.
+/// Largest head of a request, bytes.
 const HEAD: usize = 8192;
-/// Most fields of one.
+/// Largest number of header fields.
 const FIELDS: usize = 64;
-/// How long a browser may take to send it, and to take what it is sent.
+/// How long a browser may take to send a request, and to accept the answer.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Bytes of a token.
 const TOKEN: usize = 16;
 
-/// Access control: a browser has to know the token and to use an address of this computer.
+/// Access control: a browser must know the token and use an address of this computer.
 pub struct Guard {
     token: String,
     port: u16,
@@ -25,17 +25,17 @@ pub struct Guard {
 #[derive(Debug, PartialEq, Eq)]
 enum Route {
     Page,
-    /// The key of its handshake.
+    /// A WebSocket, with the key of its handshake.
     Socket(String),
-    /// Status and why.
+    /// Status and reason.
     Refused(&'static str, &'static str),
 }
 
 impl Guard {
-    /// Of a server at this port, with a token that nobody guesses.
+    /// A guard for a server at this port, with a random token.
     ///
     /// # Errors
-    /// The system gives no random numbers.
+    /// The system provides no random numbers.
     pub fn new(port: u16) -> io::Result<Self> {
         let mut bytes = [0; TOKEN];
         std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
@@ -47,10 +47,10 @@ impl Guard {
         &self.token
     }
 
-    /// Answers a browser, whose request is `read` then. One that is to be a WebSocket comes back, its handshake done.
+    /// Answers a browser; `read` is called once its request was read. Returns the stream of a WebSocket after its handshake.
     ///
     /// # Errors
-    /// It is too slow, or gone.
+    /// The browser is too slow, or has disconnected.
     pub fn admit(&self, mut stream: TcpStream, page: &str, read: impl FnOnce()) -> io::Result<Option<TcpStream>> {
         stream.set_write_timeout(Some(PATIENCE))?;
         stream.set_nodelay(true)?;
@@ -70,7 +70,7 @@ impl Guard {
             }
             Route::Refused(status, why) => (*status, "text/plain", *why),
         };
-        // Nobody else's page may frame it, and it fetches nothing but from here.
+        // No other page may frame it, and it may load nothing from elsewhere.
         let answer = format!(
             "HTTP/1.1 {status}\r\nContent-Type: {kind}; charset=utf-8\r\nContent-Length: {}\r\nConnection: close\r\nCache-Control: no-store\r\n\
              X-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\nReferrer-Policy: no-referrer\r\n\
@@ -88,7 +88,7 @@ impl Guard {
         let mut fields = [httparse::EMPTY_HEADER; FIELDS];
         let mut request = httparse::Request::new(&mut fields);
         if !matches!(request.parse(head), Ok(httparse::Status::Complete(_))) {
-            return Route::Refused("400 Bad Request", "this is no request of a browser\n");
+            return Route::Refused("400 Bad Request", "invalid HTTP request\n");
         }
         let field = |name: &str| {
             let found = request.headers.iter().find(|field| field.name.eq_ignore_ascii_case(name));
@@ -97,17 +97,17 @@ impl Guard {
         if request.method != Some("GET") {
             return Route::Refused("405 Method Not Allowed", "only GET\n");
         }
-        // A name that somebody else's server gave this address would let that server's page in.
+        // Against DNS rebinding: another server's name could point to this address.
         if !field("host").is_some_and(|host| self.is_here(host)) {
             return Route::Refused(
                 "421 Misdirected Request",
-                "open the panel by the address that it printed, not by a name\n",
+                "open the panel by the address that it printed, not by a host name\n",
             );
         }
         let (path, query) =
             request.path.and_then(|path| path.split_once('?')).unwrap_or((request.path.unwrap_or(""), ""));
         if !matches!(path, "/" | "/socket") {
-            return Route::Refused("404 Not Found", "the panel is one page: /\n");
+            return Route::Refused("404 Not Found", "the panel has only the page /\n");
         }
         let token = query.split('&').find_map(|part| part.strip_prefix("token=")).unwrap_or("");
         if !is_same(token, &self.token) {
@@ -138,13 +138,13 @@ impl Guard {
     }
 }
 
-/// In a time that does not tell how much of it is right.
+/// Compares tokens in constant time.
 fn is_same(given: &str, token: &str) -> bool {
     let differ = given.bytes().zip(token.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b));
     given.len() == token.len() && differ == 0
 }
 
-/// The head of a request. What follows it at once is dropped: a browser waits for the answer.
+/// Reads the head of a request. Data after it is dropped: a browser waits for the answer.
 fn head(stream: &mut TcpStream) -> io::Result<Vec<u8>> {
     let begun = Instant::now();
     let mut head = Vec::new();

@@ -1,4 +1,4 @@
-//! Requests of a page or a check to the machine.
+//! Requests of a page or of the wiring check to the machine.
 
 use std::time::{Duration, Instant};
 
@@ -30,7 +30,7 @@ pub(super) fn send_edge<P: Port>(operator: &mut Operator<P>, request: Request) -
     operator.in_control = true;
     operator.session.supervise(Request::None)?;
     let (sent, since) = (operator.status().tick, Instant::now());
-    // A machine without ticks gets the request, too.
+    // A machine that is not ticking also gets the request.
     while operator.status().tick < sent + BEFORE && since.elapsed() < ALIVE {
         std::thread::sleep(Duration::from_millis(1));
         operator.look()?;

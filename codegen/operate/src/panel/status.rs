@@ -1,6 +1,7 @@
 //! Status messages for the operator: state of the machine, and advice.
 
 use crate::GAUGES;
+use serde::Serialize;
 use specgen_compiler::ir::Supervision;
 use specgen_language::model::Model;
 use specgen_link::Status;
@@ -8,9 +9,11 @@ use specgen_runtime::setpoint::{BUSY, REFUSED, STALE};
 use specgen_runtime::supervisor::{Cause, Fault, Finding, FindingText, Phase};
 
 /// Kind (`ok`, `note`, `warning`, `error`), state, advice, and the number of the cause with its limit.
+#[derive(Serialize)]
 pub struct StatusMessage {
     pub kind: &'static str,
     pub what: String,
+    #[serde(rename = "do")]
     pub advice: &'static str,
     pub code: Option<String>,
 }
@@ -19,8 +22,8 @@ pub struct StatusMessage {
 fn cause(cause: Cause) -> (&'static str, &'static str) {
     match cause {
         Cause::None => ("", ""),
-        Cause::GaugeNotFinite => ("A gauge reads no number.", "Check its converter and cable."),
-        Cause::GaugeRange => ("A gauge is out of its range.", "Check its cable and its zero."),
+        Cause::GaugeNotFinite => ("A gauge reading is not a number.", "Check its converter and cable."),
+        Cause::GaugeRange => ("A gauge is out of range.", "Check its cable and its zero."),
         Cause::GaugeStuck => ("A gauge does not follow the legs.", "Check its cable and converter."),
         Cause::GaugeDisagreement => (
             "A gauge disagrees with the model.",
@@ -29,22 +32,22 @@ fn cause(cause: Cause) -> (&'static str, &'static str) {
         Cause::TrackingError => {
             ("The platform does not follow its set-point.", "Check load, gains, and that nothing touches the platform.")
         }
-        Cause::VoltageSaturation => ("A leg is at the end of its voltage.", "Move to where the legs have room."),
-        Cause::SlewSaturation => ("A leg moves as fast as its amplifier can.", "Move or play more slowly."),
-        Cause::MissedTick => ("Ticks were missed.", "Look at the load of the controller's computer."),
+        Cause::VoltageSaturation => ("A leg is at its voltage limit.", "Move to where the legs have room."),
+        Cause::SlewSaturation => ("A leg is at its slew-rate limit.", "Move or play more slowly."),
+        Cause::MissedTick => ("Ticks were missed.", "Check the load of the controller's computer."),
         Cause::LinkLost => ("The host was silent.", "Check the link."),
-        Cause::Integrity => ("Tables or settings are not those that were built.", "Flash the controller anew."),
-        Cause::Converter => ("A converter does not answer.", "Check its supply and cables."),
-        Cause::EmergencyStop => ("The hardware stop is pressed.", "Release it when it is safe."),
+        Cause::Integrity => ("Tables or settings differ from the build.", "Flash the controller again."),
+        Cause::Converter => ("A converter does not respond.", "Check its supply and cables."),
+        Cause::EmergencyStop => ("The emergency stop is pressed.", "Release it when it is safe."),
         Cause::HostGone => ("The host was gone for too long.", "Check the link."),
-        Cause::Wiring => ("Gauges or legs are not wired as the spec says.", "Mend it with the amplifiers off."),
+        Cause::Wiring => ("The wiring of gauges or legs does not match the spec.", "Fix it with the amplifiers off."),
         Cause::AmplifierFault => {
-            ("An amplifier reports a fault.", "Look at the amplifiers, then at the cable of their fault line.")
+            ("An amplifier reports a fault.", "Check the amplifiers, then the cable of their fault line.")
         }
-        Cause::Stalled => ("The controller stood still.", "Was a debugger attached, or the computer suspended?"),
+        Cause::Stalled => ("The controller stalled.", "Was a debugger attached, or the computer suspended?"),
         Cause::Oscillation => (
             "The platform oscillates.",
-            "Look for a structural mode that the spec lacks, loose bolts, vibration of the floor. Then acknowledge.",
+            "Check for a structural mode that the spec lacks, loose bolts, floor vibration. Then acknowledge.",
         ),
     }
 }
@@ -53,27 +56,25 @@ fn cause(cause: Cause) -> (&'static str, &'static str) {
 pub fn advice(finding: Finding) -> &'static str {
     match finding {
         Finding::None | Finding::Fallback(_) => "",
-        Finding::Gauge(_, Fault::Inverted) => "Exchange the wires of the gauge, or turn its `direction` in the spec.",
+        Finding::Gauge(_, Fault::Inverted) => "Swap the wires of the gauge, or reverse its `direction` in the spec.",
         Finding::Gauge(_, Fault::Dead) => "Check cable and supply of the gauge.",
-        Finding::Gauge(_, Fault::Swapped(_)) => {
-            "Exchange the cables of the two gauges, or their `[[gauge]]` in the spec."
-        }
+        Finding::Gauge(_, Fault::Swapped(_)) => "Swap the cables of the two gauges, or their `[[gauge]]` in the spec.",
         Finding::Gauge(_, Fault::Gain(_)) => "Check `sensor.range` or its calibration, and the range of its converter.",
         Finding::Leg(_, Fault::Inverted) => {
-            "Switch off. Exchange the wires of the stack only if its marking shows that they are wrong; else see its gauge."
+            "Switch off. Swap the wires of the stack only if its marking shows that they are wrong; otherwise check its gauge."
         }
         Finding::Leg(_, Fault::Dead) => "Check amplifier, cable and bolts of the leg.",
-        Finding::Leg(_, Fault::Swapped(_)) => "Exchange the amplifier cables of the two legs.",
+        Finding::Leg(_, Fault::Swapped(_)) => "Swap the amplifier cables of the two legs.",
         Finding::Leg(_, Fault::Gain(_)) => "Check the amplifier's gain, `dac.range` and the record of the leg.",
         Finding::Nothing => "Check the supplies of amplifiers and gauges, and that stacks are connected.",
         Finding::Inverted => {
-            "Compare the gauges' wires and `direction` with the drawing. Exchange wires of stacks only if their markings show that they are wrong."
+            "Compare the gauges' wires and `direction` with the drawing. Swap wires of stacks only if their markings show that they are wrong."
         }
         Finding::Common(_) => {
             "Check the amplifiers' gain and `dac.range`, `sensor.range` or its calibration, and `actuator.stroke`."
         }
         Finding::Unexplained => {
-            "If something shakes the machine, stop that or raise `wiring_check.amplitude`. Else check gauge by gauge and leg by leg, with the others unplugged."
+            "If something shakes the machine, stop that or raise `wiring_check.amplitude`. Otherwise check gauge by gauge and leg by leg, with the others unplugged."
         }
         Finding::NoRoom => "Widen `code_min` and `code_max`.",
         Finding::TooSlow => "Raise `max_step_codes`.",
@@ -90,7 +91,7 @@ fn limit(of: Cause, rules: &Supervision, model: &Model) -> Option<String> {
         Cause::TrackingError => Some(format!("limit {share:.0}\u{2009}% of the workspace")),
         Cause::MissedTick => Some(format!("limit {} in 1\u{2009}s", model.supervisor.missed_ticks)),
         Cause::Stalled => Some(format!("limit {} in a row", model.supervisor.missed_in_a_row)),
-        // The third axis is one of translation, or the third leg.
+        // Index 2 is a translation (z), or a leg.
         Cause::Oscillation => Some(format!("limit {:.0}\u{2009}nm", 1e9 / rules.steadiness.per_limit[2])),
         Cause::LinkLost => {
             Some(format!("limit {:.0}\u{2009}ms", f64::from(rules.host_ticks) * model.timing.period * 1e3))
@@ -109,7 +110,7 @@ pub fn message(status: &Status, rules: &Supervision, model: &Model) -> StatusMes
         ((what, advice), Finding::Fallback(_)) if of != Cause::None => {
             (format!("{what} Fallen back: {finding}."), advice)
         }
-        // It was asked to hold, and the stage stays.
+        // A hold has cleared the cause, but the fallback stays.
         (_, Finding::Fallback(_)) => (format!("It oscillated; fallen back: {finding}."), cause(Cause::Oscillation).1),
         ((what, _), _) => {
             (format!("{what} The wiring check found: {}.", FindingText(finding, rules.alike())), advice(finding))
@@ -122,34 +123,36 @@ pub fn message(status: &Status, rules: &Supervision, model: &Model) -> StatusMes
     });
     let message = |kind, what: &str, advice| StatusMessage { kind, what: what.to_owned(), advice, code: code.clone() };
     match phase {
-        Some(Phase::Disarmed) => message("note", "Disarmed. Amplifiers are off.", "To begin: arm, then run."),
-        Some(Phase::Arming) => {
-            message("note", "Arming. The wiring is checked, leg by leg.", "Run may be asked for now.")
-        }
+        Some(Phase::Disarmed) => message("note", "Disarmed. Amplifiers are off.", "To start: arm, then run."),
+        Some(Phase::Arming) => message("note", "Arming. Checking the wiring, leg by leg.", "Run can be requested now."),
         Some(Phase::Running) => {
             let bits = status.status & !BUSY;
             let (kind, what, advice) = if of != Cause::None {
                 return message("error", &format!("Running. {what}"), advice);
             } else if bits & REFUSED != 0 {
-                ("warning", "Running. The last command is refused.", "Hold, run, and move to where there is reach.")
+                ("warning", "Running. The last command was refused.", "Hold, run, and move within the reach.")
             } else if bits & STALE != 0 {
                 ("warning", "Running. The stream of set-points has stopped.", "Move, or send set-points.")
             } else if bits & GAUGES != 0 {
-                ("warning", "Running. A gauge is not read, or not believed.", "Check its converter and cable.")
+                ("warning", "Running. A gauge is not read, or implausible.", "Check its converter and cable.")
             } else if bits != 0 {
-                ("warning", "Running, with a limit reached.", "Look at the status below the events.")
+                ("warning", "Running, with a limit reached.", "See the status below the events.")
             } else if status.status & BUSY != 0 {
-                ("ok", "Running. A motion is under way.", "")
+                ("ok", "Running. A motion is in progress.", "")
             } else {
                 ("ok", "Running. Nothing to do.", "")
             };
             message(kind, what, advice)
         }
-        Some(Phase::Holding) if what.is_empty() => message("note", "Holding. The law is suspended.", "Run goes on."),
+        Some(Phase::Holding) if what.is_empty() => {
+            message("note", "Holding. The law is suspended.", "Run to continue.")
+        }
         Some(Phase::Holding) => message("warning", &format!("Holding. {what}"), advice),
         Some(Phase::RampingDown) if of == Cause::None => message("note", "Ramping down.", ""),
         Some(Phase::RampingDown) => message("error", &format!("Ramping down. {what}"), advice),
         Some(Phase::Faulted) => message("error", what, advice),
-        None => message("error", "The machine reports an unknown phase.", "Build panel and controller alike."),
+        None => {
+            message("error", "The machine reports an unknown phase.", "Use the same specgen for panel and controller.")
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! The wiring check of a page: it arms the machine, whose controller checks gauges and legs, and reports the result.
+//! The wiring check of a page. It arms the machine, whose controller checks gauges and legs, and reports the result.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -13,7 +13,7 @@ use super::request::send_edge;
 use super::{Panel, status};
 use crate::commands::{Operator, SessionError};
 
-/// How long a machine may take to arm beyond what its spec says.
+/// Extra time for arming, beyond that of the spec.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Result of the check, and advice.
@@ -24,7 +24,7 @@ struct Verdict {
     advice: &'static str,
 }
 
-/// Arms a machine that is disarmed. It holds where gauges and legs are as the spec says; else it is faulted, and the verdict says why.
+/// Arms a disarmed machine. It then holds if gauges and legs match the spec; otherwise it faults, and the verdict has the reason.
 pub(super) fn check<P: Port + 'static>(
     operator: &mut Operator<P>,
     panel: &Rc<RefCell<Panel>>,
@@ -40,7 +40,7 @@ pub(super) fn check<P: Port + 'static>(
     };
     let phase = |operator: &Operator<P>| Phase::from_word(u64::from(operator.phase()));
     if phase(operator) != Some(Phase::Disarmed) {
-        return refused("the check arms the machine: ramp down, or acknowledge its fault, before".to_owned());
+        return refused("the check arms the machine: first ramp down, or acknowledge its fault".to_owned());
     }
     panel.borrow_mut().check = json!({ "runs": true, "done": 0 });
     let first = operator.status().tick + u64::from(rules.arm_ticks);
@@ -51,7 +51,7 @@ pub(super) fn check<P: Port + 'static>(
     let verdict = loop {
         operator.look()?;
         if std::mem::take(&mut panel.borrow_mut().clients.ends) {
-            return refused("the check was ended".to_owned());
+            return refused("the check was stopped".to_owned());
         }
         let legs = operator.status().tick.saturating_sub(first) / u64::from(wiring.ticks);
         panel.borrow_mut().check["done"] = json!(legs.min(6));
@@ -59,9 +59,9 @@ pub(super) fn check<P: Port + 'static>(
         match phase(operator) {
             Some(Phase::Holding | Phase::Running) => {
                 let what = match wiring.leg_gain {
-                    Some(_) => "Gauges and legs are as the spec says: sign, order and gain.",
+                    Some(_) => "Gauges and legs match the spec: sign, order and gain.",
                     None => {
-                        "Gauges and legs are as the spec says: sign and order. Gains of legs are not tested until each has a record."
+                        "Gauges and legs match the spec: sign and order. Gains of legs are not tested until each has a record."
                     }
                 };
                 break Verdict { good: true, what: what.to_owned(), advice: "" };
@@ -72,8 +72,8 @@ pub(super) fn check<P: Port + 'static>(
                 break Verdict { good: false, what, advice: status::advice(finding) };
             }
             Some(Phase::Faulted) => return Err(SessionError::Fault(format!("the machine is {}", operator.state()))),
-            // Whoever held it, or ramped it down.
-            Some(Phase::Disarmed | Phase::RampingDown) if arms => return refused("the check was ended".to_owned()),
+            // Another host has held it, or ramped it down.
+            Some(Phase::Disarmed | Phase::RampingDown) if arms => return refused("the check was stopped".to_owned()),
             _ if since.elapsed() > limit => return refused(format!("the machine is still {}", operator.state())),
             now => {
                 arms |= now == Some(Phase::Arming);

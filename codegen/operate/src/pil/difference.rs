@@ -1,16 +1,16 @@
-//! The first word in which host and device differ. There is no tolerance.
+//! The first word in which host and device differ, without tolerance.
 
 use std::fmt;
 
 use host_sim::word::{Scalar, WordKind};
 use serde::Serialize;
 
-/// Where host and device first differ.
+/// The first difference of host and device.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Difference {
-    /// Tick since power-up, counted from 0; those of arming count.
+    /// Tick since power-up, counted from 0, including those of arming.
     pub tick: u64,
-    /// Name of the output word; `machine_digest` if only what is remembered differs.
+    /// Name of the output word; `machine_digest` if only the internal state differs.
     pub signal: String,
     /// Bits on the host.
     pub host: u64,
@@ -21,7 +21,7 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Of two rows of output words and the digests after them.
+    /// Compares two rows of output words and the digests after them.
     pub(super) fn first(
         tick: u64,
         names: &[String],
@@ -38,7 +38,7 @@ impl Difference {
     }
 }
 
-/// Words of the supervised tick that are no reals.
+/// Words of the supervised tick that are integers.
 const INTEGERS: [&str; 3] = ["supervisor", "conditions", "machine_digest"];
 
 impl fmt::Display for Difference {

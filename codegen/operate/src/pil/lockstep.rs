@@ -1,4 +1,4 @@
-//! Two controllers as one: the host library and a device behind the link, stepped with the same words and compared by bits.
+//! Two controllers as one: the host library and a device on the link, stepped with the same words and compared bit for bit.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,14 +14,14 @@ use specgen_link::{CostUnit, Identity, Reply, Request, WORDS, put_words};
 use super::difference::Difference;
 use super::session::{self, OpenError, OpenSession};
 
-/// Ticks that arming may take.
+/// Largest number of ticks for arming.
 const ARMING: u64 = 100_000;
 /// Phases of the supervisor.
 const DISARMED: u8 = 0;
 const RUNNING: u8 = 2;
-/// `setpoint_kind` of six legs' settings: leg displacements.
+/// `setpoint_kind` in the settings of six legs: leg displacements.
 const SETPOINT_LEG: u64 = 1;
-/// Requests to it.
+/// Requests to the supervisor.
 const ARM: u64 = 1;
 const RUN: u64 = 2;
 
@@ -32,7 +32,7 @@ pub enum Stop {
     Difference(Difference),
     /// The link failed.
     Link(ClientError),
-    /// The supervisor does not reach the running phase, or left it.
+    /// The supervisor does not reach the running phase, or leaves it.
     Supervisor {
         /// Tick since power-up.
         tick: u64,
@@ -41,7 +41,7 @@ pub enum Stop {
     },
     /// The host's controller refuses the settings.
     Settings(ControllerError),
-    /// Ended from outside.
+    /// Interrupted by the user.
     Interrupted,
 }
 
@@ -51,7 +51,7 @@ impl fmt::Display for Stop {
             Self::Difference(difference) => difference.fmt(f),
             Self::Link(error) => error.fmt(f),
             Self::Supervisor { tick, word } => {
-                write!(f, "tick {tick}: instead of running the machine is {word}; host and device agree on it")
+                write!(f, "tick {tick}: the machine is {word} instead of running; host and device agree")
             }
             Self::Settings(error) => error.fmt(f),
             Self::Interrupted => f.write_str("interrupted"),
@@ -59,28 +59,28 @@ impl fmt::Display for Stop {
     }
 }
 
-/// What a stage of the tick costs on the device.
+/// Cost of a stage of the tick on the device.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cost {
     /// `supervise` is the whole tick.
     pub name: String,
-    /// Calls counted.
+    /// Number of calls.
     pub calls: u64,
-    /// Least.
+    /// Minimum.
     pub min: u64,
     /// Mean.
     pub mean: f64,
-    /// Most.
+    /// Maximum.
     pub max: u64,
-    /// For the whole tick: most stack seen in use, bytes; none if the device does not measure it.
+    /// For the whole tick: peak stack, bytes; none if the device does not measure it.
     pub stack: Option<u32>,
 }
 
-/// The host's controller with a device beside it. As a [`TickController`] it closes the loop of any scenario; after a reset the
-/// first tick is preceded by those that arm the machine, with the readings of that tick and what the legs add to them.
+/// The host's controller and a device, as one [`TickController`] for any scenario. After a reset, it first arms the machine with
+/// the readings of the first tick plus the displacements of the legs during arming.
 ///
-/// Where the two differ, the link fails or the supervisor leaves its running phase it gives voltages that are no numbers, which
-/// ends every scenario at once; [`Lockstep::stop`] then says why.
+/// If the two differ, the link fails or the supervisor leaves the running phase, it outputs NaN voltages, which end any scenario;
+/// [`Lockstep::stop`] then has the reason.
 pub struct Lockstep<P> {
     host: Supervised,
     client: Client<P>,
@@ -101,10 +101,10 @@ pub struct Lockstep<P> {
 }
 
 impl<P: Port> Lockstep<P> {
-    /// Opens the link and asks whether the device runs this very controller. Set, `interrupted` ends the run.
+    /// Opens the link and checks that the device runs the same controller. Setting `interrupted` ends the run.
     ///
     /// # Errors
-    /// No answer, or the answer of another controller.
+    /// No answer, or another controller.
     pub fn open(
         host: Supervised,
         port: P,
@@ -155,18 +155,18 @@ impl<P: Port> Lockstep<P> {
         })
     }
 
-    /// Why the run ended early, if it did. Forgotten at the next reset.
+    /// Why the run ended early, if it did; cleared by the next reset.
     #[must_use]
     pub fn stop(&self) -> Option<&Stop> {
         self.stop.as_ref()
     }
 
-    /// Takes it.
+    /// Takes the reason.
     pub fn take_stop(&mut self) -> Option<Stop> {
         self.stop.take()
     }
 
-    /// Ticks that host and device computed alike, in all runs.
+    /// Ticks in which host and device were equal, in all runs.
     #[must_use]
     pub fn ticks(&self) -> u64 {
         self.total
@@ -178,19 +178,19 @@ impl<P: Port> Lockstep<P> {
         self.waited
     }
 
-    /// In what the device counts costs.
+    /// Unit of the device's costs.
     #[must_use]
     pub fn counted(&self) -> CostUnit {
         self.identity.counted
     }
 
-    /// The line, and what came damaged over it.
+    /// The line, and the number of damaged frames.
     pub fn line(&mut self) -> (&mut P, u32) {
         let damaged = self.client.damaged();
         (self.client.port(), damaged)
     }
 
-    /// What the stages of a tick cost on the device since it started, the whole tick first.
+    /// Costs of the stages of a tick on the device since it started, the whole tick first.
     ///
     /// # Errors
     /// As [`Client::ask`].
@@ -214,7 +214,7 @@ impl<P: Port> Lockstep<P> {
         Ok(costs)
     }
 
-    /// Sends the settings in force, with a reset or without.
+    /// Sends the current settings, with or without a reset.
     fn settle(&mut self, reset: bool) -> Result<(), Stop> {
         let words = put_words(&self.config, &mut self.bytes).ok_or(Stop::Link(ClientError::TooLong))?;
         let request = if reset { Request::LockstepReset { config: words } } else { Request::WriteConfig { words } };
@@ -224,7 +224,7 @@ impl<P: Port> Lockstep<P> {
         }
     }
 
-    /// One tick on both, with this request to the supervisor; what the supervisor says after it.
+    /// Runs one tick on both, with this request to the supervisor. Returns the supervisor's word.
     fn tick(&mut self, input: &[u64], request: u64) -> Result<MachineWord, Stop> {
         if self.interrupted.load(Ordering::Relaxed) {
             return Err(Stop::Interrupted);
@@ -255,11 +255,10 @@ impl<P: Port> Lockstep<P> {
         Ok(word)
     }
 
-    /// Arms the machine where it stands, at rest: the readings move by what the legs do in the wiring check, by the controller's model.
+    /// Arms the machine at rest. The readings include the displacements of the legs in the wiring check, by the controller's model.
     ///
-    /// Six legs are asked for where they stand until they run, so that what follows is the trajectory from its first tick on:
-    /// the supervisor would lead them from where they stand to its first point for as long as a period takes, which is not what
-    /// the run measures.
+    /// For six legs, the set-point stays at the measured displacements until the machine is running, so that the run starts with
+    /// the first tick of the trajectory. Otherwise the supervisor would move the legs to its first point for up to a period.
     fn arm(&mut self, input: &[u64]) -> Result<(), Stop> {
         let mut input = self.stays(input);
         let mut standing = self.host.standing(&input).map_err(Stop::Settings)?;
@@ -268,14 +267,14 @@ impl<P: Port> Lockstep<P> {
             if self.tick >= ARMING {
                 return Err(Stop::Supervisor { tick: self.tick, word });
             }
-            // Run is taken once it is armed.
+            // The supervisor accepts `run` once it is armed.
             standing.show(&self.host, &self.ours, &mut input);
             word = self.tick(&input, if word.phase == DISARMED { ARM } else { RUN })?;
         }
         Ok(())
     }
 
-    /// The row with the gauges' words as the set-point, where that is one of leg displacements.
+    /// The input row with the gauges' words as set-point, if the set-point is of leg displacements.
     fn stays(&self, input: &[u64]) -> Vec<u64> {
         let description = self.host.controller().description();
         let mut row = input.to_vec();
@@ -317,7 +316,7 @@ impl<P: Port> TickController for Lockstep<P> {
     fn configure(&mut self, words: &[u64]) -> Result<(), ControllerError> {
         self.host.configure(words)?;
         self.config = words.to_vec();
-        // At reset they go with the next one.
+        // At reset they are sent with the next one.
         if !self.fresh
             && let Err(stop) = self.settle(false)
         {

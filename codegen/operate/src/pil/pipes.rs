@@ -16,18 +16,18 @@ use specgen_language::interrupt::Scratch;
 use specgen_toolchain::emulator::{self, Emulator};
 use specgen_toolchain::{Image, TargetError};
 
-/// How often it is looked whether the emulator still runs.
+/// Interval of checks that the emulator is running.
 const LOOK: Duration = Duration::from_millis(20);
-/// How long an emulator may take to end by itself.
+/// How long the emulator may take to exit.
 const END: Duration = Duration::from_secs(2);
 
-/// A running emulator. Dropped, it ends: the firmware sees its pipe closed, and what does not end by itself is ended.
+/// A running emulator. Dropping it closes the pipe, on which the firmware exits; otherwise the process is killed.
 pub struct Pipes {
     emulator: Child,
-    /// Gone when the emulator is to end.
+    /// None once the emulator should exit.
     to: Option<File>,
     from: File,
-    /// Image, pipes and what the emulator printed.
+    /// Image, pipes and output of the emulator.
     folder: Scratch,
 }
 
@@ -42,7 +42,7 @@ impl Pipes {
             let path = folder.path().join(name);
             mkfifoat(CWD, &path, Mode::RUSR | Mode::WUSR)
                 .map_err(|e| TargetError::io("creating the pipe", &path, e.into()))?;
-            // Both ways, so that opening does not wait for the other side.
+            // For reading and writing, so that opening does not wait for the other side.
             let file = OpenOptions::new().read(true).write(true).open(&path);
             file.map_err(|e| TargetError::io("opening the pipe", &path, e))
         };
@@ -51,7 +51,7 @@ impl Pipes {
         let file = File::create(&printed).map_err(|e| TargetError::io("creating", &printed, e))?;
         let mut command = emulator.command(image, folder.path())?;
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(file);
-        // Of a group of its own: Ctrl-C is for us, who then close the pipe.
+        // In its own process group, so that Ctrl-C does not reach it; we close the pipe instead.
         command.process_group(0);
         let child = command.spawn().map_err(|e| TargetError::io("running", &emulator.program, e))?;
         Ok(Self { emulator: child, to: Some(to), from, folder })
@@ -85,7 +85,7 @@ fn printed(folder: &Path) -> String {
 impl Port for Pipes {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.alive()?;
-        // The client waits for an answer before it sends more: what is in the pipe never comes near its room of 64 KiB.
+        // The client waits for each answer, so the pipe, with room for 64 KiB, is never full.
         self.to.as_mut().map_or(Ok(()), |to| to.write_all(bytes))
     }
 
@@ -114,7 +114,7 @@ impl Drop for Pipes {
             }
             std::thread::sleep(Duration::from_millis(1));
         }
-        // It may have ended meanwhile; then there is nothing to do.
+        // If it has exited meanwhile, this does nothing.
         let _ = self.emulator.kill();
         let _ = self.emulator.wait();
     }

@@ -1,4 +1,4 @@
-//! The runs in the loop: the scenarios of `sim`, with a lock-step for a controller.
+//! Runs of processor-in-the-loop: the scenarios of `sim`, with a lock-step as controller.
 
 use std::path::Path;
 use std::time::Instant;
@@ -23,11 +23,11 @@ use specgen_language::ui::Ui;
 use specgen_studies::machine::PlantOptions;
 use specgen_studies::{machine, runs};
 
-/// Operating frequency unless asked otherwise, Hz.
+/// Default operating frequency, Hz.
 const FREQUENCY: f64 = 10.0;
-/// The same against a work part.
+/// Default operating frequency against a work part, Hz.
 const MACHINING_FREQUENCY: f64 = 1.0;
-/// Control ticks per period of the leg trajectory, unless asked otherwise.
+/// Default number of control ticks per period of the leg trajectory.
 const SAMPLES: u32 = 500;
 
 /// Options of the runs.
@@ -39,23 +39,23 @@ pub struct Options<'a> {
     pub scenario: Option<&'a str>,
     /// A trajectory of the spec.
     pub trajectory: Option<&'a str>,
-    /// One law only.
+    /// One control mode only.
     pub mode: Option<&'a str>,
     /// Operating frequency, Hz.
     pub frequency: Option<f64>,
     /// Control ticks per period of the leg trajectory.
     pub samples: Option<u32>,
-    /// Only so much of the trajectory, s.
+    /// Run only this much of the trajectory, s.
     pub seconds: Option<f64>,
     /// The simulated machine.
     pub plant: PlantOptions,
     /// A board at this serial port, at this rate in baud; QEMU without one.
     pub port: Option<(&'a Path, u32)>,
-    /// An image that is built already.
+    /// An existing image.
     pub elf: Option<&'a Path>,
 }
 
-/// A run that has ended, to draw its errors.
+/// A completed run, to plot its errors.
 pub enum Run<'a> {
     /// Of six legs.
     Legs {
@@ -75,10 +75,10 @@ pub enum Run<'a> {
     },
 }
 
-/// Reasons why a plan does not end.
+/// Errors of a plan.
 pub(super) enum PlanError {
     Command(Failure),
-    /// The error of a run; the lock-step knows the reason best.
+    /// The error of a run; the lock-step may have a better reason.
     Run(RunError),
 }
 
@@ -94,7 +94,7 @@ impl From<Failure> for PlanError {
     }
 }
 
-/// Runs something and adds the time that it took.
+/// Runs `run` and adds its duration to `seconds`.
 fn timed<T>(seconds: &mut f64, run: impl FnOnce() -> T) -> T {
     let start = Instant::now();
     let done = run();
@@ -110,7 +110,7 @@ pub(super) enum Plan {
         frequency: f64,
         samples: u32,
     },
-    /// A path of the paper, streamed.
+    /// A streamed path of the paper.
     Path {
         name: &'static str,
         path: PaperPath,
@@ -118,7 +118,7 @@ pub(super) enum Plan {
         modes: Vec<(&'static str, u32)>,
         frequency: f64,
     },
-    /// A trajectory on board.
+    /// A trajectory generated on the device.
     Board { name: String, path: OnBoard, mode: Option<(&'static str, u32)> },
 }
 
@@ -126,7 +126,7 @@ impl Plan {
     /// The plan of the options.
     ///
     /// # Errors
-    /// Arguments that make no sense for the spec.
+    /// The options do not apply to the spec.
     pub fn of(options: &Options<'_>, compiled: &Compilation) -> Result<Self, Failure> {
         match &compiled.model.task_space {
             Some(task) => Self::platform(options, compiled, task),
@@ -137,7 +137,7 @@ impl Plan {
     fn legs(options: &Options<'_>, compiled: &Compilation) -> Result<Self, Failure> {
         if options.scenario.is_some() || options.trajectory.is_some() {
             return Err(Failure::Usage(
-                "--scenario and --trajectory are for a platform that six gauges see; this spec has no [control]: its one scenario is the leg trajectory"
+                "--scenario and --trajectory need a spec with [control]; without it, the leg trajectory is the only scenario"
                     .to_owned(),
             ));
         }
@@ -189,7 +189,7 @@ impl Plan {
         Ok(Self::Path { name, path, part, modes: wanted.map_or(usual, |mode| vec![mode]), frequency })
     }
 
-    /// Runs it; what is found goes into the report.
+    /// Runs the plan, and writes the results to the report.
     pub fn run<P: Port>(
         &self,
         lockstep: &mut Lockstep<P>,
@@ -283,7 +283,7 @@ fn legs(compiled: &Compilation, samples: u32, options: &Options<'_>, ui: &Ui) ->
 
 fn platform(compiled: &Compilation, options: &Options<'_>, ui: &Ui) -> Result<PlatformScenario, PlanError> {
     let model = &compiled.model;
-    // A plan of a platform is made of a spec that has one.
+    // Only a spec with a platform leads here.
     let Some(task) = &model.task_space else {
         return Err(Failure::Usage("this spec has no [control]".to_owned()).into());
     };

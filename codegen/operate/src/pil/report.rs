@@ -1,4 +1,4 @@
-//! The result of a run in the loop.
+//! The report of a processor-in-the-loop run.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -17,29 +17,29 @@ use specgen_studies::runs::TrajectoryErrors;
 use super::difference::Difference;
 use super::lockstep::Cost;
 
-/// The result of a run in the loop.
+/// The report of a processor-in-the-loop run.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// Name of the spec.
     pub name: String,
     /// Digest of the spec.
     pub digest: String,
-    /// What was in the loop.
+    /// The device.
     pub device: String,
-    /// Ticks that host and device computed alike.
+    /// Ticks in which host and device were equal.
     pub ticks: u64,
-    /// The first that they did not.
+    /// The first difference.
     pub first_difference: Option<Difference>,
     /// Control interval, s.
     pub interval: f64,
-    /// Time that the loops took, s.
+    /// Run time of the loops, s.
     pub seconds: f64,
-    /// Of these, waiting for the device.
+    /// Part of it spent waiting for the device.
     #[serde(serialize_with = "as_seconds")]
     pub waited: Duration,
-    /// Frames from the device that came damaged, and were asked for again.
+    /// Damaged frames from the device, which were requested again.
     pub damaged_frames: u32,
-    /// What costs are counted in; empty if they are not.
+    /// Unit of the costs; empty if they are not counted.
     pub counted: &'static str,
     /// Costs of the parts of a tick.
     pub costs: Vec<Cost>,
@@ -52,14 +52,14 @@ pub struct Report {
     pub free_motion: PoseTable,
     /// Platform, against a work part.
     pub machining: Value,
-    /// Platform, a trajectory on board.
+    /// Platform, a trajectory generated on the device.
     pub on_board: Option<TrajectoryErrors>,
-    /// Runs that did not come to the end of their path.
+    /// Runs that ended before the end of their path.
     pub ended_early: Vec<String>,
-    /// Errors in words.
+    /// Errors as text.
     #[serde(skip)]
     pub errors: String,
-    /// The line about the picture of them.
+    /// The line about their plot.
     #[serde(skip)]
     pub plot: Option<String>,
 }
@@ -97,26 +97,26 @@ impl Report {
         }
     }
 
-    /// A run that did not come to the end of its path: no figure.
+    /// Records a run that ended before the end of its path, without a score.
     pub(super) fn ended(&mut self, name: &str, error: &RunError) {
         // Writing to a String cannot fail.
         let _ = writeln!(self.errors, "{name}: not scored: {error}, as on the host");
         self.ended_early.push(name.to_owned());
     }
 
-    /// Puts the table of free motion before what else is said of errors.
+    /// Puts the table of free motion before other errors.
     pub(super) fn write_free_motion(&mut self) {
         let text = self.free_motion.ours_to_text();
         self.errors.insert_str(0, &text);
     }
 
-    /// The same of work parts.
+    /// Puts the table of work parts before other errors.
     pub(super) fn write_machining(&mut self, table: &MachiningTable) {
         self.errors.insert_str(0, &table.ours_to_text());
         self.machining = serde_json::json!(table);
     }
 
-    /// Closed-loop ticks in a second of this machine's time.
+    /// Closed-loop ticks per second of real time.
     fn rate(&self) -> f64 {
         if self.seconds > 0.0 { self.ticks as f64 / self.seconds } else { 0.0 }
     }
@@ -140,10 +140,10 @@ impl Outcome for Report {
         }
         if let Some(stack) = self.costs.first().and_then(|whole| whole.stack) {
             let bound = self.stack_bound.map_or_else(String::new, |bound| format!(", static bound {bound} bytes"));
-            let _ = writeln!(out, "stack of a tick: {} bytes seen{bound}", stack);
+            let _ = writeln!(out, "stack of a tick: peak {} bytes{bound}", stack);
         }
         if self.damaged_frames > 0 {
-            let _ = writeln!(out, "{} frames came damaged and were asked for again", self.damaged_frames);
+            let _ = writeln!(out, "{} damaged frames were requested again", self.damaged_frames);
         }
         let rate = self.rate();
         let _ = writeln!(

@@ -1,4 +1,4 @@
-//! One command in the loop: builds, opens the line, and runs the plan.
+//! The command `pil`: builds, opens the line, and runs the plan.
 
 use std::path::{Path, PathBuf};
 
@@ -23,17 +23,17 @@ use super::report::Report;
 use super::serial::SerialLine;
 use super::session::OpenError;
 
-/// Runs the controller of a spec in the loop. `draw` gets every run that has ended.
+/// Runs the controller of a spec in the loop. `draw` gets every completed run.
 ///
 /// # Errors
-/// The options are not possible, a tool is missing, or host and device differ.
+/// The options are invalid, a tool is missing, or host and device differ.
 pub fn run(
     options: &Options<'_>,
     compiled: &Compilation,
     draw: &mut dyn FnMut(Run<'_>),
     ui: &Ui,
 ) -> Result<Report, Failure> {
-    // Errors in the options, and missing tools, are reported before the minutes of the rest.
+    // Report invalid options and missing tools before the long part of the work.
     let plan = Plan::of(options, compiled)?;
     let line =
         options.port.map(|(path, baud)| SerialLine::open(path, baud).map_err(Failure::Environment)).transpose()?;
@@ -68,7 +68,7 @@ pub fn run(
     close(job, pipes, Timeout::PIPE, Report::new(compiled, name, bound))
 }
 
-/// The whole tick in the image.
+/// Symbol of the whole tick in the image.
 const SUPERVISE: &str = "specgen_supervise";
 
 fn given(path: &Path, compiled: &Compilation) -> Result<Image, Failure> {
@@ -82,7 +82,7 @@ fn built(compiled: &Compilation, output: &Path, target_dir: &Path, ui: &Ui) -> R
     Ok(target::build_pil(output, mcu, target_dir)?)
 }
 
-/// What a loop is closed with.
+/// The parts of a closed loop.
 struct Job<'a> {
     options: &'a Options<'a>,
     plan: Plan,
@@ -94,7 +94,7 @@ struct Job<'a> {
 
 fn close<P: Port>(job: Job<'_>, port: P, timeout: Timeout, mut report: Report) -> Result<Report, Failure> {
     let Job { options, plan, compiled, host, draw, ui } = job;
-    // From the first tick on there is something to report.
+    // From here on an interrupt reports the result so far.
     let mut lockstep = Lockstep::open(host, port, timeout, interrupt::heed()).map_err(|error| match error {
         OpenError::Other(text) => Failure::Gate(text),
         OpenError::Link(_) => Failure::Environment(format!("{}: {error}", report.device)),
@@ -133,7 +133,7 @@ fn stopped(stop: Stop, mut report: Report, ui: &Ui) -> Failure {
     match stop {
         Stop::Difference(difference) => {
             let message = format!(
-                "{} computes other bits than the host: {difference}; a damaged image, or a defect of specgen to report with the spec",
+                "{} computes other bits than the host: {difference}; either the image is damaged, or this is a bug in specgen: report it with the spec",
                 report.device
             );
             report.first_difference = Some(difference);

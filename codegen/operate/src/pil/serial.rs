@@ -1,4 +1,4 @@
-//! A serial line: raw bytes, no flow control, a limit on every wait.
+//! A serial line: raw bytes, no flow control, a timeout for every wait.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Write};
@@ -13,12 +13,12 @@ use specgen_link::client::Port;
 
 use super::wait::ready;
 
-/// Baud rate unless asked otherwise. A USB serial port of a board ignores it.
+/// Default baud rate. A board's USB serial port ignores it.
 pub const BAUD: u32 = 921_600;
-/// Longest wait for room to send.
+/// Timeout of sending.
 const SEND: Duration = Duration::from_secs(2);
 
-/// An open serial line, for nobody else.
+/// An open serial line, in exclusive use.
 pub struct SerialLine {
     file: File,
 }
@@ -27,10 +27,10 @@ impl SerialLine {
     /// Opens a serial device, 8 data bits, no parity, one stop bit.
     ///
     /// # Errors
-    /// In words: no such device, no permission, in use, no serial device, a rate that it does not do.
+    /// No such device, no permission, in use, not a serial device, or an unsupported rate.
     pub fn open(path: &Path, baud: u32) -> Result<Self, String> {
         let name = path.display();
-        // O_NONBLOCK, so that a missing carrier does not hold us up; every wait is a poll.
+        // O_NONBLOCK, so that opening does not wait for a carrier; all waits use poll.
         let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits();
         let file = OpenOptions::new()
             .read(true)
@@ -38,16 +38,18 @@ impl SerialLine {
             .custom_flags(flags.cast_signed())
             .open(path)
             .map_err(|error| format!("cannot open {name}: {}", advice(&error)))?;
-        let mut settings =
-            tcgetattr(&file).map_err(|_| format!("{name} is no serial device; expected one such as /dev/ttyACM0"))?;
-        ioctl_tiocexcl(&file).map_err(|error| format!("{name} cannot be had alone: {error}"))?;
+        let mut settings = tcgetattr(&file)
+            .map_err(|_| format!("{name} is not a serial device; expected one such as /dev/ttyACM0"))?;
+        ioctl_tiocexcl(&file).map_err(|error| format!("{name} cannot be opened exclusively: {error}"))?;
         settings.make_raw();
         settings.control_modes |= ControlModes::CLOCAL | ControlModes::CREAD;
         settings.control_modes -= ControlModes::CSTOPB | ControlModes::CRTSCTS;
-        settings.set_speed(baud).map_err(|_| format!("{name} does not do {baud} baud; name another with --baud"))?;
+        settings
+            .set_speed(baud)
+            .map_err(|_| format!("{name} does not support {baud} baud; choose another with --baud"))?;
         let set = tcsetattr(&file, OptionalActions::Now, &settings);
-        set.map_err(|error| format!("{name} does not take the settings of a raw line at {baud} baud: {error}"))?;
-        // What was on the line before is of no session of ours.
+        set.map_err(|error| format!("{name} cannot be set to raw mode at {baud} baud: {error}"))?;
+        // Discards data from before this session.
         tcflush(&file, QueueSelector::IOFlush).map_err(|error| format!("{name}: {error}"))?;
         Ok(Self { file })
     }
@@ -60,7 +62,7 @@ fn advice(error: &io::Error) -> String {
             "no permission; add yourself to its group (often: sudo usermod -aG dialout $USER) and log in again"
                 .to_owned()
         }
-        ErrorKind::ResourceBusy => "another program has it open; end that one first".to_owned(),
+        ErrorKind::ResourceBusy => "another program has it open; close that first".to_owned(),
         _ => error.to_string(),
     }
 }
@@ -73,7 +75,7 @@ impl Port for SerialLine {
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {
                     if !ready(&self.file, PollFlags::OUT, SEND)? {
-                        let text = format!("the line took no byte for {} s", SEND.as_secs());
+                        let text = format!("the line accepted no data for {} s", SEND.as_secs());
                         return Err(io::Error::new(ErrorKind::TimedOut, text));
                     }
                 }

@@ -1,4 +1,4 @@
-//! Opening a session with a device, and who is there.
+//! Opens a session with a device, and reads its description.
 
 use std::fmt;
 

@@ -16,17 +16,17 @@ use specgen_runtime::supervisor::Finding;
 
 use super::{Plant, PlantServer};
 
-/// How long it waits for a controller before it looks whether it is to end, ns.
+/// Timeout of a wait for a controller, after which it checks whether to end, ns.
 const TIMEOUT: u64 = SECOND / 10;
 
 /// Options of a server.
 #[derive(Debug)]
 pub struct Options<'a> {
-    /// Name under which a controller finds the machine.
+    /// Name of the machine for controllers.
     pub name: &'a str,
-    /// Faults of the wiring, one for each time that the amplifiers are on.
+    /// Wiring faults, one for each time that the amplifiers are switched on.
     pub faults: Vec<Finding>,
-    /// Processor that it stays on.
+    /// Processor to run on.
     pub processor: Option<usize>,
     /// SCHED_FIFO priority.
     pub priority: Option<u8>,
@@ -44,7 +44,7 @@ pub struct Summary {
     digest: String,
     ticks: u64,
     controllers: u64,
-    /// None of these without a tick.
+    /// None without ticks, as below.
     p50_ns: Option<u64>,
     p99_ns: Option<u64>,
     max_ns: Option<u64>,
@@ -64,7 +64,7 @@ impl Outcome for Summary {
 /// Serves the machine of a spec at `path` in shared memory until Ctrl-C or the end of its time.
 ///
 /// # Errors
-/// The file is served already, the system refuses the processor or the priority, or the shared memory is damaged.
+/// The file is already in use, the system refuses the processor or the priority, or the shared memory is damaged.
 pub fn serve(
     plant: Plant,
     compiled: &Compilation,
@@ -77,7 +77,7 @@ pub fn serve(
     let environment = |error: &dyn std::fmt::Display| Failure::Environment(error.to_string());
     processor.map_or(Ok(()), scheduling::pin).map_err(|error| environment(&error))?;
     priority.map_or(Ok(()), scheduling::set_fifo).map_err(|error| environment(&error))?;
-    // However it ends, the file is removed, and the summary is shown.
+    // An interrupt must still remove the file and show the summary.
     let stop = interrupt::heed();
     let server = Server::create(path, &compiled.ir.digest).map_err(|error| match error {
         OpenError::Served { .. } => Failure::Usage(error.to_string()),
@@ -86,7 +86,7 @@ pub fn serve(
     let machine = &compiled.ir.name;
     ui.progress(&format!("machine of {machine} at {}: start rt-pc --sim {name}; Ctrl-C ends it", path.display()));
 
-    // With a spare processor it does not sleep between two ticks: waking it costs the controller time. Under SCHED_FIFO it has to
+    // With a spare processor it does not sleep between ticks, because waking it delays the controller. Under SCHED_FIFO it must
     // sleep, or the kernel stops it for 50 ms in every second.
     let period = (compiled.model.timing.period * 1e9) as u64;
     let spare = std::thread::available_parallelism().map_or(1, usize::from) > 1;
@@ -94,7 +94,7 @@ pub fn serve(
     let end = seconds.map(|seconds| clock::now() + (seconds * SECOND as f64) as u64);
     let times = answer(&mut served, &server, look, || is_over(stop, end)).ok_or_else(|| {
         Failure::Environment(format!(
-            "{}: the memory that machine and controller share has lost its mark: the file was made shorter, or overwritten; start both again",
+            "{}: the memory shared by machine and controller is damaged: its file was truncated or overwritten; restart both",
             path.display()
         ))
     })?;
